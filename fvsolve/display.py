@@ -18,7 +18,7 @@ class Displayable:
     picture: ClassVar[str] = ""
 
     def summary_line(self) -> str:
-        """Summary in some words."""
+        """Summary of the result in one line, for `repr`."""
         raise NotImplementedError
 
     def table_columns(self) -> Mapping[str, Sequence[Any]]:
@@ -26,7 +26,7 @@ class Displayable:
         raise NotImplementedError
 
     def frame(self):
-        """Table as a pandas DataFrame; FvsolveError if pandas is not installed."""
+        """Table as a pandas DataFrame. Raises FvsolveError if pandas is not installed."""
         from fvsolve.errors import FvsolveError
 
         try:
@@ -37,7 +37,7 @@ class Displayable:
 
     @validated(path=PATH)
     def plot(self, path=None):
-        """Plot as a matplotlib Figure, also written to `path` if given."""
+        """Plot of the result as a matplotlib Figure, also written to the file `path` if given."""
         module, _, name = self.picture.partition(":")
         return save_if_path(getattr(import_module(module), name)(self), path)
 
@@ -62,7 +62,7 @@ def save(figure, path) -> None:
 
 
 def save_if_path(figure, path):
-    """Return a figure, also written to `path` if given; FvsolveError if that fails."""
+    """Return the figure, also written to the file `path` if given. Raises FvsolveError if it cannot be written."""
     try:
         if path is not None:
             save(figure, path)

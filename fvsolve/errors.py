@@ -1,4 +1,4 @@
-"""Error classes, faults and notices, and functions that word them."""
+"""Error classes, faults of cases and notices of runs, and functions for the texts of messages."""
 
 from __future__ import annotations
 
@@ -15,7 +15,11 @@ INVISIBLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2
 
 @dataclass(frozen=True)
 class Fault:
-    """Fault of a case file: key path, message with the found and the expected value, line in the file."""
+    """Fault of a case file.
+
+    place : key path, such as "links.main.length"; message : text with the found and the expected value
+    line : line number in the file, or None
+    """
 
     place: str
     message: str
@@ -48,7 +52,7 @@ class Notice:
         return self.text
 
     def plain(self) -> dict:
-        """Dictionary of its fields, for JSON."""
+        """Fields of the notice as a dictionary, for JSON."""
         return {"kind": self.kind, "place": self.place, "key": self.key, "value": self.value, "limit": self.limit,
                 "ok": self.ok, "text": self.text}  # fmt: skip
 
@@ -73,7 +77,10 @@ class CaseError(FvsolveError):
 
 @contextmanager
 def collect_faults(faults: list[Fault], place: str = "") -> Iterator[None]:
-    """Catch the errors of the body and append them to `faults`: all of a CaseError, other errors at `place`."""
+    """Catch errors raised in the `with` block and append them to `faults`.
+
+    A CaseError adds all its faults; any other FvsolveError or a ValueError adds one fault with the key path `place`.
+    """
     try:
         yield
     except CaseError as error:
@@ -127,7 +134,7 @@ EXTRA_NAMES = 2  # names above the limit of a listing that are still listed
 
 
 def listing(names: Iterable[str], limit: int = 12) -> str:
-    """Names in a line, sorted, without duplicates; of many names the first `limit` and their total number."""
+    """Text that lists names, sorted, without duplicates; of many names only the first `limit` and their total number."""
     names = sorted({*names})
     if len(names) <= limit + EXTRA_NAMES:
         return ", ".join(names)

@@ -39,15 +39,17 @@ def all_commands(
 
 Cases = Annotated[list[str], typer.Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
 SingleCase = Annotated[str, typer.Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
-Set = Annotated[list[str], typer.Option("--set", metavar="KEY=VALUE", help="override of a key: links.main.cells=400")]
+Set = Annotated[
+    list[str], typer.Option("--set", metavar="KEY=VALUE", help="new value of a key of the case: links.main.cells=400")
+]
 Json = Annotated[bool, typer.Option("--json", help="print one JSON object on standard output instead of text")]
 
 
 def load_case(name: str, overrides: list[str], scheme: str | None = None, method: str | None = None):
     """Read a case and apply the overrides. Raises CaseError with all faults of the case and of the overrides.
 
-    scheme, method : lists of a study that replace those of the case, separated by commas. If the case is invalid with
-        its own scheme and method, it is read with the first of each list: the overrides may apply only to these.
+    scheme, method : names for a study, separated by commas, or None. If the case is invalid with its own scheme and
+        method, it is read with the first of these names: the overrides may be valid only with these.
     """
     from fvsolve.case import load, shipped
 

@@ -20,30 +20,36 @@ def chart(
         str | None, typer.Option(metavar="LIST", help="schemes to compare (default upwind,muscl,upwind5,weno5)")
     ] = None,
     method: Annotated[
-        str | None, typer.Option(metavar="LIST", help="methods to compare (default a representative selection)")
+        str | None, typer.Option(metavar="LIST", help="methods to compare (default a selection that suits the case)")
     ] = None,
     cells: Annotated[
         str | None,
         typer.Option(
             metavar="LIST",
-            help="numbers of cells of the longest pipe, or of a basin side: 50,100,200 (default five, to 400)",
+            help="numbers of cells of the longest pipe or basin side: 50,100,200 (default five numbers up to 400)",
         ),
     ] = None,
     rtol: Annotated[
         str | None,
         typer.Option(
-            metavar="LIST", help="relative tolerances, for a case without pipes: 1e-3,1e-6 (default 1e-2 to 1e-10)"
+            metavar="LIST",
+            help="relative tolerances, for a case without pipes and basins: 1e-3,1e-6 (default 1e-2 to 1e-10)",
         ),
     ] = None,
     step: Annotated[
         str | None,
         typer.Option(
-            metavar="LIST", help="steps [s], for methods without an error estimate: 1e-3,1e-4 (default seven steps)"
+            metavar="LIST",
+            help="time steps [s], for methods without an error estimate: 1e-3,1e-4 (default seven steps)",
         ),
     ] = None,
     target: Annotated[
         float | None,
-        typer.Option(metavar="ERROR", help="error, over the range, whose cheapest [numerics] settings are printed"),
+        typer.Option(
+            metavar="ERROR",
+            help="greatest accepted error, as a fraction of a probe's range; prints the cheapest [numerics] for it "
+            "(default none, with --models 0.01)",
+        ),
     ] = None,
     models: Annotated[bool, typer.Option("--models", help="compare models of the case instead of methods")] = False,
     jobs: Jobs = 1,
@@ -52,7 +58,7 @@ def chart(
     out: Out = None,
     as_json: Json = False,
 ) -> None:
-    """Error against CPU time and work over schemes, methods and resolution; the cheapest setting for each error."""
+    """Chart error against CPU time and work for schemes, methods and resolutions; list the cheapest for each error."""
     from fvsolve.studies.accuracy.chart import chart as study
     from fvsolve.studies.accuracy.chart_files import write_chart
 
@@ -154,7 +160,7 @@ def _ms(key: str) -> Callable[[Mapping], str]:
 
 
 def _times(row: Mapping) -> str:
-    """Ratio of the default's time to the time of the row."""
+    """CPU time of the default setting divided by the CPU time of the cheapest setting, for the error of a row."""
     default = row["default_seconds"]
     return "-" if default is None else f"{default / row['seconds']:.2g}"
 

@@ -17,17 +17,20 @@ from fvsolve.errors import FvsolveError, visible
 @app.command()
 def run(
     cases: Cases,
-    out: Annotated[Path | None, typer.Option(metavar="DIR", help="run directory (default runs/NAME)")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="run directory, or for several cases its parent (default runs/NAME)"),
+    ] = None,
     set: Set = [],  # noqa: B006
-    resume: Annotated[bool, typer.Option("--resume", help="continue from the last checkpoint")] = False,
-    force: Annotated[bool, typer.Option("--force", help="replace an earlier run")] = False,
-    threads: Annotated[
-        int, typer.Option(metavar="N", help="number of threads; rows of basin cells are distributed over them")
-    ] = 1,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="continue an interrupted run from its last checkpoint")
+    ] = False,
+    force: Annotated[bool, typer.Option("--force", help="replace an earlier run in the run directory")] = False,
+    threads: Annotated[int, typer.Option(metavar="N", help="number of threads that share the rows of basin cells")] = 1,
     no_pictures: Annotated[bool, typer.Option("--no-pictures", help="write no pictures")] = False,
     estimate_error: Annotated[
         bool,
-        typer.Option("--estimate-error", help="estimate the error of peaks, by runs of half and twice the resolution"),
+        typer.Option("--estimate-error", help="estimate the errors of peaks, by runs at half and twice the resolution"),
     ] = False,
     as_json: Json = False,
 ) -> None:
@@ -85,7 +88,7 @@ def _run(model, place: Path, force: bool, resume: bool, threads: int, painter, q
 
 
 def _judge(result, case) -> None:
-    """Estimate the error of the peaks of a run and write it into the summary."""
+    """Estimate the errors of the peaks of a run by more runs, and write them into its summary.json."""
     from fvsolve.output.summary_file import write_summary
     from fvsolve.studies.peak_error import peak_errors
 
@@ -176,7 +179,7 @@ def compare(
     run_b: Annotated[Path, typer.Argument(metavar="RUN_B")],
     as_json: Json = False,
 ) -> None:
-    """Compare two runs: differences of each probe that both have."""
+    """Compare two runs: greatest and rms difference (RUN_B minus RUN_A) of each common probe."""
     from fvsolve.cli import printing
     from fvsolve.run import open_run
     from fvsolve.run.comparison import differences
@@ -198,7 +201,7 @@ def view(
     field: Annotated[
         str | None,
         typer.Option(
-            help="quantity: pressure, head, velocity, flow, depth, a scalar, ... (default pressure, or by parts)"
+            help="quantity to draw: pressure, head, velocity, flow, ... (default pressure; see docs/results.md)"
         ),
     ] = None,
     contours: Annotated[int, typer.Option(metavar="N", min=0, max=100, help="number of contour lines")] = 0,
@@ -207,7 +210,7 @@ def view(
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="picture file (default RUN/view-FIELD.png)")] = None,
 ) -> None:
-    """Draw a field at a time, or an animation of all times, off screen with PyVista."""
+    """Draw a quantity in all parts at one time, or an animation of all stored times, into a file with PyVista."""
     from fvsolve.run import open_run
     from fvsolve.units import parse
 

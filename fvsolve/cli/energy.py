@@ -25,18 +25,26 @@ from fvsolve.errors import FvsolveError
 from fvsolve.studies.result_table import Column, ResultTable, cell_text
 
 OptionalCase = Annotated[
-    str | None, typer.Argument(metavar="[CASE]", help="case to run (without a case: schemes and methods are judged)")
+    str | None,
+    typer.Argument(metavar="[CASE]", help="case to run (default none: list the passivity of schemes and methods)"),
 ]
 Port = Annotated[
-    str | None, typer.Option(metavar="NODE", help="node at whose port the passivity of the network is checked")
+    str | None,
+    typer.Option(metavar="NODE", help="node from which the passivity of the network is checked (default none)"),
 ]
 Schemes = Annotated[
     str | None,
-    typer.Option(metavar="S,S,...", help="schemes to run or, without a case, to judge (default that of the case; all)"),
+    typer.Option(
+        metavar="S,S,...",
+        help="schemes to run with a case (default the scheme of the case), or to list without a case (default all)",
+    ),
 ]
 Methods = Annotated[
     str | None,
-    typer.Option(metavar="M,M,...", help="methods to run or, without a case, to judge (default that of the case; all)"),
+    typer.Option(
+        metavar="M,M,...",
+        help="methods to run with a case (default the method of the case), or to list without a case (default all)",
+    ),
 ]
 LINES = 12  # greatest number of lines of a kind on the terminal; energy.csv has all
 RESTARTS = "the same command starts from the beginning"
@@ -44,7 +52,7 @@ FILES = ("energy.csv", "energy.png", "energy.svg")
 
 
 def _limit(key: str) -> Callable[[Mapping], str]:
-    """Function that formats the greatest step of a row: "any", "none" or a number."""
+    """Function that formats the greatest passive step in column `key`: "any", "none" or a number."""
     return lambda row: "any" if math.isinf(row[key]) else "none" if row[key] == 0.0 else f"{row[key]:.6g}"
 
 
@@ -86,7 +94,7 @@ def refuse_without_case(options: dict) -> None:
     given = [name for name, value in options.items() if value]
     if given:
         raise FvsolveError(f"{', '.join(given)}: valid only with a case. Expected fvsolve energy CASE {given[0]} ...; "
-                           "without a case schemes and methods are judged and no file is written")  # fmt: skip
+                           "without a case the passivity of schemes and methods is listed, without files")  # fmt: skip
 
 
 @contextmanager
@@ -262,7 +270,7 @@ def print_claims(schemes, methods, as_json: bool) -> None:
     line(terminal, "")
     line(
         terminal,
-        "Methods: any network at any step; limits on a leaking chamber, a resonator, and a closed pipe",
+        "Methods: passive on any network at any step; greatest passive step on a leak, a resonator, a closed pipe",
         "bold",
     )
     good = [entry.scheme for entry in known if entry.passive]

@@ -19,7 +19,7 @@ def failure_map(
     case: SingleCase,
     scheme: Annotated[
         str | None,
-        typer.Option(metavar="A,B", help="schemes, one panel for each (default upwind and that of the case)"),
+        typer.Option(metavar="A,B", help="schemes, one panel for each (default upwind and the scheme of the case)"),
     ] = None,
     method: Annotated[
         str | None, typer.Option(metavar="A,B", help="methods, one row for each (default seven methods)")
@@ -34,7 +34,11 @@ def failure_map(
         str | None, typer.Option(metavar="KEY=A,B", help="values of a key of the case, one column for each")
     ] = None,
     tolerance: Annotated[
-        float, typer.Option(metavar="X", help="greatest accepted mean error of a probe, over its range")
+        float,
+        typer.Option(
+            metavar="X",
+            help="greatest accepted error of a probe: mean over the run, as a fraction of the probe's range",
+        ),
     ] = 0.02,
     jobs: Jobs = 1,
     dask: Dask = None,
@@ -42,7 +46,7 @@ def failure_map(
     set: Set = [],  # noqa: B006
     as_json: Json = False,
 ) -> None:
-    """Map failures: methods against steps or a key, each square by a run: stable, ringing, wrong, blown up ..."""
+    """Map failures of methods over time steps or values of a key. Each run is stable, ringing, wrong, blown up, ..."""
     from fvsolve.studies.failure.failure_map import failure_map as study
     from fvsolve.studies.result_cache import ResultCache
     from fvsolve.studies.sampling import key_with_unit
@@ -133,15 +137,19 @@ def _show(result, files: list[Path], head: str) -> None:
             terminal.line(console, f"{word}: {VERDICT_TEXTS[word]}")
     terminal.line(console, f"tolerance: {result.tolerance:g} of a probe's range, mean over the run, worst probe")
     terminal.line(console, f"reference: {result.reference}; its error is at most {result.doubt:.2g}")
-    terminal.line(console, "predicted limit: first step at which an eigenvalue grows by 1000 within the run (13)")
+    terminal.line(
+        console,
+        "predicted limit: least step at which an eigenmode grows by 1000 within the run (docs/course.md, equation 13)",
+    )
     if result.lines:
         terminal.line(
             console,
-            "or a wave between a storage element and a delay line does; growth caused by jumps is not predicted",
+            "or a wave between a storage element and a delay line; growth caused by jumps is not predicted",
         )
     if result.limited:
         terminal.line(
-            console, f"of {', '.join(result.limited)}: by the weights in smooth flow, an estimate and not a bound"
+            console,
+            f"limit of {', '.join(result.limited)}: from the weights in smooth flow, an estimate and not a bound",
         )
     for reason in {square.measures.reason: None for square in result.squares if square.verdict == "refused"}:
         terminal.line(console, f"refused: {reason}")
@@ -150,7 +158,7 @@ def _show(result, files: list[Path], head: str) -> None:
 
 
 def _by_courant(result) -> bool:
-    """True if Courant numbers are shorter column labels than steps in seconds."""
+    """True if columns are labelled with Courant numbers: columns are steps, all of Courant number 0.01 or more."""
     return result.key == "step" and bool(result.wave_rate) and min(result.values) * result.wave_rate >= 0.01
 
 

@@ -14,7 +14,9 @@ from fvsolve.studies.result_table import ResultTable, write_csv
 
 SHOWN = 24  # greatest number of poles on the terminal; poles.csv has all
 
-AtTime = Annotated[str | None, typer.Option(metavar="T", help="time of the state: seconds, or `20 ms` (default start)")]
+AtTime = Annotated[
+    str | None, typer.Option(metavar="T", help="time of the state: seconds, or `20 ms` (default start of the run)")
+]
 BeforeJump = Annotated[
     bool, typer.Option("--left-limit", help="use the state just before a kink or jump of a schedule")
 ]
@@ -78,7 +80,7 @@ def linearise(
 
 
 def write_matrices(folder: Path, system) -> None:
-    """Write linear.npz, and A, B, C, D as CSV tables with named rows and columns."""
+    """Write linear.npz, and the matrices A, B, C, D as CSV tables with named rows and columns."""
     a, names = system.a, system.states
     arrays = {"A": a}
     if system.sparse:
@@ -108,7 +110,7 @@ def with_names(names, matrix):
 
 
 def print_system(system, values, poles: list[dict], folder: Path) -> None:
-    """Print the state, the accuracy of the differences and the slowest poles."""
+    """Print the state, the accuracy of the difference quotients and the slowest poles."""
     from fvsolve.cli import terminal
     from fvsolve.studies.linear.eigenvalues import POLES
 

@@ -68,9 +68,13 @@ def _table(all_facts: dict[str, Facts]) -> None:
         if name != facts.name:
             terminal.line(console, f"{name} is {facts.name}")
     terminal.line(
-        console, "error: order of the embedded solution; stage: stage order; real, imaginary: greatest stable"
+        console,
+        "error: order of the embedded solution; stage: stage order; A, L: A-stable, L-stable; real, imaginary:",
     )
-    terminal.line(console, "|h lambda| on these axes; SSP: greatest step in Euler steps; Padé: degrees (k, m) of R")
+    terminal.line(
+        console,
+        "greatest stable |h lambda| on the axis; SSP: greatest step in steps of Euler; Padé: degrees of numerator and denominator of R",
+    )
 
 
 def _show(method: Method, facts: Facts, path: Path) -> None:

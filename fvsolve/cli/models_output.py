@@ -31,7 +31,8 @@ def show_models(case, target: float, as_json: bool) -> None:
     terminal.print_sheet(ResultTable(TABLE, rows), console)
     richest, cheapest = hierarchy.richest, hierarchy.cheapest
     terminal.line(
-        console, "error: root mean square over time of the worst probe, over its range; greatest: greatest at any time;"
+        console,
+        "error: root mean square over time of the worst probe (of), over its range; greatest: maximum over time;",
     )
     terminal.line(console, f"reference for both: {richest.name}, {richest.law}")
     for reason in dict.fromkeys(level.reason for level in hierarchy.rungs if level.error is None):

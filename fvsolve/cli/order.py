@@ -35,13 +35,15 @@ def order(
     refine: Annotated[
         str | None,
         typer.Option(
-            help="resolution to refine: both (cells and steps), space or time (default both; without cells time)"
+            help="resolution to refine: both (cells and time steps), space or time (default both, time without cells)"
         ),
     ] = None,
     key: Annotated[
-        str | None, typer.Option(metavar="KEY", help="single resolution key to refine: links.main.cells")
+        str | None, typer.Option(metavar="KEY", help="single key to refine instead: links.main.cells")
     ] = None,
-    levels: Annotated[int | None, typer.Option(help="number of refinement levels (default 4; for time 6)")] = None,
+    levels: Annotated[
+        int | None, typer.Option(help="number of refinement levels (default 4, with --refine time 6)")
+    ] = None,
     cells: Annotated[
         int | None,
         typer.Option(help="number of cells of the longest pipe or side at the coarsest level (default from the case)"),
@@ -158,7 +160,7 @@ def fit_rows(result) -> list[list[str]]:
 
 
 def fit_text(fit) -> str:
-    """Text of a fitted order with its spread, or "none" or "no error"."""
+    """Text of a fitted order with its spread; "none" without an order, "no error" if all errors are 0."""
     from fvsolve.studies.accuracy.fit import NO_ERROR
 
     if fit.reason:

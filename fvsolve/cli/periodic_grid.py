@@ -28,17 +28,18 @@ LIMIT_EXPLANATIONS = {
     True: "the measured limit does not depend on the length of the run",
     False: "no sharp limit: it falls as runs get longer",
 }
-LEGEND = "set by l: the longest waves, s: the shortest (two cells), b: a wave between, a: all waves together"
+LEGEND = "l: the longest waves set the limit, s: the shortest (two cells), b: a wave between, a: all waves together"
 
 
 def without_case(
     scheme: str | None, method: str | None, cells: int | None, steps: int | None, as_json: bool, out: Path | None,
     courant: float | None = None,
 ) -> None:  # fmt: skip
-    """Print limits of the named schemes and methods, comma separated (default all linear schemes and all methods).
+    """Print Courant limits of schemes and methods (names separated by commas; default all, without limited schemes).
 
-    With `cells` or `steps` explicit methods are also measured on a periodic pipe; limited schemes always are. Growth
-    is given at `courant`. CSV files are written into the folder `out`, if given. Raises FvsolveError for unknown names.
+    With `cells` or `steps`, limits of explicit methods are also measured by runs on a periodic pipe; limits of limited
+    schemes always are. `courant` : Courant number at which the growth of waves is printed. CSV files are written into
+    the folder `out`, if given. Raises FvsolveError for unknown names.
     """
     named, methods = comma_list(scheme, "--scheme") or None, method_names(method) or None
     linear = None if named is None else [name for name in named if name not in LIMITED]
@@ -66,7 +67,7 @@ def without_case(
 
 
 def _measure(named, linear, methods, cells: int | None, steps: int | None) -> tuple[list, list]:
-    """Limits measured by runs: (linear schemes, if `cells` or `steps` is given; limited schemes)."""
+    """Two lists of limits measured by runs: of linear schemes (if `cells` or `steps` is given), of limited schemes."""
     limited = [name for name in named or () if name in LIMITED]
     given = {name: n for name, n in (("cells", cells), ("steps", steps)) if n is not None}
     with progress_line() as progress:
@@ -164,7 +165,8 @@ def _table(limits: list[AdvectionLimit]) -> None:
     terminal.table(["method", *schemes], shown, console)
     terminal.line(console, LEGEND)
     terminal.line(
-        console, "none: grows at every step, however small; every: stable at every step; +: stable again above"
+        console,
+        "none: a wave grows at every step, however small; every: stable at every step; +: stable again at larger steps",
     )
     if free:
         terminal.line(console, f"stable at every Courant number with all these schemes: {', '.join(free)}")

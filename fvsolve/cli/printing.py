@@ -263,7 +263,7 @@ def _print_first(console, lines: list[str], every: bool) -> None:
 
 
 def _print_notices(console, warnings: list[dict], every: bool = False) -> None:
-    """Print all notices of faults in bold red, then the other notices, of many only the first ones."""
+    """Print all notices of wrong results in bold red, then the other notices, of many only the first ones."""
     for notice in warnings:
         if not notice["ok"]:
             _line(console, f"note: {notice['text']}", "bold red")
@@ -320,7 +320,7 @@ def _step_text(case, facts: dict) -> str:
     expected = facts["expected_seconds"]
     cost = "" if expected is None else f", about {expected:.2g} s"
     step = f"step at the start {case.step_amount(facts['step'])}, set by {facts['step_set_by']}"
-    return f"{step}; {facts['steps']} such steps{cost}"
+    return f"{step}; {facts['steps']} steps of this size in the run{cost}"
 
 
 def _ledger_text(ledger: dict) -> str:

@@ -33,7 +33,11 @@ def plot(
     directory: Annotated[Path, typer.Argument(metavar="RUN", help="a run directory")],
     probes: Annotated[str, typer.Option(metavar="A,B", help="probes whose histories are drawn")] = "",
     route: Annotated[
-        str, typer.Option(metavar="NAME", help="route whose long section is drawn (default all, without other options)")
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="route whose long section is drawn (default all routes, or none with --probes or --phase)",
+        ),
     ] = "",
     phase: Annotated[list[str], typer.Option(metavar="X:Y", help="phase plane: probe Y over probe X")] = [],  # noqa: B006
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="folder of the pictures (default RUN)")] = None,
@@ -49,19 +53,25 @@ def plot(
 def fatigue(
     directory: Annotated[Path, typer.Argument(metavar="RUN", help="a run directory")],
     probes: Annotated[
-        str, typer.Option(metavar="A,B", help="probes of pressure or head (default all such probes)")
+        str, typer.Option(metavar="A,B", help="probes of pressure or head (default all probes of pressure or head)")
     ] = "",
     range: Annotated[
         float | None, typer.Option(metavar="R", help="pressure range of the fatigue strength, in the unit of the probe")
     ] = None,
     allowable_range: Annotated[
-        float | None, typer.Option(metavar="N", help="number of cycles of --range to failure")
+        float | None, typer.Option(metavar="N", help="number of cycles of the range --range until failure")
     ] = None,
     slope: Annotated[
-        float | None, typer.Option(metavar="M", help="exponent of the strength: N (R / r)^M cycles of a range r")
+        float | None,
+        typer.Option(
+            metavar="M", help="exponent of the fatigue strength: N (R / r)^M cycles of another range r until failure"
+        ),
     ] = None,
     per_day: Annotated[
-        float, typer.Option(metavar="N", help="number of such runs per day, for the service life")
+        float,
+        typer.Option(
+            metavar="N", help="number of times per day that the events of this run occur, for the service life"
+        ),
     ] = 1.0,
     as_json: Json = False,
 ) -> None:
@@ -73,7 +83,7 @@ def fatigue(
     given = [entry for entry in (range, allowable_range, slope) if entry is not None]
     if len(given) not in (0, 3) or any(not entry > 0.0 for entry in given) or not per_day > 0.0:
         raise FvsolveError(
-            "expected --range, --allowable-range and --slope together (fatigue strength), and all values above 0"
+            "--range, --allowable-range, --slope: expected all three or none; these and --per-day must be above 0"
         )
     strength = counting.FatigueStrength(*given) if given else None
     names = [name.strip() for name in probes.split(",") if name.strip()]

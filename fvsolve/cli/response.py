@@ -21,7 +21,11 @@ SYMBOLS = {"admittance": "Y", "impedance": "Z"}
 def response(
     case: SingleCase,
     port: Annotated[
-        str, typer.Option(metavar="NODE", help="node of the port: a reservoir, junction, inflow, chamber or tank")
+        str,
+        typer.Option(
+            metavar="NODE",
+            help="node at which flow and pressure are taken: a reservoir, junction, inflow, chamber or tank",
+        ),
     ],
     at: AtTime = None,
     before: BeforeJump = False,
@@ -32,7 +36,7 @@ def response(
     set: Set = [],  # noqa: B006
     as_json: Json = False,
 ) -> None:
-    """Transfer function between pressure and flow at a port: state space, frequency response, positive realness."""
+    """Compute the transfer function of pressure and flow at a node: matrices, frequency response, positive realness."""
     from fvsolve.studies.ports.response import response as ask
 
     loaded = load_case(case, set)
@@ -61,7 +65,7 @@ def si_unit(result) -> str:
 
 
 def output_unit(case, result) -> tuple[float, str]:
-    """(value of 1 SI unit, unit) of H in the units of `[output]` for pressure and flow."""
+    """Factor from SI to the unit of the transfer function H, and that unit, by the units of `[output]`."""
     flow, pressure = column("", "flow", case), column("", "pressure", case)
     if flow.plain and pressure.plain:
         return 1.0, si_unit(result)
@@ -73,7 +77,7 @@ def output_unit(case, result) -> tuple[float, str]:
 
 
 def draw(result, path: Path, size: float, unit: str) -> None:
-    """Write PNG and SVG pictures of H in `unit`; `size` is the value of 1 SI unit in it."""
+    """Write PNG and SVG pictures of the transfer function H; size : factor from SI to `unit`."""
     from fvsolve.draw.response_picture import response_figure
 
     verdict = result.verdict

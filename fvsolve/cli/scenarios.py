@@ -18,10 +18,10 @@ def study(
     out: Out = None,
     jobs: Jobs = 1,
     dask: Dask = None,
-    force: Annotated[bool, typer.Option("--force", help="replace earlier runs")] = False,
+    force: Annotated[bool, typer.Option("--force", help="replace earlier runs of this study")] = False,
     as_json: Json = False,
 ) -> None:
-    """Run every event with every protection of a study file and report the limits that hold."""
+    """Run every event with every protection of a study file, and list the limits that hold or fail."""
     from fvsolve.studies import scenarios
 
     with progress_line() as progress:
@@ -91,7 +91,7 @@ def verdicts_of(row: dict) -> list:
 
 
 def standing(row: dict) -> str:
-    """One-word status of a run."""
+    """Status of a run in a word: "FAILS" if it or a limit fails, else "open" or "holds"; "-" without limits."""
     from fvsolve.run.result import FAILS, HOLDS, IN_WORDS, OPEN
 
     states = [FAILS] * (not row["ok"]) + [entry.state for entry in verdicts_of(row)]

@@ -19,7 +19,7 @@ def sensitivity(
         str, typer.Option(metavar="max(PROBE)", help="outcome to analyse: min, max or final of a probe")
     ],
     samples: Annotated[
-        int, typer.Option(metavar="N", help="base sample size, a power of two; needs about N (keys + 2) runs")
+        int, typer.Option(metavar="N", help="base sample size, a power of two, for about N (number of keys + 2) runs")
     ] = 64,
     seed: Seed = 0,
     jobs: Jobs = 1,

@@ -19,18 +19,24 @@ def size(
     vary: Annotated[str, typer.Option("--vary", metavar="KEY=LOW,HIGH", help="key to size and its range")],
     goal: Annotated[
         str,
-        typer.Option(metavar="minimum|maximum", help="goal: minimum or maximum value that satisfies all limits"),
+        typer.Option(
+            metavar="minimum|maximum", help="value to find: the minimum or the maximum that satisfies all limits"
+        ),
     ] = "minimum",
     dependent: Annotated[
         list[str],
         typer.Option(
-            metavar='"KEY = formula"', help="dependent key as a formula of x, the value of the sized key in SI"
+            metavar='"KEY = formula"', help="key that changes too, as a formula of x, the value of the sized key in SI"
         ),
     ] = [],  # noqa: B006
-    rtol: Annotated[float, typer.Option(help="relative tolerance of the bracket")] = 0.01,
+    rtol: Annotated[
+        float, typer.Option(help="greatest relative distance between the value found and a value that fails")
+    ] = 0.01,
     error: Annotated[
         bool,
-        typer.Option("--error", help="require margins larger than their errors, from two more runs of each value"),
+        typer.Option(
+            "--error", help="require margins above their numerical errors, estimated by two more runs for each value"
+        ),
     ] = False,
     set: Set = [],  # noqa: B006
     as_json: Json = False,

@@ -26,7 +26,8 @@ FILE = columns(
 @app.command()
 def stability(
     case: Annotated[
-        str | None, typer.Argument(metavar="[CASE]", help="case file (default advection on a periodic grid)")
+        str | None,
+        typer.Argument(metavar="[CASE]", help="case file or shipped case (default none: advection on a periodic grid)"),
     ] = None,
     scheme: Annotated[
         str | None, typer.Option(metavar="A,B", help="schemes to study (default scheme of the case)")
@@ -94,7 +95,7 @@ def stability(
 
 
 def refuse_options(case: str | None, of_a_case: dict, of_a_grid: dict) -> None:
-    """Raise FvsolveError for options without effect: those of a case without it, those of a grid with a case."""
+    """Raise FvsolveError for given options without effect: `of_a_case` need a case, `of_a_grid` need no case."""
     from fvsolve.errors import FvsolveError
 
     useless = [name for name, value in (of_a_grid if case else of_a_case).items() if value not in (None, False, [])]
@@ -104,7 +105,7 @@ def refuse_options(case: str | None, of_a_case: dict, of_a_grid: dict) -> None:
 
 
 def pictures(result, folder: Path) -> list[str]:
-    """Draw the spectrum over the stability region for each row with a linear scheme; returns the file names."""
+    """Draw the spectrum over the stability region for each pair with a linear scheme; returns the file names."""
     from fvsolve.draw.spectrum_picture import spectrum_figure
     from fvsolve.steppers import analyse
 
@@ -153,7 +154,7 @@ def print_stability(result, folder: Path, files: list[str]) -> None:
 
 
 def terminal_columns(cells: bool) -> list[Column]:
-    """Columns on the terminal. With cells, steps are given also as Courant numbers, and bounds only so."""
+    """Columns on the terminal. With cells, steps are also given as Courant numbers, and bounds only as these."""
     heads = {"scheme": "scheme", "method": "method"}
     for quantity in ("predicted", "measured"):
         heads |= {quantity: f"{quantity} [s]", f"{quantity}_courant": "Courant"}

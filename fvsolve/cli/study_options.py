@@ -17,7 +17,10 @@ from fvsolve.errors import FvsolveError, visible
 PROGRESS_INTERVAL = 10.0  # interval between lines of progress if the output is not a terminal [s]
 
 Out = Annotated[
-    Path | None, typer.Option(metavar="DIR", help="folder of tables and pictures (default runs/NAME.STUDY)")
+    Path | None,
+    typer.Option(
+        metavar="DIR", help="folder of tables and pictures (default runs/NAME.STUDY, such as runs/main.sweep)"
+    ),
 ]
 Jobs = Annotated[int, typer.Option(metavar="N", help="number of runs at a time, each in its own process")]
 Dask = Annotated[
@@ -40,7 +43,7 @@ def comma_list(text: str | None, option: str = "") -> list[str] | None:
 
 
 def method_names(text: str | None) -> list[str] | None:
-    """Method names of `--method A,B`; a word that is the path of a file adds the tableau in it as a method."""
+    """Method names of `--method A,B`. A word that is the path of a file registers the tableau in this file."""
     names = comma_list(text, "--method")
     return None if names is None else [method_name(name) for name in names]
 
@@ -65,7 +68,7 @@ def warn_replaced(folder: Path, name: str) -> None:
 
 
 def clear_files(folder: Path, *patterns: str) -> Path:
-    """Delete files of an earlier command from the folder, so that old and new files are never mixed."""
+    """Delete files of an earlier command (glob patterns) from the folder, and return the folder."""
     for path in [file for pattern in patterns for file in folder.glob(pattern)]:
         path.unlink()
     return folder
@@ -84,10 +87,11 @@ def writable_folder(folder: Path) -> Path:
 
 @contextmanager
 def progress_line(resumable: bool = True) -> Iterator[Callable[[int, int, str], None]]:
-    """Context manager that yields `progress(done, total, next)`.
+    """Context manager that yields `progress(done, total, label)`; label : text on the next run.
 
     On a terminal it rewrites one line; otherwise it prints a line every `PROGRESS_INTERVAL`. Ctrl-C ends the command
-    with exit code 130. Finished points are on disk and the same command resumes there, unless `kept` is False.
+    with exit code 130, and a message on what is kept.
+    resumable : True if finished runs are on disk and the same command continues from there
     """
     is_terminal, counts, text, finished = sys.stderr.isatty(), [0, 0], [""], threading.Event()
 

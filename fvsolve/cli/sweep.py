@@ -21,7 +21,8 @@ Values = Annotated[
 ]
 Ranges = Annotated[list[str], typer.Option("--vary", metavar="KEY=LOW,HIGH", help="range of a key, for --sample")]
 Outcomes = Annotated[
-    list[str], typer.Option("--quantity", metavar="max(PROBE)", help="quantity to chart (default all extremes)")
+    list[str],
+    typer.Option("--quantity", metavar="max(PROBE)", help="quantity to chart over the keys (default all extremes)"),
 ]
 VALUES_FORMAT = "KEY=a,b,c, for example links.main.cells=100,200,400"
 RANGE_FORMAT = "KEY=LOW,HIGH, for example links.main.length=900,1000"
@@ -38,7 +39,11 @@ def sweep(
         typer.Option(metavar="FILE.csv", help="CSV file with the values of every run: a column for each key"),
     ] = None,
     sample: Annotated[
-        str | None, typer.Option(metavar="sobol:N", help="sample of N runs within the ranges of --vary; or lhs:N")
+        str | None,
+        typer.Option(
+            metavar="sobol:N",
+            help="sample of N runs in the ranges of --vary: sobol:N (Sobol) or lhs:N (Latin hypercube)",
+        ),
     ] = None,
     vary: Ranges = [],  # noqa: B006
     seed: Seed = 0,
