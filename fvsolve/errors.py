@@ -134,7 +134,7 @@ EXTRA_NAMES = 2  # names above the limit of a listing that are still listed
 
 
 def listing(names: Iterable[str], limit: int = 12) -> str:
-    """Text that lists names, sorted, without duplicates; of many names only the first `limit` and their total number."""
+    """Text that lists names, sorted, without duplicates; of many names the first `limit` and their total number."""
     names = sorted({*names})
     if len(names) <= limit + EXTRA_NAMES:
         return ", ".join(names)

@@ -1,4 +1,4 @@
-"""Case files: keys, units and checks between parts."""
+"""Reading of case files: keys, units, and checks between the parts of a case."""
 
 from fvsolve.case.case import Case
 from fvsolve.case.expectations import Compare, Expect

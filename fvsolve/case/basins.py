@@ -34,7 +34,7 @@ Faults = Iterator[tuple[tuple, str]]
 
 @dataclass(frozen=True)
 class BasinFields:
-    """Basin as seen by probes: name -> dimension of its fields, and its mesh."""
+    """Fields of a basin that probes can record (name -> dimension), and its mesh."""
 
     fields: dict[str, str]
     mesh: Mesh
@@ -42,7 +42,10 @@ class BasinFields:
     quantities: ClassVar[dict[str, str]] = {}
 
     def point(self, label: str, place: str | None) -> tuple[float, float]:
-        """Point [m] that a text such as "3.5,1.2" gives. Raises ValueError."""
+        """Point (x, y) [m] of the text `place` after "@", such as "3.5,1.2"; label : probe without it, for messages.
+
+        Raises ValueError if it is not a point inside the mesh.
+        """
         middle = ",".join(f"{value:.4g}" for value in self.mesh.centre[len(self.mesh.centre) // 2])
         if place is None:
             raise ValueError(f'a probe of a basin needs a point, for example "{label}@{middle}"')
@@ -53,7 +56,7 @@ class BasinFields:
         return self.inside(x, y)
 
     def inside(self, x: float, y: float) -> tuple[float, float]:
-        """Return the point if it lies inside the mesh. Raises ValueError if it lies outside or in a hole."""
+        """Return the point (x, y) [m] if it lies inside the mesh. Raises ValueError if it lies outside or in a hole."""
         if not (math.isfinite(x) and math.isfinite(y)):
             raise ValueError(f"{x:g}, {y:g} is not a point")
         if self.points.cell(x, y) < 0:
@@ -63,14 +66,14 @@ class BasinFields:
 
     @cached_property
     def points(self) -> MeshPoints:
-        """Locator of points in the mesh."""
+        """Locator that finds the cell of a point."""
         from fvsolve.mesh.mesh_points import MeshPoints
 
         return MeshPoints(self.mesh)
 
 
 def lumped_fields(basin: Basin) -> dict[str, str]:
-    """Fields that probes can read in water without cells: the depth, if the water sloshes in modes."""
+    """Fields (name -> dimension) of a basin without cells: the depth if its water sloshes in modes, else none."""
     return (
         {"depth": basin.physics_type.fields["depth"]}
         if basin.sloshing == "modes" and basin.physics_type.has_modes
@@ -79,7 +82,7 @@ def lumped_fields(basin: Basin) -> dict[str, str]:
 
 
 def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
-    """Mesh of a basin. Raises Misfit with all faults of the mesh."""
+    """Mesh of a basin, from its keys or its mesh file. Raises ValueFault with all faults of the mesh."""
     from fvsolve.mesh import read, rectangle
 
     try:
@@ -101,15 +104,15 @@ def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
 
 
 def fault_keys(place: str) -> tuple:
-    """Key path of the place of a mesh fault: "patches.east", "holes[0]"; empty if it is not a key of a basin."""
+    """Key path from the text of a mesh fault, such as "patches.east" or "holes[0]"; empty if no key of a basin."""
     path = [int(word) if word.isdigit() else word for word in re.split(r"[.\[\]]", place) if word]
     return tuple(path) if path and path[0] in Basin.keys() else ()
 
 
 def line_faults(output: Output, nodes: dict[str, Any]) -> Faults:
-    """Faults of output lines across basins.
+    """Faults (key path, message) of `[output.lines]`, the lines across basins.
 
-    nodes : name -> kind of the node, or the `BasinFields` of a basin
+    nodes : name -> class of the node, the `BasinFields` of a basin, or None for a faulty node
     """
     for name, line in output.lines.items():
         pool, key = nodes.get(line.basin), ("output", "lines", name)
@@ -132,7 +135,7 @@ def line_faults(output: Output, nodes: dict[str, Any]) -> Faults:
         if line.from_ == line.to:
             yield (*key, "to"), "is also the start of the line; expected another point"
     if output.lines and output.fields == 0:
-        yield ("output", "lines"), "are written with every frame, but fields is 0; expected fields = 1 or more"
+        yield ("output", "lines"), "are written with every frame, but `fields` is 0; expected `fields = 1` or more"
 
 
 def patch_names(mesh: Mesh) -> tuple[str, ...]:
@@ -141,20 +144,20 @@ def patch_names(mesh: Mesh) -> tuple[str, ...]:
 
 
 def boundary_cells(mesh: Mesh, patch: str) -> np.ndarray:
-    """Indices of the cells next to a patch : int64[count]."""
+    """Indices of the cells that have a face in a patch : int64[count], sorted."""
     return np.unique(mesh.left[mesh.patch(patch)])
 
 
 def place_kind(basin: Basin, patch: str) -> type[PatchNode]:
-    """Class of a patch as a place: `MovingWall` or `PatchNode`."""
+    """Class of the node that a patch forms for links: `MovingWall` or `PatchNode`."""
     stated = basin.patches.get(patch)
     return MovingWall if stated is not None and stated.moves else PatchNode
 
 
 def places(name: str, basin: Basin, mesh: Mesh, pose: Any = None) -> dict[str, PatchNode]:
-    """Patches as places, with the water at rest.
+    """Nodes that the patches of a basin form for links, by full name BASIN.PATCH, with the state of water at rest.
 
-    pose : pose of the body that carries the basin; without it, elevation and depth are those of an upright basin
+    pose : pose of the body that carries the basin; if None, elevation and depth are those of the upright basin
     """
     result = {}
     for patch in patch_names(mesh):
@@ -169,7 +172,7 @@ def places(name: str, basin: Basin, mesh: Mesh, pose: Any = None) -> dict[str, P
 
 
 def places_on_bodies(nodes: dict[str, Any], meshes: dict[str, Mesh]) -> dict[str, PatchNode]:
-    """Patches of basins on bodies as places; basins with faulty formulas are left out."""
+    """Nodes that patches of basins on bodies form, by full name; basins with faulty formulas are left out."""
     result: dict[str, PatchNode] = {}
     for name, mesh in meshes.items():
         if nodes[name].on is not None:
@@ -189,9 +192,9 @@ def _patch_hint(basin: Basin, known: tuple[str, ...], name: str) -> str:
 def find_faults(
     nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: Any, times: tuple, all_nodes: Any
 ) -> Faults:
-    """Faults of basins: density law, patches, moving walls, formulas.
+    """Faults (key path, message) of basins: density law, patches, moving walls, formulas.
 
-    times : start and end [s]; all_nodes : names of all nodes, also of faulty ones
+    meshes : meshes of basins by name; times : start and end of the run [s]; all_nodes : all nodes, also faulty ones
     """
     pools = {name: node for name, node in nodes.items() if isinstance(node, Basin)}
     joined = {place for link in links.values() for place in link.ports.values()}
@@ -210,7 +213,7 @@ def find_faults(
             if patch not in known:
                 yield (*key, "patches", patch), f"the mesh has no such patch; {_patch_hint(basin, known, patch)}"
             elif f"{name}.{patch}" in joined and not own.joined:
-                yield (*key, "patches", patch), "a link joins here, but the flow is given by velocity"
+                yield (*key, "patches", patch), "a link joins here, but the key `velocity` gives the flow"
             elif f"{name}.{patch}" in joined and (options.boundary or options.impedance) is not None:
                 key_name = "boundary" if options.boundary else "impedance"
                 yield (

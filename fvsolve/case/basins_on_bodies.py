@@ -1,4 +1,4 @@
-"""Checks and mass of basins on bodies."""
+"""Checks of basins on bodies, and the mass that their water adds to bodies."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ Faults = Iterator[tuple[tuple, str]]
 
 
 def find_faults(name: str, basin: Any, nodes: dict[str, Any], named: Any) -> Faults:
-    """Faults of a basin on a body."""
+    """Faults (key path, message) of the keys of a basin that concern the body it is on."""
     key = ("nodes", name)
     yield from place_faults(name, basin, nodes, named)
     if basin.on is None:
         if basin.sloshing != "cells":
-            yield (*key, "sloshing"), "applies only to water on a body; name the body with on"
+            yield (*key, "sloshing"), "applies only to water on a body; give the body as `on = BODY`"
         return
     if not basin.physics_type.on_bodies:
         kinds = " or ".join(show(name) for name, patch_options in Physics.kinds.items() if patch_options.on_bodies)
@@ -35,7 +35,7 @@ def find_faults(name: str, basin: Any, nodes: dict[str, Any], named: Any) -> Fau
     if any(patch_options.moves for patch_options in basin.patches.values()):
         yield (
             (*key, "on"),
-            "a basin on a body cannot have moving walls; leave on out, or body and travel of its patches",
+            "a basin on a body cannot have moving walls; leave out `on`, or `body` and `travel` of its patches",
         )
     free = next(free_joints(basin.on, nodes), None)
     for patch, patch_options in basin.patches.items():
@@ -54,21 +54,21 @@ def find_faults(name: str, basin: Any, nodes: dict[str, Any], named: Any) -> Fau
 
 
 def place_faults(name: str, node: PlaceOnBody, nodes: dict[str, Any], named: Any) -> Faults:
-    """Faults of the place of a node on a body."""
+    """Faults of the keys that put a node on a body: `on`, `at`, `attitude`, `elevation`."""
     key = ("nodes", name)
     if node.on is None:
         for other in ("at", "attitude"):
             if getattr(node, other, None) is not None:
-                yield (*key, other), "is a place on a body; name the body with on"
+                yield (*key, other), "is a position on a body; give the body as `on = BODY`"
         return
     if node.on in nodes or node.on not in named:  # otherwise the body itself is faulty
         yield from (((*key, "on"), text) for text in body_faults(node.on, nodes, named))
     if node.elevation is not None:
-        yield (*key, "elevation"), f"the node is on {node.on}; give its place with at, in the axes of that body"
+        yield (*key, "elevation"), f"the node is on {node.on}; give its position as `at`, in the axes of that body"
 
 
 def overturned(nodes: dict[str, Any], poses: dict[str, Any]) -> Faults:
-    """Faults of water on fixed joints whose bed is overturned: gravity never presses it on the bed."""
+    """Faults of tanks and basins on fixed joints that are tilted by 90 degrees or more, so that the water runs out."""
     for name, node in nodes.items():
         on = getattr(node, "on", None)
         wet = node.kind == "tank" or (
@@ -83,7 +83,7 @@ def overturned(nodes: dict[str, Any], poses: dict[str, Any]) -> Faults:
 
 
 def body_faults(on: str, nodes: dict[str, Any], named: Any) -> Iterator[str]:
-    """Faults of the body that carries a node; named : tables of all nodes, also of faulty ones."""
+    """Fault text if `on` is not a body; named : tables of all nodes, also of faulty ones."""
     bodies = [body for body, node in nodes.items() if isinstance(node, Body)]
     bodies += [body for body in named if body not in nodes and getattr(named[body], "get", {}.get)("type") == "body"]
     if not isinstance(nodes.get(on), Body):
@@ -93,7 +93,7 @@ def body_faults(on: str, nodes: dict[str, Any], named: Any) -> Iterator[str]:
 
 
 def free_joints(on: str, nodes: dict[str, Any]) -> Iterator[str]:
-    """Bodies from `on` down to the world whose joints move freely (neither fixed nor driven)."""
+    """Names of those bodies among `on` and its carriers whose joints move freely (neither fixed nor driven)."""
     for body in carriers(on, nodes):
         joint = nodes[body].joint
         if joint.kind != "fixed" and joint.drive_schedule is None:
@@ -101,7 +101,7 @@ def free_joints(on: str, nodes: dict[str, Any]) -> Iterator[str]:
 
 
 def carriers(on: str, nodes: dict[str, Any]) -> Iterator[str]:
-    """Body `on` and all bodies that carry it."""
+    """Names of the body `on` and of all bodies that carry it, from `on` to the world."""
     seen: set[str] = set()
     while isinstance(nodes.get(on), Body) and on not in seen:
         seen.add(on)
@@ -112,9 +112,9 @@ def carriers(on: str, nodes: dict[str, Any]) -> Iterator[str]:
 def nodes_with_water(
     nodes: dict[str, Any], lumped: dict[str, Any], density: float, gravity: float, t: float
 ) -> dict[str, Any]:
-    """Nodes with lumped water: its mass, centre and inertia are added to bodies, its modes are extra bodies.
+    """Nodes with lumped water: bodies with the mass, centre and inertia of water, and sloshing modes as extra bodies.
 
-    lumped : meshes of basins without cells; density [kg/m3]; gravity [m/s2]; t : start time [s]
+    lumped : basin -> mesh, of basins whose water has no cells; density [kg/m3]; gravity [m/s2]; t : start time [s]
     """
     result = dict(nodes)
     for name, mesh in lumped.items():
@@ -141,7 +141,10 @@ def nodes_with_water(
 
 
 def frozen_water(basin: Any, mesh: Any, density: float) -> tuple[float, np.ndarray, np.ndarray]:
-    """(mass [kg], centre [m], inertia about it [kg m2]) of water at rest as prisms on cells, in axes of the basin."""
+    """Mass [kg], centre [m] and inertia about the centre [kg m2] of water at rest, in the axes of the basin.
+
+    The water is the sum of prisms over the cells. centre : float64[3]; inertia : float64[3, 3]
+    """
     bed = means(samples(basin.bed, mesh))
     depth = np.maximum(basin.level - bed, 0.0)
     mass = density * mesh.area * depth

@@ -1,6 +1,6 @@
 """Poses and velocities of bodies at the start, from the joints of a case.
 
-Equations (59), (62) and (67) for points, in NumPy; the kernels evaluate them at later times.
+Equations (59), (62) and (67) of docs/course.md in NumPy; the kernels evaluate them at later times.
 """
 
 from __future__ import annotations
@@ -26,7 +26,12 @@ Faults = Iterator[tuple[tuple, str]]
 
 @dataclass(frozen=True)
 class Pose:
-    """Attitude R, origin [m], its velocity [m/s], angular velocity [rad/s] of a body, relative to the world."""
+    """Pose and motion of a body in world axes.
+
+    attitude : float64[3, 3]  rotation matrix from body axes to world axes
+    place, velocity : float64[3]  position [m] and velocity [m/s] of the origin of the body axes
+    spin : float64[3]  angular velocity [rad/s]
+    """
 
     attitude: np.ndarray
     place: np.ndarray
@@ -34,11 +39,11 @@ class Pose:
     spin: np.ndarray
 
     def at(self, place: Any) -> np.ndarray:
-        """World position (59) of a point in body axes [m]."""
+        """World position [m] of the point `place` in body axes [m], equation (59)."""
         return self.place + self.attitude @ np.asarray(place, dtype=float)
 
     def velocity_at(self, place: Any) -> np.ndarray:
-        """World velocity (67) of a point in body axes [m/s]."""
+        """World velocity [m/s] of the point `place` in body axes [m], equation (67)."""
         return self.velocity + np.cross(self.spin, self.attitude @ np.asarray(place, dtype=float))
 
 
@@ -47,7 +52,7 @@ AT_REST = Pose(np.eye(3), np.zeros(3), np.zeros(3), np.zeros(3))
 
 @dataclass(frozen=True)
 class BodyQuantities:
-    """Body as seen by probes: the quantities that its joint has."""
+    """Quantities of a body that probes can record; they depend on its joint."""
 
     body: Body
     kind: ClassVar[str] = "body"
@@ -64,7 +69,7 @@ class BodyQuantities:
 
 
 def bodies_of(nodes: dict[str, Any]) -> dict[str, Body]:
-    """Bodies by name; each stands after the body that carries it, otherwise in the order of the file.
+    """Bodies by name, each after the body that carries it, otherwise in the order of the file.
 
     Bodies in a loop, and bodies on a missing node or point, are left out.
     """
@@ -82,19 +87,19 @@ def bodies_of(nodes: dict[str, Any]) -> dict[str, Body]:
 
 
 def carrier_exists(nodes: dict[str, Any], body: Body) -> bool:
-    """True if the node and the point that a body is joined to exist."""
+    """True if the node and the point to which the joint of a body is fixed exist."""
     name, point = carrier_of(body)
     return name == WORLD or (hasattr(nodes.get(name), "points") and (not point or point in nodes[name].points))
 
 
 def carrier_of(body: Body) -> tuple[str, str]:
-    """(node, point) that a body is joined to; `WORLD` for the world, "" for no point."""
+    """Names (node, point) to which the joint of a body is fixed; `WORLD` for the world, "" without a point."""
     name, _, point = (body.joint.on or WORLD).partition(".")
     return name, point
 
 
 def joint_position(nodes: dict[str, Any], body: Body) -> np.ndarray:
-    """Position of a joint in the axes of the node that carries it [m]."""
+    """Position of the joint of a body in the axes of the node that carries it : float64[3] [m]."""
     name, point = carrier_of(body)
     if point:
         return np.array(nodes[name].points[point])
@@ -102,7 +107,7 @@ def joint_position(nodes: dict[str, Any], body: Body) -> np.ndarray:
 
 
 def poses(nodes: dict[str, Any], t: float) -> dict[str, Pose]:
-    """Poses of all bodies at the start time t [s]."""
+    """Poses of all bodies by name at the start time t [s]."""
     result: dict[str, Pose] = {}
     for name, body in bodies_of(nodes).items():
         up = result.get(carrier_of(body)[0], AT_REST)
@@ -111,7 +116,10 @@ def poses(nodes: dict[str, Any], t: float) -> dict[str, Pose]:
 
 
 def body_pose(body: Body, up: Pose, at: np.ndarray, t: float) -> Pose:
-    """Pose of a body whose joint lies at `at` [m] in the axes of its carrier, with pose `up`."""
+    """Pose of a body at the start time t [s]; at : position of its joint in the axes of its carrier [m].
+
+    up : pose of the carrier
+    """
     joint = body.joint
     turn, place = up.attitude @ joint.attitude.rotation, up.at(at)
     velocity, spin, axis = up.velocity_at(at), up.spin, turn @ joint.unit_axis
@@ -129,12 +137,12 @@ def body_pose(body: Body, up: Pose, at: np.ndarray, t: float) -> Pose:
 
 
 def joint_coordinate(joint: Any, t: float) -> float:
-    """Angle [rad] or travel [m] of a joint at the start."""
+    """Angle [rad] or travel [m] of a joint at the start time t [s]; 0 if it has none."""
     return float(value(joint.coordinate, t, left=True)) if joint.coordinate is not None else 0.0
 
 
 def joint_rate(joint: Any, t: float) -> float:
-    """Rate of a joint at the start; of a driven joint by one-sided differences of its schedule."""
+    """Rate [rad/s, m/s] of a joint at the start time t [s]; for a driven joint by differences of its schedule."""
     if joint.drive_schedule is None:
         return float(joint.rate or 0.0)
     h = 1e-4
@@ -143,7 +151,10 @@ def joint_rate(joint: Any, t: float) -> float:
 
 
 def body_point(nodes: dict[str, Any], place: str) -> tuple[str, np.ndarray] | None:
-    """(body, position in its axes) of a place that a link names; (`WORLD`, ...) on a frame; None if it is no point."""
+    """Body and position in its axes [m] of a point BODY.POINT or a node that a link joins; None if it is neither.
+
+    For a point of a frame the body is `WORLD`.
+    """
     name, _, point = place.partition(".")
     node = nodes.get(name)
     if getattr(node, "domain", "") == "spatial" and not point:
@@ -154,7 +165,10 @@ def body_point(nodes: dict[str, Any], place: str) -> tuple[str, np.ndarray] | No
 
 
 def separation(nodes: dict[str, Any], poses_of: dict[str, Pose], first: str, second: str) -> float | None:
-    """Distance from place `first` to place `second` at the start [m], signed on the axis of masses; None if unknown."""
+    """Distance from `first` to `second` at the start [m], names that a link joins; None if a position is unknown.
+
+    Between masses on their common axis it is signed: positive if `second` has the greater coordinate.
+    """
     ends = [nodes.get(place) for place in (first, second)]
     if all(getattr(end, "domain", "") == "translational" for end in ends):
         return ends[1].initial_position - ends[0].initial_position
@@ -166,12 +180,12 @@ def separation(nodes: dict[str, Any], poses_of: dict[str, Pose], first: str, sec
 
 
 def point_inertia(mass: float, r: np.ndarray) -> np.ndarray:
-    """Inertia about the origin of a point mass at r : float64[3, 3] [kg m2]."""
+    """Inertia matrix about the origin of a point mass [kg] at r : float64[3] [m]; result float64[3, 3] [kg m2]."""
     return mass * (np.dot(r, r) * np.eye(3) - np.outer(r, r))
 
 
 def coincident_ends(nodes: dict[str, Any], links: dict[str, Any], poses_of: dict[str, Pose]) -> Faults:
-    """Faults of links along a line between two points that coincide at the start: the line has no direction."""
+    """Faults of links that act along the line between two points, if these coincide at the start: no direction."""
     for name, link in links.items():
         ends = [link.ports.get(port) for port in (("case", "rod") if "rod" in link.ports else ("from", "to"))]
         if (
@@ -203,7 +217,7 @@ def open_pins(nodes: dict[str, Any], links: dict[str, Any], poses_of: dict[str, 
 
 
 def find_faults(nodes: dict[str, Any], named: Any) -> Faults:
-    """Faults of the nodes that carry bodies: unknown body or point, and loops (each reported once).
+    """Faults of the key `on` of joints: unknown body or point, and bodies that carry each other in a loop.
 
     named : tables of all nodes, also of faulty ones
     """
@@ -222,7 +236,7 @@ def find_faults(nodes: dict[str, Any], named: Any) -> Faults:
             has = f"its points are {listing(own[on].points)}" if own[on].points else "it has no points"
             yield keys, f"{on} has no point {show(point)}; {has}{did_you_mean(point, own[on].points)}"
         elif not point and on not in bodies:
-            yield keys, f"{show(on)} is a frame; expected a point of it, FRAME.POINT, or leave on out"
+            yield keys, f"{show(on)} is a frame; expected a point of it, FRAME.POINT, or leave out `on`"
     loop = set(bodies) - set(bodies_of(nodes)) - {name for name in bodies if not ends_in_loop(nodes, bodies, name)}
     while loop:
         name = min(loop, key=list(bodies).index)
@@ -233,7 +247,7 @@ def find_faults(nodes: dict[str, Any], named: Any) -> Faults:
         text = " on ".join([*ring, ring[0]])
         yield (
             ("nodes", ring[0], "joint", "on"),
-            f"is carried by itself: {text}; remove on from one of its bodies and close the loop by a pin",
+            f"is carried by itself: {text}; remove `on` from one of these bodies and close the loop by a pin",
         )
         loop -= {member for member in loop if set(carrier_chain(bodies, member)) & set(ring)}
 
@@ -247,5 +261,5 @@ def carrier_chain(bodies: dict[str, Body], name: str) -> list[str]:
 
 
 def ends_in_loop(nodes: dict[str, Any], bodies: dict[str, Body], name: str) -> bool:
-    """True if the carriers of a body form a loop, rather than end at a missing node."""
+    """True if the carriers of a body form a loop; False if they end at a missing node."""
     return carrier_of(bodies[carrier_chain(bodies, name)[-1]])[0] in bodies

@@ -1,4 +1,4 @@
-"""Case as read: names, parts and numbers in SI."""
+"""Class `Case`: names, parts and numbers of a case file in SI."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ from fvsolve.units import show
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Case(Displayable):
-    """Frozen hydraulic scene; SI units, pressures absolute [Pa]. Cases are equal if their tables are equal.
+    """Case as read, immutable; SI units, pressures absolute [Pa]. Cases are equal if their tables are equal.
 
     properties : properties of the fluid at its reference state
     nodes, links : name -> part, in the order of the file
-    copies : name -> path of the files it used, under the names that `resolved()` refers to
+    copies : name in the text of `resolved()` -> path, of the schedule and measurement files that the case used
     """
 
     name: str
@@ -81,19 +81,19 @@ class Case(Displayable):
 
     @property
     def files(self) -> list[Path]:
-        """Schedule and compare files that the case used."""
+        """Paths of the schedule and measurement files that the case used."""
         return list(self.copies.values())
 
     @property
     def probes(self) -> list[Probe]:
-        """Probes to record: those of the output, then those that only expect or compare names."""
+        """Probes to record: the probes of `[output]`, then further probes that `[expect]` and `[compare]` name."""
         named = [*self.output.probes]
         named += [claim.probe for claim in [*self.expect.values(), *self.compare.values()] if claim.probe is not None]
         return list({probe.text: probe for probe in named}.values())
 
     @cached_property
     def extreme_probes(self) -> list[Probe]:
-        """Probes followed only for their extremes: points of profiles, and extents of limits and claims."""
+        """Probes with only extremes recorded: at points of pipe profiles, and for limits and claims on parts."""
         named = [*of_profiles(self.links)]
         extents = [claim.extent for claim in [*self.limits.values(), *self.expect.values()] if claim.extent is not None]
         for extent in extents:
@@ -102,7 +102,7 @@ class Case(Displayable):
 
     @property
     def schemes(self) -> tuple[str, ...]:
-        """Schemes that can solve the fluid of this case."""
+        """Names of the schemes that can solve the fluid of this case, with or without cavitation."""
         air = self.properties.air
         return CAVITY_SCHEMES if air is not None and air.cavitation else tuple(SCHEMES)
 
@@ -113,7 +113,7 @@ class Case(Displayable):
 
     @cached_property
     def places(self) -> dict[str, Node]:
-        """Places of the fluid: hydraulic nodes, then the chambers of cylinders, with their state at the start."""
+        """Hydraulic nodes, patches of basins and chambers of cylinders, by full name, with their state at the start."""
         result = {}
         for name, node in self.nodes.items():
             if name in self.meshes:
@@ -129,7 +129,7 @@ class Case(Displayable):
 
     @cached_property
     def poses(self) -> dict[str, Any]:
-        """Poses of bodies at the start, name -> `bodies.Pose`; each body stands after its carrier."""
+        """Poses of bodies at the start, name -> `bodies.Pose`; each body comes after its carrier."""
         return bodies.poses(self.nodes_with_water, self.numerics.start)
 
     @cached_property
@@ -144,7 +144,7 @@ class Case(Displayable):
 
     @cached_property
     def as_stated(self) -> Case:
-        """Case with bodies and masses where the file puts them; bushings and preloads count from there."""
+        """Case with bodies and masses at the positions of the file, from which bushings and preloads count."""
         return replace(self, equilibrium_nodes={}) if self.equilibrium_nodes else self
 
     @property
@@ -156,7 +156,7 @@ class Case(Displayable):
         return free and self.numerics.initial == "equilibrium"
 
     def separation(self, first: str, second: str) -> float:
-        """Distance from place `first` to place `second` at the start [m], signed on the axis of masses."""
+        """Distance from node or point `first` to `second` at the start [m]; between masses on their axis with sign."""
         return bodies.separation(self.nodes_with_water, self.poses, first, second)
 
     @cached_property
@@ -174,14 +174,14 @@ class Case(Displayable):
 
     @cached_property
     def elevations_stated(self) -> bool:
-        """True if at least one place of the fluid states an elevation."""
+        """True if the file states an elevation for at least one hydraulic node or chamber."""
         return any(place.elevation is not None for place in self.places.values())
 
     def elevation(self, name: str) -> float:
-        """Elevation of a place of the fluid above datum [m]; 0 if the case states none.
+        """Elevation of a hydraulic node, patch or chamber above datum [m]; 0 if the case states no elevations.
 
-        A reservoir given by head may leave it out where other places state theirs. It then lies level with the first
-        node that a link joins to it, since only its head drives the flow.
+        A reservoir given by head may lack an elevation although other nodes have one. It then lies level with the
+        first node that a link joins to it, since only its head drives the flow.
         """
         if (neighbour := getattr(self._known(name, self.places, "place of the fluid"), "level_of", None)) is not None:
             return self.elevation(neighbour)
@@ -197,11 +197,11 @@ class Case(Displayable):
 
     @cached_property
     def elevations(self) -> dict[str, float]:
-        """Elevations of all places of the fluid above datum [m]."""
+        """Elevations of all hydraulic nodes, patches and chambers above datum [m], by full name."""
         return {name: self.elevation(name) for name in self.places}
 
     def unit_of(self, dimension: str) -> str:
-        """Unit of a dimension in `[output]`; SI if it states none."""
+        """Unit of a dimension in `[output]`, such as "bar" for "pressure"; the SI unit if `[output]` states none."""
         known, stated = units.DIMENSIONS[dimension], self.output.units
         return stated.get(dimension) or stated.get(known.base) or known.si
 
@@ -222,7 +222,11 @@ class Case(Displayable):
         return f"{step:.{digits}g} s" if longer else self.amount(step, "time", digits)
 
     def wave_speed(self, name: str) -> float:
-        """Wave speed of a pipe [m/s]: as stated, or sqrt(K / rho) with 1/K = 1/beta + diameter / (E wall)."""
+        """Wave speed of a pipe [m/s]: as stated, or sqrt(K / rho).
+
+        1/K = 1/beta + c D / (E e), with bulk modulus beta and density rho of the fluid, diameter D, restraint factor
+        c, wall thickness e and modulus E.
+        """
         link = self.links.get(name) if isinstance(name, str) else None
         if link is None or link.kind != "pipe":
             link = self._known(name, {key: pipe for key, pipe in self.links.items() if pipe.kind == "pipe"}, "pipe")
@@ -235,16 +239,17 @@ class Case(Displayable):
         return known[name]
 
     def resolved(self) -> str:
-        """TOML text in SI with every default filled in; beside its files it reads back as an equal case.
+        """TOML text of the case in SI with all defaults filled in; with its files beside it, it gives an equal case.
 
-        Properties that follow from the fluid's name are comments: as keys they would hold at any other temperature too.
+        Properties that follow from the fluid's name are comments, because as keys they would override the properties
+        at another temperature.
         """
         fluid = self.properties.plain()
         came = [f"# {key} = {text.inline(value)}" for key, value in fluid.items() if value is not None]
         return text.write(self.table()).replace("\n[fluid]\n", "\n".join(["", "[fluid]", *came[1:], ""]), 1)
 
     def table(self) -> dict[str, Any]:
-        """Nested dicts of the case in SI with every default filled in."""
+        """Nested dicts of the case, shaped like a case file, in SI with every default filled in."""
         result = {
             "schema": self.schema,
             "title": self.title,
@@ -276,17 +281,17 @@ class Case(Displayable):
 
 
 def wave_speed(pipe: Pipe, fluid: Any) -> float:
-    """Wave speed in a pipe filled with a fluid [m/s]."""
+    """Wave speed in a pipe filled with a fluid [m/s]: as stated, or from the stiffness of fluid and wall."""
     if pipe.wave_speed is not None:
         return pipe.wave_speed
     return math.sqrt(1.0 / (1.0 / fluid.bulk_modulus + elastic_compliance(pipe)) / fluid.density)
 
 
 def default_cells(pipes: dict[str, Pipe], fluid: Any, cell_time: float | None) -> dict[str, int]:
-    """Number of cells of each pipe: as stated, else travel time / `cell_time` [s], at least one.
+    """Number of cells of each pipe: as stated, else the travel time of a wave divided by `cell_time` [s], at least 1.
 
-    `cell_time` defaults to the longest travel time of the case over `DEFAULT_CELLS`. A number too large for
-    a count is cut at 10^18; the caller refuses it.
+    If `cell_time` is None, it is the longest travel time of the pipes over `DEFAULT_CELLS`. A number above 10^18 is
+    replaced by 10^18; the caller refuses it.
     """
     travel = {name: pipe.length / wave_speed(pipe, fluid) for name, pipe in pipes.items()}
     if cell_time is None:

@@ -1,4 +1,4 @@
-"""Samples and means of formulas in the cells of a mesh."""
+"""Values of a formula at points in the cells of a mesh, and their means over cells."""
 
 from __future__ import annotations
 
@@ -17,14 +17,15 @@ GAUSS = (0, 0), (-1, -1), (1, 1), (-1, 1), (1, -1), (-1, 0), (1, 0), (0, -1), (0
 
 
 def is_grid(mesh: Mesh) -> bool:
-    """True if the cells fill a rectangular grid."""
+    """True if the mesh is a full rectangular grid of nx times ny cells."""
     return mesh.grid is not None and len(mesh.cells) == mesh.grid.nx * mesh.grid.ny
 
 
 def samples(shape: SpatialField | None, mesh: Mesh) -> np.ndarray:
-    """Values of a formula in the cells : float64[points, n].
+    """Values of a formula at points in the n cells : float64[points, n]; 0 without a formula.
 
-    On grids there are nine Gauss points a cell, the centre first; on other meshes only the centre.
+    On full rectangular grids there are nine Gauss points per cell, in the order of `GAUSS`; on other meshes there is
+    only the centre.
     """
     x, y = np.ascontiguousarray(mesh.centre.T)
     if not is_grid(mesh):
@@ -39,9 +40,9 @@ def samples(shape: SpatialField | None, mesh: Mesh) -> np.ndarray:
 
 
 def means(values: np.ndarray) -> np.ndarray:
-    """Means over cells of `samples` : float64[n]. Constant samples keep their value to the bit.
+    """Means over each cell of the result of `samples` : float64[n]. A constant value is returned to the bit.
 
-    The order of the sums keeps the result the same on mirrored and rotated cells.
+    The order of the sums makes the result the same to the bit for mirrored and rotated cells.
     """
     if len(values) == 1:
         return values[0]

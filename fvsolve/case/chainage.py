@@ -1,6 +1,6 @@
 """Parts placed on a pipe by chainage; the pipe is cut into pieces between them.
 
-Meaning of `on = "main", at = "1.84 km"`:
+The keys `on = "main", at = "1.84 km"` place a part 1.84 km along the pipe `main`:
 a node : the pipe runs through it
 a link without `from` and `to` : it lies in the pipe
 a link with only `to`, or with one port : it branches off the pipe
@@ -39,7 +39,10 @@ Report = Callable[[tuple, str], None]
 
 @dataclass
 class Placed:
-    """Raw part on a pipe, and its distance from the `from` end of the pipe [m]."""
+    """Raw part placed on a pipe.
+
+    group : "nodes" or "links"; given : keys of the part as in the file; distance : from the `from` end of the pipe [m]
+    """
 
     group: str
     name: str
@@ -59,7 +62,7 @@ class Placed:
 
     @property
     def joins(self) -> tuple[str, str]:
-        """Places where the piece before the part ends and the piece after it starts."""
+        """Names of the nodes where the pipe piece before the part ends and the piece after it starts."""
         if self.group == "nodes":
             return self.name, self.name
         return (f"{self.name}-in", f"{self.name}-out") if self.inline else (f"{self.name}-at", f"{self.name}-at")
@@ -67,13 +70,13 @@ class Placed:
 
 @dataclass
 class CutTable:
-    """Table of a case with its pipes cut.
+    """Raw table of a case in which pipes are replaced by their pieces.
 
     pieces : cut pipe -> names of its pieces
-    origin : (group, name) of an added part -> that of the part in the file
+    origin : (group, name) of an added part -> (group, name) of the part in the file from which it comes
     unreadable : (group, name) of parts that are not read, since the part, its pipe or another part on it is faulty
-    uncut : pipes that are not cut for that reason
-    connections_known : True if the places that each link joins are known
+    uncut : pipes that are not cut, since a part on them is faulty
+    connections_known : True if it is known which nodes each link joins
     """
 
     table: dict[str, Any]
@@ -86,7 +89,7 @@ class CutTable:
 
 
 def placed(table: dict[str, Any]) -> list[tuple[str, str, dict[str, Any]]]:
-    """(group, name, raw part) of each part that states a chainage `at`, or that is `on` a pipe."""
+    """List of (group, name, raw part) of each part with a chainage `at`, or with a pipe as `on`."""
     links = table.get("links")
     pipes = [name for name, link in links.items() if is_pipe(link)] if isinstance(links, dict) else []
     bodies = list(table["nodes"]) if isinstance(table.get("nodes"), dict) else []
@@ -119,12 +122,14 @@ def unfit_reason(group: str, part: dict[str, Any]) -> str | None:
     if group == "nodes" and (kind.domain != "hydraulic" or kind.own_places(part) is not None):
         return f"a {kind.kind} cannot be placed on a pipe; expected a place of the fluid"
     if group == "links" and not set(kind.joins) <= {"from", "to"}:
-        return f"a {kind.kind} has other ports than from and to; place a junction on the pipe and join the part to it"
+        return (
+            f"a {kind.kind} has other ports than `from` and `to`; place a junction on the pipe and join the part to it"
+        )
     return "a pipe has a length; place a junction on the pipe and join to it" if kind is Pipe else None
 
 
 def add_bends(table: dict[str, Any]) -> dict[str, Any]:
-    """Add to a table a junction at every bend of a pipe."""
+    """Copy of a raw table with a junction added at every bend of a pipe."""
     nodes, links = table.get("nodes"), table.get("links")
     result: dict[str, Any] = {}
     for name, link in links.items() if isinstance(nodes, dict) and isinstance(links, dict) else ():
@@ -144,13 +149,13 @@ def pieces_of(table: dict[str, Any]) -> dict[str, list[str]]:
 
 
 def settings(table: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings by dotted keys; keys of a piece become those under `pieces` in the table before cutting."""
+    """Settings (dotted key -> value), with keys of a pipe piece replaced by keys in the table `pieces` of its pipe."""
     return {".".join(own) if (own := original_keys(table, keys := split_key(str(key)))) != keys else key: value
             for key, value in given.items()}  # fmt: skip
 
 
 def original_keys(table: dict[str, Any], keys: tuple[str, ...]) -> tuple[str, ...]:
-    """Key path of a piece's key in the table before cutting; other key paths are returned unchanged."""
+    """Key path in the file for a key of a pipe piece: in the table `pieces` of its pipe. Others stay unchanged."""
     match = re.fullmatch(r"(.+)-\d+", keys[1]) if len(keys) > 2 and keys[0] == "links" else None
     if match and keys[1] not in table.get("links", {}) and keys[1] in pieces_of(table).get(match[1], ()):
         return ("links", match[1], "pieces", *keys[1:])
@@ -158,33 +163,37 @@ def original_keys(table: dict[str, Any], keys: tuple[str, ...]) -> tuple[str, ..
 
 
 def faults(table: dict[str, Any]) -> Iterator[tuple[tuple, str]]:
-    """Faults of the keys of placed parts, apart from the value of the chainage."""
+    """Faults (key path, message) of the keys `on`, `at` and `from` of placed parts, without the value of `at`."""
     links = table.get("links", {})
     pipes = [name for name, link in links.items() if is_pipe(link)]
     for group, name, part in placed(table):
         on, key = part.get("on"), (group, name)
         if "on" not in part:
-            yield key, f"at is {show(part['at'])}, but on is missing; expected the name of the pipe"
+            yield key, f"`at` is {show(part['at'])}, but `on` is missing; expected the name of the pipe"
         elif on not in pipes:
             near = did_you_mean(str(on), pipes) or f"; pipes are {listing(pipes) or 'none'}"
             yield (*key, "on"), f"no pipe named {show(on)}{near}"
         elif "at" not in part:
-            yield key, f"at is missing; expected the chainage along {on}"
+            yield key, f"`at` is missing; expected the chainage along {on}"
         if kind_of(group, part) is None:
             continue
         if (reason := unfit_reason(group, part)) is not None:
             yield (*key, "on"), reason
         elif "from" in part:
-            yield (*key, "from"), "on and at place it on a pipe, so it starts there; remove from, or on and at"
+            yield (
+                (*key, "from"),
+                "`on` and `at` place it on a pipe, so it starts there; remove `from`, or `on` and `at`",
+            )
 
 
 def cut(
     table: dict[str, Any], read_pipes: dict[str, Pipe], cells: dict[str, int], faulty: set, report: Report
 ) -> CutTable:
-    """Cut the pipes of a table at the parts placed on them.
+    """Cut the pipes of a raw table at the parts placed on them.
 
-    read_pipes : pipes without faults, as read; cells : number of cells of each; faulty : (group, name) of parts with a
-    faulty place; report : function of the keys and the text of a fault
+    read_pipes : pipes without faults, as read; cells : number of cells of each of these pipes
+    faulty : (group, name) of parts with faulty keys `on` or `at`; report : function that takes the key path and the
+    message of a fault
     """
     result = CutTable({**table, "nodes": dict(table["nodes"]), "links": {}, "routes": dict(table.get("routes", {}))},
                    frozenset(table["links"]))  # fmt: skip
@@ -223,7 +232,7 @@ def cut(
 
 
 def add_unknown_pieces(result: CutTable, name: str, given: dict[str, Any], parts: list[Placed], report: Report) -> None:
-    """Add to the table pieces of a faulty pipe, of which only the connections are known."""
+    """Add pieces of a pipe to the table of which only the connections are known, as a part on the pipe is faulty."""
     names = result.pieces[name] = [f"{name}-{k + 1}" for k in range(len(parts) + 1)]
     name_faults(result, name, given, parts, names, report)
     starts = [given.get("from"), *(part.joins[1] for part in parts)]
@@ -241,7 +250,7 @@ def add_unknown_pieces(result: CutTable, name: str, given: dict[str, Any], parts
 
 
 def read_distance(part: Placed, on: str | None, pipe: Pipe | None, report: Report) -> bool:
-    """Set the distance of a part along its pipe; False, with a report, if its chainage is faulty."""
+    """Set the distance of a part along its pipe. If its chainage is faulty, report it and return False."""
     key, given = (part.group, part.name, "at"), part.given["at"]
     try:
         chainage = units.parse(given, "length")
@@ -263,20 +272,21 @@ def read_distance(part: Placed, on: str | None, pipe: Pipe | None, report: Repor
 
 
 def sort_parts(parts: list[Placed], report: Report) -> bool:
-    """Sort parts by distance; False, with a report, if two parts have the same distance."""
+    """Sort parts by distance. If two parts have the same distance, report it and return False."""
     parts.sort(key=lambda part: part.distance)
     pairs = [(part, other) for part, other in zip(parts, parts[1:], strict=False) if part.distance == other.distance]
     for part, other in pairs:
-        report((other.group, other.name, "at"), f"{part.name} has the same place; join the part to it, or change at")
+        report((other.group, other.name, "at"), f"{part.name} has the same place; join the part to it, or change `at`")
     return not pairs
 
 
 def cut_pipe(
     result: CutTable, name: str, given: dict, whole: Pipe, parts: list[Placed], cells: int, report: Report
 ) -> None:
-    """Add the pieces of a pipe, their nodes and their route to the table.
+    """Add the pieces of a pipe, the nodes between them and the route along them to the table of `result`.
 
-    parts : sorted by distance. A piece has the number of cells nearest to its share of the pipe's cells, at least 1.
+    given, whole : the pipe raw and as read; parts : parts on it, by distance; cells : number of cells of the pipe
+    A piece has its share of these cells by length, rounded, at least 1.
     """
     edges = np.array([0.0, *(part.distance for part in parts), whole.length])
     counts = np.maximum(1, np.floor(np.diff(edges) / whole.length * cells + 0.5 + TIE).astype(int))
@@ -290,7 +300,7 @@ def cut_pipe(
 def name_faults(
     result: CutTable, name: str, given: dict, parts: list[Placed], names: list[str], report: Report
 ) -> None:
-    """Report names that cutting a pipe would give twice, and keys of unknown pieces."""
+    """Report names that exist already and would be given to pieces, nodes or the route, and keys of unknown pieces."""
     for item in names:
         if item in result.named:
             result.connections_known = False
@@ -320,7 +330,10 @@ def name_faults(
 def write_pieces(
     result: CutTable, name: str, given: dict, whole: Pipe, parts: list[Placed], edges: np.ndarray, counts: list[int]
 ):
-    """Add the pieces of a pipe, the nodes between them and the elevations of these nodes."""
+    """Add the pieces of a pipe and the nodes between them, with their elevations, to the table of `result`.
+
+    edges : float64[k + 1]  distances of the ends of the k pieces from the `from` end [m]; counts : cells of each piece
+    """
     links, nodes = result.table["links"], result.table["nodes"]
     rest = {key: value for key, value in given.items() if key not in PIECE_KEYS}
     joins = [item.joins for item in parts]
@@ -350,7 +363,7 @@ def write_pieces(
 
 
 def keys_of_piece(given: dict, piece: str) -> Any:
-    """Keys that a cut pipe states for one piece."""
+    """Keys for one piece from the table `pieces` of a cut pipe; empty without such a table."""
     own = given.get("pieces")
     values = own.get(piece) if isinstance(own, dict) else None
     return values if isinstance(values, dict) else {}

@@ -1,4 +1,4 @@
-"""Effect of a changed key on the model: new tables, a new start, or a new model."""
+"""Effect of a changed key on the model: other numbers, another initial state, or a new model."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ CLASSES = (VALUE, PROFILE, SHAPE)
 
 
 def changes(case: Case, key: str) -> str:
-    """Effect of changing the value under a key such as "links.gate.area": "value", "profile" or "shape".
+    """Effect of changing the value of a key such as "links.gate.area" on the model: "value", "profile" or "shape".
 
-    value : other numbers in the tables of the model; state, flows and pressures at the start are the same to the bit
-    profile : another start too, in tables of the same sizes, names and whole numbers
-    shape : another model
-    This holds between values of the same meaning: zero demand or zero loss may be a special case. Raises FvsolveError
-    for an unknown key.
+    value : only numbers in the arrays of the model change; the initial state, its flows and pressures do not
+    profile : the initial state changes too; the sizes of arrays, the names and the whole numbers in them do not
+    shape : the model must be built again
+    The result may not hold for a change to or from a special value such as zero demand or zero loss. Raises
+    FvsolveError for an unknown key.
     """
     keys = split_key(key)
     own = class_of_key(case, keys)
@@ -46,7 +46,7 @@ def changes(case: Case, key: str) -> str:
 
 
 def class_of_key(case: Case, keys: tuple[Any, ...]) -> str:
-    """Class of a key in this case."""
+    """Effect ("value", "profile" or "shape") of changing the value at a key path of this case."""
     result, links = (
         declaration_of(case.raw, keys).changes,
         [raw_link(case.raw, name) for name in case.raw.get("links", {})],
@@ -62,7 +62,7 @@ def class_of_key(case: Case, keys: tuple[Any, ...]) -> str:
 
 
 def declaration_of(raw: dict[str, Any], keys: tuple[str, ...]) -> Value:
-    """Declaration of a key by its part; for a key inside a value without keys, the declaration of that value."""
+    """Declaration of a key by its type of part. For a path inside a value such as a list, that of the whole value."""
     result: Value | None = Keys(declarations(raw))
     keys = original_keys(raw, keys)
     for key in (*keys[:2], *keys[4:]) if keys[2:3] == ("pieces",) else keys:
@@ -80,7 +80,7 @@ def declaration_of(raw: dict[str, Any], keys: tuple[str, ...]) -> Value:
 
 @dataclass(frozen=True)
 class Keys(Value):
-    """Table of keys with a value declaration each."""
+    """Declaration of a table: key -> declaration of its value."""
 
     values: dict[str, Value]
 
@@ -89,7 +89,7 @@ class Keys(Value):
 
 
 def declarations(raw: dict[str, Any]) -> dict[str, Value]:
-    """Declaration of each key of a case, with the names of its parts."""
+    """Declarations of all keys of a case, as nested tables with the names of its parts."""
     signals = Keys(dict.fromkeys(raw.get("signals", {}), Scheduled("number")))
     result = {**values_of(TOP), "ambient_pressure": Quantity("pressure"), "signals": signals}
     result |= {name: Nested(model) for name, model in TABLES.items()}
@@ -110,7 +110,7 @@ def values_of(keys: dict[str, tuple[Value, Any]]) -> dict[str, Value]:
 
 
 def driven_keys(table: Any, signal: str, keys: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """Key paths of everything that a signal drives."""
+    """Key paths of all values in a raw table that refer to a signal, outside `[signals]`."""
     if isinstance(table, dict):
         if table.get("signal") == signal and keys[:1] != ("signals",):
             yield keys

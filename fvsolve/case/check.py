@@ -1,4 +1,4 @@
-"""Checks between the parts of a case; each part has checked itself."""
+"""Checks between the parts of a case; the keys of each part are checked when it is read."""
 
 from __future__ import annotations
 
@@ -23,7 +23,10 @@ Faults = Iterator[tuple[tuple, str]]
 
 
 def network(table: dict[str, Any]) -> Faults:
-    """Faults of the incidence list, from names alone: unknown places, loose nodes, islands, no fixed pressure."""
+    """Faults (key path, message) of connections in a raw table: unknown names, unconnected nodes, wrong domains.
+
+    Also separate networks, and networks in which no part sets a pressure.
+    """
     nodes, links = ({n: p for n, p in _dict(table.get(group)).items()} for group in ("nodes", "links"))
     gone = [name for name in (*nodes, *links) if has_unknown_places(name, nodes, links)]
     places = _places(nodes, links, gone)
@@ -89,7 +92,11 @@ def parts(
     meshes: dict[str, Any],
     lumped: dict[str, Any],
 ) -> Faults:
-    """Faults of elevations, of bodies, and of each part in the context of the others."""
+    """Faults (key path, message) of elevations, of bodies, and of each part in the context of the other parts.
+
+    ambient : ambient pressure [Pa]; gravity [m/s2]; raw : raw case, for values in messages; start : start time [s]
+    meshes, lumped : basin -> mesh, of basins with cells and of basins whose water is lumped masses
+    """
     poses = bodies.poses(nodes, start)
     named = nodes if raw is None else _dict(raw.table.get("nodes"))
     high = {name: node for name, node in nodes.items() if moving_network_checks.has_elevation(node, poses)}
@@ -126,19 +133,19 @@ PLACE_KEYS = ("on", "at", "attitude")  # keys of places on bodies
 
 
 def in_space(part: Any) -> bool:
-    """True if a part has a place in space or on a body; a case without such parts has no faults in space."""
+    """True if a part has points, a route or a position in space or on a body."""
     values = vars(part)
     return "points" in values or bool(values.get("route")) or any(values.get(key) is not None for key in PLACE_KEYS)
 
 
 def numerics(numerics: Numerics, has_cells: bool) -> Faults:
-    """Faults of times and of step control."""
+    """Faults (key path, message) of times and step control; has_cells : True if the case has pipes or basins."""
     if not numerics.end > numerics.start:
         yield ("numerics", "end"), f"{numerics.end:g} s is not after the start at {numerics.start:g} s"
     method = METHODS.get(numerics.method)
     if numerics.courant is not None and not has_cells:
-        or_rtol = " or rtol" if method is None or method.adaptive else ""
-        yield ("numerics", "courant"), f"needs cells, and the case has no pipe or basin; give step{or_rtol}"
+        or_rtol = " or `rtol`" if method is None or method.adaptive else ""
+        yield ("numerics", "courant"), f"needs cells, and the case has no pipe or basin; give `step`{or_rtol}"
     least = LEAST_STEP * max(abs(numerics.start), abs(numerics.end))
     if numerics.step is not None and not numerics.step > least:
         yield (
@@ -148,28 +155,31 @@ def numerics(numerics: Numerics, has_cells: bool) -> Faults:
     if numerics.rtol is not None and numerics.rtol < LEAST_TOLERANCE:
         yield ("numerics", "rtol"), f"{numerics.rtol:g} is below rounding; expected {LEAST_TOLERANCE:g} or more"
     if numerics.method == AUTO and not numerics.courant is numerics.step is None:
-        yield ("numerics", "method"), 'method "auto" controls the error of its steps; give rtol, not courant or step'
+        yield (
+            ("numerics", "method"),
+            'method "auto" controls the error of its steps; give `rtol`, not `courant` or `step`',
+        )
     by_error = numerics.rtol is not None or (not has_cells and numerics.courant is numerics.step is None)
     if by_error and method is not None and not method.adaptive:
         able = " or ".join(dict.fromkeys(show(other.name) for other in METHODS.values() if other.adaptive))
-        message = f"method {show(method.name)} estimates no error; use {able}, or {'courant or ' * has_cells}step"
+        message = f"method {show(method.name)} estimates no error; use {able}, or {'`courant` or ' * has_cells}`step`"
         yield ("numerics", "method" if numerics.rtol is None else "rtol"), message
 
 
 def follows_cavities(fluid: FluidSpec | None, has_cells: bool) -> bool:
-    """True if cavities are solved in pipes; fluid : None if it is faulty."""
+    """True if cavities in pipes are computed, that is, with cells and `cavitation`; fluid : None if it is faulty."""
     return has_cells and fluid is not None and bool(fluid.cavitation)
 
 
 def cavities(numerics: Numerics, has_cells: bool, fluid: FluidSpec | None) -> Faults:
-    """Faults of schemes that cannot resolve the edge of a cavity."""
+    """Fault of a scheme that cannot compute cavities, in a case with `cavitation`."""
     if follows_cavities(fluid, has_cells) and numerics.scheme not in (None, *CAVITY_SCHEMES):
         able = " or ".join(map(show, CAVITY_SCHEMES))
         yield ("numerics", "scheme"), f"{show(numerics.scheme)} does not follow cavities in pipes; expected {able}"
 
 
 def claims(expect: dict[str, Expect], numerics: Numerics) -> Faults:
-    """Faults of claims at a time outside the run."""
+    """Faults of claims in `[expect]` at a time outside the run."""
     for text, claim in expect.items() if numerics.end > numerics.start else ():
         if claim is not None and claim.time is not None and not numerics.start <= claim.time <= numerics.end:
             run = f"{numerics.start:g} s to {numerics.end:g} s"
@@ -185,13 +195,13 @@ def _kind(group: str, part: Any) -> Any:
 
 
 def _owned_places(name: str, link: Any) -> dict[str, str]:
-    """Full name -> domain of the places that a link owns."""
+    """Full name -> domain of the nodes that a link contains, such as the chambers of a cylinder."""
     kind = _kind("links", link)
     return {f"{name}.{place}": domain for place, domain in kind.owns.items()} if kind else {}
 
 
 def own_places(name: str, node: Any) -> list[str] | None:
-    """Full names of the places that replace a node; None if the node is a place itself."""
+    """Full names that links use for a node, such as the patches of a basin; None if they use the node's own name."""
     kind = _kind("nodes", node)
     own = kind.own_places(_dict(node)) if kind else None
     return None if own is None else [f"{name}.{place}" for place in own]
@@ -209,18 +219,18 @@ def has_mesh_file(node: Any) -> bool:
 
 
 def named_places(name: str, links: dict[str, Any]) -> list[str]:
-    """Places of a part that raw links name."""
+    """Names after "NAME." that raw links use for points, patches or chambers of the part `name`."""
     places = [place for link in links.values() for _, place, _ in _ports(_dict(link)) if isinstance(place, str)]
     return [place.partition(".")[2] for place in places if place.startswith(f"{name}.")]
 
 
 def _ends(link: Any) -> list[str]:
-    """Names in the from and to of a raw link."""
+    """Values of `from` and `to` of a raw link, as text."""
     return [str(_dict(link).get(key)) for key in ("from", "to")]
 
 
 def _joined_places(name: str, node: Any, places: dict[str, Any]) -> list[str]:
-    """Places that a node joins without a link: its own places, and the bodies that carry it."""
+    """Names that a node connects without a link: its patches or similar, and the body that carries it."""
     own, kind = own_places(name, node) or [], _kind("nodes", node)
     return own + [body for body in (kind.bodies(_dict(node)) if kind else ()) if body in places]
 
@@ -232,7 +242,7 @@ def points_of(name: str, node: Any) -> list[str]:
 
 
 def _carrier_pairs(nodes: dict[str, Any], places: dict[str, Any]) -> list[list[str]]:
-    """Pairs of each body and its carrier, and of each frame with points and the world."""
+    """Pairs of connected names: each body with its carrier, and each frame that has points with the world."""
     pairs = []
     for name, node in nodes.items():
         kind, on = _dict(node).get("type"), _dict(_dict(node).get("joint")).get("on")
@@ -244,12 +254,12 @@ def _carrier_pairs(nodes: dict[str, Any], places: dict[str, Any]) -> list[list[s
 
 
 def _fits(domain: str, domains: str) -> bool:
-    """True if the domain of a place suits a port; `domains` lists those of the port, joined by " or "."""
+    """True if the domain of a node suits a port; domains : domains of the port, joined by " or "."""
     return domain in domains.split(" or ")
 
 
 def _places(nodes: dict[str, Any], links: dict[str, Any], gone: list[str]) -> dict[str, str | None]:
-    """Domain of every place, None if its type is faulty; gone : parts whose places are unknown."""
+    """Domain of every name that links can use, None if it is faulty; gone : parts with unknown points or patches."""
     result: dict[str, str | None] = {}
     for name, node in nodes.items():
         kind, own = _kind("nodes", node), own_places(name, node)
@@ -261,7 +271,7 @@ def _places(nodes: dict[str, Any], links: dict[str, Any], gone: list[str]) -> di
 
 
 def has_unknown_places(name: str, nodes: dict[str, Any], links: dict[str, Any]) -> bool:
-    """True if the places of a part are unknown because the part is faulty."""
+    """True if the points, patches or chambers of a part are unknown because the part is faulty."""
     for group, parts in (("nodes", nodes), ("links", links)):
         if name in parts and _kind(group, parts[name]) is None:
             return True
@@ -270,7 +280,7 @@ def has_unknown_places(name: str, nodes: dict[str, Any], links: dict[str, Any]) 
 
 
 def _ports(link: dict[str, Any]) -> list[tuple[tuple, Any, str | None]]:
-    """(keys, raw place, required domain) of every stated port of a link."""
+    """List of (key path in the link, name that the port joins, required domain) of every port of a raw link."""
     kind = _kind("links", link)
     if kind is None:
         return [((key,), link.get(key), None) for key in ("from", "to")]
@@ -289,7 +299,7 @@ def _unknown_place(place: str, places: dict[str, Any], nodes: dict[str, Any], li
 
 
 def chambers_of(link: Any) -> list[str]:
-    """Places of the fluid that a link owns."""
+    """Names of the chambers with fluid that a link contains."""
     return [place for place, domain in link.owns.items() if domain == "hydraulic"]
 
 
@@ -305,7 +315,7 @@ def _wrong_domain(place: str, domain: str, places: dict[str, Any], nodes: dict[s
 
 
 def _islands(ends: dict[str, list[str]]) -> list[list[str]]:
-    """Groups of nodes connected by links, in order of appearance."""
+    """Groups of connected names, in order of appearance; ends : link -> names that it connects."""
     root: dict[str, str] = {}
 
     def find(name: str) -> str:
@@ -369,7 +379,7 @@ def _vacuum(keys: tuple, values: list[float], fluid: Any, raw: Raw) -> Faults:
 
 
 def _raw_value(keys: tuple, index: int, raw: Raw) -> tuple[Any, tuple]:
-    """Value that the file has for an entry of a schedule, and its key path."""
+    """Raw value of entry `index` of a schedule, and its key path, also if a signal gives the schedule."""
     given = raw.get(keys)
     if isinstance(given, dict) and "signal" in given:
         keys = ("signals", given["signal"])

@@ -1,4 +1,4 @@
-"""Copies a shipped case with all files that it uses."""
+"""Copying of a shipped case with all files that it uses."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ from fvsolve.errors import FvsolveError, did_you_mean, listing
 
 
 def copy(name: str, to: Path) -> list[Path]:
-    """Copy a shipped case to `to` and its files beside it. Raises FvsolveError before overwriting a file."""
+    """Copy a shipped case to the file `to`, and its other files into the same folder; returns the paths.
+
+    Raises FvsolveError if one of these files exists.
+    """
     if name not in names():
         raise FvsolveError(f"no shipped case {name}{did_you_mean(name, names())}; cases are {listing(names())}")
     if to.is_dir():

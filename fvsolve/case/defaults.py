@@ -1,4 +1,4 @@
-"""`[defaults.pipe]`: keys of pipes that do not state them."""
+"""Table `[defaults.pipe]`: values of keys for all pipes that do not state these keys."""
 
 from __future__ import annotations
 
@@ -17,19 +17,22 @@ COMPLETED = ("wall", "friction")  # tables that other keys may complete: checked
 
 
 def values(kind: str) -> dict[str, Value]:
-    """Keys that the defaults of a type may have."""
+    """Keys that may have a default for a type of part (key -> declaration)."""
     return {key: value for key, value in KINDS[kind].values().items() if key not in NOT_DEFAULT}
 
 
 def defaults_of(table: Mapping[str, Any], kind: Any) -> dict[str, Any]:
-    """Raw defaults of a type of part; empty if they are not a table."""
+    """Raw defaults for a type of part from `[defaults]`; empty if there are none or if they are not a table."""
     result = table.get("defaults")
     result = result.get(kind) if isinstance(result, dict) and isinstance(kind, str) and kind in KINDS else None
     return result if isinstance(result, dict) else {}
 
 
 def with_defaults(table: Mapping[str, Any], given: dict[str, Any]) -> dict[str, Any]:
-    """Table of a part, completed by the defaults of its type. Its own keys, and alternatives to them, come first."""
+    """Raw table of a part, completed by the defaults for its type.
+
+    A default is left out if the part states the key, or an alternative to the key.
+    """
     general = defaults_of(table, given.get("type"))
     if not general:
         return given
@@ -41,17 +44,17 @@ def with_defaults(table: Mapping[str, Any], given: dict[str, Any]) -> dict[str, 
 
 
 def raw_link(table: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """Raw table of a link with its defaults; for a piece of a cut pipe, that of the pipe."""
+    """Raw table of a link, completed by defaults; for a piece of a cut pipe, the table of the whole pipe."""
     return with_defaults(table, table["links"][pipe_of_piece(table, name)])
 
 
 def pipe_of_piece(table: Mapping[str, Any], name: str) -> str:
-    """Name in the file of a link: its own, or that of the pipe it is a piece of."""
+    """Name of a link in the file; for a piece of a cut pipe, the name of the pipe."""
     return name if name in table.get("links", ()) else name.rpartition("-")[0]
 
 
 def fill_pipes(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Copy a table with the defaults filled into every link and the table `defaults` removed."""
+    """Copy of a raw table with the defaults filled into every link and the table `defaults` removed."""
     links = {
         name: with_defaults(table, link) if isinstance(link, dict) else link for name, link in table["links"].items()
     }
@@ -70,7 +73,7 @@ def default_place(table: Mapping[str, Any], keys: tuple) -> tuple:
 
 
 def find_faults(table: Mapping[str, Any], setting: ReadContext) -> Iterator[tuple[tuple, str]]:
-    """Faults of the tables of defaults, and of values that are invalid for every part."""
+    """Faults (key path, message) of the table `[defaults]`: unknown types or keys, and invalid values."""
     given = table.get("defaults", {})
     if not isinstance(given, dict):
         yield ("defaults",), f"{show(given)} is not a table; expected [defaults.pipe]"

@@ -1,4 +1,4 @@
-"""Design limits of a case: `[limits.NAME]`."""
+"""Design limits of a case, from the tables `[limits.NAME]`."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ BOUNDS = ("minimum", "maximum", "class_fraction")
 
 
 class Bound(Value):
-    """Number in the unit of the limited quantity, or a pressure by name ("vacuum", "vapor")."""
+    """Value of a key that is a bound: a number with the dimension of the quantity, or "vacuum" or "vapor"."""
 
     changes = VALUE
 
@@ -54,7 +54,7 @@ class Bound(Value):
 
 
 class On(Value):
-    """Names of parts or routes; resolved later, when the parts are known."""
+    """Value of the key `on`: names of parts or routes, which are looked up later, when all parts are read."""
 
     changes = VALUE
 
@@ -67,7 +67,7 @@ class On(Value):
 
 @dataclass(frozen=True)
 class DesignLimit:
-    """Lower and upper bound of a quantity on an extent, checked after every step [SI].
+    """Lower and upper bound [SI] of a quantity in some parts of a case (the extent), checked after every step.
 
     minimum, maximum : a number, "vacuum" (ambient pressure) or "vapor" (vapour pressure)
     class_fraction : greatest gauge pressure over the allowable pressure of the class of each pipe [-]
@@ -87,7 +87,7 @@ class DesignLimit:
 
 
 def limit_keys(quantity: str, dimension: str) -> dict[str, tuple[Value, Any]]:
-    """Keys of a limit on a quantity."""
+    """Keys of a limit on a quantity: name -> (declaration, default)."""
     bound = Bound(dimension, quantity in OF_PRESSURE)
     return {
         "on": (On(), NEEDED),
@@ -101,7 +101,7 @@ def limit_keys(quantity: str, dimension: str) -> dict[str, tuple[Value, Any]]:
 def read_limit(
     name: str, given: Any, kinds: Kinds, routes: Mapping[str, Any], links: Mapping[str, Any], setting: ReadContext
 ) -> DesignLimit | None:
-    """Read one table of `[limits]`; None if its parts are faulty. Raises ValueError, ValueFault."""
+    """Read one table of `[limits]`; None if the parts that it names are faulty. Raises ValueError, ValueFault."""
     if not isinstance(given, dict):
         raise ValueError(f'{show(given)} is not a table; expected for example {{ on = "pipes", maximum = "16 barg" }}')
     quantity = given.get("quantity", "gauge_pressure" if "class_fraction" in given else "pressure")
@@ -143,7 +143,7 @@ def read_limit(
 
 
 def limit_faults(limit: DesignLimit | None, fluid: Any, gravity: float) -> Iterator[tuple[tuple, str]]:
-    """Faults of a limit that depend on the fluid and gravity of its case."""
+    """Faults (key path, message) of a limit that depend on the fluid and gravity [m/s2] of its case."""
     if limit is None:
         return
     if gravity == 0.0 and limit.extent.quantity in ("head", "pressure_head"):
@@ -157,12 +157,12 @@ def limit_faults(limit: DesignLimit | None, fluid: Any, gravity: float) -> Itera
 
 
 def pipes_without_class(extent: Extent, links: Mapping[str, Any]):
-    """Faults of `class_fraction` on quantities or parts without a pressure class."""
+    """Fault of `class_fraction` for a quantity other than pressure, or for parts without a pressure class."""
     if extent.quantity not in OF_PRESSURE or extent.quantity == "head":
-        yield ("class_fraction",), f"a class limits pressure, not {extent.quantity}; leave quantity out"
+        yield ("class_fraction",), f"a class limits pressure, not {extent.quantity}; leave out `quantity`"
         return
     bare = {name for name, link in links.items() if getattr(link, "allowable_pressure", None) is None}
     parts = [name for group, name in extent.parts if group != "links" or name in bare]
     if parts:
         more = f" and {len(parts) - 1} more" if len(parts) > 1 else ""
-        yield ("class_fraction",), f"{parts[0]}{more} has no pressure class; give it class or allowable_pressure"
+        yield ("class_fraction",), f"{parts[0]}{more} has no pressure class; give it `class` or `allowable_pressure`"

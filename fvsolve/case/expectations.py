@@ -1,4 +1,4 @@
-"""Claims and measured series of a case: `[expect]`, `[compare]`."""
+"""Claims (`[expect]`) and measured series (`[compare]`) of a case."""
 
 from __future__ import annotations
 
@@ -25,9 +25,11 @@ _BARE = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 
 @dataclass(frozen=True)
 class Expect:
-    """Claim: a function of a probe (max, min, mean, final, at), or an extreme of a part or route, equals `value`.
+    """Claim that a function (max, min, mean, final, at) of a probe equals `value`, or an extreme over a part or route.
 
-    value : expected value [SI], within rtol, atol
+    text : claim as in the file, such as "max(gate.pressure)"; time : time of the function `at` [s], else None
+    probe, extent : probe, or parts and quantity; the other is None
+    value : expected value [SI]; rtol, atol : relative and absolute [SI] tolerance
     """
 
     text: str
@@ -46,9 +48,11 @@ class Expect:
 
 @dataclass(frozen=True, eq=False)
 class Compare:
-    """Measured series for comparison with a probe: columns by header, shift to be added to its times [s].
+    """Measured series for comparison with a probe.
 
-    t, v : float64[n]  times as measured, without shift [s], and values [SI, pressures absolute]
+    file, path : name as in the case, and path, of a CSV file; time, value : headers of its columns
+    shift : time that is added to the measured times [s]
+    t, v : float64[n]  measured times without shift [s], and values [SI, pressures absolute]
     """
 
     probe: Probe
@@ -66,7 +70,7 @@ class Compare:
 
 
 def read_expect(claim: str, given: Any, kinds: Kinds, routes: Mapping[str, Any], setting: ReadContext) -> Expect | None:
-    """Read one entry of `[expect]`; None if the part of its probe is faulty. Raises ValueFault."""
+    """Read one entry of `[expect]`; None if the part that the claim names is faulty. Raises ValueFault."""
     faults, named = [], (None, None, None, None)
     try:
         named = read_claim(claim, kinds, routes, setting)
@@ -93,7 +97,10 @@ def read_expect(claim: str, given: Any, kinds: Kinds, routes: Mapping[str, Any],
 def read_claim(
     claim: str, kinds: Kinds, routes: Mapping[str, Any], setting: ReadContext
 ) -> tuple[str, Probe | None, Extent | None, float | None]:
-    """Return (function, probe, extent, time [s]) of a claim; probe and extent are None if the part is faulty."""
+    """Split a claim into function, probe, extent and time [s], each None if absent. Raises ValueError.
+
+    Probe and extent are both None if the part is faulty.
+    """
     match = _CLAIM.fullmatch(claim)
     if match is None or match[1] not in FUNCTIONS:
         hint = did_you_mean(match[1], FUNCTIONS) if match else ""
@@ -126,7 +133,7 @@ def read_claim(
 
 
 def expect_keys(dimension: str) -> dict[str, tuple[Any, Any]]:
-    """Keys of a claim on a probe of that dimension; the tolerance of a pressure is a difference, never gauge."""
+    """Keys of a claim on a quantity of that dimension; `atol` of a pressure is a difference of pressures, not gauge."""
     difference = "modulus" if dimension.endswith("pressure") else dimension
     return {
         "value": (Quantity(dimension, changes=VALUE), NEEDED),

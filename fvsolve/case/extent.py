@@ -1,4 +1,4 @@
-"""Parts and a quantity whose extremes over all steps are recorded."""
+"""Quantity in some parts of a case whose extremes over all steps are recorded, for limits and claims."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ OF_PRESSURE = {"pressure": "pressure", "gauge_pressure": "gauge_pressure", "head
 
 @dataclass(frozen=True)
 class Extent:
-    """Quantity of all `parts` (pairs of group and name); on pipes in every cell, at both ends and profile points."""
+    """Quantity in all `parts` (pairs of group and name); in pipes in every cell, at both ends and at profile points."""
 
     on: tuple[str, ...]  # as the file names them
     parts: tuple[tuple[str, str], ...]
@@ -26,7 +26,7 @@ class Extent:
     dimension: str
 
     def probes(self, links: Mapping[str, Any]) -> Iterator[Probe]:
-        """Probes to follow for the extremes, in addition to the pressures of cells."""
+        """Probes that record the extremes, in addition to the recorded extreme pressures of all cells."""
         pressed = self.quantity in OF_PRESSURE
         quantity, dimension = ("pressure", "pressure") if pressed else (self.quantity, self.dimension)
         for group, name in self.parts:
@@ -40,12 +40,12 @@ class Extent:
 
 
 def along(pipe: str, quantity: str, share: float, dimension: str) -> Probe:
-    """Probe at a fraction of the length of a pipe, read along a straight line between cells."""
+    """Probe at the fraction `share` of the length of a pipe, interpolated linearly between cells."""
     return Probe(f"links.{pipe}.{quantity}@{share!r}", "links", pipe, quantity, share, dimension, straight=True)
 
 
 def of_profiles(links: Mapping[str, Any]) -> Iterator[Probe]:
-    """Pressure probes at both ends and at every point of pipes with a profile."""
+    """Pressure probes at both ends and at every profile point of pipes with an elevation profile."""
     for name, link in links.items():
         if getattr(link, "profile", None) is not None:
             inner = link.profile.distance[1:-1] / link.length
@@ -54,9 +54,10 @@ def of_profiles(links: Mapping[str, Any]) -> Iterator[Probe]:
 
 
 def read_extent(given: Any, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) -> Extent | None:
-    """Read the extent of names; None if one of the parts is faulty.
+    """Read a quantity in the parts or routes that `given` (a name or a list) names; None if one of the parts is faulty.
 
-    Raises ValueError for unknown names, ValueFault (below the key `quantity`) if a part lacks the quantity.
+    kinds : classes of all parts by group and name. Raises ValueError for unknown names, ValueFault (at the key
+    `quantity`) if a part does not have the quantity.
     """
     names = [given] if isinstance(given, str) else given
     if not isinstance(names, (list, tuple)) or not names or not all(isinstance(word, str) for word in names):
@@ -96,7 +97,10 @@ def read_extent(given: Any, quantity: str, kinds: Kinds, routes: Mapping[str, An
 
 
 def parts_of(name: str, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) -> list[tuple[str, str]] | None:
-    """Pairs (group, name) of the parts that a name stands for; None if a part is faulty. Raises ValueError."""
+    """Pairs (group, name) of the parts that a name of a part or route, "pipes" or "nodes" stands for.
+
+    None if a part is faulty. Raises ValueError for an unknown name or a missing quantity.
+    """
     group, dot, rest = name.partition(".")
     if dot and group in ("nodes", "links") and rest in kinds[group]:
         return None if kinds[group][rest] is None else [(group, rest)]
@@ -127,21 +131,21 @@ def parts_of(name: str, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) 
 
 
 def counts_as_node(kind: Any, quantity: str) -> bool:
-    """True if a kind of node counts among "nodes" for a quantity.
+    """True if the word "nodes" in a limit or claim includes this class of node for a quantity.
 
-    The pressure of a reservoir is given, perhaps without an elevation: it does not count.
+    A reservoir is not included for pressures and heads, since its pressure is given.
     """
     return quantity in quantities_of(kind) and not (kind is Reservoir and quantity in OF_PRESSURE)
 
 
 def quantities_of(kind: Any) -> dict[str, str]:
-    """Quantities of a kind of part that can be recorded -> dimension."""
+    """Quantities that can be recorded in a class of part: name -> dimension."""
     result = {**getattr(kind, "quantities", {}), **getattr(kind, "along", {})}
     return result | ({"pressure_head": "head"} if "pressure" in result else {})
 
 
 def only_dimension(quantity: str) -> str | None:
-    """Dimension of a quantity over all kinds of parts; None if no kind has it, or if kinds differ."""
+    """Dimension of a quantity in all types of parts; None if no type has it, or if the dimensions differ."""
     kinds = [kind for group in KINDS.values() for kind in group.values()]
     dimensions = {quantities_of(kind).get(quantity) for kind in kinds} - {None}
     return dimensions.pop() if len(dimensions) == 1 else None

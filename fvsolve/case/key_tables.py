@@ -76,7 +76,7 @@ def materials_table() -> str:
 
 
 def model_of(name: str) -> type[Table]:
-    """Declaration of a type of part, or of another table."""
+    """Declaration (class) of a type of part, or of another table of the case."""
     known = {**TABLES, **KINDS["nodes"], **KINDS["links"]}
     if name not in known:
         raise FvsolveError(f"unknown table of keys {show(name)}{did_you_mean(name, known)}; expected a type of part, "
@@ -85,7 +85,7 @@ def model_of(name: str) -> type[Table]:
 
 
 def rows_of(name: str, model: type[Table]) -> list[tuple[str, ...]]:
-    """Table rows, one per key; keys that another part lists in full share one row."""
+    """Rows of the table of a part, one per key; keys that the table of another part lists share one row."""
     rows = [row("type", Text(), NEEDED)] if name in ("every node", "every link") else []
     borrowed: dict[str, str] = {}  # key -> owner
     for base, owner in SHARED.items():
@@ -109,7 +109,7 @@ def row(key: str, value: Value, default: Any, needs: tuple[tuple[str, ...], ...]
 
 
 def about(value: Value) -> tuple[str, str]:
-    """Description without the unit, and the text of the default "if left out"."""
+    """Description of a key without its unit, and the text of its default, from the words before "if left out"."""
     unit = DIMENSIONS[value.dimension].si if isinstance(getattr(value, "dimension", None), str) else "-"
     words = value.about.replace(f" [{unit}]", "").replace(f"[{unit}]", "").strip("; ")
     if not words.endswith(LEFT_OUT):
@@ -119,7 +119,7 @@ def about(value: Value) -> tuple[str, str]:
 
 
 def default_cell(key: str, default: Any, needs: tuple[tuple[str, ...], ...]) -> str:
-    """Text of the default of a key."""
+    """Text of the default of a key; needs : groups of keys of which a table needs at least one."""
     for group in needs:
         if key in group:
             return f"*needed*, or {', '.join(f'`{other}`' for other in group if other != key)}"

@@ -1,4 +1,4 @@
-"""Read a case from a TOML file or dict."""
+"""Reading of a case from a TOML file or a dict."""
 
 from __future__ import annotations
 
@@ -89,10 +89,10 @@ TOP = {
 
 @validated(set=TABLE)
 def load(source: str | Path | Mapping[str, Any] | Case | Raw, set: Mapping[str, Any] | None = None) -> Case:
-    """Read the case of a TOML file, a shipped case by name, a dict shaped like a file, or a case; `set` overrides keys.
+    """Read a case from a TOML file, the name of a shipped case, a dict shaped like a file, or another case.
 
-    Numbers come out in SI, pressures absolute [Pa]. Raises CaseError with every fault: line, key path, the value found,
-    the expected value and the nearest valid name.
+    set : values that override keys, such as {"links.main.cells": 400}. Numbers of the result are in SI, pressures
+    absolute [Pa]. Raises CaseError with every fault: line, key path, value found, expected value, nearest valid name.
     """
     if isinstance(source, Raw):
         return _Reader(replace(source, table=read_raw(source.table).table, overridden=[]), set or {}).case()
@@ -105,20 +105,20 @@ def load(source: str | Path | Mapping[str, Any] | Case | Raw, set: Mapping[str, 
 
 
 def find_source(source: Any) -> Any:
-    """Path of a shipped case if the source is its name and no such file exists; otherwise the source."""
+    """Path of a shipped case if `source` is its name and not the path of a file; otherwise `source`."""
     if isinstance(source, str) and not Path(source).is_file() and source in shipped.names():
         return shipped.find(source)
     return source
 
 
 def shortest_cell_time(links: Mapping[str, Any], meshes: Mapping[str, Any], fluid: Any) -> float:
-    """Shortest travel time of a wave through a cell [s], in basins at 1 m/s; inf without cells."""
+    """Shortest travel time of a wave through a cell [s], with 1 m/s in basins; inf without cells."""
     times = [link.length / link.cells / wave_speed(link, fluid) for link in links.values() if isinstance(link, Pipe)]
     return min([*times, *(float(mesh.area.min()) ** 0.5 for mesh in meshes.values())], default=math.inf)
 
 
 def _alternatives() -> list[tuple[str, ...]]:
-    """Groups of keys of which a table may have at most one, over all tables."""
+    """Groups of alternative keys in all types of tables; a table may have at most one key of a group."""
     return _alternatives_of((Numerics, Friction, *KINDS["nodes"].values(), *KINDS["links"].values()))
 
 
@@ -128,7 +128,7 @@ def _alternatives_of(models: tuple) -> list[tuple[str, ...]]:
 
 
 class _Reader:
-    """Reader of one case: collects faults, in the order in which tables depend on each other."""
+    """Reader of one case. It reads the tables in the order in which they depend on each other, and collects faults."""
 
     def __init__(self, raw: Raw, settings: Mapping[str, Any], before: Case | None = None):
         self.raw, self.before = raw, before
@@ -253,12 +253,12 @@ class _Reader:
         return case if named is None else self.exact(case)
 
     def sizes(self, numerics, output, links, meshes, properties) -> Iterator[tuple[tuple, str]]:
-        """Faults of sizes, and of steps below the rounding of the time."""
+        """Faults of cases too large for the memory, and of steps below the rounding of the time."""
         yield from resource_checks.find_faults(numerics, output, links, meshes)
         yield from resource_checks.rounding_faults(numerics, shortest_cell_time(links, meshes, properties))
 
     def exact(self, case: Case) -> Case:
-        """Check the case against its exact solution; settings that invalidate the solution remove it."""
+        """Check that `[exact]` is valid for the case. If overrides make it invalid, it is removed without a fault."""
         faults = list(exact.find_faults(case))
         settings = {keys[0] for keys in self.raw.overridden}
         if faults and settings and "exact" not in settings:
@@ -298,9 +298,9 @@ class _Reader:
         self.origin |= result.origin
 
     def reuse(self, place: tuple, given: Any, make: Callable[[], Any]) -> Any:
-        """Value read at a key path in the case before, if its raw value is the same object; else the result of `make`.
+        """Value at a key path as read for the case `before`, if the raw value is the same object; else `make()`.
 
-        Values without faults that use no file and no signal are cached for the next reading.
+        A value without faults that uses no file and no signal is kept in `read` for the next reading.
         """
         before = None if self.before is None else self.before.read.get(place)
         if before is not None and before[0] is given:
@@ -313,7 +313,7 @@ class _Reader:
         return value
 
     def stop(self) -> None:
-        """Raise the faults collected so far."""
+        """Raise CaseError if faults were collected."""
         if self.faults:
             raise CaseError(dict.fromkeys(self.faults), self.raw.file)
 
@@ -363,7 +363,7 @@ class _Reader:
             return None
 
     def valid_keys(self, name: str, model: Any) -> Any:
-        """Model with the valid keys of a table only; all of them may be missing."""
+        """Instance of `model` with only the valid keys of a table, perhaps none; it is not checked."""
         values = {}
         for key, value in model.values().items():
             with suppress(KeyError, TypeError, ValueError):
@@ -371,7 +371,7 @@ class _Reader:
         return model.model_construct(**values)
 
     def valid_times(self) -> Numerics | None:
-        """Valid keys of `[numerics]`, if start and end are among them, else None."""
+        """Numerics with the valid keys of a faulty `[numerics]`; None if `end` or a stated `start` is not valid."""
         given = self.raw.table.get("numerics")
         valid = self.valid_keys("numerics", Numerics) if isinstance(given, dict) else None
         times = {key for key in ("start", "end") if valid is not None and key in given}
@@ -421,7 +421,7 @@ class _Reader:
             return spec, None
 
     def in_celsius(self, stated: dict[str, Any], key: str) -> str:
-        """Hint for a temperature in kelvin outside the fluid's range that would be valid in degrees Celsius."""
+        """Hint for a message if a temperature in kelvin is out of range but would be valid in degrees Celsius."""
         given = self.raw.get(("fluid", "temperature"))
         if key != "temperature" or isinstance(given, str):
             return ""
@@ -464,20 +464,20 @@ class _Reader:
         return result
 
     def uncounted(self) -> list[str]:
-        """Faulty parts whose places are unknown, and pipes whose number of pieces is unknown."""
+        """Names of faulty parts with unknown points or patches, and of pipes with an unknown number of pieces."""
         nodes, links = self.group("nodes"), self.group("links")
         pipes = [name for name, link in links.items()
                 if chainage.is_pipe(link) and not isinstance(link.get("bends", []), list)]  # fmt: skip
         return pipes + [name for name in (*nodes, *links) if check.has_unknown_places(name, nodes, links)]
 
     def part(self, kind: Any, given: dict[str, Any]) -> Any:
-        """Read a part of a type from its table."""
+        """Read a part of class `kind` from its raw table, completed by defaults."""
         rest = {key: value for key, value in defaults.with_defaults(self.raw.table, given).items() if key != "type"}
         kind = kind.variant(rest) if issubclass(kind, Node) else kind
         return kind.model_validate(rest, context=self.setting)
 
     def meshes(self, nodes: dict[str, Any]) -> dict[str, Any]:
-        """Meshes of basins by name; basins with a faulty mesh are removed from `nodes`."""
+        """Meshes of basins with cells, by name. Basins with a faulty mesh are removed from `nodes`."""
         result = {}
         for name, node in [*nodes.items()]:
             try:
@@ -490,9 +490,9 @@ class _Reader:
         return result
 
     def network_table(self, meshes: dict[str, Any]) -> dict[str, Any]:
-        """Table of the file for the check of connections: basins with all patches of their meshes.
+        """Raw table for the check of connections, in which basins have all patches of their meshes.
 
-        A lost node is a junction. A basin with a faulty mesh has the patches that links name.
+        A basin with a faulty mesh file has the patches that links name, and a node that cannot be read is a junction.
         """
         nodes, links = self.group("nodes"), self.group("links")
         patches = {name: basins.patch_names(mesh) for name, mesh in meshes.items()}

@@ -1,4 +1,4 @@
-"""Checks of places on bodies, and of links that join them."""
+"""Checks of nodes on bodies, and of links that join them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LENGTH_TOLERANCE = (
 
 
 def with_elevation(node: Node, poses: dict[str, Any]) -> Node:
-    """Node with its elevation at the start, if it is on a body; else the node itself."""
+    """Copy of a node on a body with its elevation at the start; any other node is returned unchanged."""
     pose = poses.get(getattr(node, "on", None))
     if pose is None or isinstance(node, Basin):
         return node
@@ -28,13 +28,16 @@ def with_elevation(node: Node, poses: dict[str, Any]) -> Node:
 
 
 def has_elevation(node: Node, poses: dict[str, Any]) -> bool:
-    """True if a node has a single known elevation: not a basin on a body, nor a node on an unknown body."""
+    """True if a node has a single known elevation; False for a basin on a body and for a node on an unknown body."""
     on = getattr(node, "on", None)
     return on is None or (on in poses and not isinstance(node, Basin))
 
 
 def find_faults(nodes: dict[str, Any], links: dict[str, Any], patches: dict[str, Any], named: Any) -> Faults:
-    """Faults of places on bodies, and of links that join them; patches : those of basins on bodies, by full name."""
+    """Faults (key path, message) of nodes on bodies, and of links that join them.
+
+    patches : patches of basins on bodies, by full name; named : tables of all nodes, also of faulty ones
+    """
     for name, node in nodes.items():
         if isinstance(node, Basin) or not isinstance(node, PlaceOnBody):
             continue
@@ -52,7 +55,10 @@ def find_faults(nodes: dict[str, Any], links: dict[str, Any], patches: dict[str,
 
 
 def missing_reactions(nodes: dict[str, Any], links: dict[str, Any], free: bool = False) -> Faults:
-    """Faults of networks whose reaction on their bodies is not modelled; free : only of bodies that move freely."""
+    """Faults of parts whose flow acts on a body by a force that is not modelled.
+
+    free : True for only the faults on bodies that move freely
+    """
 
     def on_body(name: str) -> bool:
         on = getattr(node_of(name, nodes), "on", None)
@@ -94,25 +100,25 @@ def missing_reactions(nodes: dict[str, Any], links: dict[str, Any], free: bool =
 
 
 def set_by_columns(end: str, nodes: dict[str, Any], links: dict[str, Any]) -> bool:
-    """True if only rigid columns and restrictions set the pressure of a place."""
+    """True if only rigid columns and restrictions set the pressure of the node `end`."""
     kinds = {link.kind for link in links.values() if end in link.ports.values()}
     return nodes[end].kind in ("junction", "inflow") and "pipe" not in kinds
 
 
 def node_of(place: str, nodes: dict[str, Any]) -> Any:
-    """Node at a place, or the basin that has it as a patch."""
+    """Node of that name, or the basin of a patch BASIN.PATCH; None if there is neither."""
     return nodes.get(place, nodes.get(place.rpartition(".")[0]))
 
 
 def link_faults(link: Any, ends: list[str], nodes: dict[str, Any], patches: dict[str, Any]) -> Faults:
-    """Faults of a link with at least one end on a body."""
+    """Faults (key path in the link, message) of a link with at least one end on a body."""
     stand = [node_of(place, nodes) for place in ends]
     on = [getattr(node, "on", None) for node in stand]
     if None in stand or any(body is not None and body not in nodes for body in on):
         return  # an end is faulty
     if not any(on):
         if getattr(link, "route", None):
-            yield ("route",), "is a route on a body, but no end of the pipe is on a body; give both ends on and at"
+            yield ("route",), "is a route on a body, but no end of the pipe is on a body; give both ends `on` and `at`"
         return
     if len(set(on)) > 1:
         each = zip(ends, on, strict=True)
@@ -149,7 +155,7 @@ def patch_faults(end: str, node: Any) -> Iterator[str]:
 
 
 def position_text(ends: list[str], patches: dict[str, Any]) -> str:
-    """Text of the computed positions of patches."""
+    """Text with the computed positions of those ends that are patches; empty if none is."""
     texts = [
         f"{end} at [{', '.join(f'{coordinate:.7g}' for coordinate in patches[end].at)}]"
         for end in ends

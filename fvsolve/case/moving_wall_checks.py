@@ -28,14 +28,17 @@ def axis_of(basin: Any, mesh: Any) -> int:
 
 
 def outward(mesh: Any, patch: str) -> tuple[int, float]:
-    """(axis, 1 or -1) of the outward normal of a patch perpendicular to an axis."""
+    """Axis (0 for x, 1 for y) and sign (1 or -1) of the outward normal of a patch perpendicular to this axis."""
     normal = mesh.normal[mesh.patch(patch)].mean(axis=0)
     axis = int(np.argmax(np.abs(normal)))
     return axis, float(np.sign(normal[axis]))
 
 
 def weights(basin: Any, mesh: Any, patch: str, at: np.ndarray) -> np.ndarray:
-    """Share of the travel of a wall at positions `at` [m]: 1 at the wall, 0 at the end of its zone : float64[...]."""
+    """Displacement of mesh points over the travel of a wall [-]: 1 at the wall, 0 at the end of its zone.
+
+    at : float64[n]  coordinates of the points along the axis of motion [m]; the result is float64[n]
+    """
     axis, side = outward(mesh, patch)
     low, high = mesh.points[:, axis].min(), mesh.points[:, axis].max()
     zone = basin.patches[patch].zone or high - low
@@ -43,9 +46,9 @@ def weights(basin: Any, mesh: Any, patch: str, at: np.ndarray) -> np.ndarray:
 
 
 def area_growth(mesh: Any, axis: int, share: np.ndarray) -> np.ndarray:
-    """Growth of cell areas per travel, relative to the areas as drawn : float64[n] [1/m].
+    """Relative growth of cell areas per travel of a wall, from the initial areas : float64[n] [1/m].
 
-    share : float64[p]  share of the wall's travel at the points of the mesh
+    axis : axis of motion, 0 for x, 1 for y; share : float64[p]  displacement of mesh points over the wall's travel [-]
     """
     swept = mesh.length * mesh.normal[:, axis] * share[mesh.ends].mean(axis=1)
     inner = mesh.inner
@@ -62,11 +65,15 @@ def find_faults(
     times: tuple[float, float],
     named: Any,
 ) -> Iterator[tuple[tuple, str]]:
-    """Faults of moving walls; times : start and end [s]."""
+    """Faults (key path, message) of the moving walls of a basin.
+
+    joined : full names of patches that links join; times : start and end of the run [s]
+    named : tables of all nodes, also of faulty ones
+    """
     key = ("nodes", name, "patches")
     for patch, options in basin.patches.items():
         if options.zone is not None and not options.moves:
-            yield (*key, patch, "zone"), "applies only to a moving wall; give body or travel too"
+            yield (*key, patch, "zone"), "applies only to a moving wall; give `body` or `travel` too"
     walls = {patch: options for patch, options in moving_walls(basin).items() if patch in mesh.patches[:-1]}
     for patch, options in walls.items():
         yield from (
@@ -86,14 +93,14 @@ def find_faults(
 def wall_faults(
     basin: Any, mesh: Any, patch: str, options: Any, nodes: dict, times: tuple, named: Any
 ) -> Iterator[tuple[tuple, str]]:
-    """Faults of one wall; keys are relative to its patch."""
+    """Faults (key path within the patch, message) of one moving wall; arguments as in `find_faults`."""
     if not basin.physics_type.moves:
         yield (), f"physics {show(basin.physics)} does not support moving walls"
     for other in ("boundary", "impedance", "scalars"):
         if getattr(options, other):
             yield (other,), "applies only to an open boundary, and this is a moving wall; leave it out"
     if options.span is not None:
-        yield ("span",), "a moving wall is a whole side; leave span out"
+        yield ("span",), "a moving wall is a whole side; leave out `span`"
     if options.body is not None and (
         options.body in nodes or options.body not in named
     ):  # otherwise the body itself is faulty
@@ -123,7 +130,7 @@ def wall_faults(
 
 
 def body_faults(name: str, nodes: dict[str, Any], axis: int) -> Iterator[str]:
-    """Faults of the body that a wall names; axis : along which the wall moves."""
+    """Fault texts for the mass or body `name` that moves a wall; axis : axis of motion, 0 for x, 1 for y."""
     known = [other for other, node in nodes.items() if getattr(node, "kind", "") in ("mass", "body")]
     node = nodes.get(name)
     if node is None:
@@ -132,27 +139,28 @@ def body_faults(name: str, nodes: dict[str, Any], axis: int) -> Iterator[str]:
         yield from slider_faults(name, node, nodes, axis)
     elif node.kind != "mass":
         still = "a frame, which is fixed" if node.kind == "frame" else f"a {node.kind}"
-        yield f"{name} is {still}; expected a mass, a body on a prismatic joint, or travel instead of body"
+        yield f"{name} is {still}; expected a mass, a body on a prismatic joint, or `travel` instead of `body`"
 
 
 def slider_faults(name: str, node: Any, nodes: dict[str, Any], axis: int) -> Iterator[str]:
-    """Faults of a body that moves a wall."""
+    """Fault texts for a body that does not slide on the world along the axis of a wall; axis : 0 for x, 1 for y."""
     up = nodes.get((node.joint.on or "").partition(".")[0])
     if node.joint.kind != "prismatic" or getattr(up, "kind", "frame") != "frame":
-        yield f"{name} does not slide on the world; expected a prismatic joint on the world, or travel instead of body"
+        yield f"{name} does not slide on the world; expected a prismatic joint on it, or `travel` instead of `body`"
     elif abs(slide_direction(node)[axis]) < 1.0 - 1e-9:
         yield f"{name} does not slide along {'xy'[axis]}, the axis of the wall; change the axis of its joint"
 
 
 def slide_direction(body: Any) -> np.ndarray:
-    """Direction in the world along which a body on a prismatic joint slides : float64[3]."""
+    """Unit vector in world axes along which a body on a prismatic joint slides : float64[3]."""
     return body.joint.attitude.rotation @ body.joint.unit_axis
 
 
 def travel_faults(travel: Any, side: float, zone: float, times: tuple, mesh: Any, per: np.ndarray) -> Iterator[str]:
-    """Faults of the travel of a wall: jumps, travel beyond its zone, and an inverted cell at the end of the zone.
+    """Fault texts for the travel of a wall: jumps, travel beyond its zone, and inverted cells.
 
-    per : float64[n]  growth of cell areas per travel, relative to the areas [1/m]
+    travel : schedule [m]; side : sign of the outward normal; zone : width of the deformed zone [m]
+    times : start and end of the run [s]; per : float64[n]  relative growth of cell areas per travel [1/m]
     """
     if travel.kind == "step":
         yield "jumps, and a wall has a finite speed; expected a schedule without jumps, for example a ramp"
@@ -169,7 +177,7 @@ def travel_faults(travel: Any, side: float, zone: float, times: tuple, mesh: Any
 
 
 def outline_faults(basin: Any, mesh: Any, patch: str) -> Iterator[tuple[tuple, str]]:
-    """Faults of boundaries that a wall would deform: in its zone they must be parallel to its motion."""
+    """Fault of a boundary that a moving wall would deform: in the wall's zone it must be parallel to the motion."""
     axis, _ = outward(mesh, patch)
     outer = np.arange(mesh.inner, mesh.left.size)
     own = mesh.patch(patch)
@@ -182,7 +190,7 @@ def outline_faults(basin: Any, mesh: Any, patch: str) -> Iterator[tuple[tuple, s
 
 
 def bed_faults(basin: Any, mesh: Any, patch: str) -> Iterator[tuple[tuple, str]]:
-    """Faults of a bed that is not flat in the zone of a wall."""
+    """Fault of a bed that is not flat in the deformed zone of a wall."""
     axis, _ = outward(mesh, patch)
     corners = np.where(mesh.cells < 0, mesh.cells[:, :1], mesh.cells)
     goes = weights(basin, mesh, patch, mesh.points[:, axis]) > 0.0
@@ -196,7 +204,7 @@ def bed_faults(basin: Any, mesh: Any, patch: str) -> Iterator[tuple[tuple, str]]
 
 
 def faults_between(basin: Any, mesh: Any, walls: dict[str, Any], times: tuple) -> Iterator[tuple[tuple, str]]:
-    """Faults between walls: different axes, inverted cells, and other patches on the side of a moving wall."""
+    """Faults of several walls together: different axes, inverted cells, fixed patches on the side of a moving wall."""
     yield from crossing_faults(basin, mesh, walls, times)
     axes = {patch: outward(mesh, patch) for patch in walls}
     first = next(iter(axes), None)
@@ -215,7 +223,7 @@ def faults_between(basin: Any, mesh: Any, walls: dict[str, Any], times: tuple) -
 
 
 def crossing_faults(basin: Any, mesh: Any, walls: dict[str, Any], times: tuple) -> Iterator[tuple[tuple, str]]:
-    """Faults of walls whose travels together invert a cell, although each travel alone does not."""
+    """Fault of walls whose motions together invert a cell, although each motion alone does not."""
     driven = {patch: item.travel for patch, item in walls.items() if item.travel is not None}
     if len(driven) < 2 or len({outward(mesh, patch)[0] for patch in driven}) > 1:
         return

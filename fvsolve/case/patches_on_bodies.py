@@ -1,4 +1,4 @@
-"""Places on bodies of the patches of basins."""
+"""Positions and water depths of patches of basins on bodies."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ import numpy as np
 
 from fvsolve.case.cell_means import means, samples
 
-BISECTIONS = 200  # bisections
+BISECTIONS = 200  # number of bisections
 
 
 def on_body(basin: Any, mesh: Any, patch: str, rest: dict[str, Any], pose: Any) -> dict[str, Any]:
-    """Add to the state at rest of a patch its place: the middle of its faces, on the bed of the cells next to it.
+    """State at rest of a patch, with the keys `on` and `at` added: body and position of the middle of its faces.
 
-    pose : pose of the body at the start, for elevation and depth of water; None leaves both as they are
+    rest : state at rest in the upright basin; pose : pose of the body at the start, by which elevation and depth are
+    computed; if None, they stay as in `rest`
     """
     faces = mesh.patch(patch)
     x, y = mesh.length[faces] @ mesh.middle[faces] / mesh.length[faces].sum()
@@ -29,7 +30,10 @@ def on_body(basin: Any, mesh: Any, patch: str, rest: dict[str, Any], pose: Any) 
 
 
 def depth_over(basin: Any, mesh: Any, place: np.ndarray, attitude: np.ndarray) -> float:
-    """Depth of water with a horizontal surface over a place in axes of a basin, at least 0 [m]."""
+    """Depth of water with a horizontal surface above a point of a tilted basin, at least 0 [m].
+
+    place : float64[3]  point in the axes of the basin [m]; attitude : float64[3, 3]  rotation matrix of the body
+    """
     down = (attitude @ basin.rotation).T @ np.array([0.0, 0.0, -1.0])
     if not down[2] < 0.0:
         return 0.0
@@ -42,9 +46,10 @@ def depth_over(basin: Any, mesh: Any, place: np.ndarray, attitude: np.ndarray) -
 
 
 def level_over(drawn: np.ndarray, tilt: np.ndarray, area: np.ndarray, volume: float) -> float:
-    """Level of a volume of water over a tilted bed relative to its level at rest [m]; 0 without tilt.
+    """Level of a volume of water [m3] over a tilted bed, relative to the level without tilt [m].
 
-    drawn : height of the bed above the level at rest [m]; tilt : its rise by the tilt [m]; area [m2]; volume [m3]
+    drawn : float64[n]  height of the bed in each cell above that level, without tilt [m]
+    tilt : float64[n]  rise of the bed by the tilt [m]; area : float64[n]  areas of the cells [m2]
     """
     ground = drawn + tilt
     if not np.ptp(ground - drawn) > 0.0:

@@ -1,4 +1,4 @@
-"""Routes: consecutive pipes with one chainage."""
+"""Routes: consecutive pipes with one running chainage."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fvsolve.units import show
 
 
 class PipeNames(Value):
-    """List of names of consecutive pipes."""
+    """Value of a key that lists the names of consecutive pipes."""
 
     about = "names of consecutive pipes; each begins where the previous pipe ends, or across links without length"
     takes = "list of names"
@@ -35,7 +35,7 @@ class PipeNames(Value):
 
 
 class Route(Table):
-    """`[routes.NAME]`: consecutive pipes with one chainage."""
+    """Table `[routes.NAME]`: consecutive pipes with one running chainage."""
 
     pipes: Annotated[tuple[str, ...], PipeNames()]
     start: Annotated[
@@ -47,7 +47,7 @@ class Route(Table):
 
 @dataclass(frozen=True)
 class Leg:
-    """Pipe on a route.
+    """Pipe on a route, with its chainages and direction.
 
     begin, end : chainages where the route enters and leaves the pipe [m]
     backwards : True if the route runs from the `to` end of the pipe to its `from` end
@@ -59,28 +59,28 @@ class Leg:
     backwards: bool
 
     def chainage(self, distance: Any) -> Any:
-        """Chainage at distances from the `from` end of the pipe [m]."""
+        """Chainage [m] of points at distances from the `from` end of the pipe [m]."""
         return self.end - distance if self.backwards else self.begin + distance
 
     def distance(self, chainage: Any) -> Any:
-        """Distance from the `from` end of the pipe at chainages [m]."""
+        """Distance from the `from` end of the pipe [m] of points at chainages [m]."""
         return self.end - chainage if self.backwards else chainage - self.begin
 
 
 def is_cut(name: str, pipes: Sequence[str]) -> bool:
-    """True if a route consists of the pieces of one cut pipe."""
+    """True if `pipes` are the pieces of the cut pipe `name`, in order."""
     return list(pipes) == [f"{name}-{k + 1}" for k in range(len(pipes))]
 
 
 def pipe_leg(pipe: str, links: dict[str, Any]) -> Leg:
-    """Leg of a single pipe from `from` to `to`, with the chainages of its profile if it has one."""
+    """Leg of a single pipe, from `from` to `to`, with the chainages of its elevation profile, else from 0."""
     profile = links[pipe].profile
     begin = 0.0 if profile is None else float(profile.chainage[0])
     return Leg(pipe, begin, begin + links[pipe].length, False)
 
 
 def expand_pieces(route: Route, pieces: dict[str, list[str]], links: dict[str, Any]) -> Route:
-    """Replace cut pipes of a route by their pieces, in the direction of the route."""
+    """Copy of a route in which cut pipes are replaced by their pieces, in the direction of the route."""
     cut = [name for name in route.pipes if name in pieces]
     options = []
     for turned in itertools.product((1, -1), repeat=len(cut)):
@@ -105,7 +105,7 @@ def has_known_type(given: Any) -> bool:
 def find_faults(
     routes: dict[str, Route | None], links: dict[str, Any], named: dict[str, Any], pieces: dict[str, list[str]]
 ) -> Iterator[tuple]:
-    """Faults of routes: names that are not pipes, and pipes that are not consecutive.
+    """Faults (key path, message) of routes: names that are not pipes, and pipes that are not consecutive.
 
     named : raw links, also faulty ones; pieces : cut pipe -> names of its pieces
     """
@@ -140,14 +140,17 @@ def find_faults(
 
 
 def index_in_file(route: Route, pieces: dict[str, list[str]], k: int) -> int:
-    """Index in the file of the name that pipe k of a route came from; pieces of a pipe share a name."""
+    """Index in the list of the file for pipe k of a route; all pieces of a cut pipe have the index of its name."""
     cut_pipe = {piece: name for name, own in pieces.items() for piece in own}
     names = [cut_pipe.get(pipe, pipe) for pipe in route.pipes[: k + 1]]
     return sum(following != before for following, before in itertools.pairwise(names))
 
 
 def joined_places(links: dict[str, Any], named: dict[str, Any] = {}) -> dict[str, str]:  # noqa: B006
-    """Place -> representative of all places joined to it by links without length, also by faulty links."""
+    """Name of a node -> common name of all nodes that links without length join to it.
+
+    links : links by name; named : raw links, also faulty ones, which count as joined
+    """
     root: dict[str, str] = {}
 
     def find(name: str) -> str:
@@ -166,9 +169,10 @@ def joined_places(links: dict[str, Any], named: dict[str, Any] = {}) -> dict[str
 
 
 def directions(route: Route, links: dict[str, Any], named: dict[str, Any] = {}) -> list[list[tuple[int, bool]]]:  # noqa: B006
-    """Possible directions of each pipe of a route: (index of the choice for the previous pipe, backwards).
+    """Possible directions of the pipes of a route: a list for each pipe with a pair for each possible direction.
 
-    The first entry is a start before the first pipe. The list ends with an empty entry at the first gap.
+    A pair is (index of a suitable pair in the list of the previous pipe, True if the pipe is passed backwards); the
+    index for the first pipe is -1. The result ends with an empty list at the first gap.
     """
     root = joined_places(links, named)
     ends = [[root.get(place, place) for place in (links[pipe].from_, links[pipe].to)] for pipe in route.pipes]
@@ -192,7 +196,7 @@ def first_gap(route: Route, links: dict[str, Any], named: dict[str, Any] = {}) -
 
 
 def legs(route: Route, links: dict[str, Any]) -> list[Leg]:
-    """Legs of a route: its pipes with chainages and directions."""
+    """Legs of a route without gaps: its pipes with chainages and directions."""
     choices = directions(route, links)
     turned, at = [], 0
     for options in reversed(choices):

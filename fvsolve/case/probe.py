@@ -1,4 +1,4 @@
-"""Probes: recorded quantities of parts."""
+"""Probes (recorded quantities of parts) and the reading of their texts."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ DEFAULT_OF_LINKS = ("flow", "flow_P", "flow_T", "flow_A", "flow_B", "force")
 class Probe:
     """Recorded quantity of a part.
 
-    text : as the case writes it
-    fraction : place along a pipe as a fraction of its length from the `from` end, else None
+    text : text of the probe in the case, such as "main.pressure@0.5"
+    fraction : distance from the `from` end of a pipe over its length [-], else None
     point : x, y in a basin [m], else None
     straight : True to interpolate linearly between cells, not by the polynomial of the scheme
     """
@@ -47,10 +47,10 @@ Kinds = Mapping[str, Mapping[str, "type[Node] | type[Link] | BasinFields | Scala
 
 
 def read_probe(given: object, kinds: Kinds) -> Probe | None:
-    """Probe of a text; None if its part is faulty. Raises ValueError.
+    """Probe from its text, such as "gate.pressure"; None if the part is faulty. Raises ValueError.
 
-    kinds : for "nodes" and "links" the class of each name (None if its type is unknown, for a basin its probes), and
-    the "scalars"
+    kinds : "nodes" and "links" -> class of each part by name (None if faulty, `BasinFields` for a basin);
+    "scalars" -> scalars; "routes" -> legs of routes; "pipes" -> pipes; "uncut" -> faulty parts with unknown points
     """
     match = _PROBE.fullmatch(given.strip()) if isinstance(given, str) else None
     if match is None:
@@ -84,12 +84,15 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
 
 
 def may_be_piece(name: str, kinds: Kinds) -> bool:
-    """True if a name may be that of a piece, bend or place of a faulty part, whose places are unknown."""
+    """True if a name may denote a pipe piece, bend, point or patch of a faulty part, for which these are unknown."""
     return any(name.startswith((f"{pipe}-", f"{pipe}.")) for pipe in kinds.get("uncut", ()))
 
 
 def route_probe(text: str, name: str, quantity: str, place: str | None, kinds: Kinds) -> Probe | None:
-    """Probe at a fraction of the length or a chainage of a route; None if the route is faulty. Raises ValueError."""
+    """Probe of a quantity on a route; None if the route is faulty. Raises ValueError.
+
+    place : text after "@", a fraction of the length of the route or a chainage with unit
+    """
     along = Pipe.along | _scalars_of(Pipe, kinds, "along")
     if quantity not in along:
         near = did_you_mean(quantity, along)
@@ -111,10 +114,10 @@ def route_probe(text: str, name: str, quantity: str, place: str | None, kinds: K
 
 
 def fraction_of(place: str, length: float | None, begin: float) -> float:
-    """Fraction of a length that a text gives as a fraction, or as a chainage with its unit. Raises ValueError.
+    """Fraction of the length of a pipe or route, from a text such as "0.5" or "1.2 km". Raises ValueError.
 
-    length : length [m]; None for a faulty pipe, where every chainage is accepted
-    begin : chainage of the start [m]
+    length : length of the pipe or route [m]; None for a faulty pipe, where every chainage is accepted
+    begin : chainage of its start [m]
     """
     try:
         share = float(place)
@@ -134,7 +137,7 @@ def fraction_of(place: str, length: float | None, begin: float) -> float:
 
 
 def default_probes(kinds: Kinds) -> list[Probe]:
-    """Default probes: all nodes (pressure, head, level; motion of masses and bodies) and all links (flows; force)."""
+    """Default probes: main quantities of all nodes (pressure, level, position) and of all links (flow, force)."""
     probes = []
     for part, quantities in (("nodes", DEFAULT_OF_NODES), ("links", DEFAULT_OF_LINKS)):
         other = kinds["links" if part == "nodes" else "nodes"]
@@ -152,7 +155,7 @@ def default_probes(kinds: Kinds) -> list[Probe]:
 
 
 def _scalars_of(kind: type[Node] | type[Link], kinds: Kinds, where: str) -> dict[str, str]:
-    """Scalars that a kind of part has: all if it has a pressure, else none."""
+    """Scalars (name -> "number") that a class of part has: all scalars of the case if it has a pressure, else none."""
     return dict.fromkeys(kinds["scalars"] if "pressure" in getattr(kind, where, {}) else (), "number")
 
 

@@ -1,4 +1,4 @@
-"""Raw case before it is read: nested dicts, line numbers, overrides."""
+"""Raw case before its values are read: nested dicts, line numbers, overrides."""
 
 from __future__ import annotations
 
@@ -20,7 +20,11 @@ DEEPEST = 40
 
 @dataclass
 class Raw:
-    """Nested dicts `table` of a source, with its `text` and the key paths that settings have `overridden`."""
+    """Raw case.
+
+    table : nested dicts as in the file; text : text of the file; folder : folder of the file, for other files
+    overridden : key paths whose values were replaced by overrides
+    """
 
     table: dict[str, Any]
     name: str = "case"
@@ -31,7 +35,7 @@ class Raw:
 
     @functools.cached_property
     def lines(self) -> dict[tuple, int]:
-        """Key path -> line number; computed at the first fault."""
+        """Key path -> line number in the file, computed when first needed."""
         return key_lines(self.text)
 
     @property
@@ -40,21 +44,21 @@ class Raw:
         return self.path.name if self.path else self.name
 
     def line(self, keys: tuple) -> int | None:
-        """Line of a key path, or of the nearest table that contains it."""
+        """Line number of a key path, or of the innermost table that contains it; None if unknown."""
         for count in range(len(keys), 0, -1):
             if keys[:count] in self.lines:
                 return self.lines[keys[:count]]
         return None
 
     def is_override(self, keys: tuple) -> bool:
-        """True if a key path was set, lies below a path that was set, or was created by a setting."""
+        """True if an override replaced the value at a key path or a table around it, or created the key path."""
         if any(keys[: len(path)] == path for path in self.overridden):
             return True
         created = bool(self.lines) and keys not in self.lines
         return created and any(path[: len(keys)] == keys for path in self.overridden if keys)
 
     def get(self, keys: tuple) -> Any:
-        """Value at a key path, or None."""
+        """Value at a key path; None if there is none."""
         value: Any = self.table
         for key in keys:
             try:
@@ -65,7 +69,7 @@ class Raw:
 
 
 def read_raw(source: Any) -> Raw:
-    """Read the raw case of a TOML file or a dict. Raises CaseError."""
+    """Read the raw case from a TOML file or a dict. Raises CaseError."""
     if isinstance(source, Mapping):
         return Raw(_copy(source))
     if not isinstance(source, (str, Path)):
@@ -85,7 +89,7 @@ def read_raw(source: Any) -> Raw:
 
 
 def copy_paths(table: dict[str, Any], paths: list[tuple[str, ...]]) -> dict[str, Any]:
-    """Copy a table along the paths that are to be written; share all other values with the original."""
+    """Copy of a table and of its inner tables along `paths`; all other values are shared with the original."""
     copy = dict(table)
     for key in {path[0] for path in paths}:
         below = [path[1:] for path in paths if path[0] == key and path[1:]]
@@ -95,10 +99,10 @@ def copy_paths(table: dict[str, Any], paths: list[tuple[str, ...]]) -> dict[str,
 
 
 def override(raw: Raw, settings: Mapping[str, Any], alternatives: list[tuple[str, ...]]) -> list[Fault]:
-    """Put settings (dotted key -> value, text parsed as TOML where possible) into a raw case; return their faults.
+    """Override values of a raw case; returns the faults of overrides that cannot be applied.
 
-    A setting replaces the key of the file that belongs to the same group of `alternatives`. A table may have at most
-    one key of each group.
+    settings : dotted key -> value; a text is parsed as TOML where possible
+    alternatives : groups of keys of which a table may have at most one; an override removes the other keys of its group
     """
     faults = []
     groups = {group: raw.get((group,)) for group in ("nodes", "links")}
@@ -126,7 +130,7 @@ def override(raw: Raw, settings: Mapping[str, Any], alternatives: list[tuple[str
 
 
 def locate_faults(error: CaseError, case: Any) -> CaseError:
-    """Locate the faults of a case that was read before: add line numbers or mark overrides, with the file's name."""
+    """Copy of an error on a case that was read, with the file's name and line numbers or marks of overrides added."""
     if case.path is None:
         return CaseError(error.faults, case.name)
     try:
@@ -182,7 +186,7 @@ def syntax_fault(error: ValueError, text: str) -> Fault:
 
 
 def _bare_name(line_text: str) -> str:
-    """Describe a wrong unquoted name on a line of TOML; empty if there is none."""
+    """Description of an invalid unquoted name in a line of TOML; empty if there is none."""
     match = re.fullmatch(r"\[+([^\[\]\"']+)\]+\s*(?:#.*)?|([^=\[\]\"'#]+?)\s*=.*", line_text)
     names = [name.strip() for name in (match[1] or match[2]).split(".")] if match else []
     odd = next((name for name in names if name and not re.fullmatch(r"[A-Za-z0-9_-]+", name)), None)
@@ -215,7 +219,7 @@ def _copy(value: Any, depth: int = 0) -> Any:
 
 @functools.lru_cache(maxsize=4096)
 def split_key(key: str) -> tuple[str, ...]:
-    """Keys of a path written as in TOML: "links.valve.area"."""
+    """Keys of a dotted path written as in TOML, such as "links.valve.area"."""
     try:
         table: Any = tomllib.loads(f"{key} = 0") if "\n" not in key and "=" not in key else None
     except ValueError:

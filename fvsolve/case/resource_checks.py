@@ -1,6 +1,6 @@
 """Memory, disk space and step size that a case needs, checked before the model is built.
 
-The bytes were measured: a pipe cell takes 0.36 kB in a model (names of states, tables) and 0.16 kB in an explicit run.
+Sizes were measured: a pipe cell takes 0.36 kB in a model (names of states, arrays) and 0.16 kB in an explicit run.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ FRAME_CELL = 60  # size of a cell of a frame on disk [B]
 def find_faults(
     numerics: Any, output: Any, links: dict[str, Any], meshes: dict[str, Any]
 ) -> Iterator[tuple[tuple, str]]:
-    """Faults of counts that do not fit into memory, and of output intervals below the rounding of the time."""
+    """Faults of cells or rows that need too much memory, and of output intervals below the rounding of time."""
     pipes = {name: link for name, link in links.items() if isinstance(link, Pipe)}
     method, span = METHODS.get(numerics.method), numerics.end - numerics.start
     implicit = method is None or not method.explicit
@@ -54,7 +54,7 @@ def find_faults(
 
 
 def rounding_faults(numerics: Any, crossing: float) -> Iterator[tuple[tuple, str]]:
-    """Faults of a Courant number whose steps are below the rounding of the time.
+    """Fault of a Courant number whose steps are below the rounding of the time.
 
     crossing : shortest travel time of a wave through a cell [s]
     """
@@ -67,7 +67,7 @@ def rounding_faults(numerics: Any, crossing: float) -> Iterator[tuple[tuple, str
 
 
 def disk_size(case: Any, text: int = TEXT, frame_cell: int = FRAME_CELL) -> float:
-    """Estimated size of history.csv and the frames [B]."""
+    """Estimated size of history.csv and the frames [B]; text, frame_cell : bytes per number and per cell of a frame."""
     numerics, output = case.numerics, case.output
     cells = sum(link.cells for link in case.links.values() if isinstance(link, Pipe))
     cells += sum(len(mesh.cells) for mesh in case.meshes.values())

@@ -19,14 +19,14 @@ RESERVED = {"time", "t", "mass", "energy", "nodes", "pipe", "value", "min_pressu
 
 
 def reserved_names() -> set[str]:
-    """Reserved names: columns of output files, quantities of parts, and fields of basins except velocities."""
+    """Names that scalars cannot have: columns of output files, quantities of parts, and fields of basins."""
     kinds = [kind for group in KINDS.values() for kind in group.values()]
     fields = {name for physics in Physics.kinds.values() for name in physics.fields if name not in VELOCITY_FIELDS}
     return RESERVED | fields | {name for kind in kinds for name in (*kind.quantities, *getattr(kind, "along", {}))}
 
 
 def find_faults(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], fluid: Any) -> Faults:
-    """Faults of names, of values that parts cannot have, and of parts that do not support scalars yet."""
+    """Faults (key path, message) of names of scalars, their values in parts, and parts that do not support them."""
     for name in scalars:
         if len(name) > LONGEST_NAME:
             yield ("scalars", name), f"has {len(name)} letters; expected at most {LONGEST_NAME}"
@@ -65,7 +65,7 @@ def find_faults(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str,
 
 
 def _value_fault(scalar: str, value: Any, part: Any, scalars: dict[str, Any]) -> str | None:
-    """Fault of the value of a scalar that a part states; None if it is valid."""
+    """Fault text for the value of a scalar that a part states; None if it is valid."""
     if scalar not in scalars:
         return _unknown(scalar, scalars)
     if isinstance(part, Basin):

@@ -14,7 +14,7 @@ MAX_ENTRIES = 20  # entries of a hand-written schedule; longer schedules are rec
 
 
 def notices(case: Any) -> list[Notice]:
-    """Notices of every schedule that still changes, and of every trip, after the end of the run."""
+    """Notices of each schedule that still changes after the end of the run, and of each trip after it."""
     end, result = case.numerics.end, []
     for group in ("nodes", "links"):
         for name, part in getattr(case, group).items():
@@ -27,9 +27,9 @@ def notices(case: Any) -> list[Notice]:
 
 
 def starts_after_end(part: Any, end: float) -> Iterator[tuple[str, float]]:
-    """Yield (key, time [s]) of schedules and trips of a part that continue after `end`.
+    """Yield (key, time [s]) of each schedule of a part that changes after the time `end` [s], and of a later trip.
 
-    A wave has no end: its first period counts.
+    The time is that of the last change or of the trip; for a periodic schedule it is the end of its first period.
     """
     for name, info in type(part).model_fields.items():
         value = getattr(part, name)

@@ -34,7 +34,7 @@ def schema_text(content: dict[str, Any]) -> str:
 
 
 def full_schema() -> dict[str, Any]:
-    """Schema of a case file without shared definitions."""
+    """Schema of a case file in which repeated parts are written out."""
     definitions: dict[str, Any] = {}
     properties: dict[str, Any] = dict.fromkeys(KEYS, {})
     properties |= keys_json(TOP)["properties"]
@@ -110,12 +110,12 @@ def _without_siblings(part: dict[str, Any]) -> dict[str, Any]:
 
 
 def _is_schema(part: dict[str, Any]) -> bool:
-    """True if a dict is the schema of a value, not a table of schemas by key."""
+    """True if a dict is the schema of a value; False if it is a table of schemas by key."""
     return any(isinstance(part.get(word), (str, list)) for word in ("type", "anyOf", "enum"))
 
 
 def _numbered(names: dict[str, str]) -> dict[str, str]:
-    """Number equal names."""
+    """Add numbers to equal names, so that each is unique; names : schema text -> name."""
     counts: Counter[str] = Counter()
     for text, name in names.items():
         counts[name] += 1
@@ -124,7 +124,7 @@ def _numbered(names: dict[str, str]) -> dict[str, str]:
 
 
 def _name(part: dict[str, Any]) -> str:
-    """Name of a shared schema: its dimension, that of the values of a schedule, or the keys of a table."""
+    """Name for a shared schema: its dimension, the dimension of a schedule or list, or the keys of a table."""
     first = next(iter(part.get("anyOf", [])), part)
     if (
         isinstance(first, dict)
@@ -142,7 +142,7 @@ def _name(part: dict[str, Any]) -> str:
 
 
 def _without_titles(part: Any) -> Any:
-    """Remove what pydantic adds to every key: its title, and a default of null."""
+    """Copy of a schema without the titles and the null defaults that pydantic adds to every key."""
     if isinstance(part, list):
         return [_without_titles(item) for item in part]
     if not isinstance(part, dict):
@@ -155,14 +155,14 @@ def _without_titles(part: Any) -> Any:
 
 
 def _with_shared_definitions(model: Any, definitions: dict[str, Any]) -> dict[str, Any]:
-    """Schema of a model; its definitions are moved to `definitions`."""
+    """Schema of a pydantic model; its shared definitions are moved into the dict `definitions`."""
     result = _without_titles(model.model_json_schema(by_alias=True))
     definitions |= result.pop("$defs", {})
     return result
 
 
 def _defaults(definitions: dict[str, Any]) -> dict[str, Any]:
-    """Schema of `[defaults.KIND]`: keys of the parts, all optional."""
+    """Schema of the tables `[defaults.KIND]`, with the keys of the parts, all optional."""
     result = {}
     for kind, model in defaults.KINDS.items():
         keys = _with_shared_definitions(model, definitions)["properties"]

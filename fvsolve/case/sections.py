@@ -1,4 +1,4 @@
-"""Tables fluid, numerics, output and exact of a case: keys and defaults."""
+"""Tables `[fluid]`, `[numerics]`, `[output]` and `[exact]` of a case: keys and defaults."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ VISCOSITIES = UsualRange(1e-5, 5.0, "liquefied gases to heavy fuel oil")
 
 
 class FluidSpec(Table):
-    """`[fluid]`: fluid, its state and its density law; numbers here override those of CoolProp."""
+    """Table `[fluid]`: fluid, its state and its density law. Stated properties replace the properties from CoolProp."""
 
     name: Annotated[str, Text('a CoolProp fluid, "ISO VG 46", "INCOMP::..." or "user"', BY_CELLS)]
     temperature: Annotated[
@@ -129,7 +129,7 @@ class FluidSpec(Table):
 
 
 class MethodNames(Collection):
-    """`auto` and the names of all methods, with methods that the user adds later."""
+    """Collection of valid method names: `auto` and all methods, also methods that are added while the program runs."""
 
     def __iter__(self) -> Iterator[str]:
         return iter((AUTO, *METHODS))
@@ -142,7 +142,7 @@ class MethodNames(Collection):
 
 
 class MethodChoice(Choice):
-    """Method by name, or by a file that contains its tableau as text."""
+    """Value of a key that is a method: its name, or the path of a file that contains its tableau as text."""
 
     def read(self, given: Any, setting: ReadContext) -> str:
         if not isinstance(given, str) or given in BUILT_IN or given == AUTO:
@@ -166,7 +166,7 @@ class MethodChoice(Choice):
 
 
 class Numerics(Table):
-    """`[numerics]`: time span, discretisation in space and time, initial state."""
+    """Table `[numerics]`: time span, discretisation in space and time, initial state."""
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("courant", "step", "rtol"),)
 
@@ -256,10 +256,10 @@ class Numerics(Table):
     ] = "continue"
 
     def filled(self, has_cells: bool, carries: bool, rubs: bool, parts: bool) -> Numerics:
-        """Fill in the default scheme, step control and method.
+        """Copy with the default scheme, step control and method filled in.
 
-        carries : True if basins carry scalars; rubs : True if their beds have friction; parts : True if cavities are
-        solved in pipes
+        has_cells : True if the case has pipes or basins; carries : True if basins carry scalars
+        rubs : True if beds of basins have friction; parts : True if cavities in pipes are computed
         """
         changes: dict[str, Any] = {}
         if self.scheme is None:
@@ -282,7 +282,7 @@ def uses_error_control(method: str | None) -> bool:
 
 
 class OutputUnits(Value):
-    """`[output] units`: a unit for each quantity of probes and parts."""
+    """Value of `units` in `[output]`: unit of each quantity of probes and parts."""
 
     about = 'unit per quantity, for example { pressure = "barg", flow = "l/s" }; SI, absolute if left out'
     takes = "`{ QUANTITY = UNIT }`"
@@ -340,7 +340,7 @@ class OutputUnits(Value):
 
 
 class ProbeNames(Value):
-    """List of texts; they are read as probes later, when the parts are known."""
+    """Value of `probes` in `[output]`: a list of texts, which are read as probes later, when all parts are read."""
 
     about = "recorded quantities; those of all nodes and links if left out"
     takes = "list of probes"
@@ -355,7 +355,7 @@ class ProbeNames(Value):
 
 
 class OutputLine(Table):
-    """Line across a basin along which its fields are written with every frame."""
+    """Table of one line across a basin, along which its fields are written with every frame."""
 
     basin: Annotated[str, Text("name of the basin", VALUE)]
     from_: Annotated[
@@ -368,7 +368,7 @@ class OutputLine(Table):
 
 
 class Output(Table):
-    """`[output]`: recorded quantities, times and units."""
+    """Table `[output]`: recorded quantities, output times and units."""
 
     every: Annotated[
         float | None,
@@ -389,12 +389,12 @@ class Output(Table):
     units: Annotated[dict[str, str], OutputUnits()] = {}
 
     def table(self) -> dict[str, Any]:
-        """Table as in a case file."""
+        """Keys and values as in a case file."""
         values = {**super().table(), "probes": [probe.text for probe in self.probes]}
         return {key: value for key, value in values.items() if value != {}}
 
 
 class ExactSpec(Table):
-    """`[exact]`: exact solution of the case; studies measure errors against it."""
+    """Table `[exact]`: exact solution of the case, from which studies compute errors."""
 
     name: Annotated[str, Choice("exact solution", tuple(NAMES), "name of the exact solution", changes=VALUE)]

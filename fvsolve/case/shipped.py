@@ -1,4 +1,4 @@
-"""Shipped cases of the package."""
+"""Cases that are shipped with the package: folder, names, paths, titles."""
 
 from __future__ import annotations
 

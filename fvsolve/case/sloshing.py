@@ -1,14 +1,16 @@
 """Linear sloshing modes of a tank: masses on springs, and the water below a flat surface.
 
 Potential theory of a flat bed and upright walls, small motions, any depth h (Dodge, The New Dynamic Behavior of Liquids
-in Moving Containers, 2000, chapter 3). Odd mode n of a box along a side L, k = n pi / L, and of an upright cylinder of
-radius a, k = x / a with J1'(x) = 0, both along x and along y, with w^2 = g k tanh(k h):
+in Moving Containers, 2000, chapter 3). A box has odd modes n along each side L with wave number k = n pi / L. An
+upright cylinder of radius a has modes with k = s / a, J1'(s) = 0, along x and along y. The angular frequency w is given
+by w^2 = g k tanh(k h). With the mass M of all water, a mode has the mass m and this rise of the surface per travel of m:
 
-    box       m = M 8 tanh(k h) / (k h (k L)^2)         surface -4 tanh(k h) / (k L) cos(k x) per travel, x from a wall
-    cylinder  m = M 2 tanh(k h) / (k h (x^2 - 1))       surface 2 x tanh(k h) / (x^2 - 1) J1(k r) / J1(x) cos(angle)
+    box       m = M 8 tanh(k h) / (k h (k L)^2)     rise -4 tanh(k h) / (k L) cos(k x), x from a wall
+    cylinder  m = M 2 tanh(k h) / (k h (s^2 - 1))   rise 2 s tanh(k h) / (s^2 - 1) J1(k r) / J1(s) cos(angle)
 
-each at h - (2 / k) tanh(k h / 2) above the bed. With its surface held flat the water has the inertia of an ideal fluid
-under a lid (Joukowski, 1885), not that of a rigid body. Higher modes are left out: their water moves with the tank.
+r and angle are polar coordinates about the axis. The mass m lies h - (2 / k) tanh(k h / 2) above the bed. With its
+surface held flat the water has the inertia of an ideal fluid under a lid (Joukowski, 1885), not that of a rigid body.
+Higher modes are left out: their water moves with the tank.
 """
 
 from __future__ import annotations
@@ -32,7 +34,11 @@ Faults = Iterator[tuple[tuple, str]]
 
 
 class Outline(NamedTuple):
-    """Outline of a tank: sides of a box, or twice the diameter of a cylinder; its centre [m]; True if round."""
+    """Outline of a tank.
+
+    sides : lengths of a box along x and y [m], or the diameter of a cylinder twice
+    middle : float64[2]  centre in the axes of the basin [m]; is_round : True for a cylinder
+    """
 
     sides: tuple[float, float]
     middle: np.ndarray
@@ -40,8 +46,10 @@ class Outline(NamedTuple):
 
 
 class SloshingMode(NamedTuple):
-    """Sloshing mode along x (0) or y (1): number, k [1/m], mass [kg], height above the bed [m], w^2 [1/s2].
+    """Sloshing mode, modelled by a mass on a spring.
 
+    along : direction, 0 for x, 1 for y; number : number of the mode, from 1; k : wave number [1/m]
+    mass : moving mass [kg]; height : its height above the bed [m]; square : square of the angular frequency [1/s2]
     rise : rise of the surface at the wall in the positive direction per travel of the mass [-]
     """
 
@@ -55,14 +63,17 @@ class SloshingMode(NamedTuple):
 
 
 class Slowest(NamedTuple):
-    """Slowest mode of a tank: k h, and the excess of its frequency in shallow-water theory [%]."""
+    """Slowest mode of a tank.
+
+    kh : wave number times depth [-]; excess : excess of its frequency in shallow-water theory over the true one [%]
+    """
 
     kh: float
     excess: float
 
 
 def slowest(basin: Any, mesh: Any) -> Slowest | None:
-    """Slowest mode of a tank with a flat bed; None for tanks with unknown modes."""
+    """Slowest mode of a tank; None if its modes are not known: no flat bed, no water, or not a box or cylinder."""
     bed, outline = means(samples(basin.bed, mesh)), outline_of(mesh)
     if outline is None or np.ptp(bed) > FLAT * abs(basin.level - bed.min()) or not basin.level > bed[0]:
         return None
@@ -71,7 +82,7 @@ def slowest(basin: Any, mesh: Any) -> Slowest | None:
 
 
 def outline_of(mesh: Any) -> Outline | None:
-    """Box or circle that a mesh fills; None for other outlines."""
+    """Rectangle or circle that a mesh fills; None for other outlines."""
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     area, sides = float(mesh.area.sum()), high - low
     if abs(area / float(np.prod(sides)) - 1.0) < 1e-9:
@@ -94,7 +105,7 @@ def depth_of(basin: Any, mesh: Any) -> float:
 
 
 def modes(outline: Outline, depth: float, density: float, gravity: float, count: int = MODES) -> list[SloshingMode]:
-    """First `count` modes of water in a tank, alternately along x and y."""
+    """First `count` modes in each direction of water in a tank, alternately along x and y; depth [m]."""
     from scipy.special import jnp_zeros
 
     result = []
@@ -113,13 +124,13 @@ def modes(outline: Outline, depth: float, density: float, gravity: float, count:
 
 
 def area_of(outline: Outline) -> float:
-    """Area of the bed [m2]."""
+    """Area of the bed of a tank [m2]."""
     a, b = outline.sides
     return 0.25 * np.pi * a * a if outline.is_round else a * b
 
 
 def surface_rise(outline: Outline, mode: SloshingMode, x: float, y: float) -> float:
-    """Rise of the surface at a point per travel of the mass of a mode [-]."""
+    """Rise of the surface at the point (x, y) [m] per travel of the mass of a mode [-]."""
     from scipy.special import j1, jnp_zeros
 
     dx, dy = np.array([x, y]) - outline.middle
@@ -132,7 +143,7 @@ def surface_rise(outline: Outline, mode: SloshingMode, x: float, y: float) -> fl
 
 
 def lid_inertia(outline: Outline, depth: float, density: float) -> np.ndarray:
-    """Inertia about the centre of an ideal fluid that fills a closed box or cylinder : float64[3, 3] [kg m2]."""
+    """Inertia matrix about the centre of an ideal fluid that fills a closed box or cylinder : float64[3, 3] [kg m2]."""
     a, b = outline.sides
     if outline.is_round:
         across = density * cylinder_inertia(0.5 * a, depth)
@@ -143,7 +154,10 @@ def lid_inertia(outline: Outline, depth: float, density: float) -> np.ndarray:
 
 
 def rectangle_inertia(a: float, b: float) -> float:
-    """Polar moment of a rectangle less its torsion constant [m4]: inertia of an ideal fluid / (density height)."""
+    """Inertia of an ideal fluid in a rotating box, per density and height of the box [m4].
+
+    It is the polar moment of the rectangle with sides a, b [m] less its torsion constant.
+    """
     long, short = max(a, b), min(a, b)
     odd = np.arange(1, 2 * TERMS, 2)
     series = float(np.sum(np.tanh(0.5 * np.pi * odd * long / short) / odd**5))
@@ -152,9 +166,10 @@ def rectangle_inertia(a: float, b: float) -> float:
 
 
 def cylinder_inertia(a: float, h: float) -> float:
-    """Inertia of an ideal fluid in a closed cylinder about a diameter through its centre / density [m5].
+    """Inertia per density [m5] of an ideal fluid in a closed cylinder about a horizontal axis through its centre.
 
-    phi = (-r z + sum b I1(c r) sin(c z)) cos(angle), c = (2 j - 1) pi / h, has the normal velocity of all walls.
+    a : radius [m]; h : height [m]. The velocity potential (-r z + sum of b_j I1(c_j r) sin(c_j z)) cos(angle), with
+    c_j = (2 j - 1) pi / h and z from the centre, has the normal velocity of all walls.
     """
     from scipy.special import ive
 
@@ -168,7 +183,7 @@ def cylinder_inertia(a: float, h: float) -> float:
 
 
 def find_faults(nodes: dict[str, Any], lumped: dict[str, Any], poses: dict[str, Any]) -> Faults:
-    """Faults of basins with water as modes."""
+    """Faults (key path, message) of basins whose water is modelled by sloshing modes; lumped : their meshes."""
     for name, mesh in lumped.items():
         basin, key = nodes[name], ("nodes", name)
         if basin.sloshing != "modes" or not basin.physics_type.has_modes:
@@ -191,7 +206,7 @@ def find_faults(nodes: dict[str, Any], lumped: dict[str, Any], poses: dict[str, 
 
 
 def weightless(nodes: dict[str, Any], gravity: float | None) -> Faults:
-    """Fault of zero gravity with a free water surface."""
+    """Fault of zero gravity in a case with a free water surface."""
     for name, basin in nodes.items():
         if gravity == 0.0 and getattr(getattr(basin, "physics_type", None), "has_modes", False):
             if not (basin.on and basin.sloshing == "frozen"):
@@ -203,7 +218,7 @@ def weightless(nodes: dict[str, Any], gravity: float | None) -> Faults:
 
 
 def unsupported_keys(key: tuple, basin: Any) -> Faults:
-    """Faults of keys that modes do not support."""
+    """Faults of keys of a basin that are not valid with sloshing modes; key : key path of the basin."""
     for key_name in sorted(basin.start.model_fields_set) if basin.start is not None else ():
         yield (*key, "start", key_name), "modes start from level water at rest; leave it out"
     for patch, patch_options in basin.patches.items():
@@ -215,17 +230,21 @@ def unsupported_keys(key: tuple, basin: Any) -> Faults:
 
 
 def held_water(basin: Any, mesh: Any, density: float) -> tuple[float, np.ndarray, np.ndarray]:
-    """(mass [kg], centre [m], inertia about it [kg m2]) of water with a fixed surface, in axes of the basin."""
+    """Mass [kg], centre [m] and inertia about the centre [kg m2] of water with its surface held flat.
+
+    centre : float64[3] and inertia : float64[3, 3] are in the axes of the basin.
+    """
     outline, depth = outline_of(mesh), depth_of(basin, mesh)
     centre = np.array([*outline.middle, bed_of(basin, mesh) + 0.5 * depth])
     return density * area_of(outline) * depth, centre, lid_inertia(outline, depth, density)
 
 
 def mode_bodies(name: str, basin: Any, mesh: Any, pose: Any, density: float, gravity: float) -> dict[str, Body]:
-    """Bodies that slide on springs for the modes, and a fixed body of negative mass.
+    """Bodies, by name, that model the sloshing modes of a basin: one on a spring per mode, and one of negative mass.
 
-    The negative mass subtracts the modes from the water with a fixed surface. In a cylinder the two modes of a number
-    share a mass: it slides along y on a massless body that slides along x.
+    The fixed body of negative mass subtracts the moving masses from the water, which is added to the body with its full
+    mass. In a cylinder the modes of one number along x and y share a mass, which slides along y on a massless body
+    that slides along x.
     """
     outline, turn, all_modes, result = outline_of(mesh), basin.rotation, modes_of(basin, mesh, density, gravity), {}
     bed = np.array(basin.place) + turn @ (*outline.middle, bed_of(basin, mesh))
@@ -253,10 +272,10 @@ def mode_bodies(name: str, basin: Any, mesh: Any, pose: Any, density: float, gra
 def surface_factors(
     basin: Any, mesh: Any, x: float, y: float, density: float, gravity: float
 ) -> tuple[list[SloshingMode], list[float]]:
-    """Modes, and the rise of the surface at a point per travel of each mode.
+    """Modes of a basin, and the rise of the surface at the point (x, y) [m] per travel of each mode [-].
 
-    Modes that are left out would follow the acceleration statically, like the last modelled modes. Their rise is added
-    to that of the last mode along each axis, so that a surface in equilibrium is plane.
+    Higher modes, which are not modelled, would follow the acceleration without delay. Their rise is added to the rise
+    of the last modelled mode along each axis, so that a surface in equilibrium is plane.
     """
     outline, all_modes = outline_of(mesh), modes_of(basin, mesh, density, gravity)
     rises = [surface_rise(outline, mode, x, y) for mode in all_modes]
@@ -271,17 +290,17 @@ def surface_factors(
 
 
 def mode_body_name(name: str, mode: SloshingMode) -> str:
-    """Name of the body of a mode."""
+    """Name of the body that models a mode, such as "pool x1"."""
     return f"{name} {'xy'[mode.along]}{mode.number}"
 
 
 def modes_of(basin: Any, mesh: Any, density: float, gravity: float) -> list[SloshingMode]:
-    """Modes of a basin."""
+    """Sloshing modes of a basin; density [kg/m3], gravity [m/s2]."""
     return modes(outline_of(mesh), depth_of(basin, mesh), density, gravity)
 
 
 def hidden_body(mass: float, inertia: np.ndarray, joint: Joint, centre: np.ndarray) -> Body:
-    """Body that is not in the file; its mass may be negative."""
+    """Body that is not in the file; mass [kg], also negative, inertia : float64[3, 3] [kg m2], centre of mass [m]."""
     return Body.model_construct(
         mass=mass, inertia=tuple(map(tuple, inertia.tolist())), joint=joint, points={},
         centre_of_mass=tuple(np.asarray(centre).tolist()),

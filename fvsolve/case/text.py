@@ -10,7 +10,7 @@ from fvsolve.errors import LONGEST_NAME
 
 
 def write(table: dict[str, Any]) -> str:
-    """TOML text of nested dicts; tables down to the second level get a header, deeper tables are written inline."""
+    """TOML text of nested dicts. Tables at the first two levels have a header; deeper tables are written inline."""
     lines = [f"{_key(key)} = {inline(value)}" for key, value in table.items() if not isinstance(value, dict)]
     for key, value in table.items():
         if isinstance(value, dict):
@@ -19,7 +19,7 @@ def write(table: dict[str, Any]) -> str:
 
 
 def path(keys: tuple[Any, ...]) -> str:
-    """Key path as text of a message: `links.main.length`, `output.probes[2]`."""
+    """Text of a key path for messages, such as `links.main.length` or `output.probes[2]`."""
     text = ""
     for key in keys:
         name = str(key) if len(str(key)) <= LONGEST_NAME else f"{str(key)[:57]}..."
@@ -45,7 +45,7 @@ def _key(key: str) -> str:
 
 
 def inline(value: Any) -> str:
-    """TOML text of a value on the right of `key =`, with inline tables."""
+    """TOML text of a value to the right of `key =`; tables are written inline."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):

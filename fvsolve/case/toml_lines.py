@@ -1,4 +1,4 @@
-"""Line numbers of the keys of a TOML text; tomllib checks the syntax."""
+"""Line numbers of the keys in a TOML text that tomllib has checked."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fast update of a case that was read before, after numbers of its parts were changed."""
+"""Fast reading of a case that differs from an earlier case only in numbers of its parts."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ PRESENCE_KEYS = ("required_pressure",)  # keys whose presence alone changes the 
 
 
 def update_values(reader: Any) -> Case | None:
-    """Update the case before with new numbers of parts; None if more than numbers may change, or for any fault.
+    """Copy of the case `reader.before` with new numbers of parts; None if more may change, or for any fault.
 
-    Names, types, connections, probes, claims and every other table stay as they were.
+    reader : reader of the new case. Names, types, connections, probes, claims and all other tables are kept.
     """
     before, raw = reader.before, reader.raw
     if (
@@ -60,7 +60,10 @@ def update_values(reader: Any) -> Case | None:
 
 
 def read_before(given: dict[str, Any], before: dict[str, Any], part: Any) -> dict[str, Any]:
-    """Table of a part, with schedules as they were read before if their raw values are unchanged."""
+    """Table of a part in which unchanged raw schedules are replaced by the schedules read for the earlier case.
+
+    given, before : raw tables of the part now and earlier; part : part as read earlier
+    """
     values = vars(part)
     same = {key: schedule for key, value in given.items() if isinstance(schedule := values.get(key), Schedule)
             and isinstance(value, dict) and before.get(key) is value}  # fmt: skip
@@ -68,7 +71,7 @@ def read_before(given: dict[str, Any], before: dict[str, Any], part: Any) -> dic
 
 
 def is_self_contained(case: Case) -> bool:
-    """True if a case uses no files or signals, and only parts depend on the numbers of parts."""
+    """True if a case has no files, signals, scalars, basins, placed parts or equilibrium to compute."""
     no_outer_input = not (
         placed(add_bends(case.raw))
         or case.signals
@@ -82,7 +85,7 @@ def is_self_contained(case: Case) -> bool:
 
 
 def is_number_key(raw: Any, keys: tuple) -> bool:
-    """True if a key path is a number or a schedule of a part."""
+    """True if the value at a key path is a number or a schedule of a part."""
     if len(keys) < 3 or keys[0] not in GROUPS or keys[2] in PRESENCE_KEYS:
         return False
     part = raw.get(keys[:2])

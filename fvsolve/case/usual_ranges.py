@@ -1,4 +1,4 @@
-"""Notices of values outside usual ranges, probably given in another unit."""
+"""Notices of values outside usual ranges, which were probably given in a wrong unit."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ TOP = {  # keys outside tables
 
 
 def notices(case: Any) -> list[Notice]:
-    """Notices of keys outside their usual range, and of keys that contradict each other."""
+    """Notices of values outside the usual range of their key, and of keys that contradict each other."""
     parts = {("fluid",): case.fluid}
     parts |= {(group, name): part for group in ("nodes", "links") for name, part in getattr(case, group).items()}
     result = [_notice((), (key,), case, *odd) for key, value in TOP.items()
@@ -43,7 +43,7 @@ def notices(case: Any) -> list[Notice]:
 
 
 def _wave_speed(case: Any, name: str, link: Any) -> tuple[float, float, str] | None:
-    """(value, limit, text) of a wave speed that contradicts the stated material; None if there is none."""
+    """Stated wave speed, wave speed of the wall [m/s] and message, if they contradict each other, else None."""
     if getattr(link, "wave_speed", None) is None or link.material is None:
         return None
     from fvsolve.case.wave_speed_check import wave_speed_mismatch  # late import: few pipes state both
@@ -52,7 +52,7 @@ def _wave_speed(case: Any, name: str, link: Any) -> tuple[float, float, str] | N
 
 
 def _of_part(part: Table, raw: Any) -> list[tuple[tuple[Any, ...], float, float, str]]:
-    """Unusual values of a part, cached while the part and its raw table are the same objects."""
+    """Result of `_of_table` for a part, cached while the part and its raw table are the same objects."""
     known = CACHE.get(id(part))
     if known is None or known[0] is not part or known[1] is not raw:
         if len(CACHE) >= MAX_CACHED:
@@ -62,7 +62,7 @@ def _of_part(part: Table, raw: Any) -> list[tuple[tuple[Any, ...], float, float,
 
 
 def _of_table(table: Table, raw: Any) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
-    """(keys, value, limit, text) of each unusual value of a table and of its inner tables."""
+    """Yield (key path, value [SI], limit [SI], message) for each unusual value of a table and of its inner tables."""
     for name, info in type(table).model_fields.items():
         key, value = info.alias or name, getattr(table, name)
         given = _raw_value(raw, (key,))
@@ -78,7 +78,7 @@ def _of_table(table: Table, raw: Any) -> Iterator[tuple[tuple[Any, ...], float, 
 
 
 def _beyond(declared: Any, value: Any, given: Any) -> tuple[float, float, str] | None:
-    """(value, limit, text) of the first number outside the usual range; None if all are inside."""
+    """First number outside the usual range, the limit that it exceeds [SI], and a message; None if all are inside."""
     usual = getattr(declared, "usual", None)
     for x in _numbers(value) if usual else ():
         if x == 0.0 or usual.least <= x <= usual.greatest:
@@ -92,7 +92,7 @@ def _beyond(declared: Any, value: Any, given: Any) -> tuple[float, float, str] |
 
 
 def _numbers(value: Any) -> list[float]:
-    """Numbers of a quantity, a schedule or a table of areas."""
+    """Numbers in the value of a key: a quantity, a schedule or a table of areas."""
     value = getattr(value, "area", getattr(value, "value", value))
     return [float(x) for x in (value if hasattr(value, "__len__") else [value])]
 

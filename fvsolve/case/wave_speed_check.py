@@ -1,4 +1,4 @@
-"""Comparison of a stated wave speed with that of the stated pipe wall."""
+"""Comparison of a stated wave speed with the wave speed that the stated pipe wall gives."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ WALL_KEYS = ("diameter", "nominal", "schedule", "class", "material", "lining")  
 
 
 def wave_speed_mismatch(case: Any, name: str) -> tuple[float, float, str] | None:
-    """Return (value, limit, text) if the stated wave speed is far from that of the stated wall, else None."""
+    """Stated wave speed, wave speed of the wall [m/s] and message, if they differ by more than 20 %, else None."""
     pipe, keys = case.links[name], defaults.raw_link(case.raw, name)
     try:
         wall = Pipe.model_validate(
@@ -28,5 +28,5 @@ def wave_speed_mismatch(case: Any, name: str) -> tuple[float, float, str] | None
         return None
     size = " ".join(str(keys[key]) for key in ("material", "class", "nominal") if key in keys)
     text = (f"{case.amount(pipe.wave_speed, 'velocity')} is stated, but the wall of {size} gives "
-            f"{case.amount(speed, 'velocity')}; leave wave_speed out, or material and class")  # fmt: skip
+            f"{case.amount(speed, 'velocity')}; leave out `wave_speed`, or `material` and `class`")  # fmt: skip
     return pipe.wave_speed, speed, text

@@ -284,7 +284,7 @@ def test_a_line_that_lies_in_no_basin_is_refused():
         "output.lines.b.to: 12,2 m lies outside the mesh or in a hole; the nearest point inside is",
         "output.lines.c.to: is also the start of the line",
         '"d d" is not a valid name',
-        "output.lines: are written with every frame, but fields is 0",
+        "output.lines: are written with every frame, but `fields` is 0",
     ):
         assert says in str(error.value)
 

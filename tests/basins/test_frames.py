@@ -173,9 +173,9 @@ def test_a_tank_that_falls_freely_ends_the_run_by_name():
 # faults ----------
 
 FAULTS = {
-    "the node is on body; give its place with at": ({}, {"elevation": 1.0}),
+    "the node is on body; give its position as `at`": ({}, {"elevation": 1.0}),
     "expected a body: body; did you mean": ({}, {"on": "bdy"}),
-    "name the body with on": ({}, {"on": None, "at": [0, 0, 1]}),
+    "give the body as `on = BODY`": ({}, {"on": None, "at": [0, 0, 1]}),
     "and the reaction to outflow is not modelled": (
         {"joint": {"kind": "revolute", "axis": [0, 0, 1]}},
         {"patches": {"gap": {"side": "east", "boundary": "open"}}},

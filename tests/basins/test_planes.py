@@ -271,7 +271,7 @@ FAULTS = {
     "join": (
         {"physics": "transport", "velocity": {"u": 1.0}},
         {"tap": valve("pool.out", "end", 0.1)},
-        "given by velocity",
+        "the key `velocity` gives the flow",
     ),
     "expression": ({"physics": "transport", "velocity": {"expression": "swril"}}, {}, 'did you mean "swirl"'),
     "ways": ({"physics": "transport", "velocity": {"u": 1.0, "stream": "x"}}, {}, "expected"),

@@ -260,7 +260,7 @@ def test_depth_is_level_at_the_start_however_suddenly_its_body_is_let_go():
 @pytest.mark.parametrize(
     ("change", "place", "said"),
     [
-        ({"on": None}, "nodes.b.sloshing", "applies only to water on a body; name the body with on"),
+        ({"on": None}, "nodes.b.sloshing", "applies only to water on a body; give the body as `on = BODY`"),
         ({"holes": [[0, 0, 0.5, 0.25]]}, "nodes.b.sloshing", "modes are known only for boxes and upright cylinders"),
         ({"bed": "0.1 * x"}, "nodes.b.bed", "modes are known only over a flat bed"),
         ({"bed": 1.0}, "nodes.b.level", "there is no water above the bed, at 1 m"),

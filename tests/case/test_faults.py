@@ -527,7 +527,7 @@ BAD = {
         .replace('wave_speed = "1219.2 m/s"\n', "")
         .replace("cells = 200", "")
         .replace('"junction"', '"chamber"\nvolume = 1'),
-        "numerics.courant: needs cells, and the case has no pipe or basin; give step or rtol",
+        "numerics.courant: needs cells, and the case has no pipe or basin; give `step` or `rtol`",
     ),
     # output
     "probe of nothing": (

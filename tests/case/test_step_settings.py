@@ -52,8 +52,11 @@ FAULTS = {
         cellless(method="gauss-4", courant=20.0),
         "needs cells, and the case has no pipe or basin",
     ),
-    "auto by courant": (piped(method="auto", courant=0.9), 'method "auto" controls the error of its steps; give rtol'),
-    "auto by step": (piped(method="auto", step=1e-3), 'method "auto" controls the error of its steps; give rtol'),
+    "auto by courant": (
+        piped(method="auto", courant=0.9),
+        'method "auto" controls the error of its steps; give `rtol`',
+    ),
+    "auto by step": (piped(method="auto", step=1e-3), 'method "auto" controls the error of its steps; give `rtol`'),
     "two settings": (piped(method="radau-iia-5", rtol=1e-6, courant=2.0), "courant and rtol are given; keep one"),
     "no such algebra": (piped(method="gauss-4", linear_algebra="bandid"), 'did you mean "banded"?'),
 }

@@ -81,7 +81,7 @@ def test_bodies_that_hang_in_a_loop_are_named():
     nodes = {name: body(1, [1, 1, 1], hinge(on=on)) for name, on in (("a", "c"), ("b", "a"), ("c", "b"))}
     found = told({**nodes, "d": body(1, [1, 1, 1], hinge(on="c"))})
     assert (
-        "is carried by itself: a on c on b on a; remove on from one of its bodies" in found
+        "is carried by itself: a on c on b on a; remove `on` from one of these bodies" in found
         and found.count("is carried by itself") == 1
     )
 
@@ -250,10 +250,10 @@ TOLD = """all.toml: 11 faults
   line 12: nodes.arm.inertia[0]: "1 kg m" is a quantity of [kg·m]; expected a moment of inertia, for example "12 kg m2"
   line 13: nodes.arm.joint: axis is missing: a revolute joint needs it, for example [0, 1, 0]
   line 17: nodes.boom.inertia: moments of 1, 1, 9 kg m2 are not possible: the largest exceeds the sum of the other two
-  line 23: nodes.a.joint.on: is carried by itself: a on b on a; remove on from one of its bodies and close the loop by a pin
+  line 23: nodes.a.joint.on: is carried by itself: a on b on a; remove `on` from one of these bodies and close the loop by a pin
   line 33: nodes.c.joint.attitude.matrix: is not a rotation: R'R differs from the identity by 3; expected orthogonal columns of length 1
   line 39: nodes.pool.on: "boon" is not a node; expected a body: a, arm, b, boom, c; did you mean "boom"?
-  line 40: nodes.pool.elevation: the node is on boon; give its place with at, in the axes of that body
+  line 40: nodes.pool.elevation: the node is on boon; give its position as `at`, in the axes of that body
   line 46: nodes.flume.patches.lid.travel: moves 1.5 m inward, but its zone is only 1 m wide; expected less, or a wider zone
   line 50: links.lift.stroke: the piston starts at 3 m (ground.far minus ground.lug); expected 0 to 1 m
   line 58: links.s.to: no place named "boom.eye"; places are a, arm, b, boom, c, flume.lid, ground, ground.far, ground.lug, lift.A, lift.B; did you mean "boom"?"""  # noqa: E501

@@ -303,9 +303,9 @@ def test_what_does_not_ride_together_is_told_all_at_once():
     case["links"]["bridge"] = {**PIPE, "from": "port", "to": "shore", "length": 3.0}
     case["links"]["long"] = {**PIPE, "from": "port", "to": "head", "length": 3.0}
     found = said(case)
-    assert "give its place with at" in found["nodes.port.elevation"]
+    assert "give its position as `at`" in found["nodes.port.elevation"]
     assert 'did you mean "hull"' in found["nodes.starboard.on"]
-    assert "name the body with on" in found["nodes.shore.at"]
+    assert "give the body as `on = BODY`" in found["nodes.shore.at"]
     assert "counts from the ground" in found["nodes.head.head"]
     assert "port, on hull and shore, which is fixed: this would be a flexible hose" in found["links.bridge"]
     assert "too short: its route on hull is" in found["links.long.length"]
