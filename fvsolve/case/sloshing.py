@@ -3,7 +3,7 @@
 Potential theory of a flat bed and upright walls, small motions, any depth h (Dodge, The New Dynamic Behavior of Liquids
 in Moving Containers, 2000, chapter 3). A box has odd modes n along each side L with wave number k = n pi / L. An
 upright cylinder of radius a has modes with k = s / a, J1'(s) = 0, along x and along y. The angular frequency w is given
-by w^2 = g k tanh(k h). With the mass M of all water, a mode has the mass m and this rise of the surface per travel of m:
+by w^2 = g k tanh(k h). With the mass M of all water, a mode has mass m and this rise of the surface per travel of m:
 
     box       m = M 8 tanh(k h) / (k h (k L)^2)     rise -4 tanh(k h) / (k L) cos(k x), x from a wall
     cylinder  m = M 2 tanh(k h) / (k h (s^2 - 1))   rise 2 s tanh(k h) / (s^2 - 1) J1(k r) / J1(s) cos(angle)

@@ -201,7 +201,7 @@ def view(
     field: Annotated[
         str | None,
         typer.Option(
-            help="quantity to draw: pressure, head, velocity, flow, ... (default pressure; see docs/results.md)"
+            help="quantity to draw: pressure, head, flow, ... (default pressure; without pipes another field)"
         ),
     ] = None,
     contours: Annotated[int, typer.Option(metavar="N", min=0, max=100, help="number of contour lines")] = 0,

@@ -1,8 +1,8 @@
 """Pressure cycles of a run by rainflow counting, and the fatigue damage that they cause.
 
 Cycles are counted by ASTM E1049-85 (package `rainflow`) over all rows of a probe; half cycles count 0.5. A part that
-endures `cycles` of a range R0 endures `cycles (R0 / R)^slope` of a range R (Basquin 1910). The damage of cycles of
-several ranges is the sum of count / endured cycles (Palmgren 1924, Miner 1945).
+endures N cycles of a range R0 endures N (R0 / R)^m cycles of a range R (Basquin 1910). The damage of cycles of several
+ranges is the sum of counted over endured cycles (Palmgren 1924, Miner 1945).
 """
 
 from __future__ import annotations
@@ -22,19 +22,25 @@ SMALLEST_RANGE = 1e-3  # smallest range that is counted, as a fraction of the gr
 
 @dataclass(frozen=True)
 class FatigueStrength:
-    """Fatigue strength of a part: endured `cycles` at a pressure `range` [unit of the probe], and the Basquin slope."""
+    """Fatigue strength of a part.
+
+    range : pressure range R0 [unit of the probe]; cycles : endured cycles N of this range; slope : Basquin exponent m
+    """
 
     range: float
     cycles: float
     slope: float
 
     def allowed(self, range: float) -> float:
-        """Cycles of another range that the part endures: cycles (R0 / R)^slope."""
+        """Number of cycles of another pressure range that the part endures."""
         return self.cycles * (self.range / range) ** self.slope
 
 
 def count_cycles(values: np.ndarray, bins: int = 10) -> list[tuple[float, float]]:
-    """(range, count) of the cycles of a series, greatest range first; each range is the upper end of its bin."""
+    """Pairs (range, number of cycles) of a series, greatest range first.
+
+    bins : number of equal bins of ranges; each range in the result is the upper end of its bin.
+    """
     cycles = list(import_library("rainflow").extract_cycles(values.tolist()))
     greatest = max((cycle[0] for cycle in cycles), default=0.0)
     if not greatest > 0.0:
@@ -47,10 +53,11 @@ def count_cycles(values: np.ndarray, bins: int = 10) -> list[tuple[float, float]
 
 
 def cycles(result, probes: list[str] | None = None, strength: FatigueStrength | None = None) -> list[dict[str, Any]]:
-    """Cycles of every probe of pressure or head, and with `strength` the fatigue damage of one run, `share`.
+    """Cycles of pressure or head at the named probes (default all probes of these quantities), a dict for each probe.
 
-    A range counts with the upper end of its bin, so the damage is on the safe side. Raises FvsolveError for probes of
-    other quantities and for values that are not finite.
+    cycles : pairs (range, number of cycles); share : fraction of the fatigue life that a run uses, if `strength` is
+    given. Ranges are upper ends of bins, so that the share is on the safe side. Raises FvsolveError for probes of other
+    quantities and for values that are not finite.
     """
     known = [name for name in result.probes if result.column(name).dimension in PRESSURE_QUANTITIES]
     unknown = [name for name in probes or () if name not in known]

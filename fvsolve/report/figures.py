@@ -44,9 +44,10 @@ FONT = 'system-ui, -apple-system, "Segoe UI", "Helvetica Neue", Arial, sans-seri
 
 
 def section_figure(section: Section, moving: HeadAnimation | None, unit: str, along: str, bins: int) -> dict[str, Any]:
-    """Figure of a long section: heads, pipe, vapour and class lines, cavity spans, devices, and the animated head.
+    """Figure of a long section: heads, pipe, vapour and class lines, spans of cavities, devices, animated head.
 
-    unit, along : units of head and chainage; bins : of a long line, the number of bins with their extremes
+    moving : animated head, or None; unit, along : units of head and chainage; bins : a long line is divided into so
+    many bins, of which only the extremes are drawn
     """
     k = section.drawn_indices(bins)
     x, lines = (
@@ -97,7 +98,10 @@ def section_figure(section: Section, moving: HeadAnimation | None, unit: str, al
 
 
 def study_section_figure(several: list[tuple[str, Section]], unit: str, along: str) -> dict[str, Any]:
-    """Figure of a section of several (name, section): pipe, vapour line and limits once, heads in a colour per run."""
+    """Figure of one long section in several runs: pipe, vapour line and limits once, heads of each run in a colour.
+
+    several : (name of the run, section) of each; unit, along : units of head and chainage
+    """
     first = max((section for _, section in several), key=lambda section: len(section.devices))
     k = first.drawn_indices()
     x = packed_array(first.chainage[k], "f4")
@@ -116,7 +120,7 @@ def study_section_figure(several: list[tuple[str, Section]], unit: str, along: s
 
 
 def history_figure(panel: HistoryPanel, time_unit: str, doubt: float | None) -> dict[str, Any]:
-    """Figure of the series of a quantity; shaded from the time `doubt`, from which results are not reliable."""
+    """Figure of the series of a quantity over time; shaded from the time `doubt`, from which results are not valid."""
     data, names = [], [line.name for line in panel.lines if not line.measured]
     for line in panel.lines:
         place = names.index(line.name)
@@ -147,7 +151,7 @@ def escape_markup(text: str) -> str:
 
 
 def packed_array(values: Sequence[float] | np.ndarray, kind: str = "f8") -> dict[str, str]:
-    """Array as plotly.js reads it, in base64; kind : "f8" (exact) or "f4" (seven digits)."""
+    """Array in the base64 format of plotly.js; kind : "f8" (exact) or "f4" (seven digits)."""
     packed = np.ascontiguousarray(values, f"<{kind}").tobytes()
     return {"dtype": kind, "bdata": base64.b64encode(packed).decode()}
 
@@ -194,7 +198,7 @@ def _vertical_line(x: float) -> dict[str, Any]:
 
 
 def _limits(section: Section, x, k: np.ndarray) -> list[dict[str, Any]]:
-    """Traces of the vapour line and of limits; upper and lower limits have different dashes."""
+    """Traces of the vapour line and of limits at chainages x; k : indices of the points to draw."""
     return [
         _line(name, x, packed_array(line[k], "f4"), **(LINE_LOOKS.get(name) or LIMIT_LOOKS[name.rpartition(", ")[2]]))
         for name, line in section.lines.items()
@@ -202,7 +206,7 @@ def _limits(section: Section, x, k: np.ndarray) -> list[dict[str, Any]]:
 
 
 def _section_layout(sections: list[Section], unit: str, along: str) -> dict[str, Any]:
-    """Layout of a figure of sections, with the chainage and devices of the first."""
+    """Layout of a figure of sections, with the chainages and devices of the first section."""
     first, seen = sections[0], head_window(sections, unit)
     layout, names = _layout(f"head [{unit}]", f"chainage [{along}]", SECTION_HEIGHT), _place_names(first)
     layout["margin"]["t"] = (
@@ -216,7 +220,7 @@ def _section_layout(sections: list[Section], unit: str, along: str) -> dict[str,
 
 
 def _limit_arrow(limits: list[str], edge: int) -> list[dict[str, Any]]:
-    """Arrow to the upper (1) or lower (0) edge with the limits outside the axis; a double click shows them."""
+    """Arrow at the upper (edge = 1) or lower (0) edge that names limits outside the axis; [] without such limits."""
     text, away = "<br>".join(map(escape_markup, limits)), 7 * len(limits) + 6  # pixels from the edge
     arrow = {"xref": "paper", "yref": "paper", "x": 0.97, "y": edge, "ax": 0, "ay": away if edge else -away,
              "showarrow": True, "arrowhead": 2, "arrowwidth": 1.2, "arrowcolor": CLASS_COLOUR, "xanchor": "right",

@@ -19,7 +19,10 @@ MAX_NUMBERS = 45_000  # greatest number of values of all animated lines of a rep
 
 
 class HeadAnimation(NamedTuple):
-    """Head line at each time: chainages float64[n] and heads float64[k, n] in their units, times float64[k] [s]."""
+    """Head along a section at several times.
+
+    chainage : float64[n] and heads : float64[k, n], in the units of the envelope; times : float64[k] [s]
+    """
 
     chainage: np.ndarray
     times: np.ndarray
@@ -27,7 +30,7 @@ class HeadAnimation(NamedTuple):
 
 
 def head_animations(result, ways: Iterable[SectionPath]) -> list[HeadAnimation]:
-    """Animated head lines of sections; [] if no frames were stored. Raises RunError if a frame cannot be read."""
+    """Animated heads of the sections `ways`; [] if no frames were stored. Raises RunError if a frame cannot be read."""
     ways, frames = list(ways), _pipe_frames(result)
     if not frames or not ways:
         return []
@@ -52,7 +55,7 @@ def _pipe_frames(result) -> list[tuple[float, Path]]:
 
 
 def _cells_along(result, way: SectionPath, counts: dict[str, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Chainages of cells along a section, at most POINTS evenly chosen ones, and their indices in a frame.
+    """Chainages of cells along a section (at most `MAX_POINTS`, evenly chosen), and their indices in a frame.
 
     counts : pipe -> number of cells, in the order of a frame
     """

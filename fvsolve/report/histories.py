@@ -14,7 +14,7 @@ MAX_NUMBERS = 40_000  # greatest number of values of all series of a report toge
 
 
 class Series(NamedTuple):
-    """Series of a probe or a measurement in the units of history.csv; seen : visible at first."""
+    """Series of a probe or a measurement, in the units of history.csv; seen : True if it is visible at first."""
 
     name: str
     t: np.ndarray
@@ -24,7 +24,7 @@ class Series(NamedTuple):
 
 
 class HistoryPanel(NamedTuple):
-    """Series of one quantity and unit."""
+    """Panel of series of one quantity and unit."""
 
     quantity: str
     unit: str
@@ -32,7 +32,7 @@ class HistoryPanel(NamedTuple):
 
 
 def history_panels(result) -> list[HistoryPanel]:
-    """Panels of histories in the order of the probes; in a large panel the lines with the widest range are visible."""
+    """Panels of histories in the order of the probes; in a large panel only series of the widest range are visible."""
     groups: dict[tuple[str, str], list[str]] = {}
     for name in chosen_probes(result):
         groups.setdefault((probe_quantity(name), result.units[name]), []).append(name)
@@ -49,7 +49,7 @@ def history_panels(result) -> list[HistoryPanel]:
 
 
 def chosen_probes(result) -> list[str]:
-    """Names of the probes of the report: all, or of many those with the widest range in each panel."""
+    """Names of the probes in the report: all, or of many probes the probes of the widest range in each panel."""
     if len(result.probes) <= MAX_PROBES:
         return result.probes
     groups: dict[tuple[str, str], list[str]] = {}

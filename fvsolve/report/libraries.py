@@ -17,7 +17,7 @@ def import_library(name: str) -> Any:
 
 
 def template(text: str) -> Any:
-    """Jinja template that escapes all values, so that they never become markup."""
+    """Jinja template from its text; it escapes all values, so that they never become markup."""
     jinja = import_library("jinja2")
     return jinja.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja.StrictUndefined,
                              ).from_string(text)  # fmt: skip

@@ -32,7 +32,7 @@ MAX_BINS = 150  # greatest number of bins of a long line; the extremes of head a
 
 
 class SectionDevice(NamedTuple):
-    """Node of a section with the devices at it."""
+    """Node of a section, with its devices: the node itself, if it is not a junction, and links other than pipes."""
 
     chainage: float
     place: str
@@ -41,14 +41,14 @@ class SectionDevice(NamedTuple):
 
 @dataclass(frozen=True)
 class Section:
-    """Long section: a path through the network with the results along it.
+    """Long section: a path through the network with the results along it, in the units of `[output]`.
 
     chainage : float64[n]; pipe : str[n]  pipe of each point
     along : quantity -> float64[n]
     lines : name -> float64[n]  heads of vapour pressure, pressure class and limits, NaN where there is none
     ends : chainages of both ends
-    parted : spans of chainage where the vapour pressure was reached
-    beyond : (chainage, head, name of the limit) of places where a limit is violated
+    cavity_spans : (begin, end) of chainage where the vapour pressure was reached
+    violations : (chainage, head, name of the limit) of points where a limit is violated
     """
 
     way: SectionPath
@@ -78,7 +78,7 @@ class Section:
         return np.unique([0, *rows, n - 1])
 
     def labels(self) -> list[tuple[float, str, bool]]:
-        """(chainage, names, True if a device is there) of labels that do not overlap.
+        """Labels that do not overlap: (chainage, names, True if a device is there) of each.
 
         Devices and ends have priority over plain junctions; devices close to each other share a label.
         """
@@ -96,7 +96,7 @@ class Section:
 
 
 class HeadWindow(NamedTuple):
-    """Ends of the head axis, and texts of the limits above and below it."""
+    """Ends of the head axis of a picture, and texts on limits above and below it, which are not drawn."""
 
     low: float
     high: float
@@ -105,7 +105,7 @@ class HeadWindow(NamedTuple):
 
 
 def head_window(sections: Sequence[Section], unit: str) -> HeadWindow:
-    """Head axis of a picture of sections: heads, profile, vapour line and limits close to them.
+    """Head axis for a picture of sections, with heads, pipe elevations, vapour line and limits close to them.
 
     Limits far away are only named, so that they do not compress the heads.
     """
@@ -133,7 +133,7 @@ def head_window(sections: Sequence[Section], unit: str) -> HeadWindow:
 
 
 def value_range(lines: list[np.ndarray]) -> tuple[float, float] | None:
-    """Least and greatest of all finite values; None if there is none."""
+    """Least and greatest of all finite values in some arrays; None if there is none."""
     values = np.concatenate([np.ravel(line) for line in lines] or [np.empty(0)])
     values = values[np.isfinite(values)]
     return (float(values.min()), float(values.max())) if values.size else None
@@ -178,7 +178,10 @@ def _cavity_spans(result, least: np.ndarray, chainage: np.ndarray, way: SectionP
 
 
 def _violations(result, way: SectionPath, chainage: np.ndarray, along: dict) -> list[tuple[float, float, str]]:
-    """(chainage [m], head, name of the limit) of places of a path where a limit on pressure or head is violated."""
+    """Points of a path where a limit on pressure or head is violated: (chainage [m], head, name of the limit) of each.
+
+    chainage : float64[n]  chainages of the section [m]; along : quantity -> float64[n]  results of the section
+    """
     violations, chainages = [], Chainages(result.case)
     for verdict in result.summary["verdicts"]:
         limit = result.case.limits.get(verdict["name"])
@@ -195,7 +198,7 @@ def _violations(result, way: SectionPath, chainage: np.ndarray, along: dict) -> 
 
 
 def _devices(result, way: SectionPath) -> list[SectionDevice]:
-    """Nodes of a path with their devices, chainages in m: nodes other than junctions, and links other than pipes."""
+    """Nodes of a path with their devices; chainages in m."""
     case, devices = result.case, []
     for place, chainage in way.places:
         owner = place.partition(".")[0]

@@ -32,12 +32,12 @@ HIDDEN_KEYS = (
 
 
 def all_tables(result) -> list[ReportTable | None]:
-    """All tables of the model, in order; None for a table that the case has no rows for."""
+    """All tables of the model, in order; None instead of a table without rows."""
     return [fluid(result), pipes(result), walls(result), parts(result)]
 
 
 def fluid(result) -> ReportTable:
-    """Properties of the liquid at its reference state, and their source."""
+    """Table of the properties of the liquid at its reference state, and their source."""
     case, liquid = result.case, result.summary["fluid"]
     rows = []
     for key, words, dimension in FLUID_ROWS:
@@ -123,7 +123,7 @@ def parts(result) -> ReportTable:
 
 
 def key_text(part: Keys, case) -> str:
-    """Text of the keys of a part with their values in the units of [output]."""
+    """Text with the keys of a part and their values, in the units of [output]."""
     values, texts = type(part).values(), []
     for key, value in part.table().items():
         if key not in HIDDEN_KEYS and value is not False and value not in ({}, []):
@@ -154,7 +154,10 @@ def _value_text(value: Any, given: Any, case) -> str:
 
 
 def _value_of_key(value: Any, key: str) -> Any:
-    """Declaration of a key within a table; None if unknown. Values of a schedule have the dimension of its key."""
+    """Declaration of a key within a table with declaration `value`; None if unknown.
+
+    A column of a curve, such as `flow`, has the dimension of its name.
+    """
     for form in getattr(value, "forms", {}).values():
         if key in form:
             return form[key][0]
@@ -171,7 +174,7 @@ def _is_numeric(given: Any) -> bool:
 
 
 def _pressure_column(shown, case):
-    """Column of a modulus or pressure drop in the unit of pressures without its zero offset (bar for barg)."""
+    """Column for a modulus or a pressure drop with the unit of pressures, but as a difference (bar for barg)."""
     if shown.dimension in ("modulus", "pressure_drop") and (UNITS[shown.unit].gauge or UNITS[shown.unit].absolute):
         return column(shown.name, shown.dimension, case, shown.unit[:-1])
     return shown

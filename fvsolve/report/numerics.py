@@ -10,7 +10,7 @@ LEDGER_TERMS = ("initial", "inflow", "outflow", "spilled", "made_up", "final")
 
 
 def settings(result) -> ReportTable:
-    """Scheme, method and step, with the numbers of steps and the time of the run."""
+    """Table of scheme, method, time step, number of steps, and computing time of a run."""
     summary, numerics = result.summary, result.case.numerics
     steps = {"courant": "Courant number", "step": "given, s", "rtol": "by error, rtol"}
     given = [
@@ -33,7 +33,7 @@ def settings(result) -> ReportTable:
 
 
 def ledgers(result) -> ReportTable | None:
-    """Balances of mass, energy and scalars: inflow, outflow, content and remainder; None without ledgers."""
+    """Table of the balances of mass, energy and scalars: inflow, outflow, storage, remainder; None without balances."""
     balances = {name: row for name, row in result.summary["ledgers"].items() if "remainder" in row}
     if not balances:
         return None
@@ -45,7 +45,7 @@ def ledgers(result) -> ReportTable | None:
 
 
 def versions(result) -> ReportTable:
-    """Versions of programs and data, hash of the case, and time of the run."""
+    """Table of versions of programs and data, hash of the case, and date of the run."""
     rows = [["run ended", result.summary.get("ended", "not recorded")]]
     words = {"case": "hash of the case", "sources": "hash of compiled sources", "fluid": "fluid properties",
              "target": "machine"}  # fmt: skip
@@ -54,13 +54,13 @@ def versions(result) -> ReportTable:
 
 
 def events(result) -> ReportTable | None:
-    """Events of self-acting parts with their times; None without events."""
+    """Table of events of self-acting parts with their times; None without events."""
     rows = [[event["time"], event["name"], event["what"]] for event in result.summary["events"]]
     return ReportTable("Events", ("time", "part", "event"), rows, ("s",), more="in summary.json") if rows else None
 
 
 def cavities(result) -> ReportTable | None:
-    """Cavities in pipes: first place and time, greatest volume and its time; None without cavities."""
+    """Table of cavities in pipes: first position and time, greatest volume and its time; None without cavities."""
     rows = [[row["place"].removeprefix("links."), row["distance"], row["time"], row["volume"], row["t_volume"]]
             for row in result.summary["cavities"]]  # fmt: skip
     heads = ("pipe", "first at", "time", "greatest volume", "time")
@@ -68,7 +68,7 @@ def cavities(result) -> ReportTable | None:
 
 
 def comparisons(result) -> ReportTable | None:
-    """Comparison of probes with measured series; None without measurements."""
+    """Table that compares probes with measured series; None without measurements."""
     rows = [[row.probe, row.file, row.unit, row.rms, row.greatest_difference, row.measured_peak, row.computed_peak]
             for row in result.comparisons]  # fmt: skip
     heads = ("probe", "measured", "unit", "rms", "greatest difference", "peak measured", "computed")

@@ -25,7 +25,7 @@ MAX_WARNINGS = 40  # greatest number on the page; summary.json has all
 
 
 def page(result, ways: list[SectionPath]) -> str:
-    """HTML report of a run."""
+    """HTML report of a run; ways : paths of its long sections."""
     sections = [section_of(result, way) for way in ways]
     figures: dict[str, Any] = {}
     probes = worst_places.extremes_of_probes(result)
@@ -102,7 +102,7 @@ def script_json(data: Any) -> str:
 
 
 def _sections(result, sections: list[Section], figures: dict[str, Any]) -> list[dict[str, Any]]:
-    """Template data of each section; adds its figure to `figures`."""
+    """Values for the template on each section, such as name and length; adds the figures to `figures`."""
     moving = head_animations(result, [item.way for item in sections])
     height, along = envelope_column(result, "max_head").unit, envelope_column(result, "distance").unit
     entries, bins = [], min(MAX_BINS, MAX_SHARED_BINS // max(len(sections), 1))
@@ -117,7 +117,7 @@ def _sections(result, sections: list[Section], figures: dict[str, Any]) -> list[
 
 
 def _histories(result, figures: dict[str, Any]) -> list[dict[str, Any]]:
-    """Template data of each panel of histories; adds its figure to `figures`."""
+    """Values for the template on each panel of histories; adds the figures to `figures`."""
     drawn = result.history_drawn()
     doubt = min((time for time, _ in drawn.get("marks", ())), default=None)
     entries = []

@@ -55,7 +55,7 @@ def write_pictures(
 
 
 def parse_probes(result, text: str, faults: list[str]) -> list[str]:
-    """Split `a.head,tank.depth@1,2` into names of probes, which may contain commas; adds a fault for unknown names."""
+    """Split `a.head,tank.depth@1,2` into names of probes, which may contain commas; adds unknown names to `faults`."""
     names, pieces = [], [piece.strip() for piece in text.split(",")] if text else []
     while pieces:
         ends = [k for k in range(1, len(pieces) + 1) if ",".join(pieces[:k]) in result.units]
@@ -82,7 +82,10 @@ def _unknown_probe(result, name: str) -> str:
 
 
 def _chosen_sections(sections: list[SectionPath], route: str, others: bool, faults: list[str]) -> list[SectionPath]:
-    """Sections to draw; adds a fault for an unknown route. others : True if probes or phase planes are drawn."""
+    """Sections to draw: the section `route`, or all sections unless `others` (probes or phase planes) are drawn.
+
+    Adds an unknown route to `faults`.
+    """
     if not route:
         return [] if others else sections
     named = [way for way in sections if way.name == route]

@@ -14,7 +14,10 @@ MAX_LATER_MARKS = 6  # greatest number of marks named after the first
 
 
 class Sentence(NamedTuple):
-    """Sentence at the top of the page; level : "bad", "doubt", "good" or "none"; links : (name, address) of pages."""
+    """Sentence at the top of the page.
+
+    level : "bad", "doubt", "good" or "none"; head : first words, in bold; links : (name, address) of pages
+    """
 
     level: str
     head: str
@@ -23,7 +26,7 @@ class Sentence(NamedTuple):
 
 
 def top_sentences(result) -> list[Sentence]:
-    """Sentences at the top: early stop, errors, doubts, verdict of the limits, then failed or open claims."""
+    """Sentences at the top of a report: early stop, errors, doubts, verdict on the limits, failed or open claims."""
     summary = result.summary
     rows = []
     if result.reason != "finished":
@@ -43,7 +46,7 @@ def top_sentences(result) -> list[Sentence]:
 
 
 def _mark_sentences(result) -> list[Sentence]:
-    """Sentence on the time from which results are not reliable: the first mark, and the places of later ones."""
+    """Sentence on the time from which results are not valid, with the first mark and the parts of later marks."""
     marks = sorted(result.marks, key=lambda mark: mark.time)
     if not marks:
         return []
@@ -61,7 +64,7 @@ def is_sound(result) -> bool:
 
 
 def verdict_sentence(result) -> Sentence:
-    """Sentence on the limits of the case: violated, open, all hold, or none stated."""
+    """Sentence on the limits of the case: some are violated, some are open, all hold, or none is stated."""
     verdicts = result.verdicts
     if not verdicts:
         return Sentence(
@@ -87,11 +90,11 @@ def verdict_sentence(result) -> Sentence:
 
 
 def open_reason(result) -> str:
-    """Reason why limits of a run are open."""
+    """Reason for which limits of a run are open (undecided)."""
     if text := not_valid(result.summary):
         return f"the run is {text}"
     if not result.ok:
-        return "the run is not sound"
+        return "the run stopped early or its numbers are wrong"
     if result.marks:
         return "from some time on the results are not to be trusted"
     if any(notice.kind == "end" for notice in result.warnings):
@@ -100,7 +103,7 @@ def open_reason(result) -> str:
 
 
 def verdict_table(result) -> ReportTable | None:
-    """Table of the verdicts of limits, failed ones first; None without limits."""
+    """Table of the verdicts on limits, violated limits first; None without limits."""
     order = (FAILS, OPEN, HOLDS)
     ordered = sorted(result.verdicts, key=lambda check: order.index(check.state))
     length, height, time = (column("", dimension, result.case) for dimension in ("length", "head", "time"))
@@ -126,7 +129,7 @@ def verdict_table(result) -> ReportTable | None:
 
 
 def worst_tables(result) -> list[ReportTable]:
-    """Tables of the worst places of each limit that applies to more than one part."""
+    """Tables of the positions with the least margins, for each limit that applies to more than one part."""
     length, height, time = (column("", dimension, result.case) for dimension in ("length", "head", "time"))
     tables = []
     for check in result.verdicts:
@@ -156,7 +159,7 @@ def worst_tables(result) -> list[ReportTable]:
 
 
 def claim_table(result) -> ReportTable | None:
-    """Table of the expected values that the case states; None without any."""
+    """Table of the expected values of the case and of the computed values; None without expected values."""
     rows = [[item.text, item.claimed, item.found, item.tolerance, item.unit, IN_WORDS[item.state]]
             for item in result.expectations]  # fmt: skip
     bad = frozenset(k for k, item in enumerate(result.expectations) if item.state == FAILS)
@@ -169,5 +172,5 @@ def claim_table(result) -> ReportTable | None:
 
 
 def claim_text(item) -> str:
-    """Text of an expected value of the case."""
+    """Text that compares an expected value of the case with the computed value."""
     return f"{item.text}: expected {item.claimed:.6g}, computed {value_text(item.found)} {item.unit}"

@@ -42,7 +42,7 @@ def write_report(directory: str | Path, out: str | Path | None = None, xlsx: boo
 
 
 def write_page(path: Path, text: str) -> None:
-    """Write a page; raises FvsolveError if that fails."""
+    """Write the text of a page into a file; raises FvsolveError if it cannot be written."""
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:

@@ -11,9 +11,10 @@ MAX_LIMIT_LINES = 6  # greatest number of limit lines in a section
 
 
 def limit_lines(result, pipe: np.ndarray, elevation: np.ndarray) -> dict[str, np.ndarray]:
-    """Name -> float64[n], head of the limit in the unit of heads, NaN where it does not apply; the class line first.
+    """Heads of pressure classes and limits along a section: name -> float64[n] in the unit of heads.
 
-    pipe : str[n]  pipe of each point; elevation : float64[n] in the unit of heads
+    The line of pressure classes is first; values are NaN where a limit does not apply.
+    pipe : str[n]  pipe of each point; elevation : float64[n]  in the unit of heads
     """
     case, lines = result.case, {}
     classes = {name: getattr(case.links[name], "allowable_pressure", None) for name in np.unique(pipe).tolist()}
@@ -39,7 +40,7 @@ def limit_lines(result, pipe: np.ndarray, elevation: np.ndarray) -> dict[str, np
 
 
 def _as_head(result, quantity: str, value, elevation: np.ndarray) -> np.ndarray:
-    """Convert a value [SI] of a pressure quantity to a head in the unit of heads."""
+    """Convert a pressure, gauge pressure, pressure head or head [SI] to a head in the unit of heads."""
     shown = envelope_column(result, "max_head")
     if quantity == "head":
         return shown.from_si(value + 0.0 * elevation)

@@ -17,7 +17,10 @@ MAX_SECTIONS = 6  # greatest number of sections of a run, unless it has more rou
 
 
 class SectionPath(NamedTuple):
-    """Path of a section: name, legs in order, and (node, chainage [m]) of the ends of its legs."""
+    """Path of a long section.
+
+    legs : pipes in order, with chainages and directions; places : (node, chainage [m]) of the ends of the pipes
+    """
 
     name: str
     legs: list[Leg]
@@ -25,22 +28,22 @@ class SectionPath(NamedTuple):
 
     @property
     def begin(self) -> float:
-        """Chainage of its start [m]."""
+        """Chainage of the start of the path [m]."""
         return self.legs[0].begin
 
     @property
     def end(self) -> float:
-        """Chainage of its end [m]."""
+        """Chainage of the end of the path [m]."""
         return self.legs[-1].end
 
     @property
     def length(self) -> float:
-        """Length from end to end [m]."""
+        """Length of the path from end to end [m]."""
         return self.end - self.begin
 
 
 def section_paths(result) -> list[SectionPath]:
-    """Section paths of a run, its routes first, then the longest; [] without pipes or if the run diverged."""
+    """Section paths of a run: routes of the case, then the longest other paths; [] without pipes or if diverged."""
     if not_valid(result.summary):
         return []
     links = result.case.links
@@ -75,7 +78,10 @@ def _joins_junctions(link, case) -> bool:
 
 
 def _path_of_chain(chain: list[tuple[str, bool, float]], result) -> SectionPath:
-    """Section path of a chain, directed so that the initial head falls along it; a single pipe keeps its direction."""
+    """Section path of a chain of pipes (name, backwards, length [m]), directed so that the initial head falls along it.
+
+    A single pipe keeps its direction.
+    """
     if len(chain) == 1:
         pipe = chain[0][0]
         return _section_path(pipe, [pipe_leg(pipe, result.case.links)], result.case.links)
@@ -97,7 +103,7 @@ def _path_of_chain(chain: list[tuple[str, bool, float]], result) -> SectionPath:
 
 
 def _section_path(name: str, legs: list[Leg], links: dict) -> SectionPath:
-    """Section path with the end nodes of its pipes; a device between two pipes thus has both its nodes."""
+    """Section path with both end nodes of each pipe, so that both nodes of a device between two pipes are included."""
     places = []
     for leg in legs:
         ends = (links[leg.pipe].from_, leg.chainage(0.0)), (links[leg.pipe].to, leg.chainage(links[leg.pipe].length))
@@ -110,9 +116,10 @@ def _initial_head(result, pipe: str, last: bool) -> float:
 
 
 def _longest_chain(pipes: dict) -> list[tuple[str, bool, float]]:
-    """Longest shortest path between two nodes along pipes: (pipe, turned, length) in order.
+    """Pipes between the two nodes that are farthest apart along pipes: list of (pipe, backwards, length [m]).
 
-    Two searches for the farthest node, the first from an end of the longest pipe; exact for networks without loops.
+    pipes : name -> (first node, second node, length). The search finds the node farthest from an end of the longest
+    pipe, then the node farthest from this node; it is exact for networks without loops.
     """
     around: dict[str, list] = {}
     for name, (a, b, length) in pipes.items():
@@ -131,7 +138,11 @@ def _longest_chain(pipes: dict) -> list[tuple[str, bool, float]]:
 
 
 def _farthest(around: dict, start: str) -> tuple[str, dict]:
-    """Node farthest from `start`, and for each node the pipe by which it was reached (Dijkstra 1959)."""
+    """Node farthest from `start` along pipes, and the shortest way to each node (Dijkstra 1959).
+
+    around : node -> list of (other node, pipe, backwards, length); the way is a dict: node -> (previous node, pipe,
+    backwards, length)
+    """
     distance, came, queue, end = {start: 0.0}, {}, [(0.0, start)], start
     done = set()
     while queue:

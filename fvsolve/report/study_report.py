@@ -27,7 +27,11 @@ CAPTION = "Maximum (solid) and minimum (dashed) head over all accepted steps, by
 
 
 def study_page(study: dict[str, Any], runs: list[tuple[dict[str, Any], Any]]) -> str:
-    """HTML report of a study; study : data of study.json, runs : (row, `Result`) of each, row["page"] its report."""
+    """HTML report of a study.
+
+    study : data of study.json; runs : (row of study.json, `Result`) of each run, with the address of its report as
+    row["page"]
+    """
     figures: dict[str, Any] = {}
     first = runs[0][1]
     events = [
@@ -47,12 +51,12 @@ def study_page(study: dict[str, Any], runs: list[tuple[dict[str, Any], Any]]) ->
 
 
 def run_name(row: dict[str, Any]) -> str:
-    """Name of a run, such as `trip with vessel`."""
+    """Name of a run from its event and protection, such as `trip with vessel`."""
     return visible(" with ".join(name for name in (row["event"], row["protection"]) if name) or "the case")
 
 
 def study_sentences(study: dict[str, Any], runs: list) -> list[Sentence]:
-    """Sentences at the top: runs that stopped early or are unreliable, then the protections that hold all limits."""
+    """Sentences at the top: runs that stopped early or are not valid, then protections with which all limits hold."""
     sentences = [Sentence("bad", f"{run_name(row)} stopped early.", f"{result.reason}.")
              for row, result in runs if result.reason != "finished"]  # fmt: skip
     sentences += [Sentence("bad", f"{run_name(row)} is not to be trusted.", item.text)
@@ -82,18 +86,18 @@ def study_sentences(study: dict[str, Any], runs: list) -> list[Sentence]:
 
 
 def run_state(result) -> str:
-    """Worst verdict of the limits of a run; a run that is not ok fails. "" without limits."""
+    """Worst state of the limits of a run; "fails" for a run that is not ok, "" without limits."""
     states = [FAILS] * (not result.ok) + [item.state for item in result.verdicts]
     return next((item for item in (FAILS, OPEN, HOLDS) if item in states), "")
 
 
 def run_links(runs: list) -> tuple[tuple[str, str], ...]:
-    """(name, page) of runs."""
+    """Names of runs and the addresses of their reports, as pairs."""
     return tuple((run_name(row), row["page"]) for row, _ in runs)
 
 
 def run_matrix(runs: list) -> ReportTable:
-    """Table with a row for each run, linked to its report: verdict and the margin of each limit."""
+    """Table with a row for each run: verdict and the margin of each limit, with a link to its report."""
     names = {verdict.name: verdict.unit for _, result in runs for verdict in result.verdicts}
     with_error = any(verdict.error is not None for _, result in runs for verdict in result.verdicts)
     rows = []
@@ -112,7 +116,7 @@ def run_matrix(runs: list) -> ReportTable:
 
 
 def failing_limits(runs: list) -> ReportTable | None:
-    """Table of the limits that fail or are open, with place and time; None without rows."""
+    """Table of the limits that fail or are open in each run, with position and time; None if all hold."""
     length, time = (column("", dimension, runs[0][1].case) for dimension in ("length", "time"))
     pages = [row["page"] for row, result in runs for item in result.verdicts if not item.ok]
     rows = [[run_name(row), item.name, IN_WORDS[item.state], item.value, item.limit, item.unit, item.margin,
@@ -139,7 +143,10 @@ def change_tables(study: dict[str, Any]) -> list[ReportTable]:
 
 
 def event_figures(event: str | None, number: int, runs: list, figures: dict[str, Any]) -> list[dict[str, Any]]:
-    """Template data of the figures of an event, which overlay the runs of all protections; adds them to `figures`."""
+    """Values for the template on the figures of an event, in which the runs of all protections are overlaid.
+
+    number : number of the event, for the keys under which the figures are added to `figures`
+    """
     own = [(row["protection"] or "", result) for row, result in runs if row["event"] == event]
     runs_drawn = [(name, result, section_paths(result)) for name, result in own]
     entries = []
@@ -162,7 +169,7 @@ def event_figures(event: str | None, number: int, runs: list, figures: dict[str,
 
 
 def warning_texts(runs: list) -> list[str]:
-    """Warnings of all runs; equal texts once, with the names of their runs."""
+    """Texts of the warnings of all runs, each once, with the names of its runs."""
     by_text: dict[str, list[str]] = {}
     for row, result in runs:
         for item in result.warnings:

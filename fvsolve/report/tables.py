@@ -28,11 +28,11 @@ def in_unit(unit_column, value: float | None) -> float | None:
 
 @dataclass(frozen=True)
 class ReportTable:
-    """Table with headers; cells are words, numbers, truth values or None.
+    """Table of a report with headers; cells are words, numbers, truth values or None.
 
     units : unit of each column, "" for words and pure numbers
     bad : indices of highlighted rows
-    loose : indices of columns whose rows have different units
+    mixed_units : indices of columns whose rows have different units
     most : greatest number of rows on the page
     more : where to find the rows that the page leaves out
     links : for each row, the page to which its first word links
@@ -50,7 +50,7 @@ class ReportTable:
 
     @property
     def heads(self) -> list[tuple[str, str]]:
-        """(header, unit) of every column."""
+        """Pairs (header, unit) of all columns."""
         return list(zip(self.headers, [*self.units, *[""] * (len(self.headers) - len(self.units))], strict=True))
 
     @property
@@ -67,7 +67,7 @@ class ReportTable:
 
     @property
     def words(self) -> list[list[str]]:
-        """Texts of the rows that the page shows."""
+        """Texts of the cells in the rows that the page shows, aligned by column."""
         shown = self.rows[: self.most]
         rough = [k for k, head in enumerate(self.headers) if head == ERROR_HEADER]
         shown = [[float(f"{value:.2g}") if k in rough and is_number(value) else value for k, value in enumerate(row)]
@@ -121,7 +121,7 @@ def decimal_places(numbers: Sequence[float]) -> int | None:
 
 
 def value_text(value: Any, places: int | None = None) -> str:
-    """Text of a value; a number has `places` decimals, or by default DIGITS significant digits."""
+    """Text of a value; a number has `places` decimals, or by default `DIGITS` significant digits."""
     if value is None or is_number(value) and not math.isfinite(value):
         return "\u2013"
     if isinstance(value, bool):

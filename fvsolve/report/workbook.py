@@ -43,7 +43,7 @@ def write_tables(report_tables: list[ReportTable], path: Path) -> Path:
 
 
 def run_tables(result, sections: list[SectionPath]) -> list[ReportTable]:
-    """All tables of a run; sections have a row for each point."""
+    """All tables of a run; tables of sections have a row for each point."""
     words = ReportTable("Summary", ("", ""), [[item.head, item.text] for item in reliability.top_sentences(result)])
     notes = ReportTable(
         "Warnings", ("kind", "place", "text"), [[item.kind, item.place, item.text] for item in result.warnings]
@@ -71,7 +71,7 @@ def run_tables(result, sections: list[SectionPath]) -> list[ReportTable]:
 
 
 def study_tables(runs: list) -> list[ReportTable]:
-    """Tables of a study with the long sections of all runs; runs : (row, `Result`) of each."""
+    """Tables of a study with the long sections of all runs; runs : (row of study.json, `Result`) of each run."""
     contents = [study_report.run_matrix(runs), study_report.failing_limits(runs)]
     for row, result in runs:
         for way in section_paths(result):
@@ -122,7 +122,7 @@ def _write_sheet(book, table: ReportTable, name: str, bold) -> None:
 
 
 def _sheet_name(title: str, taken: set[str]) -> str:
-    """Valid name of a sheet from a title, different from all in `taken`; adds it to `taken`."""
+    """Valid name for a sheet from a title, different from all names in `taken`; adds it to `taken`."""
     plain = "".join("-" if sign in FORBIDDEN_SIGNS else sign for sign in visible(title)).strip() or "table"
     name, k = plain[:MAX_SHEET_NAME], 1
     while name.casefold() in taken:

@@ -1,4 +1,4 @@
-"""Extremes of a run with place and time: of pipes from the envelope, elsewhere from the probes."""
+"""Extremes of a run with position and time: in pipes from the envelope, elsewhere from the probes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ EXTREMES = (  # quantity, its text, function of the index of the extreme, quanti
 
 
 def extremes_of_pipes(result, ways: list[SectionPath]) -> ReportTable | None:
-    """Table of the extremes over all pipes: value, pipe, distance, elevation and time; None without envelope.
+    """Table of the extremes over all pipes: value, pipe, distance, elevation, time; None without pipes or if diverged.
 
     The chainage is added if the run has a single section whose chainage differs from the distance along the pipe.
     """
@@ -58,7 +58,7 @@ def extremes_of_pipes(result, ways: list[SectionPath]) -> ReportTable | None:
 
 
 def ranked_pipes(result) -> list[ReportTable]:
-    """Tables of pipes ranked by greatest and by minimum pressure, worst first; [] for a single pipe."""
+    """Tables of pipes ranked by greatest and by least pressure, worst first; [] for a single pipe."""
     if len(result.envelope) < 2 or not_valid(result.summary):
         return []
     return [_ranking(result, name, words, most, when) for name, words, most, when in EXTREMES[:2]]
@@ -77,7 +77,7 @@ def _ranking(result, name: str, words: str, most, when: str) -> ReportTable:
 
 
 def extremes_of_probes(result) -> ReportTable | None:
-    """Least and greatest of each probe over all accepted steps with their times, and their errors if estimated."""
+    """Table of the least and greatest value of each probe over all accepted steps, with times and estimated errors."""
     peaks, rows, invalid = result.summary.get("peaks", {}), [], not_valid(result.summary) or None
     clock = UnitColumn("t", "time", result.summary["time_unit"])
     for name, extremes in result.extremes.items():

@@ -59,7 +59,10 @@ def run(
 
 @validated(directory=PATH)
 def open_run(directory: str | Path) -> Result:
-    """Read a run directory. Raises RunError if it holds no finished run, or a run of another version."""
+    """Read the result of a run from its run directory.
+
+    Raises RunError if the run is not finished, or was written by another version of fvsolve.
+    """
     from fvsolve.run.summary_fields import check
 
     contents = read_directory(Path(directory))
@@ -68,9 +71,9 @@ def open_run(directory: str | Path) -> Result:
 
 
 def model_of(case, set: Mapping | None = None, like=None):
-    """Model of the `case` argument of `run`. Faults of its start refer to lines of the file.
+    """Model for the `case` argument of `run`; faults found in the initial state have the line numbers of the file.
 
-    like : a model, as for `model.build.build_like`
+    like : earlier model or None; its arrays are reused where the case is the same (`model.build.build_like`)
     """
     from fvsolve.case import Case, load, locate_faults
     from fvsolve.model import Model
@@ -86,24 +89,30 @@ def model_of(case, set: Mapping | None = None, like=None):
         except MemoryError:
             raise RunError(f"{case.name}: memory is too small for its model; expected fewer cells") from None
     if set:
-        raise RunError("keys of a Model cannot be overridden; give set= together with a case")
+        raise RunError("keys of a Model cannot be overridden; give the argument `set` together with a case")
     return case
 
 
 def sink_of(model, out: str | Path | None, force: bool, resume: bool, threads: int = 1):
-    """Output of a run: memory, or a run directory, which is locked until it is closed."""
+    """Object that stores the output of a run: in memory, or in a run directory, which is locked until it is closed."""
     with mpi_run.rank_zero_first(comm := mpi_run.world()):
         if comm is not None and threads > 1:
-            raise RunError(f"threads = {threads}: under MPI each of the {comm.size} ranks is one thread; omit threads")
+            raise RunError(
+                f"threads = {threads}: under MPI each of the {comm.size} ranks is one thread; leave out `threads`"
+            )
         if out is not None:
             return RunDirectory(Path(out), model, force, resume)
         if resume:
-            raise RunError("resume needs the directory of the run; give it by out=")
+            raise RunError("resume needs the run directory; give it as the argument `out`")
         return MemorySink(model)
 
 
 def solved(model, sink, progress=None, threads: int = 1, begun: float | None = None) -> Result:
-    """Solve and return the result; all files are written except pictures. begun : start by time.perf_counter()."""
+    """Run a model and return its result; all files are written except pictures.
+
+    sink : result of `sink_of`; if it holds a finished run, this run is read instead
+    begun : time.perf_counter() at the start of the command, for the total time; None for now
+    """
     begun, comm = time.perf_counter() if begun is None else begun, mpi_run.world()
     if not sink.ended:
         return _result(model, _solve(model, sink, progress, threads, comm), sink, begun)
@@ -113,7 +122,7 @@ def solved(model, sink, progress=None, threads: int = 1, begun: float | None = N
 
 
 def draw(result: Result, painter: PlotProcess) -> None:
-    """Write missing pictures of a run directory; warns of pictures that fail."""
+    """Draw the pictures that are missing in a run directory; warns of pictures that cannot be drawn."""
     missing = None if result.directory is None else existing_pictures(result.directory)
     pictures, failed = [], {}
     for name, function, drawn in (("history.png", "history_figure", result.history_drawn),

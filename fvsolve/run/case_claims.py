@@ -1,4 +1,4 @@
-"""Comparison of a run with the claims of its case: expectations, limits, measured series."""
+"""Comparison of a run with its case: expected values, limits, measured series."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fvsolve.run.verdicts import places, verdict
 
 
 def claims(model, summary, result) -> dict:
-    """`expectations`, `comparisons` and `verdicts` of a run; also sets the `places` of limits in `result`."""
+    """Entries `expectations`, `verdicts` and `comparisons` of the summary of a run; also sets `result.places`."""
     columns = {column_.name: column_ for column_ in probe_columns(model)}
     case = model.case
     result.places = places(model, summary)
@@ -27,7 +27,7 @@ def claims(model, summary, result) -> dict:
 
 
 def expectations(model, summary, result) -> list[dict]:
-    """Expectations of the case, in the order of the file."""
+    """Entries of the summary for `[expect]`, in the order of the file."""
     columns = {column_.name: column_ for column_ in probe_columns(model)}
     first = min((mark.time for mark in summary.marks), default=math.inf)
     rows = []
@@ -44,10 +44,10 @@ def expectations(model, summary, result) -> list[dict]:
 
 
 def expectation(text: str, expect, column: UnitColumn, value: float, complete: bool) -> dict:
-    """Entry of `[expect]`: claimed, found, tolerance in the unit of the probe, and its state, as for limits.
+    """Entry of the summary for one claim: claimed and found value and tolerance in the unit of `column`, and state.
 
-    `max` and `min` are over all steps and rows, as are `greatest` and `least`, these over all places of a part as well.
-    `mean` is over time (trapezoids), `at` is interpolated between rows. `error` is filled in by an error estimate.
+    value : value in the run [SI], not finite if unknown; complete : True if the run is ok and valid at the time of the
+    value, without which a claim that is met is open. `error` is None until an error estimate sets it.
     """
     tolerance = expect.atol + expect.rtol * abs(expect.value)
     known = math.isfinite(value)
@@ -65,7 +65,7 @@ def expectation(text: str, expect, column: UnitColumn, value: float, complete: b
 
 
 def _at_places(model, summary, expect) -> tuple[float, float]:
-    """Greatest or least value of all places of an extent, and its time."""
+    """Greatest or least value [SI] in all parts of the extent of a claim, over all steps, and its time [s]."""
     extent, low = expect.extent, expect.function == "min"
     values, times = [], []
     for part in part_extremes(model, summary, extent):
@@ -79,7 +79,11 @@ def _at_places(model, summary, expect) -> tuple[float, float]:
 
 
 def _at_probe(expect, probe: str, summary, result) -> tuple[float, float]:
-    """Value of a probe for a claim, and its time; for a mean the end of the run."""
+    """Value of a probe [SI] for a claim, and its time [s].
+
+    `max` and `min` are over all steps and rows; `at` is interpolated between rows; `mean` is over time (trapezoids),
+    with the end of the run as its time.
+    """
     if expect.function == "min":
         return summary.extremes[probe][:2]
     if expect.function == "max":

@@ -1,4 +1,4 @@
-"""Comparison of series: measured ones with a run, a run with a run."""
+"""Comparison of a run with measured series, and of two runs."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ RESULT_KEYS = (
 
 
 def comparison(compare, column: UnitColumn, result) -> dict:
-    """Entry of `[compare]`: differences at the measured times within the run, and both peaks.
+    """Entry of the summary for one measured series: differences at the measured times in the run, and both peaks.
 
-    Differences (computed minus measured) and peaks in the unit of the probe, times in s; all None if no measured time
-    is within the run.
+    compare : series of the case; column : unit of its probe. Differences are computed minus measured values; they and
+    the peaks are in the unit of the probe, times in s. All are None if no measured time is within the run.
     """
     t, computed = result.seconds, result[column.name]
     time, measured = compare.t + compare.shift, column.from_si(compare.v)
@@ -46,7 +46,7 @@ def comparison(compare, column: UnitColumn, result) -> dict:
 
 
 def interpolated(t: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Values at given times, linear between rows; at a jump (two rows with the same time) the later row."""
+    """Values at `times`, linear between rows (t, values); at a jump (two rows of one time) of the later row."""
     times = np.asarray(times, float)
     after = np.clip(np.searchsorted(t, times, side="right"), 1, max(len(t) - 1, 1))
     if len(t) == 1:
@@ -59,9 +59,10 @@ def interpolated(t: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.nda
 
 
 def differences(a, b) -> dict:
-    """Differences of two runs, for each probe that both have: greatest and rms difference, b - a.
+    """Greatest and rms difference `b` - `a` of two results, for each probe that both have.
 
-    In the units of `a`, at the rows of `a` within both runs; `b` is interpolated where its times differ.
+    The differences are in the units of `a`, at those times of `a` that are within both runs; if the times of `b`
+    differ, its values are interpolated. "only_a" and "only_b" list probes of one run only.
     """
     shared = [probe for probe in a.probes if probe in b.units]
     return {

@@ -1,4 +1,4 @@
-"""Estimate of duration and size of a run, before it starts."""
+"""Estimate of the duration and file sizes of a run, before it starts."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ UNITS = ((86400.0 * 365.25, "years"), (86400.0, "days"), (3600.0, "hours"), (60.
 
 
 def cost_text(model) -> str:
-    """Text of the expected duration and size, "" if both are small."""
+    """Text on the expected duration and file sizes of a run; "" if both are small."""
     seconds, bytes_ = model.checks["expected_seconds"] or 0.0, disk_size(model.case)
     parts = [duration(seconds)] if seconds > LONG_RUN else []
     parts += [f"{byte_text(bytes_)} on disk"] if bytes_ > LARGE_FILES else []
@@ -17,6 +17,6 @@ def cost_text(model) -> str:
 
 
 def duration(seconds: float) -> str:
-    """Duration in a suitable unit."""
+    """Text of a duration in a suitable unit, such as "2.5 hours"."""
     length, name = next((unit for unit in UNITS if seconds >= 2.0 * unit[0]), (1.0, "s"))
     return f"{seconds / length:.2g} {name}"

@@ -1,4 +1,4 @@
-"""Run under MPI: rank 0 and the other ranks, with a check that all have the same case."""
+"""Runs under MPI: tasks of rank 0 and of the other ranks, with a check that all have the same case."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ EXTRA = 'pip install "fvsolve[mpi]"'
 
 @cache
 def world():
-    """MPI's communicator of all ranks, None for a single process. Raises FvsolveError without mpi4py."""
+    """MPI communicator of all ranks; None for a single process. Raises FvsolveError without mpi4py."""
     count = max(int(os.environ.get(name, "1")) for name in SIZES)
     if count < 2:
         return None
@@ -39,7 +39,7 @@ def world():
 
 
 def is_other_rank() -> bool:
-    """True for ranks other than 0."""
+    """True if this process is an MPI rank other than 0."""
     return (comm := world()) is not None and comm.rank > 0
 
 
@@ -54,7 +54,7 @@ def digest(model) -> str:
 
 @contextmanager
 def rank_zero_first(comm):
-    """Context of rank 0 before all ranks run; releases the other ranks if it fails."""
+    """Context manager for work of rank 0 while the other ranks wait; an exception in it ends their waiting."""
     try:
         yield
     except BaseException:
@@ -64,9 +64,9 @@ def rank_zero_first(comm):
 
 
 def all_ranks_ready(comm, model):
-    """Communicator after all ranks have the model; None if rank 0 runs alone.
+    """Communicator `comm` when all ranks have the model; None if the model cannot be divided and rank 0 runs alone.
 
-    Rank 0 compiles before the others begin. Raises FvsolveError if a rank fails, or has another case.
+    Rank 0 compiles before the others begin. Raises FvsolveError if a rank fails or has another case.
     """
     with rank_zero_first(comm):
         count = threads_of(model, comm.size)[0]
@@ -83,7 +83,10 @@ def all_ranks_ready(comm, model):
 
 
 def rows_of(model, count: int) -> dict:
-    """Basin -> first row of each rank, and number of rows, of distributed basins : name -> int64[count + 1]."""
+    """Rows of cells of each rank, for each distributed basin: name -> first row of each rank, then the number of rows.
+
+    count : number of ranks; the values are int64[count + 1]
+    """
     partition = make_partition(model, count)
     return {model.basins[b].name: rows for b, rows in zip(partition.basins, partition.firsts, strict=True)}
 

@@ -1,4 +1,4 @@
-"""Extremes over all steps at the places of an extent."""
+"""Extremes over all steps in the parts of an extent (parts and a quantity that a limit or claim names)."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ ENVELOPE_KEYS = ("distance", "elevation", "min_pressure", "t_min", "max_pressure
 
 @dataclass(frozen=True)
 class PartExtremes:
-    """Extremes at the places of a part : float64[places] each.
+    """Extremes at the n recorded positions of a part : float64[n] each; n is 1 except for pipes.
 
-    distance from a pipe's `from` end (nan for other parts), elevation [m], extremes [SI], pressures absolute, times [s]
+    distance : from the `from` end of a pipe [m], nan for other parts; elevation [m]
+    minimum, maximum : extremes over all steps [SI, pressures absolute]; t_min, t_max : their times [s]
     """
 
     group: str
@@ -30,7 +31,7 @@ class PartExtremes:
 
 
 def part_extremes(model, summary, extent) -> list[PartExtremes]:
-    """Extremes of every part of an extent."""
+    """Extremes of every part of an extent; quantities of pressure as absolute pressures."""
     is_pressure = extent.quantity in OF_PRESSURE
     pipes = {pipe.name: pipe for pipe in model.pipes}
     envelope = with_initial_heads(summary, model) if is_pressure else {}
@@ -53,21 +54,24 @@ def part_extremes(model, summary, extent) -> list[PartExtremes]:
 
 
 def valid(part: PartExtremes, until: float) -> PartExtremes:
-    """Places of a part, with nan for extremes from a time on."""
+    """Copy of the extremes of a part, with nan for those that occurred at the time `until` [s] or later."""
     sides = {side: np.where(getattr(part, f"t_{side[:3]}") < until, getattr(part, side), np.nan)
              for side in ("minimum", "maximum")}  # fmt: skip
     return replace(part, **sides)
 
 
 def along_pipe(summary, pipe, rows: list) -> PartExtremes:
-    """Extremes of watched probes along a pipe."""
+    """Extremes along a pipe, from the probes `rows` of which only extremes are recorded."""
     distance = np.array([probe.fraction for probe in rows]) * pipe.length
     extremes = np.array([summary.watched[probe.text] for probe in rows])
     return PartExtremes("links", pipe.name, distance, pipe.height(distance), *extremes.T)
 
 
 def in_quantity(model, quantity: str, pressure, elevation):
-    """Absolute pressures [Pa] as a quantity of pressure [SI]; increasing with pressure."""
+    """Convert absolute pressures [Pa] to the quantity "pressure", "gauge_pressure", "head" or "pressure_head" [SI].
+
+    elevation : elevation of the points [m]
+    """
     if quantity == "pressure":
         return pressure
     if quantity == "gauge_pressure":
@@ -77,7 +81,10 @@ def in_quantity(model, quantity: str, pressure, elevation):
 
 
 def pressure_of(model, quantity: str, value: float, elevation):
-    """Absolute pressure [Pa] for a quantity of pressure [SI]; nan below the minimum pressure of the fluid."""
+    """Absolute pressure [Pa] from a value of "pressure", "gauge_pressure", "head" or "pressure_head" [SI].
+
+    elevation : elevation of the points [m]. The result is nan below the minimum pressure of the fluid.
+    """
     if quantity == "pressure":
         return value
     if quantity == "gauge_pressure":

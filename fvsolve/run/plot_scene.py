@@ -1,4 +1,4 @@
-"""Scene that `view` draws of a run: frames, units, and places of parts."""
+"""Data of the pictures that `view` draws of a run: frames, units, and positions of parts."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ DEFAULT_UNITS = {"pressure": "bar"}  # units of pictures if `[output]` sets none
 
 
 def scene_of(case, title: str, field: str, frames: list[tuple[float, list[Path]]], contours: int) -> DrawnScene:
-    """Scene of frames (time [s], files) of a run; without frames, of its parts.
+    """Scene of a quantity of a run, for drawing; without frames, only its parts.
 
-    Raises FvsolveError for an unknown field.
+    field : name of the quantity; frames : list of (time [s], files with the fields); contours : number of contour lines
+    Raises FvsolveError for an unknown quantity.
     """
     clock = column("t", "time", case)
     captions = [(f"{field.replace('_', ' ')} at t = {clock.from_si(t):.6g} {clock.unit}", files) for t, files in frames]
@@ -53,7 +54,7 @@ def scene_of(case, title: str, field: str, frames: list[tuple[float, list[Path]]
 
 
 def unit_of(case, field: str) -> DrawnUnit:
-    """Unit of a field, as in `[output]`; for fields of user-defined physics, as in their file."""
+    """Unit of a quantity in pictures: as in `[output]`, by default bar for pressures; none for unknown names."""
     if field in case.scalars:
         return DrawnUnit(field, case.scalars[field].unit)
     own = {
@@ -73,7 +74,7 @@ def unit_of(case, field: str) -> DrawnUnit:
 
 
 def lengths_of(case) -> tuple[DrawnUnit, DrawnUnit]:
-    """Units of the plan and of heights: positions for bodies, levels for basins."""
+    """Units of plan coordinates and of heights in a picture, from `[output]`."""
     bodies = any(node.kind == "body" for node in case.nodes.values())
     plan, height = ("position", "position") if bodies else ("length", "level" if case.meshes else "head")
     columns = [column(name, name, case) for name in (plan, height)]
@@ -83,7 +84,7 @@ def lengths_of(case) -> tuple[DrawnUnit, DrawnUnit]:
 
 
 def parts_of(case, plan: dict[str, np.ndarray]) -> list[DrawnPart]:
-    """Nodes and links, except pipes and basins, with their places in the drawing."""
+    """Nodes and links, except pipes and basins, with their positions in the drawing; plan : name -> x, y [m]."""
     links = {name: link for name, link in case.links.items() if link.kind != "pipe"}
     piped = {port for link in case.links.values() if link.kind == "pipe" for port in link.ports.values()}
     parts = []
@@ -109,7 +110,7 @@ def parts_of(case, plan: dict[str, np.ndarray]) -> list[DrawnPart]:
 
 
 def _key(port: str, case) -> str:
-    """Part, or patch, of a port."""
+    """Key of the part or patch that a port joins: "nodes.NAME", "links.NAME" or "BASIN.PATCH"."""
     if port in case.nodes:
         return f"nodes.{port}"
     owner = network_layout.place(port)
@@ -117,12 +118,12 @@ def _key(port: str, case) -> str:
 
 
 def _kinds(part) -> tuple[str, ...]:
-    """Kind of a part and of its base classes."""
+    """Type names of a part and of its base classes."""
     return tuple(dict.fromkeys(kind for base in type(part).__mro__ if (kind := base.__dict__.get("kind"))))
 
 
 def _to_scale(scene: DrawnScene, lengths: dict[str, float]) -> bool:
-    """True if stated positions agree with the lengths of pipes."""
+    """True if the distances between stated positions roughly agree with the lengths of pipes."""
     points, lines, _, owner = scene.pipes[0]
     drawn = np.bincount(owner, np.linalg.norm(points[lines[:, 1]] - points[lines[:, 0]], axis=1), len(lengths))
     share = float(np.median(drawn / np.array(list(lengths.values()))))
@@ -130,7 +131,7 @@ def _to_scale(scene: DrawnScene, lengths: dict[str, float]) -> bool:
 
 
 def _anchors(case, plan: dict[str, np.ndarray]) -> dict[str, tuple[float, float, float]]:
-    """Midpoints of patches of basins."""
+    """Midpoints of the patches of basins in the drawing: BASIN.PATCH -> x, y, elevation [m]."""
     anchors = {}
     for name, mesh in case.meshes.items():
         for patch in patch_names(mesh):
@@ -140,7 +141,7 @@ def _anchors(case, plan: dict[str, np.ndarray]) -> dict[str, tuple[float, float,
 
 
 def _about_basins(case) -> dict[str, np.ndarray]:
-    """Plan positions for a case of basins without pipes: parts at a patch are placed outside of it."""
+    """Plan positions (name -> x, y [m]) for a case of basins without pipes; parts at a patch lie outside of it."""
     plan = {name: np.array(node.position, float) for name, node in case.nodes.items() if node.position is not None}
     plan |= {name: np.zeros(2) for name in case.meshes if name not in plan}
     if len(plan) == len(case.nodes):
@@ -158,7 +159,7 @@ def _about_basins(case) -> dict[str, np.ndarray]:
 
 
 def _outward(case, basin: str, patch: str) -> tuple[np.ndarray, np.ndarray]:
-    """Direction out of a basin at a patch, and the patch's midpoint."""
+    """Unit vector out of a basin at a patch, and the midpoint of the patch [m] : float64[2] each."""
     mesh = case.meshes[basin]
     middle = mesh.middle[mesh.patch(patch)].mean(axis=0)
     inside = mesh.centre[mesh.left[mesh.patch(patch)]].mean(axis=0)

@@ -22,9 +22,11 @@ STEPS = ("explicit", "damped", "diagonal", "full", "linear")  # kinds of methods
 
 @dataclass(frozen=True)
 class CacheState:
-    """State of the cache: folder of this machine's code, kind of machine, and amounts.
+    """State of the cache of compiled code.
 
-    compiled : number of functions that were added; functions, bytes : of all stored functions
+    directory : folder of the code for this type of machine; target : name of this type of machine
+    compiled : number of functions that were added; functions, bytes : number and size of all stored functions
+    seconds : duration of the compilation [s]
     """
 
     directory: str
@@ -39,9 +41,10 @@ def warm(
     cases: Sequence[Path], whole: bool, jobs: int | None = None,
     progress: Callable[[int, int, str], None] = lambda done, total, task: None,
 ) -> CacheState:  # fmt: skip
-    """Compile the code that these cases need, with `whole` also all kinds of steps, by `jobs` processes.
+    """Compile the code that some cases need, in several processes, and return the state of the cache.
 
-    progress(done, total, task) is called after each task. Raises CaseError, FvsolveError.
+    cases : paths of case files; whole : True to compile the steps of all kinds of methods too; jobs : number of
+    processes; progress(done, total, task) is called after each task. Raises CaseError, FvsolveError.
     """
     folder, began = _folder(), time.perf_counter()
     before = code_files(folder)
@@ -77,12 +80,12 @@ def _folder() -> Path:
 
 
 def code_files(folder: Path) -> dict[str, int]:
-    """Files of machine code and their sizes [bytes]."""
+    """Paths of the files of compiled code in a folder, with their sizes [bytes]."""
     return {str(path): path.stat().st_size for path in folder.rglob(f"*{store.SUFFIX}")}
 
 
 def _all(tasks: list[tuple[str, str]], jobs: int, progress: Callable[[int, str], None]) -> None:
-    """Run tasks in a process pool; the longest tasks are first."""
+    """Run tasks (kind, name) in up to `jobs` processes, in order; tasks that take longest should be first."""
     pool, started = ProcessPool(run_task, min(jobs, len(tasks))), 0
     progress(0, "compiling")
     try:
@@ -100,13 +103,13 @@ def _all(tasks: list[tuple[str, str]], jobs: int, progress: Callable[[int, str],
 
 
 def run_task(task: tuple[str, str]) -> None:
-    """Compile the code of a task in this process."""
+    """Compile the code of a task (kind, name) in this process."""
     kind, name = task
     TASKS[kind](name)
 
 
 def steps(_: str) -> None:
-    """Time loop, and the replacement of linear algebra for methods without it."""
+    """Compile the time loop, and the empty linear algebra of explicit methods."""
     from fvsolve.steppers.signatures import no_algebra
     from fvsolve.steppers.time_loop import compiled, compiled_attempt
 
@@ -114,14 +117,14 @@ def steps(_: str) -> None:
 
 
 def attempt(kind: str) -> None:
-    """Step of a kind of methods."""
+    """Compile the step of a kind of methods, such as "explicit"."""
     from fvsolve.steppers.integrator import attempt_of
 
     attempt_of(kind)
 
 
 def algebra(kind: str) -> None:
-    """Factorisations and solutions of a kind, for real and complex shifts."""
+    """Compile the linear solver of a kind, for real and for complex matrices."""
     from fvsolve.steppers.structure import functions
 
     for complex in (False, True):
@@ -129,7 +132,7 @@ def algebra(kind: str) -> None:
 
 
 def case(path: str) -> None:
-    """Code that a case needs: its start, checks, first steps and energies."""
+    """Compile the code that a case needs: initial state, checks, first steps and energies."""
     from fvsolve.output.memory_sink import MemorySink
     from fvsolve.run import model_of
     from fvsolve.solve import initial_state, solve

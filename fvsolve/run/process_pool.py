@@ -20,7 +20,10 @@ NOT_STARTED = 'a worker process could not be started; a script that uses jobs ne
 
 
 class ProcessPool:
-    """Pool of up to `size` processes, started when needed; if a process is killed, only its chunk is lost."""
+    """Pool of up to `size` processes, which are started when needed.
+
+    work : function that each process applies to every task of a chunk. If a process is killed, only its chunk is lost.
+    """
 
     def __init__(self, work: Any, size: int) -> None:
         self.work, self.capacity = work, size
@@ -29,15 +32,15 @@ class ProcessPool:
         self.busy: list[Worker] = []
 
     def submit(self, chunk: int, tasks: list) -> None:
-        """Start a chunk in a process."""
+        """Send a list of tasks, with the number `chunk`, to a free or new process."""
         worker = self.idle.pop() if self.idle else Worker(self.context, self.work)
         self.busy.append(worker)
         worker.submit(chunk, tasks)
 
     def next_result(self) -> tuple[int, list | None, float]:
-        """Next finished chunk : (number, answers or None if its process ended, seconds).
+        """Wait for a finished chunk; returns its number, the answers (None if the process ended) and its time [s].
 
-        Raises an exception of the process.
+        Raises the exception that a task raised.
         """
         while True:
             ready = wait([worker.pipe for worker in self.busy])
@@ -64,7 +67,7 @@ class ProcessPool:
 
 
 class Worker:
-    """Process and the pipe to it."""
+    """Worker process, and the connection to it."""
 
     def __init__(self, context, work: Any) -> None:
         self.pipe, far_end = context.Pipe()
@@ -97,7 +100,7 @@ class Worker:
 
 
 def serve(pipe: Connection, work: Any) -> None:
-    """Compute chunks received by a pipe, until its other end is closed."""
+    """Compute the chunks that a pipe receives and send back the results, until its other end is closed."""
     # Ctrl-C reaches all processes of a terminal; the parent process ends this process
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=end_with_parent, daemon=True).start()
@@ -117,7 +120,7 @@ def end_with_parent() -> None:
 
 
 def compute(work: Any, tasks: list) -> tuple[Any, float]:
-    """Compute tasks : (answers or the exception raised, seconds)."""
+    """Apply `work` to all tasks; returns the list of answers, or the exception raised, and the duration [s]."""
     began = time.perf_counter()
     try:
         answers = [work(task) for task in tasks]

@@ -1,4 +1,4 @@
-"""Result of a run: probes over time, extremes, verdicts, pictures."""
+"""Class `Result` of a run: probes over time, extremes, verdicts, pictures."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ IN_WORDS = {HOLDS: "holds", OPEN: "open", FAILS: "FAILS"}
 
 
 def not_valid(summary: dict) -> str:
-    """Text of the time from which the numbers of a diverged run are not valid, from its summary; "" for other runs."""
+    """Text with the time from which the numbers of a diverged run are not valid; "" for other runs."""
     if summary["invalid_from"] is None:
         return ""
     clock = UnitColumn("t", "time", summary["time_unit"])
@@ -31,7 +31,10 @@ def not_valid(summary: dict) -> str:
 
 
 class ResultMark(NamedTuple):
-    """First place and time [s] at which the model does not hold: results are not valid from there on."""
+    """First part and time [s] at which the model does not describe what happens; later results are not valid.
+
+    what : name of the event; place : part, such as "links.main"; text : message
+    """
 
     what: str
     place: str
@@ -40,7 +43,7 @@ class ResultMark(NamedTuple):
 
 
 class Extremes(NamedTuple):
-    """Least and greatest over all accepted steps and rows, in the unit of the probe, and their times [s].
+    """Least and greatest value of a probe over all accepted steps and rows, in its unit, and their times [s].
 
     Values of a diverged run from the time at which it is not valid are left out.
     """
@@ -52,7 +55,7 @@ class Extremes(NamedTuple):
 
 
 class Expectation(NamedTuple):
-    """Claim of the case; `claimed`, `found`, `tolerance` and `error` in `unit`.
+    """Claim of `[expect]` and its outcome; `claimed`, `found`, `tolerance` and `error` are in `unit`.
 
     state : `holds`, `fails`, or `open` if the run cannot decide; ok : True if it holds
     error : bound of the error of `found`, None without an error estimate
@@ -69,13 +72,15 @@ class Expectation(NamedTuple):
 
 
 class LimitVerdict(NamedTuple):
-    """Limit of the case, and the place that decides it; lengths in m, times in s, else `unit`.
+    """Limit of `[limits]` and its outcome at the part and time with the least margin.
 
-    state : `holds`; `fails` if it is exceeded; `open` if the run cannot decide, or if the error at a place exceeds its
-    margin; ok : True if it holds; margin : distance from the limit, negative beyond it
+    Lengths are in m, times in s; value, limit, margin and error are in `unit`.
+    state : `holds`; `fails` if the limit is exceeded; `open` if the run cannot decide or an error exceeds its margin
+    place, chainage, elevation, time : part, position and time of the least margin; ok : True if the limit holds
+    margin : distance of the value from the limit, negative if the limit is exceeded
     bound : "minimum" or "maximum"; until : end time of the run
     error : bound of the error of `value`, None without an error estimate; reason : cause of a large or unknown error
-    worst : entries of the worst places, a row for each bound of each part
+    worst : dicts with these entries for the parts and bounds with the least margins, worst first
     """
 
     name: str
@@ -103,7 +108,7 @@ class LimitVerdict(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """Comparison of a measured series with its probe: differences and peaks in `unit`, times in s."""
+    """Comparison of a measured series with a probe (`[compare]`): differences and peaks in `unit`, times in s."""
 
     probe: str
     unit: str
@@ -120,12 +125,11 @@ class Comparison(NamedTuple):
 
 
 class Result(Displayable):
-    """Probes over time, and facts about the run, in the units of `[output]`.
+    """Result of a run: probes over time and facts about the run, in the units of `[output]`.
 
-    `result.t` [s], `result["gate.pressure"]` float64[rows] in `result.units["gate.pressure"]`, `.probes`,
-    `.reason`, `.ok`, `.marks`, `.warnings`, `.ledger`, `.extremes`, `.envelope`, `.routes`, `.expectations`,
-    `.verdicts`, `.comparisons`; all except the arrays as plain data in `result.summary`. `result.directory` is its
-    directory on disk, or None.
+    result["gate.pressure"] : float64[rows]  values of a probe in the unit `result.units["gate.pressure"]`
+    result.t : float64[rows]  times; result.seconds : times [s]
+    result.summary : all facts except the arrays as plain data; result.directory : run directory, or None
     """
 
     def __init__(
@@ -154,17 +158,17 @@ class Result(Displayable):
 
     @property
     def marks(self) -> list[ResultMark]:
-        """First place and time from which results are not valid, one for each cause."""
+        """First part and time from which results are not valid, one mark for each cause."""
         return [ResultMark(**mark) for mark in self.summary["marks"]]
 
     @property
     def warnings(self) -> list[Notice]:
-        """Notices of legal but noteworthy facts; a notice with `ok` False makes that of the run False."""
+        """Notices of legal but remarkable situations; if `ok` of a notice is False, `ok` of the run is False."""
         return [Notice(**notice) for notice in self.summary["warnings"]]
 
     @property
     def ledger(self) -> dict:
-        """Inflow, outflow, storage and remainder of each ledger (`mass` [kg])."""
+        """Balances by name, such as "mass" [kg]: inflow, outflow, storage and remainder."""
         return self.summary["ledgers"]
 
     @property
@@ -181,7 +185,7 @@ class Result(Displayable):
 
     @property
     def verdicts(self) -> list[LimitVerdict]:
-        """Verdicts of `[limits]`, each with the place and time nearest to failure."""
+        """Verdicts on the limits of `[limits]`, each with the part and time of the least margin."""
         return [LimitVerdict(**row) for row in self.summary["verdicts"]]
 
     @property
@@ -191,14 +195,14 @@ class Result(Displayable):
 
     @cached_property
     def case(self):
-        """Case as resolved, read from the run directory if necessary."""
+        """Case of the run, with all defaults filled in; read from the run directory if necessary."""
         from fvsolve.case import load
 
         return load(self.directory / "case.toml")
 
     @cached_property
     def envelope(self) -> dict:
-        """Pipe -> distance, elevation, least and maximum pressure and head, times: float64[cells]."""
+        """Pipe -> distance, elevation, minimum and maximum pressure and head over all steps, times: float64[cells]."""
         tables = self._read_envelope()
         for arrays in tables.values():
             for array in arrays.values():
@@ -207,7 +211,7 @@ class Result(Displayable):
 
     @cached_property
     def routes(self) -> dict:
-        """Route -> chainage, pipe, distance, elevation, least and maximum pressure and head, times, along it."""
+        """Route -> chainage, pipe, distance, elevation, least and greatest pressure and head, times, along it."""
         from fvsolve.output.route_table import route_envelopes
 
         return route_envelopes(self.envelope, self.case)
@@ -265,7 +269,7 @@ class Result(Displayable):
         return save_if_path(history_figure(**self.history_drawn()), path)
 
     def history_drawn(self) -> dict[str, Any]:
-        """Arguments of the history figure, empty without probes."""
+        """Arguments for the function `history_figure`; empty without probes."""
         if not self.probes:
             return {}
         marks = [(self._time.from_si(item.time), f"{item.place} {item.what}") for item in self.marks]
@@ -283,7 +287,7 @@ class Result(Displayable):
         return save_if_path(envelope_figure(**self.envelope_drawn()), path)
 
     def envelope_drawn(self) -> dict[str, Any]:
-        """Arguments of the envelope figure, empty without pipes."""
+        """Arguments for the function `envelope_figure`; empty without pipes."""
         if not self.envelope:
             return {}
         return {
@@ -292,11 +296,11 @@ class Result(Displayable):
 
     @validated(time=NUMBER, field=TEXT, path=PATH, contours=COUNT_FROM_ZERO)
     def view(self, time: float | None = None, field: str | None = None, path=None, contours: int = 0) -> Path:
-        """Draw `field` at the frame nearest to `time` [s] (default: the last) with PyVista; return its path.
+        """Draw the quantity `field` at the frame nearest to `time` [s] (default: last) with PyVista; return the path.
 
-        By default `field` is pressure; without pipes, the first field of the first basin; without pipes, basins and
-        bodies, only the parts are drawn. `contours` : number of contour lines. Raises RunError without frames,
-        FvsolveError if drawing is not possible.
+        By default `field` is pressure, or without pipes the first field of the first basin, or without basins the
+        speed of bodies; without all of these only the parts are drawn. `contours` : number of contour lines. Raises
+        RunError without frames, FvsolveError if drawing is not possible.
         """
         if field is None and self._without_fields:
             return self._draw([], "parts", path, ".png", 0)
@@ -306,12 +310,12 @@ class Result(Displayable):
 
     @validated(path=PATH, field=TEXT, contours=COUNT_FROM_ZERO)
     def animate(self, path=None, field: str | None = None, contours: int = 0) -> Path:
-        """Draw all frames as `view` does, as a .gif or .mp4; return its path."""
+        """Draw all frames as `view` does into an animation, a .gif or .mp4 file; return the path."""
         return self._draw(list(dict.fromkeys(t for t, _ in self._frames())), field, path, ".gif", contours)
 
     @property
     def _without_fields(self) -> bool:
-        """True if no part has fields."""
+        """True if no part has fields that frames show, and the result is in a run directory."""
         kinds = {part.kind for part in (*self.case.nodes.values(), *self.case.links.values())}
         return self.directory is not None and not kinds & KINDS_WITH_FIELDS
 
@@ -324,9 +328,9 @@ class Result(Displayable):
         return frames
 
     def _no_frames(self) -> str:
-        """Reason for a run without frames."""
+        """Text of the reason for which a run has no frames."""
         if self.directory is None:
-            return "nothing was written; give the run a directory"
+            return "nothing was written; run again with a run directory (`out`)"
         if not {part.kind for part in (*self.case.nodes.values(), *self.case.links.values())} & KINDS_WITH_FIELDS:
             return f"the case has no {listing(sorted(KINDS_WITH_FIELDS))}"
         if self.case.output.fields == 0:
@@ -372,6 +376,6 @@ class Result(Displayable):
         return f"{summary['case']!r}: {self.reason}, t = {summary['t']:g} s, {len(self.units)} probes"
 
     def table_columns(self) -> dict[str, list]:
-        """Unit, least and greatest of every probe, with times."""
+        """Columns of a table of the probes: name, unit, least and greatest value, and their times."""
         columns = {"probe": self.probes, "unit": list(self.units.values())}
         return columns | {key: [getattr(row, key) for row in self.extremes.values()] for key in Extremes._fields}

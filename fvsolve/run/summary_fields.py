@@ -1,4 +1,4 @@
-"""Check that a summary read from a file has the rows of this version."""
+"""Check that a summary.json has the entries that this version of fvsolve reads."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ NESTED_ROWS = {  # rows within rows
 
 
 def check(summary: dict[str, Any], path: Path) -> None:
-    """Raise RunError if rows of a summary are not those of this version."""
+    """Raise RunError if the entries of a summary were written by another version; path : its file, for the message."""
     if faults := [*field_faults(summary)]:
         raise RunError(
             f"{path} {'; '.join(faults)}: it was written by another version of fvsolve; run again with --force"
@@ -35,7 +35,7 @@ def check(summary: dict[str, Any], path: Path) -> None:
 
 
 def field_faults(summary: dict[str, Any]) -> Iterator[str]:
-    """Texts of missing and unknown fields in the rows of each key."""
+    """Yield texts on missing and unknown entries, for each key of a summary."""
     for key, expected in ROWS.items():
         rows = as_rows(summary.get(key, []))
         if missing := [name for name in expected if any(name not in entry for entry in rows)]:
@@ -51,7 +51,7 @@ def field_faults(summary: dict[str, Any]) -> Iterator[str]:
 
 
 def as_rows(rows: list | dict) -> list[dict]:
-    """Rows of a list, or of a table by name; a single row as a list."""
+    """List of dicts from a list of dicts, from a dict of dicts, or from a single dict."""
     if isinstance(rows, dict):
         return [*rows.values()] if all(isinstance(row, dict) for row in rows.values()) else [rows]
     return rows

@@ -1,4 +1,4 @@
-"""Verdicts on limits of a design, from the extremes of a run."""
+"""Verdicts on the design limits of a case, from the extremes of a run."""
 
 from __future__ import annotations
 
@@ -26,7 +26,11 @@ PLACES_KEY = "beside"  # key of a row that is not written to files: all places o
 
 
 class Nearest(NamedTuple):
-    """Place in a part that is nearest to a bound of a limit, or most beyond it [SI]."""
+    """Position in a part with the least margin under one bound of a limit [SI].
+
+    margin : distance from the limit, negative beyond it; bound : "minimum" or "maximum"; at : index of the position
+    margins, limits : float64[n]  margin and limit at all positions of the part
+    """
 
     margin: float
     value: float
@@ -41,7 +45,7 @@ class Nearest(NamedTuple):
 
 
 class PlaceMargins(NamedTuple):
-    """All places of a part under a bound of a limit: probes, allowed values and margins, in the limit's unit."""
+    """Probes at all positions of a part, with limits and margins there for one bound, in the unit of the limit."""
 
     probes: list[str]
     limits: np.ndarray
@@ -49,15 +53,14 @@ class PlaceMargins(NamedTuple):
 
 
 def verdicts(model, summary) -> list[dict[str, Any]]:
-    """Verdict of every limit of the case, in units of `[output]`, with the worst place of each part."""
+    """Verdict on every limit of the case, in units of `[output]`, with its worst parts."""
     return [verdict(rows) for rows in places(model, summary)]
 
 
 def places(model, summary) -> list[list[dict[str, Any]]]:
-    """Rows of every limit of the case: for each bound the nearest place of each part, in their order.
+    """Rows for every limit of the case: for each part and each bound a dict on the position with the least margin.
 
-    A row whose limit is not exceeded is open if the run is not ok or incomplete: if results are not valid from a mark
-    on, or if a schedule goes on after the end.
+    If a limit is not exceeded but the run is not ok, has marks, or ends before a schedule does, the state is open.
     """
     chainage = Chainages(model.case)
     complete = bool(summary.ok and not summary.marks and not schedule_ends.notices(model.case))
@@ -81,25 +84,28 @@ def places(model, summary) -> list[list[dict[str, Any]]]:
 
 
 def verdict(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Verdict of a limit: its worst row with its state, and its worst places."""
+    """Verdict on a limit, from its rows of `places`: the worst row, with the list `worst` of the worst rows added."""
     rows = [{key: value for key, value in row.items() if key != PLACES_KEY} for row in sorted(rows, key=sort_key)]
     listed = [{key: value for key, value in row.items() if key not in SHARED} for row in worst(rows)]
     return {**rows[0], "ok": rows[0]["state"] == HOLDS, "worst": listed}
 
 
 def sort_key(row: dict[str, Any]) -> tuple[int, float]:
-    """Sort key, worst row first: by state, then by margin."""
+    """Key for sorting rows, worst first: by state, then by margin."""
     return STATES.index(row["state"]), -math.inf if row["margin"] is None else row["margin"]
 
 
 def worst(rows: list[dict]) -> list[dict]:
-    """Worst places, at least one for each bound."""
+    """First `WORST` of the sorted rows, and the first row of each bound if it is not among them."""
     first = {row["bound"]: row for row in reversed(rows)}
     return [*rows[:WORST], *(row for row in first.values() if row not in rows[:WORST])]
 
 
 def nearest(model, summary, limit, part: PartExtremes, complete: bool):
-    """For every bound of a limit, the place of a part nearest to it, or most beyond it."""
+    """Yield, for every bound of a limit, the position in a part with the least margin.
+
+    complete : True if the run can decide that a limit holds
+    """
     quantity = limit.extent.quantity
     for bound, (values, times), sign in zip(
         ("minimum", "maximum"), extremes(model, quantity, part), (1.0, -1.0), strict=True
@@ -119,7 +125,10 @@ def nearest(model, summary, limit, part: PartExtremes, complete: bool):
 
 
 def place_margins(model, extent, shown: UnitColumn, row: Nearest) -> PlaceMargins:
-    """All places of a row. A pressure head is read as a head, and its limit includes the elevation."""
+    """Limits and margins at all positions of the part of a row.
+
+    The probe for a pressure head is that of the head, so that its limit is increased by the elevation.
+    """
     part, above = row.part, extent.quantity == "pressure_head"
     text = f"{part.group}.{part.part}.{'head' if above else extent.quantity}"
     shares = part.distance / getattr(model.case.links.get(part.part), "length", np.nan)
@@ -129,10 +138,10 @@ def place_margins(model, extent, shown: UnitColumn, row: Nearest) -> PlaceMargin
 
 
 def allowed(model, limit, bound: str, part: PartExtremes):
-    """Values that a bound allows at the places of a part [SI]; None without a bound.
+    """Limit at each position of a part [SI], for the bound "minimum" or "maximum"; None if the limit lacks this bound.
 
-    Under `cavitation` no pressure falls below that of vapour. A least value at or below it is replaced by the value at
-    which a place counts as a cavity.
+    Under `cavitation` no pressure falls below the vapour pressure. A minimum at or below it is replaced by the pressure
+    below which a position counts as a cavity.
     """
     case, quantity, value = model.case, limit.extent.quantity, getattr(limit, bound)
     if bound == "maximum" and limit.class_fraction is not None:
@@ -148,14 +157,17 @@ def allowed(model, limit, bound: str, part: PartExtremes):
 
 
 def cavity_of(model, quantity: str, elevation):
-    """Value of a quantity of pressure at which a place counts as a cavity; nan for other quantities and laws."""
+    """Value of a pressure or head [SI] below which a position counts as a cavity.
+
+    elevation [m]. The result is nan for other quantities and for density laws without cavities.
+    """
     if quantity not in OF_PRESSURE or not model.case.law.cavitates:
         return np.nan
     return in_quantity(model, quantity, model.case.law.cavity_pressure, elevation)
 
 
 def first_cavity(summary, part: PartExtremes, margin: np.ndarray, at: int) -> int:
-    """Place at which the first cavity of a pipe opened, if the limit is exceeded there; else `at`."""
+    """Index of the position where the first cavity of a pipe opened, if the limit is exceeded there; else `at`."""
     distance = next(
         (cavity.distance for cavity in summary.cavities if cavity.place == f"{part.group}.{part.part}"), np.nan
     )
@@ -164,7 +176,10 @@ def first_cavity(summary, part: PartExtremes, margin: np.ndarray, at: int) -> in
 
 
 def extremes(model, quantity: str, part: PartExtremes):
-    """Least and greatest of a quantity, or of its magnitude, at the places of a part, each with its times."""
+    """Pairs (values [SI], times [s]) of the least and greatest values of a quantity at all positions of a part.
+
+    Values of velocities and forces are magnitudes.
+    """
     if quantity in OF_PRESSURE:
         low, high = (
             in_quantity(model, quantity, pressures, part.elevation) for pressures in (part.minimum, part.maximum)
@@ -180,7 +195,7 @@ def extremes(model, quantity: str, part: PartExtremes):
 
 
 def row_of(row: Nearest, shown: UnitColumn, chainage: Chainages, extent) -> dict[str, Any]:
-    """Row of a place: part, chainage and elevation [m], time [s], value, limit and margin in their unit."""
+    """Dict for a position: part, chainage and elevation [m], time [s]; value, limit, margin in the unit of `shown`."""
     part, at, known = row.part, row.at, not math.isnan(row.margin)
     return {
         "place": part.part, "chainage": chainage.of(part, at, extent.on) if known else None,
@@ -192,19 +207,19 @@ def row_of(row: Nearest, shown: UnitColumn, chainage: Chainages, extent) -> dict
 
 
 def finite(value) -> float | None:
-    """A number for JSON, None if it is not finite."""
+    """Number for JSON; None if it is not finite."""
     return float(value) if math.isfinite(value) else None
 
 
 class Chainages:
-    """Chainage of places: on the route that a limit names, else on the first route, else along their pipe."""
+    """Chainages of positions: along a route that the limit names, else along another route, else along the pipe."""
 
     def __init__(self, case) -> None:
         self.case = case
         self.legs = {name: legs(route, case.links) for name, route in case.routes.items()}
 
     def of(self, part: PartExtremes, at: int, on: tuple[str, ...]) -> float | None:
-        """Chainage of a place of a part [m]; None for a node on no route."""
+        """Chainage of position `at` of a part [m]; None for a node that is on no route. on : names in the limit."""
         if part.group == "links":
             distance = part.distance[at]
             return float(self.leg(part.part, on).chainage(distance)) if math.isfinite(distance) else None
@@ -216,10 +231,10 @@ class Chainages:
         return None
 
     def leg(self, pipe: str, on: tuple[str, ...]) -> Leg:
-        """Leg through a pipe along which chainage is measured."""
+        """Leg (pipe with chainages and direction) of a pipe for chainages; on : names in the limit."""
         result = next((leg for name in self.ordered(on) for leg in self.legs[name] if leg.pipe == pipe), None)
         return pipe_leg(pipe, self.case.links) if result is None else result
 
     def ordered(self, on: tuple[str, ...]) -> list[str]:
-        """Names of routes: those of the limit first, those along a cut pipe last."""
+        """Names of all routes in order of preference: routes that the limit names first, those of a cut pipe last."""
         return sorted(self.legs, key=lambda name: (is_cut(name, self.case.routes[name].pipes), name not in on))
