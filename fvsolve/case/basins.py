@@ -90,7 +90,9 @@ def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
             count = math.prod(basin.cells or ())
             if count * BASIN_CELL > free_memory():
                 text = f"{count:.3g} cells take about {byte_text(count * BASIN_CELL)} of memory"
-                raise ValueFault([(("cells",), f"{text}, and {byte_text(free_memory())} are free; expected fewer")])
+                raise ValueFault(
+                    [(("cells",), f"{text}, and {byte_text(free_memory())} are free; expected fewer cells")]
+                )
             sides = {name: (item.side, *item.span) if item.span else item.side for name, item in basin.patches.items()}
             grading = basin.grading or (1.0, 1.0)
             return rectangle(basin.size, basin.cells, grading=grading, patches=sides, holes=basin.holes or ())

@@ -44,7 +44,10 @@ def network(table: dict[str, Any]) -> Faults:
         if fits and {"translational", "spatial"} <= set(sorts):
             keys, place = sorts["translational"]
             text = f"{show(place)} is a place on the axis of masses, {show(sorts['spatial'][1])} a place in space"
-            yield ("links", name, *keys), f"{text}; expected two places of the same kind (of a frame, a point of it)"
+            yield (
+                ("links", name, *keys),
+                f"{text}; expected two masses, or two points in space (FRAME.POINT for a frame)",
+            )
         joined = [place for _, place, _ in ports if isinstance(place, str)]
         for k, (keys, place, _) in enumerate(ports):
             if isinstance(place, str) and place in [other for _, other, _ in ports[:k]]:
@@ -55,7 +58,7 @@ def network(table: dict[str, Any]) -> Faults:
         kinds = [_dict(node).get("type") for node in nodes.values()]
         alone = "body" in kinds or any(own_places(name, node) is not None for name, node in nodes.items())
         if table.get(group) == {} and not alone:
-            yield (group,), "is empty; expected at least two places and a link between them"
+            yield (group,), "is empty; expected at least two nodes and a link between them"
     tied = {name: _joined_places(name, node, places) for name, node in nodes.items()}
     hanging = _carrier_pairs(nodes, places)
     touched = {place for places in [*ends.values(), *tied.values(), *hanging] for place in places}
@@ -175,7 +178,7 @@ def cavities(numerics: Numerics, has_cells: bool, fluid: FluidSpec | None) -> Fa
     """Fault of a scheme that cannot compute cavities, in a case with `cavitation`."""
     if follows_cavities(fluid, has_cells) and numerics.scheme not in (None, *CAVITY_SCHEMES):
         able = " or ".join(map(show, CAVITY_SCHEMES))
-        yield ("numerics", "scheme"), f"{show(numerics.scheme)} does not follow cavities in pipes; expected {able}"
+        yield ("numerics", "scheme"), f"{show(numerics.scheme)} cannot compute cavities in pipes; expected {able}"
 
 
 def claims(expect: dict[str, Expect], numerics: Numerics) -> Faults:

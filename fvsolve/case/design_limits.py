@@ -107,7 +107,7 @@ def read_limit(
     quantity = given.get("quantity", "gauge_pressure" if "class_fraction" in given else "pressure")
     faults, extent = [], None
     if not isinstance(quantity, str):
-        faults.append((("quantity",), f"{show(quantity)} is not text"))
+        faults.append((("quantity",), f"{show(quantity)} is not text; expected the name of a quantity"))
     elif "on" in given:
         try:
             extent = read_extent(given["on"], quantity, kinds, routes)

@@ -559,7 +559,7 @@ class _Reader:
         if worst is not None and counts[worst] > MOST_CELLS:
             self.fault(
                 ("numerics", "cell_time"),
-                f"would cut {worst} into {counts[worst]:.3g} cells; {MOST_CELLS:.0e} at most",
+                f"would cut {worst} into {counts[worst]:.3g} cells; expected at most {MOST_CELLS:.0e}",
             )
             return links
         filled = {name: links[name].model_copy(update={"cells": count}) for name, count in counts.items()
@@ -596,7 +596,10 @@ class _Reader:
         for name, given in self.group("routes").items():
             result[name] = None
             if name in self.group("nodes") or name in named or name in ALL:
-                self.fault(("routes", name), f"{show(name)} is also the name of something else; expected another name")
+                self.fault(
+                    ("routes", name),
+                    f"{show(name)} is also the name of a node or link, or a reserved word; expected another name",
+                )
                 continue
             try:
                 result[name] = expand_pieces(Route.model_validate(given, context=self.setting), self.pieces, links)

@@ -36,7 +36,7 @@ def find_faults(
     if pipes and not fits(memory):
         worst = max(pipes, key=lambda name: pipes[name].cells or 0)
         text = f"{cells:.3g} cells take about {byte_text(memory)} of memory, and {byte_text(free_memory())} are free"
-        text += "; expected fewer"
+        text += "; expected fewer cells"
         yield ("links", worst, "cells"), text
     least = LEAST_STEP * max(abs(numerics.start), abs(numerics.end))
     if output.every is not None and not output.every > least:

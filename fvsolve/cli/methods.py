@@ -73,7 +73,8 @@ def _table(all_facts: dict[str, Facts]) -> None:
     )
     terminal.line(
         console,
-        "greatest stable |h lambda| on the axis; SSP: greatest step in steps of Euler; Padé: degrees of the fraction R",
+        "greatest stable |h lambda| on the axis; SSP: greatest step in steps of Euler; "
+        "Padé: degrees of numerator and denominator of R",
     )
 
 
