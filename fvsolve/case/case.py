@@ -161,7 +161,7 @@ class Case(Displayable):
 
     @cached_property
     def conduits(self) -> dict[str, Link]:
-        """Links as they are solved: those of the file, and those inside parts, such as the inlet of a tank."""
+        """Links that the model computes: links of the file, and links inside parts, such as the inlet of a tank."""
         result = {}
         for name, part in [*self.nodes.items(), *self.links.items()]:
             result |= part.inner(name)[1]

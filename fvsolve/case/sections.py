@@ -276,7 +276,7 @@ class Numerics(Table):
 
 
 def uses_error_control(method: str | None) -> bool:
-    """True if a method uses error control even with cells: `auto`, and adaptive implicit methods."""
+    """True if a method controls the error of steps by default even with cells: `auto`, adaptive implicit methods."""
     known = METHODS.get(method or "")
     return method == AUTO or (known is not None and known.adaptive and not known.explicit)
 

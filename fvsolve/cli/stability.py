@@ -127,7 +127,7 @@ def pictures(result, folder: Path) -> list[str]:
 
 
 def print_stability(result, folder: Path, files: list[str]) -> None:
-    """Print the table, and notes on bounds that mislead."""
+    """Print the table of stable steps of a case, and its notes."""
     from fvsolve.cli import terminal
 
     rows = result.rows
@@ -167,7 +167,8 @@ def terminal_columns(cells: bool) -> list[Column]:
 
 
 def table_lines(row) -> list[dict]:
-    """Lines of the table for a row; a limited scheme has an additional line for each frozen linear scheme."""
+    """Lines of the printed table for one pair of scheme and method; a limited scheme has a further line for each of its
+    linear schemes with frozen weights."""
     from fvsolve.studies.stability.stability_row import json_number
 
     frozen_lines = [{"scheme": f"{row.scheme}: {name}", "method": row.method, "predicted": json_number(h),
@@ -178,5 +179,5 @@ def table_lines(row) -> list[dict]:
 
 
 def row_label(row) -> str:
-    """Label of a row in the notes: scheme and method, or the method alone without cells."""
+    """Label of a pair of scheme and method in notes; the method alone for a case without cells."""
     return f"{row.scheme}, {row.method}" if row.rate > 0.0 else row.method

@@ -24,7 +24,7 @@ def settings(result) -> ReportTable:
     rows += [["method", "; ".join(_method_text(item, result.case) for item in summary["methods"])],
              ["step", "; ".join(given) or "by default"],
              ["steps", summary["steps"]], ["repeated steps", summary["rejections"]],
-             ["evaluations of rates", summary["rhs"]], ["computing time of the steps [s]", summary["seconds"]]]  # fmt: skip
+             ["evaluations of rates", summary["rhs"]], ["computing time [s]", summary["seconds"]]]  # fmt: skip
     if "resolution" in summary:
         rows.append(
             ["errors of peaks (\u00b1)", "; ".join([summary["resolution"]["words"], *summary["resolution"]["reasons"]])]
