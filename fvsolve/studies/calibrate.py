@@ -1,4 +1,4 @@
-"""Calibration of keys against measured series by least squares, with standard deviations."""
+"""Calibration of values in a case against measured series by least squares, with standard deviations."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ FAILED_RESIDUAL = 1e6  # residual of a run that failed
 class Calibration(PlainData):
     """Result of a calibration.
 
-    values, sigma : by key [SI], fitted value and its standard deviation from the scatter of each series; sigma is
-    infinite for a key without effect
-    correlation : of the errors of the values, rows and columns in the order of keys
-    rms : by probe, root mean square of computed less measured values, in SI
+    values : key of the case, such as "links.main.wave_speed" -> fitted value [SI]
+    sigma : key -> standard deviation of the fitted value [SI], infinite for a key without effect
+    correlation : correlation matrix of the errors of the fitted values, in the order of the keys [-]
+    rms : probe -> root mean square of computed less measured values [SI]
     doubts : texts on values that the measurements do not determine; runs : number of runs
     """
 
@@ -52,16 +52,19 @@ class Calibration(PlainData):
 
     @property
     def sheet(self) -> ResultTable:
-        """A row for each key."""
+        """Table with a row for each fitted key: key, value and sigma [SI]."""
         rows = [{"key": key, "value": value, "sigma": self.sigma[key]} for key, value in self.values.items()]
         return ResultTable([Column("key"), Column("value", words=".8g"), Column("sigma", words=".3g")], rows)
 
 
 class Residuals(RowMaker):
-    """Run a case with values of keys and return computed less measured values of each series, over its range."""
+    """Callable that runs a case with values of keys; returns the differences of every measured series.
+
+    A difference is the computed less the measured value, divided by the range of the measured series.
+    """
 
     def __call__(self, values: Mapping[str, Any]) -> list[np.ndarray] | str:
-        """Differences of each series : float64[k] each; the reason of failure if the run failed."""
+        """Run the case; returns float64[times within the run] for each series, or the reason of a failure as text."""
         from fvsolve.run import run
 
         try:
@@ -88,7 +91,7 @@ class Residuals(RowMaker):
 
 
 def series_range(measured: np.ndarray) -> float:
-    """Range of a series, which scales its differences; 1 for a constant series."""
+    """Greatest less least value of a measured series, which divides its differences; 1 for a constant series."""
     return float(np.ptp(measured)) or 1.0
 
 
@@ -102,25 +105,29 @@ def calibrate(
     dask: str | None = None,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> Calibration:
-    """Fit keys within their ranges to the series of `[compare]`, by least squares (`scipy.optimize.least_squares`).
+    """Fit values in a case to its measured series, by least squares (`scipy.optimize.least_squares`).
 
-    Each of several series is weighted by its own scatter about the fit, in rounds that begin with equal weights
-    (Aitken 1935). A sample of all ranges is run first, `jobs` runs at a time. Minimisations start at the best points of
-    the sample, because waves out of phase cause many local minima.
+    case : as for `run`, with measured series under `[compare]`; free : key -> (least, greatest value)
+    set : key -> value for all runs; seed : seed of the sample; jobs, dask : processes for the sample, as in `sweep`
+    progress : called as progress(done, total, text)
+
+    A sample of all ranges is run first. Minimisations start at the best points of the sample, because waves out of
+    phase cause many local minima. Each of several series is weighted by the inverse of its scatter about the fit, in
+    rounds that begin with equal weights (Aitken 1935).
     Raises FvsolveError if the case has no measured series, and if every run of the sample fails.
     """
     loaded = load(case, set)
     if not free:
         raise FvsolveError("no key to fit. Give at least one key and its range: links.main.wave_speed=900,1300")
     if not loaded.compare:
-        raise FvsolveError("no measured series to fit to. Expected a [compare] with a series in the case")
+        raise FvsolveError("no measured series to fit to. Expected a series under [compare] in the case")
     bounds = key_ranges(loaded, free)
     points = sample_points(loaded, free, f"sobol:{SAMPLE_PER_KEY * len(bounds)}", seed)
     return LeastSquaresFit(loaded, bounds, points, progress or (lambda done, total, text: None)).solve(jobs, dask)
 
 
 class LeastSquaresFit:
-    """State of a fit. The unknowns x are fractions of the ranges of the keys."""
+    """Least-squares fit of keys. The unknowns x : float64[keys] are fractions of the ranges, from 0 to 1."""
 
     def __init__(
         self, case: Case, bounds: dict[str, tuple[float, float]], points: list[dict], progress: Callable
@@ -132,7 +139,10 @@ class LeastSquaresFit:
         self.weights = np.ones(len(case.compare))
 
     def solve(self, jobs: int, dask: str | None) -> Calibration:
-        """Best result of all minimisations, with standard deviations; weights of several series are iterated."""
+        """Minimise from several start points; returns the best fit with standard deviations.
+
+        With several series, weights are computed and the best fit is repeated until the weights hardly change.
+        """
         from scipy.optimize import least_squares
 
         answers = [self.minimise(least_squares, x) for x in self.start_points(jobs, dask)]
@@ -145,10 +155,12 @@ class LeastSquaresFit:
         return self.result(best)
 
     def scatter(self, answer: Any) -> np.ndarray:
-        """Standard deviation of each series about the fit, over its range : float64[series].
+        """Standard deviation of each series about the fit, relative to the range of the series : float64[series].
 
-        It is the sum of squares over the degrees of freedom: points of the series less the trace of its part of
-        J (J' J)^-1 J'. If a series has no more than one degree of freedom, the value of all series together is used.
+        answer : result of `least_squares`, with the Jacobian J of the weighted differences. The square of a deviation
+        is the sum of squared differences over the degrees of freedom. These are the number of points of the series less
+        its part of the trace of J (J' J)^-1 J'. A series with at most one degree of freedom has the deviation of all
+        series together.
         """
         differences = self.differences(answer.x)
         parts = np.split(answer.jac, np.cumsum([series.size for series in differences])[:-1])
@@ -161,11 +173,11 @@ class LeastSquaresFit:
         )
 
     def weighted(self, differences: list[np.ndarray]) -> np.ndarray:
-        """Differences of all series, each times its weight, in one array."""
+        """Differences of all series, multiplied by the weight of their series and joined to one array."""
         return np.concatenate([weight * series for weight, series in zip(self.weights, differences, strict=True)])
 
     def start_points(self, jobs: int, dask: str | None) -> list[np.ndarray]:
-        """Run the sample and return its best points as start values."""
+        """Run the sample; returns its best points, at most `DESCENTS`, as starts x of minimisations."""
         costs, reason = np.full(len(self.points), np.inf), ""
         for k, answer in run_tasks(self.work, self.points, jobs, dask):
             self.runs += 1
@@ -180,7 +192,10 @@ class LeastSquaresFit:
         return [(np.array([*self.points[k].values()]) - self.low) / self.width for k in best]
 
     def minimise(self, least_squares: Callable, x: np.ndarray) -> Any:
-        """Minimise from a point, with slopes by differences over `SLOPE_STEP`."""
+        """Minimise the weighted squares from the start x; returns the result of `least_squares`.
+
+        Derivatives are finite differences over `SLOPE_STEP`.
+        """
         size = sum(series.size for series in self.differences(x))
 
         def residual(x: np.ndarray) -> np.ndarray:
@@ -193,7 +208,10 @@ class LeastSquaresFit:
         return least_squares(residual, x, slopes, bounds=(0.0, 1.0), x_scale=1.0, xtol=1e-10, ftol=1e-10)
 
     def slope(self, x: np.ndarray, k: int, size: int) -> np.ndarray:
-        """Column k of the Jacobian, from two runs near the point that finish, central if possible; 0 if fewer do."""
+        """Derivatives of all weighted differences with respect to x[k] : float64[size], column k of the Jacobian.
+
+        They come from two runs near x that finish, central if possible; 0 if fewer than two runs finish.
+        """
         results = []
         for at in (x[k] - SLOPE_STEP, x[k] + SLOPE_STEP, x[k]):
             near = np.clip(np.where(np.arange(x.size) == k, at, x), 0.0, 1.0)
@@ -204,7 +222,7 @@ class LeastSquaresFit:
         )
 
     def differences(self, x: np.ndarray) -> list[np.ndarray]:
-        """Differences of each series at a point; an empty list if the run fails."""
+        """Run the case at x; returns the differences of every series, an empty list if the run fails."""
         self.runs += 1
         answer = self.work(self.values(x))
         self.progress(len(self.points), len(self.points), f"{self.runs} runs")
@@ -214,7 +232,7 @@ class LeastSquaresFit:
         return dict(zip(self.bounds, (self.low + x * self.width).tolist(), strict=True))
 
     def result(self, answer: Any) -> Calibration:
-        """Fitted values with standard deviations, correlations and doubts from the Jacobian."""
+        """Calibration from a result of `least_squares`: values, standard deviations, correlations and doubts."""
         keys, differences = [*self.bounds], self.differences(answer.x)
         degrees = max(1, answer.fun.size - answer.x.size)
         scatter = 2.0 * answer.cost / degrees
@@ -234,9 +252,11 @@ class LeastSquaresFit:
 
 
 def identifiability(slopes: np.ndarray, keys: list[str]) -> tuple[np.ndarray, list[str]]:
-    """(inverse of J' J, texts on keys that the data do not determine) for the Jacobian J over fractions of ranges.
+    """Find the keys that the measurements do not determine.
 
-    Singular values of J are bounded from below, so that the inverse is finite also for keys without effect.
+    slopes : J, float64[points, keys], derivatives of weighted differences by the fractions of the ranges of the keys
+    Returns (inverse of J' J : float64[keys, keys], texts on keys that are not determined). Singular values of J are
+    bounded from below, so that the inverse is finite also for keys without effect.
     """
     u, s, v = np.linalg.svd(slopes, full_matrices=False)
     floor = max(float(s[0]), 1e-300) * 1e-9 if s.size else 0.0

@@ -11,7 +11,10 @@ from fvsolve.steppers.tableau import BUILT_IN, METHODS
 
 
 class PickledCase:
-    """Argument of `load` in picklable form: raw values of the case, as a resolved case may hold functions."""
+    """Case that can be pickled. A `Case` is sent as the values of its file, because it may contain functions.
+
+    source : argument of `load`, such as a path, a dict or a `Case`
+    """
 
     def __init__(self, source: Any) -> None:
         self.source = source

@@ -26,7 +26,11 @@ SIMPLEX_SIZE = 1.0  # edge length of the first simplex
 
 @dataclass(frozen=True)
 class ValveSchedule:
-    """A schedule, times [s] and values [SI] of its knots, and its peak in the unit of `Optimum.unit`."""
+    """Piecewise-linear schedule and the peak of its run.
+
+    time, value : times [s] and values [SI] of the knots, with both ends; peak : peak in `Optimum.unit`, None if the run
+    failed
+    """
 
     time: list[float]
     value: list[float]
@@ -35,7 +39,12 @@ class ValveSchedule:
 
 @dataclass(frozen=True)
 class Optimum:
-    """Schedule of the key with the least `minimise`, and the linear schedule for comparison; runs : number of runs."""
+    """Result of an optimisation of a schedule.
+
+    key : key of the schedule; minimise : quantity whose peak is minimised, such as "max(gate.pressure)"
+    unit : unit of the peaks; best : schedule with the least peak; linear : linear schedule, for comparison
+    runs : number of runs; laws : schedules of all runs in order
+    """
 
     key: str
     minimise: str
@@ -52,13 +61,17 @@ class Optimum:
 
     @property
     def schedule(self) -> str:
-        """TOML line of the best schedule for the case."""
+        """Best schedule as a line of TOML for the case file."""
         times, values = ([float(f"{x:.6g}") for x in row] for row in (self.best.time, self.best.value))
         return f"{self.key.rpartition('.')[2]} = {{ time = {times}, value = {values} }}"
 
 
 class ClosureSearch:
-    """State of a search. Unknowns z are logarithms of the rises of the pieces between fixed end times and values."""
+    """Search for the schedule with the least peak, between fixed end times and end values.
+
+    The schedule has knots + 1 linear pieces of equal duration. Unknowns z : float64[knots] are logarithms of the
+    changes of value over the pieces, divided by the change over the last piece.
+    """
 
     def __init__(self, case: Case, key: str, minimise: str, span: tuple, knots: int, progress: Callable | None) -> None:
         self.case, self.key, self.minimise, self.knots, self.progress = case, key, minimise, knots, progress
@@ -67,7 +80,7 @@ class ClosureSearch:
         self.unit = self.failure_reason = ""
 
     def law(self, z: np.ndarray) -> tuple[list[float], list[float]]:
-        """Times [s] and values [SI] of the knots; z : float64[knots]  logarithms of rises over the last rise."""
+        """(times [s], values [SI]) of the knots of a schedule, with both ends; z : float64[knots]  see the class."""
         rises = np.exp(np.clip(np.append(z, 0.0), -12.0, 12.0))
         shares = np.concatenate([[0.0], np.cumsum(rises / rises.sum())])
         shares[-1] = 1.0
@@ -95,12 +108,16 @@ def optimise(
     case, key: str, minimise: str, knots: int = 3, runs: int = 60, set: Mapping[str, Any] | None = None,
     progress: Callable | None = None,
 ) -> Optimum:  # fmt: skip
-    """Find the piecewise-linear schedule with inner knots that gives the least peak.
+    """Find the piecewise-linear schedule that gives the least peak.
 
     key : key of a schedule between two values, such as a ramp; minimise : a quantity as in `[expect]`, such as
-    "max(gate.pressure)" or "max(main.head)". The result is monotonic, with the end values and the duration of the
-    original schedule. Simplex searches (Nelder and Mead 1965) start from schedules that are linear, fast first and
-    slow first. Raises CaseError for an invalid case or an unsuitable key, FvsolveError if no run has a finite peak.
+    "max(gate.pressure)" or "max(main.head)"
+    knots : number of knots between the ends of the schedule; runs : greatest number of runs; set : key -> value
+    progress : called as progress(run, text) after every run
+
+    The result is monotonic, with the end values and the duration of the original schedule. Simplex searches (Nelder
+    and Mead 1965) start from schedules that are linear, fast first and slow first. Raises CaseError for an invalid case
+    or an unsuitable key, FvsolveError if no run has a finite peak.
     """
     from scipy.optimize import minimize
 
@@ -129,7 +146,7 @@ def optimise(
 
 
 def find_faults(case: Case | None, key: str, minimise: str, knots: int, runs: int) -> list[Fault]:
-    """Faults of the arguments of a search, before any run; case : None if the case itself has faults."""
+    """Faults of the arguments of `optimise`, found before any run; case : None if the case itself has faults."""
     faults: list[Fault] = []
     fewest = len(START_SHAPES) * (min(max(knots, 1), MAX_KNOTS) + 2)
     if not 1 <= knots <= MAX_KNOTS:
@@ -149,12 +166,15 @@ def find_faults(case: Case | None, key: str, minimise: str, knots: int, runs: in
 
 
 def peak_expectation(minimise: str) -> dict[str, Any]:
-    """Table `[expect]` with a single peak."""
+    """Table `[expect]` with the quantity `minimise` alone, so that runs compute its value."""
     return {minimise: {"value": 1.0, "atol": 1.0}}
 
 
 def span_of(case: Case, key: str) -> tuple[float, float, float, float]:
-    """(begin, end [s], first, last value [SI]) of the schedule of a key. Raises FvsolveError for an unsuitable key."""
+    """(start time [s], end time [s], first value [SI], last value [SI]) of the schedule of a key.
+
+    Raises FvsolveError for a key that has no schedule between two different values.
+    """
     laws = dict(schedules(case))
     schedule = laws.get(key)
     if schedule is None:
@@ -165,7 +185,7 @@ def span_of(case: Case, key: str) -> tuple[float, float, float, float]:
         )
     if schedule.constant or schedule.kind not in ("linear", "smooth", "ramp") or len(schedule.time) < 2:
         example = '{ start = "1 s", duration = "10 s", value = [1, 0] }'
-        raise FvsolveError(f"does not change from a value to another. Expected a ramp or a table, such as {example}")
+        raise FvsolveError(f"does not change from one value to another. Expected a ramp or a table, such as {example}")
     ends = float(schedule.time[0]), float(schedule.time[-1]), float(schedule.value[0]), float(schedule.value[-1])
     if ends[2] == ends[3]:
         raise FvsolveError(f"begins and ends at {show(ends[2])}. Expected different values at start and end")
@@ -173,7 +193,7 @@ def span_of(case: Case, key: str) -> tuple[float, float, float, float]:
 
 
 def schedules(case: Case) -> Iterator[tuple[str, Schedule]]:
-    """Pairs (key, schedule) of all parts of a case."""
+    """Pairs (dotted key, schedule) of all scheduled values of the nodes and links of a case."""
     for group in ("nodes", "links"):
         for name, part in getattr(case, group).items():
             values = {info.alias or field: getattr(part, field) for field, info in type(part).model_fields.items()}

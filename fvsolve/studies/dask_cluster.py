@@ -18,7 +18,11 @@ MATCHING_PACKAGES = ("python", "distributed", "msgpack", "cloudpickle", "numpy")
 
 
 class Cluster:
-    """Workers of the scheduler at an address such as "tcp://10.0.0.1:8786". They must have the same versions."""
+    """Workers of the Dask scheduler at an address such as "tcp://10.0.0.1:8786".
+
+    work : callable that computes a task. Workers must have the same versions of fvsolve and its packages as this
+    process.
+    """
 
     def __init__(self, work: Any, address: str) -> None:
         self.work, self.name, self.address = pickle.dumps(work), uuid.uuid4().hex, address
@@ -33,15 +37,16 @@ class Cluster:
         self.finished: queue.SimpleQueue = queue.SimpleQueue()
 
     def submit(self, chunk: int, tasks: list) -> None:
-        """Send a chunk."""
+        """Send the tasks of the chunk with this number to a worker."""
         future = self.client.submit(run_on_worker, self.name, self.work, tasks, pure=False)
         self.given[future] = chunk
         future.add_done_callback(self.finished.put)
 
     def next_result(self) -> tuple[int, list | None, float]:
-        """(chunk, answers, seconds) of the next finished chunk; answers is None if its worker was killed.
+        """Wait for the next finished chunk; returns (number of the chunk, answers of its tasks, computing time [s]).
 
-        Raises the exception that a worker raised, and RunError if the scheduler is lost.
+        The answers are None if the worker was killed. Raises the exception that a worker raised, and RunError if the
+        scheduler is lost.
         """
         future = self._next()
         chunk, status = self.given.pop(future), future.status
@@ -79,14 +84,20 @@ WORKER_CACHE = (
 
 
 def run_on_worker(name: str, work: bytes, tasks: list) -> tuple[Any, float]:
-    """Compute a chunk of tasks on a worker; the unpickled work is reused for later chunks."""
+    """Compute a chunk of tasks on a worker; returns (answers or the exception raised, computing time [s]).
+
+    work : pickled callable; name : its identity, by which a worker reuses the unpickled callable for later chunks
+    """
     if getattr(WORKER_CACHE, "name", None) != name:
         WORKER_CACHE.name, WORKER_CACHE.work = name, pickle.loads(work)
     return compute(WORKER_CACHE.work, tasks)
 
 
 def connect(address: str) -> Any:
-    """Connect to the scheduler at an address. Raises FvsolveError if there is none or the package is missing."""
+    """Connect to the scheduler at an address; returns the Dask client.
+
+    Raises FvsolveError if no scheduler answers or the package `distributed` is missing.
+    """
     try:
         from distributed import Client
     except ImportError:
@@ -101,9 +112,9 @@ def connect(address: str) -> Any:
 
 
 def check_versions(client: Any, address: str) -> None:
-    """Check versions on scheduler and workers against this process, after waiting for the first worker.
+    """Wait for the first worker, then compare versions on the scheduler and all workers with those of this process.
 
-    Raises FvsolveError if no worker comes, and with all differences of versions.
+    Raises FvsolveError if no worker comes, or if versions differ; the message lists all differences.
     """
     try:
         client.wait_for_workers(1, timeout=TIMEOUT)
@@ -128,7 +139,10 @@ def check_versions(client: Any, address: str) -> None:
 
 
 def program_differences(reported: Any) -> list[str]:
-    """Differences of the programs on a worker and here, as texts; its exception if fvsolve is missing there."""
+    """Texts on programs whose version on a worker differs from that in this process.
+
+    reported : program -> version on the worker, or the exception of the worker if fvsolve is missing there
+    """
     if not isinstance(reported, dict):
         return [f"no fvsolve ({reported})"]
     own = {
@@ -138,14 +152,14 @@ def program_differences(reported: Any) -> list[str]:
 
 
 def version_numbers(reported: dict) -> dict[str, str]:
-    """Versions of `MATCHING_PACKAGES` in a report of Dask; Python as major.minor."""
+    """Package -> version of `MATCHING_PACKAGES`, from the report of a Dask process; Python as major.minor."""
     host, packages = reported.get("host", {}), reported.get("packages", {})
     numbers = {name: str(packages.get(name)) for name in MATCHING_PACKAGES[1:]}
     return {"python": ".".join(str(host.get("python", packages.get("python"))).split(".")[:2]), **numbers}
 
 
 def differing_versions(here: dict[str, str], there: dict[str, str]) -> list[str]:
-    """Texts of versions on the remote side that differ from those here."""
+    """Texts on packages with another version there than here, such as "numpy 2.1 (here 2.2)"."""
     return [
         f"{name} {there.get(name)} (here {version})" for name, version in here.items() if there.get(name) != version
     ]

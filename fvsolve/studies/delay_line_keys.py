@@ -1,4 +1,4 @@
-"""Delay lines in studies: their names, overrides of the pipe model, cell averages of waves, expected orders."""
+"""Delay lines (pipes without cells) in studies: names, keys that select the pipe model, cell averages of waves."""
 
 from __future__ import annotations
 
@@ -13,27 +13,32 @@ POINTS = 5  # points of a cell of a line at which waves are evaluated
 WEIGHTS = np.array([275.0, 100.0, 402.0, 100.0, 275.0]) / 1152.0  # at the middles of fifths; exact to degree 5
 READING_ORDER = 6.0  # order of the interpolation in the history of a line
 EXPECTED_ORDER = (
-    "delay lines carry jumps exactly, and smooth waves without friction at whole steps; the expected order is 2 in the "
-    "length of stretches with friction (1 behind jumps) and in steps behind kinks (about 1.5 in L2, 1 in max) or in "
-    "lines shorter than steps, else up to 6 in steps, and the order of the method if there are storing parts"
+    "delay lines carry jumps exactly, and smooth waves without friction exactly at whole steps. Expected orders: 2 in "
+    "the length of segments with friction (1 behind jumps); 2 in the step behind kinks (about 1.5 in L2, 1 in max) or "
+    "in lines shorter than a step, else up to 6 in the step; the order of the method with parts that store fluid or "
+    "energy"
 )
 EXACT_NOTE = (
-    "delay lines are exact here, at any step and stretch: rows are exact to rounding, except fields along the lines"
+    "delay lines are exact here, at any step and length of segments: all errors are rounding errors, except errors of "
+    "values along the lines"
 )
 
 
 def delay_lines(case) -> list[str]:
-    """Names of pipes that are delay lines. With `fixed_choices` in the case, no pipe is left to `auto`."""
+    """Names of the pipes of a case that are delay lines, or may become delay lines by `pipe_model = "auto"`."""
     return [name for name, pipe in line_methods(case).items() if pipe.pipe_model == "delay-line"]
 
 
 def slowest_line(case) -> str:
-    """Delay line with the longest travel time; its `cells` set the length of steps."""
+    """Name of the delay line with the longest travel time of a wave; its key `cells` sets the time step."""
     return max(delay_lines(case), key=lambda name: case.links[name].length / case.wave_speed(name))
 
 
 def fixed_choices(case) -> dict[str, str]:
-    """Overrides that fix the present choice of `auto` for each pipe, independent of the changes of a study."""
+    """Overrides that replace `pipe_model = "auto"` by its present choice for each pipe.
+
+    With these overrides the changes of a study do not alter the choice. Empty if no pipe needs them.
+    """
     from fvsolve.run import model_of
 
     undecided = [
@@ -49,12 +54,12 @@ def fixed_choices(case) -> dict[str, str]:
 
 
 def as_cells(names: Iterable[str]) -> dict[str, str]:
-    """Overrides that replace these delay lines, all lines of the case, by cells."""
+    """Overrides that compute all pipes of a case with cells; names : its delay lines."""
     return {"numerics.pipe_model": "finite-volume"} | pipe_model_keys(dict.fromkeys(names, "finite-volume"))
 
 
 def cells_for_lines(case, step: float) -> dict:
-    """Overrides that replace delay lines by cells, each crossed by a wave in a step [s].
+    """Overrides that compute all delay lines with cells, which a wave crosses in at most the time `step` [s].
 
     For step = 0 the numbers of cells stay as the case states them.
     """
@@ -71,7 +76,11 @@ def pipe_model_keys(chosen: dict[str, str]) -> dict[str, str]:
 
 
 def line_averages(run_data, t: float, out: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Delay line -> sum and difference of both waves [kg/s], averaged over its cells of output."""
+    """Averages of the waves in delay lines over their cells of output, at the time t [s].
+
+    out : array of outputs of the model at t. Returns {name of the delay line: (sum, difference)}, float64[cells] each
+    [kg/s], of the waves that travel in the direction of the pipe and against it.
+    """
     sums = {}
     for k, (r, l) in run_data.along(t, out, POINTS).items():  # noqa: E741
         r, l = r.reshape(-1, POINTS) @ WEIGHTS, l.reshape(-1, POINTS) @ WEIGHTS  # noqa: E741

@@ -1,7 +1,7 @@
-"""Errors of a run against a reference: end fields, probe rows and extremes, in SI or relative to ranges.
+"""Errors of a run against a reference: values in cells at the end, values of probes over time, and extremes.
 
-The range of a probe is its range in the reference; the range of a pipe is that of its pressure. An error of 0.01 is a
-hundredth of the range of that component.
+Errors are in SI or relative to a range, the greatest less the least value in the reference. A component is a probe, or
+a quantity in the cells of a pipe or basin. A relative error of 0.01 is a hundredth of the range of the component.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ CONSTANT = 1e-9  # a component whose range is below this fraction of its size co
 
 @dataclass(frozen=True)
 class Deviation:
-    """Error of a component.
+    """Error of a component at k cells or times.
 
-    off : float64[k]  run less reference [SI]; weights : float64[k]  lengths, areas or times of the values
-    span : range in the reference [SI]; nan if constant
+    error : float64[k]  run less reference [SI]; weights : float64[k]  lengths, areas or durations of the values
+    span : range of the component in the reference [SI]; nan if it is constant
     """
 
     error: np.ndarray
@@ -34,22 +34,23 @@ class Deviation:
     span: float = math.nan
 
     def norms(self) -> dict[str, float]:
-        """Weighted mean, root mean square and greatest of absolute differences [SI]."""
+        """Weighted mean "L1", weighted root mean square "L2" and maximum "max" of the absolute error [SI]."""
         size, share = np.abs(self.error), self.weights / self.weights.sum()
         return {"L1": float(share @ size), "L2": math.sqrt(float(share @ size**2)), "max": float(size.max(initial=0.0))}
 
     def ranges(self) -> dict[str, float]:
-        """Norms divided by the range."""
+        """The three `norms` divided by the range `span` [-]."""
         return {norm: value / self.span for norm, value in self.norms().items()}
 
 
 @dataclass(frozen=True)
 class Distance:
-    """Errors of the worst component relative to its range; nan if not known.
+    """Errors of a run relative to ranges [-], each for the component with the greatest error; nan if not known.
 
-    trajectory : mean over time; greatest : greatest value at any row; end : error at the end
+    trajectory : mean error of a probe over time; greatest : error of a probe at any time
+    end : error at the end, of a probe or as mean over the cells of a pipe or basin
     overshoot : amount by which a probe leaves its range in the reference
-    worst : component with the greatest trajectory error
+    worst : probe with the greatest trajectory error
     """
 
     trajectory: float = math.nan
@@ -63,13 +64,16 @@ class Distance:
 
 
 def recording_keys(case, keys: Mapping | None = None) -> dict:
-    """Overrides with which a run also records the probes of `end_probes`, and no frames."""
+    """Overrides `keys`, and those with which a run also records the probes of `end_probes` and no values of cells."""
     own = [probe.text for probe in case.probes]
     return {**(keys or {}), "output.probes": list(dict.fromkeys([*own, *end_probes(case)])), "output.fields": 0}
 
 
 def end_probes(case) -> list[str]:
-    """Probes of nodes other than reservoirs and frames, and flows of links without cells."""
+    """Probes whose end values are compared: quantities of nodes, and flows of links other than pipes.
+
+    Nodes are those other than reservoirs and frames, their quantities are pressure, level, position and velocity.
+    """
     probes = []
     for name, node in case.nodes.items():
         quantities = [key for key in ("pressure", "level", "position", "velocity") if key in node.quantities]
@@ -85,9 +89,11 @@ def end_probes(case) -> list[str]:
 
 
 def error_norms(run: Outcome, truth, own: tuple[str, ...] | None = None) -> dict[str, dict[str, float]]:
-    """Variable -> errors of a run in L1, L2 and max [SI]: end fields, probes over time, end values of nodes and links.
+    """Errors of a run against a `Reference` : {variable: {"L1" | "L2" | "max": error [SI]}}.
 
-    own : probes compared over time (default all); `recording_keys` adds probes that are needed only for end values.
+    Variables are pressure and flow in the cells of all pipes at the end, quantities of basins at the end, probes over
+    time, and end values of nodes and links.
+    own : probes compared over time (default all); `recording_keys` adds probes that are needed only for end values
     """
     deviations, by_component = {}, field_deviations(run, truth)
     for quantity in ("pressure", "flow") if run.model.pipes else ():
@@ -109,7 +115,7 @@ def error_norms(run: Outcome, truth, own: tuple[str, ...] | None = None) -> dict
 
 
 def distance(run: Outcome, truth) -> Distance:
-    """Errors of a run relative to ranges; all nan if it did not reach the end."""
+    """Errors of a run against a `Reference`, relative to ranges; all nan if the run did not reach its end."""
     if not run.ok:
         return Distance()
     with np.errstate(invalid="ignore", over="ignore"):
@@ -126,12 +132,12 @@ def distance(run: Outcome, truth) -> Distance:
 
 
 def extremes_distance(run: Outcome, truth) -> float:
-    """Greatest difference of least and greatest values of probes, relative to ranges; nan if all are constant."""
+    """Greatest error in the least or greatest value of a probe, relative to its range; nan if all are constant."""
     return max((max(abs(low), abs(high)) for low, high in extreme_differences(run, truth)), default=math.nan)
 
 
 def extreme_differences(run: Outcome, truth) -> list[tuple[float, float]]:
-    """Differences (run less reference) of least and greatest values of changing probes, relative to ranges."""
+    """Run less reference, relative to ranges: (of the least value, of the greatest value) for each changing probe."""
     values, reference_values = run.rows[:, 1:], truth.rows(run)
     span = column_ranges(reference_values)
     low, high = ((pick(values, axis=0) - pick(reference_values, axis=0)) / span for pick in (np.min, np.max))
@@ -142,7 +148,7 @@ def extreme_differences(run: Outcome, truth) -> list[tuple[float, float]]:
 
 
 def moving_probes(run: Outcome, truth) -> dict[str, Deviation]:
-    """Deviations of the probes that change in the reference."""
+    """Probe -> deviation over time, for the probes that change in the reference."""
     return {name: gap for name, gap in probe_deviations(run, truth).items() if gap.span > 0.0}
 
 
@@ -155,10 +161,11 @@ def probe_deviations(run: Outcome, truth) -> dict[str, Deviation]:
 
 
 def field_deviations(run: Outcome, truth) -> dict[tuple, Deviation]:
-    """(pipe or basin, quantity) -> deviation over the cells at the end.
+    """(name of a pipe or basin itself, quantity) -> deviation over the cells at the end.
 
-    The range of a pipe is that of its pressure; for its flow it is multiplied by A / (rho a). The range of a quantity
-    of a basin is its range over the cells; flows along x and y both have the greater of their two ranges.
+    A pipe has the range of its pressure over the run; its flow has that range times A / (rho a), with area A, density
+    rho and wave speed a. A quantity of a basin has its range over the cells; flows along x and y both have the greater
+    of their two ranges.
     """
     model, deviations = run.model, {}
     reference_fields = truth.fields(model) if model.pipes or model.basins else {}
@@ -191,20 +198,23 @@ def field_deviations(run: Outcome, truth) -> dict[tuple, Deviation]:
 
 
 def time_weights(t: np.ndarray) -> np.ndarray:
-    """Weights of rows in a mean over time [s], trapezoidal; 1 each if all rows have the same time."""
+    """Trapezoidal weights [s] of values at the times t in a mean over time; all 1 if all times are equal."""
     steps = 0.5 * np.diff(t)
     weights = np.append(steps, 0.0) + np.append(0.0, steps)
     return weights if weights.sum() > 0.0 else np.ones(t.size)
 
 
 def column_ranges(values: np.ndarray) -> np.ndarray:
-    """Range of every column : float64[columns], nan for constant columns."""
+    """Greatest less least value of every column : float64[columns], nan for constant columns."""
     span, size = np.ptp(values, axis=0), np.abs(values).max(axis=0)
     return np.where(span > CONSTANT * size, span, np.nan)
 
 
 def pressure_ranges(envelope: Mapping[str, Mapping]) -> dict[str, float]:
-    """Pipe -> range of its pressure over a run [Pa], from the envelope."""
+    """Pipe -> range of its pressure over a run [Pa].
+
+    envelope : pipe -> least and greatest pressures of its cells, as in `Outcome`
+    """
     pressures = {name: np.append(entry["min_pressure"], entry["max_pressure"]) for name, entry in envelope.items()}
     return {name: float(column_ranges(entry)) for name, entry in pressures.items()}
 
@@ -213,7 +223,10 @@ def pressure_ranges(envelope: Mapping[str, Mapping]) -> dict[str, float]:
 
 
 def fields(model, waves: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> dict:
-    """{pipe: (pressure [Pa], flow [m3/s])} from cell averages of the sums and differences of both waves."""
+    """Pressures and flows in the cells of all pipes : {pipe: (float64[cells] [Pa], float64[cells] [m3/s])}.
+
+    waves : pipe -> (sum, difference) of the waves in both directions, averages over its cells [kg/s]
+    """
     by_pipe = {}
     for k, pipe in enumerate(model.pipes):
         total, mass_flow = waves[pipe.name]
@@ -223,7 +236,7 @@ def fields(model, waves: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> dict:
 
 
 def wave_sums(run: Outcome) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Sum and difference of both waves in the cells of every pipe at the end [kg/s]."""
+    """Pipe -> (sum, difference) of the waves in both directions in its cells at the end, float64[cells] [kg/s]."""
     sums = dict(run.lines)
     for row, pipe in zip(run.model.tables.pipes, run.model.pipes, strict=True):
         if pipe.name not in sums:
@@ -234,9 +247,10 @@ def wave_sums(run: Outcome) -> dict[str, tuple[np.ndarray, np.ndarray]]:
 
 
 def cell_averages(fine: np.ndarray, cells: int) -> np.ndarray:
-    """Averages over fewer or more equal cells, conservative to rounding.
+    """Averages over `cells` equal cells, from averages `fine` over another number of equal cells of the same pipe.
 
-    If the number of old cells is not a multiple of `cells`, the integral is interpolated by a spline of degree 5.
+    The integral is conserved to rounding. If the old number is not a multiple of `cells`, the cumulative integral is
+    interpolated by a spline of degree 5.
     """
     n = fine.size
     if n % cells == 0:

@@ -1,15 +1,18 @@
 """Error bound of the greatest value of a signal, from its local maxima at half, one and twice the resolution.
 
-A maximum has the values c, m, f at the three resolutions, differences a = m - c and b = f - m, and r = |b| / |a|, which
-is limited to 1/4 (order 2) to 0.6 (order 3/4). Its remainder beyond m is the larger of |b| / (1 - r) and
-|a| r / (1 - r), with 1 - r = 0.4 if a and b differ in sign; times 2.15, and up to 2 more if differences grow. The
-maxima of the middle resolution with their remainders bound the greatest value, because a lower maximum may come to
-exceed it. Two further terms are a fifth of the mean difference of all maxima, and the differences between the signals
-at the two times of the greatest value, up to 16 times its own difference, because a moving crest may still grow.
+A local maximum has the values c, m and f at half, one and twice the resolution. Their differences are a = m - c and
+b = f - m, with the ratio r = |b| / |a|, limited to the range from 1/4 (order 2) to 0.6 (order 3/4). The remainder of a
+maximum bounds the change of m by all finer resolutions. It is 2.15 times the larger of |b| / (1 - r) and
+|a| r / (1 - r), with 1 - r = 0.4 if a and b differ in sign. If the differences have the same sign and grow, it is
+multiplied by |b| / |a|, at most by 2.
 
-The ratio of the mean differences of whole signals shows how far they have converged. If it is small, half of the bound
-is enough. The least bound is the remainder of the greatest value by this ratio, if its own ratio is less by chance. The
-constants were chosen to hold for random mains (benchmarks/peak_bands.py --random) at the least median.
+The error bound follows from all local maxima m with their remainders, because a lower maximum may come to exceed the
+greatest. The ratio of the mean differences of whole signals shows how far they have converged. If it is small, half of
+this bound is enough. The bound is at least the larger of two terms: a fifth of the mean difference of all maxima, and
+the difference between the signals at the times of their greatest values, because a moving crest may still grow. Both
+terms are limited to 16 times the difference of the greatest value. The ratio r of the greatest value may be small by
+chance, so the bound is also at least 1.6 / 2.15 of its remainder with the ratio of whole signals. The constants were
+chosen to hold for random mains (benchmarks/peak_bands.py --random) at the least median.
 """
 
 from __future__ import annotations
@@ -32,10 +35,11 @@ Signal = tuple[np.ndarray, np.ndarray]  # times and values
 
 
 def greatest_error(places: Sequence[Sequence[Signal]], triple: Sequence[float], believed: bool = True) -> float:
-    """Error bound of the greatest value of all places at the middle resolution.
+    """Error bound of the greatest value of several signals at the middle resolution.
 
-    places : for each place the signals at two or three increasing resolutions; triple : greatest value of all steps at
-    each resolution; believed : False if no order of convergence may be assumed
+    places : for each place in the network, its signals at two or three increasing resolutions
+    triple : greatest value over all places and steps, at each resolution
+    believed : False if no order of convergence may be assumed
     """
     own_maxima, maxima = three_values(np.array([triple], float)), [local_maxima(signals) for signals in places]
     if not places:
@@ -57,17 +61,21 @@ def greatest_error(places: Sequence[Sequence[Signal]], triple: Sequence[float], 
 
 
 def three_values(maxima: np.ndarray) -> np.ndarray:
-    """Values at three resolutions : float64[maxima, 3]; of two, the missing first is extrapolated."""
+    """Values at three resolutions : float64[maxima, 3]; from two columns, a coarser one is extrapolated linearly."""
     return maxima if maxima.shape[1] == 3 else np.column_stack([2.0 * maxima[:, 0] - maxima[:, 1], maxima])
 
 
 def greatest_segment(cuts: np.ndarray, signal: Signal) -> int:
-    """Index of the local maximum that is the greatest of a signal."""
+    """Index of the local maximum with the greatest value of a signal; cuts : times that separate the maxima."""
     return int(np.searchsorted(cuts, signal[0][np.argmax(signal[1])]))
 
 
 def local_maxima(signals: Sequence[Signal]) -> tuple[np.ndarray, np.ndarray]:
-    """Times that separate the local maxima of the last signal, and greatest values between : float64[maxima, 3]."""
+    """Local maxima of a signal at increasing resolutions.
+
+    Returns (times that separate the local maxima of the finest signal, greatest values of the signals at the three
+    resolutions between these times : float64[maxima, 3]).
+    """
     t, v = signals[-1]
     cuts = t[troughs(v, RISE * float(np.ptp(v)))]
     greatest = np.full((len(cuts) + 1, len(signals)), -np.inf)
@@ -77,7 +85,7 @@ def local_maxima(signals: Sequence[Signal]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def troughs(values: np.ndarray, rise: float) -> list[int]:
-    """Indices of the minima between successive maxima that are higher by at least `rise`."""
+    """Indices of the minima between successive maxima, both of which are higher than the minimum by `rise` or more."""
     turns = np.concatenate([[0], 1 + np.flatnonzero(np.diff(np.sign(np.diff(values)))), [len(values) - 1]])
     positions, rising, high, low = [], True, 0, 0
     for i in turns.tolist():
@@ -91,9 +99,9 @@ def troughs(values: np.ndarray, rise: float) -> list[int]:
 
 
 def error_of_maxima(maxima: np.ndarray, off: np.ndarray) -> float:
-    """Error bound of the greatest of local maxima.
+    """Error bound of the greatest of several local maxima at the middle resolution.
 
-    maxima : float64[maxima, 3]; off : float64[maxima]  remainder of each
+    maxima : float64[maxima, 3]  values at the three resolutions; off : float64[maxima]  remainders
     """
     c, m, f = maxima.T
     sways, most = (m - c) * (f - m) < 0.0, float(np.max(m))
@@ -103,7 +111,10 @@ def error_of_maxima(maxima: np.ndarray, off: np.ndarray) -> float:
 
 
 def remainders(triples: np.ndarray, believed: bool = True) -> np.ndarray:
-    """Remainders: bounds of the changes of the middle values by all finer resolutions; triples : float64[values, 3]."""
+    """Bounds of the changes of the middle values by all finer resolutions : float64[values].
+
+    triples : float64[values, 3]  values at three resolutions; believed : False if no order may be assumed
+    """
     first, second = np.diff(triples, axis=1).T
     a, b, sways = np.abs(first), np.abs(second), first * second < 0.0
     ratio = np.divide(b, a, out=np.where(b > 0.0, np.inf, 0.0), where=a > 0.0)
@@ -113,7 +124,10 @@ def remainders(triples: np.ndarray, believed: bool = True) -> np.ndarray:
 
 
 def remainder_by_ratio(ratio: float, values: np.ndarray) -> float:
-    """Remainder of the second of three values, by the larger of its own ratio of differences and `ratio`."""
+    """Bound of the change of the middle value by all finer resolutions, without a safety factor.
+
+    values : float64[3] at three resolutions; ratio : used if it is larger than the ratio of their differences
+    """
     a, b = np.abs(np.diff(values)).tolist()
     r = min(max(b / a if a > 0.0 else 0.0, ratio, QUICK), SLOW)
     return max(b, a * r) / (1.0 - r)
@@ -130,6 +144,6 @@ def convergence_ratio(signals: Sequence[Signal]) -> float:
 
 
 def difference_at_peaks(middle: Signal, fine: Signal) -> float:
-    """Greatest difference of two signals at the times of their greatest values."""
+    """Greatest difference between two signals, at the two times at which either has its greatest value."""
     times = [signal[0][np.argmax(signal[1])] for signal in (middle, fine)]
     return float(np.max(np.abs(np.interp(times, *fine) - np.interp(times, *middle))))

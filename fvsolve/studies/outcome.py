@@ -24,12 +24,14 @@ def has_diverged(reason: str) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """Outcome of a run, in SI; that of a refused case has only its reason.
+    """Outcome of a run, in SI; the outcome of a refused case has only a reason.
 
+    ok : True if the run reached its end; t : time of the last state [s]
     y : float64[n]  last state; rows : float64[k, 1 + probes]  time [s], then the probes named in `probes`
     envelope : pipe -> "min_pressure", "max_pressure" [Pa], ... of its cells over the run
-    counts : steps, rejections, rhs, ...; seconds : time of stepping alone [s]; processor : its CPU time [s]
-    run_data : `RunData` of the run; lines : wave sums of delay lines at the end, see `delay_line_keys.line_averages`
+    counts : numbers of `steps`, `rejections`, evaluations of the rates `rhs`, ...
+    seconds : wall time of the steps alone [s]; processor : their CPU time [s]; run_data : `RunData` of the run
+    lines : waves in delay lines at the end, see `delay_line_keys.line_averages`
     """
 
     reason: str
@@ -53,7 +55,10 @@ class Outcome:
 
     @property
     def cell_updates(self) -> int:
-        """Calls of the rates times cells and stretches (or states, if there are none): a machine-independent cost."""
+        """Cost that is independent of the machine: evaluations of the rates times cells and segments of delay lines.
+
+        Without cells and segments, states are counted instead.
+        """
         delays, cells = self.model.tables.delays, self.model.all_cells
         if len(delays):  # of delay lines only the stretches are stepped
             cells += int((delays["stretches"] - delays["places"]).sum())
@@ -61,7 +66,7 @@ class Outcome:
 
 
 class RowSink:
-    """Sink that stores only probe rows, in SI."""
+    """Receiver of the output of a run; stores only the rows of probes, in SI."""
 
     def __init__(self) -> None:
         self.blocks: list[np.ndarray] = []
@@ -71,7 +76,7 @@ class RowSink:
         self.blocks.append(np.column_stack([t, values]))
 
     def field(self, t: float, frame: dict) -> None:
-        """Ignore a frame."""
+        """Ignore the values of cells at a time."""
 
     def checkpoint(self, state, extra: dict) -> None:
         """Ignore a checkpoint."""
@@ -81,7 +86,7 @@ class RowSink:
 
 
 def study_model(case, set: Mapping | None = None):
-    """Build the model of a case with changed keys, without frames, for `outcome`. Raises CaseError."""
+    """Build the model of a case with changed keys, without output of cell values, for `outcome`. Raises CaseError."""
     from fvsolve.case import load
 
     return model_of(load(case, {**(set or {}), "output.fields": 0, "output.lines": {}}))
@@ -93,7 +98,7 @@ def outcome(
 ) -> Outcome:  # fmt: skip
     """Run a case (or a model) with changed keys. A refused case gives an outcome with its reason.
 
-    y : float64[n]  initial state (default zero deviation from the profile)
+    y : float64[n]  initial state (default zero, no deviation from the initial steady state)
     best_of : number of runs, of which the fastest counts; later runs are compiled and cached, and are omitted if the
     first took more than `budget` [s]
     run : function that makes a run from (model, state, sink, progress) (default `solve.Run`)
@@ -108,7 +113,7 @@ def outcome(
 
 
 def refusal_text(error: CaseError) -> str:
-    """Reason of a refusal in one line: each different fault with the first place where it occurs."""
+    """Reason of a refusal in one line: each different fault once, with the first key that has it."""
     first = {fault.message: fault.place for fault in reversed(error.faults)}
     return f"refused: {'; '.join(f'{place}: {message}' for message, place in reversed(first.items()))}"
 
@@ -139,7 +144,7 @@ Progress = Callable[[int, int, str], None]  # (finished points, all points, text
 def refuse_basins(case, study: str, allow_sloshing: bool = False) -> None:
     """Raise FvsolveError if a case has basins, whose cells a study cannot refine or replace yet.
 
-    riding : accept sloshing basins that are fixed to bodies
+    study : name of the study in the message; allow_sloshing : True to accept basins with a free surface on bodies
     """
     names = [
         name

@@ -22,18 +22,21 @@ class Work(Protocol):
     def __call__(self, task: Any) -> Any: ...
 
     def lost_result(self, task: Any) -> Any:
-        """Substitute for the answer of a task that crashed its process repeatedly."""
+        """Answer for a task that crashed its process repeatedly and so has no result."""
 
 
 class Workers(Protocol):
-    """Processes that compute chunks; room : greatest number of chunks in work."""
+    """Processes that compute chunks of tasks; capacity : greatest number of chunks submitted and not yet returned."""
 
     capacity: int
 
     def submit(self, chunk: int, tasks: list) -> None: ...
 
     def next_result(self) -> tuple[int, list | None, float]:
-        """(chunk, answers, seconds) of the next finished chunk; answers is None if its process crashed."""
+        """Wait for the next finished chunk; returns (number of the chunk, answers of its tasks, computing time [s]).
+
+        The answers are None if the process crashed.
+        """
 
     def close(self) -> None: ...
 
@@ -88,7 +91,7 @@ def open_pool(work: Work, jobs: int, dask: str | None) -> Workers:
 
 
 def distribute(work: Work, tasks: Sequence, workers: Workers, first: int) -> Iterator[tuple[int, Any]]:
-    """Distribute the tasks from index `first` on to workers; yields (index, answer).
+    """Distribute the tasks from index `first` on to workers; yields (index, answer) of each finished task.
 
     If a process crashes, its chunk is split in two halves and repeated, so that only tasks that crash are lost.
     """
@@ -118,5 +121,5 @@ def distribute(work: Work, tasks: Sequence, workers: Workers, first: int) -> Ite
 
 
 def next_chunk_size(done: int, seconds: float, size: int) -> int:
-    """Number of tasks of the next chunk, after a chunk of `done` tasks took `seconds`."""
+    """Number of tasks of the next chunk, after a chunk of `done` tasks took `seconds`; size : number before."""
     return max(1, min(MAX_GROWTH * size, int(done * CHUNK_TIME / max(seconds, 1e-6))))

@@ -1,9 +1,9 @@
 """Error bounds of peaks and limit margins, from runs at half, one and twice the resolution.
 
-Each error is bounded from the local extrema of the signal (`extrema.py`); that of a limit from the signals of some
-places of each part. With column separation no order of convergence is assumed, because peaks after cavity collapse
-converge slowly (docs/cavitation.md). Without cells, the part of a peak missed between rows is an eighth of the second
-difference of rows.
+Each error is bounded from the local extrema of a signal (`extrema.py`). The error of a limit margin is bounded from the
+signals at some places of each part under the limit. With column separation no order of convergence is assumed, because
+peaks after cavity collapse converge slowly (docs/cavitation.md). Without cells, a peak between two rows of output is
+higher than the rows by up to an eighth of their second difference.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def peak_errors(result: Result, case: Any, progress: Callable[[str], None] | Non
 
 
 def reason_texts(summary: dict[str, Any]) -> list[str]:
-    """Reasons of unknown or wide errors, each once with the names of its peaks and limits."""
+    """Reasons of unknown or wide errors in a summary, each once, after the names of the peaks and limits concerned."""
     names_by_reason: dict[str, dict[str, None]] = {}
     for probe, peak in summary["peaks"].items():
         for side in SIDES:
@@ -70,7 +70,10 @@ def reason_texts(summary: dict[str, Any]) -> list[str]:
 
 
 def refined_runs(own: Result, case: Any, progress: Callable[[str], None] | None) -> dict[float, Result]:
-    """Runs at half, one and twice the resolution, with rows dense enough to resolve every peak."""
+    """Run a case at half, one and twice the resolution, with rows dense enough to resolve every peak.
+
+    Returns {0.5 | 1.0 | 2.0: result}; own : result of the case itself; progress : called with a text before each run
+    """
     named = [probe.text for probe in case.output.probes]
     rows = min(max(own.summary["steps"], MIN_ROWS), MAX_ROWS)
     every = min(case.output.every, own.summary["t"] / rows) if own.summary["t"] > 0.0 else case.output.every
@@ -85,7 +88,10 @@ def refined_runs(own: Result, case: Any, progress: Callable[[str], None] | None)
 
 
 def limit_probes(own: Result, case: Any, named: list[str]) -> list[str]:
-    """Probes at selected places of limits, as far as the case accepts them."""
+    """Names of further probes, at selected places under limits; without those that the case does not accept.
+
+    named : names of the probes of the case
+    """
     rows = [row[PLACES_KEY] for rows in own.places for row in rows]
     texts = dict.fromkeys(
         neighbours.probes[position] for neighbours in rows for position in selected_places(neighbours, len(rows))
@@ -95,7 +101,11 @@ def limit_probes(own: Result, case: Any, named: list[str]) -> list[str]:
 
 
 def selected_places(neighbours: PlaceMargins, rows: int) -> list[int]:
-    """Indices of the place with the least margin, of local minima of the margin, and of some places between."""
+    """Indices of the places under a limit whose signals are recorded.
+
+    They are the place with the least margin, local minima of the margin along the part, and some evenly spaced places.
+    neighbours : margins at all places of a part under a bound; rows : number of parts and bounds of all limits
+    """
     margins, most = np.where(np.isfinite(neighbours.margins), neighbours.margins, -np.inf), max(MAX_PLACES // rows, 1)
     padded = np.pad(margins, 1, constant_values=np.inf)
     least = np.flatnonzero((margins <= padded[:-2]) & (margins <= padded[2:]))
@@ -118,7 +128,7 @@ def accepts_probes(case: Any, texts: list[str]) -> bool:
 
 
 def peak_rows(result: Result, runs: dict[float, Result], unresolved: Unresolved) -> dict[str, Any]:
-    """Entry `peaks` of a summary, see `peak_errors`."""
+    """Entry `peaks` of a summary: probe -> unit, least and greatest value with their errors, see `peak_errors`."""
     summary, largest, rows = result.summary, {"rad": 1.0}, {}
     parts = {probe.text: (probe.part, probe.name) for probe in unresolved.case.probes}
     for extreme in summary["extremes"].values():
@@ -149,7 +159,8 @@ def peak_rows(result: Result, runs: dict[float, Result], unresolved: Unresolved)
 def error_bound(runs: dict[float, Result], triple: Sequence[float | None], places: Sequence = ()) -> float | None:
     """Error bound of the second of three values at increasing resolutions; None if it is not known.
 
-    places : signals of its places at the resolutions, oriented so that the peak is a maximum
+    triple : greatest values at half, one and twice the resolution; places : for each place, its signals at these
+    resolutions, with a sign such that the peak is a maximum
     """
     c, *finer = triple
     if not all(value is not None and math.isfinite(value) for value in finer):
@@ -165,13 +176,16 @@ def usable(signals_of_place: Sequence) -> bool:
 
 
 def signals(runs: dict[float, Result], probe: str, rising: Callable[[np.ndarray], np.ndarray]) -> list:
-    """Times and transformed values of a probe at every resolution whose run finished and recorded the probe."""
+    """(times, rising(values)) of a probe from every finished run that recorded the probe, coarsest first."""
     finished = [runs[times] for times in sorted(runs) if runs[times].reason == "finished"]
     return [(run.seconds, rising(run[probe])) for run in finished if probe in run.units]
 
 
 def limit_row(runs: dict[float, Result], limit: int, k: int, row: dict[str, Any], unresolved: Unresolved) -> dict:
-    """Row of a limit with its error. A limit that holds becomes open if the margin is smaller or the error unknown."""
+    """Row of a limit with its error. A limit that holds becomes open if its margin is below the error, or that unknown.
+
+    limit, k : indices of the limit and of the row in the results of all runs; row : part, bound, margin and places
+    """
     sign, magnitude = SIGNS[row["bound"]], row["quantity"] in MAGNITUDES
     triple = values_of_runs(runs, lambda run: run.places[limit][k]["margin"], -1.0)
     places = []
@@ -193,7 +207,10 @@ def limit_row(runs: dict[float, Result], limit: int, k: int, row: dict[str, Any]
 
 
 def expectation_error(runs: dict[float, Result], expect: Any, k: int, peak_rows: dict[str, Any]) -> float | None:
-    """Error of the value of an expectation: that of a peak, or from three values alone."""
+    """Error of the value in an expectation: the error of the peak if it is a peak, else from the values of all runs.
+
+    expect : expectation of the case; k : its index in the summaries; peak_rows : entry `peaks` of the summary
+    """
     side = {"min": "minimum", "max": "maximum"}.get(expect.function)
     if side is not None and expect.probe is not None and expect.probe.text in peak_rows:
         return peak_rows[expect.probe.text][side]["error"]
@@ -203,13 +220,19 @@ def expectation_error(runs: dict[float, Result], expect: Any, k: int, peak_rows:
 
 
 def values_of_runs(runs: dict[float, Result], of: Callable, sign: float = 1.0) -> tuple[float | None, ...]:
-    """Values at half, one and twice the resolution, times `sign`; None for a missing or unfinished run."""
+    """Values at half, one and twice the resolution, times `sign`; None for a missing or unfinished run.
+
+    of : function of a result that returns the value
+    """
     results = [of(runs[times]) if times in runs and runs[times].reason == "finished" else None for times in LEVELS]
     return tuple(None if value is None else sign * value for value in results)
 
 
 def observed_order(triple: Sequence[float | None], separated: bool) -> float | None:
-    """Observed order of three values, at most 2; None below order 1, or if the differences have opposite signs."""
+    """Observed order of three values, at most 2; None below order 1, or if the differences have opposite signs.
+
+    separated : True if column separation occurred, so that no order is assumed
+    """
     if separated or any(value is None or not math.isfinite(value) for value in triple):
         return None
     first, second = triple[1] - triple[0], triple[2] - triple[1]
@@ -219,7 +242,10 @@ def observed_order(triple: Sequence[float | None], separated: bool) -> float | N
 
 
 def between_rows(result: Result, probe: str, side: str) -> float:
-    """Height of a smooth peak above the highest row, an eighth of the second difference of rows."""
+    """Height of a smooth peak above the highest row of a probe: an eighth of the second difference of rows there.
+
+    side : "minimum" or "maximum"
+    """
     t, v = result.t, result[probe]
     position = int(np.argmin(v) if side == "minimum" else np.argmax(v))
     if not 0 < position < len(v) - 1 or t[position - 1] == t[position] or t[position] == t[position + 1]:
@@ -228,7 +254,7 @@ def between_rows(result: Result, probe: str, side: str) -> float:
 
 
 def description(runs: dict[float, Result], case: Any) -> str:
-    """Description of the method and of its restrictions for this case."""
+    """Sentence that describes how the errors of peaks were found, and the restrictions for this case."""
     others = " and ".join(f"{factor:g}" for factor in sorted(runs) if factor != 1.0)
     text = f"peaks compared with those at {others} times the resolution"
     if fixed_basins(case):

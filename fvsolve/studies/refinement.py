@@ -10,10 +10,10 @@ from fvsolve.studies.delay_line_keys import delay_lines, fixed_choices, slowest_
 
 
 def refined_keys(case, times: float) -> dict[str, Any]:
-    """Overrides for `times` the resolution: cells of pipes and basins, stretches of delay lines, steps, tolerances.
+    """Overrides for `times` the resolution: cells of pipes and basins, segments of delay lines, steps, tolerances.
 
-    Tolerances change with the inverse square; Courant numbers stay. Empty if the coarser case is invalid, for example
-    because a patch of a basin would begin within a cell.
+    `rtol` changes with the inverse square of `times`; the Courant number stays, except by `refined_step_keys`. Empty if
+    the coarser case is invalid, for example because a patch of a basin would begin within a cell.
     """
     keys = cell_keys(scaled(cell_counts(case), times))
     if times < 1.0 and not is_valid(case, scaled(cell_counts(case), times)):
@@ -30,9 +30,9 @@ def refined_keys(case, times: float) -> dict[str, Any]:
 
 
 def refined_step_keys(case, times: float) -> dict[str, Any]:
-    """Overrides with which delay lines take `times` as many steps.
+    """Overrides with which a case with delay lines takes `times` as many steps; empty if the case states the step.
 
-    Without cells it is the Courant number, otherwise `cells` of the slowest line, which sets the step.
+    Without cells the Courant number changes, otherwise the key `cells` of the slowest line, which sets the step.
     """
     if case.numerics.step is not None:
         return {}
@@ -43,5 +43,5 @@ def refined_step_keys(case, times: float) -> dict[str, Any]:
 
 
 def fixed_basins(case) -> list[str]:
-    """Basins whose cells come from a file; no resolution changes them."""
+    """Names of basins whose cells come from a file, so that their resolution cannot change."""
     return basins_from_files(case)

@@ -66,7 +66,7 @@ class ResultCache:
         return len(self.reused_keys)
 
     def get(self, case, extra: dict, make: Callable[[], dict]) -> dict:
-        """Result for a case and settings, computed by `make` if it is new; values that are not finite become None."""
+        """Result for a case and settings, computed by `make()` if it is new; values that are not finite become None."""
         known = self.find(case, extra)
         return self.store(case_key(case, extra), extra, make()) if known is None else known
 
@@ -75,14 +75,17 @@ class ResultCache:
         return self.lookup(case_key(case, extra))
 
     def lookup(self, key: str) -> dict | None:
-        """Earlier result of a key, or None."""
+        """Earlier result of a hash `key`, or None."""
         known = self.results.get(key)
         if known is not None and key not in self.new_keys:
             self.reused_keys.add(key)
         return known
 
     def store(self, key: str, settings: Any, result: dict) -> dict:
-        """Store the result of a key and return it as plain values. Raises RunError if it cannot be written."""
+        """Store the result of a hash `key` and return it as plain values. Raises RunError if it cannot be written.
+
+        settings : written with the result, for readers of the file
+        """
         result = self.results[key] = plain(result)
         self.new_keys.add(key)
         if self.path is not None:
@@ -105,13 +108,13 @@ def write_errors(path: Path) -> Iterator[None]:
 
 
 def case_key(case, extra: dict) -> str:
-    """Hash of a case, its programs and the settings."""
+    """Hash of a case, of program versions, and of the further settings `extra`."""
     return digest_of(identity(case) | {"resolved": case.table(), "extra": plain(extra)})
 
 
 @functools.cache
 def package_hash() -> str:
-    """Hash of all sources of the package."""
+    """Hash of all source files of fvsolve."""
     digest = hashlib.sha256()
     for path in sorted(jit.PACKAGE.rglob("*.py")):
         digest.update(path.read_bytes() + b"\0")
@@ -119,7 +122,7 @@ def package_hash() -> str:
 
 
 def digest_of(who: dict) -> str:
-    """Hash of everything that a point depends on, with the sources of fvsolve, plugins and user-defined methods."""
+    """Hash of all that a point depends on: the values `who`, the sources of fvsolve, plugins, user-defined methods."""
     who = who | {"package": package_hash(), "outside": sorted(jit.EXTRA_FOLDERS.values())}
     text = json.dumps(who, sort_keys=True, default=str)
     arrays = [method.text for name, method in METHODS.items() if name not in BUILT_IN and f'"{name}"' in text]
@@ -130,5 +133,8 @@ OUT = Kind(lambda given: PATH.accepts(given) or isinstance(given, ResultCache), 
 
 
 def cache_in(out: str | Path | ResultCache | None):
-    """Context manager of a result cache: opens that of a folder, or passes on an open one without closing it."""
+    """Context manager that gives a result cache.
+
+    out : folder whose cache is opened and closed, None for a cache in memory, or an open cache, which stays open
+    """
     return nullcontext(out) if isinstance(out, ResultCache) else ResultCache(out)
