@@ -1,7 +1,7 @@
 """Reference solutions for errors: an exact solution, or finer runs with other schemes and methods.
 
 `find_reference(case, finest)` finds the most accurate reference for runs with the keys `finest` or coarser. A
-`Reference` gives end fields as cell averages on any cells, probe values at the rows of a run, and its own error.
+`Reference` gives averages over any cells at the end, values of probes at the rows of a run, and its own error.
 """
 
 from __future__ import annotations
@@ -73,14 +73,14 @@ ROUNDING = 1e-15  # relative to the size of a quantity
 class Reference:
     """Reference solution of a study.
 
-    kind : "exact" | "finer" | "function"; words : description for a table
-    fields : fields(model) -> {pipe: (pressure [Pa], flow [m3/s]), ("basin", name): float64[quantities, n]}, averages
-    over the cells of that model at the end
+    kind : "exact" | "finer" | "function"; words : description of the reference
+    fields : fields(model) -> averages over the cells of `model` at the end, {pipe: (pressure [Pa], flow [m3/s]),
+    ("basin", name): float64[quantities, cells]}
     rows : rows(run) -> float64[k, probes]  reference values of the probes of a run at its rows; NaN if not known
     spans : pipe -> range of its pressure over the run [Pa], as far as known
-    own : variable -> {"L1", "L2", "max"}  error of the reference [SI]; doubt : its error relative to ranges, of the
-    worst component; both at least the error from refinements, and the difference to the second reference if any
-    second : description of the second reference; told : reasons of runs that did not finish
+    own_error : variable -> {"L1", "L2", "max"}  error of the reference [SI]; uncertainty : the same error relative to
+    ranges; both are at least the error from refinements, and the difference to the second reference if there is one
+    second : description of the second reference; failures : reasons of reference runs that did not finish
     run : the run that is the reference, or the nearest run to an exact solution
     """
 
@@ -108,13 +108,14 @@ def find_reference(
 ) -> Reference:  # fmt: skip
     """Find the most accurate reference for runs of a case with the keys `finest` or coarser ones.
 
-    opinions : number of kinds of reference runs (default all); at least two show errors common to one kind
-    judged : True if scheme and method of the case are under study, so that the reference must use others
-    way : "both", or "time": same cells and scheme as the case, if only the step is under study
-    lines : True if delay lines are under study, with a reference in cells of any scheme and method
-    stiff : True if explicit steps are limited by something other than waves
+    opinions : number of kinds of reference runs (default all); a second kind shows errors that the first kind hides
+    exclude_own : True if scheme and method of the case are under study, so that the reference must use others
+    way : "both", or "time" if only the step is under study, so that the reference has the cells and scheme of the case
+    lines : True if delay lines are under study, so that the reference has cells, with any scheme and method
+    stiff : True if a time scale other than waves limits explicit steps
     exact : True to use the solution named in [exact] of the case, if it applies
-    queue : `RunQueue` that makes the runs, instead of `run`; stages : overrides of its case that give this case
+    run : run(case, keys) -> `Outcome`; queue : `RunQueue` that makes the runs instead of `run`
+    stages : overrides that turn the case of the queue into `case`, in order; progress : called with a text
     Raises FvsolveError if too few runs reach the end: none, or only one if several are required.
     """
     from fvsolve.case import load
@@ -152,7 +153,10 @@ def find_reference(
 
 
 def submit_ahead(queue: RunQueue, stages: tuple[dict, ...], kinds: Sequence, report: Callable[[str], None]) -> Callable:
-    """Submit all runs of these kinds to a queue, coarse runs first; returns run(case, keys) that gives the results."""
+    """Submit all runs of these kinds to a queue, coarse runs first; returns run(case, keys) that gives the results.
+
+    kinds : kinds of reference runs as from `candidates`; stages : overrides applied to the case of the queue before
+    """
     report(", ".join(name for name, _ in kinds))
     by_level = zip(*(trials for _, trials in kinds), strict=True)
     for _ in queue.run_ahead([RunRequest(capped_outcome, trial, stages) for level in by_level for trial in level]):
@@ -161,7 +165,7 @@ def submit_ahead(queue: RunQueue, stages: tuple[dict, ...], kinds: Sequence, rep
 
 
 def best_reference(references: Sequence[Reference], failures: tuple[str, ...] = ()) -> Reference:
-    """Reference with the least uncertainty, which is at least its difference to the second best reference."""
+    """Reference with the least uncertainty; the uncertainty is raised to its difference from the second best."""
     first, *later = sorted(references, key=_uncertainty)
     if not later:
         return replace(first, failures=failures)
@@ -222,7 +226,7 @@ def reference_of_solution(solution: room.Solution, kind: str, words: str) -> Ref
 
 
 def split_jump_times(t: np.ndarray) -> np.ndarray:
-    """Times of rows; the two rows of a jump are shifted by a small offset to its left and to its right."""
+    """Times of rows; two rows at the same time, before and after a jump, are moved apart by a small offset."""
     shifted, offset = t.copy(), 1e-12 * max(1e-300, float(np.ptp(t)))
     repeated = np.flatnonzero(np.diff(t) == 0.0)
     shifted[repeated] -= offset
@@ -231,7 +235,7 @@ def split_jump_times(t: np.ndarray) -> np.ndarray:
 
 
 def initial_values(model) -> room.ExactStart:
-    """Initial pressures [Pa] and flows [m3/s] of a model."""
+    """Initial pressures of the nodes [Pa] and initial flows of the links [m3/s] of a model."""
     rho, tables = model.case.properties.density, model.tables
     flows = {pipe.name: row["flow"] for pipe, row in zip(model.pipes, tables.pipes, strict=True)}
     flows |= {name: row["flow"] for name, row in zip(model.column_names, tables.columns, strict=True)}
@@ -244,7 +248,10 @@ def initial_values(model) -> room.ExactStart:
 
 
 def candidates(case, judged: bool, way: str, stiff: bool, lines: bool = False) -> Iterator[tuple[str, list[dict]]]:
-    """Kinds of reference runs, best first: (description, overrides of three runs from coarse to fine)."""
+    """Kinds of reference runs, best first: (description, overrides of three runs from coarse to fine).
+
+    judged : True if scheme and method of the case are under study; way, stiff, lines : as in `find_reference`
+    """
     numerics, cells = case.numerics, cell_counts(case)
     if way == "time" and (cells or basins(case) or delayed(case)):
         yield smaller_steps(case)
@@ -278,7 +285,10 @@ def candidates(case, judged: bool, way: str, stiff: bool, lines: bool = False) -
 
 
 def smaller_steps(case) -> tuple[str, list[dict]]:
-    """Reference runs with the same cells and scheme, another method of its kind, smaller steps or tolerances."""
+    """Reference runs with smaller steps or tolerances: (description, overrides of three runs from coarse to fine).
+
+    Cells and scheme are those of the case; the method is another one, explicit or implicit like the method of the case.
+    """
     numerics, cells = case.numerics, cell_counts(case)
     judged = METHODS.get(numerics.method)
     method = alternative_method(judged is not None and judged.explicit, numerics.method)
@@ -296,12 +306,12 @@ def smaller_steps(case) -> tuple[str, list[dict]]:
 
 
 def alternative_method(explicit: bool, judged: str) -> str:
-    """Method of high order other than `judged`."""
+    """Name of a method of high order other than `judged`; explicit : True for an explicit method."""
     return next(name for name in ALTERNATIVES[explicit] if name != judged)
 
 
 def run_text(case, scheme: str, cells, method: str, control: str, size: float) -> str:
-    """Description of a run."""
+    """Description of a run, such as "upwind5 on 800 cells with rk4 at courant 0.8"."""
     where = f"{scheme} on {total_cells(case, cells)} cells with " if cells else ""
     return f"{where}{method} at {control} {size:.4g}"
 
@@ -318,7 +328,7 @@ def _is_characteristic(case, keys: dict) -> bool:
 
 
 def reference_of_refinements(words: str, runs: Sequence[Outcome]) -> Reference:
-    """Reference from the last and finest of three runs, with its own error from their differences."""
+    """Reference from the last and finest of three runs; its own error is extrapolated from their differences."""
     coarse, middle, fine = runs
     fine_reference, middle_reference = reference_of_run(fine, words), reference_of_run(middle, words)
     coarse_errors, fine_errors = error_norms(coarse, middle_reference), error_norms(middle, fine_reference)
@@ -337,7 +347,7 @@ def reference_of_refinements(words: str, runs: Sequence[Outcome]) -> Reference:
 
 
 def reference_of_run(run: Outcome, words: str = "") -> Reference:
-    """Reference from a run, without an estimate of its own error."""
+    """Reference from a run, without an estimate of the error of the run; words : description."""
 
     def fields_of(model) -> dict:
         sums = wave_sums(run)
@@ -352,7 +362,7 @@ def reference_of_run(run: Outcome, words: str = "") -> Reference:
     def rows_of(other: Outcome) -> np.ndarray:
         t = run.rows[:, 0]
         if other.rows.shape[0] != t.size or not np.allclose(other.rows[:, 0], t, rtol=1e-12, atol=1e-300):
-            raise FvsolveError("rows of two runs are at different times. Set [output] every in the case")
+            raise FvsolveError("rows of two runs are at different times. Set the key output.every in the case")
         by_probe = {name: run.rows[:, 1 + k] for k, name in enumerate(run.probes)}
         missing = np.full(t.size, np.nan)
         return np.column_stack([by_probe.get(name, missing) for name in other.probes] or [np.zeros((t.size, 0))])
@@ -361,9 +371,10 @@ def reference_of_run(run: Outcome, words: str = "") -> Reference:
 
 
 def extrapolated_error(before: float, after: float, least: float = 0.0) -> float:
-    """Error of the finest of three runs, each with twice the resolution of the previous: d / (2^p - 1).
+    """Error of the finest of three runs, each with twice the resolution of the previous: after / (2^p - 1).
 
-    d : difference of the last two runs, `after`; p : order from the ratio of both differences, limited to `ORDERS`
+    before : difference of the first two runs; after : difference of the last two runs
+    p : order from the ratio of both differences, limited to `ORDERS`; least : least error, from rounding
     """
     if after <= least:
         return least

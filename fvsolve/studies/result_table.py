@@ -28,8 +28,9 @@ class PlainData:
 class Column:
     """Column of a table: key of its values, header in files with unit, and format on a terminal.
 
-    header : default the key; words : format of numbers, or a function of the row; head : header on a terminal
-    (default header)
+    key : key of the values in the rows; header : header in files (default the key)
+    words : format of numbers such as ".3g", or a function of the row that returns text
+    head : header on a terminal (default `header`)
     """
 
     key: str
@@ -43,13 +44,13 @@ class Column:
         return self.header or self.key
 
     def formatted(self, row: Mapping) -> str:
-        """Text of the value of a row."""
+        """Text of the value of this column in a row, for a terminal."""
         return self.words(row) if callable(self.words) else cell_text(row.get(self.key), self.words)
 
 
 @dataclass(frozen=True)
 class ResultTable:
-    """Rows under columns."""
+    """Table of results; rows : for each row a mapping from the keys of the columns to values."""
 
     columns: Sequence[Column]
     rows: Sequence[Mapping[str, Any]]
@@ -74,12 +75,12 @@ class ResultTable:
 
 
 def columns(**titles: str) -> tuple[Column, ...]:
-    """Columns from keys and headers, for tables that are only written to files."""
+    """Columns from `key = "header"` arguments, for tables that are only written to files."""
     return tuple(Column(key, title) for key, title in titles.items())
 
 
 def cell_text(value: Any, spec: str = "") -> str:
-    """Text of a value: "-" for None, yes or no for bool, numbers in their format, text unchanged."""
+    """Text of a value: "-" for None, yes or no for bool, numbers by the format `spec`, text unchanged."""
     if value is None or isinstance(value, str):
         return "-" if value is None else value
     return ("yes" if value else "no") if isinstance(value, bool) else format(value, spec)

@@ -14,9 +14,10 @@ from fvsolve.studies.parallel import TaskPool
 
 
 class RunRequest(NamedTuple):
-    """Request for a run: how(case, keys) is a module-level function that returns an `Outcome` or a collection with it.
+    """Request for a run with changed keys.
 
-    stages : overrides applied to the study's case before, in order
+    function : function(case, keys) at module level that makes the run; returns an `Outcome` or a collection with it
+    keys : dotted key -> value; stages : overrides applied to the case of the study before, in order
     """
 
     function: Callable[[Case, Mapping[str, Any]], Any]
@@ -27,6 +28,7 @@ class RunRequest(NamedTuple):
 class RunQueue:
     """Runs of a study. A result computed ahead is returned once; other runs are computed when requested.
 
+    source : case of the study, as for `load`
     jobs : number of local processes; dask : address of a scheduler, used instead of local processes.
     Context manager: workers are closed on exit.
     """
@@ -41,10 +43,10 @@ class RunQueue:
         return self.pool.in_process
 
     def run_ahead(self, requests: Sequence[RunRequest]) -> Iterator[int]:
-        """Compute runs ahead of their request; yields the index of each finished run.
+        """Compute runs before their results are requested; yields the index of each finished run.
 
-        The first, cheapest run comes first, then runs from the end, where the most expensive are. With a single
-        process nothing is computed ahead; each run is computed when requested.
+        Requests go from cheap to expensive. The first run comes first, then runs from the end of the list. With a
+        single process nothing is computed ahead.
         """
         if self.in_process or not requests:
             return
@@ -70,7 +72,7 @@ class RunQueue:
 
 
 class RequestRunner:
-    """Callable that makes runs of a case, in this or another process; cases after stages are reused."""
+    """Callable that makes the run of a `RunRequest`, in this or another process; reuses the cases after stages."""
 
     def __init__(self, source: Any) -> None:
         self.sent = PickledCase(source)

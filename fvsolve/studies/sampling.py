@@ -1,4 +1,4 @@
-"""Values of keys for the runs of a study: grids, samples of ranges, rows of a file."""
+"""Values of keys of a case for the runs of a study: grids, samples of ranges, rows of a file."""
 
 from __future__ import annotations
 
@@ -27,12 +27,16 @@ MAX_RUNS = 10_000_000  # greatest number of runs
 
 
 def grid(vary: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
-    """All combinations of the values; the last key varies fastest."""
+    """All combinations of the values of the keys, as (key -> value) of each run; the last key varies fastest."""
     return [dict(zip(vary, values, strict=True)) for values in itertools.product(*vary.values())]
 
 
 def sample_points(case: Case, vary: Mapping[str, Sequence[Any]], sample: str, seed: int) -> list[dict[str, Any]]:
-    """Sample of points within the range of each key [SI]: scrambled Sobol or Latin hypercube (`scipy.stats.qmc`)."""
+    """Sample of points within the ranges of keys, each key -> value [SI], by `scipy.stats.qmc`.
+
+    vary : key -> (low, high); sample : kind and number of points, such as "sobol:64" or "lhs:100" (Latin hypercube)
+    seed : equal seeds give equal points
+    """
     kind, count = parse_sample(sample)
     low, high = (np.array(side) for side in zip(*key_ranges(case, vary).values(), strict=True))
     from scipy.stats import qmc
@@ -53,7 +57,7 @@ def parse_sample(sample: str) -> tuple[str, int]:
 
 
 def key_ranges(case: Case, vary: Mapping[str, Sequence[Any]]) -> dict[str, tuple[float, float]]:
-    """Key -> (low, high) [SI, absolute pressures]. Raises CaseError with the faults of all ranges."""
+    """Ranges of keys in SI : key -> (low, high), pressures absolute. Raises CaseError with the faults of all ranges."""
     result, faults = {}, []
     for key, given in vary.items():
         try:
@@ -66,7 +70,10 @@ def key_ranges(case: Case, vary: Mapping[str, Sequence[Any]]) -> dict[str, tuple
 
 
 def range_of(case: Case, key: str, given: Sequence[Any]) -> tuple[float, float]:
-    """(low, high) of a range [SI]. Raises ValueError for an invalid range."""
+    """Range of a key in SI : (low, high). Raises ValueError for an invalid range.
+
+    given : two values, each a number or a text with a unit
+    """
     if len(given) != 2:
         raise ValueError(f"{show(list(given))} is not a range. Expected two values, LOW,HIGH")
     quantity, setting = key_quantity(case.raw, key), ReadContext(ambient=case.ambient_pressure)
@@ -80,7 +87,10 @@ def range_of(case: Case, key: str, given: Sequence[Any]) -> tuple[float, float]:
 
 
 def key_quantity(raw: dict[str, Any], key: str) -> Quantity | None:
-    """Quantity (dimension and range) of the values of a key; None for keys of words or whole numbers."""
+    """Quantity (dimension and range) of the values of a key; None if the values are words or whole numbers.
+
+    raw : nested dicts of the case
+    """
     keys = split_key(key)
     value = declaration_of(raw, keys)
     if isinstance(value, Scheduled):
@@ -91,7 +101,7 @@ def key_quantity(raw: dict[str, Any], key: str) -> Quantity | None:
 
 
 def si_unit_of(raw: dict[str, Any], key: str) -> str:
-    """SI unit of bare numbers of a key; "" if they have none."""
+    """SI unit of the values of a key that are given without a unit; "" if they have no dimension."""
     quantity = key_quantity(raw, key)
     return "" if quantity is None or quantity.dimension == "number" else units.DIMENSIONS[quantity.dimension].si
 
@@ -104,7 +114,7 @@ def key_with_unit(raw: dict[str, Any], key: str, values: Iterable[Any]) -> str:
 
 
 def refuse_unknown(source: Any, values: Mapping[str, Any], raw: dict[str, Any]) -> None:
-    """Raise CaseError with all keys that are unknown to the case with these values."""
+    """Raise CaseError with all keys in `values` that a case cannot have; source : the case; raw : its nested dicts."""
     unknown = [key for key in values if not is_known(raw, key)]
     try:
         if unknown:
@@ -116,7 +126,7 @@ def refuse_unknown(source: Any, values: Mapping[str, Any], raw: dict[str, Any]) 
 
 
 def is_known(raw: dict[str, Any], key: str) -> bool:
-    """True if a key is valid for a case."""
+    """True if a case can have the key; raw : nested dicts of the case."""
     try:
         declaration_of(raw, split_key(key))
     except (FvsolveError, KeyError, AttributeError, TypeError):  # other types if the case itself is invalid
@@ -154,7 +164,7 @@ MAX_FAULTS = 20  # greatest number of faults in a message
 
 
 class Heading:
-    """Column of a file of points: key, unit and quantity."""
+    """Column of a CSV file of points: key, unit in the header ("" if none), quantity of the key (None for words)."""
 
     def __init__(self, name: str, unit: str, quantity: Quantity | None) -> None:
         self.name, self.unit, self.quantity = name, unit, quantity
@@ -174,7 +184,7 @@ class Heading:
         return cls(name, unit, quantity)
 
     def read(self, cell: str, place: str, faults: list[str]) -> Any:
-        """Value of a cell for an override; adds faults."""
+        """Value of a cell of the file, as for an override; adds its faults; place : name of the cell in messages."""
         value = number(cell)
         if not cell:
             faults.append(f"{place}: is empty. Expected a value in every row")

@@ -29,7 +29,11 @@ AddFault = Callable[[tuple, str], None]
 
 @dataclass(frozen=True)
 class Scenarios:
-    """Content of a study file: overrides (dotted key -> value) by the names of events and protections."""
+    """Content of a study file.
+
+    name, path : name and path of the file; case : path of the case file; error : True if errors of peaks are estimated
+    events, protections : name -> overrides (dotted key -> value)
+    """
 
     name: str
     path: Path
@@ -47,7 +51,7 @@ class Scenarios:
 
 
 def read_scenarios(path: str | Path) -> Scenarios:
-    """Read the study of a TOML file. Raises CaseError with all faults of the file and of its runs, with lines."""
+    """Read a study from a TOML file. Raises CaseError with all faults of the file and its runs, with line numbers."""
     path = Path(path)
     data, lines = read_text(path)
     faults: dict[tuple, Fault] = {}
@@ -85,7 +89,11 @@ def read_scenarios(path: str | Path) -> Scenarios:
 
 
 def possible_paths(keys: tuple) -> Iterator[tuple]:
-    """Paths at which a key of a set may be in the file, most specific first: nested, quoted, then its tables."""
+    """Paths in the TOML file under which an override may be written, to find its line; most specific first.
+
+    keys : (group, name of the event or protection, dotted key). The key may be nested tables or a quoted key; the
+    tables that contain it follow.
+    """
     below = split_key(keys[2]) if len(keys) > 2 else ()
     for n in range(len(below), 0, -1):
         yield (*keys[:2], *below[:n])
@@ -94,7 +102,7 @@ def possible_paths(keys: tuple) -> Iterator[tuple]:
 
 
 def read_text(path: Path) -> tuple[dict[str, Any], dict[tuple, int]]:
-    """Read a TOML file: (data, line of each key). Raises CaseError if it is missing, unreadable or invalid."""
+    """Read a TOML file: (data, path of each key -> line). Raises CaseError if it is missing, unreadable or invalid."""
     text = ""
     try:
         text = path.read_text(encoding="utf-8-sig").replace("\r\n", "\n")
@@ -126,7 +134,10 @@ def case_path(case: Any, folder: Path, fault: AddFault) -> Path | None:
 
 
 def read_overrides(table: Any, group: str, fault) -> dict[str, dict[str, Any]]:
-    """Sets of overrides by name, with dotted keys; adds faults."""
+    """Overrides of the events or protections in a table of the file : name -> {dotted key: value}; adds faults.
+
+    group : "events" or "protections"; fault : fault(keys, message) records a fault
+    """
     if not isinstance(table, dict):
         fault((group,), f"{show(table)} is not a table. Expected named tables, [{group}.NAME]")
         return {}
@@ -142,7 +153,7 @@ def read_overrides(table: Any, group: str, fault) -> dict[str, dict[str, Any]]:
 
 
 def dotted_keys(table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Pairs (dotted key, value) of nested tables. Keys of named parts are separate; deeper tables are values."""
+    """Pairs (dotted key, value) of nested tables, each key of a named part separate; deeper tables are values."""
     for first, inner in table.items():
         if "." in first or not isinstance(inner, dict):
             yield first, inner
@@ -160,7 +171,7 @@ def dotted_path(*keys: str) -> str:
 
 
 def all_conflicts(events: dict, protections: dict) -> Iterator[tuple[str, str, str, str]]:
-    """(event, protection, key of the event, key of the protection) of all pairs of conflicting keys."""
+    """Conflicts of overrides: (event, protection, key of the event, key of the protection) for each pair of keys."""
     for event, of_event in events.items():
         for protection, of_protection in protections.items():
             yield from (
@@ -170,7 +181,10 @@ def all_conflicts(events: dict, protections: dict) -> Iterator[tuple[str, str, s
 
 
 def conflicting_keys(first: dict[str, Any], second: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """Pairs of keys of two sets that are equal or nested, unless equal keys have equal values."""
+    """Pairs (key of `first`, key of `second`) that are equal or of which one contains the other.
+
+    Equal keys with equal values are no conflict.
+    """
     for key in first:
         for other_key in second:
             a, b = split_key(key), split_key(other_key)
@@ -179,9 +193,10 @@ def conflicting_keys(first: dict[str, Any], second: dict[str, Any]) -> Iterator[
 
 
 def run_faults(design: Scenarios, fault: AddFault) -> None:
-    """Add the faults of all runs that cannot start, at the responsible key, with the runs if not all are affected.
+    """Add the faults of all runs whose case is invalid, each at the override that causes it.
 
-    Runs of conflicting sets are omitted.
+    If only some runs with an event (or protection) have a fault, the message names their protections (or events). Runs
+    with conflicting overrides are omitted.
     """
     try:
         base = load(design.case)
@@ -209,7 +224,10 @@ def run_faults(design: Scenarios, fault: AddFault) -> None:
 
 
 def responsible_sets(design: Scenarios, place: str | None, pairs: list) -> Iterator[tuple]:
-    """(group, name, place) of the sets that change a place; without a place (group, name) of the sets of one group."""
+    """(group, name, place) of the events and protections in `pairs` that set the key `place`, or keys around it.
+
+    Without a place: (group, name) of the events, or of the protections if there are no events.
+    """
     for position, group in enumerate(("events", "protections")):
         for name in dict.fromkeys(pair[position] for pair in pairs if pair[position] is not None):
             if place is None:
@@ -221,5 +239,5 @@ def responsible_sets(design: Scenarios, place: str | None, pairs: list) -> Itera
 
 
 def within(place: str, key: str) -> bool:
-    """True if a place is a key or below it."""
+    """True if the dotted path `place` is the key, or lies below it."""
     return place == key or place.startswith((f"{key}.", f"{key}["))

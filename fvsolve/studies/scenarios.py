@@ -25,7 +25,8 @@ STUDY = "study.json"
 class ScenarioResults:
     """Results of a scenario study.
 
-    rows : for every run event, protection, directory, ok, reason, t, verdicts, extremes and more of its summary
+    design : content of the study file; folder : folder of all runs
+    rows : a dict for each run: event, protection, directory, and ok, reason, t, verdicts, extremes, ... of its summary
     """
 
     design: Scenarios
@@ -34,9 +35,9 @@ class ScenarioResults:
 
     @property
     def holds(self) -> list[str]:
-        """Protections whose runs are all ok and satisfy all limits in all events; "" is the case without protection.
+        """Names of protections with which the runs of all events are ok and satisfy all limits.
 
-        Empty if there are no limits.
+        "" is the case without protection. Empty if there are no limits.
         """
         by_protection: dict[str, list[dict[str, Any]]] = {}
         for row in self.rows:
@@ -75,6 +76,8 @@ def study(source, out: str | Path | None = None, jobs: int = 1, dask: str | None
           progress=None) -> ScenarioResults:  # fmt: skip
     """Run all events with all protections of a study file, `jobs` runs at a time, each in its own run directory.
 
+    source : path of the study file, or its content; out : folder of the runs (default runs/NAME of the study)
+    dask : address of a Dask scheduler; progress : called as progress(done, total, name of the run)
     Runs of the same study that exist are kept, and resumed if unfinished; `force` repeats all. Raises CaseError with
     the faults of the file and of all runs, RunError if a directory holds a different run.
     """
@@ -96,7 +99,7 @@ def study(source, out: str | Path | None = None, jobs: int = 1, dask: str | None
 
 
 class ScenarioRun:
-    """Callable that makes one run of a study, in this or another process."""
+    """Callable that makes one run of a scenario study, in this or another process; returns its row of results."""
 
     def __init__(self, source: Any, error: bool, force: bool) -> None:
         self.sent, self.error, self.force = PickledCase(source), error, force
@@ -129,7 +132,7 @@ def row_name(row: dict[str, Any]) -> str:
 
 
 def write_study(results: ScenarioResults) -> None:
-    """Write study.json and study.csv: a row for each run with value, margin and state of every limit."""
+    """Write study.json, and study.csv with a row for each run: value, margin and state of every limit."""
     data = results.plain()
     for row in data["runs"]:
         row["directory"] = os.path.relpath(row["directory"], results.folder)
@@ -154,7 +157,10 @@ def write_study(results: ScenarioResults) -> None:
 
 
 def open_study(folder: str | Path) -> dict[str, Any]:
-    """Read study.json of a folder; directories become paths through that folder. Raises FvsolveError if invalid."""
+    """Read study.json of a folder; run directories become paths that start with the folder.
+
+    Raises FvsolveError if the file is missing or invalid.
+    """
     folder = Path(folder)
     try:
         data = json.loads((folder / STUDY).read_text(encoding="utf-8"))
@@ -162,4 +168,4 @@ def open_study(folder: str | Path) -> dict[str, Any]:
             row["directory"] = str(folder / row["directory"])
         return data
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise FvsolveError(f"{folder} has no finished study (no {STUDY}): {error}") from None
+        raise FvsolveError(f"{folder} has no finished study: {STUDY} is missing or invalid ({error})") from None

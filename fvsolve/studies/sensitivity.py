@@ -1,4 +1,4 @@
-"""Global sensitivity analysis: Sobol indices and Morris effects of keys on an outcome, by SALib."""
+"""Global sensitivity analysis: Sobol indices and Morris effects of keys of a case on an outcome, by SALib."""
 
 from __future__ import annotations
 
@@ -27,10 +27,11 @@ MIN_SAMPLES = 2  # least base sample size of Sobol
 
 @dataclass(frozen=True, repr=False)
 class Sensitivity(Displayable, PlainData):
-    """Sensitivity indices of every key.
+    """Sensitivity indices of every key, as lists in the order of `keys`.
 
-    S1, ST : first-order and total index, the fraction of the variance of the outcome due to a key alone, and due to the
-    key with all its interactions (Saltelli 2010, Jansen 1999)
+    outcome : name of the outcome with its unit; runs : number of runs
+    S1, ST : first-order and total index [-], the fraction of the variance of the outcome due to a key alone, and due to
+    the key with all its interactions (Saltelli 2010, Jansen 1999)
     mu_star, mu, sigma : mean absolute value, mean and standard deviation of the elementary effect over the whole range
     (Morris 1991, Campolongo 2007), in the unit of the outcome
     *_conf : half widths of the 95 % confidence intervals
@@ -56,7 +57,7 @@ class Sensitivity(Displayable, PlainData):
 
     @property
     def sheet(self) -> ResultTable:
-        """A row for each key."""
+        """Table with a row for each key and a column for each index."""
         rows = [{"key": key, **{name: getattr(self, name)[k] for name in COLUMNS}} for k, key in enumerate(self.keys)]
         return ResultTable([Column("key"), *(Column(name, words=".4g") for name in COLUMNS)], rows)
 
@@ -89,9 +90,10 @@ def sensitivity(
 ) -> Sensitivity:
     """Compute Sobol and Morris indices of an outcome, such as "max(gate.pressure)", over the ranges of keys.
 
-    case : as for `run`, or a function of a dict key -> number; samples : base sample size N of Sobol (a power of two),
-    which needs N (keys + 2) runs; Morris needs N / 4 (keys + 1) more. Other arguments as for `sweep`, which makes the
-    runs and reuses earlier ones. Raises FvsolveError if a run does not have the outcome.
+    case : as for `run`, or a function of a dict key -> number; vary : key -> (low, high)
+    samples : base sample size N of Sobol (a power of two), which needs N (keys + 2) runs; Morris needs
+    N / 4 (keys + 1) more. Other arguments as for `sweep`, which makes the runs and reuses earlier ones.
+    Raises FvsolveError if a run does not have the outcome.
     """
     if samples < MIN_SAMPLES:
         raise FvsolveError(f"samples = {samples} is too small. Expected {MIN_SAMPLES} or more, a power of two")
@@ -117,7 +119,7 @@ def sensitivity(
 
 
 def values_of(result, outcome: str) -> np.ndarray:
-    """Column of a sweep : float64[runs]. Raises FvsolveError if a run has no value there."""
+    """Values of an outcome in all runs of a sweep : float64[runs]. Raises FvsolveError if a run has no value."""
     name = result.outcome(outcome)
     missing = [row for row in result.rows if row.get(name) is None]
     if missing:
@@ -128,7 +130,10 @@ def values_of(result, outcome: str) -> np.ndarray:
 
 
 def sample_points(bounds: Mapping[str, tuple[float, float]], samples: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Sample points of the Sobol and the Morris method : float64[n, keys] each."""
+    """Sample points of the Sobol and the Morris method : float64[points, keys] each.
+
+    bounds : key -> (low, high); samples : base sample size of Sobol; seed : equal seeds give equal points
+    """
     _require_salib()
     from SALib.sample import morris, sobol
 
@@ -140,7 +145,10 @@ def sample_points(bounds: Mapping[str, tuple[float, float]], samples: int, seed:
 
 
 def analyse_values(bounds, sobol_points, sobol_values, morris_points, morris_values, seed: int) -> list[list[float]]:
-    """Indices of all keys in the order of `COLUMNS`. Raises FvsolveError if the outcome is constant."""
+    """Sensitivity indices from the values of an outcome : for each entry of `COLUMNS` a list over the keys.
+
+    Raises FvsolveError if the outcome is constant.
+    """
     from SALib.analyze import morris, sobol
 
     problem = salib_problem(bounds)
@@ -154,7 +162,7 @@ def analyse_values(bounds, sobol_points, sobol_values, morris_points, morris_val
 
 
 def salib_problem(bounds: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
-    """Problem definition of SALib."""
+    """Problem definition for SALib; bounds : key -> (low, high)."""
     return {"num_vars": len(bounds), "names": [*bounds], "bounds": [list(limits) for limits in bounds.values()]}
 
 

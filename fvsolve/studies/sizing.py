@@ -29,11 +29,12 @@ _VALUE = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*"
 
 @dataclass(frozen=True)
 class SizeRun:
-    """Result of a run: value of the key, whether all limits hold, least margin over its limit, name of that limit.
+    """Result of a run with a value of the key.
 
-    margin : less the error, if that is known
-    open : reason for which limits are undecided, else empty: a schedule continues after the end of the run, the results
-    are not to be trusted, or an error is larger than the margin
+    ok : True if all limits hold; limit : name of the limit with the least margin
+    margin : margin of that limit, less its error if the error is known, relative to the limit [-]; None if not known
+    reason : reason of the end of the run; open : reason for which limits are undecided, else empty: a schedule
+    continues after the end of the run, results are not valid, or an error is larger than the margin
     """
 
     value: float
@@ -48,8 +49,10 @@ class SizeRun:
 class Size:
     """Result of a sizing.
 
-    value : value at which all limits hold, None if none was found; bracket : (value that fails, value that holds)
-    runs : all runs in order; unit : unit of the range; for bare numbers the SI unit of the key, "" if it has none
+    key : key that is sized; unit : unit of its values, for bare numbers the SI unit of the key, "" if it has none
+    goal : "minimum" or "maximum"; value : least or greatest value at which all limits hold, None if none was found
+    bracket : (value with which limits fail, value with which all limits hold), None without such a pair
+    runs : all runs in order; ties : dependent keys as texts "KEY = formula"
     """
 
     key: str
@@ -62,7 +65,7 @@ class Size:
 
     @property
     def nearest(self) -> SizeRun:
-        """The run with the greatest margin."""
+        """Run with the greatest margin."""
         return max(self.runs, key=lambda run: -math.inf if run.margin is None else run.margin)
 
     def plain(self) -> dict[str, Any]:
@@ -73,7 +76,7 @@ class Size:
 
 
 def number_and_unit(given: Any) -> tuple[float, str]:
-    """(number, unit) of a value, unit "" for a bare number. Raises ValueError if it is not a number."""
+    """Split a value such as "2 m3" into (number, unit); the unit of a bare number is "". Raises ValueError."""
     if isinstance(given, (int, float)) and not isinstance(given, bool):
         return float(given), ""
     match = _VALUE.fullmatch(given) if isinstance(given, str) else None
@@ -101,7 +104,11 @@ def parse_range(low: Any, high: Any) -> tuple[float, float, str]:
 
 
 class SizeSearch:
-    """State of a search."""
+    """Search for the least or greatest value of a key at which all limits hold, with its runs.
+
+    unit : unit of the values; ties : dependent key -> formula of x, the value in SI
+    error : True to require margins larger than their errors, from two more runs of each value
+    """
 
     def __init__(self, case: Case, key: str, unit: str, ties: Mapping[str, str], progress: Callable | None,
                  error: bool = False) -> None:  # fmt: skip
@@ -110,7 +117,7 @@ class SizeSearch:
         self.formulas = {tied: Arithmetic(text) for tied, text in ties.items()}
 
     def keys(self, value: float) -> dict[str, Any]:
-        """Overrides for a value of the key, with dependent keys from formulas of x, the value in SI."""
+        """Overrides for a value of the key, and for the dependent keys by their formulas."""
         unit = UNITS.get(self.unit)
         x = value if unit is None else float(unit.si(value)) + (self.case.ambient_pressure if unit.gauge else 0.0)
         overrides: dict[str, Any] = {self.key: f"{value!r} {self.unit}" if self.unit else value}
@@ -144,7 +151,10 @@ class SizeSearch:
         return self.runs[-1]
 
     def search(self, low: float, high: float, goal: str, rtol: float) -> tuple[float | None, tuple | None]:
-        """(value, bracket) with the least or greatest value that holds; (None, None) if no value holds."""
+        """Search between `low` and `high`; returns (value, bracket) as in `Size`, (None, None) if no value was found.
+
+        goal : "minimum" or "maximum"; rtol : relative width of the bracket at which the search ends
+        """
         best, opposite = (low, high) if goal == "minimum" else (high, low)
         if self(best).ok:
             return best, None
@@ -159,7 +169,10 @@ class SizeSearch:
         return good, (bad, good)
 
     def find_interior(self) -> float | None:
-        """Search a value that holds near the run with the greatest margin, in ever smaller intervals."""
+        """Search a value at which all limits hold, near the run with the greatest margin, in ever smaller intervals.
+
+        Returns None after `INTERIOR_TRIALS` runs without such a value.
+        """
         for _ in range(INTERIOR_TRIALS):
             runs = sorted(self.runs, key=lambda run: run.value)
             position = max(range(len(runs)), key=lambda k: -math.inf if runs[k].margin is None else runs[k].margin)
@@ -171,7 +184,10 @@ class SizeSearch:
         return None
 
     def next_value(self, bad: float, good: float) -> float:
-        """Next value: zero of the linear interpolation of margins, away from the ends, in turn with the midpoint."""
+        """Next value between `bad`, with which limits fail, and `good`, with which they hold.
+
+        In turn it is the midpoint, and the zero of the margin by linear interpolation, kept away from both ends.
+        """
         margins = [self(x).margin for x in (bad, good)]
         share = 0.5
         if None not in margins and margins[1] > margins[0] and len(self.runs) % 2:
@@ -180,7 +196,7 @@ class SizeSearch:
 
 
 def size_run(value: float, result: Any) -> SizeRun:
-    """Evaluate the limit verdicts of a run."""
+    """Evaluate the limit verdicts in the result of a run with a value of the key."""
     margins = [
         (relative_margin(row, verdict.quantity), verdict.name) for verdict in result.verdicts for row in verdict.worst
     ]
@@ -201,7 +217,7 @@ def size_run(value: float, result: Any) -> SizeRun:
 
 
 def relative_margin(row: Mapping[str, Any], quantity: str) -> float:
-    """Margin at a place, less its error, relative to the limit.
+    """Margin of a row of a limit verdict, less its error, relative to the limit [-].
 
     The divisor is at least the usual size of the quantity, such as an atmosphere for pressures and heads.
     """
@@ -219,9 +235,12 @@ def size(
 ) -> Size:  # fmt: skip
     """Find the least (or greatest) value of a key between `low` and `high` at which all limits of a case hold.
 
-    rtol : relative tolerance of the bracket. If limits fail at both ends, interior values with the greatest margins are
-    tried. ties : dependent keys as formulas of x, the value in SI. error : require margins larger than their errors,
-    from two more runs of each value. Raises CaseError for an invalid case, a case without limits, and wrong arguments.
+    low, high : numbers, or texts with a unit; goal : "minimum" or "maximum"; set : key -> value for all runs
+    ties : dependent key -> formula of x, the value in SI; rtol : relative tolerance of the bracket
+    progress : called as progress(runs, text); error : True to require margins larger than their errors, from two more
+    runs of each value
+    If limits fail at both ends, values between them with the greatest margins are tried. Raises CaseError for an
+    invalid case, a case without limits, and wrong arguments.
     """
     faults: list[Fault] = []
     loaded = None
@@ -240,9 +259,9 @@ def size(
 def find_faults(
     case: Case | None, key: str, span: Sequence[Any], goal: str, ties: Mapping[str, str], rtol: float
 ) -> list[Fault]:
-    """Faults of the arguments of a search, before any run.
+    """Faults of the arguments of `size`, found before any run.
 
-    case : None if the case has faults itself; span : empty if the range has faults itself
+    case : None if the case itself has faults; span : (low, high), empty if the range itself has faults
     """
     faults: list[Fault] = []
     if goal not in GOALS:
@@ -254,14 +273,14 @@ def find_faults(
     with collect_faults(faults, f"--vary {key}"):
         low, high, unit = parse_range(*span) if span else (0.0, 1.0, "")
         if case is not None and is_known(case.raw, key) and key_quantity(case.raw, key) is None:
-            raise ValueError("has words or whole numbers as values, so it has no range. Use a sweep")
+            raise ValueError("has words or whole numbers as values, so it has no range. Use `fvsolve sweep`")
     for name, text in ties.items():
         with collect_faults(faults, f"--dependent {name}"):
             Arithmetic(text)
             if name == key:
                 raise ValueError("is the key that is sized. Expected another key")
     if case is not None and not case.limits:
-        text = 'states no [limits] to satisfy. Expected for example { on = "pipes", maximum = "10 barg" }'
+        text = 'has no limits. Expected a table under [limits], such as { on = "pipes", maximum = "10 barg" }'
         faults.append(Fault("", f"{case.name} {text}"))
     if case is not None and span and len(faults) == count + (not case.limits):
         run_faults: list[Fault] = []

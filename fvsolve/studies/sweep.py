@@ -60,7 +60,7 @@ class Sweep(Displayable):
 
     @property
     def columns(self) -> list[str]:
-        """Names of all columns; those of probes in the order of first appearance."""
+        """Names of all columns; the columns of probes are in the order of their first appearance."""
         names = dict.fromkeys(name for row in self.rows for name in row)
         fixed = {*self.keys, *FIRST_COLUMNS, *LAST_COLUMNS}
         return [*self.keys, *FIRST_COLUMNS, *(name for name in names if name not in fixed), *LAST_COLUMNS]
@@ -71,7 +71,10 @@ class Sweep(Displayable):
         return self.columns[len(self.keys) + len(FIRST_COLUMNS) : -len(LAST_COLUMNS)]
 
     def outcome(self, name: str) -> str:
-        """Column of an outcome, given with or without its unit. Raises FvsolveError for an unknown outcome."""
+        """Name of the column of an outcome, which is given with or without its unit.
+
+        Raises FvsolveError for an unknown outcome.
+        """
         by_name = {column.partition(" [")[0]: column for column in self.outcomes}
         if name not in by_name and name not in by_name.values():
             hint = f"{did_you_mean(name, by_name)}. Outcomes are {listing(by_name) or 'none'}"
@@ -173,15 +176,15 @@ def sweep(
 def planned_values(
     source: Any, raw: dict, base: dict, vary: Mapping, points, sample: str | None, seed: int
 ) -> list[dict]:
-    """Values of every run: from points, a sample or a grid."""
+    """Values of every run, key -> value, from points, a sample or a grid; arguments as for `sweep`."""
     if points is not None:
         if vary or sample:
-            raise FvsolveError("points have all values of every run. Expected no vary and no sample in addition")
+            raise FvsolveError("`points` has all values of every run. Expected no `vary` and no `sample` in addition")
         runs = (
             points_from_file(Path(points), source, raw) if PATH.accepts(points) else [dict(point) for point in points]
         )
         if not runs or not runs[0] or any(point.keys() != runs[0].keys() for point in runs):
-            raise FvsolveError("points have different keys. Expected at least one key, with a value in every run")
+            raise FvsolveError("`points` is empty or has different keys. Expected the same keys in every run, at least one")
         return runs
     if sample is not None:
         if not vary:
@@ -196,7 +199,10 @@ def planned_values(
 
 
 class SweepRun:
-    """State of a sweep."""
+    """Sweep in progress: values of all runs, finished rows and the cache of earlier rows.
+
+    source : case as for `load`; raw : its nested dicts; base : overrides of all runs; runs : values of every run
+    """
 
     def __init__(self, source, raw: dict, base: dict, runs: list[dict], cache: ResultCache, progress) -> None:
         self.runs, self.cache, self.progress = runs, cache, progress or (lambda done, total, text: None)
@@ -238,7 +244,10 @@ class SweepRun:
             self.report_progress([index + 1] if index + 1 < len(keys) else [])
 
     def write(self, folder: Path | None) -> Sweep:
-        """Rows so far, written to the folder. Raises FvsolveError if all runs are refused for the same reason."""
+        """Collect the rows so far in a `Sweep`, and write them to the folder if there is one.
+
+        Raises FvsolveError if all runs are refused for the same reason.
+        """
         result = Sweep(tuple(self.runs[0]), [self.rows[index] for index in sorted(self.rows)], self.cache.reused)
         refused = {row["reason"] if row["reason"].startswith(REFUSED) else "" for row in result.rows}
         if len(result.rows) == len(self.runs) and len(refused) == 1 and "" not in refused:
@@ -249,7 +258,7 @@ class SweepRun:
         return result
 
     def report_progress(self, coming: list[int]) -> None:
-        """Report progress: finished rows, estimated remaining time and the next values."""
+        """Report finished rows, the estimated remaining time and the next values; coming : indices of the next runs."""
         own, remaining = len(self.rows) - self.cache.reused, len(self.runs) - len(self.rows)
         spent = time.perf_counter() - self.began
         text = f"{duration_text(spent / own * remaining)} left, " if own and remaining else ""
@@ -258,7 +267,7 @@ class SweepRun:
         )
 
     def files(self, values: Any) -> Iterator[str]:
-        """Hashes of all files that are named in values, searched recursively."""
+        """Hashes of the contents of all files that are named in values, searched recursively."""
         for value in (
             values.values() if isinstance(values, Mapping) else values if isinstance(values, (list, tuple)) else ()
         ):
@@ -283,7 +292,7 @@ def raw_of(source) -> dict[str, Any]:
 
 
 def folder_of(source) -> Path:
-    """Folder of the files of a case."""
+    """Folder to which the paths of files in a case are relative."""
     if isinstance(source, Case):
         return source.folder or Path.cwd()
     source = find_source(source)

@@ -20,9 +20,10 @@ NO_FIELDS = {"output.fields": 0, "output.lines": {}}  # output that no row needs
 
 @dataclass
 class RowMaker:
-    """Callable that runs a case with values of keys and returns the row; `base` are overrides of all runs.
+    """Callable that runs a case with values of keys and returns the row of results.
 
-    source : argument of `load`; case, model : those of the first run, from which later ones are derived
+    source : case as for `load`; base : overrides of all runs
+    case, model : case and model of the first run, from which the cases and models of later runs are derived
     """
 
     source: Any
@@ -31,7 +32,7 @@ class RowMaker:
     model: Any = field(default=None, compare=False)
 
     def __call__(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Row of a run; a refused case gives a row with its reason."""
+        """Row of the run with these values of keys; a refused case gives a row with its reason."""
         from fvsolve.output.memory_sink import MemorySink
         from fvsolve.run import model_of
         from fvsolve.solve import initial_state, solve
@@ -54,7 +55,10 @@ class RowMaker:
         return load(self.case, {**self.base_for(values), **values})
 
     def base_for(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Overrides of `base` in the same tables as `values`; they must be set again, as they may conflict."""
+        """Overrides of `base` in the same tables of the case as `values`.
+
+        They are set again together with `values`, because keys of a table may conflict.
+        """
         tables = {("exact",), *(split_key(key)[:2] for key in values)}
         return {key: value for key, value in self.base.items() if {split_key(key)[:1], split_key(key)[:2]} & tables}
 
@@ -71,7 +75,7 @@ class RowMaker:
 
 
 def row_of(model, summary, sink) -> dict[str, Any]:
-    """Row of a run, with values as in `summary.json`; None for values that are not finite."""
+    """Row of a run: column -> value as in `summary.json`, None for values that are not finite; sink : its output."""
     row = {"ok": bool(summary.ok), "reason": summary.reason, "t [s]": plain(float(summary.t))}
     row["marks"] = min(summary.marks, key=lambda mark: mark.time).text if summary.marks else ""
     row["warnings"] = [plain(column.plain()) for column in (*model.warnings, *summary.warnings)]

@@ -27,14 +27,17 @@ SMALL_DIFFERENCE = 0.1  # differences below this fraction of an error are not it
 
 
 def single_cell_pipes(case: Any) -> list[str]:
-    """Pipes whose number of cells (1) does not change at half the resolution."""
+    """Names of pipes with a single cell, whose number of cells is the same at half the resolution."""
     cells = cell_counts(case)
     half = scaled(cells, 0.5)
     return [name for name in pipes_with_cells(case) if half[f"links.{name}.cells"] == cells[f"links.{name}.cells"]]
 
 
 def short_pipes(case: Any) -> dict[str, tuple[str, int]]:
-    """Pipe -> (neighbour, cells that it needs), for pipes with a travel time below that of a cell of a neighbour."""
+    """Pipes that a wave crosses faster than a cell of a neighbouring pipe.
+
+    Returns pipe -> (neighbouring pipe, number of cells that the neighbour needs).
+    """
     pipes, short = pipes_with_cells(case), {}
     travel = {name: pipe.length / case.wave_speed(name) for name, pipe in pipes.items()}
     by_node: dict[str, list[str]] = {}
@@ -49,7 +52,7 @@ def short_pipes(case: Any) -> dict[str, tuple[str, int]]:
 
 
 def brief_pulses(case: Any) -> list[str]:
-    """Scheduled keys with a pulse shorter than the greatest travel time of a cell."""
+    """Keys of schedules with a pulse that is shorter than the longest time in which a wave crosses a cell."""
     pipes = pipes_with_cells(case)
     cell = max((pipe.length / pipe.cells / case.wave_speed(name) for name, pipe in pipes.items()), default=0.0)
     return [f"{group}.{name}.{key}" for group in ("nodes", "links") for name, part in getattr(case, group).items()
@@ -57,7 +60,7 @@ def brief_pulses(case: Any) -> list[str]:
 
 
 def pulse_width(value: Any) -> float:
-    """Shortest time in which a schedule changes in both directions [s]; inf if it does not."""
+    """Shortest time in which a scheduled value rises and falls, or falls and rises [s]; inf if it never does."""
     if not isinstance(value, Schedule) or value.wave or len(value.time) < 3:
         return np.inf
     changes = np.flatnonzero(np.diff(value.value))
@@ -68,8 +71,9 @@ def pulse_width(value: Any) -> float:
 class Unresolved:
     """Reasons of unknown peaks or wide errors of a case, each with a remedy.
 
-    unknown : part -> reason for which its peaks are unknown; shared : reasons of wide errors of all peaks
-    tolerance : accumulated error of steps of delay lines under error control, relative to the span of a signal
+    unknown : (group, name) of a part -> reason for which its peaks are unknown
+    shared : reasons of wide errors that concern all peaks
+    tolerance : accumulated error of the steps of delay lines under error control, relative to the range of a signal
     """
 
     def __init__(self, case: Any, runs: dict[float, Any]) -> None:
@@ -83,9 +87,10 @@ class Unresolved:
 
     def reason(self, part: tuple[str, str], triple: Sequence[float | None], error: float | None, span: float,
                unit: str) -> str | None:  # fmt: skip
-        """Reason for which the error of a peak is unknown or wide (above `WIDE_ERROR` times the span); otherwise None.
+        """Reason for which the error of a peak is unknown, or wide (above `WIDE_ERROR` times `span`); otherwise None.
 
-        triple : peak at half, one and twice the resolution, in its unit
+        part : (group, name) of the part; triple : peak at half, one and twice the resolution; span : range of the
+        signal; unit : unit of all values
         """
         if error is None:
             return self.unknown.get(part) or stopped_runs_text(self.case, self.runs)
@@ -95,7 +100,10 @@ class Unresolved:
 
 
 def unknown_parts(case: Any) -> dict[Part, str]:
-    """Part -> reason for which its peaks are unknown: all parts under a short pulse, else short pipes with nodes."""
+    """(group, name) of a part -> reason for which its peaks are unknown.
+
+    With a short pulse in a schedule these are all parts, otherwise pipes that are too short, and their end nodes.
+    """
     reasons: dict[Part, str] = {}
     if pulses := brief_pulses(case):
         text = (
@@ -115,7 +123,7 @@ def unknown_parts(case: Any) -> dict[Part, str]:
 
 
 def stopped_runs_text(case: Any, runs: dict[float, Any]) -> str:
-    """Reason for which runs at other resolutions have no value of a peak."""
+    """Reason for which the runs at other resolutions give no value of a peak."""
     ended = [f"{times:g} times the resolution: {run.reason}" for times, run in runs.items() if run.reason != "finished"]
     if len(runs) == 1:
         ended = [
@@ -125,7 +133,7 @@ def stopped_runs_text(case: Any, runs: dict[float, Any]) -> str:
 
 
 def difference_text(triple: Sequence[float | None], error: float, unit: str, case: Any) -> str:
-    """Text on the differences of a peak between three resolutions, for a wide error."""
+    """Reason of a wide error from the values of a peak at three resolutions, with a remedy."""
     remedy = "more cells" if cell_counts(case) else "shorter steps"
     peaks = [peak for peak in triple if peak is not None]
     steps = np.diff(peaks)
@@ -157,7 +165,7 @@ def coarse_pipes_at_devices(case: Any) -> list[str]:
 
 
 def differing_events(runs: dict[float, Any]) -> list[str]:
-    """Text on devices whose numbers of events differ between resolutions, if there are any."""
+    """List with a text on the devices whose numbers of events differ between resolutions; empty if there are none."""
     finished = [runs[times] for times in sorted(runs) if runs[times].reason == "finished"]
     counts = [Counter(event["name"] for event in run.summary["events"]) for run in finished]
     names = sorted(set().union(*counts)) if len(finished) > 1 else []

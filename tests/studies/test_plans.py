@@ -145,9 +145,9 @@ def test_a_file_that_is_not_there_is_named(case, tmp_path):
 @pytest.mark.parametrize(
     "given, said",
     [
-        ({"points": []}, "points have different keys"),
-        ({"points": [{"links.valve.area": 1.0}, {"nodes.lake.head": 1.0}]}, "points have different keys"),
-        ({"points": [{"links.valve.area": 1.0}], "vary": {"links.valve.area": [1.0, 2.0]}}, "Expected no vary"),
+        ({"points": []}, "`points` is empty or has different keys"),
+        ({"points": [{"links.valve.area": 1.0}, {"nodes.lake.head": 1.0}]}, "`points` is empty or has different keys"),
+        ({"points": [{"links.valve.area": 1.0}], "vary": {"links.valve.area": [1.0, 2.0]}}, "Expected no `vary`"),
         ({"sample": "sobol:8"}, "no key varies"),
         ({"vary": {"links.valve.area": [1.0, 2.0], "nodes.lake.head": []}}, "nodes.lake.head: no values"),
     ],
