@@ -184,7 +184,7 @@ def planned_values(
             points_from_file(Path(points), source, raw) if PATH.accepts(points) else [dict(point) for point in points]
         )
         if not runs or not runs[0] or any(point.keys() != runs[0].keys() for point in runs):
-            raise FvsolveError("`points` is empty or has different keys. Expected the same keys in every run, at least one")
+            raise FvsolveError("`points` is empty or has different keys. Expected one or more keys, equal in every run")
         return runs
     if sample is not None:
         if not vary:

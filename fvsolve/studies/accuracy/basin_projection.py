@@ -1,6 +1,6 @@
-"""Fields of basins at the end of a run, averaged over the cells of coarser meshes.
+"""Quantities in the cells of basins at the end of a run, averaged over the cells of coarser meshes.
 
-A variable has the name "BASIN at the end: QUANTITY". Its values are deviations, as states are.
+A variable has the name "BASIN at the end: QUANTITY". Its values are deviations from the initial steady state.
 """
 
 from __future__ import annotations
@@ -12,19 +12,22 @@ SPLINE_DEGREE = 5  # degree of the spline through cumulative contents, for edges
 
 
 def basin_fields(basin, y: np.ndarray) -> dict[str, np.ndarray]:
-    """Fields of a basin by quantity, from the states `y` of a model; scalars as amounts in each cell."""
+    """Values in the cells of a basin, quantity -> float64[cells], from the state vector `y` of a model.
+
+    Quantities are deviations from the initial steady state; scalars are amounts in each cell.
+    """
     fields = dict(zip(basin.quantities, basin.deviations(y), strict=True))
     scalars = getattr(basin, "scalars", ())
     return fields | (dict(zip(scalars, basin.amounts(y), strict=True)) if scalars else {})
 
 
 def variable_name(basin, quantity: str) -> str:
-    """Name of the variable of a basin's quantity."""
+    """Name of the variable for a quantity of a basin at the end of a run."""
     return f"{basin.name} at the end: {quantity}"
 
 
 def unit_of(case, variable: str) -> str | None:
-    """Unit of a variable; None if it does not belong to a basin."""
+    """SI unit of a variable by its name, "-" for a scalar; None if the variable does not belong to a basin."""
     name, _, quantity = variable.partition(" at the end: ")
     node = case.nodes.get(name)
     if not quantity or node is None or node.kind != "basin":
@@ -33,7 +36,10 @@ def unit_of(case, variable: str) -> str | None:
 
 
 def project_to(fine, values, coarse) -> np.ndarray:
-    """Cell averages float64[quantities, n] of a fine basin over the cells of a coarse basin with the same outline."""
+    """Average values in the cells of a fine basin over the cells of a coarse basin with the same outline.
+
+    values : float64[quantities, fine cells]; returns float64[quantities, coarse cells]
+    """
     if fine.n == coarse.n and np.array_equal(fine.mesh.centre, coarse.mesh.centre):
         return np.asarray(values)
     fine_grid, coarse_grid = fine.mesh.grid, coarse.mesh.grid
@@ -53,7 +59,10 @@ def project_to(fine, values, coarse) -> np.ndarray:
 def coarse_contents(
     fine_contents: np.ndarray, fine: np.ndarray, coarse: np.ndarray, degree: int, axis: int
 ) -> np.ndarray:
-    """Contents of cells between the edges `coarse`, from cells between the edges `fine`, along an axis."""
+    """Integrals over the cells between the edges `coarse`, from integrals over the cells between the edges `fine`.
+
+    axis : axis of `fine_contents` along which the cells lie; degree : degree of the spline for edges that do not match
+    """
     first = np.zeros_like(np.take(fine_contents, [0], axis=axis))
     cumulative = np.concatenate([first, np.cumsum(fine_contents, axis=axis)], axis=axis)
     edges = np.clip(np.searchsorted(fine, coarse - EDGE_TOLERANCE * (fine[-1] - fine[0])), 0, fine.size - 1)

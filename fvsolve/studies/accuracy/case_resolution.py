@@ -38,7 +38,7 @@ def basins(case) -> dict[str, Basin]:
 
 
 def cell_counts(case) -> Counts:
-    """Numbers of cells that refine a case: of pipes that are not delay lines, and of rectangular basins."""
+    """Numbers of cells that a study can refine: of pipes that are not delay lines, and of rectangular basins."""
     numbers: Counts = {f"links.{name}.cells": (pipe.cells,) for name, pipe in pipes_with_cells(case).items()}
     return numbers | {f"nodes.{name}.cells": basin.cells for name, basin in basins(case).items() if basin.cells}
 
@@ -49,23 +49,26 @@ def basins_from_files(case) -> list[str]:
 
 
 def cell_keys_of(cells_by_key: Counts) -> dict[str, Any]:
-    """Numbers of cells as keys of a case."""
+    """Overrides of a case that set these numbers of cells: dotted key -> number, or list of two numbers."""
     return {key: list(numbers) if len(numbers) > 1 else numbers[0] for key, numbers in cells_by_key.items()}
 
 
 def scaled(cells_by_key: Counts, factor: float) -> Counts:
-    """Numbers of cells multiplied by a factor along every side; at least 1."""
+    """Numbers of cells multiplied by `factor` along every pipe and every side of a basin; at least 1."""
     return {key: tuple(max(1, round(n * factor)) for n in numbers) for key, numbers in cells_by_key.items()}
 
 
 def total_cells(case, cells_by_key: Counts) -> int:
-    """Number of cells of all pipes and basins."""
+    """Total number of cells of a case with these numbers of cells, with basins whose mesh is a file."""
     fixed = sum(case.meshes[name].area.size for name in basins_from_files(case))
     return fixed + sum(part_cells(case, key, numbers) for key, numbers in cells_by_key.items())
 
 
 def part_cells(case, key: str, numbers: tuple[int, ...]) -> int:
-    """Number of cells of one part; holes of a rectangle have no cells."""
+    """Number of cells of the part with this key; holes of a rectangular basin have no cells.
+
+    numbers : cells of the pipe, or along both sides of the basin
+    """
     table = key.split(".")[0]
     if table == "links":
         return numbers[0]
@@ -75,12 +78,12 @@ def part_cells(case, key: str, numbers: tuple[int, ...]) -> int:
 
 
 def most_cells(cells_by_key: Counts) -> int:
-    """Greatest number of cells along one side."""
+    """Greatest number of cells along a pipe or along a side of a basin."""
     return max(max(numbers) for numbers in cells_by_key.values())
 
 
 def cell_size(case, key: str, numbers: tuple[int, ...]) -> float:
-    """Cell size of a part [m]; for a rectangle the greater of the mean cell sizes along its sides."""
+    """Cell size of the part with this key [m]; for a basin the greater of the mean cell sizes along its sides."""
     table, name, _ = key.split(".")
     lengths = (case.links[name].length,) if table == "links" else case.nodes[name].size
     return max(length / n for length, n in zip(lengths, numbers, strict=True))
@@ -100,7 +103,8 @@ def is_valid(case, cells_by_key: Counts) -> bool:
 def greatest_wave_rate(case, cells_by_key: Mapping[str, tuple[int, ...]]) -> float:
     """Number of cells that the fastest wave crosses per second [1/s].
 
-    Basins count with their own rate, at the start. Delay lines count with cells per travel time of the slowest line.
+    The rate of basins is that at the start. Delay lines have a rate too: the number of cells of the slowest line over
+    the travel time of a wave along it.
     """
     rates = [case.wave_speed(name) * cells_by_key[f"links.{name}.cells"][0] / pipe.length
              for name, pipe in pipes_with_cells(case).items()]  # fmt: skip
@@ -126,14 +130,18 @@ def scheme_order(case) -> int:
 def order_varies(case) -> bool:
     """True if `scheme_order` is an upper bound only.
 
-    Free surfaces in the plane fall to second order, along one axis they do not.
+    A scheme above second order has second order for free surfaces of waves in two directions, but its full order for
+    waves along one axis.
     """
     fifth = scheme_order(case) > BASIN_ORDER
     return fifth and any(basin.physics_type.has_shocks for basin in basins(case).values())
 
 
 def has_initial_jump(case, coarse: Mapping, fine: Mapping) -> bool:
-    """True if a basin starts with a jump: neighbours differ by as much on finer cells."""
+    """True if a basin starts with a jump: the greatest difference between neighbouring cells stays on finer cells.
+
+    coarse, fine : overrides that set the numbers of cells
+    """
     if not any(basin.start or getattr(basin, "scalars", {}) for basin in basins(case).values()):
         return False
     steps = [initial_steps(study_model(case, cells)) for cells in (coarse, fine)]
@@ -141,7 +149,7 @@ def has_initial_jump(case, coarse: Mapping, fine: Mapping) -> bool:
 
 
 def initial_steps(model) -> list[float]:
-    """Greatest difference between neighbours at the start, for every quantity of every basin."""
+    """Greatest difference between neighbouring cells at the start, for every quantity of every basin [SI]."""
     greatest = []
     for basin in model.basins:
         inner = basin.mesh.inner

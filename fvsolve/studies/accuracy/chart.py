@@ -55,9 +55,10 @@ WRONG_ERROR = 1.0  # errors above the range of the component are wrong results
 
 @dataclass(frozen=True)
 class TargetSetting:
-    """Setting whose run reaches a target error, with its point and its keys.
+    """Setting whose run reaches a target error.
 
-    numerics : keys of [numerics] without that prefix; others : all other keys, dotted
+    target : target error over the trajectory [-]; point : the setting and the results of its run
+    numerics : keys under [numerics], without that prefix -> value; others : all other keys, dotted -> value
     """
 
     target: float
@@ -76,11 +77,14 @@ class TargetSetting:
 
 @dataclass(frozen=True, repr=False)
 class Chart(Displayable):
-    """Errors of a case against their cost.
+    """Errors of a case against their cost, for several schemes, methods and resolutions.
 
-    reference, second : the two references in words; floor : their difference, below which errors mean nothing
-    default : name of the curve of the program's defaults; told : references that failed
-    left_out : usual schemes that do not support the fluid; aim : setting for a target error
+    points : settings with the results of their runs; front : cheapest setting for each target error
+    reference, second : descriptions of the two references; floor : the difference between the two, see `Distance`;
+    smaller errors are not reliable
+    default : name of the curve of the default scheme and method; compile_seconds : time of compilation [s]
+    reused : number of points from earlier studies; told : reasons of failed references
+    left_out : usual schemes that do not support the fluid; aim : setting for a target error, None without a target
     """
 
     case: str
@@ -107,16 +111,16 @@ class Chart(Displayable):
 
     @property
     def rows(self) -> list[dict]:
-        """All points as dicts, with the fields of their settings."""
+        """All points as dicts of their results and of the fields of their settings."""
         return [vars(point.setting) | vars(point) for point in self.points]
 
     def curves(self) -> dict[str, list[Point]]:
-        """Points by name of scheme and method, from coarse to fine."""
+        """Name of scheme and method -> points of the curve, from coarse to fine."""
         return curves_by_name(self.points)
 
     @property
     def stands(self) -> Point | None:
-        """Point of the program's defaults, 100 cells or a tolerance of 1e-6; None if it was not run."""
+        """Point of the default setting: 100 cells or a tolerance of 1e-6, with default scheme and method; else None."""
         curve = self.curves().get(self.default, [])
         return next(
             (point for point in curve if DEFAULT_CELLS == point.setting.cells or point.setting.size == DEFAULT_RTOL),
@@ -129,7 +133,7 @@ class Chart(Displayable):
         return [point for point in self.points if not point.ok]
 
     def plain(self) -> dict:
-        """Return the chart as plain data, SI, with the lines of `aim` as text."""
+        """Return the chart as plain data, SI; `paste` is the setting for a target error as TOML for the case."""
         stands = None if self.stands is None else asdict(self.stands)
         return (
             asdict(self)
@@ -165,11 +169,13 @@ def chart(
     jobs: int = 1,
     dask: str | None = None,
 ) -> Chart:
-    """Run a case over schemes x methods x cells (or tolerances) and compare errors with their cost.
+    """Run a case with all combinations of schemes, methods and cells (or tolerances); compare errors with their cost.
+
+    schemes, methods : names (default a selection)
 
     cells : numbers of cells of the pipe with the longest travel time of a wave, or along the longer side of a basin
     rtol, step : tolerances [-] and steps [s] of a case without cells; if all its pipes are delay lines, steps only
-    target : error over the trajectory; the cheapest setting that reaches it is found and run
+    target : error over the trajectory, relative to the range; the cheapest setting that reaches it is found and run
     out : folder in which finished points are stored and found again; progress : progress(done, total, next)
     jobs, dask : processes that make the runs, as in `sweep`; each takes longer if they share cache and memory
     Raises CaseError, FvsolveError.
@@ -181,12 +187,15 @@ def chart(
 
 
 def toml_value(value) -> str:
-    """Text or number in TOML."""
+    """Value of a text or number as it is written in TOML."""
     return f'"{value}"' if isinstance(value, str) else repr(value)
 
 
 class _ChartStudy:
-    """Runs, reference and results of one chart."""
+    """Work-precision study of a case: makes the runs, the reference and the chart.
+
+    points : cache of earlier points; queue : makes the runs
+    """
 
     def __init__(self, case: Case, points: ResultCache, progress: Progress, queue: RunQueue) -> None:
         self.case, self.queue = case, queue
@@ -201,7 +210,7 @@ class _ChartStudy:
         self.given_up: dict[tuple, str] = {}  # curve -> resolution of the run that was given up
 
     def run(self, schemes, methods, cells, rtol, step, target) -> Chart:
-        """Run all settings, and settings for the target if there is one."""
+        """Run all settings, and further settings for the target error if there is one; arguments as for `chart`."""
         schemes, methods = name_list(schemes), name_list(methods)
         check_names(schemes, methods)
         if main_part_name(self.case_in_cells):
@@ -242,7 +251,10 @@ class _ChartStudy:
         return reference
 
     def finest_keys(self) -> dict | None:
-        """Keys of the finest cells under study, for the references; delay lines get cells of that travel time."""
+        """Overrides with the finest cells under study, for the references; None if the case has no cells.
+
+        Delay lines get cells that a wave crosses in the same time as these cells.
+        """
         if not delay_lines(self.case):
             return None if self.finest is None else cell_keys(self.case, self.finest)
         main, cells = (
@@ -253,11 +265,11 @@ class _ChartStudy:
         return keys | cells_for_lines(self.case, self.case.links[main].length / self.case.wave_speed(main) / cells)
 
     def coarse_data(self) -> dict:
-        """Coarse run as plain data, so that a repeated study finds the same cells in the cache."""
+        """Results of a coarse run as plain data; from the cache, a repeated study then has the same cells."""
         return asdict(run_coarse(self.case if main_part_name(self.case) else self.case_in_cells))
 
     def floor(self) -> dict:
-        """References in words, and how far they disagree."""
+        """Descriptions of both references, and the difference between them, as plain data with keys of `Distance`."""
 
         def make() -> dict:
             reference = self.reference
@@ -303,7 +315,10 @@ class _ChartStudy:
         return Point(setting, **values)
 
     def add_coarser(self, points: list[Point], target: float) -> list[Point]:
-        """All points, with coarser points before each curve until its coarsest point exceeds the target."""
+        """Extend each curve by coarser points until the error of its coarsest point exceeds the target.
+
+        Returns all points, old and new.
+        """
         all_points = []
         for curve in curves_by_name(points).values():
             extended = list(curve)
@@ -317,7 +332,7 @@ class _ChartStudy:
         return all_points
 
     def compile(self, setting: MethodSetting) -> float:
-        """Wall time of the first run of a curve less that of the second [s]; 0 for a refused setting."""
+        """Wall time of a first run with a setting less that of a second [s], mostly compilation; 0 if it is refused."""
         try:
             return compile_seconds(study_model(self.case, setting.keys))
         except CaseError:
@@ -373,7 +388,7 @@ def cost_grows(setting: MethodSetting) -> bool:
 
 
 def _target_setting(target: float, point: Point, case: Case) -> TargetSetting:
-    """Setting of a point, with a method from a file as the path of that file."""
+    """Setting of a point, with the path of the file for a method that is read from a file."""
     keys = point.setting.keys
     if "numerics.method" in keys:
         keys = keys | {"numerics.method": _method_in_file(keys["numerics.method"], case)}
@@ -384,7 +399,10 @@ def _target_setting(target: float, point: Point, case: Case) -> TargetSetting:
 
 
 def _method_in_file(method: str, case: Case) -> str:
-    """Method as in a case file: for a tableau in a file its path, relative to the case if it is below its folder."""
+    """Value of the key `method` for a case file: a name, or the path of the file that contains the tableau.
+
+    The path is relative to the folder of the case if the file lies below this folder.
+    """
     path = Path(METHODS[method].source) if method in METHODS and method not in BUILT_IN else None
     if path is None or not path.is_file():
         return method

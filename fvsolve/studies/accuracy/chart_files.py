@@ -48,7 +48,7 @@ def write_chart_csv(chart: Chart, path: Path) -> None:
 
 
 def chart_picture(chart: Chart, title: str = ""):
-    """matplotlib Figure of a chart: errors over the trajectory and at the end, by CPU time and by work."""
+    """matplotlib Figure of a chart: errors over the trajectory and at the end, against CPU time and cell updates."""
     from fvsolve.draw.work_precision_picture import Curve, chart_figure
 
     curves = []

@@ -1,4 +1,4 @@
-"""Settings that a chart runs: schemes, methods and resolutions."""
+"""Settings of a work-precision study: schemes, methods and resolutions that are run."""
 
 from __future__ import annotations
 
@@ -41,13 +41,14 @@ CELL_TIME = 1e-8  # usual time of one call of the rates for one cell [s]
 
 @dataclass(frozen=True)
 class CoarseRun:
-    """Coarse run of a case with cells: its cells, the steps for Courant number 0.9, and the steps that it took.
+    """Facts from a coarse run of a case with cells, which set the numbers of cells of the study.
 
-    works : cells times steps of runs with MAX_CELLS, half as many, a quarter ..., while pipes have at least one cell
+    cells : number of cells; waves : number of steps at Courant number 0.9; steps : number of steps that the run took
+    works : work (cells times steps) of runs with MAX_CELLS cells, half as many, a quarter ...
     compile_seconds : time of a first run less that of a second run [s]
-    dearness : time of the rates for one cell, in units of CELL_TIME
-    sizes : possible numbers of cells of a basin and their works, halved and doubled so that patches and holes end on
-    grid lines; None if the main part is a pipe
+    dearness : time to evaluate the rates of one cell, as a multiple of CELL_TIME
+    sizes : (number of cells, work) of a basin, for numbers with which patches and holes end on grid lines; None if the
+    main part is a pipe
     """
 
     cells: int
@@ -65,7 +66,7 @@ class CoarseRun:
 
     @property
     def levels(self) -> list[int]:
-        """Five numbers of cells, each twice the number before; the finest run takes about a minute."""
+        """Numbers of cells of the study, at most five, each twice the previous; the finest run takes about a minute."""
         if self.sizes is not None:
             return [n for n, work in self.sizes if self.dearness * work <= MAX_WORK][-LEVEL_COUNT:] or [
                 self.sizes[0][0]
@@ -80,7 +81,7 @@ class CoarseRun:
 
 
 def run_coarse(case: Case) -> CoarseRun:
-    """Run a case with cells on few cells, by the program's defaults."""
+    """Run a case with few cells and the default scheme and method."""
     cells = basin_cells(case) or MAX_CELLS // 16
     model = study_model(case, cells_setting(case, default_scheme(case), DEFAULT_METHOD, cells).keys)
     span = case.numerics.end - case.numerics.start
@@ -99,7 +100,10 @@ def run_coarse(case: Case) -> CoarseRun:
 
 
 def basin_sizes(case: Case) -> list[tuple[int, float]]:
-    """Possible numbers of cells of the main basin, its own halved and doubled, and their works."""
+    """(number of cells along its longer side, work) of the main basin, for all possible numbers.
+
+    The numbers are that of the case, halved and doubled; work is cells times steps.
+    """
     main_cells, sizes = basin_cells(case), []
     for n in (main_cells * 2**k // 2**LEVEL_COUNT for k in range(2 * LEVEL_COUNT)):
         try:
@@ -110,7 +114,7 @@ def basin_sizes(case: Case) -> list[tuple[int, float]]:
 
 
 def run_work(case: Case, cells: int) -> float:
-    """Cells times steps of a run with this number of cells in the main part."""
+    """Cells times steps of a run at Courant number 1, with this number of cells in the main part."""
     changed = load(case, cell_keys(case, cells))
     cells_by_key = cell_counts(changed)
     return (
@@ -121,12 +125,12 @@ def run_work(case: Case, cells: int) -> float:
 
 
 def default_scheme(case: Case) -> str:
-    """The program's default scheme, or the last scheme of the fluid if the default does not support the fluid."""
+    """Name of the default scheme, or of the last scheme that the case supports if the default is not supported."""
     return DEFAULT_SCHEME if DEFAULT_SCHEME in case.schemes else case.schemes[-1]
 
 
 def default_curve(case: Case) -> str:
-    """Name of the curve of the program's defaults."""
+    """Name of the curve of the default scheme and method."""
     if main_part_name(case):
         return f"{default_scheme(case)} {DEFAULT_METHOD}"
     return DEFAULT_METHOD if delay_lines(case) else DEFAULT_METHOD_RTOL
@@ -140,9 +144,9 @@ def unsupported_schemes(case: Case, schemes: Sequence[str] | None) -> list[str]:
 def chart_settings(
     case: Case, coarse_run: CoarseRun | None, schemes, methods, cells, rtol, step
 ) -> list[MethodSetting]:
-    """All settings, curve by curve from coarse to fine; the default's curve is always included.
+    """Settings of all curves, each curve from coarse to fine; the curve of the defaults is always included.
 
-    coarse_run : coarse run of a case with cells, None for other cases
+    coarse_run : facts from a coarse run of a case with cells, None for other cases; other arguments as for `chart`
     Raises FvsolveError for options that the case does not support.
     """
     if not main_part_name(case) and delay_lines(case):
@@ -151,7 +155,7 @@ def chart_settings(
         return _lumped_settings(case, schemes, methods, cells, rtol, step)
     if rtol or step:
         raise FvsolveError(
-            f"{case.name} has cells, so its resolution is their number: use --cells, not --rtol or --step"
+            f"{case.name} has cells, so its resolution is the number of cells. Use --cells instead of --rtol and --step"
         )
     pairs, levels = (
         scheme_method_pairs(case, schemes, methods, coarse_run.stiff),
@@ -164,7 +168,7 @@ def _lumped_settings(case: Case, schemes, methods, cells, rtol, step) -> list[Me
     if schemes or cells:
         option = "scheme" if schemes else "cells"
         raise FvsolveError(
-            f"{case.name} has no pipe, so there is no {option} to choose. Its resolution is rtol or step"
+            f"{case.name} has no pipe, so the option {option} does not apply. Use rtol or step for its resolution"
         )
     span = case.numerics.end - case.numerics.start
     steps = sorted(step or [span / n for n in STEP_COUNTS], reverse=True)
@@ -178,12 +182,12 @@ def _lumped_settings(case: Case, schemes, methods, cells, rtol, step) -> list[Me
 def _delay_line_settings(case: Case, schemes, methods, cells, rtol, step) -> list[MethodSetting]:
     """Settings of a case with delay lines alone, whose resolution is the step.
 
-    A tolerance is no resolution here: the error of a step does not include the interpolation between steps.
+    A tolerance is not used: the error estimate of a step does not include the interpolation between steps.
     """
     if schemes or cells or rtol:
         option = "scheme" if schemes else "cells" if cells else "rtol"
         raise FvsolveError(
-            f"{case.name} has only delay lines, so there is no {option} to choose. Their resolution is step"
+            f"{case.name} has only delay lines, so the option {option} does not apply. Use step for their resolution"
         )
     travel = max(pipe.length / case.wave_speed(name) for name, pipe in pipes(case).items())
     steps = sorted(step or [float(f"{travel / n:.2g}") for n in TRAVEL_PARTS], reverse=True)
@@ -211,7 +215,7 @@ def scheme_method_pairs(
 
 
 def check_names(schemes: Sequence[str] | None, methods: Sequence[str] | None) -> None:
-    """Raises FvsolveError for an unknown name, with the nearest known names."""
+    """Raise FvsolveError for an unknown scheme or method, with the nearest known names."""
     for kind, given, names in (("scheme", schemes, tuple(SCHEMES)), ("method", methods, (AUTO, *METHODS))):
         for name in given or ():
             if name not in names:

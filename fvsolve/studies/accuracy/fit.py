@@ -1,8 +1,10 @@
 """Order of convergence fitted to errors, or the reason why there is none.
 
-The fit is the least-squares slope of log error over log size in a window of successive rows. The window ends at the
-last row above the floor. It begins where the orders between rows come near the slope. Rows before the window are
-pre-asymptotic, rows after it are at the floor. If other rows remain, there is no order, and no number is given.
+A row is a size (of cells, steps or a tolerance) with the error of the run. The floor is an error that finer rows do not
+reduce, such as rounding or the error of the reference. The fit is the least-squares slope of log error over log size in
+a window of successive rows. The window ends at the last row above the floor. It begins where the orders between rows
+come near the slope. Rows before the window are pre-asymptotic, rows after it are at the floor. If other rows remain,
+there is no order, and no number is given.
 """
 
 from __future__ import annotations
@@ -30,13 +32,13 @@ PRE_ASYMPTOTIC, FLOOR, OFF_LINE, FAILED = "pre-asymptotic", "floor", "off the li
 
 @dataclass(frozen=True)
 class Fit:
-    """An order with its spread, or the reason why there is none.
+    """Fitted order of convergence with its spread, or the reason why there is none.
 
-    pairwise : order between each row and the next, NaN where there is none
-    order, spread : slope in the window, and greatest distance of its pairwise orders from it, with the expected further
-    drift; NaN if there is a reason
-    marks : per row "", "pre-asymptotic", "floor", "off the line" or "failed"; rows without a mark are fitted
-    constant : of error = constant size^order; reason : "" if there is an order; note : remark on the order
+    pairwise : order between each row and the next, NaN if an error is zero or unknown
+    order : slope of log error over log size in the window; NaN without an order
+    spread : greatest distance between `order` and the pairwise orders in the window, with their expected further drift
+    marks : for each row "", "pre-asymptotic", "floor", "off the line" or "failed"; rows with "" are fitted
+    constant : factor C of error = C size^order; reason : "" if there is an order; note : remark on the order
     """
 
     pairwise: tuple[float, ...]
@@ -60,9 +62,10 @@ ERRORS = Kind(lambda value: is_array(value, "fiu", 1, 1, finite=False), "a row o
 
 @validated(sizes=SERIES, errors=ERRORS, floor=NUMBER)
 def fit(sizes, errors, floor: float = 0.0) -> Fit:
-    """Fit the order p of errors ~ C sizes^p, sizes falling; errors below ten times `floor` are not used.
+    """Fit the order p of convergence, errors ~ C sizes^p with a constant C.
 
-    sizes : float64[n]  of cells or steps; errors : float64[n]  not negative, NaN if a run failed
+    sizes : float64[n]  sizes of cells or steps, falling; errors : float64[n]  not negative, NaN if a run failed
+    floor : error that is not reduced by refinement; errors below ten times the floor are not used
     Raises FvsolveError for sizes that do not fall, for negative errors, and for a negative floor.
     """
     h, e = np.asarray(sizes, dtype=float), np.asarray(errors, dtype=float)
@@ -84,7 +87,7 @@ def fit(sizes, errors, floor: float = 0.0) -> Fit:
 
 
 class FitRows:
-    """Rows of a fit: sizes h, errors e, and their marks."""
+    """Rows of a fit: sizes h, errors e, and marks as in `Fit`; `good` are the indices of rows without a mark."""
 
     def __init__(self, h: np.ndarray, e: np.ndarray, floor: float) -> None:
         self.h, self.e, self.floor = h, e, floor
@@ -99,17 +102,17 @@ class FitRows:
     # fits ---------------------------------------------------------------------------------------------------
 
     def fit_all(self, strict: bool = True) -> Fit | None:
-        """Fit a window of all good rows; None if there is no window.
+        """Fit a window of the rows without a mark; None if there is no window.
 
-        If not strict, the last order of the window may deviate from the others; the spread then includes it.
+        strict : False if the last order between rows of the window may deviate from the orders before it
         """
         limits = find_window(self.h[self.good], self.e[self.good], strict)
         return None if limits is None else self.fit_window(self.good, *limits)
 
     def fit_without_outlier(self) -> Fit | None:
-        """Fit a window without one row that lies far below the line of the other rows; None if there is none.
+        """Fit a window without one row that lies far below the line of the other rows; None if no row does.
 
-        Such a row occurs where an error changes sign.
+        A row lies so low where an error changes sign.
         """
         best = None
         for i in range(1, len(self.good) - 1):
@@ -124,7 +127,10 @@ class FitRows:
         return best
 
     def fit_window(self, rows: np.ndarray, first: int, stop: int, note: str = "", outlier: int | None = None) -> Fit:
-        """Fit the rows first to stop - 1 of `rows`; outlier : row that lies off the line."""
+        """Fit the window from first to stop - 1 of the row indices `rows`.
+
+        note : remark on a row that leaves the line behind the window; outlier : index of a row that lies off the line
+        """
         marks = list(self.marks)
         for k, i in enumerate(rows):
             marks[i] = (
@@ -142,7 +148,7 @@ class FitRows:
         return Fit(self.pairwise, slope, spread, tuple(marks), math.exp(intercept), "", note)
 
     def no_fit(self, reason: str) -> Fit:
-        """Result without an order."""
+        """Fit without an order, with the reason."""
         return Fit(self.pairwise, math.nan, math.nan, tuple(self.marks), math.nan, reason)
 
     # reasons ---------------------------------------------------------------------------------------------------
@@ -170,7 +176,7 @@ class FitRows:
         return f"no order: the last orders between rows differ ({last_orders}). Try more levels, or fewer"
 
     def drift_reason(self) -> str:
-        """Reason if the spread reaches the order, so that the orders may drift on to zero or to twice their value."""
+        """Reason for no order if the spread is as large as the order, so that orders may drift to zero or double."""
         last_orders = ", ".join(f"{x:.2f}" for x in pair_orders(self.h[self.good], self.e[self.good])[-3:])
         rows = self.good.size
         return f"no order: orders between rows still drift ({last_orders}) after {rows} rows. Try {rows + 2} rows"
@@ -187,7 +193,7 @@ def pair_orders(h: np.ndarray, e: np.ndarray) -> np.ndarray:
 
 
 def remaining_drift(p: np.ndarray) -> float:
-    """Expected further drift of orders, as a multiple of their last change.
+    """Expected further drift of the orders p between rows, as a multiple of their last change.
 
     With ratio r < 1 of the last two changes it is the geometric series r / (1 - r), within the limits of DRIFT_STEPS.
     """
@@ -208,15 +214,17 @@ def line_of(h: np.ndarray, e: np.ndarray) -> tuple[float, float]:
 
 
 def order_tolerance(order: float) -> float:
-    """Greatest distance of the orders between rows from the slope of their line."""
+    """Greatest allowed distance of orders between rows from the slope `order` of their line."""
     return 0.12 + 0.04 * order
 
 
 def find_window(h: np.ndarray, e: np.ndarray, strict: bool = True) -> tuple[int, int, str] | None:
-    """(first, stop, note) of the last window of rows that shows one order; None if there is none.
+    """Find the last window of rows that shows one order: (first, stop, note), or None.
 
-    Errors after the window must be flat, or a single row after at least four rows may leave their line. Errors before
-    it must not rise by a factor of ALLOWED_RISE.
+    The window has the rows first to stop - 1 of the sizes h and errors e; note : remark on a row behind it.
+    strict : as in `FitRows.fit_all`
+    Errors behind the window must be flat, or a single row behind at least four rows may leave their line. Errors before
+    the window must not rise by a factor of ALLOWED_RISE.
     """
     p = pair_orders(h, e)
     for stop in range(len(h), LEAST_ROWS - 1, -1):
@@ -233,14 +241,14 @@ def find_window(h: np.ndarray, e: np.ndarray, strict: bool = True) -> tuple[int,
 
 
 def is_line(h, e, first: int, stop: int) -> bool:
-    """True if rows lie on a falling line."""
+    """True if log error over log size of the rows first to stop - 1 lies on a line, with errors that fall."""
     slope, _ = line_of(h[first:stop], e[first:stop])
     spread = np.max(np.abs(pair_orders(h[first:stop], e[first:stop]) - slope))
     return slope >= LEAST_ORDER and spread <= order_tolerance(slope)
 
 
 def last_deviates(p: np.ndarray) -> bool:
-    """True if the last order deviates from the orders before it: the changes of converging orders decrease."""
+    """True if the last of the orders p between rows deviates: its change is larger than the change before it."""
     if len(p) < LEAST_ROWS:
         return False
     before, last = np.abs(np.diff(p[-3:]))
@@ -248,7 +256,7 @@ def last_deviates(p: np.ndarray) -> bool:
 
 
 def may_be_floor(h, e, first: int, stop: int) -> bool:
-    """True if a short or rough window follows rows that fall much faster: it may be their floor."""
+    """True if rows first to stop - 1 may be a floor: they are few or rough, and errors before them fall much faster."""
     slope, _ = line_of(h[first:stop], e[first:stop])
     before = np.max(pair_orders(h[: first + 1], e[: first + 1]), initial=0.0)
     return bool(before > STEEP_RATIO * slope + 0.3) and not (
@@ -257,14 +265,14 @@ def may_be_floor(h, e, first: int, stop: int) -> bool:
 
 
 def is_clear_line(h, e, first: int, stop: int) -> bool:
-    """True if rows lie so close to a line that an excess of later rows above the line is visible."""
+    """True if the rows first to stop - 1 lie so close to a line that later rows above the line can be recognised."""
     slope, _ = line_of(h[first:stop], e[first:stop])
     spread = np.max(np.abs(pair_orders(h[first:stop], e[first:stop]) - slope))
     return bool(spread < CLEAR_SPREAD * (1.0 + slope))
 
 
 def extend_window(h, e, p, first: int, stop: int) -> tuple[int, int]:
-    """Window extended by earlier rows on its line, and without a last row that begins to leave the line."""
+    """(first, stop) of a window, extended by earlier rows on its line, without a last row that begins to leave it."""
     while (
         first > 0
         and is_line(h, e, first - 1, stop)
@@ -281,7 +289,7 @@ def extend_window(h, e, p, first: int, stop: int) -> tuple[int, int]:
 
 
 def classify_tail(h, e, first: int, stop: int) -> str | None:
-    """Kind of the rows after a window: "" for none or a floor, a note if a row leaves the line, else None."""
+    """Kind of the rows behind a window: "" for no rows or a floor, a note if one row leaves the line, else None."""
     rest = e[stop:]
     if rest.size == 0:
         return ""

@@ -21,10 +21,10 @@ from fvsolve.studies.run_queue import RunQueue
 
 
 class ManufacturedStudy(OrderStudy):
-    """Rows of a study with a start, a source or an exact solution as functions along the pipes.
+    """Order study with an initial state, a source or an exact solution as functions along the pipes.
 
-    Without a source the runs differ from usual runs by their initial state only; with a source they are integrated by
-    `steppers.ode.integrate`.
+    Functions are as in `order`. Without a source, runs differ from usual runs by their initial state only; with a
+    source they are integrated by `steppers.ode.integrate`.
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class ManufacturedStudy(OrderStudy):
         )
 
     def reference_of_function(self) -> Reference:
-        """Reference by the exact function; nodes have its pressures at the ends of their pipes."""
+        """Reference from the exact function; the pressure of a node is that at the end of its pipe."""
         laws = {}
         for name, pipe in pipes(self.case).items():
             for node, x in ((pipe.from_, 0.0), (pipe.to, pipe.length)):
@@ -69,7 +69,7 @@ class ManufacturedStudy(OrderStudy):
         return reference_of_solution(solution, "function", "exact solution given as a function")
 
     def run(self, level) -> Outcome:
-        """Run of a row."""
+        """Run of a level of refinement."""
         return self.outcome(self.case, recording_keys(self.case, level.set))
 
     def outcome(self, case, keys) -> Outcome:
@@ -79,7 +79,10 @@ class ManufacturedStudy(OrderStudy):
         return outcome(model, y=y) if self.source is None else RunWithSource(model, self.source).run(y)
 
     def initial_state(self, model) -> np.ndarray:
-        """Initial state: deviations of both waves of the given start, averaged over cells [kg/s]; else zero."""
+        """Initial state vector: waves in both directions of the given start, averaged over cells [kg/s].
+
+        They are deviations from the initial steady state; zero without a given start.
+        """
         y = np.zeros(model.y_size)
         for k, pipe in enumerate(model.pipes if self.initial else []):
             row, n = model.tables.pipes[k], pipe.cells
@@ -92,7 +95,10 @@ class ManufacturedStudy(OrderStudy):
 
 
 class UserFunction:
-    """Function of the user along pipes; raises a FvsolveError if it fails or returns unusable values."""
+    """Function of the user along pipes, function(pipe, x, t) or without t; returns two arrays.
+
+    Raises FvsolveError if the function fails or returns unusable values.
+    """
 
     def __init__(self, name: str, function: Callable) -> None:
         self.name, self.function = name, function
@@ -116,7 +122,7 @@ class UserFunction:
         return first, second
 
     def fault_for(self, pipe: str, problem: str) -> FvsolveError:
-        """Return the error, and store it: compiled steps that call the function cannot pass it on."""
+        """Return the error of a pipe, and store it, because compiled steps that call the function cannot pass it on."""
         self.fault = FvsolveError(
             f'{self.name}(pipe, x{", t" if self.name != "initial" else ""}) on "{pipe}" {problem}'
         )
@@ -124,13 +130,13 @@ class UserFunction:
 
 
 class RunWithSource:
-    """One run with a source, in segments between the kinks and jumps of the case."""
+    """Run of a model with a source along the pipes, integrated between the kinks and jumps of its schedules."""
 
     def __init__(self, model, source: UserFunction) -> None:
         self.model, self.run_data, self.source, self.limit = model, RunData(model), source, np.inf
 
     def rates(self, t: float, y: np.ndarray, dydt: np.ndarray) -> None:
-        """Rates of the model plus the source."""
+        """Write the rates of the model plus the source at the state (t, y) to `dydt`."""
         dydt[:] = self.run_data.evaluate(t, y, self.limit)[0]
         for row, pipe in zip(self.model.tables.pipes, self.model.pipes, strict=True):
             mass, momentum = averages(lambda x, name=pipe.name: self.source(name, x, t), pipe.edges)
@@ -139,7 +145,7 @@ class RunWithSource:
             dydt[o + n : o + 2 * n] += 0.5 * (row["speed"] * mass - momentum)
 
     def run(self, y: np.ndarray) -> Outcome:
-        """Run from the start of the case to its end; the outcome of a failed run gives the reason."""
+        """Run from the initial state y to the end of the case; the outcome of a failed run gives the reason."""
         from fvsolve.steppers.ode import integrate
 
         model, numerics, every = self.model, self.model.case.numerics, self.model.case.output.every
@@ -169,11 +175,11 @@ class RunWithSource:
         )  # fmt: skip
 
     def row(self, t: float, y: np.ndarray) -> np.ndarray:
-        """Row of the history: time and probes."""
+        """Row of output at the state (t, y): time [s], then the values of the probes [SI]."""
         out = self.run_data.evaluate(t, y, self.limit)[1]
         return np.concatenate([[t], self.run_data.observe(t, y, out)])
 
     def step(self) -> float:
-        """Fixed step of the case, or the step for its Courant number [s]."""
+        """Time step [s]: that of the case, or the step for its Courant number."""
         numerics = self.model.case.numerics
         return numerics.step or numerics.courant / float(self.model.wave_rates.max())

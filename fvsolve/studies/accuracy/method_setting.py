@@ -1,4 +1,4 @@
-"""One setting of a chart: scheme, method and resolution, as keys of a case."""
+"""Setting of a work-precision study: scheme, method and resolution, as keys of a case."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ IMPLICIT_RTOL = 1e-4  # rtol of implicit methods with cells: their steps follow 
 
 @dataclass(frozen=True)
 class MethodSetting:
-    """Scheme (None without cells), method, kind and size of step control, and cells of the main part.
+    """Scheme, method and resolution of a run.
 
-    keys : dotted keys of the case -> values
+    scheme : None without cells; control : "courant", "rtol" or "step"; size : its value [-] or [s]
+    cells : number of cells of the main part, None without cells; keys : dotted keys of the case -> values
     """
 
     scheme: str | None
@@ -29,7 +30,7 @@ class MethodSetting:
 
     @property
     def curve(self) -> tuple:
-        """Identity of the curve that this setting belongs to."""
+        """Scheme, method and step control, which all settings of a curve have in common."""
         return self.scheme, self.method, "courant" if self.control == "courant" else self.control
 
     @property
@@ -44,7 +45,7 @@ class MethodSetting:
 
 
 def main_part_name(case: Case) -> str | None:
-    """Name of the part whose number of cells is the resolution; None without cells, since delay lines have none.
+    """Name of the main part, whose number of cells is the resolution; None if the case has no cells.
 
     It is the basin with most cells along a side, else the pipe with the longest travel time of a wave.
     """
@@ -56,15 +57,16 @@ def main_part_name(case: Case) -> str | None:
 
 
 def basin_cells(case: Case) -> int | None:
-    """Cells along the longer side of the main basin; None if the main part is a pipe."""
+    """Number of cells along the side of the main basin with most cells; None if the main part is a pipe."""
     basin = basins(case).get(main_part_name(case) or "")
     return None if basin is None else max(basin.cells)
 
 
 def cell_keys(case: Case, cells: int) -> dict:
-    """Keys that give the main part this number of cells, and scale all other parts in proportion.
+    """Overrides that give the main part this number of cells, and scale the cells of all other parts in proportion.
 
-    Pipes that state `cells` keep that key; the others share one `cell_time`. With basins all parts state `cells`.
+    They set `cells` of the pipes that state it in the case; for other pipes they set `numerics.cell_time`. With basins
+    they set `cells` of all parts.
     """
     main_part, main_cells = main_part_name(case), basin_cells(case)
     if main_cells is not None:
@@ -85,7 +87,7 @@ def cell_keys(case: Case, cells: int) -> dict:
 def cells_setting(case: Case, scheme: str, method: str, cells: int) -> MethodSetting:
     """Setting of a case with cells: Courant number 0.9, or 1 for upwind with Euler.
 
-    Adaptive implicit methods use a tolerance instead.
+    Methods with error control have a tolerance instead. cells : number of cells of the main part
     """
     by_error = uses_error_control(method)
     control = "rtol" if by_error else "courant"
@@ -95,8 +97,9 @@ def cells_setting(case: Case, scheme: str, method: str, cells: int) -> MethodSet
 
 
 def lumped_setting(method: str, size: float, control: str | None = None) -> MethodSetting:
-    """Setting of a case of ordinary differential equations or delay lines.
+    """Setting of a case without cells, which consists of ordinary differential equations or delay lines.
 
+    size : tolerance [-] or step [s]
     control : "rtol" or "step"; if None a tolerance, or a step for methods without an error estimate
     """
     control = control or ("rtol" if is_adaptive(method) else "step")

@@ -1,4 +1,4 @@
-"""Hierarchy of models of a case, from rigid columns to cells, under every density law: errors and computing times."""
+"""Errors and computing times of simple and rich models of a case, from rigid columns to cells, by density law."""
 
 from __future__ import annotations
 
@@ -33,12 +33,13 @@ SCHEDULE_SAMPLES = 4001  # sample times of each schedule, to find its steepest s
 
 @dataclass(frozen=True)
 class ModelLevel:
-    """Model of a case: its name and law, number of states, errors against the richest level, and cost.
+    """Level of the model hierarchy: a model of the case with its errors against the richest level, and its cost.
 
-    errors : probe -> root mean square over time of the difference to the richest level, over the range there [-]
-    error : greatest of these errors, None if the level is skipped; `reason` then explains it
+    name : name of the level, such as "rigid column"; law : density law; states : number of states
+    errors : probe -> root mean square over time of the difference to the richest level, over the range of the probe [-]
+    error : greatest of these errors; None if the level was skipped or failed, with the `reason`
     greatest : greatest difference of any probe at any time, over its range [-]
-    seconds : time of the steps, the best of three runs [s]; rhs : calls of the rates
+    seconds : time of the steps, the best of three runs [s]; rhs : number of evaluations of the rates
     """
 
     name: str
@@ -59,11 +60,12 @@ class ModelLevel:
 
 @dataclass(frozen=True)
 class LawDifference:
-    """Difference of the linear law from the richest law, of the probe with the greatest difference, over its range [-].
+    """Difference between the results of the linear density law and of the richest law.
 
-    error : root mean square over time; start : at the start of the run; moves : range over the greatest value [-]
-    level : greatest pressure at the start over the stiffness [-]
-    swift : greatest velocity head of a pipe at the start, rho v^2 / 2 [Pa], which the linear law neglects
+    probe : probe with the greatest difference; error : root mean square of its difference over time, over its range [-]
+    start : difference at the start of the run, over the range [-]; moves : range over the greatest value [-]
+    level : greatest pressure at the start, over the stiffness rho a^2 of the softest pipe [-]
+    swift : greatest velocity head rho v^2 / 2 of a pipe at the start [Pa], which the linear law neglects
     """
 
     probe: str
@@ -76,15 +78,16 @@ class LawDifference:
 
 @dataclass(frozen=True)
 class Hierarchy:
-    """All levels, simplest first, with the cheapest sufficient level and rules for the choice.
+    """Levels of the model hierarchy of a case, with rules of thumb for the choice of a model.
 
-    richest : reference of all other levels, refined until its own error is within the target
-    deep : notes on shallow-water theory for tanks on bodies; case : gives the units of all texts
-    own : approximate error of the richest level from its cells [-]; None without cells or without a finer run
-    cheapest : fastest level with an error within the target; travel_time : greatest of a wave along a pipe [s]
+    rungs : all levels, simplest first; cheapest : fastest level with an error within `target`
+    richest : reference of all other levels, refined until the error from its cells is within `target`
+    travel_time : greatest travel time of a wave along a pipe [s]
     change_time : range of the fastest schedule over its steepest slope [s]
     strain : greatest change of pressure from the start, over the stiffness of the softest pipe or of the fluid [-]
-    apart : difference of the linear law from the richest law on the same structure, None if it was not run
+    law_difference : difference of the linear law from the richest law for equal cells, None if linear was not run
+    own_error : approximate error of the richest level from its cells [-]; None without cells or without a finer run
+    shallow_water : notes on shallow-water theory for tanks on bodies; case : the case, for units of texts
     """
 
     rungs: list[ModelLevel]
@@ -101,7 +104,7 @@ class Hierarchy:
 
     @property
     def own_error_note(self) -> str:
-        """Note on the richest level's own error; empty if the case has no cells."""
+        """Note on the error of the richest level from its cells; empty if the case has no cells."""
         if self.richest.name == "as it is":
             return ""
         if self.own_error is None:
@@ -130,7 +133,7 @@ class Hierarchy:
         return [*rules, self.own_error_note] if self.own_error_note else rules
 
     def _law_rule(self, apart: LawDifference) -> str:
-        """Rule of thumb for the density law: its difference against dp/K."""
+        """Rule of thumb for the density law: its difference against dp/K (change of pressure over stiffness)."""
         side = "within" if apart.error <= self.target else "above"
         text = f"linear differs from {self.richest.law} by {apart.error:.3g} of the range of {apart.probe}"
         text += f", {side} the target"
@@ -161,7 +164,7 @@ class Hierarchy:
 
 @validated(set=TABLE, target=NUMBER, progress=FUNCTION)
 def with_whole_pipes(case):
-    """Return the case; if parts placed along pipes divide these, with the pieces as its pipes."""
+    """Return the case; pipes that are divided by parts placed along them are replaced by their pieces."""
     from fvsolve.case import load
 
     return load(case.table()) if placed(add_bends(case.raw)) else case
@@ -173,13 +176,15 @@ def ladder(
     target: float = DEFAULT_TARGET,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> Hierarchy:
-    """Run a case as rigid columns, lumped volumes, delay lines, few cells and many cells, under every possible law.
+    """Run a case as rigid columns, lumped volumes, delay lines, few and many cells, with every possible density law.
 
     A case with water in tanks on bodies is run with frozen water, modes and cells, the same for all tanks.
+    set : key -> value; target : error relative to the range of a probe that is acceptable
+    progress : called as progress(done, total, next)
 
-    A level that does not suit the case is skipped, with a reason. The richest level has at least the case's own cells
-    and the richest law that runs. Errors are those of the probes that a level has. Raises FvsolveError if the case
-    itself does not run, or if all its probes are constant.
+    A level that does not suit the case is skipped, with a reason. The richest level has at least the cells of the case,
+    and the richest density law that runs. Errors are those of the probes that a level has. Raises FvsolveError if the
+    case itself does not run, or if all its probes are constant.
     """
     from fvsolve.case import load
 
@@ -228,11 +233,13 @@ def ladder(
 def refine_richest(
     case, law: str, own_run: Outcome, target: float, report: Callable[[str], None]
 ) -> tuple[list, float | None]:
-    """(levels with 2, 4, ... times the cells as (name, run), own error of the last level, or of `own_run` without any).
+    """Run levels with 2, 4, ... times the cells until the error of the last level is within `target`.
 
+    Returns ([(name, run) of each finer level], error of the last of these levels, or of `own_run` if there is none).
     The error of a level is d / (1 - r), with its difference d to the next level and the ratio r of successive
-    differences (1/2 for the first). A level that only served to find this error is left out. Refinement ends if the
-    error is within the target, or if no finer level can be run: then the last error is r times the error before it.
+    differences (1/2 for the first). A level that only served to find this error is left out. If no finer level can be
+    run, the error is r times the error of the level before, None without any finer level.
+    own_run : run with the cells of the case; law : density law; report : called with the name of each level
     """
     runs, differences, ratio = [("full line", own_run)], [], 0.5
     for name in finer_levels(case, MAX_DOUBLINGS):
@@ -254,7 +261,7 @@ def refine_richest(
 
 
 def possible_laws(case) -> list[str]:
-    """Density laws that the fluid of a case can have; only its own law if the case contains no fluid."""
+    """Names of the density laws that are possible for a case; only the law of the case if it contains no fluid."""
     from fvsolve.case import load
 
     if not case.places:
@@ -272,7 +279,7 @@ def possible_laws(case) -> list[str]:
 
 
 def _run_level(case, name: str, law: str) -> Outcome:
-    """Run of a level under a law; a level that the case cannot have gives an outcome with the reason."""
+    """Run of a level with a density law; a level that does not suit the case gives an outcome with the reason."""
     try:
         return outcome(
             case, {**level_keys(case, name), "fluid.law": law}, best_of=BEST_OF, run=long_capped_level, budget=BRIEF_RUN
@@ -292,7 +299,7 @@ def long_capped_level(model, state, sink, progress) -> CappedRun:
 
 
 def _level_of(name: str, law: str, run: Outcome, richest: Outcome) -> ModelLevel:
-    """Level of a run, with its errors against the richest run."""
+    """Level from its run, with errors against the run of the richest level."""
     if not run.ok:
         return ModelLevel(name, law, run.reason)
     gaps = moving_probes(run, reference_of_run(richest))
@@ -308,7 +315,10 @@ def _rms_error(gap: Deviation) -> float:
 
 
 def law_difference(linear: Outcome, richest: Outcome) -> LawDifference | None:
-    """Difference of the linear law from the richest law, same structure; None for the same run or a failed run."""
+    """Difference between a run with the linear density law and a run with the richest law.
+
+    None if both are the same run, or if the linear run failed.
+    """
     if linear is richest or not linear.ok:
         return None
     gaps = moving_probes(linear, reference_of_run(richest))
@@ -321,12 +331,15 @@ def law_difference(linear: Outcome, richest: Outcome) -> LawDifference | None:
 
 
 def velocity_head(model) -> float:
-    """Greatest velocity head of a pipe at the start, rho v^2 / 2 [Pa]; 0 without pipes."""
+    """Greatest velocity head rho v^2 / 2 of a pipe at the start [Pa], with density rho and velocity v; 0 without pipes."""
     return 0.5 * model.case.properties.density * float(velocities(model).max(initial=0.0)) ** 2
 
 
 def shallow_water_notes(case, target: float) -> Iterator[str]:
-    """Notes for tanks on bodies: excess of the frequency of the slowest mode in shallow-water theory, if known."""
+    """Notes for tanks on bodies: error of the frequency of the slowest sloshing mode in shallow-water theory, if known.
+
+    target : acceptable error [-]
+    """
     share = 100.0 * target
     for name, basin in sloshing_basins(case).items():
         mesh = {**case.meshes, **case.lumped}[name]
@@ -347,7 +360,7 @@ def travel_time(model) -> float:
 
 
 def change_time(model) -> float:
-    """Time of the fastest change of an input [s]: range of a schedule over its steepest slope, or run-down of a pump.
+    """Time of the fastest change [s]: range of a schedule over its steepest slope, or run-down time of a pump.
 
     0 if a schedule jumps, infinite if nothing changes.
     """
@@ -368,7 +381,7 @@ def change_time(model) -> float:
 
 
 def schedule_values(model, index: int, times) -> np.ndarray:
-    """Values of a schedule at the given times."""
+    """Values [SI] of the schedule with this index at the given times [s]."""
     return np.array([value_with_limit(model.tables.schedules, model.tables.pieces, index, t, np.inf) for t in times])
 
 
@@ -384,12 +397,12 @@ def run_down_time(model, name: str, t: float) -> float:
 
 
 def greatest_strain(run: Outcome) -> float:
-    """Greatest change of a pressure or head probe from the start, over the stiffness [-]."""
+    """Greatest change of a pressure or head probe from the start, over the stiffness of the softest pipe [-]."""
     return max((float(np.max(np.abs(p - p[0]))) for p in probe_pressures(run)), default=0.0) / least_stiffness(run)
 
 
 def probe_pressures(run: Outcome) -> list[np.ndarray]:
-    """Histories of the probes of pressure and head, a head as rho g h [Pa]."""
+    """Pressures over time of the probes of pressure and head [Pa], float64[rows] each; a head h as rho g h."""
     weight = run.model.case.properties.density * run.model.case.gravity
     histories = []
     for k, probe in enumerate(run.model.case.probes, 1):

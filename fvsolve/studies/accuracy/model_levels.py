@@ -1,7 +1,7 @@
-"""Levels of the model hierarchy as keys of a case.
+"""Overrides of a case that turn it into a simpler or richer model (a level of the model hierarchy).
 
-Levels are rigid columns, lumped volumes, delay lines and few or many cells; for water in tanks on bodies frozen water,
-modes and cells.
+Levels of pipes are rigid columns, lumped volumes, delay lines, and few or many cells. Levels of tanks on moving bodies
+are frozen water (a rigid mass), sloshing modes and cells.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ LUMPED_NUMERICS = {"numerics.method": "auto", "numerics.rtol": 1e-7}
 
 
 class NotApplicable(Exception):
-    """Raised with the reason if a case has no model of a level."""
+    """Raised, with the reason, if a case cannot be turned into a level."""
 
 
 def level_names(case) -> list[str]:
@@ -41,7 +41,7 @@ def level_names(case) -> list[str]:
 
 
 def sloshing_basins(case) -> dict[str, Any]:
-    """Basins with a free surface that are mounted on bodies."""
+    """Basins with a free surface that are mounted on bodies: name -> node."""
     return {
         name: node
         for name, node in case.nodes.items()
@@ -61,7 +61,7 @@ def finer_levels(case, doublings: int) -> list[str]:
 
 
 def level_keys(case, level: str) -> dict[str, Any]:
-    """Keys that turn a case into a level. Raises NotApplicable if that is impossible."""
+    """Overrides that turn a case into the level with this name. Raises NotApplicable if this is impossible."""
     if level in ("full line", "as it is"):
         return {}
     if sloshing_basins(case):
@@ -89,7 +89,7 @@ def level_keys(case, level: str) -> dict[str, Any]:
 
 
 def sloshing_keys(case, level: str) -> dict[str, Any]:
-    """Keys of a level for all tanks on bodies: frozen water, modes, or cells (the case's own, or a multiple)."""
+    """Overrides for all tanks on bodies: frozen water, modes, or cells (as many as in the case, or a multiple)."""
     basins, keys = sloshing_basins(case), {"expect": {}, "compare": {}, "routes": {}, "limits": {}}
     if level in ("frozen", "modes"):
         quantities = {"frozen": (), "modes": ("depth",)}[level]
@@ -109,7 +109,7 @@ def sloshing_keys(case, level: str) -> dict[str, Any]:
 
 
 def delay_line_keys_of(case, pipes: dict[str, Any]) -> dict[str, Any]:
-    """Keys that make all pipes delay lines."""
+    """Overrides that make all pipes delay lines. Raises NotApplicable if a pipe cannot be a delay line."""
     for name, pipe in pipes.items():
         if reason := reason_for_cells(case, name, pipe):
             raise NotApplicable(f"{name} cannot be a delay line: {reason}")
@@ -121,7 +121,7 @@ def _survives(probe, pipes: dict) -> bool:
 
 
 def rigid_column(case, name: str) -> dict[str, Any]:
-    """Table of a pipe as a rigid column."""
+    """Table of the case (key -> value) that describes a pipe as a rigid column."""
     names = ("from", "to", "length", "diameter", "friction", "minor_loss", "initial_flow")
     raw = {"diameter": case.links[name].diameter, **raw_link(case.raw, name)}
     table = {"type": "rigid-column", **{key: raw[key] for key in names if key in raw}}
@@ -132,7 +132,11 @@ def rigid_column(case, name: str) -> dict[str, Any]:
 
 
 def orifice_of(case, model, name: str) -> dict[str, Any]:
-    """Table of a pipe as an orifice with the pipe's friction loss at the initial flow, dp = zeta rho v^2 / 2."""
+    """Table of the case (key -> value) for an orifice with the friction loss of a pipe at its initial flow.
+
+    The loss is dp = zeta rho v^2 / 2, with loss coefficient zeta, density rho and velocity v. Raises NotApplicable if
+    zeta is not known or not positive.
+    """
     row = model.tables.pipes[[pipe.name for pipe in model.pipes].index(name)]
     law = [row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds")]
     flow, scale = float(row["flow"]), 2.0 * model.case.properties.density * row["area"] * case.links[name].length
@@ -147,9 +151,10 @@ def orifice_of(case, model, name: str) -> dict[str, Any]:
 
 
 def junction_chambers(case, pipes: dict) -> dict[str, Any]:
-    """Junctions at the ends of pipes as chambers that hold half of each pipe.
+    """Overrides that turn junctions into chambers, each with half the volume of every adjacent pipe.
 
-    The volume contains the stiffness of fluid and wall: V beta / K, K = rho a^2.
+    Volumes are multiplied by beta / (rho a^2), so that a chamber of stiffness beta is as elastic as fluid and pipe wall
+    (bulk modulus beta, density rho, wave speed a). Raises NotApplicable if a node cannot be a chamber.
     """
     volume_of: dict[str, float] = {}
     fluid = case.properties
