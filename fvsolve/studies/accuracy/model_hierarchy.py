@@ -331,7 +331,7 @@ def law_difference(linear: Outcome, richest: Outcome) -> LawDifference | None:
 
 
 def velocity_head(model) -> float:
-    """Greatest velocity head rho v^2 / 2 of a pipe at the start [Pa], with density rho and velocity v; 0 without pipes."""
+    """Greatest velocity head rho v^2 / 2 of a pipe at the start [Pa] (density rho, velocity v); 0 without pipes."""
     return 0.5 * model.case.properties.density * float(velocities(model).max(initial=0.0)) ** 2
 
 

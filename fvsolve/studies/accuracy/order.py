@@ -41,12 +41,13 @@ def order(
     exact: Callable | None = None, out: str | Path | ResultCache | None = None, progress: Progress | None = None,
     jobs: int = 1, dask: str | None = None,
 ) -> Order | list[Order]:  # fmt: skip
-    """Errors of a case over a refinement, and the order at which they fall; a list for several schemes or methods.
+    """Run a case over a refinement; returns errors and the order at which they fall.
 
+    With several schemes or methods, the result is a list with an `Order` for each pair of scheme and method.
     case, set : as in `run`; refine, key, levels, cells : as in `studies.accuracy.refine.refinement_plan`
-    schemes, methods : name or list of names that replace those of the case
-    against : "auto" (exact if the case names an exact solution, else finer; richardson with basins), "exact", "finer"
-    (two levels finer, by another scheme and method) or "richardson" (each row against the next)
+    schemes, methods : name or list of names that replace the scheme and method of the case
+    against : reference, "auto" (exact if the case names an exact solution, else finer; richardson with basins),
+    "exact", "finer" (two levels finer, by another scheme and method) or "richardson" (each row against the next)
     initial : initial(pipe, x) -> pressure [Pa], flow [m3/s] at the start, x float64[k] [m]
     source : source(pipe, x, t) -> mass [kg/s/m] and momentum [kg/s2] fed per length; both are averaged over cells
     exact : exact(pipe, x, t) -> pressure [Pa], flow [m3/s]; the reference, and the start if `initial` is left out
@@ -75,9 +76,10 @@ def order(
 
 
 def _order_of_pair(case, settings: Mapping, rows: tuple, against, given, points, progress, queue: RunQueue) -> Order:
-    """Order study of one scheme and method.
+    """Order study of one scheme and method; most arguments as for `order`.
 
-    rows : refine, key, levels and cells; given : initial, source and exact solution, None if absent
+    settings : overrides of the case; rows : (refine, key, levels, cells); given : (initial, source, exact), None if
+    absent; points : cache of earlier rows; queue : makes the runs
     """
     from fvsolve.case import load
 

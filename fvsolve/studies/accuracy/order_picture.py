@@ -29,20 +29,20 @@ def order_picture(study):
 
 
 def study_title(study) -> str:
-    """Scheme, method and kind of refinement."""
+    """Title of an order study: scheme, method and description of the refinement."""
     scheme = f"{study.scheme}, " if study.rows[0].level.cells else ""
     return f"{scheme}{study.method}, {study.plan.words}"
 
 
 def variable_unit(variable: str, known: Mapping[str, str] = {}) -> str:  # noqa: B006
-    """SI unit of a variable, from `known` of a study or from its part; a scalar of the case has its own label."""
+    """SI unit of a variable: from `known` (variable -> unit) if it is there, else by the dimension of the quantity."""
     from fvsolve.units import DIMENSIONS
 
     return known[variable] if variable in known else DIMENSIONS[variable_dimension(variable)].si
 
 
 def variable_dimension(variable: str) -> str:
-    """Dimension of a variable of pipes, nodes or links; "number" for any other variable."""
+    """Dimension of a variable of pipes, nodes or links, such as "pressure"; "number" for other variables."""
     from fvsolve.parts import KINDS
 
     quantity = variable.split("@")[0].rsplit(".", 1)[-1].rsplit(" ", 1)[-1]
@@ -53,7 +53,7 @@ def variable_dimension(variable: str) -> str:
 
 
 def error_scale(case, variable: str) -> tuple[float, str]:
-    """Size of 1 SI unit and unit, for differences of a variable or for "length", in the units of `[output]`."""
+    """(factor from SI, unit) for errors of a variable, or for "length", in the units of `[output]`."""
     from fvsolve.output.unit_columns import column
 
     result = column("", variable if variable == "length" else variable_dimension(variable), case)

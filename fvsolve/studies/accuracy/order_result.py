@@ -12,7 +12,11 @@ from fvsolve.studies.accuracy.refine import Level, Plan
 
 @dataclass(frozen=True)
 class OrderRow:
-    """Level, errors by variable and norm, and cost of one row; `reason` explains a failed run."""
+    """Row of an order study: a level of refinement with its errors and cost.
+
+    errors : variable -> {"L1" | "L2" | "max": error [SI]}; seconds : time of the run [s]
+    rhs : number of evaluations of the rates; reason : reason of a failed run, else empty
+    """
 
     level: Level
     errors: dict[str, dict[str, float]]
@@ -33,11 +37,11 @@ class OrderRow:
 class Order(Displayable):
     """Order study of one scheme and method.
 
-    fits : variable -> {"L1" | "L2" | "max": Fit}; own : variable -> norm -> error of the reference itself
-    units : units of variables that are not probes; shown : variable, or "length" -> (size of 1 SI, unit) of printed
-    errors, SI if absent
-    kind : kind of the reference, "exact" | "finer" | "richardson" | "function"; words : the reference in words
-    notes : remarks on the numbers
+    rows : levels of refinement with errors, from coarse to fine; fits : variable -> {"L1" | "L2" | "max": Fit}
+    kind : kind of the reference, "exact" | "finer" | "richardson" | "function"; words : description of the reference
+    own_error : variable -> {"L1" | "L2" | "max": error of the reference itself [SI]}; notes : remarks on the numbers
+    units : SI units of the variables of basins
+    shown : variable, or "length" -> (factor from SI, unit) of printed errors and sizes, SI if absent
     """
 
     case: str
@@ -59,7 +63,7 @@ class Order(Displayable):
         return f"of {self.case!r}: {self.scheme}, {self.method}, {len(self.rows)} rows against {self.kind}"
 
     def table_columns(self) -> dict[str, list]:
-        """Columns over all rows: cells, size, step [s], errors by variable and norm, and cost; SI."""
+        """Columns of the table, header -> value of each row: cells, size, step [s], errors in SI, and cost."""
         columns: dict[str, list] = {"cells": [row.level.cells for row in self.rows]}
         columns |= {"size": [row.level.size for row in self.rows], "step": [row.level.step for row in self.rows]}
         for name, norms in self.fits.items():
@@ -69,7 +73,7 @@ class Order(Displayable):
         return columns | {"rhs": [row.rhs for row in self.rows], "seconds": [row.seconds for row in self.rows]}
 
     def error_unit(self, variable: str) -> tuple[float, str]:
-        """(size of 1 SI unit, unit) of the printed errors of a variable."""
+        """(factor from SI, unit) of the printed errors of a variable."""
         from fvsolve.studies.accuracy.order_picture import variable_unit
 
         return self.shown.get(variable) or (1.0, variable_unit(variable, self.units))

@@ -42,14 +42,15 @@ ORDER_TOLERANCE = 0.06, 0.04  # a, b: greatest distance a + b order of an order 
 
 
 def timed_run(case, keys: Mapping) -> Outcome:
-    """Run of a row, the faster of two if it is brief."""
+    """Run a case with changed keys, the faster of two runs if they are brief."""
     return outcome(case, keys, best_of=BEST_OF, run=long_capped_run, budget=BRIEF_RUN)
 
 
 class OrderStudy:
-    """Rows of one study and their reference.
+    """Order study of one scheme and method: runs the rows of a refinement, compares them with a reference, fits orders.
 
-    queue : `RunQueue` that makes the runs; settings : overrides of the case of the queue that give this case
+    plan : refinement; against : kind of the reference as in `order`
+    queue : `RunQueue` that makes the runs; settings : overrides that turn the case of the queue into `case`
     """
 
     def __init__(self, case, plan: Plan, against: str, queue: RunQueue, settings: Mapping) -> None:
@@ -63,7 +64,7 @@ class OrderStudy:
 
     @cached_property
     def breaks(self) -> list[tuple[float, bool]]:
-        """Kinks and jumps that travel through cells, at the start too: (time [s], True for a jump)."""
+        """Kinks and jumps that travel through cells: (time [s], True for a jump), also those of the initial state."""
         breaks = list(study_model(self.case).breaks)
         first, second = (level.set for level in self.plan.levels[:2])
         if self.plan.way != "time" and has_initial_jump(self.case, first, second):
@@ -108,12 +109,12 @@ class OrderStudy:
         return self.fitted_order(rows, reference_data["kind"], reference_data["words"], own, sizes)
 
     def cache_key(self, name) -> dict:
-        """Settings that identify a cached point of the case; name : "reference" or the number of a row."""
+        """Settings that identify a cached result of the case; name : "reference" or the number of a row."""
         return {"study": "order", "against": self.against, "way": self.plan.way, "what": name,
                 "levels": [level.set for level in self.plan.levels]}  # fmt: skip
 
     def reference_data(self, progress: Progress, total: int) -> dict:
-        """Description and own error of the reference, and sizes of all variables, as plain data."""
+        """Kind, description and error of the reference, and sizes of all variables, as plain data."""
         progress(0, total, "reference")
         reference = self.reference
         return {"kind": reference.kind, "words": reference.words, "own": reference.own_error, "sizes": self.sizes()}
@@ -125,9 +126,10 @@ class OrderStudy:
         return self.find_reference(way, self.against != "finer", queue=self.queue)
 
     def find_reference(self, way: str, exact: bool, **options) -> Reference:
-        """Reference for the finest row, of one kind of runs with another scheme and method.
+        """Find a reference for the finest row: one kind of runs, with another scheme and method.
 
-        way : "time" keeps the cells and the scheme; exact : True to use the case's exact solution if it applies
+        way : "time" keeps the cells and the scheme; exact : True to use the exact solution of the case if it applies
+        options : further arguments of `find_reference`
         """
         method, last = METHODS.get(self.case.numerics.method), self.plan.levels[-1]
         delayed = way != "time" and delay_lines(self.case)
@@ -138,15 +140,15 @@ class OrderStudy:
         )  # fmt: skip
 
     def request(self, level: Level) -> RunRequest:
-        """Request for the run of a row."""
+        """Request for the run of a level of refinement."""
         return RunRequest(timed_run, recording_keys(self.case, level.set), self.stages)
 
     def run(self, level: Level) -> Outcome:
-        """Run of a row."""
+        """Run of a level of refinement."""
         return self.queue(self.case, self.request(level))
 
     def sizes(self) -> dict[str, float]:
-        """Size of each variable in the first row that runs, as the scale of rounding errors."""
+        """Greatest absolute value of each variable in the first row that runs [SI], the scale of rounding errors."""
         for level in self.plan.levels:
             run = self.run(level)
             if run.ok:
@@ -154,13 +156,17 @@ class OrderStudy:
         raise FvsolveError(f"no row could be run: {run.reason}")
 
     def row(self, level: Level) -> OrderRow:
-        """Run and errors of a row."""
+        """Make the run of a level of refinement; returns its row with errors."""
         run = self.run(level)
         errors = error_norms(run, self.reference, self.probe_names) if run.ok else {}
         return row_of_run(level, run, errors)
 
     def fitted_order(self, rows, kind: str, words: str, own: dict, sizes: dict) -> Order:
-        """Order of all variables and norms, with notes; own : error of the reference, sizes : of the variables."""
+        """Fit an order for every variable and norm, and add notes.
+
+        kind, words : kind and description of the reference; own : variable -> norm -> error of the reference [SI]
+        sizes : variable -> greatest absolute value [SI]
+        """
         fits, doubtful, smooth_order = {}, [], self.smooth_order()
         for name in sizes:
             fits[name] = {}
@@ -201,7 +207,7 @@ class OrderStudy:
             )
 
     def smooth_order(self) -> float:
-        """Order of scheme and method together in smooth flow; NaN if rows are tolerances.
+        """Order of scheme and method together for smooth solutions; NaN if tolerances are refined.
 
         With delay lines it is the order of the interpolation in their history, for any method.
         """
@@ -216,10 +222,10 @@ class OrderStudy:
         return method if self.plan.way == "time" else min(space, method)
 
     def theory(self) -> dict[str, float]:
-        """Norm -> expected order, NaN if there is none.
+        """Expected order for each norm, NaN if it is not known.
 
-        Jumps (s = 0) and kinks (s = 1) reduce the order p to (s + 1) p / (p + 1) in L1, (s + 1/2) p / (p + 1) in L2
-        and s p / (p + 1) in max.
+        Jumps (s = 0) and kinks (s = 1) reduce the order p of smooth solutions to (s + 1) p / (p + 1) in L1,
+        (s + 1/2) p / (p + 1) in L2 and s p / (p + 1) in max.
         """
         p, breaks = self.smooth_order(), self.breaks
         if delay_lines(self.case):
@@ -232,7 +238,10 @@ class OrderStudy:
         return {"L1": (s + 1) * p / (p + 1), "L2": (s + 0.5) * p / (p + 1), "max": s * p / (p + 1)}
 
     def order_notes(self, exact: bool) -> list[str]:
-        """Notes on the order expected with jumps or kinks in cells, or delay lines; exact : no row has an error."""
+        """Notes on the expected order if jumps or kinks travel through cells, or if there are delay lines.
+
+        exact : True if all errors of delay lines are rounding errors
+        """
         breaks = self.breaks
         if delay_lines(self.case):
             return [EXACT_NOTE if exact else EXPECTED_ORDER]
@@ -249,7 +258,10 @@ class OrderStudy:
         ]
 
     def step_error_note(self, fits) -> list[str]:
-        """Note with a smaller step, tolerance or Courant number, if the time error may hide the order in space."""
+        """Note with a smaller step, tolerance or Courant number, if the time error may hide the order in space.
+
+        A list with one text, or empty; fits : variable -> norm -> fit
+        """
         with_errors = [norms["L1"] for norms in fits.values() if norms["L1"].reason != NO_ERROR]
         hidden = any(FLOOR in fitted.marks or fitted.reason for fitted in with_errors)
         if self.plan.way != "space" or not hidden or len(self.plan.levels) < LEAST_ROWS:
@@ -268,7 +280,7 @@ class OrderStudy:
     # Richardson ------------------------------------------------------------------------------------------------
 
     def richardson(self, progress: Progress) -> Order:
-        """Study without a reference: differences of each row to the next, extrapolated to errors."""
+        """Study without a reference: differences between each row and the next, extrapolated to errors."""
         runs, levels = [], self.plan.levels
         for count, at in enumerate(self.queue.run_ahead([self.request(level) for level in levels]), 1):
             progress(count, len(levels), level_text(self.plan, levels[at]))
@@ -299,7 +311,7 @@ class OrderStudy:
 
 
 def check_order(fitted: Fit, smooth_order: float) -> Fit:
-    """Return a fit, with a note if its order is far above that of scheme and method in smooth flow."""
+    """Return a fit, with a note if its order is far above `smooth_order`, that of scheme and method."""
     if fitted.reason or not fitted.order > smooth_order + EXCESS_ORDER:
         return fitted
     return replace(fitted, note=f"errors fall faster than the order {smooth_order:g} of scheme and method allows: the "
@@ -310,7 +322,7 @@ RICHARDSON = "Richardson: each row against the next, extrapolated"
 
 
 def check_three_differences(fitted: Fit, theory: float) -> Fit:
-    """Return a fit of differences; without an order if there are only three and they do not show the expected order."""
+    """Return a fit of differences; without an order if it has three rows only, and differs from the order `theory`."""
     tolerance = max(fitted.spread, ORDER_TOLERANCE[0] + ORDER_TOLERANCE[1] * theory)
     if fitted.reason or fitted.marks.count("") > LEAST_ROWS or not abs(fitted.order - theory) > tolerance:
         return fitted
@@ -328,14 +340,19 @@ def mark_finest(fitted: Fit, rows) -> Fit:
 
 
 def is_certain(fitted: Fit, ratio: float) -> bool:
-    """True if the order p is known well enough for a relative error of 1 / (1 - ratio^-p) of at most a quarter."""
+    """True if the fitted order p is certain enough to extrapolate errors.
+
+    The factor 1 / (1 - ratio^-p) of an extrapolation must have a relative error of at most a quarter; ratio : size of a
+    row over that of the next.
+    """
     return fitted.order > 0.0 and np.log(ratio) * fitted.spread <= EXTRAPOLATION_ERROR * (ratio**fitted.order - 1.0)
 
 
 def extrapolate(rows, fits) -> tuple[OrderRow, ...]:
-    """Rows with errors instead of differences d to the next row, if the order p is certain.
+    """Rows with errors instead of differences to the next row, where the fitted order p is certain.
 
-    The error of a row is d plus the error of the next row; for the last difference this is d / (ratio^p - 1).
+    The error of a row is its difference d plus the error of the next row. After the last difference, the error of the
+    next row is d / (ratio^p - 1), with the ratio of the sizes of both rows.
     """
     results: list[OrderRow] = []
     for k in range(len(rows) - 1, -1, -1):
@@ -351,7 +368,7 @@ def extrapolate(rows, fits) -> tuple[OrderRow, ...]:
 
 
 def difference_notes(rows, fits) -> list[str]:
-    """Note that names the variables and norms whose rows are differences instead of errors."""
+    """Note that names the variables and norms with differences instead of errors; a list with one text, or empty."""
     ratio = rows[0].level.size / rows[1].level.size
     names = [f"{name} ({', '.join(uncertain)})" for name, norms in fits.items()
              if (uncertain := [norm for norm, fitted in norms.items() if not is_certain(fitted, ratio)])]  # fmt: skip
@@ -363,7 +380,7 @@ def difference_notes(rows, fits) -> list[str]:
 
 
 def row_of_run(level: Level, run: Outcome, errors: dict) -> OrderRow:
-    """Row of the table from its run and errors."""
+    """Row of an order study from its run and errors."""
     counts = run.counts
     updates = run.cell_updates if run.model is not None else 0
     return OrderRow(level, errors, run.seconds, counts.get("rhs", 0), updates, counts.get("steps", 0),
@@ -371,26 +388,26 @@ def row_of_run(level: Level, run: Outcome, errors: dict) -> OrderRow:
 
 
 def row_of_data(level: Level, data: Mapping) -> OrderRow:
-    """Row from plain data."""
+    """Row of an order study from plain data of the cache."""
     seconds = np.nan if data["seconds"] is None else data["seconds"]
     return OrderRow(level, error_numbers(data["errors"]), seconds, data["rhs"], data["cell_updates"], data["steps"],
                data["reason"])  # fmt: skip
 
 
 def error_numbers(errors: Mapping) -> dict:
-    """Variable -> norm -> number, NaN instead of None."""
+    """Errors from plain data : variable -> {norm: error}, with NaN instead of None."""
     return {name: {norm: np.nan if e is None else e for norm, e in norms.items()} for name, norms in errors.items()}
 
 
 def level_text(plan: Plan, level: Level) -> str:
-    """Resolution of a row in words."""
+    """Text of the resolution of a level, such as "200 cells" or "step 0.001"."""
     if plan.way != "time" and level.cells:
         return f"{level.cells} cells"
     return f"{plan.measure.split(' ')[0]} {level.size:.4g}"
 
 
 def row_notes(rows, doubtful: list[str]) -> list[str]:
-    """Notes on failed rows, and on variables with errors too close to that of the reference."""
+    """Notes on failed rows, and on the variables `doubtful`, whose errors are too close to that of the reference."""
     notes = []
     failed = [row for row in rows if row.reason]
     if failed:

@@ -12,10 +12,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Crossing:
-    """Crossing of a curve with a target error: its cost, and the two points around it.
+    """Crossing of a curve of errors and costs with a target error.
 
-    cost : at the target, log-log between the two points; at the coarsest point if that is accurate enough
-    coarser, finer : indices of the points, equal if the crossing is a point; share : fraction of the way, in logarithms
+    cost : cost at the target, interpolated in logarithms between two points; the cost of the coarsest point if its
+    error is within the target
+    coarser, finer : indices of the two points around the target, equal if the crossing is at a point
+    share : position of the crossing between the points in logarithms, 0 at the coarser and 1 at the finer point
     """
 
     cost: float
@@ -25,12 +27,16 @@ class Crossing:
 
     @property
     def within(self) -> bool:
-        """True if the target lies between two points; False at a point, where the error may be less than the target."""
+        """True if the crossing lies between two points; False at a point, whose error may be less than the target."""
         return self.coarser != self.finer
 
 
 def find_crossing(errors: Sequence[float], costs: Sequence[float], target: float) -> Crossing | None:
-    """Coarsest place of a curve from which on all errors are at most `target`; None if its finest point exceeds it."""
+    """Coarsest crossing of a curve, from which on all errors are at most `target`.
+
+    errors, costs : of the points of the curve, from coarse to fine. None if the error of the finest point exceeds the
+    target.
+    """
     good = len(errors)
     while good > 0 and errors[good - 1] <= target:
         good -= 1
@@ -61,7 +67,7 @@ def pareto_front(errors: Sequence[float], costs: Sequence[float]) -> list[int]:
 
 
 def target_powers(errors: Sequence[float], floor: float) -> list[float]:
-    """Powers of ten 1e-1, 1e-2, ... down to the last that some error reaches and that is not below the floor."""
+    """Target errors 1e-1, 1e-2, ... down to the least that some error reaches and that is not below `floor`."""
     least = max(min((e for e in errors if math.isfinite(e)), default=math.inf), floor)
     powers, exponent = [], -1
     while 10.0**exponent >= least and exponent > -16:

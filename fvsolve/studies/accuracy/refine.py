@@ -1,4 +1,4 @@
-"""Rows of a refinement, as keys of a case, from coarse to fine."""
+"""Plan of a refinement: levels from coarse to fine, as keys of a case."""
 
 from __future__ import annotations
 
@@ -40,10 +40,12 @@ LEAST_COURANT = 0.02  # smaller Courant numbers would take too long
 
 @dataclass(frozen=True)
 class Level:
-    """One row of a refinement: the keys that it sets, and its size.
+    """Level of a refinement.
 
-    set : dotted keys -> values; size : cell size [m], step or stretch [s], or tolerance, falling from row to row
-    cells : number of cells of all pipes and basins; step : fixed step [s], NaN if steps follow a tolerance
+    set : dotted keys that it sets -> values
+    size : cell size [m], time step [s], travel time of a segment of a delay line [s], or tolerance [-]; falls from
+    level to level
+    cells : number of cells of all pipes and basins; step : fixed time step [s], NaN if steps follow a tolerance
     """
 
     set: dict
@@ -66,7 +68,7 @@ class Plan:
 
 
 def resolutions(case) -> dict[str, str]:
-    """Keys of a case that set its resolution, with their kind of refinement: "both", "space" or "time"."""
+    """Keys of a case that set its resolution -> kind of refinement: "both" (space and time), "space" or "time"."""
     ways = dict.fromkeys(cell_counts(case), "both")
     if delay_lines(case):
         ways["numerics.delay_tolerance"] = "space"
@@ -85,12 +87,12 @@ def pipes_by_cell_time(case) -> list[str]:
 def refinement_plan(
     case, refine: str | None = None, key: str | None = None, levels: int | None = None, cells: int | None = None
 ) -> Plan:
-    """Rows of a refinement of a case, coarsest first.
+    """Plan of a refinement of a case; a row is the run of a level, coarsest first.
 
-    refine : "both" (cells, stretches of delay lines and steps halved together; the default with cells or delay lines),
-    "space" (cells and stretches halved, one step suitable for the finest row) or "time" (steps halved, or rtol divided
-    by ten if the case states it; the default for other cases)
-    key : single resolution that is refined instead of all; levels : number of rows
+    refine : "both" (sizes of cells, segments of delay lines, and steps halved from row to row; the default with cells
+    or delay lines), "space" (sizes of cells and segments halved, one step suitable for the finest row) or "time" (steps
+    halved, or rtol divided by ten if the case states it; the default for other cases)
+    key : key of the only resolution that is refined, such as "links.main.cells" (default all); levels : number of rows
     cells : cells of the coarsest row, along the pipe or side with most cells; other numbers change in proportion
     Raises FvsolveError for an unknown or impossible refinement, key, or number of levels or cells.
     """
@@ -112,13 +114,13 @@ def refinement_plan(
         raise FvsolveError(f"levels = {levels} is too few. Expected at least 2, and at least 3 for a fitted order")
     if refine == "time" and cells is not None:
         raise FvsolveError(
-            f"cells = {cells}: only steps are refined here, so cells stay. Leave it out, or set the cells of the case"
+            f"cells = {cells}: only steps are refined here. Leave `cells` out, or set the cells of the case"
         )
     if refine == "time":
         return time_plan(case, key, levels)
     if delay_lines(case) and (key == "numerics.delay_tolerance" or not cell_counts(case)):
         if cells is not None:
-            raise FvsolveError(f"cells = {cells}: cells of delay lines are only places of output. Leave it out")
+            raise FvsolveError(f"cells = {cells}: cells of delay lines are only for output. Leave `cells` out")
         return delay_line_plan(case, refine, levels)
     return space_plan(case, refine, key, levels, cells)
 
@@ -127,10 +129,10 @@ def refinement_plan(
 
 
 def delay_line_plan(case, way: str, levels: int) -> Plan:
-    """Rows with half the tolerance of delay lines from row to row, so with twice the stretches.
+    """Plan with half the tolerance of delay lines from row to row, so with twice the number of segments.
 
-    For "both" steps are halved too, and are the sizes [s]. Else sizes are the travel times of a stretch [s], of the
-    line with most stretches in the last row.
+    With way = "both" steps are halved too, and the size of a row is its step [s]. With "space" it is the travel time of
+    a segment [s], in the line with most segments in the last row.
     """
     count, step = total_cells(case, cell_counts(case)), first_step(case) if case.numerics.rtol is None else math.nan
     rows = [stretch_keys(case, way, k) for k in range(levels)]
@@ -145,14 +147,14 @@ def delay_line_plan(case, way: str, levels: int) -> Plan:
     tables = [study_model(case, row).tables.delays for row in rows]
     line = int(np.argmax(tables[-1]["stretches"]))
     if tables[0]["stretches"][line] == tables[-1]["stretches"][line]:
-        raise FvsolveError("a smaller numerics.delay_tolerance cuts no delay line of this case into more stretches: "
-                           'there is no friction, or stretches are as short as a step. '
+        raise FvsolveError("a smaller numerics.delay_tolerance divides no delay line of this case into more segments: "
+                           'there is no friction, or segments are as short as a step. '
                            'Expected "both" or "time"')  # fmt: skip
     refined = [Level(row, float(table["tau"][line]), count, step) for row, table in zip(rows, tables, strict=True)]
     return Plan(way, "stretch [s]", tuple(refined), f"{STRETCH_WORDS}, one step for all rows")
 
 
-STRETCH_WORDS = "tolerance of delay lines halved, so that they have twice the stretches"
+STRETCH_WORDS = "tolerance of delay lines halved, so that they have twice as many segments"
 STRETCH_AND_STEP_WORDS = {
     False: f"{STRETCH_WORDS}, and steps halved",
     True: f"{STRETCH_WORDS}, and their longest step halved",
@@ -160,7 +162,7 @@ STRETCH_AND_STEP_WORDS = {
 
 
 def stretch_keys(case, way: str, k: int) -> dict:
-    """Keys of row k: tolerance of delay lines divided by 2^k, and their cells times 2^k if these set the step."""
+    """Overrides of row k: tolerance of delay lines divided by 2^k, and their cells times 2^k if cells set the step."""
     keys = {"numerics.delay_tolerance": case.numerics.delay_tolerance / 2**k} if delay_lines(case) else {}
     if way == "both" and (case.numerics.rtol is not None or (cell_counts(case) and case.numerics.courant is not None)):
         keys |= {f"links.{name}.cells": pipes(case)[name].cells * 2**k for name in delay_lines(case)}
@@ -171,7 +173,10 @@ def stretch_keys(case, way: str, k: int) -> dict:
 
 
 def space_plan(case, way: str, key: str | None, levels: int, cells: int | None) -> Plan:
-    """Rows with twice the cells from row to row, of all pipes and basins or of the part that the key names."""
+    """Plan with twice the cells from row to row, of all pipes and basins, or of the part that `key` names.
+
+    Arguments as for `refinement_plan`; way : "both" or "space"
+    """
     first = coarsest_counts(case, key, cells)
     refined = [name for name in first if key in (None, name)]
     if key == "numerics.cell_time":
@@ -195,12 +200,12 @@ def space_plan(case, way: str, key: str | None, levels: int, cells: int | None) 
     text = (
         f"cells of all {kinds}" if len(refined) == len(first) and not basins_from_files(case) else f"cells of {names}"
     )
-    text += " and stretches of delay lines" if delay_lines(case) and key is None else ""
+    text += " and segments of delay lines" if delay_lines(case) and key is None else ""
     return Plan(way, "cell size [m]", tuple(rows), f"{text} doubled, {stepping_words(case, way, courant)}")
 
 
 def coarsest_counts(case, key: str | None, cells: int | None) -> Counts:
-    """Numbers of cells of the first row."""
+    """Numbers of cells of the first row; key, cells : as for `refinement_plan`."""
     own_counts = cell_counts(case)
     if cells is None:
         return own_counts
@@ -212,10 +217,11 @@ def coarsest_counts(case, key: str | None, cells: int | None) -> Counts:
 
 
 def space_courant(case, levels: int) -> float | None:
-    """Courant number of the finest row for a time error of about a hundredth of its space error, at most the case's.
+    """Courant number of the finest row, with a time error of about a hundredth of the space error there.
 
-    The time error is C^q dx^q and the space error dx^p; if p > q, their ratio grows by 2^(p - q) from row to row.
-    None if the case states no Courant number.
+    With Courant number C, cell size dx and orders p in space and q in time, the time error is C^q dx^q and the space
+    error dx^p. If p > q, their ratio grows by 2^(p - q) from row to row. The result is at most the Courant number of
+    the case, None if the case states none.
     """
     numerics = case.numerics
     if numerics.courant is None:
@@ -226,9 +232,11 @@ def space_courant(case, levels: int) -> float | None:
 
 
 def step_keys(case, cells: Counts, step_cells: Counts, k: int, courant: float | None) -> tuple[float, dict]:
-    """(step [s], keys) of row k: by the Courant number on the cells `step_cells`, or from the case's step.
+    """(time step [s], overrides that set it) of row k: by the Courant number, or from the step of the case.
 
-    step_cells : `cells` itself if the step is refined with the cells, so that the case's step is halved k times
+    cells : numbers of cells of the row; step_cells : numbers of cells that set the step, the same object as `cells` if
+    the step is refined with the cells, so that the step of the case is halved k times
+    Under error control the step is NaN.
     """
     numerics = case.numerics
     if numerics.rtol is not None:
@@ -243,7 +251,7 @@ def step_keys(case, cells: Counts, step_cells: Counts, k: int, courant: float | 
 
 
 def stepping_words(case, way: str, courant: float | None) -> str:
-    """Description of the steps of a refinement."""
+    """Text on the time steps of a refinement."""
     numerics = case.numerics
     if numerics.rtol is not None:
         return f"steps by error, rtol = {numerics.rtol:g} in all rows"
@@ -259,7 +267,7 @@ def stepping_words(case, way: str, courant: float | None) -> str:
 
 
 def time_plan(case, key: str | None, levels: int) -> Plan:
-    """Rows with half the step from row to row on one grid, or with a tenth of the tolerance."""
+    """Plan with half the step from row to row, or a tenth of the tolerance, with constant cells."""
     numerics, count = case.numerics, total_cells(case, cell_counts(case))
     by_error = key == "numerics.rtol" or (key is None and numerics.rtol is not None)
     if by_error:
@@ -279,9 +287,10 @@ def time_plan(case, key: str | None, levels: int) -> Plan:
 
 
 def first_step(case) -> float:
-    """Longest step of a time refinement [s]: that of the case, shortened to a whole fraction of the output interval.
+    """Longest time step of a refinement in time [s].
 
-    A step that the case states is not shortened; without cells the output interval is the step.
+    It is the step that the case states, otherwise the step for its Courant number, shortened to a whole fraction of the
+    output interval; without pipes and basins it is the output interval.
     """
     numerics, every = case.numerics, case.output.every
     if numerics.step is not None:

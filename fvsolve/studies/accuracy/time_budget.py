@@ -23,8 +23,9 @@ def affordable_plan(
     case, refine: str | None, key: str | None, levels: int | None, cells: int | None, against: str,
     points: ResultCache | None,
 ) -> Plan:  # fmt: skip
-    """Rows of a refinement. If nothing sets the cells of the first row, they are chosen to end in a minute or two.
+    """Plan of a refinement; cells of the first row that are not given are chosen for a study of a minute or two.
 
+    refine, key, levels, cells : as in `refinement_plan`; against : kind of the reference as in `order`
     points : result cache, which also stores the chosen number of cells
     """
     refinement = refinement_plan(case, refine, key, levels, cells)
@@ -51,7 +52,11 @@ def affordable_plan(
 
 
 def first_cells(case, rows: Plan, refine: str | None, levels: int | None, against: str) -> int:
-    """Cells of the first row: the case's own, halved until the study fits the time, if patches and holes allow."""
+    """Number of cells of the first row: that of the case, halved until the study takes at most `CPU_BUDGET`.
+
+    It is not halved if patches or holes of a basin would then not end between cells. rows : plan with the cells of the
+    case; other arguments as in `affordable_plan`
+    """
     own_counts, exact = cell_counts(case), case.exact is not None or against != "auto" or bool(basins(case))
     cells, seconds = most_cells(own_counts), rhs_seconds(study_model(case)) / total_cells(case, own_counts)
     while cells >= 2 * LEAST_CELLS and cpu_time(case, rows, seconds, exact) > CPU_BUDGET:
@@ -63,8 +68,9 @@ def first_cells(case, rows: Plan, refine: str | None, levels: int | None, agains
 
 
 def cpu_time(case, rows: Plan, seconds: float, exact: bool) -> float:
-    """CPU time of all rows, and of a reference unless there is an exact solution [s]; 0 if steps follow an error.
+    """Estimated CPU time of all rows [s], and of a reference unless `exact`; 0 if steps follow a tolerance.
 
+    rows : plan of the refinement; exact : True if the study needs no finer run as reference
     seconds : time of one call of the rates for one cell [s]
     """
     numerics = case.numerics

@@ -1,4 +1,4 @@
-"""CPU time of runs: the best of several, with code that is already compiled."""
+"""CPU time of runs: the least of several runs, with code that is already compiled."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ class CappedRun(Run):
     max_seconds, max_steps = np.inf, np.inf
 
     def pause(self) -> None:
-        """Pause as any run does, then check the cost."""
+        """Do what a run does between two chunks of steps, then check the cost."""
         super().pause()
         self.check()
 
     def check(self) -> None:
-        """Raise GivenUp if the cost exceeds its limits."""
+        """Raise GivenUp if CPU time or number of steps exceeds its limit."""
         if self.processor > self.max_seconds or self.loop.loop_state[loop_indices.STEPS] > self.max_steps:
             raise GivenUp
 
@@ -47,28 +47,31 @@ class GivenUp(Exception):
 
 
 def capped_run(model, state, sink, progress) -> Run:
-    """Run with at most LIMIT seconds of CPU time."""
+    """Run that is stopped after CPU_LIMIT seconds of CPU time."""
     run = CappedRun(model, state, sink, progress)
     run.max_seconds = CPU_LIMIT
     return run
 
 
 def long_capped_run(model, state, sink, progress) -> Run:
-    """Run with at most LASTING seconds of CPU time."""
+    """Run that is stopped after REFERENCE_CPU_LIMIT seconds of CPU time."""
     run = CappedRun(model, state, sink, progress)
     run.max_seconds = REFERENCE_CPU_LIMIT
     return run
 
 
 def probe_run(model, state, sink, progress) -> Run:
-    """Run with about TASTE steps at most."""
+    """Run that is stopped after about PROBE_STEPS steps."""
     run = CappedRun(model, state, sink, progress)
     run.max_steps = PROBE_STEPS
     return run
 
 
 def finished_run(model, run=None) -> Outcome:
-    """Outcome of one run of a model, made by `run`. Raises KeyboardInterrupt if the user interrupted the run."""
+    """Outcome of one run of a model. Raises KeyboardInterrupt if the user interrupted the run.
+
+    run : function that makes the run from (model, state, sink, progress), such as `capped_run`
+    """
     result = outcome(model, run=run)
     if result.reason.startswith("interrupted"):
         raise KeyboardInterrupt

@@ -1,4 +1,4 @@
-"""Work-precision front of a chart: the cheapest setting for each error, and the default next to it."""
+"""Work-precision front: the cheapest setting for each target error, next to the default setting."""
 
 from __future__ import annotations
 
@@ -15,10 +15,12 @@ GREATEST_RTOL = 0.1  # results of greater tolerances are meaningless
 
 @dataclass(frozen=True)
 class Point:
-    """One setting and the results of its run.
+    """Setting and the results of its run.
 
-    trajectory, greatest, end, overshoot : errors over the range of the worst component (`studies/distance.py`)
-    seconds : CPU time of the steps, the best of several runs [s]; updates : calls of the rates times cells (states)
+    ok : True if the result is usable, otherwise `reason` explains why it is not
+    trajectory, greatest, end, overshoot, worst : errors relative to ranges, see `Distance` in `studies/distance.py`
+    seconds : CPU time of the steps, the least of several runs [s]; rhs : number of evaluations of the rates
+    updates : rhs times cells (or states, without cells); steps : number of steps
     """
 
     setting: MethodSetting
@@ -37,9 +39,11 @@ class Point:
 
 @dataclass(frozen=True)
 class FrontRow:
-    """One row of the front: the cheapest curve for a target error, and the program's default next to it.
+    """Cheapest curve (scheme and method) for a target error, next to the curve of the default scheme and method.
 
-    name, by_updates : cheapest curve by CPU time and by cell updates; None if no curve reaches the target
+    name, fineness, seconds : curve with the least CPU time, its resolution as text, and the CPU time [s]
+    by_updates, updates : curve with the least number of cell updates, and that number
+    default_* : values of the default curve. None or "" if no curve (or the default curve) reaches the target
     """
 
     target: float
@@ -54,7 +58,7 @@ class FrontRow:
 
 
 def curves_by_name(points: Sequence[Point]) -> dict[str, list[Point]]:
-    """Points by name of scheme and method, in their order."""
+    """Name of scheme and method -> points of this curve, in their order."""
     points_by_name: dict[str, list[Point]] = {}
     for point in points:
         points_by_name.setdefault(point.setting.name, []).append(point)
@@ -62,7 +66,10 @@ def curves_by_name(points: Sequence[Point]) -> dict[str, list[Point]]:
 
 
 def front_row(points: Sequence[Point], target: float, floor: float, default: str) -> FrontRow:
-    """Front row of a target error; default : name of the default's curve."""
+    """Row of the front for a target error; default : name of the curve of the default scheme and method.
+
+    floor : smaller errors count as this error
+    """
     by_time, by_work = (cheapest_curve(points, target, floor, cost) for cost in ("seconds", "updates"))
     name, best = by_time or (None, None)
     default_time, default_work = (
@@ -100,7 +107,7 @@ def cheapest_curve(points: Sequence[Point], target: float, floor: float, cost: s
 
 
 def interpolated_setting(case: Case, coarse: MethodSetting, fine: MethodSetting, share: float) -> MethodSetting:
-    """Setting at the fraction `share` of the way between two settings of a curve."""
+    """Setting between two settings of a curve; share : position in logarithms, 0 at `coarse` and 1 at `fine`."""
     if coarse.cells is not None:
         return cells_setting(
             case, coarse.scheme, coarse.method, math.ceil(interpolate_log(coarse.cells, fine.cells, share))
@@ -118,7 +125,7 @@ def coarser_setting(case: Case, setting: MethodSetting) -> MethodSetting | None:
 
 
 def fineness_text(points, name: str | None, where: Crossing | None) -> str:
-    """Approximate number of cells, tolerance or step at the crossing of a curve."""
+    """Text of the resolution at a crossing, such as "200 cells" or "rtol 1e-06"; name : curve, where : crossing."""
     if name is None or where is None:
         return ""
     coarse, fine = (curves_by_name(points)[name][k].setting for k in (where.coarser, where.finer))
