@@ -21,11 +21,14 @@ IMPLIED_KINDS = ("valve", "pump", "damper", "pipe", "chamber", "tank")  # kinds 
 
 @dataclass(frozen=True)
 class Port:
-    """Passivity at a port, condition (2): E0 + integral of p q dt >= 0, p gauge pressure, heights from the port.
+    """Passivity at a port: the network may not return more energy than it had at the start and received elsewhere.
 
-    work : least value of the integral [J], at `time` [s]; at_start : E0, available energy at the start [J]
-    others : energy supplied by other ports at the least margin [J]; margin : least value of E0 + work + others [J], at
-    `t_margin` [s]; course, bound : float64[k]  the integral and -(E0 + others) at the rows of the ledger [J]
+    Condition (2): E0 + W + O >= 0 at any time, with the available energy E0 at the start, W the integral over time of
+    p q at the port (gauge pressure p, flow q into the network), and O the energy supplied by other ports. Heights are
+    measured from the port.
+    node : name of the port; work : least value of W [J], at `time` [s]; at_start : E0 [J]
+    margin : least value of E0 + W + O [J], at `t_margin` [s]; others : O at that time [J]
+    passive : True if the condition holds; course, bound : float64[k]  W and -(E0 + O) at the rows of the ledger [J]
     text : verdict as a sentence, in the units of `[output]`
     """
 
@@ -48,15 +51,16 @@ class Port:
 
 @dataclass(frozen=True)
 class Energy:
-    """Energy ledger of a run at ends of steps, cumulative since the start [J].
+    """Energy ledger of a run: energies since the start at ends of steps [J].
 
     t : float64[k] [s]; supplied, stored, dissipated : {"PART": float64[k]}, stored as change since the start
-    scheme, law : {"PART": float64[k]}  energy removed by the discretisation of a pipe, or by an inexact law
+    scheme, law : {"PART": float64[k]}  energy removed by the discretisation in space of a pipe, and by a law of a part
+    that conserves energy only approximately
     step : float64[k]  energy removed by the time steps; newton : float64[k]  energy of Newton residuals
-    remainder : supplied - stored - dissipated, the sum of these four; positive if the numerical method dissipates
-    energy, negative if it creates energy
-    at_start : {"PART": J}  available energy at the start; datum : elevation of zero height [m]
-    marks : texts on events outside the validity of the model, with their times
+    remainder : float64[k]  supplied - stored - dissipated, the sum of scheme, law, step and newton; positive if the
+    numerical method dissipates energy, negative if it creates energy
+    at_start : {"PART": available energy at the start [J]}; datum : elevation of zero height [m]
+    marks : texts on events outside the validity of the model, with their times; port : passivity at a port, if checked
     """
 
     reason: str
@@ -79,7 +83,7 @@ class Energy:
 
     @property
     def throughput(self) -> float:
-        """Energy throughput: greatest sum of energy supplied by ports and released by parts [J]."""
+        """Energy throughput [J]: greatest sum, at any time, of the energy supplied by ports and released by parts."""
         total = np.zeros(len(self.t))
         for values in self.supplied.values():
             total += np.maximum(values, 0.0)
@@ -89,12 +93,12 @@ class Energy:
 
     @property
     def numerical_remainder(self) -> np.ndarray:
-        """Remainder without Newton residuals: energy removed by scheme, law and step : float64[k] [J]."""
+        """Energy removed by scheme, law and time steps, without Newton residuals : float64[k] [J]."""
         return self.remainder - self.newton
 
     @property
     def relative(self) -> float:
-        """|`numerical_remainder`| at the end over `throughput`; 0 without throughput."""
+        """Magnitude of `numerical_remainder` at the end over `throughput` [-]; 0 without throughput."""
         return 0.0 if self.throughput == 0.0 else float(abs(self.numerical_remainder[-1]) / self.throughput)
 
     @property
@@ -104,20 +108,26 @@ class Energy:
 
     @property
     def verdict(self) -> str:
-        """Meaning of the remainder, without Newton residuals, which are not a property of scheme and method."""
+        """Effect of the numerical method on the energy, as text: dissipates, creates, or rounding only.
+
+        Newton residuals do not count, because they are not a property of scheme and method.
+        """
         if self.relative <= ROUNDING:
             return "rounding"
         return "the numbers dissipate" if self.numerical_remainder[-1] > 0.0 else "the numbers create energy"
 
     def numerical(self) -> dict[str, np.ndarray]:
-        """Remainder by cause: scheme, law, step and Newton, without causes that are always zero, and their sum."""
+        """Remainder by cause, as float64[k] [J]: "scheme", "law", "step", "newton", and their sum "remainder".
+
+        Causes that are always zero are left out.
+        """
         zeros = np.zeros(len(self.t))
         causes = {"scheme": sum(self.scheme.values(), zeros), "law": sum(self.law.values(), zeros), "step": self.step,
                   "newton": self.newton if self.newton_counts else zeros}  # fmt: skip
         return {name: values for name, values in causes.items() if values.any()} | {"remainder": self.remainder}
 
     def plain(self) -> dict:
-        """Plain values for JSON: the ledger at the end; the table has all rows."""
+        """Plain values for JSON: the ledger at the end of the run."""
         lines = {json_name: {name: float(values[-1]) for name, values in getattr(self, kind).items()}
                  for kind, json_name in JSON_NAMES.items()}  # fmt: skip
         port = None if self.port is None else self.port.plain()
@@ -138,8 +148,8 @@ def energy(case, set=None, port: str | None = None, progress=None) -> Energy:
     """Run a case with changed keys and compute its energy ledger; `case` as for `run`, or a Model.
 
     port : a reservoir, inflow or junction with a demand, at which condition (2) of passivity is checked
-    progress : called as progress(t, seconds, steps). Raises CaseError for an invalid case, FvsolveError for an unknown
-    port.
+    set : key -> value; progress : called as progress(t, seconds, steps)
+    Raises CaseError for an invalid case, FvsolveError for an unknown port.
     """
     model = study_model(case, set) if not hasattr(case, "tables") else case
     check_port(model.case, port)
@@ -154,7 +164,7 @@ def energy(case, set=None, port: str | None = None, progress=None) -> Energy:
 
 
 def ledger(run: EnergyRun, summary, port: str | None) -> Energy:
-    """Energy ledger from the recorded totals of a run."""
+    """Energy ledger from the recorded totals of a run; summary : summary of the run; port : as in `energy`."""
     accounts, totals, holdings = run.accounts, np.array(run.totals), np.array(run.holdings)
     lines = {
         kind: lines_by_name(accounts.accounts, kind, totals) for kind in ("supplied", "dissipated", "scheme", "law")
@@ -182,7 +192,10 @@ def ledger(run: EnergyRun, summary, port: str | None) -> Energy:
 
 
 def lines_by_name(accounts: list[Account], kind: str, columns: np.ndarray) -> dict[str, np.ndarray]:
-    """Ledger lines of a kind that are not always zero, named "PART", or "PART KIND" if a part has several kinds."""
+    """Ledger lines of a category that are not always zero: "PART", or "PART KIND" with several kinds -> energies [J].
+
+    kind : category, such as "dissipated"; columns : float64[rows, accounts]  energies of all accounts [J]
+    """
     lines = {}
     for k, account in enumerate(accounts):
         if account.category == kind and columns[:, k].any():
@@ -193,7 +206,7 @@ def lines_by_name(accounts: list[Account], kind: str, columns: np.ndarray) -> di
 
 
 def check_port(case, port: str | None) -> None:
-    """Raise FvsolveError if a node of a case is not a port."""
+    """Raise FvsolveError if `port` is not a node of the case at which fluid enters or leaves; None is accepted."""
     ports = [name for name, node in case.places.items() if node.driven is not None]
     if port is not None and port not in ports:
         hint = did_you_mean(port, ports) or f". Ports are {', '.join(ports)}"
@@ -202,7 +215,7 @@ def check_port(case, port: str | None) -> None:
 
 
 def port_verdict(run: EnergyRun, port: str) -> Port:
-    """Check condition (2) of passivity at every step of a run; heights are measured from the port."""
+    """Check condition (2) of passivity (see `Port`) at every step of a run; port : name of the node."""
     lines, totals = run.accounts.accounts, np.array(run.step_totals)
     own_lines = [k for k, account in enumerate(lines) if account.category == "supplied" and account.place == port]
     supplied_lines = run.accounts.of("supplied")
@@ -222,7 +235,7 @@ def port_verdict(run: EnergyRun, port: str) -> Port:
 
 
 def port_text(port: Port, case) -> str:
-    """Verdict at a port as a sentence, in the units of `[output]`."""
+    """Verdict on the passivity at a port as a sentence, in the units of `[output]` of the case."""
     work, least, own_bound, others, margin = (
         case.amount(energy_value, "energy", 6)
         for energy_value in (port.work, 0.0 - port.at_start, -(port.at_start + port.others), port.others, port.margin)

@@ -1,4 +1,4 @@
-"""Energy remainders of a case for several schemes and methods."""
+"""Energy created or removed by the numerical method in runs of a case with several schemes and methods."""
 
 from __future__ import annotations
 
@@ -32,14 +32,16 @@ PAIR_COLUMNS = (  # columns of a row
 def measure_pairs(
     case, schemes=None, methods=None, port: str | None = None, progress=None, points=None, watch=None
 ) -> list[dict]:
-    """Run a case with every pair of scheme and method; returns a row for each pair with the energy remainders.
+    """Run a case with every pair of scheme and method; returns a row (dict) with the energy remainders of each pair.
 
-    creates : True if the remainder without Newton residuals is below zero by more than rounding at any row, None if the
-    case did not run; least : least value of that remainder [J]; margin : least value of E0 + energy supplied at the
-    port and at others [J], None without a port
-    progress : called as progress(done, total, next); points : `ResultCache` of earlier rows; watch : called as
-    watch(t, seconds, steps) during every run. A pair that is refused or diverges gives a row with its reason. Raises
-    FvsolveError for unknown names.
+    Entries of a row are those of `PAIR_COLUMNS`. remainder, scheme_loss, step_loss, newton_loss : at the end [J], see
+    `Energy`; least : least value over time of the remainder without Newton residuals [J]
+    creates : True if `least` is below zero by more than rounding, or if the run failed; None if it was refused
+    margin : least margin of the passivity at the port [J], see `Port`; None without a port
+
+    schemes, methods : names (default those of the case); progress : called as progress(done, total, next)
+    points : `ResultCache` of earlier rows; watch : called as watch(t, seconds, steps) during every run
+    A pair that is refused or diverges gives a row with its reason. Raises FvsolveError for unknown names.
     """
     check_port(case, port)
     points = points or ResultCache()
@@ -57,7 +59,7 @@ def measure_pairs(
 
 
 def pair_result(case, scheme: str, method: str, port: str | None, watch=None) -> dict:
-    """Row of a pair: energy remainders of a case run with a scheme and a method."""
+    """Row of a pair: energy remainders of a run of the case with this scheme and method, see `measure_pairs`."""
     missing = dict.fromkeys(
         ("remainder", "scheme_loss", "step_loss", "newton_loss", "least", "relative", "creates", "margin")
     )

@@ -1,10 +1,14 @@
 """Passivity of schemes and methods: conditions and step limits under which a passive network stays passive.
 
-The energy after a step exceeds that of a ledger with the weights of the method by h^2 times the sum of
-m_ij <k_i, k_j>, with M = B A + A^T B - b b^T (Burrage and Butcher 1979). If M and the weights b are non-negative, no
-passive network supplies more energy than it had, for any step. If M has a negative eigenvalue, a flow into a chamber
-shows it. Without external flow the propagator R(h A) must not increase the energy: |R(-x)| <= 1 for a leaking chamber,
-|R(i y)| <= 1 for a column oscillating in a tank, and norm R(h A) <= 1 for a closed pipe, if the scheme creates none.
+A Runge-Kutta method has coefficients A, weights b (B = diag b) and stage slopes k_i; h is the step. A ledger adds the
+powers at the stages with the weights b. For the energy |y|^2 of the states y, it exceeds the energy after a step by h^2
+times the sum of m_ij <k_i, k_j>, with M = B A + A^T B - b b^T (Burrage and Butcher 1979). If M and b are non-negative,
+no passive network supplies more energy than it had, for any step. If M has a negative eigenvalue, some flow into a
+chamber creates energy.
+
+Without external flow, the solution of dy/dt = J y is multiplied by R(h J) in a step, with the stability function R. The
+energy must not grow: |R(-x)| <= 1 for a leaking chamber, |R(i y)| <= 1 for a column that oscillates in a tank, and norm
+R(h J) <= 1 for a closed pipe, if the scheme creates no energy.
 """
 
 from __future__ import annotations
@@ -29,12 +33,13 @@ LEAST, MOST = 0.01, 8.0  # range of Courant numbers
 
 @dataclass(frozen=True)
 class MethodClaim:
-    """Passivity of a method.
+    """Passivity of a method, with limits of the step h.
 
-    any_network : True if passive for any network and any step; leak : greatest h / tau for a leaking chamber;
-    resonator : greatest h omega for a resonator
-    chamber : least eigenvalue of M for stages at different times. If it is negative, some flow into a chamber creates
-    energy, h^2 times its value over the sum of squared flows in a step.
+    any_network : True if the method is passive for any network and any step
+    leak : greatest h / tau for a leaking chamber with time constant tau
+    resonator : greatest h omega for an undamped resonator with angular frequency omega
+    chamber : least eigenvalue of the matrix M (see the module), with stages at equal times joined. If it is negative,
+    some flow into a chamber creates energy in a step, in proportion to its magnitude, h^2 and the squared flows.
     any_network and chamber are None for a Rosenbrock method, whose ledger is not a sum of stage powers.
     """
 
@@ -47,11 +52,11 @@ class MethodClaim:
 
 @dataclass(frozen=True)
 class SchemeClaim:
-    """Effect of a scheme on the energy of a closed pipe, continuous in time.
+    """Effect of a scheme on the energy of a pipe closed at both ends, with exact integration in time.
 
-    rate : greatest relative growth rate of the energy per travel time of a cell; gain : greatest ratio of the energy
-    at any time to that at the start; passive : True if the energy never grows. All None for a limited scheme, which has
-    no matrix.
+    rate : greatest relative growth rate of the energy, per travel time of a wave through a cell [-]
+    gain : greatest ratio of the energy at any time to the energy at the start [-]
+    passive : True if the energy never grows. All are None for a scheme with a limiter, which is not linear.
     """
 
     scheme: str
@@ -62,9 +67,9 @@ class SchemeClaim:
 
 @dataclass(frozen=True)
 class Pair:
-    """Greatest Courant number up to which no state of a closed pipe gains energy in a step; inf: any, 0: none.
+    """Scheme and method, with the Courant number up to which no state of a closed pipe gains energy in a step.
 
-    None if the scheme has no matrix.
+    courant : inf if there is no limit, 0 if any step can create energy, None for a scheme with a limiter
     """
 
     scheme: str
@@ -93,9 +98,9 @@ class Passivity:
 
 @validated(schemes=NAMES, methods=NAMES, progress=FUNCTION)
 def passivity(schemes=None, methods=None, progress=None) -> Passivity:
-    """Compute the passivity of schemes and methods (default all). Raises FvsolveError for unknown names.
+    """Compute the passivity of schemes, of methods and of their pairs. Raises FvsolveError for unknown names.
 
-    progress : called as progress(done, total, next) for each name
+    schemes, methods : name or list of names (default all); progress : called as progress(done, total, next)
     """
     schemes = check_names(schemes, list(SCHEMES), "scheme")
     methods = check_names(methods, method_names(), "method")
@@ -113,7 +118,10 @@ def passivity(schemes=None, methods=None, progress=None) -> Passivity:
 
 
 def check_names(given, known: list[str], kind: str) -> list[str]:
-    """List of names from a name or names, all known names for None. Raises FvsolveError for an unknown name."""
+    """List of names from a name or a list of names; all `known` names for None.
+
+    kind : "scheme" or "method", for the message. Raises FvsolveError for an unknown name.
+    """
     given = name_list(given)
     for name in given or ():
         if name not in known:
@@ -142,20 +150,27 @@ def method_claim(name: str) -> MethodClaim:
 
 
 def stage_matrix(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """M = B A + A^T B - b b^T."""
+    """Matrix M = B A + A^T B - b b^T of a Runge-Kutta method, with coefficients A, weights b and B = diag b."""
     weighted = b[:, None] * a
     return weighted + weighted.T - np.outer(b, b)
 
 
 def stages_by_time(c: np.ndarray) -> np.ndarray:
-    """float64[s, times]: 1 if a stage is at a time; stages at equal times have equal flows."""
+    """Matrix float64[stages, times] that joins stages at equal times: 1 if a stage is at a time, otherwise 0.
+
+    c : times of the stages as fractions of a step
+    """
     times = sorted(set(np.round(c, 12)))
     return np.array([[float(abs(x - time) < 1e-9) for time in times] for x in c])
 
 
 @functools.cache
 def closed_pipe(scheme: str) -> tuple[np.ndarray, np.ndarray]:
-    """(A, S) of a lossless pipe closed at both ends: dy/dt = A y per travel time of a cell, energy |S y|^2."""
+    """Matrices (A, S) of a lossless pipe closed at both ends, with a scheme.
+
+    States y are the waves in both directions in the cells. They change by dy/dt = A y, with time in travel times of a
+    wave through a cell; the energy is |S y|^2 up to a factor.
+    """
     from fvsolve.studies.outcome import study_model
 
     model = study_model({
@@ -173,7 +188,10 @@ def closed_pipe(scheme: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def energy_matrix(settings, n: int) -> np.ndarray:
-    """S with |S c|^2 equal to the sum over cells of the mean squares in the energy ledger, for n dx = 1."""
+    """Matrix S with |S c|^2 equal to the sum of the mean squares of a quantity in n cells, as in the energy ledger.
+
+    c : averages of the quantity over the cells; settings : settings of a model, which contain the scheme
+    """
     from fvsolve.kernels.linear_energy import GAUSS_WEIGHTS, POINTS, polynomial_width
 
     width = int(polynomial_width(settings, n))
@@ -188,14 +206,14 @@ def energy_matrix(settings, n: int) -> np.ndarray:
 
 @functools.cache
 def pipe_operator(scheme: str) -> np.ndarray:
-    """A in coordinates whose Euclidean norm is the square root of the energy."""
+    """Matrix A of `closed_pipe` in coordinates S y, whose Euclidean norm is the square root of the energy."""
     a, s = closed_pipe(scheme)
     return np.linalg.solve(s.T, (s @ a).T).T
 
 
 @functools.cache
 def scheme_claim(scheme: str) -> SchemeClaim:
-    """Energy growth of the semi-discrete scheme."""
+    """Energy growth in a closed pipe with a scheme, with exact integration in time."""
     if SCHEMES[scheme].limited:
         return SchemeClaim(scheme, None, None, None)
     b = pipe_operator(scheme)
@@ -205,7 +223,10 @@ def scheme_claim(scheme: str) -> SchemeClaim:
 
 
 def greatest_gain(b: np.ndarray) -> float:
-    """Greatest |exp(b t)|^2, t in travel times of a cell: first 4 in fine steps, then 4 times the cells of the pipe."""
+    """Greatest energy gain |exp(b t)|^2 at any sampled time t of a closed pipe with the matrix b.
+
+    t is in travel times of a wave through a cell: up to 4 in steps of 0.02, then 80 more in steps of 0.25.
+    """
     from scipy.linalg import expm
 
     power, gain = np.eye(len(b)), 1.0
@@ -244,7 +265,10 @@ def courant_limit(scheme: str, method: str) -> float | None:
 
 
 def step_gain(scheme: str, method: str, courant: float) -> float:
-    """Norm of R(courant A): greatest growth factor of the square root of the energy in a step."""
+    """Greatest growth factor of the square root of the energy of a closed pipe in a step.
+
+    It is the norm of R(courant A), with the stability function R of the method and the matrix A of `pipe_operator`.
+    """
     b = courant * pipe_operator(scheme)
     numerator, denominator = (matrix_polynomial(coefficients, b) for coefficients in polynomials(method))
     return float(np.linalg.norm(np.linalg.solve(denominator, numerator), 2))
@@ -252,7 +276,7 @@ def step_gain(scheme: str, method: str, courant: float) -> float:
 
 @functools.cache
 def polynomials(method: str) -> tuple[list[float], list[float]]:
-    """Coefficients of numerator and denominator of R, lowest power first, rounded to floats."""
+    """Coefficients (of the numerator, of the denominator) of the stability function, lowest power first."""
     from fvsolve.steppers import stability_function
 
     r = stability_function(method_of(method))
@@ -260,14 +284,14 @@ def polynomials(method: str) -> tuple[list[float], list[float]]:
 
 
 def method_of(name: str):
-    """Method with a name."""
+    """Runge-Kutta method with this name."""
     from fvsolve.steppers import method_named
 
     return method_named(name)
 
 
 def matrix_polynomial(coefficients: list[float], b: np.ndarray) -> np.ndarray:
-    """Polynomial of a matrix; coefficients lowest power first."""
+    """Value of a polynomial of the matrix b; coefficients : lowest power first."""
     total = np.zeros_like(b)
     for x in reversed(coefficients):
         total = total @ b + x * np.eye(len(b))
@@ -275,7 +299,7 @@ def matrix_polynomial(coefficients: list[float], b: np.ndarray) -> np.ndarray:
 
 
 def method_names() -> list[str]:
-    """Names of all methods."""
+    """Names of all methods of time integration."""
     from fvsolve.steppers import METHODS
 
     return list(METHODS)

@@ -1,4 +1,4 @@
-"""Energy of accepted steps, summed from stage powers with the weights of the method."""
+"""Energy of each accepted time step: sum of the powers at its stages with the weights of the method."""
 
 from __future__ import annotations
 
@@ -40,7 +40,10 @@ class EnergyLoop(RunLoop):
         self.controls[loop_indices.ALLOW_FUSED] = 0.0  # fused steps store no stages
 
     def run(self, budget: float) -> int:
-        """`Loop.run`, one step at a time."""
+        """Run `RunLoop.run` one step at a time, and add the energy of each accepted step; budget : number of steps.
+
+        Returns the status code of the loop.
+        """
         code, left, armed = super().run(0.0), budget, self.armed
         while code == loop_indices.BUDGET_SPENT and left > 0.0 and not automatic.is_change_due(self.stepper):
             t, y, rules = self.t, self.now.copy(), armed.copy()
@@ -56,19 +59,19 @@ class EnergyLoop(RunLoop):
         return code
 
     def power(self, t: float, y: np.ndarray) -> np.ndarray:
-        """Power of every ledger line at a state [W]."""
+        """Power of every ledger line at the state (t, y) [W] : float64[lines]."""
         return self.accounts.power_at(t, y, self.dydt, self.out_work)
 
     def tableau(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Coefficients, weights and times of the stages of a step."""
+        """Coefficients float64[s, s], weights float64[s] and times float64[s] of the s stages of a step."""
         s = self.stepper.k.shape[0]
         a, (b, c) = (part.reshape(-1, s) for part in np.split(self.stepper.coefficients[: s * s + 2 * s], [s * s]))
         return a, b, c
 
     def step_energy(self, t: float, y: np.ndarray, first: np.ndarray, supply: np.ndarray) -> np.ndarray:
-        """Energy that the step from (t, y) adds to every ledger line and to the Newton residual [J].
+        """Energy that the step from (t, y) adds to every ledger line, and last to the Newton residual [J].
 
-        first, supply : slope and supplied powers at (t, y)
+        first, supply : slope dy/dt and supplied powers [W] of the first stage, at (t, y)
         """
         stepper, h = self.stepper, float(self.loop_state[loop_indices.LAST])
         (a, b, c), total = self.tableau(), np.zeros_like(self.total)
@@ -94,10 +97,11 @@ class EnergyLoop(RunLoop):
         return h * total
 
     def limit_next(self, h: float, off: float, lost: float) -> None:
-        """Limit the next step by the quadrature error of the dissipated energy.
+        """Limit the next step so that the quadrature error of the dissipated energy stays small.
 
-        off : quadrature error in this step [J]; lost : dissipated energy so far [J]. The error control of states does
-        not cover it: for states that are parabolas in time, methods of order two are exact, but not for powers.
+        h : this step [s]; off : quadrature error in this step [J]; lost : dissipated energy so far [J]
+        The error control of states does not cover this error: for states that are parabolas in time, a method of order
+        two is exact, but the integral of the power is not.
         """
         grow = (
             min(MOST, 0.9 * (QUADRATURE_TOLERANCE * lost / off) ** (1.0 / self.controls[loop_indices.ORDER]))
@@ -107,10 +111,10 @@ class EnergyLoop(RunLoop):
         self.controls[loop_indices.STEP_MAX] = min(self.longest, h * max(LEAST, grow))
 
     def jump_correction(self, t: float, y: np.ndarray) -> np.ndarray:
-        """Correction of the energies of the step from (t, y) for jumps in delay lines within the step [J].
+        """Correction of the energies of the step from (t, y) for jumps of waves in delay lines within the step [J].
 
-        Stage powers have the value before or after a jump, so that the weights place the jump at a wrong time. Stages
-        may lie outside the step.
+        The power at a stage is that before or after a jump, so that the weights place the jump at a wrong time.
+        Returns the correction for every ledger line, and last for the Newton residual.
         """
         past, total, h = self.run_data.past, np.zeros_like(self.total), self.t - t
         if not past.size or past[JUMPS_TRAVELLING] == 0.0:
@@ -131,9 +135,9 @@ class EnergyLoop(RunLoop):
     def stage(self, t: float, y: np.ndarray, slope: np.ndarray, supply: np.ndarray) -> np.ndarray:
         """Power of every ledger line and of the Newton residual at a stage [W].
 
-        Newton iterations end at a slope f + J d instead of f(t, y). Supplied and stored powers use `slope` and `supply`
-        of the stage; other lines use f. The difference, grad E . (f - slope) less the change of supply, is assigned to
-        the Newton residual.
+        Newton iterations of an implicit method end at a slope near to the rates f(t, y). Supplied and stored powers use
+        `slope` and `supply` of the stage, other lines use f. The difference between supplied power and rate of storage
+        that this causes is the power of the Newton residual.
         """
         power, values = self.power(t, y), self.out_work
         if self.stepper.method.explicit:
@@ -146,20 +150,26 @@ class EnergyLoop(RunLoop):
         return np.append(power, change[self.supplied].sum() - change[self.rates].sum())
 
     def rosenbrock_coefficients(self) -> tuple[np.ndarray, np.ndarray, float]:
-        """Further coefficients of a Rosenbrock method: C : float64[s, s], d : float64[s], gamma."""
+        """Further coefficients (C : float64[s, s], d : float64[s], gamma) of a Rosenbrock method with s stages.
+
+        They are as in `steppers/ros.py`.
+        """
         s = self.stepper.k.shape[0]
         coefficients = self.stepper.coefficients[s * s + 3 * s :]
         return coefficients[: s * s].reshape(s, s), coefficients[s * s : s * s + s], float(coefficients[s * s + s])
 
     def power_weights(self) -> np.ndarray:
-        """Weights of the stage powers of a Rosenbrock step in the sum of `linearly_implicit`."""
+        """Weights float64[s] with which the powers at the stages of a Rosenbrock step enter its energy."""
         (_, b, _), (big_c, _, gamma) = self.tableau(), self.rosenbrock_coefficients()
         return np.append(0.0, np.linalg.solve((np.eye(b.size - 1) - gamma * big_c[1:, 1:]).T, gamma * b[1:]))
 
     def linearly_implicit(self, t: float, y: np.ndarray, h: float, a, c, k) -> np.ndarray:
-        """Stage values of ledger lines of a Rosenbrock step : float64[s, lines], from z' = P(t, y) appended to y.
+        """Stage values w of the ledger lines in a Rosenbrock step from (t, y) : float64[s, lines] [W].
 
-        w_i = g (P(U_i) + P_y h k_i + d_i h P_t + sum of C_ij w_j), see `steppers/ros.py`; P_y and P_t by differences.
+        The energies z of the lines, with dz/dt = P(t, y) and P the powers, are integrated like further states:
+        w_i = gamma (P(t + c_i h, U_i) + P_y h k_i + d_i h P_t + sum over j < i of C_ij w_j), with stage values
+        U_i = y + h sum a_ij k_j and stage slopes k_i. Derivatives P_y and P_t are differences; C, d, gamma : see
+        `rosenbrock_coefficients`.
         """
         s, (big_c, late, gamma) = len(c), self.rosenbrock_coefficients()
         per, eps, slope = 1e-3 * h, 1e-3, 0.0
@@ -174,7 +184,7 @@ class EnergyLoop(RunLoop):
         return w
 
     def released_stops(self, t: float, y: np.ndarray, part: np.ndarray) -> np.ndarray:
-        """Correct the energies of a step for end stops whose contact opens within it.
+        """Correct the energies `part` of the step from (t, y) for end stops whose contact opens within the step.
 
         The stored energy changes by the exact difference between the ends of the step; the remainder is dissipated.
         The rate of the stored energy has a kink where the contact force ends, which stage values do not resolve.
@@ -193,7 +203,7 @@ class EnergyLoop(RunLoop):
         return part
 
     def add(self, part: np.ndarray) -> None:
-        """Add to the totals with compensated (Kahan) summation."""
+        """Add the energies `part` of a step to the totals, with compensated (Kahan) summation."""
         corrected = part + self.carry
         new = self.total + corrected
         self.carry = corrected - (new - self.total)
@@ -201,14 +211,17 @@ class EnergyLoop(RunLoop):
 
 
 def stop_travels(model, t: float, y: np.ndarray) -> np.ndarray:
-    """Travel [m] and speed [m/s] of every end stop at a state : float64[stops, 2]."""
+    """Travel [m] and speed [m/s] of the body at every end stop, at the state (t, y) : float64[stops, 2]."""
     out, tables = model.evaluate(t, y)[1], model.tables
     first = int(model.layout["travel"]) + 2 * len(tables.braces)
     return out[first : first + 2 * len(tables.stops)].reshape(-1, 2)
 
 
 def stop_compression(stop, x: float, speed: float) -> tuple[float, bool]:
-    """(compression of an end stop [m], True if the contact opens: the body leaves faster than the stop can follow)."""
+    """(compression of an end stop [m], True if the body leaves the stop faster than the stop can follow).
+
+    stop : row of the table of stops; x : travel of the body [m]; speed : its speed [m/s]
+    """
     above, below = x - stop["above"], -stop["below"] - x
     depth, faster = (above, speed) if above > below else (below, -speed)
     leaves = faster < 0.0 and stop["stiffness"] * depth + stop["damping"] * faster <= 0.0
@@ -216,7 +229,7 @@ def stop_compression(stop, x: float, speed: float) -> tuple[float, bool]:
 
 
 class EnergyRun(Run):
-    """Run with an energy ledger."""
+    """Run that records an energy ledger: totals at every step, and rows of a table."""
 
     loop_type = EnergyLoop
 
