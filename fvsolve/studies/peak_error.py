@@ -182,7 +182,7 @@ def signals(runs: dict[float, Result], probe: str, rising: Callable[[np.ndarray]
 
 
 def limit_row(runs: dict[float, Result], limit: int, k: int, row: dict[str, Any], unresolved: Unresolved) -> dict:
-    """Row of a limit with its error. A limit that holds becomes open if its margin is below the error, or that unknown.
+    """Row of a limit with its error. A limit that holds becomes open if the error is unknown or above the margin.
 
     limit, k : indices of the limit and of the row in the results of all runs; row : part, bound, margin and places
     """

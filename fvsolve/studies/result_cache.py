@@ -20,7 +20,7 @@ from fvsolve.validation import PATH, Kind
 
 
 class ResultCache:
-    """Results of earlier points by case and settings, in `points.jsonl` of a folder; in memory without a folder.
+    """Results of the points (runs) of a study, in `points.jsonl` of a folder; in memory without a folder.
 
     The folder is locked until the cache is closed (context manager). Raises RunError if another study has the lock.
     A result is reused only for the same case (as resolved, with its files), the same extra settings and the same

@@ -153,7 +153,10 @@ def read_overrides(table: Any, group: str, fault) -> dict[str, dict[str, Any]]:
 
 
 def dotted_keys(table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Pairs (dotted key, value) of nested tables, each key of a named part separate; deeper tables are values."""
+    """Flatten tables of overrides to pairs (dotted key, value).
+
+    A named part, such as links.main, gives a pair for each of its keys; deeper tables remain values.
+    """
     for first, inner in table.items():
         if "." in first or not isinstance(inner, dict):
             yield first, inner

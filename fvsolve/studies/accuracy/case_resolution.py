@@ -130,8 +130,8 @@ def scheme_order(case) -> int:
 def order_varies(case) -> bool:
     """True if `scheme_order` is an upper bound only.
 
-    A scheme above second order has second order for free surfaces of waves in two directions, but its full order for
-    waves along one axis.
+    For free surfaces, a scheme above second order has its full order if waves travel along one axis only, otherwise
+    second order.
     """
     fifth = scheme_order(case) > BASIN_ORDER
     return fifth and any(basin.physics_type.has_shocks for basin in basins(case).values())

@@ -1,4 +1,8 @@
-"""Work-precision study: error against CPU time and work over schemes, methods and resolutions."""
+"""Work-precision study: error against CPU time and cell updates, over schemes, methods and resolutions.
+
+A setting is a scheme, a method and a resolution; a point is a setting with the results of its run. A curve has the
+points of one scheme and method, from coarse to fine.
+"""
 
 from __future__ import annotations
 
@@ -106,7 +110,7 @@ class Chart(Displayable):
         return f"of {self.case!r}: {len(self.points)} points, {len(self.failed)} failed; default {self.default}"
 
     def table_columns(self) -> dict[str, list]:
-        """Columns TABLE_COLUMNS of all points."""
+        """Columns of a table of all points : name in TABLE_COLUMNS -> values."""
         return ResultTable([Column(key) for key in TABLE_COLUMNS], self.rows).table_columns()
 
     @property
@@ -172,7 +176,6 @@ def chart(
     """Run a case with all combinations of schemes, methods and cells (or tolerances); compare errors with their cost.
 
     schemes, methods : names (default a selection)
-
     cells : numbers of cells of the pipe with the longest travel time of a wave, or along the longer side of a basin
     rtol, step : tolerances [-] and steps [s] of a case without cells; if all its pipes are delay lines, steps only
     target : error over the trajectory, relative to the range; the cheapest setting that reaches it is found and run
@@ -375,13 +378,16 @@ class _ChartStudy:
 
 
 def empty_point(reason: str) -> dict:
-    """Data of a point without a run."""
+    """Results of a point without a run: NaN or 0, and the reason."""
     cost = {"seconds": math.nan, "rhs": 0, "updates": 0, "steps": 0}
     return {"ok": False, "reason": reason, **asdict(Distance()), **cost}
 
 
 def cost_grows(setting: MethodSetting) -> bool:
-    """True if finer settings of a curve cost more; an implicit method may be faster with a smaller tolerance."""
+    """True if finer settings of the curve certainly cost more.
+
+    False for adaptive implicit methods and `auto` without cells, which may be faster with a smaller tolerance.
+    """
     if setting.cells is not None or setting.control == "step" or not is_adaptive(setting.method):
         return True
     return setting.method != AUTO and METHODS[setting.method].explicit

@@ -1,4 +1,4 @@
-"""Settings of a work-precision study: schemes, methods and resolutions that are run."""
+"""Settings of a work-precision study: schemes, methods and resolutions. A curve has one scheme and method."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ def default_curve(case: Case) -> str:
 
 
 def unsupported_schemes(case: Case, schemes: Sequence[str] | None) -> list[str]:
-    """Usual schemes of a chart that do not support the fluid of this case."""
+    """Names of default schemes of a chart that do not support the fluid of this case; none if `schemes` is given."""
     return [] if schemes or not main_part_name(case) else [name for name in DEFAULT_SCHEMES if name not in case.schemes]
 
 
@@ -201,7 +201,10 @@ def _delay_line_settings(case: Case, schemes, methods, cells, rtol, step) -> lis
 def scheme_method_pairs(
     case: Case, schemes: Sequence[str] | None, methods: Sequence[str] | None, stiff: bool = False
 ) -> list[tuple[str, str]]:
-    """Pairs of scheme and method: all requested pairs, else a representative selection; always the default pair."""
+    """Pairs (scheme, method): all pairs of the given names, or a selection without methods; always the default pair.
+
+    stiff : True if a time scale other than waves limits explicit steps
+    """
     names = list(schemes or [name for name in DEFAULT_SCHEMES if name in case.schemes])
     if methods:
         pairs = [(scheme, method) for scheme in names for method in methods]

@@ -154,7 +154,7 @@ class FitRows:
     # reasons ---------------------------------------------------------------------------------------------------
 
     def too_few_reason(self) -> str:
-        """Reason for fewer than three good rows."""
+        """Reason for no order with fewer than three rows without a mark."""
         if not np.any(self.e > 0.0):
             return NO_ERROR
         if FLOOR in self.marks or OFF_LINE in self.marks:

@@ -1,4 +1,8 @@
-"""Errors and computing times of simple and rich models of a case, from rigid columns to cells, by density law."""
+"""Errors and computing times of models of a case, from rigid columns to many cells, with every density law.
+
+A level of the hierarchy is a model of the case with a density law. The richest level, with most cells and the most
+complete law that runs, is the reference of all others.
+"""
 
 from __future__ import annotations
 
@@ -289,7 +293,7 @@ def _run_level(case, name: str, law: str) -> Outcome:
 
 
 def long_capped_level(model, state, sink, progress) -> CappedRun:
-    """Run with at most LEVEL_CPU_LIMIT seconds of CPU time."""
+    """Run that is stopped after LEVEL_CPU_LIMIT seconds of CPU time."""
     run = CappedRun(model, state, sink, progress)
     run.max_seconds = LEVEL_CPU_LIMIT
     return run

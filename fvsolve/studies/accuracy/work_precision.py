@@ -1,4 +1,7 @@
-"""Work-precision front: the cheapest setting for each target error, next to the default setting."""
+"""Work-precision front: the cheapest setting for each target error, next to the default setting.
+
+A curve has the points (settings with results) of one scheme and method, from coarse to fine.
+"""
 
 from __future__ import annotations
 

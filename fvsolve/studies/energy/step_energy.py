@@ -229,7 +229,7 @@ def stop_compression(stop, x: float, speed: float) -> tuple[float, bool]:
 
 
 class EnergyRun(Run):
-    """Run that records an energy ledger: totals at every step, and rows of a table."""
+    """Run that records an energy ledger: totals of all ledger lines at every step, and rows of a table."""
 
     loop_type = EnergyLoop
 
@@ -262,7 +262,7 @@ class EnergyRun(Run):
         self.losses.append(self.impact_losses.copy())
 
     def stop_columns(self) -> None:
-        """Stop columns, and add the kinetic energy of the lost flows to the impact losses (Carnot)."""
+        """Stop rigid columns that can no longer flow; add their kinetic energy to the impact losses (Carnot)."""
         before = self.flows()
         super().stop_columns()
         columns, rho = self.model.tables.columns, self.model.case.properties.density
