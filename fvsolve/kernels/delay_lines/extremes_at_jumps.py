@@ -1,7 +1,8 @@
-"""Extremes on both sides of jumps: at nodes, at places within delay lines, and where two jumps cross there.
+"""Extremes of pressure and flow on both sides of jumps: at nodes, within delay lines, and where two jumps cross.
 
-A jump passes between two recorded states. Values on both sides of it are the smooth part at its time, by linear
-interpolation between both states, plus the jumps that have arrived by then.
+A jump is an instantaneous change of a wave; it passes a point between two recorded states. The value just before or
+after it is the smooth part at that time, by linear interpolation between both states, plus the jumps that have arrived
+by then. q : segment of a delay line; clock : result of `reading_data`; places : result of `offsets_of`.
 """
 
 from fvsolve.jit import njit
@@ -30,14 +31,19 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit(forceinline=True)
 def spare_offsets(tables):
-    """Offsets in `spare` of: probe values and node pressures of the last record, both without jumps now, work array."""
+    """Offsets in the array `spare` of five arrays, in this order.
+
+    - probe values and node pressures of the last record
+    - probe values and node pressures at the end of the step without the jumps that arrive in it
+    - work array
+    """
     at, probes, nodes = 2 * tables.layout[0]["size"], tables.probes.size, tables.nodes.size
     return at, at + probes, at + probes + nodes, at + 2 * probes + nodes, at + 2 * (probes + nodes)
 
 
 @njit
 def store_values(tables, out, values):
-    """Store the recorded values of probes and pressures of nodes."""
+    """Store probe values and node pressures of an accepted state in `spare`, as those of the last record."""
     first, second, _, _, _ = spare_offsets(tables)
     pressure = tables.layout[0]["pressure"]
     for k in range(tables.probes.size):
@@ -48,7 +54,10 @@ def store_values(tables, out, values):
 
 @njit
 def store_smooth_values(t, y, state, handle):
-    """Store values of probes and pressures of nodes at t for the case that no jump has arrived."""
+    """Store probe values and node pressures at t in `spare`, for the case that no jump arrives in the step.
+
+    state : `out` at t for this case
+    """
     tables = open_tables(handle)
     _, _, third, fourth, fifth = spare_offsets(tables)
     pressure = tables.layout[0]["pressure"]
@@ -59,7 +68,11 @@ def store_smooth_values(t, y, state, handle):
 
 @njit
 def extremes_at_jump(t, time, y, state, handle):
-    """Update extremes by the state beside a jump that arrives at `time`; state : at t, with jumps up to `time`."""
+    """Update the extremes of probes and the first times below vapour pressure by the values beside a jump.
+
+    time : arrival time of the jump [s]; t : end of the step [s]; state : `out` at t with the jumps that have arrived so
+        far
+    """
     tables = open_tables(handle)
     past, spare, marks, pipes, nodes = tables.past, tables.spare, tables.marks, tables.pipes, tables.nodes
     first, second, third, fourth, fifth = spare_offsets(tables)
@@ -85,7 +98,12 @@ def extremes_at_jump(t, time, y, state, handle):
 
 @njit
 def line_extremes_at_jumps(past, places, clock, line, q, x, sign, before, t):
-    """(least, its time, greatest, its time) of r + sign l at jumps that pass a share x of stretch q in a step."""
+    """Extremes of r + sign l on both sides of the jumps that pass a point of a delay line, without friction loss.
+
+    Returns (least, time of the least, greatest, time of the greatest) [kg/s, s]; without a jump, least is INFINITE.
+    r, l : forward and backward wave; sign : 1 for pressure, -1 for flow; x : position as fraction of segment q
+    before, t : begin and end of the step [s]
+    """
     least, t_least, greatest, t_greatest = INFINITE, t, -INFINITE, t
     queue, tau, s, same = int(past[JUMP_CAPACITY]), line["tau"], line["stretch"] + q, clock[4]
     ring, mask = ring_of(places, line, q)
@@ -111,7 +129,7 @@ def line_extremes_at_jumps(past, places, clock, line, q, x, sign, before, t):
 
 @njit
 def envelope_where_jumps_cross(past, places, clock, tables, line, q, before, t):
-    """Update the envelope at each point of stretch q where two jumps cross in a step."""
+    """Update the pressure envelope at each point of segment q where two jumps cross between the times `before` and t."""
     queue, tau, s, same, pipe = (
         int(past[JUMP_CAPACITY]),
         line["tau"],
@@ -150,7 +168,7 @@ def envelope_where_jumps_cross(past, places, clock, tables, line, q, before, t):
 
 @njit
 def update_line_extremes(past, places, tables, before, t):
-    """Update envelopes and extremes within lines by the values at jumps that have passed there since `before`."""
+    """Update envelopes and extremes within delay lines by the values beside jumps that pass between `before` and t."""
     clock = reading_data(past, int(past[COUNT]) - 1)
     for number in range(tables.delays.size):
         line, pipe = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]]
@@ -180,7 +198,10 @@ def update_line_extremes(past, places, tables, before, t):
 
 @njit(forceinline=True)
 def mark_vapour(tables, number, j, t, value):
-    """Record the first time at which the pressure at a place of a pipe falls below vapour pressure."""
+    """Record the first time at which the pressure at output point j of a pipe falls below vapour pressure.
+
+    number : number of the pipe; value : sum of both waves [kg/s]
+    """
     marks, cell = tables.marks, tables.pipes[number]["cell"] + j
     if value < tables.profile[cell] and marks[number] != marks[number]:
         marks[number] = t
@@ -188,7 +209,7 @@ def mark_vapour(tables, number, j, t, value):
 
 @njit
 def update_probe_extremes(past, places, clock, tables, before, t):
-    """Update the extremes of probes within lines by the values at jumps since `before`."""
+    """Update the extremes of probes within delay lines by the values beside jumps between the times `before` and t."""
     for k in range(tables.probes.size):
         probe = tables.probes[k]
         if (probe["kind"] != PIPE_PRESSURE and probe["kind"] != PIPE_FLOW) or probe["side"] != 0:

@@ -1,4 +1,4 @@
-"""Update of delay lines after an accepted state: waves sent by nodes, jumps that have arrived, envelopes."""
+"""Update of the history of delay lines after an accepted state: sent waves, arrived jumps, pressure envelopes."""
 
 from fvsolve.jit import njit
 from fvsolve.kernels.delay_lines.extremes_at_jumps import store_values, update_line_extremes
@@ -38,7 +38,10 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def record_lines(t, y, out, handle, values):
-    """After an accepted step, store the waves sent into lines, pass on arrived jumps and update envelopes."""
+    """After an accepted step, store the waves sent into delay lines, pass on arrived jumps, and update envelopes.
+
+    values : probe values of the state y at t
+    """
     tables = open_tables(handle)
     past = tables.past
     k, places, status = int(past[COUNT]), offsets_of(past), out[STATUS]
@@ -69,7 +72,7 @@ def record_lines(t, y, out, handle, values):
 
 @njit
 def record_again(past, places, tables, t, y, out):
-    """Record a state at the time of the last entry: after a kink or an event, or with its state corrected."""
+    """Record a state at the time of the last entry again: after a kink or event, or after a correction of the state."""
     k = int(past[COUNT]) - 1
     last = time_of(past, k)
     if past[CORRECTED_TIME] == last:
@@ -82,7 +85,7 @@ def record_again(past, places, tables, t, y, out):
 
 @njit
 def record_step(past, places, tables, t, y, out, handle):
-    """Write a new entry, after the jumps that have arrived since the last entry are passed on."""
+    """Write the waves of an accepted state as a new entry; pass on the jumps that have arrived in the step before."""
     before = time_of(past, int(past[COUNT]) - 1)
     write_joint_arrivals(past, places, tables, t)
     live = past[JUMPS_TRAVELLING] > 0.0
@@ -116,7 +119,10 @@ NAN = float("nan")
 
 @njit(forceinline=True)
 def update_line_envelope(t, places, clock, tables, number):
-    """Update the envelope along a line at the time of the last entry, and its first time below vapour pressure."""
+    """Update the pressure envelope along a delay line at the time t of the last entry.
+
+    The first time below vapour pressure is updated too. number : number of the delay line
+    """
     line, envelope = tables.delays[number], tables.envelope
     n, cell = line["places"], tables.pipes[line["pipe"]]["cell"]
     r, l, low, high = tables.scratch[:n], tables.scratch[n : 2 * n], 0, 0
@@ -131,7 +137,7 @@ def update_line_envelope(t, places, clock, tables, number):
 
 @njit
 def update_line_envelopes(t, places, tables):
-    """Update the envelopes along all lines."""
+    """Update the pressure envelopes along all delay lines at the time t of the last entry."""
     clock = reading_data(tables.past, int(tables.past[COUNT]) - 1)
     for i in range(tables.delays.size):
         update_line_envelope(t, places, clock, tables, i)
@@ -139,7 +145,7 @@ def update_line_envelopes(t, places, tables):
 
 @njit
 def write_ends(past, places, tables, entry, out):
-    """Write the waves that nodes send into an entry once more."""
+    """Write the waves that nodes send into delay lines again into an existing entry."""
     for i in range(tables.delays.size):
         line, at = tables.delays[i], tables.layout[0]["ends"] + 4 * tables.delays[i]["pipe"]
         write_entry(past, places, line, 0, entry, 0, out[at])
@@ -148,7 +154,10 @@ def write_ends(past, places, tables, entry, out):
 
 @njit
 def remove_all_arrived_jumps(past, places, delays, before):
-    """Remove from all lists the jumps that had arrived before a time and are not read any more."""
+    """Remove the jumps that have arrived and that no later reading needs from the lists of all delay lines.
+
+    before : time of the last entry [s]
+    """
     for i in range(delays.size):
         line = delays[i]
         for s in range(line["stretch"], line["stretch"] + line["stretches"]):

@@ -1,8 +1,9 @@
-"""Correction of states that a jump changes within a step, after the step is taken.
+"""Correction of states for a jump that arrives within a step, applied after the step.
 
-The rates of a state change when a jump arrives. The weights of the step count the new rate for too short or too long a
-time. The missing part is added, so that a jump is correct to second order. The supply of a lake, and the mass in lines
-except the mass given to stores, are those of the method.
+The rates of a state change when a jump arrives. The weights of the Runge-Kutta method count the new rate for too short
+or too long a time. The missing part is added, so that a jump is correct to second order. Without a correction are the
+supply through nodes of given pressure, and the mass in delay lines except the mass that they give to nodes with
+storage.
 """
 
 from math import exp, expm1
@@ -18,10 +19,11 @@ NAN = float("nan")
 
 @njit(forceinline=True)
 def change_times(past, tables, t, time, sent):
-    """(time since a change within the step that ends at t, time that the weights of the step count it) [s].
+    """Times for which a change within a step acts, and for which the weights of the method count it [s].
 
     Stages before the change do not include it. Stages after it include it as if it had always been there. No stage
     includes a jump that was sent since the last entry.
+    t, time : end of the step, and time of the change; sent : time at which the jump was sent
     """
     if sent > time_of(past, int(past[COUNT]) - 1) + time_tolerance(past):
         return t - time, 0.0
@@ -35,9 +37,10 @@ def change_times(past, tables, t, time, sent):
 
 @njit(forceinline=True)
 def missing_time(times, rate):
-    """Time that the weights of the step miss [s], reduced because a store soon balances the inflow, at `rate` [1/s].
+    """Time that the weights of the step miss [s], reduced because a node with storage soon balances the inflow.
 
-    Without the reduction a jump into a store that fills within a step would be corrected by more than it brings.
+    times : result of `change_times`; rate : rate at which the node adopts the new pressure [1/s]
+    Without the reduction, a jump at a node that fills within a step would be corrected by more than it brings.
     """
     since, booked = times
     late = since - booked
@@ -46,7 +49,7 @@ def missing_time(times, rate):
 
 @njit(forceinline=True)
 def stores_inflow(tables, i):
-    """True if node i stores its inflow now."""
+    """True if node i has storage and stores its inflow now; a tank that is empty or spills does not."""
     node = tables.nodes[i]
     if node["kind"] == FIXED or node["kind"] == JUNCTION or node["kind"] == PATCH:
         return False
@@ -56,13 +59,16 @@ def stores_inflow(tables, i):
 
 @njit(forceinline=True)
 def filling_rate(tables, out, i, j):
-    """Rate at which store i adopts the pressure of the waves at node j [1/s]."""
+    """Rate at which the pressure of node i, which has storage, adopts the pressure of the waves at node j [1/s]."""
     return stiffness_of(tables.nodes, tables.layout[0], out, i) * tables.nodes[j]["admittance"]
 
 
 @njit(forceinline=True)
 def correct_store(past, tables, y, out, pipe, i, flow, times):
-    """Add the mass of a flow out of a line that began within the step to a store, and subtract it from the line."""
+    """Add the mass of a flow from a delay line, which began within the step, to node i; subtract it from the line.
+
+    Nodes without storage are left unchanged. flow [kg/s]; times : result of `change_times`
+    """
     if flow != 0.0 and stores_inflow(tables, i):
         mass = flow * missing_time(times, filling_rate(tables, out, i, i))
         y[tables.nodes[i]["y"]] += mass
@@ -72,7 +78,10 @@ def correct_store(past, tables, y, out, pipe, i, flow, times):
 
 @njit
 def correct_columns(past, tables, y, i, change, times):
-    """Add the speed that a pressure jump [Pa] at node i has given to rigid columns."""
+    """Add the mass flow that a pressure jump within the step, `change` [Pa] at node i, has given to rigid columns.
+
+    times : result of `change_times`
+    """
     columns = tables.columns
     for k in range(columns.size):
         side = (columns[k]["from_node"] == i) - (columns[k]["to_node"] == i)
@@ -85,11 +94,11 @@ def correct_columns(past, tables, y, i, change, times):
 
 @njit
 def correct_behind_valves(past, tables, y, spare, out, times):
-    """Correct stores behind valves, and rigid columns, for a jump at nodes that are solved with valves.
+    """Correct nodes with storage behind valves, and rigid columns, for a jump at nodes that are solved with valves.
 
-    The mass added to stores is subtracted from the lines that feed them.
+    The mass added to these nodes is subtracted from the delay lines that feed them.
 
-    spare, out : state before and after the jump
+    spare, out : state before and after the jump; times : result of `change_times`
     """
     layout, valves, nodes = tables.layout[0], tables.valves, tables.nodes
     pressure, given, fed = layout["pressure"], 0.0, 0.0

@@ -1,8 +1,8 @@
-"""Jumps in delay lines: detection, storage, and passage through friction and the joints of stretches.
+"""Jumps in delay lines: detection, storage, passage through friction and through the joints between segments.
 
-An instantaneous change by a schedule, a valve or an event is a jump. A jump below `numerics.delay_tolerance` joins the
-smooth part. Friction in the middle of a stretch reflects the difference of the friction losses with and without
-the jump.
+A jump is an instantaneous change of a wave by a schedule, a valve or an event. A jump below `numerics.delay_tolerance`
+joins the smooth part of the wave. Friction in the middle of a segment reflects the difference of the friction losses
+with and without the jump. s, q : segment, counted over all lines, or within its line; wave : 0 forward, 1 backward.
 """
 
 from fvsolve.jit import njit
@@ -46,7 +46,7 @@ NOISE = 1e-13  # fraction of a wave of half a bar below which a change is roundi
 
 @njit(forceinline=True)
 def has_short_lines(tables):
-    """True if a line is shorter than a step."""
+    """True if the travel time of any delay line is shorter than the longest step."""
     for i in range(tables.delays.size):
         if tables.delays[i]["now"] > 0.0:
             return True
@@ -55,28 +55,31 @@ def has_short_lines(tables):
 
 @njit(forceinline=True)
 def least_jump(past, tables, pipe):
-    """Size below which a jump joins the smooth part: a share of the greatest jump or greatest wave [kg/s]."""
+    """Size below which a jump joins the smooth part [kg/s]: a fraction of the greatest jump or greatest wave so far."""
     least = tables.settings[0]["jumps"] * max(past[GREATEST_JUMP], past[GREATEST_WAVE])
     return max(least, NOISE * 0.5e5) * pipe["admittance"]
 
 
 @njit
 def store_jump(past, places, s, wave, t, size, pipe):
-    """Store a jump that enters stretch s; where its list is full, record the size that did not fit."""
+    """Store a jump of a wave that enters segment s at t; where the list is full, record the size that did not fit.
+
+    size : change of the wave [kg/s]
+    """
     if not insert_jump(past, places, jump_head(places, s, wave), t, size):
         past[GREATEST_UNSTORED_JUMP] = max(past[GREATEST_UNSTORED_JUMP], abs(size) / pipe["admittance"])
 
 
 @njit
 def store_large_jump(past, places, tables, s, wave, t, size, pipe):
-    """Store a jump that enters stretch s, unless it is small: then it joins the smooth part."""
+    """Store a jump of a wave that enters segment s at t, unless it is small: then it joins the smooth part."""
     if abs(size) > least_jump(past, tables, pipe):
         store_jump(past, places, s, wave, t, size, pipe)
 
 
 @njit(forceinline=True)
 def first_waiting_jump(past, places, s, wave):
-    """Offset of the first jump of a wave of stretch s that has not been passed on; -1 where there is none."""
+    """Offset in `past` of the first jump of a wave of segment s that has not been passed on at its end; -1 for none."""
     at, queue = jump_head(places, s, wave), int(past[JUMP_CAPACITY])
     if not past[at + ARRIVED_COUNT] < past[at + JUMP_COUNT]:
         return -1
@@ -85,7 +88,10 @@ def first_waiting_jump(past, places, s, wave):
 
 @njit
 def reflected_part(past, places, tables, line, pipe, q, wave, size, t):
-    """Part of a jump, not yet passed on, that friction in the middle of stretch q reflects [kg/s]."""
+    """Part of a jump that friction in the middle of segment q reflects [kg/s]; the jump is not yet passed on.
+
+    size : change of the wave by the jump [kg/s]; t : arrival time at the end of the segment [s]
+    """
     if not has_friction(pipe):
         return 0.0
     ring, mask = ring_of(places, line, q)
@@ -101,7 +107,7 @@ def reflected_part(past, places, tables, line, pipe, q, wave, size, t):
 
 @njit
 def pass_jumps_at_joints(past, places, tables, t):
-    """Pass on all jumps that leave stretches within lines by t."""
+    """Pass all jumps that leave inner segments of delay lines by t on to the next segments, with their reflections."""
     queue = int(past[JUMP_CAPACITY])
     for number in range(tables.delays.size):
         line, pipe = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]]
@@ -121,7 +127,7 @@ def pass_jumps_at_joints(past, places, tables, t):
 
 @njit
 def write_joint_arrivals(past, places, tables, t):
-    """Write the waves that arrive at t at the joints of stretches and at the ends of lines into `past`."""
+    """Write the waves that arrive at t at the joints between segments and at the ends of delay lines into `past`."""
     write_all_arrivals(past, tables, t)
     clock = reading_data(past, newest_before(past, t))
     for i in range(tables.delays.size):
@@ -132,9 +138,9 @@ def write_joint_arrivals(past, places, tables, t):
 
 @njit
 def complete_short_arrivals(past, places, tables, t):
-    """Complete the arriving waves of lines shorter than a step, which so far hold for p' = 0 at their ends.
+    """Complete the arriving waves of delay lines shorter than a step by the part that arrives at once.
 
-    t : time of the last entry, whose waves give the part that arrives at once
+    Before, they hold for zero pressure deviations at both ends. t : time of the last entry, whose waves give this part
     """
     newest = int(past[COUNT]) - 1
     clock = reading_data(past, newest)
@@ -155,7 +161,7 @@ def complete_short_arrivals(past, places, tables, t):
 
 @njit(forceinline=True)
 def last_sent_wave(past, places, line, q, side, k):
-    """Wave sent into stretch q of a line by entry k, with its jumps [kg/s]."""
+    """Wave sent into segment q of a delay line by entry k, with its jumps [kg/s]; side : 0 forward, 1 backward wave."""
     ring, mask = ring_of(places, line, q)
     jumps = jump_head(places, line["stretch"] + q, side)
     return past[ring + 2 * (k & mask) + side] + jumps_until(past, places, jumps, INFINITE)
@@ -163,7 +169,7 @@ def last_sent_wave(past, places, line, q, side, k):
 
 @njit
 def waves_differ(past, places, tables, k, out):
-    """True if the waves that nodes send differ from those of entry k by more than rounding."""
+    """True if the waves that nodes send now differ from those of entry k by more than rounding."""
     for i in range(tables.delays.size):
         line = tables.delays[i]
         pipe, at = tables.pipes[line["pipe"]], tables.layout[0]["ends"] + 4 * line["pipe"]
@@ -176,7 +182,7 @@ def waves_differ(past, places, tables, k, out):
 
 @njit
 def detect_jumps(past, places, tables, t, y, out, short):
-    """Store the differences between the present waves and the last entry: large ones as jumps, small ones in the entry.
+    """Compare the waves that nodes send now with the last entry; store large differences as jumps, others in the entry.
 
     short : True if nodes joined by lines shorter than a step are solved again; then the state is corrected
     """

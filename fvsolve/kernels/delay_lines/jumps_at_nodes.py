@@ -1,10 +1,11 @@
 """Jumps of delay lines at nodes: each at its own time, in order of arrival, with the values on both sides of it.
 
-At a node with p' = sum / Y a jump is reflected and passed on at once. At a valve the nodes are solved again with the
-jump. So a jump passes linear elements exactly, and nonlinear elements by the secant over the jump. In the tables used
-for this (`sharp`) lines shorter than a step are treated like longer lines: a jump needs its travel time there too.
-At nodes with instantaneous devices a step ends when a jump arrives. The left limit is recorded, then the jump is
-admitted and events act (`admit_jumps`).
+At a junction of pipes only, the pressure is the sum of the arriving waves over the admittance Y, so a jump is reflected
+and passed on at once. At a valve the nodes are solved again with the jump. So a jump passes linear elements exactly,
+and nonlinear elements by the secant over the jump. The tables `sharp` serve this purpose: there, lines shorter than a
+step are treated like longer lines, so that a jump needs its travel time in them too. At nodes with instantaneous
+devices a step ends when a jump arrives. The state just before is recorded, then the jump is admitted and events act
+(`admit_jumps`). q : segment within its line; wave : 0 forward, 1 backward; side : 0 end at `from`, 1 end at `to`.
 """
 
 from fvsolve.jit import njit
@@ -56,23 +57,24 @@ CROWDED_COUNT = 1e6  # jumps travelling at one time; with so many, only a jump a
 
 @njit(forceinline=True)
 def solved_alone(tables, i):
-    """True if a node is solved without others: p' is given, or it is the sum of the arriving waves over Y."""
+    """True if node i is solved without other nodes: its pressure is given, or is the sum of arriving waves over Y."""
     node = tables.nodes[i]
     return node["kind"] != JUNCTION or node["solve"] == ALONE
 
 
 @njit(forceinline=True)
 def end_stretch(line, side):
-    """Number of the stretch at an end of a line; side : 0 `from`, 1 `to`."""
+    """Segment at an end of a delay line, counted over all lines; side : 0 `from`, 1 `to`."""
     return line["stretch"] + (line["stretches"] - 1 if side == 1 else 0)
 
 
 @njit(forceinline=True)
 def ends_step(past, tables, line, pipe, q, wave, size):
-    """True if a jump of a wave of stretch q, or the part that friction reflects, ends a step when it arrives.
+    """True if a step ends when a jump of segment q, or the part that friction reflects, arrives.
 
     It does so at nodes with instantaneous devices. After a small jump the device acts at the end of the step. The
-    bound never decreases in a run: otherwise a jump to be passed on within a step would stay in the list.
+    least size of such a jump never decreases in a run: otherwise a jump to be passed on within a step would stay in the
+    list.
     """
     acts = line["acts"]
     if acts == 0:
@@ -88,7 +90,7 @@ def ends_step(past, tables, line, pipe, q, wave, size):
 
 @njit
 def next_arrival(past, places, tables, t):
-    """Time of the next jump after t that ends a step [s]."""
+    """Arrival time of the next jump after t that ends a step [s]; INFINITE for none."""
     first_time, queue, after = INFINITE, int(past[JUMP_CAPACITY]), t + time_tolerance(past)
     for number in range(tables.delays.size):
         line, pipe = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]]
@@ -133,7 +135,10 @@ def admit_jumps(past, places, tables, t):
 
 @njit
 def earliest_jump(past, places, tables, t):
-    """(line, stretch, wave, offset) of the jump that arrives first at an end of a line by t; line -1 without a jump."""
+    """Jump that arrives first at an end of a delay line by t: (line, segment within the line, wave, offset in `past`).
+
+    line is -1 without a jump. Jumps that end a step are left out.
+    """
     best, result = t + time_tolerance(past), (-1, 0, 0, -1)
     for number in range(tables.delays.size):
         line = tables.delays[number]
@@ -149,7 +154,10 @@ def earliest_jump(past, places, tables, t):
 
 @njit
 def pass_jumps_at_ends(past, places, own, t, y, out, handle):
-    """Pass on the jumps that arrive at the ends of lines up to t, in order; return True if there is a jump."""
+    """Pass on the jumps that arrive at the ends of delay lines up to t, in order; return True if there is a jump.
+
+    own : tables of the run, in which short lines couple their ends at once
+    """
     number, q, wave, place = earliest_jump(past, places, own, t)
     if number < 0:
         return False
@@ -187,7 +195,10 @@ def pass_jumps_at_ends(past, places, own, t, y, out, handle):
 
 @njit
 def leave_stretch(past, places, tables, y, state, number, q, wave, time, size, times):
-    """Pass a jump on from stretch q of a line, in the direction of a wave; False if nodes must be solved for it."""
+    """Pass a jump on from segment q of a delay line, in the direction of a wave; False if nodes must be solved for it.
+
+    number : number of the line; size : change of the wave [kg/s]; times : result of `change_times`
+    """
     line, pipe = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]]
     onward, side = q + 1 if wave == 0 else q - 1, 1 if wave == 0 else 0
     if size == 0.0:
@@ -204,7 +215,10 @@ def leave_stretch(past, places, tables, y, state, number, q, wave, time, size, t
 
 @njit
 def enter_plain_node(past, places, tables, y, state, number, side, time, size, times):
-    """Let a jump arrive at a node at an end of a line that is solved alone; times : see `change_times`."""
+    """Let a jump arrive at an end of a delay line, at a node that is solved alone.
+
+    number : number of the line; size : change of the wave [kg/s]; times : result of `change_times`
+    """
     line, pipe, layout = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]], tables.layout[0]
     i = pipe["to_node"] if side == 1 else pipe["from_node"]
     node, at = tables.nodes[i], layout["ends"] + 4 * line["pipe"]
@@ -228,7 +242,10 @@ def enter_plain_node(past, places, tables, y, state, number, side, time, size, t
 
 @njit
 def solve_nodes_again(past, places, tables, t, y, state, sharp, time, times):
-    """Solve the nodes with the waves that arrive now; store the differences of the sent waves as jumps."""
+    """Solve the nodes with the waves that arrive now; store the changes of the waves they send as jumps.
+
+    time : arrival time of the jump [s]; times : result of `change_times`
+    """
     layout, size = tables.layout[0], state.size
     solved = tables.spare[size : 2 * size]
     run_job(CLOSE, t, y, y[:0], solved, sharp)

@@ -1,13 +1,18 @@
 """Stored energy, friction power and rate of storage of delay lines, from the waves sent into them.
 
-A stretch contains the waves sent into it at ages u of 0 .. tau: the forward wave at u c from its beginning, the
-backward wave at u c from its end. Behind the middle the forward wave is smaller by delta, the friction loss there; the
-backward wave is larger by delta. In units of 1 / (rho A) per length the stretch stores
-R^2 + L^2 + (q0 + M0) R + (q0 - M0) L above the profile of flow M0 and q0 = Y P0, and q0 falls by drag0. So the power
-that enters at the ends is stored or taken: sum of l (drag(M) - drag0) M of the middles, plus drag0 times the integral
-of M. The power taken is the friction, sum of l drag(M) M, and the error of the midpoint rule for a falling profile.
-A line shorter than a step h stores the share 1 - beta of the waves sent in h, and takes beta (1 - beta) c (s - s_h)^2
-of each wave.
+A segment of travel time tau contains the waves sent into it at ages u of 0 .. tau: the forward wave R at the distance
+u c from its beginning, the backward wave L at u c from its end; c is the wave speed. Beyond the middle of the segment
+the forward wave is smaller by delta, the friction loss there, and the backward wave is larger by delta.
+
+In units of 1 / (rho A) per length, with density rho and area A, the segment stores
+R^2 + L^2 + (q0 + M0) R + (q0 - M0) L above the initial steady state. M0 is its mass flow, q0 = Y P0 its total pressure
+P0 times the admittance Y; q0 falls along the line by drag0 per travel time. The power that enters at the ends is stored
+or taken. Taken are (drag(M) - drag0) M times the length of the segment, with the flow M in its middle, and drag0 times
+the integral of M. The power taken is that of friction, drag(M) M times the length, and the error of the midpoint rule
+for falling q0.
+
+A line shorter than a step h stores the fraction 1 - beta of the waves sent in h, beta = 1 - tau / h. It takes
+beta (1 - beta) c (s - s_h)^2 of each wave s; s_h is the wave sent h before.
 """
 
 import numpy as np
@@ -40,7 +45,7 @@ GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 
 @njit
 def sent_waves(t, out, tables, number, q, at):
-    """Both waves sent into stretch q of a line at a time `at` <= t [kg/s]."""
+    """Both waves sent into segment q of delay line `number` at a time `at` <= t: (forward, backward) [kg/s]."""
     past, newest = tables.past, int(tables.past[COUNT]) - 1
     if newest >= 0 and (at <= time_of(past, newest) or t <= time_of(past, newest)):
         return read_waves(past, offsets_of(past), reading_data(past, newest), tables.delays[number], q, at)
@@ -49,7 +54,7 @@ def sent_waves(t, out, tables, number, q, at):
 
 @njit
 def kink_before(past, places, line, q, t, least):
-    """The latest time before t, not before `least`, at which a wave sent into stretch q may have a kink or jump [s]."""
+    """Latest time before t at which a wave sent into segment q may have a kink or jump [s]; at least `least`."""
     latest, queue, before = least, int(past[JUMP_CAPACITY]), t - time_tolerance(past)
     k, x = find_interval(past, int(past[COUNT]) - 1, before)
     k += x == 1.0
@@ -67,7 +72,7 @@ def kink_before(past, places, line, q, t, least):
 
 @njit
 def stretch_integrals(t, out, tables, number, q):
-    """Integrals over stretch q of R - L [kg m/s] and of the energy stored in each wave, times rho A."""
+    """Integrals over segment q of R - L [kg m/s], and of the energy of forward and of backward wave times rho A."""
     past, line, st = tables.past, tables.delays[number], tables.settings[0]
     pipe, places, hold, share = tables.pipes[line["pipe"]], offsets_of(past), line["hold"], 1.0 - line["now"]
     first, flow = tables.nodes[pipe["from_node"]], pipe["flow"]
@@ -94,7 +99,10 @@ def stretch_integrals(t, out, tables, number, q):
 
 @njit
 def line_energy(t, out, tables, number, rows):
-    """Change of the energy stored in a line since the profile [J]; rows[0] forward wave, rows[1] backward wave."""
+    """Change of the energy stored in a delay line since the start [J], as sum of two parts.
+
+    rows[0] : part of the forward wave; rows[1] : part of the backward wave
+    """
     line, rows[0], rows[1] = tables.delays[number], 0.0, 0.0
     per = 1.0 / (tables.settings[0]["rho"] * tables.pipes[line["pipe"]]["area"])
     for q in range(line["stretches"]):
@@ -105,9 +113,9 @@ def line_energy(t, out, tables, number, rows):
 
 @njit
 def line_power(t, out, tables, number, rows):
-    """Write friction power, 0 and rate of storage of a line [W] into rows[1:4].
+    """Write friction power, 0 and rate of storage of delay line `number` [W] into rows[1:4].
 
-    rows[0] : power that enters at the ends of the line
+    rows[0] : power that enters at the ends of the line, set before
     """
     line = tables.delays[number]
     pipe, beta, at = tables.pipes[line["pipe"]], line["now"], tables.layout[0]["ends"] + 4 * line["pipe"]

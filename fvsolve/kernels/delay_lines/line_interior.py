@@ -1,8 +1,9 @@
-"""Forward and backward waves at any place of a delay line, for probes, fields and envelopes.
+"""Forward and backward waves at any point of a delay line, for probes, output along the line and envelopes.
 
-At a share x of a stretch r(t, x) = sent(t - x tau) - x delta and l(t, x) = sent(t - (1 - x) tau) + (1 - x) delta.
-Here delta is the friction loss in the middle of the stretch, at the time when the wave at x passes the middle. At both
-ends the formulas give the arriving waves.
+At a fraction x of a segment of travel time tau, from its `from` end, the forward wave is
+r(t, x) = sent(t - x tau) - x delta, and the backward wave is l(t, x) = sent(t - (1 - x) tau) + (1 - x) delta. delta is
+the friction loss in the middle of the segment, at the time when the wave at x passes the middle. At both ends the
+formulas give the arriving waves.
 """
 
 from fvsolve.jit import njit
@@ -32,7 +33,7 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def sent_wave(t, out, tables, number, q, wave, at):
-    """Wave sent into stretch q of a line at a time `at` <= t, which may lie in the step that ends at t [kg/s].
+    """Wave sent into segment q of delay line `number` at a time `at` <= t [kg/s]; `at` may lie in the step that ends at t.
 
     wave : 0 forward, 1 backward
     """
@@ -59,7 +60,7 @@ def sent_wave(t, out, tables, number, q, wave, at):
 
 @njit
 def waves_at(t, out, tables, number, share):
-    """(forward, backward) wave [kg/s] at a share of the length of a line, measured from its `from` end."""
+    """(forward, backward) wave [kg/s] of delay line `number` at a fraction `share` of its length from its `from` end."""
     line = tables.delays[number]
     pipe, stretches = tables.pipes[line["pipe"]], line["stretches"]
     q = min(int(share * stretches), stretches - 1)
@@ -83,7 +84,11 @@ def waves_along_line(t, out, tables, number, r, l):
 
 @njit
 def sent_wave_linear(past, places, clock, ring, mask, jumps, wave, t):
-    """Wave sent into a stretch at t [kg/s], by linear interpolation between entries; jumps : offset of their head."""
+    """Wave sent into a segment at t [kg/s], by linear interpolation between entries, with its jumps.
+
+    ring, mask : result of `ring_of`; clock : result of `reading_data`; jumps : offset in `past` of the head of its
+        jumps
+    """
     last, latest, often, even = clock[0], clock[1], clock[2], clock[3]
     place = (t - latest) * often
     if place > -even:
@@ -101,7 +106,7 @@ def sent_wave_linear(past, places, clock, ring, mask, jumps, wave, t):
 def waves_at_linear(t, past, places, clock, line, share):
     """Both waves as in `waves_at` at the time t of the last entry, by linear interpolation; used for envelopes.
 
-    The friction loss delta is that of the waves which arrive at t.
+    The friction loss delta belongs to the waves that arrive at the ends of the segment at t.
     """
     stretches, tau = line["stretches"], line["tau"]
     q = min(int(share * stretches), stretches - 1)
@@ -124,7 +129,7 @@ def waves_at_linear(t, past, places, clock, line, share):
 
 @njit
 def waves_along_line_number(t, out, handle, number, r, l):
-    """Write both waves [kg/s] at the centres of r.size equal parts of a line, given by its number."""
+    """Write both waves [kg/s] at the centres of r.size equal parts of delay line `number`."""
     waves_along_line(t, out, open_tables(handle), number, r, l)
 
 

@@ -1,10 +1,14 @@
 """Delay lines in the right-hand side, under the linear density law.
 
-Both waves travel unchanged along a stretch to its middle. There friction takes delta = tau / 2 (drag(M) - drag0) from
-the forward wave and adds it to the backward wave. M is the flow in the middle, M + delta = M0 + r - l of the waves sent
-tau ago (midpoint rule along the path; passive, as friction is). A line shorter than the longest step h delivers the
-share 1 - tau / h of a sent wave at once and the rest after h. Its mean delay is tau, and it amplifies no wave. Its ends
-are coupled at once: p' is that of two admittances Y tau / (2 h - tau) with a conductance between them.
+A line consists of segments of travel time tau. The forward wave r and the backward wave l travel unchanged to the
+middle of a segment. There friction subtracts delta = tau / 2 (drag(M) - drag0) from the forward wave and adds it to the
+backward wave; drag is the rate of mass flow by friction [kg/s2], drag0 its value in the initial steady state. M is the
+mass flow in the middle, M + delta = M0 + r - l, with M0 in the initial steady state and the waves sent tau ago
+(midpoint rule along the path; passive, as friction is).
+
+A line shorter than the longest step h delivers the fraction beta = 1 - tau / h of a sent wave at once and the rest
+after h. Its mean delay is tau, and it amplifies no wave. Its ends are coupled at once: p' follows from two admittances
+Y tau / (2 h - tau) with a conductance between them; Y is the admittance of the pipe.
 """
 
 from fvsolve.jit import njit
@@ -47,13 +51,16 @@ def drag_and_slope(pipe, flow):
 
 @njit(forceinline=True)
 def has_friction(pipe):
-    """True if friction changes the waves."""
+    """True if friction changes the waves of a pipe."""
     return not (pipe["friction"] == FRICTION_NONE and pipe["drag"] == 0.0)
 
 
 @njit(forceinline=True)
 def friction_loss(pipe, line, r, l):
-    """Friction loss delta [kg/s] in the middle of a stretch, where waves r and l meet, by Newton; it is monotone."""
+    """Friction loss delta [kg/s] in the middle of a segment, where waves r and l meet, by Newton's method.
+
+    The equation is monotone in the flow.
+    """
     if not has_friction(pipe):
         return 0.0
     kappa, x, flow, drag0 = 0.5 * line["tau"], r - l, pipe["flow"], pipe["drag"]
@@ -71,9 +78,11 @@ def friction_loss(pipe, line, r, l):
 
 @njit(forceinline=True)
 def write_arrivals(past, places, clock, line, pipe, q, t):
-    """Write the waves that arrive at the ends of stretch q of a line at t, and the friction loss, into `past`.
+    """Write both waves that arrive at t at the ends of segment q of a delay line, and its friction loss, into `past`.
 
-    In a line shorter than a step both waves hold for p' = 0 at its ends. Jumps travel through it as through any line.
+    Three numbers [kg/s]: the backward wave at its beginning, the forward wave at its end, delta. In a line shorter than
+    a
+    step both waves hold for p' = 0 at its ends. Jumps travel through it as through any line.
     """
     ring, mask = ring_of(places, line, q)
     k, w = stencil(past, clock, t - line["hold"])
@@ -94,7 +103,7 @@ def write_arrivals(past, places, clock, line, pipe, q, t):
 
 @njit
 def write_all_arrivals(past, tables, t):
-    """Write the waves that arrive at the ends of all lines at t.
+    """Write the waves that arrive at the ends of all delay lines at t into `past`.
 
     Nodes are solved several times at one time; the waves are read only once.
     """
@@ -113,7 +122,7 @@ def write_all_arrivals(past, tables, t):
 
 @njit
 def outgoing_line_waves(t, y, dydt, out, handle):
-    """Write the waves that leave delay lines into out[ends], and add their flow into nodes to out[net]."""
+    """Write the waves that leave delay lines into out[ends], and add their mass flow into nodes to out[net] [kg/s]."""
     tables = open_tables(handle)
     past, layout, lines = tables.past, tables.layout[0], tables.delays
     started, place, ends, net = past[COUNT] > 0.0, offsets_of(past)[0], layout["ends"], layout["net"]
@@ -132,9 +141,10 @@ def outgoing_line_waves(t, y, dydt, out, handle):
 
 @njit
 def incoming_line_waves(t, y, dydt, out, handle):
-    """Waves that nodes send into delay lines: Y p' less the arriving waves; d/dt of the mass in the lines [kg/s].
+    """Write the waves that nodes send into delay lines, Y p' minus the arriving waves, and the rate of mass in the lines.
 
-    In lines shorter than a step the arriving waves depend on p'. d/dt of the mass is the flow in at both ends.
+    Y : admittance of the pipe [kg/s per Pa]; p' : deviation of the node pressure from the initial steady state [Pa]
+    In lines shorter than a step the arriving waves depend on p'. The rate of mass [kg/s] is the inflow at both ends.
     """
     tables = open_tables(handle)
     layout, lines = tables.layout[0], tables.delays
@@ -158,7 +168,10 @@ def incoming_line_waves(t, y, dydt, out, handle):
 
 @njit
 def solve_line_clusters(t, y, dydt, out, handle):
-    """Solve nodes joined by lines shorter than a step and by no valve: p' by the inverse of their admittance matrix."""
+    """Solve for the pressures of nodes that are joined by lines shorter than a step and by no valve.
+
+    p' of each group of such nodes is the inverse of their admittance matrix times the arriving flows.
+    """
     tables = open_tables(handle)
     layout, integers, work = tables.layout[0], tables.integers, tables.scratch
     for number in range(tables.clusters.size):

@@ -1,15 +1,25 @@
 """History of the waves sent into delay lines: ring buffers, lists of jumps, interpolation in time.
 
-A wave is the sum of a smooth part u, stored at accepted times, and of jumps, each with its time:
-w(t) = u(t) + sum of jumps up to t. So no interpolation crosses a jump. u is read by the Lagrange polynomial through up
-to six entries, as many before t as after it (in the newest interval one more before), so that no wave is amplified.
-Entries of a step that is not accepted yet are never read.
+A wave is the sum of a smooth part u, stored at accepted times (entries), and of jumps, each with its time:
+w(t) = u(t) + sum of the jumps sent up to t. So no interpolation crosses a jump. u is read by the Lagrange polynomial
+through up to six entries, as many before t as after it (in the newest interval one more before), so that no wave is
+amplified. Entries of a step that is not accepted yet are never read.
 
-past = [header; times of entries; arriving waves and friction loss of each stretch; heads of the jumps of both waves of
-each stretch; times, sizes and running sums of these jumps; ring of entries (u forward, u backward) of each stretch, as
-long as its delay needs]. A head holds the sum of the jumps removed from the list, the index of the first jump, the
-number of jumps, and how many of them have arrived. So a step through a large network touches little memory: the ends
-of rings, and heads.
+The array `past` contains in this order:
+
+    header        HEADER_SIZE numbers
+    times         of entries [s]
+    arrivals      backward wave at the beginning, forward wave at the end and friction loss of each segment [kg/s]
+    heads         of the lists of jumps, one for each wave of each segment: sum of the jumps removed from the list,
+                  index of the first jump, number of jumps, number of these that have arrived
+    jumps         lists of times, sizes and running sums of the jumps
+    rings         entries (u forward, u backward) of each segment, as many as its travel time needs
+
+So a step through a large network touches little memory: the ends of rings, and heads.
+
+Arguments: q : segment within its line; s : segment counted over all lines; wave : 0 forward, 1 backward; at : offset
+of a head in `past`; queue : capacity of a list of jumps; places : result of `offsets_of`; clock : result of
+`reading_data`.
 """
 
 from fvsolve.jit import njit
@@ -62,7 +72,7 @@ def time_of(past, k):
 
 @njit(forceinline=True)
 def offsets_of(past):
-    """(offsets of arrivals, heads of jumps, jumps and rings in `past`, factor of the present length of rings)."""
+    """Offsets of arrivals, heads, jumps and rings in `past`, and the factor by which rings have been lengthened."""
     stretches, arrivals = int(past[STRETCHES]), HEADER_SIZE + int(past[CAPACITY])
     heads = arrivals + ARRIVALS_SIZE * stretches
     jumps = heads + 2 * HEAD_SIZE * stretches
@@ -71,20 +81,20 @@ def offsets_of(past):
 
 @njit(forceinline=True)
 def ring_of(places, line, q):
-    """(offset of the entries of stretch q of a line, bit mask for entry numbers)."""
+    """(offset in `past` of the entries of segment q of a line, bit mask that wraps entry numbers)."""
     length = places[4] * line["ring_size"]
     return places[3] + 2 * (places[4] * line["ring"] + q * length) + RING_GAP * (line["stretch"] + q), length - 1
 
 
 @njit(forceinline=True)
 def jump_head(places, s, wave):
-    """Offset of the head of the jumps of a wave of stretch s."""
+    """Offset in `past` of the head of the list of jumps of a wave of segment s."""
     return places[1] + HEAD_SIZE * (2 * s + wave)
 
 
 @njit(forceinline=True)
 def jump_list(places, queue, at):
-    """Offset of the times of the jumps whose head is at `at`; sizes and running sums follow."""
+    """Offset in `past` of the times of the jumps of the head at `at`; their sizes and running sums follow."""
     return places[2] + 3 * queue * ((at - places[1]) // HEAD_SIZE)
 
 
@@ -96,7 +106,7 @@ def time_tolerance(past):
 
 @njit(forceinline=True)
 def newest_before(past, t):
-    """Number of the newest entry before t, which a step that ends at t may read."""
+    """Number of the newest entry before t; a step that ends at t may read up to this entry."""
     k = int(past[COUNT]) - 1
     while k > PROFILE_ENTRIES and time_of(past, k) >= t - time_tolerance(past):
         k -= 1
@@ -105,7 +115,7 @@ def newest_before(past, t):
 
 @njit(forceinline=True)
 def lagrange_six(x):
-    """Lagrange weights of entries -2 .. 3 at x in [0, 1)."""
+    """Six Lagrange weights of entries k - 2 .. k + 3 at the fraction x in [0, 1) of the way from entry k to k + 1."""
     a, b, d, e, f = x + 2.0, x + 1.0, x - 1.0, x - 2.0, x - 3.0
     ab, de, ef = a * b, d * e, e * f
     return (
@@ -116,20 +126,26 @@ def lagrange_six(x):
 
 @njit(forceinline=True)
 def lagrange_four(x):
-    """Lagrange weights of entries -1 .. 2 at x in [0, 1), padded to six."""
+    """Lagrange weights of entries k - 1 .. k + 2 at the fraction x, in the order of `lagrange_six`, other weights 0."""
     b, d, e = x + 1.0, x - 1.0, x - 2.0
     return 0.0, x * d * e / -6.0, b * d * e / 2.0, b * x * e / -2.0, b * x * d / 6.0, 0.0
 
 
 @njit(forceinline=True)
 def lagrange_three(x):
-    """Lagrange weights of entries -1 .. 1 at x in [0, 1), padded to six; for the newest interval."""
+    """Lagrange weights of entries k - 1 .. k + 1 at the fraction x, in the order of `lagrange_six`, other weights 0.
+
+    They are used in the newest interval.
+    """
     return 0.0, 0.5 * x * (x - 1.0), 1.0 - x * x, 0.5 * x * (x + 1.0), 0.0, 0.0
 
 
 @njit
 def find_interval(past, newest, t):
-    """(entry k, share of the way to entry k + 1) at time t; before the first entry that of the profile."""
+    """(entry k, fraction of the way to entry k + 1) at time t, up to the entry `newest`.
+
+    Before the first entry of the run, k is the entry of the initial steady state.
+    """
     low, high = max(PROFILE_ENTRIES, int(past[COUNT]) - int(past[CAPACITY]) + PROFILE_ENTRIES), newest
     if t >= time_of(past, high):
         return high - 1, 1.0
@@ -146,7 +162,7 @@ def find_interval(past, newest, t):
 
 @njit
 def lagrange_unequal(past, newest, t):
-    """(entry before t, weights) for unequal steps: cubic through four entries, or linear where steps differ much."""
+    """(entry before t, six weights) for unequal steps: cubic through four entries, or linear if steps differ much."""
     low, x = find_interval(past, newest, t)
     line = (0.0, 0.0, 1.0 - x, x, 0.0, 0.0)
     if low < PROFILE_ENTRIES:
@@ -167,7 +183,7 @@ def lagrange_unequal(past, newest, t):
 
 @njit(forceinline=True)
 def reading_data(past, newest):
-    """Data for readings: (newest entry, its time, 1 / step, number of equal steps, tolerance of equal times).
+    """Data for readings: newest entry, its time [s], 1 / step [1/s], number of equal steps, tolerance of times [s].
 
     The result does not depend on whether an entry after `newest` exists already.
     """
@@ -199,7 +215,10 @@ def stencil(past, clock, t):
 
 @njit(forceinline=True)
 def interpolate_waves(past, at, mask, k, w):
-    """Smooth parts of both waves of a stretch by weights of entries k - 2 .. k + 3; at : offset of its entries."""
+    """Smooth parts of both waves of a segment by the weights w of entries k - 2 .. k + 3: (forward, backward) [kg/s].
+
+    at, mask : result of `ring_of`
+    """
     a, b, c = at + 2 * ((k - 2) & mask), at + 2 * ((k - 1) & mask), at + 2 * (k & mask)
     d, e, f = at + 2 * ((k + 1) & mask), at + 2 * ((k + 2) & mask), at + 2 * ((k + 3) & mask)
     r = w[0] * past[a] + w[1] * past[b] + w[2] * past[c] + w[3] * past[d] + w[4] * past[e] + w[5] * past[f]
@@ -210,13 +229,16 @@ def interpolate_waves(past, at, mask, k, w):
 
 @njit(forceinline=True)
 def wrap_index(i, queue):
-    """Index i wrapped to the length of a ring of jumps."""
+    """Index i wrapped to the capacity `queue` of a list of jumps."""
     return i if i < queue else i - queue
 
 
 @njit
 def first_after(past, queue, times, first, count, t):
-    """Number of the first jump of a list that was sent after t."""
+    """Index in a list of jumps of the first jump that was sent after t; the length of the list if there is none.
+
+    times : offset of the list in `past`; first, count : index of the first jump, number of jumps
+    """
     low, high = 0, count
     while low < high:
         middle = (low + high) // 2
@@ -229,7 +251,7 @@ def first_after(past, queue, times, first, count, t):
 
 @njit(forceinline=True)
 def sum_of_first(past, places, at, count):
-    """Sum of the jumps removed from the list of a wave and of the first `count` jumps in it; at : their head."""
+    """Sum of the jumps removed from the list of a wave and of the first `count` jumps in it [kg/s]."""
     if count == 0:
         return past[at + REMOVED_SUM]
     queue = int(past[JUMP_CAPACITY])
@@ -238,7 +260,7 @@ def sum_of_first(past, places, at, count):
 
 @njit
 def sum_listed_jumps(past, places, at, t):
-    """Sum of the jumps of a wave up to t, where its list is not empty; at : offset of their head."""
+    """Sum of the jumps of a wave sent up to t [kg/s], where its list is not empty."""
     count, queue, first = int(past[at + JUMP_COUNT]), int(past[JUMP_CAPACITY]), int(past[at + FIRST_JUMP])
     times = jump_list(places, queue, at)
     if past[times + wrap_index(first + count - 1, queue)] <= t:
@@ -248,19 +270,19 @@ def sum_listed_jumps(past, places, at, t):
 
 @njit(forceinline=True)
 def jumps_until(past, places, at, t):
-    """Sum of the jumps of a wave up to t; at : offset of their head."""
+    """Sum of the jumps of a wave sent up to t [kg/s]; at : offset of the head of its list."""
     return sum_listed_jumps(past, places, at, t) if past[at + JUMP_COUNT] > 0.0 else past[at + REMOVED_SUM]
 
 
 @njit(forceinline=True)
 def passed_jumps(past, places, at):
-    """Sum of the jumps of a wave that have been passed on where they arrive; at : offset of their head."""
+    """Sum of the jumps of a wave that have been passed on at the end of their segment [kg/s]."""
     return sum_of_first(past, places, at, int(past[at + ARRIVED_COUNT]))
 
 
 @njit(forceinline=True)
 def arrived_until(past, places, clock, at, t, tau):
-    """Sum of the jumps of a wave that have arrived by t, after a travel time tau; at : offset of their head."""
+    """Sum of the jumps of a wave that have arrived by t, after a travel time tau [kg/s]; at : offset of their head."""
     if past[ONLY_PASSED_JUMPS] > 0.0:
         return passed_jumps(past, places, at)
     return jumps_until(past, places, at, min(t + clock[4], past[NEXT_ARRIVAL] - clock[4]) - tau)
@@ -268,7 +290,7 @@ def arrived_until(past, places, clock, at, t, tau):
 
 @njit(forceinline=True)
 def read_waves(past, places, clock, line, q, t):
-    """Both waves sent into stretch q of a line at t [kg/s]: from its beginning and from its end."""
+    """Both waves sent into segment q of a delay line at t: (forward, backward) [kg/s]."""
     at, mask = ring_of(places, line, q)
     k, w = stencil(past, clock, t)
     r, l = interpolate_waves(past, at, mask, k, w)
@@ -278,7 +300,10 @@ def read_waves(past, places, clock, line, q, t):
 
 @njit
 def insert_jump(past, places, at, t, size):
-    """Insert a jump into the list of a wave; False where the list is full, then the jump joins the smooth part."""
+    """Insert a jump of a wave into its list; return False where the list is full, then the jump joins the smooth part.
+
+    t : time at which the jump was sent [s]; size [kg/s]
+    """
     queue, first, count = int(past[JUMP_CAPACITY]), int(past[at + FIRST_JUMP]), int(past[at + JUMP_COUNT])
     i, times = count, jump_list(places, queue, at)
     while i > 0 and past[times + wrap_index(first + i - 1, queue)] > t + time_tolerance(past):
@@ -304,7 +329,7 @@ def insert_jump(past, places, at, t, size):
 
 @njit
 def update_running_sums(past, places, at, begin):
-    """Update the running sums of the jumps of a wave from jump `begin` on; at : offset of their head."""
+    """Update the running sums of the jumps of a wave from jump number `begin` of its list on."""
     queue, first = int(past[JUMP_CAPACITY]), int(past[at + FIRST_JUMP])
     total, times = sum_of_first(past, places, at, begin), jump_list(places, queue, at)
     for j in range(begin, int(past[at + JUMP_COUNT])):
@@ -315,7 +340,7 @@ def update_running_sums(past, places, at, begin):
 
 @njit
 def remove_arrived_jumps(past, places, at, t):
-    """Remove the jumps that have arrived and were sent before t from the list."""
+    """Remove the jumps that have arrived and were sent before t from the list of a wave."""
     queue = int(past[JUMP_CAPACITY])
     times = jump_list(places, queue, at)
     while past[at + ARRIVED_COUNT] > 0.0 and past[times + int(past[at + FIRST_JUMP])] < t:
@@ -350,7 +375,7 @@ def begin_entry(past, t):
 
 @njit(forceinline=True)
 def write_entry(past, places, line, q, k, wave, value):
-    """Store the smooth part of a wave as entry k; value : whole wave [kg/s]."""
+    """Store the smooth part of a wave of segment q as entry k; value : whole wave, smooth part and jumps [kg/s]."""
     at, mask = ring_of(places, line, q)
     jumps = jumps_until(past, places, jump_head(places, line["stretch"] + q, wave), INFINITE)
     past[at + 2 * (k & mask) + wave] = value - jumps

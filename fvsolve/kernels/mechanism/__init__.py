@@ -1,1 +1,1 @@
-"""Multibody system: joints, forces at points, mass matrix; imported and compiled only for scenes that have bodies."""
+"""Multibody system: joints, forces at points, mass matrix; imported and compiled only for cases that contain bodies."""

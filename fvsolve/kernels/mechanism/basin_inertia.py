@@ -1,8 +1,13 @@
-"""Contribution of the water of basins on bodies to the mass matrix: along the normals of their beds only.
+"""Contribution of the water in basins to the mass matrix of the bodies that carry the basins.
 
-Row b of basins, at layout["tank"] + TANK_OUT b: mass moments 1, x, y, xx, xy, yy in axes of the basin; these axes in
-the world; position of its origin from o (`body_layout`); force and torque about its origin on its body for q'' = 0, in
-its own axes. The row of a basin without body contains zeros.
+The water moves with its body only along the normal of the bed of the basin; along the bed it slides. For basin b the
+array `out` contains TANK_OUT numbers from layout["tank"] + TANK_OUT b on, all 0 for a basin that is not on a body:
+
+    MOMENTS       6 sums over cells of mass times 1, x, y, x^2, x y, y^2 [kg, kg m, kg m2]; x, y in axes of the basin
+    EAST, NORTH, NORMAL   unit vectors of the x, y and z axes of the basin, in axes of the world
+    BASIN_ARM     position of the origin of the basin from the point o (`body_layout`), in axes of the world [m]
+    BASIN_LOAD    force [N] and torque about the origin of the basin [N m] of the water on the body for zero joint
+                  accelerations (q'' = 0), in axes of the basin
 """
 
 from fvsolve.jit import njit
@@ -37,7 +42,11 @@ __all__ = [
 
 @njit
 def add_basin_inertia(out, tables):
-    """Add J' N J to M in `scratch`; J : acceleration n . (a + alpha x r) along the normal per freedom, N : moments."""
+    """Add the inertia of the water in all basins on bodies, J' N J for each basin, to the mass matrix in `scratch`.
+
+    J : coefficients of 1, x, y in the normal acceleration of the bed, a column for each degree of freedom
+    N : matrix of the moments of mass of 1, x, y
+    """
     work, freedoms, paths, n = tables.scratch, tables.freedoms, tables.integers, tables.freedoms.size
     for b in range(tables.basins.size):
         i, tank = nearest_free_body(tables, tables.basins[b]["body"]), tables.layout[0]["tank"] + TANK_OUT * b
@@ -58,7 +67,11 @@ def add_basin_inertia(out, tables):
 
 @njit(forceinline=True)
 def normal_accelerations(out, work, tank, s):
-    """Coefficients of 1, x and y in the velocity along the normal of a basin by a freedom with S at scratch[s]."""
+    """Normal velocity of the bed of a basin per unit rate of one degree of freedom, as coefficients of 1, x and y.
+
+    tank : offset of the numbers of the basin in `out`
+    s : offset in `work` of the angular velocity and the velocity at o per unit rate of that degree of freedom
+    """
     wx, wy, wz = work[s], work[s + 1], work[s + 2]
     u, v, w = freedom_velocity(work, s, out[tank + BASIN_ARM], out[tank + BASIN_ARM + 1], out[tank + BASIN_ARM + 2])
     n, e, k = tank + NORMAL, tank + EAST, tank + NORTH
@@ -71,7 +84,10 @@ def normal_accelerations(out, work, tank, s):
 
 @njit
 def extra_basin_load(out, tables, b):
-    """(force, torque about the origin of its body) of the water in basin b, minus those for q'' = 0."""
+    """Load of the water in basin b on its body due to the joint accelerations q'' alone, without the load for q'' = 0.
+
+    Returns six numbers in axes of the world: force [N], torque about the origin of the body [N m].
+    """
     here, tank = body_row(tables, tables.basins[b]["body"]), tables.layout[0]["tank"] + TANK_OUT * b
     r = tank + BASIN_ARM
     x, y, z = out[r] - out[here + ARM], out[r + 1] - out[here + ARM + 1], out[r + 2] - out[here + ARM + 2]

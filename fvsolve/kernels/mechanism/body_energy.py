@@ -1,8 +1,9 @@
 """Power and stored energy of bodies and of their joints.
 
-Rows of `power` [W] of a body, before those of devices and basins: rate of stored energy, dissipation of its joint,
-power of its driven joint. Row of `stored` [J], change since the start: kinetic energy, m g z of the centre of mass and
-k s^2 / 2 of the joint.
+`power` has three entries for each body [W], before those of devices and basins: rate of the stored energy, power
+dissipated by the damping of the joint, power supplied by a driven joint. `stored` has one entry for each body [J], the
+change since the start of kinetic energy + m g z + k s^2 / 2. m : mass, z : height of the centre of mass, k : stiffness
+of the joint, s : its coordinate.
 """
 
 from fvsolve.jit import njit
@@ -25,7 +26,11 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def body_energy_rate(body, out, here, gravity):
-    """Rate of the kinetic and potential energy of a body: m v_c . a_c + w . J alpha + m g dz_c/dt [W]."""
+    """Rate of the kinetic and potential energy of a body [W]: m v . a + w . J alpha + m g v_z.
+
+    m : mass; v, a : velocity and acceleration of the centre of mass; w, alpha : angular velocity and acceleration; J :
+    inertia about the centre of mass; here : offset of the body in `out`
+    """
     x, y, z, u, v, w = centre_of(body, out, here)
     a, b, c = acceleration_at(out, here, here + ACCELERATION, x, y, z)
     s = here + SPIN_RATE
@@ -67,7 +72,7 @@ def joint_damping_power(body, y):
 
 @njit
 def power_bodies(t, y, dydt, out, handle, power):
-    """Write the power rows of bodies."""
+    """Write three powers of each body to `power` [W]: rate of stored energy, joint damping, joint drive."""
     tables = open_tables(handle)
     bodies, gravity = tables.bodies, tables.settings[0]["gravity"]
     at = body_power_row(tables, power)
@@ -82,7 +87,7 @@ def power_bodies(t, y, dydt, out, handle, power):
 
 @njit
 def stored_bodies(t, y, dydt, out, handle, stored):
-    """Write the storage rows of bodies."""
+    """Write the change of kinetic, potential and spring energy of each body since the start [J] to `stored`."""
     tables = open_tables(handle)
     bodies, gravity = tables.bodies, tables.settings[0]["gravity"]
     at = body_stored_row(tables, stored)

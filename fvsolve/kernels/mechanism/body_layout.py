@@ -1,8 +1,9 @@
-"""Layout of the rows of bodies in `out`, and vector operations on them.
+"""Layout of the data of bodies in the array `out`, and operations on vectors in arrays.
 
-Row i begins at layout["body"] + BODY_OUT i. All vectors are in axes of the world. The reference point o of a tree is
-the centre of mass of a free root, or the position of the joint of any other root. So sums over a tree do not suffer
-from cancellation. q'' are the accelerations of freedoms, joint accelerations that forces determine.
+The data of body i begin at layout["body"] + BODY_OUT i. All vectors are in axes of the world. Jointed bodies form
+trees. The reference point o of a tree is the centre of mass of its root if the root is a free body, else the position
+of the joint of the root. So sums over a tree do not suffer from cancellation. q'' are the accelerations of the degrees
+of freedom, which forces determine; R is the rotation matrix from axes of the body to axes of the world.
 """
 
 from fvsolve.jit import njit
@@ -25,13 +26,13 @@ BIAS_AT_O = 42  # its derivative for q'' = 0 [m/s2]
 
 @njit(forceinline=True)
 def body_row(tables, i):
-    """Offset of the row of body i."""
+    """Index in `out` of the first number of body i."""
     return tables.layout[0]["body"] + BODY_OUT * i
 
 
 @njit
 def nearest_free_body(tables, i):
-    """First body with freedoms on the way from body i to its root; -1 if there is none."""
+    """First body with degrees of freedom on the way from body i, itself included, to the root of its tree; or -1."""
     while i >= 0 and tables.bodies[i]["freedoms"] == 0:
         i = tables.bodies[i]["parent"]
     return i
@@ -39,7 +40,10 @@ def nearest_free_body(tables, i):
 
 @njit(forceinline=True)
 def freedom_path(tables, i):
-    """(offset in `integers` of the freedoms that move body i, from the root on; their number); i : has freedoms."""
+    """List of the degrees of freedom that move body i, from the root on: (its offset in `integers`, its length).
+
+    Body i must have degrees of freedom.
+    """
     last = tables.freedoms[tables.bodies[i]["freedom"] + tables.bodies[i]["freedoms"] - 1]
     return last["path"], last["depth"] + 1
 
@@ -52,27 +56,30 @@ def dot(a, i, x, y, z):
 
 @njit(forceinline=True)
 def cross(a, i, x, y, z):
-    """Vector product of the vector at a[i] and (x, y, z) (34)."""
+    """Vector product of the vector at a[i] and (x, y, z)."""
     return a[i + 1] * z - a[i + 2] * y, a[i + 2] * x - a[i] * z, a[i] * y - a[i + 1] * x
 
 
 @njit(forceinline=True)
 def freedom_velocity(work, s, x, y, z):
-    """Velocity at (x, y, z) from o by unit rate of a freedom with S at scratch[s]."""
+    """Velocity of a point of a body per unit rate of one degree of freedom; (x, y, z) : its position from o.
+
+    s : offset in `work` of the angular velocity and the velocity at o per unit rate of that degree of freedom
+    """
     u, v, w = cross(work, s, x, y, z)
     return work[s + 3] + u, work[s + 4] + v, work[s + 5] + w
 
 
 @njit(forceinline=True)
 def rotate(out, r, v, k):
-    """Vector v[k:k+3] in axes of a body, transformed to axes of the world: R v, R at out[r] (35)."""
+    """Transform the vector v[k:k+3] from axes of a body to axes of the world; rotation matrix by rows at out[r]."""
     x, y, z = v[k], v[k + 1], v[k + 2]
     return dot(out, r, x, y, z), dot(out, r + 3, x, y, z), dot(out, r + 6, x, y, z)
 
 
 @njit(forceinline=True)
 def rotate_back(out, r, x, y, z):
-    """Vector (x, y, z) in axes of the world, transformed to axes of a body: R' v, R at out[r]."""
+    """Transform (x, y, z) from axes of the world to axes of a body; out[r] : rotation matrix of the body, by rows."""
     return (
         out[r] * x + out[r + 3] * y + out[r + 6] * z,
         out[r + 1] * x + out[r + 4] * y + out[r + 7] * z,
@@ -88,7 +95,10 @@ def write_vector(out, k, x, y, z):
 
 @njit(forceinline=True)
 def add_force(out, row, rx, ry, rz, fx, fy, fz):
-    """Add a force [N] to a body, at r from its origin [m]; all in axes of the world."""
+    """Add a force (fx, fy, fz) [N] to the sums FORCE and TORQUE of a body, in axes of the world.
+
+    row : offset of the body in `out`; (rx, ry, rz) : point of application minus origin of the body [m]
+    """
     out[row + FORCE] += fx
     out[row + FORCE + 1] += fy
     out[row + FORCE + 2] += fz
@@ -99,7 +109,7 @@ def add_force(out, row, rx, ry, rz, fx, fy, fz):
 
 @njit(forceinline=True)
 def add_torque(out, row, x, y, z):
-    """Add a torque [N m] to a body."""
+    """Add a torque (x, y, z) [N m] to the sum TORQUE of a body; row : offset of the body in `out`."""
     out[row + TORQUE] += x
     out[row + TORQUE + 1] += y
     out[row + TORQUE + 2] += z

@@ -1,6 +1,7 @@
-"""Probe values of bodies and of their points, from the rows of bodies in `out`.
+"""Probe values of bodies and of their points, computed from the data of bodies in `out` (`body_layout`).
 
-A quantity is given by its index in `BODY_QUANTITIES` or `POINT_QUANTITIES`; vectors are in axes of the world.
+A quantity is given by its index in `BODY_QUANTITIES` or `POINT_QUANTITIES`; vectors are in axes of the world. Equation
+numbers in brackets are those of docs/course.md. here : offset of the data of a body in `out`.
 """
 
 from math import atan2, cos, hypot, sin, sqrt
@@ -41,14 +42,14 @@ POINT_QUANTITIES = (
 
 @njit
 def angular_momentum(body, out, here):
-    """Angular momentum about the centre of mass, J w (68) [kg m2/s]."""
+    """Angular momentum of a body about its centre of mass, J w (68) [kg m2/s]; J : inertia, w : angular velocity."""
     r, w = here + ATTITUDE, here + SPIN
     return inertia_product(body["inertia"], out, r, out[w], out[w + 1], out[w + 2])
 
 
 @njit
 def inertia_product(own, out, r, x, y, z):
-    """R J R' (x, y, z); own : J by rows, R at out[r]."""
+    """Product R J R' (x, y, z); J : inertia matrix `own` in axes of a body, by rows; R : rotation matrix at out[r]."""
     a, b, c = (
         out[r] * x + out[r + 3] * y + out[r + 6] * z,
         out[r + 1] * x + out[r + 4] * y + out[r + 7] * z,
@@ -60,7 +61,10 @@ def inertia_product(own, out, r, x, y, z):
 
 @njit
 def kinetic_energy(body, out, here):
-    """Kinetic energy m v_c^2 / 2 + w J w / 2 [J]."""
+    """Kinetic energy of a body, m v^2 / 2 + w . J w / 2 [J].
+
+    m : mass, v : velocity of the centre of mass, w : angular velocity, J : inertia about the centre of mass
+    """
     _, _, _, u, v, w = centre_of(body, out, here)
     x, y, z = angular_momentum(body, out, here)
     return 0.5 * (body["mass"] * (u * u + v * v + w * w) + dot(out, here + SPIN, x, y, z))
@@ -68,7 +72,10 @@ def kinetic_energy(body, out, here):
 
 @njit
 def acceleration_at(out, here, at, x, y, z):
-    """Acceleration of a point fixed in a body at (x, y, z) from its origin, (65); at : index of that of the origin."""
+    """Acceleration of a point fixed in a body [m/s2], (65); (x, y, z) : its position from the origin of the body.
+
+    here : offset of the body in `out`; at : index in `out` of the acceleration of its origin
+    """
     a, b, c = cross(out, here + SPIN_RATE, x, y, z)
     u, v, w = cross(out, here + SPIN, x, y, z)
     p, q, r = cross(out, here + SPIN, u, v, w)
@@ -77,7 +84,10 @@ def acceleration_at(out, here, at, x, y, z):
 
 @njit
 def joint_load(out, tables, i):
-    """(force, torque about its origin) of the joint on body i, from (68) of body i and all bodies that it carries."""
+    """Force [N] and torque [N m] of the joint of body i on that body, six numbers; the torque is about its origin.
+
+    They follow from the equations of Newton and Euler (68) of body i and of all bodies that it carries.
+    """
     bodies, first = tables.bodies, body_row(tables, i)
     fx = fy = fz = tx = ty = tz = 0.0
     for j in range(i, bodies.size):
@@ -114,10 +124,11 @@ def joint_load(out, tables, i):
 
 @njit
 def roll_pitch_yaw(out, r):
-    """(roll, pitch, yaw) of (40), R = R_z(yaw) R_y(pitch) R_x(roll); roll is computed from R_z(-yaw) R.
+    """Angles (roll, pitch, yaw) [rad] of the rotation matrix R at out[r], R = R_z(yaw) R_y(pitch) R_x(roll) (40).
 
-    So the angles give R also near a pitch of 90 degrees, where the entries that give roll and yaw vanish. There only
-    their sum or difference is defined: yaw is set to 0, as in `fvsolve.rotations`.
+    Roll is computed from R_z(-yaw) R. So the angles give R also near a pitch of 90 degrees, where the entries of R that
+    give roll and yaw vanish. There only the sum or difference of roll and yaw is defined: yaw is set to 0, as in
+    `fvsolve.rotations`.
     """
     level = hypot(out[r], out[r + 3])  # cos(pitch)
     yaw = atan2(out[r + 3], out[r]) if level > LEAST_COSINE else 0.0
@@ -128,7 +139,10 @@ def roll_pitch_yaw(out, r):
 
 @njit
 def euler_parameters(body, y, out, here):
-    """(eta, eps) of (44), normalised: those of the states of a free body; else computed from R, with eta >= 0."""
+    """Normalised Euler parameters (eta, eps_x, eps_y, eps_z) of the attitude of a body (44).
+
+    For a free body they are read from the states; for other bodies they are computed from R, with eta >= 0.
+    """
     if body["joint"] == FREE:
         h, a, b, c = joint_parameters(body, 3, y)
         size = sqrt(h * h + a * a + b * b + c * c)
@@ -155,7 +169,7 @@ def euler_parameters(body, y, out, here):
 
 @njit
 def body_value(t, y, out, tables, i, number):
-    """Quantity of body i, by its index in `BODY_QUANTITIES`."""
+    """Value of a quantity of body i; number : index of the quantity in `BODY_QUANTITIES`."""
     body, here = tables.bodies[i], body_row(tables, i)
     if number < 3:
         return out[here + POSITION + number]
@@ -186,10 +200,13 @@ def body_value(t, y, out, tables, i, number):
 
 @njit
 def point_value(out, tables, k, number):
-    """Quantity of point k, by its index in `POINT_QUANTITIES`.
+    """Value of a quantity of point k; number : index of the quantity in `POINT_QUANTITIES`.
 
-    The terms of its acceleration are those of (65) in the axes of the parent of its body; with the acceleration of the
-    origin of these axes they add up to the whole. For a body joined to the world the axes are its own.
+    The parts of the acceleration are the terms of (65), relative to the axes of the parent of the body that contains
+    the
+    point. With the acceleration of the origin of the parent they add up to the acceleration of the point. If that body
+    is
+    joined to the world, its own axes take the place of those of a parent.
     """
     moved = point_at(out, tables, k, POSITION)
     if number < 6:
@@ -235,7 +252,7 @@ def surface_value(y, tables, probe):
 
 @njit
 def observe_bodies(t, y, out, handle, values):
-    """Write the values of the probes of bodies, their points, and modal water surfaces."""
+    """Write the values of the probes of bodies, of their points, and of the water surfaces of sloshing models."""
     tables = open_tables(handle)
     probes = tables.probes
     for k in range(probes.size):

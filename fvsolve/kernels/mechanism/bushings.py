@@ -1,8 +1,10 @@
-"""Bushings: spring-damper force by the gap of two points, and torque by the deviation (56) of two attitudes.
+"""Bushings: springs with dampers between two points `from` and `to` of bodies, for displacement and for rotation.
 
-Imported only for scenes that have bushings. In axes of the body of `from`: rho is the position of `to` minus that of
-`from`; R~ = R R_d', with R the attitude of the body of `to` and R_d its attitude at the start. 2 eta eps is the skew
-part of R~, and eps.eps = (3 - trace R~) / 4. The force acts on both bodies at `to`, so that its power is force times
+Imported only for cases that have bushings. The force opposes the gap rho, the position of `to` minus that of `from`,
+and its rate. The torque opposes the deviation of attitudes R~ = R R_d' (equation (56) of docs/course.md) and the
+relative angular velocity. R is the attitude of the body of `to` in axes of the body of `from`, and R_d is R at the
+start. With the Euler parameters eta and eps of R~, the torque is proportional to 2 eta eps, the vector of the skew part
+of R~; eps . eps = (3 - trace R~) / 4. The force acts on both bodies at the point `to`, so its power is force times
 d(rho)/dt.
 """
 
@@ -28,7 +30,7 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit(forceinline=True)
 def attitude_entry(out, tables, i, r, c):
-    """Entry (r, c) of the attitude of body i; of the identity for the world (i < 0)."""
+    """Entry (r, c) of the rotation matrix of body i; for the world (i < 0) of the identity."""
     if i < 0:
         return 1.0 if r == c else 0.0
     return out[body_row(tables, i) + ATTITUDE + 3 * r + c]
@@ -36,7 +38,12 @@ def attitude_entry(out, tables, i, r, c):
 
 @njit
 def gap_of(out, tables, bushing):
-    """(position of `to` minus `from`, its rate relative to the body of `from`), in axes of the world: 6 numbers."""
+    """Gap of a bushing and its rate, six numbers in axes of the world.
+
+    The gap is the position of `to` minus that of `from` [m]. The rate is the velocity of `to` relative to the axes of
+    the
+    body of `from` [m/s].
+    """
     i = tables.points[bushing["from_point"]]["body"]
     x, y, z, u, v, w = point_at(out, tables, bushing["to_point"], POSITION)
     p, q, s, _, _, _ = point_at(out, tables, bushing["from_point"], POSITION)
@@ -52,7 +59,11 @@ def gap_of(out, tables, bushing):
 
 @njit
 def deviation(out, tables, bushing, r, c):
-    """Entry (r, c) of R~ in axes of the world, R_to R_d' R_from'; R_d : that of `to` in axes of `from` at the start."""
+    """Entry (r, c) of the deviation of attitudes in axes of the world, R_to R_d' R_from'.
+
+    R_to, R_from : attitudes of both bodies; R_d : attitude of the body of `to` in axes of the body of `from` at the
+        start
+    """
     i, j = tables.points[bushing["from_point"]]["body"], tables.points[bushing["to_point"]]["body"]
     total = 0.0
     for k in range(3):
@@ -67,7 +78,10 @@ def deviation(out, tables, bushing, r, c):
 
 @njit
 def rotation_deviation(out, tables, bushing):
-    """(2 eta eps, relative angular velocity w~, eps.eps), in axes of the world: 7 numbers."""
+    """Rotation of the body of `to` relative to that of `from` since the start, seven numbers in axes of the world.
+
+    They are 2 eta eps (3 numbers), the relative angular velocity [rad/s] (3 numbers), and eps . eps; see the module.
+    """
     x = 0.5 * (deviation(out, tables, bushing, 2, 1) - deviation(out, tables, bushing, 1, 2))
     y = 0.5 * (deviation(out, tables, bushing, 0, 2) - deviation(out, tables, bushing, 2, 0))
     z = 0.5 * (deviation(out, tables, bushing, 1, 0) - deviation(out, tables, bushing, 0, 1))
@@ -80,7 +94,7 @@ def rotation_deviation(out, tables, bushing):
 
 @njit
 def bushing_loads(out, tables, bushing):
-    """(force [N], torque [N m]) on the body of `to`, in axes of the world."""
+    """Force [N] and torque [N m] of a bushing on the body of `to`, six numbers in axes of the world."""
     x, y, z, u, v, w = gap_of(out, tables, bushing)
     a, b, c, p, q, s, _ = rotation_deviation(out, tables, bushing)
     k, d, h, e = bushing["stiffness"], bushing["damping"], bushing["turn_stiffness"], bushing["turn_damping"]
@@ -106,7 +120,7 @@ def add_bushing_loads(t, y, dydt, out, handle):
 
 @njit
 def bushing_rate_limit(t, y, dydt, out, handle):
-    """Raise out[RATE], the rate that limits steps [1/s], for bushings; bound as in `mass_matrix.body_rate_limit`."""
+    """Raise out[RATE], the rate that limits steps [1/s], to the bound for bushings; it is as in `body_rate_limit`."""
     tables = open_tables(handle)
     bushings, work, n = tables.bushings, tables.scratch, tables.freedoms.size
     stiffness, damping = 0.0, 0.0
@@ -149,7 +163,7 @@ def observe_bushings(t, y, out, handle, values):
 
 @njit
 def power_bushings(t, y, dydt, out, handle, power):
-    """Write the power rows of bushings: rate of stored energy, dissipation [W]."""
+    """Write two entries of `power` for each bushing [W]: rate of stored energy, dissipated power."""
     tables = open_tables(handle)
     at = bushing_power_row(tables, power)
     for k in range(tables.bushings.size):
@@ -165,7 +179,10 @@ def power_bushings(t, y, dydt, out, handle, power):
 
 @njit
 def stored_bushings(t, y, dydt, out, handle, stored):
-    """Write the storage rows of bushings: k gap^2 / 2 + 2 k_turn eps.eps since the start [J]."""
+    """Write an entry of `stored` for each bushing [J]: change since the start of k gap^2 / 2 + 2 k_turn eps . eps.
+
+    k [N/m], k_turn [N m/rad] : stiffnesses of the bushing; eps : see the module
+    """
     tables = open_tables(handle)
     at = bushing_stored_row(tables, stored)
     for k in range(tables.bushings.size):

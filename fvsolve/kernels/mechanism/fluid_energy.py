@@ -1,9 +1,13 @@
-"""Energy of fluid contained in moving bodies, in the frame of the world.
+"""Energy of the fluid that moving bodies contain, in the frame of the world.
 
-The energy of a moving network exceeds that of a network at rest by V^2 / 2 + g (z - z at the start) of all its mass, V
-the velocity of its place, and by M (v . C + W . Z) of the flow M along a path (C, Z). Fluid from links supplies
-(v^2 - |W x r|^2) / 2 + g (z - z at the start) per mass in addition, at the surface of an open tank. A body supplies the
-power -(F . v + T . W) by the load (F, T) of the fluid on it.
+Relative to a network at rest, each unit of mass has in addition V^2 / 2 + g (z - z at the start); V and z are velocity
+and height of the point of the body where the fluid is. A mass flow M along a flow path (C, Z) has in addition
+M (v . C + W . Z); v and W are velocity and angular velocity of the body, C and Z the integrals of dr and r x dr along
+the path, r is the position in axes of the body. Fluid that passes from a node into a link brings in addition
+(v^2 - |W x r|^2) / 2 + g (z - z at the start) per unit mass; for an open tank r and z are taken at its surface. If the
+fluid loads a body with force F and torque T, the body supplies the power -(F . v + T . W) to the fluid.
+
+Other arguments: here : offset of a body in `out`; motion : `scratch` after `set_body_motion`.
 """
 
 from fvsolve.jit import njit
@@ -44,13 +48,13 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit(forceinline=True)
 def height_on_body(out, here, r):
-    """z of a point r of a body in the world [m]."""
+    """Height in the world of a point r in axes of a body [m]."""
     return out[here + POSITION + 2] + dot(out, here + ATTITUDE + 6, r[0], r[1], r[2])
 
 
 @njit(forceinline=True)
 def speed_squared_at(motion, r):
-    """V^2 of a point r of a body [m2/s2]."""
+    """Square of the speed in the world of a point r in axes of a body [m2/s2]."""
     u, v, w = cross(motion, BODY_SPIN, r[0], r[1], r[2])
     u, v, w = u + motion[BODY_VELOCITY], v + motion[BODY_VELOCITY + 1], w + motion[BODY_VELOCITY + 2]
     return u * u + v * v + w * w
@@ -58,7 +62,14 @@ def speed_squared_at(motion, r):
 
 @njit
 def segment_energy(tables, out, here, segment, z, rise):
-    """V^2 / 2 + g (height - z - rise s) of a segment (r, t, m) [J]; with d in place of m, its inflow [W]."""
+    """Energy of a segment of fluid that is due to the motion of its body [J].
+
+    The energy is the integral of V^2 / 2 + g (height - z - rise s) over the mass; s : distance along the segment [m].
+    segment : (start r, direction t, mass moments m), see `fluid_loads`. With the rates of the moments in place of m,
+        the
+        result is the power that the inflow brings [W].
+    z, rise : elevation of the start of the segment in the network at rest [m], and its increase per distance s
+    """
     motion, g, (r, t, m) = tables.scratch, tables.settings[0]["gravity"], segment
     u, v, w = cross(motion, BODY_SPIN, r[0], r[1], r[2])
     u, v, w = u + motion[BODY_VELOCITY], v + motion[BODY_VELOCITY + 1], w + motion[BODY_VELOCITY + 2]
@@ -71,14 +82,14 @@ def segment_energy(tables, out, here, segment, z, rise):
 
 @njit(forceinline=True)
 def load_power(motion, load):
-    """Power that a body supplies to the fluid that exerts a load on it, -(F . v + T . W) [W]."""
+    """Power -(F . v + T . W) that a body supplies to fluid [W]; load : force F and torque T of the fluid on it."""
     force = motion[BODY_VELOCITY] * load[0] + motion[BODY_VELOCITY + 1] * load[1] + motion[BODY_VELOCITY + 2] * load[2]
     return -(force + (motion[BODY_SPIN] * load[3] + motion[BODY_SPIN + 1] * load[4] + motion[BODY_SPIN + 2] * load[5]))
 
 
 @njit
 def segment_energy_rate(tables, out, here, segment, d, z, rise):
-    """Rate of the energy of a segment whose mass moments change at d [W]."""
+    """Rate of the energy of a segment that `segment_energy` gives [W]; d : rates of the mass moments of the segment."""
     motion, (r, t, m) = tables.scratch, segment
     carried = load_power(motion, segment_load(motion, r, t, m, ZERO_VECTOR))
     return carried + segment_energy(tables, out, here, (r, t, d), z, rise)
@@ -86,13 +97,16 @@ def segment_energy_rate(tables, out, here, segment, d, z, rise):
 
 @njit(forceinline=True)
 def path_velocity(motion, path):
-    """v . C + W . Z, the velocity of the body integrated along a flow path [m2/s]."""
+    """Velocity of a body integrated along a flow path (C, Z) on it, v . C + W . Z [m2/s]."""
     return load_power(motion, (-path[0], -path[1], -path[2], -path[3], -path[4], -path[5]))
 
 
 @njit
 def path_energy_rate(tables, out, here, path, change, flow, rate):
-    """Rate of the energy M (v . C + W . Z) of a flow M along a path [W]; change : rate of the path, rate : dM/dt."""
+    """Rate of the energy M (v . C + W . Z) of a mass flow M along a flow path (C, Z) on a body [W].
+
+    path, change : (C, Z) and its rate; flow, rate : M [kg/s] and dM/dt [kg/s2]
+    """
     motion, g, up = tables.scratch, tables.settings[0]["gravity"], here + ATTITUDE + 6
     x, y, z = cross(motion, BODY_SPIN, motion[BODY_VELOCITY], motion[BODY_VELOCITY + 1], motion[BODY_VELOCITY + 2])
     x, y, z = x + motion[BODY_GRAVITY], y + motion[BODY_GRAVITY + 1], z + motion[BODY_GRAVITY + 2]
@@ -105,7 +119,10 @@ def path_energy_rate(tables, out, here, path, change, flow, rate):
 
 @njit
 def extra_head(y, out, tables, here, i):
-    """Energy per mass supplied to node i in addition to that at rest, in a tank at its surface [J/kg]."""
+    """Energy per mass that the motion of the body adds to flow from node i into a link [J/kg].
+
+    For a tank, the energy at its surface also replaces the energy at the pressure of its bottom.
+    """
     st, node, motion = tables.settings[0], tables.nodes[i], tables.scratch
     r = as_tuple(tables.moving_segments[node["moving_segment"]]["start"])
     z, more = node["elevation"], 0.0
@@ -127,7 +144,7 @@ def extra_head(y, out, tables, here, i):
 
 @njit
 def add_node_power(y, dydt, out, tables, i, power):
-    """Add the supply and the energy rate of node i that are due to the motion of its body [W]."""
+    """Add to `power` the supplied power and the rate of energy of node i that are due to the motion of its body [W]."""
     node, st, motion = tables.nodes[i], tables.settings[0], tables.scratch
     here = body_row(tables, tables.moving_segments[node["moving_segment"]]["body"])
     segment = node_segment(y, tables, i)
@@ -145,7 +162,7 @@ def add_node_power(y, dydt, out, tables, i, power):
 
 @njit
 def add_node_stored(y, out, tables, i, stored):
-    """Add the energy stored at node i that is due to the motion of its body [J]."""
+    """Add to `stored` the energy of the fluid at node i that is due to the motion of its body [J]."""
     node = tables.nodes[i]
     here, z = body_row(tables, tables.moving_segments[node["moving_segment"]]["body"]), node["elevation"]
     if node["kind"] == TANK:
@@ -199,7 +216,7 @@ def pipe_extra_energy(y, out, tables, k, here):
 
 @njit
 def column_energy_rate(y, dydt, out, tables, k, here):
-    """Rate of the energy of column k that is due to the motion of its body [W]; heights from the datum."""
+    """Rate of the energy of rigid column k that is due to the motion of its body [W]; heights count from the datum."""
     column, z, total = tables.columns[k], tables.settings[0]["datum"], 0.0
     for m in range(column["moving_segments"]):
         total += segment_energy_rate(tables, out, here, column_segment(tables, column, m), ZERO_VECTOR, z, 0.0)
@@ -211,7 +228,7 @@ def column_energy_rate(y, dydt, out, tables, k, here):
 
 @njit
 def column_extra_energy(y, out, tables, k, here):
-    """Energy of column k that is due to the motion of its body [J]; heights from the datum."""
+    """Energy of rigid column k that is due to the motion of its body [J]; heights count from the datum."""
     column, z, motion = tables.columns[k], tables.settings[0]["datum"], tables.scratch
     total = (column["flow"] + y[column["y"]]) * path_velocity(motion, column_path(y, tables, column))
     for m in range(column["moving_segments"]):
@@ -221,7 +238,7 @@ def column_extra_energy(y, out, tables, k, here):
 
 @njit
 def add_power(t, y, dydt, out, handle, power):
-    """Add the power due to the motion of bodies to the power rows of nodes, pipes and columns."""
+    """Add the power due to the motion of bodies to the entries of nodes, pipes and rigid columns in `power`."""
     tables = open_tables(handle)
     nodes, pipes, columns, segments, motion = (
         tables.nodes,
@@ -264,7 +281,7 @@ def add_power(t, y, dydt, out, handle, power):
 
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
-    """Add the energy due to the motion of bodies to the storage rows of nodes, pipes and columns."""
+    """Add the energy due to the motion of bodies to the entries of nodes, pipes and rigid columns in `stored`."""
     tables = open_tables(handle)
     nodes, pipes, columns, segments = tables.nodes, tables.pipes, tables.columns, tables.moving_segments
     for i in range(nodes.size):

@@ -1,8 +1,9 @@
-"""Contribution of contained fluid to the mass matrix of bodies that forces can move.
+"""Contribution of the fluid of networks to the mass matrix M of bodies that forces can move.
 
-The fluid counts as frozen, minus the inertia of its sliding along the flow path (C, Z), the integrals of dr and r x dr.
-For a column this is rho (A / L) c c', c = (C, Z) from surface to surface. For each cell of a pipe the factor is its
-mass over its length squared.
+First all fluid counts as fixed to its body. Then the inertia of its sliding along the flow path (C, Z) is subtracted; C
+and Z are the integrals of dr and r x dr along the path. For a rigid column of density rho, area A and length L this
+inertia is rho (A / L) c c' with c = (C, Z), taken from surface to surface. For each cell of a pipe, the mass of the
+cell over the square of its length replaces rho A / L.
 """
 
 from fvsolve.jit import njit
@@ -28,7 +29,10 @@ from fvsolve.kernels.mechanism.fluid_loads import (
 
 @njit
 def add_segment_inertia(out, tables, i, segment):
-    """Add a segment of fluid (r, t, m) on body i to M; velocities are linear along it."""
+    """Add the inertia of a straight segment of fluid on body i to M; velocities are linear along the segment.
+
+    segment : (start r, direction t, mass moments m), see `fluid_loads`
+    """
     r, t, m = segment
     work, n, here = tables.scratch, tables.freedoms.size, body_row(tables, i)
     path, count = freedom_path(tables, nearest_free_body(tables, i))
@@ -51,7 +55,10 @@ def add_segment_inertia(out, tables, i, segment):
 
 @njit(forceinline=True)
 def path_component(out, work, here, s, flow_path):
-    """Velocity of a freedom integrated along a flow path (C, Z): C . v + Z . w."""
+    """Velocity of a body integrated along a flow path (C, Z), C . v + Z . w, per unit rate of one degree of freedom.
+
+    s : offset in `work` of the angular velocity and the velocity at o per unit rate; here : offset of the body in `out`
+    """
     u, v, w = freedom_velocity(work, s, out[here + ARM], out[here + ARM + 1], out[here + ARM + 2])
     cx, cy, cz = to_world(out, here, flow_path[0], flow_path[1], flow_path[2])
     zx, zy, zz = to_world(out, here, flow_path[3], flow_path[4], flow_path[5])
@@ -61,7 +68,10 @@ def path_component(out, work, here, s, flow_path):
 
 @njit
 def subtract_sliding_inertia(out, tables, i, flow_path, slides):
-    """Subtract from M the inertia of sliding along a flow path on body i; slides : mass over length squared [kg/m2]."""
+    """Subtract from M the inertia of fluid that slides along a flow path (C, Z) on body i.
+
+    slides : mass of the fluid over its length squared [kg/m2]
+    """
     work, n, here = tables.scratch, tables.freedoms.size, body_row(tables, i)
     path, count = freedom_path(tables, nearest_free_body(tables, i))
     for p in range(count):
@@ -74,7 +84,10 @@ def subtract_sliding_inertia(out, tables, i, flow_path, slides):
 
 @njit
 def add_pipe_inertia(y, out, tables, k):
-    """Add a pipe to M: its fluid is fixed across the axis and free along it, except the mass added by waves."""
+    """Add the fluid of pipe k to M: it moves with the body across the axis of the pipe and slides along the axis.
+
+    Under the linear density law, the mass that pressure waves add does not slide.
+    """
     pipe, (r, t, span) = tables.pipes[k], pipe_segment(tables, k)
     i, m = tables.moving_segments[pipe["moving_segment"]]["body"], pipe_moments(tables, y, k, span, 1.0)[0]
     add_segment_inertia(out, tables, i, (r, t, m))
@@ -86,7 +99,7 @@ def add_pipe_inertia(y, out, tables, k):
 
 @njit
 def add_fluid_inertia(y, out, tables):
-    """Add the fluid on bodies that forces can move to M in `scratch`."""
+    """Add the fluid of nodes, pipes and rigid columns on bodies that forces can move to M in `scratch`."""
     nodes, segments, pipes, columns = tables.nodes, tables.moving_segments, tables.pipes, tables.columns
     if segments.size == 0:
         return

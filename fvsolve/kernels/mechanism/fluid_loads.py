@@ -1,15 +1,18 @@
 """Force and torque of contained fluid on its body, in axes of the body and about its origin.
 
 Fluid lies along straight segments. A segment from r along the unit vector t has the mass moments m = (m0, m1, m2), the
-integrals of 1, s and s^2 over its mass; d are their rates. A flow path has (C, Z), the integrals of dr and r x dr along
-it, and carries the mass flow M. By (68) of all fluid the load on the body is
+integrals of 1, s and s^2 over its mass; s is the distance from r, and d are the rates of m. A flow path has (C, Z), the
+integrals of dr and r x dr along it, and carries the mass flow M. By the equations of Newton and Euler ((68) of
+docs/course.md) for all fluid, the load on the body is
 
     force   m0 G - W' x S - W x (W x S + S') - (M C)' - W x M C
     torque  S x G - J W' - J' W - W x J W - (M Z)' - W x M Z
 
-S is the first moment, J the inertia. G = g - a_o, W and W' are written to `scratch` by
-`noninertial_forces.set_body_motion`. Fluid leaves a network with the velocity of its node. The flow inside a tank is
-that of the first cell of each connected pipe, and of each connected column.
+A prime is d/dt. S is the sum of mass times position, J the inertia about the origin. G = g - a_o is gravity minus the
+acceleration of the origin, W the angular velocity; `noninertial_forces.set_body_motion` writes G, W and W' to `scratch`
+(also named `motion`). Fluid leaves a network with the velocity of its node. The flow inside a tank is that of the first
+cell of each connected pipe, and of each connected rigid column. A load is a tuple of six numbers: force [N], torque
+[N m].
 """
 
 from fvsolve.jit import njit
@@ -46,13 +49,16 @@ def as_tuple(a):
 
 @njit(forceinline=True)
 def add_six(a, b):
-    """Sum of two loads, or of two flow paths."""
+    """Sum of two loads, or of two flow paths, of six numbers each."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5]
 
 
 @njit
 def inertia_times(r, t, m, x, y, z):
-    """J w of a segment: the integral of s' x (w x s') over its mass; s' : position, w = (x, y, z)."""
+    """Inertia of a segment times the vector w = (x, y, z): integral of p x (w x p) over its mass; p : position.
+
+    r, t, m : start, direction and mass moments of the segment
+    """
     square = m[0] * (r[0] * r[0] + r[1] * r[1] + r[2] * r[2]) + m[2] * (t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
     square += 2.0 * m[1] * (r[0] * t[0] + r[1] * t[1] + r[2] * t[2])
     a, b = r[0] * x + r[1] * y + r[2] * z, t[0] * x + t[1] * y + t[2] * z
@@ -66,7 +72,7 @@ def inertia_times(r, t, m, x, y, z):
 
 @njit
 def segment_load(motion, r, t, m, d):
-    """Force and torque of a segment of fluid with mass moments m and their rates d."""
+    """Force and torque of a segment of fluid on its body; m, d : mass moments of the segment and their rates."""
     sx, sy, sz = m[0] * r[0] + m[1] * t[0], m[0] * r[1] + m[1] * t[1], m[0] * r[2] + m[1] * t[2]
     gx, gy, gz = as_tuple(motion[BODY_GRAVITY : BODY_GRAVITY + 3])
     ex, ey, ez = cross(motion, BODY_SPIN_RATE, sx, sy, sz)
@@ -85,7 +91,10 @@ def segment_load(motion, r, t, m, d):
 
 @njit
 def flow_load(motion, path, change, flow, rate):
-    """Force and torque of a flow along a path that changes at `change`; flow [kg/s], rate : its derivative [kg/s2]."""
+    """Force and torque of a mass flow along a flow path on its body.
+
+    path, change : (C, Z) and its rate; flow, rate : mass flow [kg/s] and its derivative [kg/s2]
+    """
     cx, cy, cz = cross(motion, BODY_SPIN, path[0], path[1], path[2])
     zx, zy, zz = cross(motion, BODY_SPIN, path[3], path[4], path[5])
     return (
@@ -114,26 +123,29 @@ def level_rate(dydt, tables, i):
 
 @njit(forceinline=True)
 def tank_path(tables, i, high):
-    """Flow path from the bottom of the tank at node i to the height `high` above it [m]."""
+    """Flow path (C, Z) from the bottom of the tank at node i to the height `high` above it [m]."""
     r = tables.moving_segments[tables.nodes[i]["moving_segment"]]["start"]
     return 0.0, 0.0, high, r[1] * high, -r[0] * high, 0.0
 
 
 @njit(forceinline=True)
 def tank_paths(tables, i, j, a, b):
-    """Flow path down the tank at node i from height a and up the tank at node j to height b, for flow from i to j."""
+    """Flow path (C, Z) of a flow from node i to node j inside the tanks there.
+
+    It leads down the tank at node i from height a [m], and up the tank at node j to height b [m].
+    """
     return add_six(tank_path(tables, i, -a), tank_path(tables, j, b))
 
 
 @njit(forceinline=True)
 def vertical_moments(mass, high):
-    """Mass moments of a mass distributed evenly over the height `high` above a bottom."""
+    """Mass moments (m0, m1, m2) of a mass [kg] that is distributed evenly over the height `high` above a bottom [m]."""
     return mass, 0.5 * mass * high, mass * high * high / 3.0
 
 
 @njit
 def node_segment(y, tables, i):
-    """Segment (r, t, m) of the fluid at a node."""
+    """Segment (r, t, m) of the fluid stored at node i; its mass is 0 for a node without storage."""
     node = tables.nodes[i]
     r = as_tuple(tables.moving_segments[node["moving_segment"]]["start"])
     if node["kind"] == TANK:
@@ -143,7 +155,12 @@ def node_segment(y, tables, i):
 
 @njit
 def node_segment_rates(y, dydt, out, tables, i):
-    """Rates d of the fluid at a node: its inflow, in a tank at the surface; the negative supply if it has no volume."""
+    """Rates d of the mass moments of the fluid at node i, from its inflow [kg/s, kg m/s, kg m2/s].
+
+    In a tank the inflow counts at the surface. A node without volume has the rate -supply, because supplied fluid
+    leaves it
+    into the network.
+    """
     node = tables.nodes[i]
     if node["kind"] == TANK:
         high, more = level_at(y, tables, i), dydt[node["y"]]
@@ -165,7 +182,7 @@ def node_load(y, dydt, out, tables, i):
 
 @njit(forceinline=True)
 def mass_per_length(tables, pipe, k):
-    """Mass per length of the profile in cell k of a pipe [kg/m]."""
+    """Mass per length in cell k of a pipe in the initial steady state [kg/m]."""
     if tables.settings[0]["law"] == LAW_LINEAR:
         return tables.settings[0]["rho"] * pipe["area"]
     return tables.profile[pipe["center"] + k]
@@ -173,7 +190,10 @@ def mass_per_length(tables, pipe, k):
 
 @njit
 def pipe_segment(tables, k):
-    """(r, t, distance between its ends [m]) of a pipe on a body; t is zero if both ends are at the same place."""
+    """Start r, unit vector t and distance between the ends [m] of pipe k on a body.
+
+    t is zero if both ends are at the same point.
+    """
     pipe = tables.pipes[k]
     r, s = (
         tables.moving_segments[pipe["moving_segment"]]["start"],
@@ -187,9 +207,10 @@ def pipe_segment(tables, k):
 
 @njit
 def pipe_moments(tables, y, k, length, share):
-    """(mass moments m, sum over cells of flow times length along the segment) of a pipe.
+    """Mass moments m of pipe k, and the sum over its cells of mass flow times length along the segment [kg m/s].
 
-    y : states, then share is 1; or rates, then share is 0
+    y : states with share = 1; or rates of states with share = 0, then the results are rates
+    length : distance between the ends of the pipe [m]
     """
     pipe = tables.pipes[k]
     n, o, per = pipe["cells"], pipe["y"], 1.0 / pipe["speed"]
@@ -209,7 +230,11 @@ def straight_path(r, t):
 
 @njit
 def pipe_end(y, tables, k, right, share):
-    """(node of the tank at an end of a pipe, or -1; flow of the cell there, or its rate if share is 0)."""
+    """Node of the tank at an end of pipe k, -1 if there is no tank; and mass flow of the cell at that end [kg/s].
+
+    right : 1 for the end at `to`, 0 at `from`
+    y : states with share = 1; or rates of states with share = 0, then the flow is a rate [kg/s2]
+    """
     pipe = tables.pipes[k]
     n, i = pipe["cells"], pipe["to_node"] if right == 1 else pipe["from_node"]
     at = pipe["y"] + right * (n - 1)
@@ -218,7 +243,7 @@ def pipe_end(y, tables, k, right, share):
 
 @njit
 def pipe_load(y, dydt, tables, k):
-    """Force and torque of the fluid in a pipe, and of the flow between its ends and the surfaces of tanks."""
+    """Force and torque of the fluid in pipe k, and of the flow between its ends and the surfaces of tanks."""
     motion, (r, t, length) = tables.scratch, pipe_segment(tables, k)
     m, flow = pipe_moments(tables, y, k, length, 1.0)
     d, rate = pipe_moments(tables, dydt, k, length, 0.0)
@@ -240,7 +265,7 @@ def pipe_load(y, dydt, tables, k):
 
 @njit
 def column_path(y, tables, column):
-    """Flow path (C, Z) of a column, with the paths in tanks at its ends, in axes of its body."""
+    """Flow path (C, Z) of a rigid column, with the paths in tanks at its ends, in axes of its body."""
     first, last = (
         tables.moving_segments[column["moving_segment"]]["start"],
         tables.moving_segments[column["moving_segment"] + column["moving_segments"] - 1]["end"],
@@ -256,7 +281,7 @@ def column_path(y, tables, column):
 
 @njit
 def column_segment(tables, column, k):
-    """(r, t, m) of segment k of a column; the mass of the column is distributed by length."""
+    """Segment (r, t, m) number k of a rigid column; the mass of the column is distributed by length."""
     total = 0.0
     for m in range(column["moving_segments"]):
         total += segment_length(tables.moving_segments[column["moving_segment"] + m])
@@ -279,7 +304,7 @@ def segment_length(segment):
 
 @njit
 def column_load(y, dydt, tables, k):
-    """Force and torque of the fluid in a column, and of the flow between its ends and the surfaces of tanks."""
+    """Force and torque of the fluid in rigid column k, and of the flow between its ends and the surfaces of tanks."""
     column, motion = tables.columns[k], tables.scratch
     i, j = column["from_node"], column["to_node"]
     faster = tank_paths(tables, i, j, level_rate(dydt, tables, i), level_rate(dydt, tables, j))
@@ -296,13 +321,13 @@ def column_load(y, dydt, tables, k):
 
 @njit(forceinline=True)
 def is_fluid_node(kind):
-    """True if nodes of a kind contain fluid or let it out."""
+    """True if nodes of a kind contain fluid or let it leave the network."""
     return kind == TANK or kind == CHAMBER or kind == FIXED or kind == JUNCTION
 
 
 @njit
 def add_load(out, here, load, sign):
-    """Add a load to a body (sign +1), or subtract it (sign -1)."""
+    """Add a load in axes of a body to its sums FORCE and TORQUE (sign +1), or subtract it (sign -1)."""
     x, y, z = to_world(out, here, sign * load[0], sign * load[1], sign * load[2])
     add_force(out, here, 0.0, 0.0, 0.0, x, y, z)
     x, y, z = to_world(out, here, sign * load[3], sign * load[4], sign * load[5])
@@ -311,9 +336,10 @@ def add_load(out, here, load, sign):
 
 @njit
 def add_all_fluid_loads(y, dydt, out, tables, least, sign, wide, spin):
-    """Add (sign +1) or subtract (sign -1) the loads of all networks with a code `loads_body` of at least `least`.
+    """Add (sign +1) or subtract (sign -1) the loads of the fluid in nodes, pipes and rigid columns on their bodies.
 
-    wide, spin : offsets in a body row of the acceleration of its origin and of its angular acceleration
+    least : least code `loads_body` that is included; 1 : forces move the body, 2 : a joint load is an output
+    wide, spin : offsets, in the data of a body, of the acceleration of its origin and of its angular acceleration
     """
     nodes, pipes, columns, segments = tables.nodes, tables.pipes, tables.columns, tables.moving_segments
     for i in range(nodes.size):
@@ -339,6 +365,6 @@ def add_all_fluid_loads(y, dydt, out, tables, least, sign, wide, spin):
 
 @njit
 def add_fluid_loads(t, y, dydt, out, handle):
-    """Add the fluid loads to all bodies that need them (`loads_body` at least 1), computed for q'' = 0."""
+    """Add the fluid loads for q'' = 0 (zero joint accelerations) to all bodies with `loads_body` of at least 1."""
     if dydt.size > 0:
         add_all_fluid_loads(y, dydt, out, open_tables(handle), MOVED_BY_FORCES, 1.0, BIAS, SPIN_BIAS)

@@ -22,7 +22,11 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def point_at(out, tables, k, base):
-    """(position, velocity) of point k, (59) and (67); position from o if `base` is ARM. The world is at rest."""
+    """Position [m] and velocity [m/s] of point k, six numbers in axes of the world; (59) and (67) of docs/course.md.
+
+    base : POSITION for the position from the origin of the world, or ARM for that from o (`body_layout`)
+    Points of the world have no velocity; all numbers are 0 for k < 0.
+    """
     if k < 0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     point = tables.points[k]
@@ -46,7 +50,7 @@ def spin_of(out, tables, k):
 
 @njit(forceinline=True)
 def root_of(tables, k):
-    """Root of the body of point k; -1 for the world."""
+    """Body that is the root of the tree to which point k belongs; -1 for the world."""
     if k < 0 or tables.points[k]["body"] < 0:
         return -1
     return tables.bodies[tables.points[k]["body"]]["root"]
@@ -54,7 +58,7 @@ def root_of(tables, k):
 
 @njit
 def update_elements(out, tables):
-    """Write direction, elongation since the start and rate of elongation of all force elements."""
+    """Write unit direction, elongation since the start [m] and its rate [m/s] of all force elements to `out`."""
     layout, lines = tables.layout[0], tables.lines
     for k in range(lines.size):
         line, at, to = lines[k], layout["along"] + 3 * k, layout["travel"] + 2 * lines[k]["push"]
@@ -82,7 +86,7 @@ def update_elements(out, tables):
 
 @njit(forceinline=True)
 def add_element_end_force(out, tables, k, acts, x, y, z):
-    """Add a force, or for `acts` ABOUT a torque, at point k to its body."""
+    """Add a force (x, y, z) [N], or for `acts` ABOUT a torque [N m], at point k to the body of that point."""
     if k >= 0 and tables.points[k]["body"] >= 0:
         here = body_row(tables, tables.points[k]["body"])
         if acts == ABOUT:
@@ -93,7 +97,7 @@ def add_element_end_force(out, tables, k, acts, x, y, z):
 
 @njit
 def add_element_forces(t, y, dydt, out, handle):
-    """Add the forces of all elements to their bodies: along the line at `to`, opposite at `from`."""
+    """Add the forces of all elements to their bodies: along their direction at `to`, opposite to it at `from`."""
     tables = open_tables(handle)
     layout, lines = tables.layout[0], tables.lines
     for k in range(lines.size):

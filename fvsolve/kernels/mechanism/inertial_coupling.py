@@ -1,9 +1,9 @@
-"""Acceleration of contained fluid by its body, once the accelerations of bodies are solved.
+"""Acceleration of contained fluid by its body, after the accelerations of bodies are solved.
 
-The coupling follows from the Lagrangian (70) of fluid and bodies. First the rates of flow are computed for
-q'' = 0, q'' being the accelerations of the freedoms of bodies. Then the bodies are solved with the fluid loads
-(`fluid_loads`) and with the fluid in the mass matrix, minus its sliding (`fluid_inertia`). Last, the accelerations of
-bodies act on the flow.
+The coupling follows from the Lagrangian of fluid and bodies ((70) of docs/course.md). First the rates of flow are
+computed for q'' = 0; q'' are the accelerations of the degrees of freedom of bodies. Then q'' is solved with the fluid
+loads (`fluid_loads`) and with the inertia of the fluid (`fluid_inertia`). Last, the rates of flow are corrected for
+q''.
 """
 
 from fvsolve.jit import njit
@@ -33,7 +33,10 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def path_acceleration(out, tables, segment, path):
-    """Acceleration of a body, minus that for q'' = 0, integrated along a flow path on it: C . a + Z . e [m2/s2]."""
+    """Acceleration of a body due to q'' alone, integrated along a flow path (C, Z) on it: C . a + Z . e [m2/s2].
+
+    a, e : acceleration of the origin and angular acceleration, minus their values for q'' = 0
+    """
     here = body_row(tables, tables.moving_segments[segment]["body"])
     a, e, b, c = here + ACCELERATION, here + SPIN_RATE, here + BIAS, here + SPIN_BIAS
     ax, ay, az = rotate_back(out, here + ATTITUDE, out[a] - out[b], out[a + 1] - out[b + 1], out[a + 2] - out[b + 2])
@@ -43,7 +46,7 @@ def path_acceleration(out, tables, segment, path):
 
 @njit
 def accelerate_pipe_flow(y, dydt, out, tables, k):
-    """Add the inertial force by the acceleration of its body to the waves of all cells of a pipe."""
+    """Add the inertial force of the acceleration of the body to the rates of the waves in all cells of pipe k."""
     pipe, (r, t, length) = tables.pipes[k], pipe_segment(tables, k)
     n, o = pipe["cells"], pipe["y"]
     push = 0.5 * length / n / pipe["dx"] * path_acceleration(out, tables, pipe["moving_segment"], straight_path(r, t))
@@ -58,7 +61,7 @@ def accelerate_pipe_flow(y, dydt, out, tables, k):
 def accelerate_network_flow(t, y, dydt, out, handle):
     """Add the inertial forces of the accelerations of bodies, minus those for q'' = 0, to the rates of flow.
 
-    Where joint loads are requested (`loads_body` 2), the fluid loads are computed again with the new rates.
+    Where a joint load is an output (`loads_body` = 2), the fluid loads are computed again with the new rates.
     """
     tables = open_tables(handle)
     pipes, columns, segments = tables.pipes, tables.columns, tables.moving_segments
@@ -81,7 +84,10 @@ def accelerate_network_flow(t, y, dydt, out, handle):
 
 @njit
 def pipe_rate_limit(t, y, dydt, out, handle):
-    """Raise out[RATE], the rate that limits steps [1/s], for bodies braked by waves: rho A c at both ends of a pipe."""
+    """Raise out[RATE], the rate that limits steps [1/s], for bodies that are damped by waves in their pipes.
+
+    The damping is rho A c at both ends of a pipe; rho : density, A : area, c : wave speed.
+    """
     tables = open_tables(handle)
     work, n, damping = tables.scratch, tables.freedoms.size, 0.0
     for k in range(tables.pipes.size):

@@ -1,9 +1,12 @@
 """Kinematics of bodies from (t, y): attitudes, positions, velocities, bias accelerations and weight.
 
-(45), (52), (59) to (67): the axes of a body are those of its parent, rotated by the joint. Velocities and accelerations
-along the tree are spatial vectors at the reference point o (`body_layout`), V = V_parent + S q'. Columns of S: revolute
-(a, r x a), prismatic (0, a), ball the three (R e, r x R e); a free body has the velocity of its centre in the world and
-R w. The acceleration at o is A = A_parent + S q'' + V x S q' (Featherstone 2008, chapter 2).
+Equations (45), (52) and (59) to (67) of docs/course.md: the axes of a body are those of its parent, rotated by the
+joint. Velocities and accelerations along a tree of bodies are spatial vectors (angular part, linear part) at the
+reference point o (`body_layout`), V = V_parent + S q'; q' are the rates of the joint. Columns of S, with axis a, unit
+vectors e and position r of the joint from o: revolute (a, r x a); prismatic (0, a); ball joint three columns
+(R e, r x R e). A free body has as rates the velocity of its centre of mass in the world and its angular velocity in its
+own axes. The acceleration at o is A = A_parent + S q'' + V x S q' (Featherstone 2008, chapter 2). The bias is A for
+q'' = 0. own : data of a body in `out`.
 """
 
 from math import cos, sin
@@ -54,7 +57,7 @@ def multiply_matrices(a, i, b, j, c, k):
 
 @njit
 def rotation_about_axis(q, k, angle, axis):
-    """Write the rotation matrix about a unit axis, (43), to q[k]."""
+    """Write the rotation matrix about a unit axis by an angle [rad], by rows, to q[k], (43) of docs/course.md."""
     c, s, x, y, z = cos(angle), sin(angle), axis[0], axis[1], axis[2]
     rest = 1.0 - c
     write_vector(q, k, c + x * x * rest, x * y * rest - z * s, x * z * rest + y * s)
@@ -64,7 +67,10 @@ def rotation_about_axis(q, k, angle, axis):
 
 @njit
 def rotation_of_parameters(q, k, h, a, b, c):
-    """Write the rotation matrix of normalised Euler parameters, (45), to q[k]: a rotation even if they have drifted."""
+    """Write the rotation matrix of the Euler parameters (h, a, b, c), by rows, to q[k], (45) of docs/course.md.
+
+    The result is a rotation also if the norm of the parameters has drifted from 1.
+    """
     s = 2.0 / (h * h + a * a + b * b + c * c)
     write_vector(q, k, 1.0 - s * (b * b + c * c), s * (a * b - h * c), s * (a * c + h * b))
     write_vector(q, k + 3, s * (a * b + h * c), 1.0 - s * (a * a + c * c), s * (b * c - h * a))
@@ -73,21 +79,21 @@ def rotation_of_parameters(q, k, h, a, b, c):
 
 @njit(forceinline=True)
 def joint_parameters(body, first, y):
-    """Euler parameters (eta, eps) of a joint; first : index of the first among its coordinates."""
+    """Euler parameters (eta, eps) of a joint; first : index of eta among the coordinates of the joint."""
     at, e = body["y"] + first, body["start"]
     return e[first] + y[at], e[first + 1] + y[at + 1], e[first + 2] + y[at + 2], e[first + 3] + y[at + 3]
 
 
 @njit(forceinline=True)
 def joint_velocities(body, first, y):
-    """Three velocities of a joint from index `first` on."""
+    """Three velocities of a joint; first : index of the first of them among the velocities of the joint."""
     at, v = body["rate"] + first, body["speed"]
     return v[first] + y[at], v[first + 1] + y[at + 1], v[first + 2] + y[at + 2]
 
 
 @njit
 def set_free_body(body, y, own):
-    """Write attitude, position and motion of a free body; o is its centre of mass."""
+    """Write attitude, position, velocity and bias acceleration of a free body; o is its centre of mass."""
     rotation_of_parameters(own, ATTITUDE, *joint_parameters(body, 3, y))
     cx, cy, cz = rotate(own, ATTITUDE, body["centre"], 0)
     at, x0 = body["y"], body["start"]
@@ -103,7 +109,7 @@ def set_free_body(body, y, own):
 
 @njit
 def set_joint_frame(body, out, tables, own):
-    """Write position and motion of a body as those of its parent at the joint, and the joint axes to scratch[9:18]."""
+    """Set position and motion of a body to those of its parent at the joint; write the joint axes to scratch[9:18]."""
     work = tables.scratch
     if body["parent"] < 0:
         for k in range(9):
@@ -126,7 +132,7 @@ def set_joint_frame(body, out, tables, own):
 
 @njit
 def set_revolute(body, t, y, tables, own):
-    """Apply a revolute joint: rotate the axes; add S q' and, if the joint is driven, S q''."""
+    """Rotate a body by its revolute joint; add the velocity S q' and, if the joint is driven, S q''."""
     angle, rate, change = joint_coordinate(body, t, y, tables)
     rotation_about_axis(tables.scratch, 0, angle, body["axis"])
     multiply_matrices(tables.scratch, 9, tables.scratch, 0, own, ATTITUDE)
@@ -138,7 +144,7 @@ def set_revolute(body, t, y, tables, own):
 
 @njit
 def set_prismatic(body, t, y, tables, own):
-    """Apply a prismatic joint: move the position; add S q' and, if the joint is driven, S q''."""
+    """Move a body by its prismatic joint; add the velocity S q' and, if the joint is driven, S q''."""
     travel, rate, change = joint_coordinate(body, t, y, tables)
     copy_joint_axes(tables, own)
     a, b, c = rotate(own, ATTITUDE, body["axis"], 0)
@@ -159,7 +165,7 @@ def copy_joint_axes(tables, own):
 
 @njit
 def add_joint_velocity(own, wx, wy, wz, vx, vy, vz):
-    """Add S q' = (w, v) to the motion of a body, and V x S q' to its bias acceleration."""
+    """Add the joint velocity S q' = (w, v) to the velocity V of a body, and V x S q' to its bias acceleration."""
     for k, w, v in ((0, wx, vx), (1, wy, vy), (2, wz, vz)):
         own[SPIN + k] += w
         own[VELOCITY_AT_O + k] += v
@@ -190,7 +196,10 @@ def set_jointed_body(body, t, y, out, tables, own):
 
 @njit
 def add_drive_acceleration(own, x, y, z, turns):
-    """Add the acceleration S q'' of a driven joint; turns : 1 revolute, 0 prismatic."""
+    """Add the acceleration S q'' of a driven joint to the bias acceleration of a body.
+
+    (x, y, z) : axis times q'' in axes of the world; turns : 1 for a revolute, 0 for a prismatic joint
+    """
     if turns == 1:
         own[SPIN_BIAS] += x
         own[SPIN_BIAS + 1] += y
@@ -203,9 +212,10 @@ def add_drive_acceleration(own, x, y, z, turns):
 
 @njit(forceinline=True)
 def origin_acceleration(out, here, wide, spin):
-    """Acceleration of the origin of a body from that at o: a + alpha x r + w x v; v : velocity of the origin.
+    """Acceleration of the origin of a body from that at o: a + alpha x r + w x v.
 
-    wide : index of a; spin : offset of alpha in the row of the body
+    a : acceleration at o, at index `wide`; alpha : angular acceleration, at offset `spin` in the data of the body
+    r : origin minus o; w, v : angular velocity, and velocity of the origin; here : offset of the body in `out`
     """
     ax, ay, az = cross(out, here + spin, out[here + ARM], out[here + ARM + 1], out[here + ARM + 2])
     v = here + VELOCITY
@@ -246,5 +256,5 @@ def kinematics(t, y, dydt, out, handle):
 
 @njit
 def kinematics_for_events(t, y, out, handle, g):
-    """Call `kinematics` before event functions, which no right-hand side precedes."""
+    """Call `kinematics` before event functions are evaluated, because they do not follow an evaluation of the rates."""
     kinematics(t, y, y[:0], out, handle)

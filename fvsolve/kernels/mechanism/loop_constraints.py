@@ -1,10 +1,16 @@
-"""Loop constraints (pins) by Lagrange multipliers with Baumgarte stabilisation; imported only for scenes with pins.
+"""Loop constraints (pins) by Lagrange multipliers with Baumgarte stabilisation; imported only for cases with pins.
 
-A constraint row keeps n . rho constant: n is a direction, rho the position of `to` in the axes of the body of `from`.
-Equal and opposite forces act on both bodies at the same point. G q' is the rate of the rows, Z = L^-T G', and
-Z' Z = G M^-1 G'. lambda = -(Z' Z)^-1 (rows of the accelerations without pins + 2 pull G q' + pull^2 gap). Forces and
-positions are relative to those at the start, which are stored in the table: so a balanced start has no rounding errors.
-Layout of `scratch` after the data of `kernels.mechanism.mass_matrix`: G, Z (a row of freedoms each), Z' Z, lambda.
+A pin constrains up to three directions n: it keeps n . rho constant, where rho is the position of its point `to` in the
+axes of the body of its point `from`. Equal and opposite forces lambda along n act on both bodies at `to`. Let q be the
+coordinates of all degrees of freedom, M = L'L the mass matrix, and G q' the velocities along all constrained
+directions. With Z = L^-T G', so that Z' Z = G M^-1 G',
+
+    lambda = -(Z' Z)^-1 (accelerations along these directions without pins + 2 pull G q' + pull^2 gap)
+
+pull is the rate of stabilisation [1/s], gap the change of n . rho since the start [m]. Forces and positions are
+relative to those at the start, which the table of pins contains: so a balanced start has no rounding errors. `scratch`
+contains, after the data of `mass_matrix`: G and Z, with a number for each direction and degree of freedom; Z' Z;
+lambda.
 """
 
 from math import sqrt
@@ -41,7 +47,7 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit(forceinline=True)
 def constraint_offset(tables):
-    """Offset of G in `scratch`."""
+    """Offset of the matrix G in `scratch`."""
     return scratch_offsets(tables)[1] + LOAD_SIZE * tables.bodies.size
 
 
@@ -53,7 +59,7 @@ def body_of(tables, point):
 
 @njit
 def pin_direction(out, tables, pin, r):
-    """Present direction r of a pin in axes of the world."""
+    """Unit vector of constrained direction r of a pin, at its present attitude, in axes of the world."""
     i = body_of(tables, pin["from_point"])
     if i < 0:
         return pin["directions"][3 * r], pin["directions"][3 * r + 1], pin["directions"][3 * r + 2]
@@ -62,7 +68,10 @@ def pin_direction(out, tables, pin, r):
 
 @njit
 def relative_motion(out, tables, pin):
-    """(gap, velocity, acceleration) of `to` relative to the body of `from`, (65), in axes of the world: 9 numbers."""
+    """Position of `to` minus that of `from` [m], and velocity and acceleration of `to` in axes of the body of `from`.
+
+    Returns 9 numbers, as components in axes of the world; (65) of docs/course.md.
+    """
     i, j = body_of(tables, pin["from_point"]), body_of(tables, pin["to_point"])
     x, y, z, u, v, w = point_at(out, tables, pin["to_point"], POSITION)
     p, q, s, _, _, _ = point_at(out, tables, pin["from_point"], POSITION)
@@ -86,7 +95,10 @@ def relative_motion(out, tables, pin):
 
 @njit
 def add_pin_force(out, tables, pin, r, size):
-    """Add the force `size` of row r to both bodies, at `to`: positive on its body, negative on the other."""
+    """Add the force `size` [N] along constrained direction r of a pin to both bodies, at the point `to`.
+
+    It is positive on the body of `to`, and negative on the body of `from`.
+    """
     nx, ny, nz = pin_direction(out, tables, pin, r)
     x, y, z, _, _, _ = point_at(out, tables, pin["to_point"], POSITION)
     for end, sign in ((pin["to_point"], size), (pin["from_point"], -size)):
@@ -99,7 +111,7 @@ def add_pin_force(out, tables, pin, r, size):
 
 @njit
 def fill_constraint_rows(out, tables):
-    """Write G, Z and, in place of lambda, the right-hand side of each row; return the number of rows."""
+    """Write G, Z and, in place of lambda, the right-hand sides to `scratch`; return the number of directions."""
     pins, work, n, g = tables.pins, tables.scratch, tables.freedoms.size, constraint_offset(tables)
     rows = 0
     for k in range(pins.size):
@@ -128,7 +140,7 @@ def fill_constraint_rows(out, tables):
 
 @njit
 def multipliers(tables, rows):
-    """Solve for lambda in place, by the Cholesky factor Z' Z = C C'."""
+    """Solve Z' Z lambda = right-hand sides in place, by Cholesky factors Z' Z = C C'; rows : number of directions."""
     work, n, z = tables.scratch, tables.freedoms.size, constraint_offset(tables) + rows * tables.freedoms.size
     h, last = z + rows * n, z + rows * n + rows * rows
     for i in range(rows):
@@ -151,7 +163,7 @@ def multipliers(tables, rows):
 
 @njit
 def start_gaps(t, y, dydt, out, handle):
-    """Write the gaps at the start in place of the forces, where `model.mechanism` reads them."""
+    """Write n . gap of each constrained direction [m] in place of the pin forces in `out`, for `model.mechanism`."""
     tables = open_tables(handle)
     pins, at = tables.pins, tables.layout[0]["pin"]
     for k in range(pins.size):
@@ -163,7 +175,7 @@ def start_gaps(t, y, dydt, out, handle):
 
 @njit
 def add_start_pin_forces(t, y, dydt, out, handle):
-    """Add the forces of pins at the start, along the present directions."""
+    """Add the pin forces at the start to the forces on bodies, along the directions of the pins at the state y."""
     tables = open_tables(handle)
     pins = tables.pins
     for k in range(pins.size):
@@ -173,7 +185,7 @@ def add_start_pin_forces(t, y, dydt, out, handle):
 
 @njit
 def solve_pinned_accelerations(t, y, dydt, out, handle):
-    """Solve for the accelerations of all bodies under their forces and those of pins; write rates of the states."""
+    """Solve for the accelerations of all bodies with pin forces; write them and the rates of the states."""
     tables = open_tables(handle)
     pins, work, n, at = tables.pins, tables.scratch, tables.freedoms.size, tables.layout[0]["pin"]
     add_start_pin_forces(t, y, dydt, out, handle)

@@ -1,10 +1,14 @@
 """Accelerations of bodies, M q'' = forces - bias, by the composite rigid body algorithm, factored along the tree.
 
-Lagrange's equations (70) of a tree are the equations of Newton and Euler (68) of its bodies, projected on the columns S
-of the joints. M_jk = S_k . I_j S_j, with I_j the inertia of all bodies carried by joint j (Featherstone 2008, chapter
-6). A row of M contains only the freedoms between j and the root; the factor M = L'L has no further entries. Layout of
-`scratch`: S (6 numbers per freedom), forces and later accelerations, a work column, M; then per body ten numbers of
-inertia about o (mass, mass times centre, xx yy zz xy xz yz) and six of force.
+q are the coordinates of the degrees of freedom. Column S of a degree of freedom is the spatial velocity (angular, then
+linear at o) per unit rate. Lagrange's equations ((70) of docs/course.md) of a tree of bodies are the equations of
+Newton and Euler (68) of the bodies, projected on the columns S. M_jk = S_k . I_j S_j, with I_j the inertia of all
+bodies carried by joint j (Featherstone 2008, chapter 6). Row j of M contains only the degrees of freedom between j and
+the root; the factor L of M = L'L has no further entries.
+
+Layout of `scratch`, with n degrees of freedom: S (6 n numbers); forces, later accelerations (n); a work column (n); M.
+Then for each body ten numbers of inertia about o (mass, mass times centre, xx yy zz xy xz yz), and for each body six of
+torque and force.
 """
 
 from math import sqrt
@@ -41,7 +45,7 @@ INERTIA_SIZE, LOAD_SIZE = 10, 6  # numbers per body
 
 @njit(forceinline=True)
 def scratch_offsets(tables):
-    """(offset of the inertias, offset of the forces of bodies) in `scratch`."""
+    """(offset of the inertias of bodies, offset of the torques and forces of bodies) in `scratch`."""
     freedoms, n = tables.freedoms, tables.freedoms.size
     rows = freedoms[n - 1]["row"] + freedoms[n - 1]["depth"] + 1 if n > 0 else 0
     first = 8 * n + rows
@@ -50,7 +54,10 @@ def scratch_offsets(tables):
 
 @inline
 def joint_columns(body, own, s):
-    """Write S of the freedoms of a joint: angular velocity and velocity at o of each; own : row of the body."""
+    """Write the columns S of a joint to s: angular velocity and velocity at o per unit rate of each degree of freedom.
+
+    own : data of the body in `out`
+    """
     kind, x, y, z = body["joint"], own[ARM], own[ARM + 1], own[ARM + 2]
     first = 0
     if kind == FREE:
@@ -78,7 +85,10 @@ def joint_columns(body, own, s):
 
 @inline
 def inertia_about_o(body, own, result):
-    """Write the inertia of a body about o, ten numbers: R J R' plus the terms of its mass."""
+    """Write the inertia of a body about o, in axes of the world, as ten numbers.
+
+    The numbers are mass, mass times centre (3), and moments of inertia xx yy zz xy xz yz.
+    """
     m, inertia, r = body["mass"], body["inertia"], ATTITUDE
     gx, gy, gz = rotate(own, r, body["centre"], 0)
     gx, gy, gz = gx + own[ARM], gy + own[ARM + 1], gz + own[ARM + 2]
@@ -97,7 +107,7 @@ def inertia_about_o(body, own, result):
 
 @njit(forceinline=True)
 def inertia_row(own, r, inertia):
-    """Row of R, at own[r], times the inertia matrix of a body in its own axes."""
+    """Row of the rotation matrix R, at own[r], times the inertia matrix of a body in its own axes."""
     x, y, z = own[r], own[r + 1], own[r + 2]
     return (
         x * inertia[0] + y * inertia[3] + z * inertia[6],
@@ -108,7 +118,10 @@ def inertia_row(own, r, inertia):
 
 @njit(forceinline=True)
 def spatial_momentum(inertia, wx, wy, wz, vx, vy, vz):
-    """Inertia times (w, v): (angular momentum about o, momentum); with accelerations (torque, force); six numbers."""
+    """Inertia (ten numbers) times the spatial velocity (w, v): angular momentum about o, momentum; six numbers.
+
+    For a spatial acceleration in place of (w, v), the result is torque and force.
+    """
     m, hx, hy, hz = inertia[0], inertia[1], inertia[2], inertia[3]
     xx, yy, zz, xy, xz, yz = inertia[4], inertia[5], inertia[6], inertia[7], inertia[8], inertia[9]
     return (
@@ -123,7 +136,11 @@ def spatial_momentum(inertia, wx, wy, wz, vx, vy, vz):
 
 @inline
 def bias_load(own, inertia, load):
-    """Write the load about o that a joint must supply to its body for q'' = 0, I A + V x* I V - forces; six numbers."""
+    """Write the load (torque about o, force) that a joint must supply to its body for q'' = 0, six numbers.
+
+    The load is I A + V x* I V - applied loads. I : inertia; V, A : spatial velocity, and acceleration for q'' = 0; x* :
+    spatial cross product of motion and force (Featherstone 2008)
+    """
     w, v, a, c = SPIN, VELOCITY_AT_O, SPIN_BIAS, BIAS_AT_O
     lx, ly, lz, px, py, pz = spatial_momentum(inertia, own[w], own[w + 1], own[w + 2], own[v], own[v + 1], own[v + 2])
     tx, ty, tz, fx, fy, fz = spatial_momentum(inertia, own[a], own[a + 1], own[a + 2], own[c], own[c + 1], own[c + 2])
@@ -138,7 +155,10 @@ def bias_load(own, inertia, load):
 
 @njit
 def fill_mass_matrix(y, out, tables):
-    """Write S, M and the forces of all freedoms to `scratch`; the balance of forces at the start is subtracted."""
+    """Write S, M and the forces of all degrees of freedom to `scratch`.
+
+    The forces are minus those that are stored as rounding of the equilibrium at the start.
+    """
     bodies, freedoms, work, paths = tables.bodies, tables.freedoms, tables.scratch, tables.integers
     n = freedoms.size
     first, loads = scratch_offsets(tables)
@@ -182,9 +202,9 @@ def fill_mass_matrix(y, out, tables):
 
 @njit
 def factor_mass_matrix(tables):
-    """Factor M = L'L in place, row by row from the leaves; L has the sparsity of M.
+    """Factor M = L'L in place, row by row from the leaves of the tree; L has the sparsity of M.
 
-    The diagonal contains the reciprocal of that of L, because later solves divide by it.
+    The diagonal contains the reciprocals of the diagonal of L, because later solutions divide by it.
     """
     freedoms, work, paths, n = tables.freedoms, tables.scratch, tables.integers, tables.freedoms.size
     for j in range(n - 1, -1, -1):
@@ -201,7 +221,7 @@ def factor_mass_matrix(tables):
 
 @njit
 def solve_factor(tables, at):
-    """Solve L' z = b in place, b at scratch[at]; |z|^2 = b' M^-1 b."""
+    """Solve L' z = b in place, b at scratch[at], after `factor_mass_matrix`; |z|^2 = b' M^-1 b."""
     freedoms, work, paths, n = tables.freedoms, tables.scratch, tables.integers, tables.freedoms.size
     b = work[at : at + n]
     for j in range(n - 1, -1, -1):
@@ -214,7 +234,7 @@ def solve_factor(tables, at):
 
 @njit
 def solve_mass_matrix(tables, at):
-    """Solve M x = b in place, b at scratch[at]."""
+    """Solve M x = b in place, b at scratch[at], after `factor_mass_matrix`."""
     freedoms, work, paths, n = tables.freedoms, tables.scratch, tables.integers, tables.freedoms.size
     solve_factor(tables, at)
     b = work[at : at + n]
@@ -228,7 +248,7 @@ def solve_mass_matrix(tables, at):
 
 @njit
 def spread_accelerations(out, tables):
-    """Write the accelerations of all bodies from those of the freedoms, from the root to the leaves."""
+    """Write the accelerations of all bodies, from those of the degrees of freedom, from the root to the leaves."""
     bodies, work, n = tables.bodies, tables.scratch, tables.freedoms.size
     loads = scratch_offsets(tables)[1]
     for i in range(bodies.size):
@@ -253,7 +273,10 @@ def spread_accelerations(out, tables):
 
 @njit
 def coordinate_rates(body, y, dydt):
-    """Write d/dt of the coordinates of a joint: velocities, or rates of Euler parameters by (44), w in body axes."""
+    """Write d/dt of the coordinates of a joint: velocities, and rates of Euler parameters ((44) of docs/course.md).
+
+    The rates of Euler parameters follow from the angular velocity in axes of the body.
+    """
     at, first = body["y"], 0
     if body["joint"] == REVOLUTE or body["joint"] == PRISMATIC:
         dydt[at] = body["speed"][0] + y[body["rate"]]
@@ -270,7 +293,10 @@ def coordinate_rates(body, y, dydt):
 
 @njit
 def add_point_force(out, tables, point, acts, x, y, z, at):
-    """Add the generalised force of a unit force or torque (x, y, z) at a point to b at scratch[at]."""
+    """Add the generalised forces of a force (x, y, z) at a point of a body to the vector at scratch[at].
+
+    For `acts` ABOUT, (x, y, z) is a torque.
+    """
     if point < 0 or tables.points[point]["body"] < 0:
         return
     i = tables.points[point]["body"]
@@ -285,9 +311,9 @@ def add_point_force(out, tables, point, acts, x, y, z, at):
 
 @njit
 def add_body_force(out, tables, i, px, py, pz, x, y, z, at):
-    """Add the generalised force of a force (x, y, z) on body i at (px, py, pz) in the world to b at scratch[at].
+    """Add the generalised forces of a force (x, y, z) on body i at (px, py, pz) to the vector at scratch[at].
 
-    Nothing is added for the world (i < 0).
+    All are in axes of the world. Nothing is added for the world (i < 0).
     """
     if i >= 0:
         here = body_row(tables, i)
@@ -301,7 +327,7 @@ def add_body_force(out, tables, i, px, py, pz, x, y, z, at):
 
 @njit
 def add_body_wrench(tables, i, tx, ty, tz, fx, fy, fz, at):
-    """Add the generalised force of a torque about o and a force on body i to b at scratch[at]."""
+    """Add the generalised forces of a torque (tx, ty, tz) about o and a force (fx, fy, fz) on body i to scratch[at]."""
     work, i = tables.scratch, nearest_free_body(tables, i)
     if i < 0:
         return
@@ -315,7 +341,7 @@ def add_body_wrench(tables, i, tx, ty, tz, fx, fy, fz, at):
 
 @njit
 def mobility(tables, at):
-    """b' M^-1 b with M factored and b at scratch[at], the inverse of the effective mass in the direction b."""
+    """Reciprocal of the effective mass in a direction b, b' M^-1 b; M is factored, b at scratch[at] is overwritten."""
     work, total = tables.scratch, 0.0
     solve_factor(tables, at)
     for j in range(tables.freedoms.size):
@@ -325,9 +351,10 @@ def mobility(tables, at):
 
 @njit
 def body_rate_limit(out, tables):
-    """Upper bound of the rates of bodies [1/s]: c / 2 + sqrt(c^2 / 4 + k), k and c summed over forces with b' M^-1 b.
+    """Upper bound of the rates of bodies [1/s], at least the greatest angular velocity: c / 2 + sqrt(c^2 / 4 + k).
 
-    The trace of M^-1 K exceeds its greatest eigenvalue. The bound is at least the greatest angular velocity.
+    k, c : sums over springs and dampers of stiffness and damping, each times b' M^-1 b; b : direction of the force
+    The trace of M^-1 K exceeds its greatest eigenvalue; K : stiffness matrix.
     """
     rate, freedoms, work, lines = out[RATE], tables.freedoms, tables.scratch, tables.lines
     stiffness, damping, n, at = 0.0, 0.0, freedoms.size, 7 * freedoms.size
@@ -359,13 +386,13 @@ def body_rate_limit(out, tables):
 
 @njit
 def start_mass_matrix(t, y, dydt, out, handle):
-    """Write the forces of freedoms and M only; used for the equilibrium at the start."""
+    """Write the forces of the degrees of freedom and M to `scratch`, for the equilibrium at the start."""
     fill_mass_matrix(y, out, open_tables(handle))
 
 
 @njit
 def state_rates(y, dydt, tables):
-    """Write the rates of the states of joints from the accelerations of their freedoms; nothing if dydt is empty."""
+    """Write the rates of the states of joints from the accelerations of degrees of freedom, unless dydt is empty."""
     bodies, work, n = tables.bodies, tables.scratch, tables.freedoms.size
     if dydt.size == 0:
         return

@@ -1,12 +1,13 @@
 """Inertial and gravity forces on the fluid in pipes, rigid columns and tanks of moving bodies.
 
-In axes of the body the drive of a segment from r1 to r2, energy per mass of its fluid [J/kg], is
+The drive of a segment of fluid from r1 to r2 is the work of these forces along it per unit mass [J/kg]. In axes of the
+body it is
 
-    (g - a_o) . (r2 - r1) - W' . w + (|W x r2|^2 - |W x r1|^2) / 2,  w = integral of r x dr along it,
+    (g - a_o) . (r2 - r1) - W' . w + (|W x r2|^2 - |W x r1|^2) / 2,  w = integral of r x dr along it
 
-a_o : acceleration of the origin of the body; W : its angular velocity. This is Lagrange's equation (70) for fluid that
-slides along a given path. Coriolis forces are perpendicular to the path. The drive at the start is already contained in
-the profile.
+a_o : acceleration of the origin of the body; W, W' : its angular velocity and angular acceleration. This is Lagrange's
+equation ((70) of docs/course.md) for fluid that slides along a given path. Coriolis forces are perpendicular to the
+path. The initial steady state already balances the drive at the start.
 """
 
 from fvsolve.jit import njit
@@ -37,9 +38,9 @@ THIN_LAYER = 1e-6  # thickness of a layer added at the surface to test if fluid 
 
 @njit
 def set_body_motion(tables, out, i, wide, spin):
-    """Write g - a_o, W, W' and velocity of body i in its own axes to scratch.
+    """Write g - a_o, W, W' and the velocity of the origin of body i, in its own axes, to `scratch`.
 
-    wide, spin : offsets of a_o and W' in the row of the body
+    wide, spin : offsets of a_o and W' in the data of the body in `out`
     """
     here, motion = body_row(tables, i), tables.scratch
     b, w, e, v = here + wide, here + SPIN, here + spin, here + VELOCITY
@@ -52,7 +53,7 @@ def set_body_motion(tables, out, i, wide, spin):
 
 @njit
 def speed_squared(motion, x, y, z):
-    """|W x r|^2 [m2/s2]."""
+    """Square of the speed of rotation at r = (x, y, z), |W x r|^2 [m2/s2]; motion : see `set_body_motion`."""
     u, v, w = cross(motion, BODY_SPIN, x, y, z)
     return u * u + v * v + w * w
 
@@ -68,7 +69,7 @@ def segment_drive(motion, r1, r2, wx, wy, wz):
 
 @njit
 def set_segment_drives(t, y, dydt, out, handle):
-    """Write the drive of all segments, minus that at the start, to out[ride] [J/kg]."""
+    """Write the drive of each moving segment of fluid, minus its drive at the start, to `out` [J/kg]."""
     tables = open_tables(handle)
     segments, at, last = tables.moving_segments, tables.layout[0]["moving_segment"], -1
     for k in range(segments.size):
@@ -84,7 +85,7 @@ def set_segment_drives(t, y, dydt, out, handle):
 
 @njit
 def bottom_pressure_per_density(tables, out, segment, level):
-    """Pressure over density at the bottom of a tank [J/kg]; level : depth along the z axis of its body [m]."""
+    """Pressure over density at the bottom of a tank on a body [J/kg]; level : depth along the z axis of the body."""
     set_body_motion(tables, out, segment["body"], BIAS, SPIN_BIAS)
     motion, r = tables.scratch, segment["start"]
     x, y, z = r[0], r[1], r[2]
@@ -97,9 +98,11 @@ def bottom_pressure_per_density(tables, out, segment, level):
 
 @njit
 def moving_tank_pressures(t, y, dydt, out, handle):
-    """Write the pressures at the bottoms of tanks on bodies: p' = rho (weight now - that of the profile); linear law.
+    """Write the pressures at the bottoms of tanks on bodies, as deviations from the initial steady state; linear law.
 
-    A weightless tank would lose its fluid: it ends the run.
+    p' = rho (bottom pressure over density - its value in the initial steady state). A tank whose fluid has no weight
+    would
+    lose the fluid: it ends the run.
     """
     tables = open_tables(handle)
     nodes, rho = tables.nodes, tables.settings[0]["rho"]
@@ -120,7 +123,7 @@ def moving_tank_pressures(t, y, dydt, out, handle):
 def mark_weightless(tables, out, i, segment, level):
     """Write the status NO_WEIGHT if the fluid at the surface of the tank at node i has no weight.
 
-    Its number in out[WHERE] follows those of basins.
+    out[WHERE] is set to i plus the number of basins, because lower numbers denote basins.
     """
     if not bottom_pressure_per_density(tables, out, segment, level + THIN_LAYER) > bottom_pressure_per_density(
         tables, out, segment, level
@@ -130,7 +133,12 @@ def mark_weightless(tables, out, i, segment, level):
 
 @njit
 def moving_column_rates(t, y, dydt, out, handle):
-    """Write d/dt of the flow in rigid columns: pressure difference, offset of the profile, drive since the start."""
+    """Write the rates of the mass flow in rigid columns [kg/s2] on moving bodies and elsewhere, without friction.
+
+    The rate is area / length times the driving pressure: pressure difference of the ends, plus density times the change
+    of
+    the drive since the start, plus the constant `offset` of the column.
+    """
     tables = open_tables(handle)
     columns, p, at = tables.columns, tables.layout[0]["pressure"], tables.layout[0]["moving_segment"]
     for k in range(columns.size):
@@ -143,7 +151,10 @@ def moving_column_rates(t, y, dydt, out, handle):
 
 @njit
 def add_cell_drives(t, y, dydt, out, handle):
-    """Add the drive of the cells of pipes to the rates of their waves, dM/dt by A rho / dx of it; linear law."""
+    """Add the drive of the cells of pipes to the rates of their waves; linear density law.
+
+    It changes dM/dt by A rho / dx times the drive. M : mass flow, A : area, rho : density, dx : length of a cell
+    """
     tables = open_tables(handle)
     pipes, rho, at = tables.pipes, tables.settings[0]["rho"], tables.layout[0]["moving_segment"]
     for i in range(pipes.size if dydt.size > 0 else 0):

@@ -10,7 +10,10 @@ from fvsolve.kernels.tank_levels import tank_level
 
 @njit
 def moving_tank_pressures_barotropic(t, y, dydt, out, handle):
-    """Write the pressures at the bottoms of tanks on bodies: h(p) = h(ambient) + weight per mass [J/kg]."""
+    """Write the pressures at the bottoms of tanks on bodies, as deviations from the initial steady state.
+
+    The pressure p follows from the enthalpy, h(p) = h(ambient pressure) + bottom pressure over density [J/kg].
+    """
     tables = open_tables(handle)
     st, nodes, floats = tables.settings[0], tables.nodes, tables.floats
     for i in range(nodes.size):
@@ -28,7 +31,10 @@ def moving_tank_pressures_barotropic(t, y, dydt, out, handle):
 
 @njit
 def add_cell_drives_barotropic(t, y, dydt, out, handle):
-    """Add the drive of the cells of pipes to the rates of their waves, dM/dt by m / dx of it; m : mass per length."""
+    """Add the drive of the cells of pipes to the rates of their waves.
+
+    It changes dM/dt by m / dx times the drive. M : mass flow, m : mass per length, dx : length of a cell
+    """
     tables = open_tables(handle)
     pipes, profile, at = tables.pipes, tables.profile, tables.layout[0]["moving_segment"]
     for i in range(pipes.size if dydt.size > 0 else 0):
