@@ -129,7 +129,7 @@ def line_extremes_at_jumps(past, places, clock, line, q, x, sign, before, t):
 
 @njit
 def envelope_where_jumps_cross(past, places, clock, tables, line, q, before, t):
-    """Update the pressure envelope at each point of segment q where two jumps cross between the times `before` and t."""
+    """Update the pressure envelope at each point of segment q where two jumps cross between times `before` and t."""
     queue, tau, s, same, pipe = (
         int(past[JUMP_CAPACITY]),
         line["tau"],

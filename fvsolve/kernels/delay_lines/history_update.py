@@ -85,7 +85,7 @@ def record_again(past, places, tables, t, y, out):
 
 @njit
 def record_step(past, places, tables, t, y, out, handle):
-    """Write the waves of an accepted state as a new entry; pass on the jumps that have arrived in the step before."""
+    """Pass on the jumps that have arrived in an accepted step; then write the waves as a new entry."""
     before = time_of(past, int(past[COUNT]) - 1)
     write_joint_arrivals(past, places, tables, t)
     live = past[JUMPS_TRAVELLING] > 0.0

@@ -33,9 +33,9 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def sent_wave(t, out, tables, number, q, wave, at):
-    """Wave sent into segment q of delay line `number` at a time `at` <= t [kg/s]; `at` may lie in the step that ends at t.
+    """Wave sent into segment q of delay line `number` at a time `at` <= t [kg/s].
 
-    wave : 0 forward, 1 backward
+    `at` may lie in the step that ends at t. wave : 0 forward, 1 backward
     """
     past, line = tables.past, tables.delays[number]
     newest = int(past[COUNT]) - 1
@@ -60,7 +60,7 @@ def sent_wave(t, out, tables, number, q, wave, at):
 
 @njit
 def waves_at(t, out, tables, number, share):
-    """(forward, backward) wave [kg/s] of delay line `number` at a fraction `share` of its length from its `from` end."""
+    """Forward and backward wave [kg/s] of delay line `number` at a fraction `share` of its length from `from`."""
     line = tables.delays[number]
     pipe, stretches = tables.pipes[line["pipe"]], line["stretches"]
     q = min(int(share * stretches), stretches - 1)

@@ -141,10 +141,10 @@ def outgoing_line_waves(t, y, dydt, out, handle):
 
 @njit
 def incoming_line_waves(t, y, dydt, out, handle):
-    """Write the waves that nodes send into delay lines, Y p' minus the arriving waves, and the rate of mass in the lines.
+    """Write the waves that nodes send into delay lines, Y p' minus the arriving waves; write d/dt of the mass in lines.
 
     Y : admittance of the pipe [kg/s per Pa]; p' : deviation of the node pressure from the initial steady state [Pa]
-    In lines shorter than a step the arriving waves depend on p'. The rate of mass [kg/s] is the inflow at both ends.
+    In lines shorter than a step the arriving waves depend on p'. d/dt of the mass [kg/s] is the inflow at both ends.
     """
     tables = open_tables(handle)
     layout, lines = tables.layout[0], tables.delays

@@ -33,7 +33,7 @@ COUNT, CAPACITY, JUMP_CAPACITY, STRETCHES = (
 )  # entries so far, capacity for times, for jumps of a wave, stretches
 RING_FACTOR = 4  # factor by which rings are longer than at first
 LAST_STEP, EQUAL_STEPS = 5, 6  # length of the last step [s], number of last steps of that length
-STEP_BEFORE, EQUAL_STEPS_BEFORE = 7, 8  # values of STEP and EVEN before the last entry
+STEP_BEFORE, EQUAL_STEPS_BEFORE = 7, 8  # values of both before the last entry
 GREATEST_JUMP, GREATEST_UNSTORED_JUMP, JUMPS_TRAVELLING = (
     9,
     10,
@@ -44,9 +44,9 @@ CORRECTED_TIME = 14  # time of the last corrected state [s]
 NEXT_ARRIVAL = 15  # arrival of the next jump at a node that acts at once [s]; before this time no reading includes it
 ONLY_PASSED_JUMPS = 16  # 1 while readings include only jumps that have been passed on
 MOST_JUMPS_TRAVELLING = 18  # greatest number of jumps travelling at one time
-GREATEST_WAVE = 17  # greatest wave so far, deviation from the profile [Pa]
+GREATEST_WAVE = 17  # greatest wave so far, deviation from the initial steady state [Pa]
 INFINITE = 1e300  # time [s]
-PROFILE_ENTRIES = 8  # entries of the profile (zeros) before the first entry
+PROFILE_ENTRIES = 8  # entries of the initial steady state (zeros) before the first entry
 REMOVED_SUM, FIRST_JUMP, JUMP_COUNT, ARRIVED_COUNT, HEAD_SIZE = (
     0,
     1,
