@@ -1,1 +1,1 @@
-"""Basins: common parts and a folder for each physics, loaded and compiled only for models that contain a basin."""
+"""Basins: common parts, and a folder for each type of basin; loaded and compiled only for models with a basin."""

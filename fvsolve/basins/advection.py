@@ -1,10 +1,12 @@
 """Advection of scalars over a grid of rectangles by given flows.
 
-s_t + div(F c) = 0 for amounts s = depth c per area. Rates of a uniform c are c times the divergence of F, to the bit.
-In flows without divergence, Euler steps keep every value within the range of its neighbours up to these Courant numbers
-(with the rate of `grid_fastest`): upwind 1; muscl 1/2, next to an inlet 1/3; muscl with minmod 2/3, next to an inlet
-1/2. Up to 1/2, weno5 keeps all values between `least` and `most`; upwind5 has no bounds. SSP methods keep the same
-bounds up to their coefficient times these numbers.
+s_t + div(F c) = 0, with c the value of a scalar, s = depth c its amount per area, and F the flow per width [m2/s]. The
+rate of a uniform c is c times the divergence of F, to the last bit.
+
+The Courant number is the step times the rate of `grid_fastest`. In flows without divergence, Euler steps keep every
+value within the range of its neighbours up to these Courant numbers: upwind 1; muscl 1/2, next to an inlet 1/3; muscl
+with minmod 2/3, next to an inlet 1/2. Up to 1/2, weno5 keeps all values between `least` and `most`; upwind5 has no
+bounds. SSP methods keep these bounds up to their SSP coefficient times these numbers.
 
 The boundary faces of a grid are ordered west (ny), east (ny), south (nx), north (nx).
 """
@@ -22,22 +24,23 @@ WENO_COURANT = 0.5  # Courant number up to which weno5 keeps its bounds
 
 @njit
 def put_values(s, depth, c):
-    """Values c = s / depth of cells."""
+    """Write the values c = s / depth of cells; s : amounts per area, depth [m]."""
     for i in range(c.size):
         c[i] = s[i] / max(depth[i], THIN)
 
 
 @njit
 def stencil_values(nx, ny, begin, stop, s, depth, c):
-    """Values of cells of rows `begin` to `stop`, and of three rows on either side."""
+    """Write the values c = s / depth of the cells of rows `begin` to `stop` - 1, and of three rows on either side."""
     a, z = nx * max(begin - 3, 0), nx * min(stop + 3, ny)
     put_values(s[a:z], depth[a:z], c[a:z])
 
 
 @njit
 def grid_fastest(nx, ny, kx, ky, flow_x, flow_y, depth, work):
-    """Greatest rate |u| kx + |v| ky of a grid [1/s], with the greater flow of two opposite faces of a cell.
+    """Greatest rate |u| kx + |v| ky of the cells of a grid [1/s], with the greater flow of opposite faces of a cell.
 
+    u, v : velocities along x and y [m/s]; kx, ky and flows as for `grid_advection`
     work : float64[nx]
     """
     top = work[:nx]
@@ -57,7 +60,7 @@ def grid_fastest(nx, ny, kx, ky, flow_x, flow_y, depth, work):
 
 
 def advection_work(scheme, nx, ny):
-    """Length of the work array of a scheme."""
+    """Length of the work array of `grid_advection` and `add_fifth_order` for a scheme."""
     if scheme == UPWIND or scheme == MUSCL:
         return nx * ny + second_order_work(nx, ny)
     most = max(grid_excesses_work(nx, ny), limit_excesses_work(nx, ny), second_order_work(nx, ny))
@@ -66,14 +69,16 @@ def advection_work(scheme, nx, ny):
 
 @njit
 def grid_advection(scheme, limiter, nx, ny, begin, stop, kx, ky, factor, flow_x, flow_y, depth, outside, s, work, rate):
-    """Rates of the amounts `s` in factor times the flows, by muscl or, for any other scheme, by upwind.
+    """Write the rates of the amounts `s` by muscl or, for any other scheme, by upwind, in flows times `factor`.
 
-    The rates are those of rows `begin` to `stop`; two rows on either side are read too.
-    kx : float64[nx], ky : float64[ny]  1 / widths and heights [1/m]; factor : on all flows, of either sign
-    flow_x : float64[ny (nx + 1)], flow_y : float64[(ny + 1) nx]  flows through the faces, row by row, per depth [m2/s]
-    or,
-    with depths, total [m3/s]
-    depth : float64[nx ny], empty if s is the value; outside : float64[ring]  values of inflow at boundary faces
+    The rates are those of rows `begin` to `stop` - 1; two rows on either side are read too.
+    kx : float64[nx], ky : float64[ny]  1 / widths and heights of cells [1/m]
+    factor : factor of either sign on all flows
+    flow_x : float64[ny (nx + 1)], flow_y : float64[(ny + 1) nx]  flows through faces, row by row: velocity [m/s] times
+        face
+        length, [m2/s], if `depth` is empty; else with depth [m3/s]
+    depth : float64[nx ny]  depths of cells [m]; empty if s is the value c
+    outside : float64[2 (nx + ny)]  values of inflow at boundary faces
     work : float64[advection_work(scheme, nx, ny)]; s, rate : float64[nx ny]
     """
     c, rest, first = s, work[nx * ny :], scheme if scheme == MUSCL else UPWIND
@@ -89,7 +94,7 @@ def grid_advection(scheme, limiter, nx, ny, begin, stop, kx, ky, factor, flow_x,
 def add_fifth_order(
     scheme, nx, ny, kx, ky, factor, flow_x, flow_y, depth, outside, least, most, fastest, s, work, rate
 ):
-    """Add to rates by upwind the difference of those by upwind5 or weno5.
+    """Add to rates by upwind their difference from the rates by upwind5 or weno5.
 
     scheme : LINEAR for upwind5, or WENO5; least, most : bounds that weno5 keeps, infinite for none
     fastest : rate of `grid_fastest` for the flows [1/s]; other arguments as for `grid_advection`

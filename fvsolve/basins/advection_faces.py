@@ -1,13 +1,19 @@
 """Advection and diffusion of scalars by given flows through the faces of any mesh.
 
-s_t + div(F c) = div(D depth grad c) for amounts s = depth c per area. Rates of a uniform c are c times the divergence
-of F, to the bit. Euler steps up to the reciprocal of the returned rate keep all values between two bounds: a value at a
-side differs from that of its cell by no more than the distance to the nearer bound. So the outflow is at most twice as
-far from a bound as the cell. Up to two thirds of that step, `minmod` keeps values within the range of the neighbours.
-Other limiters have second order on any mesh. Diffusion uses the difference of two cells along the line between their
-centres. Where this line is not normal to the face, the mean of both gradients gives the rest: second order, without
-bounds on such cells. There is no diffusion through walls and where the flow leaves; where it enters, the value outside
-holds at the face.
+s_t + div(F c) = div(D depth grad c), with c the value of a scalar, s = depth c its amount per area, F the flow per
+width [m2/s] and D the diffusivity. The rate of a uniform c is c times the divergence of F, to the last bit.
+
+Euler steps up to the reciprocal of the returned rate keep all values between two bounds, because the value at a side of
+a cell differs from the value of the cell by no more than the distance to the nearer bound. So the flow that leaves has
+at most twice the distance of the cell from a bound. Up to two thirds of that step, `minmod` keeps values within the
+range of the neighbours. Other limiters have second order on any mesh.
+
+Diffusion uses the difference of two cells along the line between their centres. Where this line is not normal to the
+face, the mean of the gradients of both cells gives the oblique part: this is of second order, but without bounds. There
+is no diffusion through walls and where the flow leaves; where it enters, the value outside holds at the face.
+
+c, d : values and depths of the cells of a block; w : scratch of a block, float64[ROWS BLOCK]; geo, far : measures of
+sides from `floats`, see `cell_sides`.
 """
 
 import numpy as np
@@ -55,7 +61,7 @@ ROWS = 11
 
 @njit
 def put_values(s, depth, c, d):
-    """Values c = s / depth of a block of cells, and their depths, 1 where `depth` is empty."""
+    """Write the values c = s / depth of a block of cells, and their depths d, which are 1 where `depth` is empty."""
     if depth.size == 0:
         for i in range(s.size):
             c[i], d[i] = s[i], 1.0
@@ -66,7 +72,10 @@ def put_values(s, depth, c, d):
 
 @njit
 def put_gradients(j, floats, integers, values, shown, edges, w, gx, gy):
-    """Gradients of block j by least squares."""
+    """Write the least-squares gradients gx, gy of the values in block j of cells.
+
+    shown : values beyond the boundary sides `edges`; w : float64[BLOCK]  scratch
+    """
     slots, at, places = integers[0], j % integers[4] * BLOCK, integers[HEAD:].view(np.int32)
     c, gx, gy = values[at:], gx[at:], gy[at:]
     for i in range(BLOCK):
@@ -85,7 +94,10 @@ def put_gradients(j, floats, integers, values, shown, edges, w, gx, gy):
 
 @njit
 def gather_flows(faces, factor, flow, out):
-    """Outward flows through one side of each cell of a block."""
+    """Write the outward flows through one side of each cell of a block.
+
+    faces : numbers of the faces, ~f where the normal of face f points inwards
+    """
     for i in range(BLOCK):
         f = faces[i]
         out[i] = factor * (flow[f] if f >= 0 else -flow[~f])
@@ -93,16 +105,16 @@ def gather_flows(faces, factor, flow, out):
 
 @njit
 def put_allowed(c, least, most, allowed):
-    """Greatest allowed deviation of sides from a block of cells: the distance to the nearer bound."""
+    """Write the greatest allowed deviation of side values from cell values of a block: the distance to the nearer bound."""
     for i in range(BLOCK):
         allowed[i] = max(min(c[i] - least, most - c[i]), 0.0)
 
 
 @njit
 def add_advection(count, c, d, cl, far, w):
-    """Subtract from the rates of a block of cells the outflow through one side, beyond that of a uniform c.
+    """Subtract the advective outflow through one side of each cell of a block, beyond that of a uniform c, from the rates.
 
-    count : factor of the outflow in the rate that limits the step
+    count : factor of the outflow in the rate that limits the step; cl : values at the side, inside the cell
     """
     for i in range(BLOCK):
         q = far[PER_AREA * BLOCK + i] * w[_FLOW + i]
@@ -113,7 +125,7 @@ def add_advection(count, c, d, cl, far, w):
 
 @njit
 def add_diffusion(diffusivity, c, d, gx, gy, geo, far, w):
-    """Add to the rates of a block of cells the diffusive inflow through one side of each."""
+    """Add the diffusive inflow through one side of each cell of a block to the rates; gx, gy : gradients."""
     for i in range(BLOCK):
         a, b = d[i], w[_DEPTH + i]
         k = diffusivity * geo[_REACH + i] * (2.0 * a * b / (a + b + TINY))
@@ -124,14 +136,14 @@ def add_diffusion(diffusivity, c, d, gx, gy, geo, far, w):
 
 @njit
 def clear(w):
-    """Set rates and sums to zero."""
+    """Set the rates, divergences and outflows of a block in the scratch w to zero."""
     for i in range(BLOCK):
         w[_RATE + i], w[_DIVERGENCE + i], w[_OUTFLOW + i] = 0.0, 0.0, 0.0
 
 
 @njit
 def put_rates(c, w, rate):
-    """Rates of a block of cells, and the greatest sum so far in each lane."""
+    """Write the rates of a block of cells, and update the greatest outflow rate so far in the scratch w."""
     for i in range(BLOCK):
         w[_TOP + i] = max(w[_TOP + i], w[_OUTFLOW + i])
     for i in range(rate.size):
@@ -147,15 +159,19 @@ def work_size(integers):
 def advection_rates(
     scheme, wide_by, diffusivity, factor, floats, integers, flow, depth, outside, least, most, s, work, rate
 ):
-    """Rates of the amounts `s`; returns the reciprocal of the step that keeps bounds, which diffusion shortens [1/s].
+    """Write the rates of the amounts `s`; return the reciprocal of the step that keeps the bounds [1/s].
 
-    That is the greatest fraction of a cell that leaves it per time, for `muscl` twice that.
+    The returned rate is the greatest fraction of a cell that leaves it per time, for `muscl` twice that, and more with
+    diffusion.
 
     scheme : UPWIND or MUSCL; wide_by : allowed excess of values at sides over the range of neighbours, 1 for none
-    diffusivity : [m2/s], 0 for none; factor : on all flows
-    flow : float64[f]  through faces, left to right [m2/s], with depth [m3/s]; depth : float64[n], empty if s is the
-    value
-    outside : float64[b]  values of inflow; least, most : bounds, infinite for none
+    diffusivity : [m2/s], 0 for none; factor : factor on all flows
+    floats, integers : mesh, see `cell_sides`; least, most : bounds of c, infinite for none
+    flow : float64[faces]  through faces, from the left to the right cell: velocity [m/s] times length, [m2/s]; with
+        depths
+        [m3/s]
+    depth : float64[cells]  [m]; empty if s is the value c
+    outside : float64[boundary faces]  values of inflow; s, rate : float64[cells]
     work : float64[work_size(integers)]
     """
     slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]

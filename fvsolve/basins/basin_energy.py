@@ -1,9 +1,10 @@
 """Power of flows into basins through patches, under the linear law.
 
-Rows of `power` of a basin [W], at the end: power of the inflow through patches at their potential; loss there (inflow
-has no speed, outflow takes its kinetic energy along unpaid); friction; rate of storage; on a body, power dissipated by
-the law. `stored` contains the change of energy since the profile [J]. A physics fills its own rows that are not zero;
-squares are those of cell means.
+The last entries of `power` belong to basins, five for each basin [W]: power of the inflow through patches at their
+total pressure; loss at patches (inflow has no speed, and outflow takes its kinetic energy along without payment);
+friction; rate of storage; on a body, power dissipated by the density law. An entry of `stored` for each basin contains
+the change of its energy since the start [J]. Each type of basin fills the entries that are not zero for it; squares are
+squares of cell means.
 """
 
 from fvsolve.jit import njit
@@ -14,19 +15,19 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def basin_first_row(tables, power, b):
-    """First row of `power` of basin b."""
+    """Index of the first of the five entries of basin b in `power`."""
     return basin_power_row(tables, power) + BASIN_ROWS * b
 
 
 @njit(forceinline=True)
 def rest_potential(st, basin):
-    """Potential of the profile [Pa]."""
+    """Total pressure p - p_ambient + rho g z of a basin in the initial steady state [Pa]; z counts from the datum."""
     return basin["rest"] - st["rho"] * st["gravity"] * st["datum"]
 
 
 @njit
 def patch_power(t, y, dydt, out, handle, power):
-    """Set rows of basins to zero, and add the power of the inflow through all patches."""
+    """Set the entries of basins in `power` to zero, and add the power of the inflow through all patches [W]."""
     tables = open_tables(handle)
     rho, patches, layout = tables.settings[0]["rho"], tables.patches, tables.layout[0]
     for k in range(basin_first_row(tables, power, 0), power.size):

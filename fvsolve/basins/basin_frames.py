@@ -1,15 +1,17 @@
 """Accelerated frame of reference of a basin on a body, and the potential of its inertial and gravity forces.
 
 In the axes of the basin, z is along its normal and r = (x, y, 0) is the distance from its middle. The middle has the
-acceleration a, and the axes rotate at W. The equation of motion is (65)
-u_t + u.grad u + grad(p) / rho + grad(phi) = - 2 W_z x u - dW_z/dt x r, with G = R' ((0, 0, -g) - a) and
+acceleration a, the axes rotate at the angular velocity W, and R is the rotation matrix of the axes. The equation of
+motion of the water with velocity u ((65) of docs/course.md) is
 
+    u_t + u.grad u + grad(p) / rho + grad(phi) = - 2 W_z x u - dW_z/dt x r,  G = R' ((0, 0, -g) - a)
     phi = - G_x x - G_y y - ((W_y^2 + W_z^2) x^2 - 2 W_x W_y x y + (W_x^2 + W_z^2) y^2) / 2
 
-The water below a free surface has the weight g_n = -G_z along the normal, and phi / g_n is added to the bed elevation:
-tilt, accelerations and centrifugal forces act like a moving bed. In a liquid, phi is added to the reconstructed
-pressure (`liquid_on_body`). So water at rest in the frame stays at rest to round-off. Neglected are accelerations along
-z away from the origin, and vertical momentum: both are of the order of angle times depth over wave length.
+The water below a free surface has the weight g_n = -G_z per mass along the normal, and phi / g_n is added to the bed
+elevation: tilt, accelerations and centrifugal forces act like a moving bed. In a liquid, phi is added to the
+reconstructed pressure (`liquid_on_body`). So water at rest in the frame stays at rest to round-off. Neglected are
+accelerations along z away from the origin, and vertical momentum: both are of the order of angle times depth over wave
+length.
 """
 
 from fvsolve.jit import inline, njit
@@ -51,9 +53,9 @@ def set_frames(t, y, dydt, out, handle):
 
 @njit
 def frame_component(out, row, plane, at, k, x, y, z):
-    """Component of a vector of the world along axis k of a frame.
+    """Component of a vector (x, y, z) in axes of the world along axis k of the frame of a basin.
 
-    Its rotation matrix relative to its body is at plane[at].
+    row : offset of the body in `out`; plane[at] : rotation matrix of the frame in axes of the body, by rows
     """
     ax, ay, az = rotate(out, row + ATTITUDE, plane[at + k : at + k + 7 : 3], 0)
     return ax * x + ay * y + az * z
@@ -61,7 +63,7 @@ def frame_component(out, row, plane, at, k, x, y, z):
 
 @njit
 def set_frame(tables, basin, out):
-    """Compute G, W, dW/dt and gravity alone in the axes of a basin."""
+    """Compute G, W, dW/dt and gravity alone in the axes of a basin, and store them in `plane`."""
     plane, at, row = tables.plane, basin["frame"], body_row(tables, basin["body"])
     rx, ry, rz = rotate(out, row + ATTITUDE, plane[at : at + 3], 0)
     ex, ey, ez = cross(out, row + SPIN_BIAS, rx, ry, rz)
@@ -84,7 +86,7 @@ def set_frame(tables, basin, out):
 
 @njit(forceinline=True)
 def potential_coefficients(plane, at, per):
-    """Coefficients (fx, fy, xx, xy, yy) of a potential for the frame at plane[at].
+    """Coefficients (fx, fy, xx, xy, yy) of the potential phi of the frame at plane[at], multiplied by `per`.
 
     per phi = x (fx + xx x + xy y) + y (fy + yy y)
     """
@@ -95,7 +97,7 @@ def potential_coefficients(plane, at, per):
 
 @njit
 def tilt_bed(plane, basin):
-    """Add phi / g_n to the bed elevation above the level at rest."""
+    """Write the bed elevation of a basin above the level at rest, with phi / g_n added."""
     at, n = basin["frame"], basin["n"]
     to, drawn = basin["plan"] + n, int(plane[at + REST_SURFACE])
     add_potential(plane, basin, 1.0 / plane[at + GN], plane[drawn : drawn + n], plane[to : to + n])
@@ -103,7 +105,7 @@ def tilt_bed(plane, basin):
 
 @njit
 def add_potential(plane, basin, per, values, lifted):
-    """Write the values of all cells plus per phi to `lifted`."""
+    """Write the values of all cells of a basin plus per times phi to `lifted`."""
     n, nx, at = basin["n"], basin["nx"], int(plane[basin["frame"] + CELL_POSITIONS])
     phi = potential_coefficients(plane, basin["frame"], per)
     if nx == 0:
@@ -114,9 +116,9 @@ def add_potential(plane, basin, per, values, lifted):
 
 @njit
 def add_potential_points(phi, x, y, values, lifted):
-    """Write values plus the potential at points to `lifted`; values None count as 0.
+    """Write values plus the potential at the points (x, y) to `lifted`; values None count as 0.
 
-    phi : coefficients of `potential`
+    phi : result of `potential_coefficients`
     """
     fx, fy, xx, xy, yy = phi
     for i in range(lifted.size):
@@ -136,7 +138,7 @@ def add_potential_rows(phi, x, y, values, lifted):
 
 @inline
 def add_potential_row(x, values, slope, xx, constant, lifted):
-    """Write values plus the potential at a row of cells to `lifted`."""
+    """Write values plus the potential at a row of cells to `lifted`; the potential is x (slope + xx x) + constant."""
     for i in range(lifted.size):
         rise = x[i] * (slope + xx * x[i]) + constant
         lifted[i] = rise if values is None else values[i] + rise

@@ -1,4 +1,4 @@
-"""Patches of basins: flow through an open boundary, and momentum of the flow of links."""
+"""Patches of basins, the named parts of their boundary: flow through open patches, momentum of the flow of links."""
 
 from fvsolve.basins.boundary_cells import patch_inflow
 from fvsolve.jit import njit
@@ -8,19 +8,22 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit(forceinline=True)
 def normal_gravity(st, plane, basin):
-    """Gravity along the normal of a basin [m/s2], on a body that of its accelerated frame; see `basin_frames`."""
+    """Gravity along the normal of a basin [m/s2]; on a body, minus the acceleration of its frame (`basin_frames`)."""
     return st["gravity"] if basin["frame"] < 0 else plane[basin["frame"] + GN]
 
 
 @njit(forceinline=True)
 def needs_rates(basin, dydt):
-    """True if the rates of a basin are needed, or the flows through its open patches, which follow from them."""
+    """True if rates of a basin are requested, or needed for the flows through open patches or for a frame."""
     return dydt.size > 0 or basin["through"] >= 0 or basin["frame"] >= 0
 
 
 @njit
 def put_open_flows(tables, b, per, out):
-    """Write the flows through the open boundary of a basin, patch by patch, as supplies of the nodes of patches."""
+    """Write the flow through each open patch of basin b as supply of the node of the patch [kg/s].
+
+    per : factor from the flow of the cells to mass flow
+    """
     patches = tables.patches
     for k in range(patches.size):
         if patches[k]["basin"] == b and patches[k]["open"] == 1:
@@ -41,10 +44,12 @@ def record_patches(t, y, out, handle, values):
 
 @njit
 def add_link_momentum(plane, patch, m, push, dydt, x, y):
-    """Add to the momentum of the cell at face m of a patch the part that a wall would not transmit.
+    """Add the part of the momentum flux at face m of a patch that a wall would not transmit to the rates of its cell.
 
-    A wall stops the flow, so the pressure on it is p + Z u_n. With a flow at v through the face it is p + Z (u_n - v).
-    push : Z v, v positive outward
+    A wall stops the flow, so the pressure on it is p + Z u_n, with u_n the velocity of the cell toward the wall and Z
+    the
+    impedance. With a flow at velocity v through the face it is p + Z (u_n - v).
+    push : Z v, v positive outward; x, y : indices in `dydt` of the momentum of the cell
     """
     at, count = patch["normals"], patch["faces"]
     share = push * plane[at + 2 * count + m]
@@ -54,6 +59,9 @@ def add_link_momentum(plane, patch, m, push, dydt, x, y):
 
 @njit
 def put_inward(turn, k, flux, inward):
-    """Inward flows through a row of faces. turn : 1 or -1 for fluxes inward or outward; k : 1 / lengths of faces"""
+    """Write inward flows through a row of boundary faces.
+
+    turn : 1 or -1 for fluxes inward or outward; k : 1 / lengths of faces [1/m]
+    """
     for i in range(inward.size):
         inward[i] = turn * flux[i] / k[i]

@@ -1,6 +1,7 @@
-"""Probes common to all basins: flows through patches, and velocities.
+"""Probes common to basins of all types: flows through patches, and velocities.
 
-Each physics reads its own cells. The number of a field is `side` in a probe of kind CELL_FIELD.
+Each type of basin computes the other probes of its cells. Column `side` of a probe of kind CELL_FIELD contains the
+number of its quantity.
 """
 
 from math import sqrt
@@ -15,13 +16,13 @@ U, V, SPEED, FIRST_OWN = range(4)  # fields of velocities; numbers from OWN on a
 
 @njit
 def velocity_value(field, u, v):
-    """Value of a velocity field: u, v or speed."""
+    """Value of a velocity quantity: u, v or the speed, by the code `field`."""
     return u if field == U else v if field == V else sqrt(u * u + v * v)
 
 
 @njit
 def observe_flows(t, y, out, handle, values):
-    """Write values[k] of the probes of flows through patches [m3/s]."""
+    """Write the values of the probes of flows through patches [m3/s], under the linear density law."""
     tables = open_tables(handle)
     probes = tables.probes
     for k in range(probes.size):
@@ -31,7 +32,7 @@ def observe_flows(t, y, out, handle, values):
 
 @njit
 def observe_dense_flows(t, y, out, handle, values):
-    """Write the flows through patches [m3/s] with the density at the patch, under all laws but linear."""
+    """Write the values of the probes of flows through patches [m3/s] under other laws, with the density at the patch."""
     tables = open_tables(handle)
     st, probes, at = tables.settings[0], tables.probes, tables.layout[0]["pressure"]
     for k in range(probes.size):

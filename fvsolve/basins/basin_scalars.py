@@ -1,6 +1,6 @@
 """Scalars in basins: values at patches and beyond the boundary, sources and decay of their amounts.
 
-Amounts are per area, s = depth c; a basin with a given velocity has depth 1.
+The amount of a scalar per area is s = depth c, with c its value; a basin with a given velocity has depth 1.
 """
 
 from math import cos, pi
@@ -21,7 +21,7 @@ DRY_WEIGHT = 1e-12  # weight of a dry cell in the value at a patch [m]
 
 @njit
 def depth_at(tables, basin, y, i):
-    """Depth of a cell over which an amount is distributed, 1 without depth."""
+    """Depth of cell i over which the amount of a scalar is distributed [m]; 1 for a basin without depth."""
     if basin["deep"] == 0:
         return 1.0
     return max(tables.plane[basin["plan"] + i] + y[basin["y"] + i], 0.0)
@@ -29,13 +29,16 @@ def depth_at(tables, basin, y, i):
 
 @njit
 def cell_value(tables, basin, q, y, i):
-    """Value of scalar q in a cell."""
+    """Value of scalar q in cell i of a basin."""
     return y[basin["carried"] + q * basin["n"] + i] / max(depth_at(tables, basin, y, i), THIN)
 
 
 @njit
 def patch_values(t, y, dydt, out, handle):
-    """Compute the value of every scalar at every patch: the mean of its outflow, or by area if all cells are dry."""
+    """Compute the value of every scalar in the water that leaves through every patch.
+
+    It is the mean over the cells at the patch, weighted by their outflow, or by area if all cells are dry.
+    """
     tables = open_tables(handle)
     nodes, value = tables.nodes.size, tables.layout[0]["value"]
     for k in range(tables.patches.size):
@@ -54,7 +57,7 @@ def patch_values(t, y, dydt, out, handle):
 
 @njit
 def observe_values(t, y, out, handle, values):
-    """Write values[k] of every probe of a scalar at a point of a basin."""
+    """Write the values of the probes of scalars at points of basins."""
     tables = open_tables(handle)
     for k in range(tables.probes.size):
         probe = tables.probes[k]
@@ -67,7 +70,7 @@ def observe_values(t, y, out, handle, values):
 
 @njit
 def put_boundary_values(t, tables, patch, basin, q):
-    """Write the value of a scalar beyond the faces of a patch, its schedule's or its initial one."""
+    """Write the value of scalar q beyond the faces of a patch: the value of its schedule, else its initial value."""
     schedule = tables.integers[patch["values"] + q]
     value = tables.scalars[q]["initial"]
     if schedule >= 0:
@@ -79,7 +82,7 @@ def put_boundary_values(t, tables, patch, basin, q):
 
 @njit
 def prepare_scalars(t, tables, b, y):
-    """Compute depths and values beyond the boundary of a basin, for its scalars."""
+    """Compute the depths of the cells of basin b, and the values of scalars beyond its boundary."""
     plane, basin, patches = tables.plane, tables.basins[b], tables.patches
     n, o, at, seen = basin["n"], basin["y"], basin["plan"], deviations_of(basin, tables.seen, y)
     if basin["deep"] == 1:
@@ -110,7 +113,7 @@ def depth_count(basin):
 
 @njit
 def add_sources(t, y, dydt, out, handle):
-    """Add decay and inflow through patches to rates of amounts; record them, and the flow through the boundary."""
+    """Add decay and the inflow of links to the rates of all scalars; record both, and the flow through the boundary."""
     tables = open_tables(handle)
     work = tables.work
     for b in range(tables.basins.size if dydt.size > 0 else 0):
@@ -128,7 +131,10 @@ def add_sources(t, y, dydt, out, handle):
 
 @njit
 def add_scalar_sources(tables, b, basin, q, factor, per, depth, outside, y, s, rate, out):
-    """Add decay and the inflow of links to the rates of a scalar; record them, and the flow through the boundary."""
+    """Add decay and the inflow of links to the rates of scalar q; record both, and the flow through the boundary.
+
+    per : mass per area and depth of the amounts s; factor : factor on given flows; s, rate : amounts and their rates
+    """
     scalar, patches, n = tables.scalars[q], tables.patches, basin["n"]
     if basin["through"] >= 0:
         record_boundary(tables, b, basin, q, factor, per, rate, outside, out)
@@ -151,9 +157,9 @@ def add_scalar_sources(tables, b, basin, q, factor, per, depth, outside, y, s, r
 
 @njit
 def record_boundary(tables, b, basin, q, factor, per, rate, outside, out):
-    """Record the inflow of a scalar through each open patch.
+    """Record the inflow of scalar q through each open patch [kg/s].
 
-    The patch with most outflow gets the remaining gain of all cells.
+    The remaining gain of all cells is recorded at the patch with the greatest outflow.
     """
     plane, patches, nodes = tables.plane, tables.patches, tables.nodes.size
     flows = plane if has_given_flows(basin) else tables.work
@@ -179,7 +185,7 @@ def record_boundary(tables, b, basin, q, factor, per, rate, outside, out):
 
 @njit
 def add_link_inflow(tables, patch, basin, q, y, rate, out):
-    """Distribute the inflow of a scalar through a patch over its cells.
+    """Distribute the inflow of scalar q from the links at a patch over the cells at the patch.
 
     Where water leaves, each cell loses its own value.
     """

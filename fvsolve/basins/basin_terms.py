@@ -1,4 +1,4 @@
-"""Terms of the right-hand side and probes common to basins of all physics (`kernels.rhs_assembly`)."""
+"""Functions that basins of all types add to the right-hand side and to the probes (`kernels.rhs_assembly`)."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ SCALAR_TERMS = (
 
 
 def terms_of_basins(basins: list, valves: bool) -> tuple[RhsTerms, ...]:
-    """Terms of basins without scalars. valves : True if there are valves in the network"""
+    """Terms of all basins without their scalars; valves : True if there are valves in the network."""
     shared = [COMMON] if basins and basins[0].case.law.linear else [COMMON, DENSITY_LAWS] if basins else []
     shared += [FRAMES] if any(basin.part.on is not None for basin in basins) else []
     moving = [WALLS] if any(basin.moves for basin in basins) else []
@@ -59,13 +59,13 @@ def terms_of_basins(basins: list, valves: bool) -> tuple[RhsTerms, ...]:
 
 
 def terms_of_scalars(basins: list) -> tuple[RhsTerms, ...]:
-    """Terms of scalars in basins; each term selects its basins itself."""
+    """Terms of the scalars in all basins; each term selects its basins itself."""
     needed = {piece for basin in basins for piece in scalar_terms(basin)}
     return tuple(terms for terms in SCALAR_TERMS if terms in needed)
 
 
 def scalar_terms(basin) -> Iterator[RhsTerms]:
-    """Terms of the scalars of a basin, if it has scalars."""
+    """Terms of the scalars of one basin; none without scalars."""
     if not basin.scalars:
         return
     yield from (PATCH_VALUES, SOURCES)

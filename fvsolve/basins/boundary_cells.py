@@ -1,4 +1,4 @@
-"""Cells next to a patch, and their weights in the flow through it."""
+"""Cells of basins next to a patch, and their weights in the flow through the patch."""
 
 from fvsolve.jit import njit
 
@@ -8,7 +8,7 @@ LEAST_DEPTH = 1e-9  # volume at a patch over its area below which its surface te
 
 @njit
 def available_fraction(depth):
-    """Fraction of the demanded outflow that water of a depth supplies."""
+    """Fraction of the demanded outflow that water of a depth [m] supplies."""
     s = min(max(depth, 0.0) / SHALLOW, 1.0)
     return s * s * (3.0 - 2.0 * s)
 
@@ -27,7 +27,7 @@ def patch_length(tables, patch):
 
 @njit
 def depth_at_patch(plane, basin, i, y):
-    """Depth of cell i of a basin of water."""
+    """Depth of cell i of a basin with a free surface [m]."""
     return max(plane[basin["plan"] + i] + y[basin["y"] + i], 0.0)
 
 
@@ -39,14 +39,17 @@ def outflow_weight(depth):
 
 @njit
 def flow_weight(plane, basin, leaves, i, y):
-    """Weight of cell i in the flow through a patch [m]; for inflow, a dry cell has the depth of a film."""
+    """Weight of cell i in the flow through a patch [m]; leaves : True for outflow.
+
+    For inflow, a dry cell has the depth SHALLOW of a film.
+    """
     depth = depth_at_patch(plane, basin, i, y)
     return outflow_weight(depth) if leaves else max(depth, SHALLOW)
 
 
 @njit
 def weighted_volume(tables, patch, leaves, y):
-    """Sum of area times `weight` of the cells next to a patch [m3], always positive."""
+    """Sum of area times `flow_weight` over the cells at a patch [m3], always positive; leaves : True for outflow."""
     basin, plane, total = tables.basins[patch["basin"]], tables.plane, 0.0
     for m in range(patch["count"]):
         i = tables.integers[patch["first"] + m]
@@ -56,13 +59,13 @@ def weighted_volume(tables, patch, leaves, y):
 
 @njit(forceinline=True)
 def has_given_flows(basin):
-    """True if flows through faces are those of a given velocity, in `plane`; computed flows are in `work`."""
+    """True if the flows through faces follow from a given velocity; these are in `plane`, computed flows in `work`."""
     return basin["given"] == 1
 
 
 @njit
 def patch_inflow(tables, patch):
-    """Total inflow through all faces of a patch."""
+    """Total inflow through all faces of a patch, in the unit of the flows of the basin."""
     basin, total = tables.basins[patch["basin"]], 0.0
     flows = tables.plane if has_given_flows(basin) else tables.work
     for m in range(patch["faces"]):

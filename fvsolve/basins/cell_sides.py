@@ -1,25 +1,28 @@
 """Sides of cells of any mesh: layout of their arrays, least-squares gradients, and the limiter.
 
 A cell has `slots` sides, three or four. Cells are stored in blocks of BLOCK; the last block is padded. Every cell reads
-the values beyond its sides and computes its own rates. Both cells of a face compute the same flux to the bit, so the
-scheme is conservative. A missing side (a triangle among quadrilaterals) has length 0 and itself as neighbour.
+the values beyond its sides and computes its own rates. Both cells of a face compute the same flux to the last bit, so
+the scheme is conservative. A missing side (a triangle among quadrilaterals) has length 0 and its own cell as neighbour.
 
-Temporary values of cells and their sides are stored in a ring of the last `ring` blocks, so that they stay in a near
+Temporary values of cells and of their sides are stored in a ring of the last `ring` blocks, so that they stay in a near
 cache: cell i of block j at (j BLOCK + i) modulo ring BLOCK, its side k at ((4 j + k) BLOCK + i) modulo 4 ring BLOCK.
-Rates of block j are computed once the sides of blocks before need[j] are known, and these once the cells before need[]
-of theirs. Loops run over BLOCK cells and a few arrays at constant distances, so that the compiler knows that they do
-not overlap.
+The rates of block j need the sides of all blocks before need[j]. The sides of block k need the values of the cells of
+all blocks before need[k]. Loops run over BLOCK cells and a few arrays at constant distances, so that the compiler knows
+that they do not overlap.
 
-integers : int64[:]  slots, cells, faces, boundary faces, ring; by block, side and row of BLOCK, two int32 to an
-           int64: places of the neighbour cell and of its side (on the boundary its own); need[blocks]; of the boundary
-           in order of sides: side not taken modulo, number; by block and side: face (~f where its normal points
-           inwards)
-floats : float64[:]  by block, side and row of BLOCK: outward normal, length / area, vector from the centre to the
-side's
-         middle, weights of its difference in the gradient; of the boundary in order of sides: outward normal; of faces:
-         length; by block, side and row again: 1 / area, 1 / distance to the next cell along the normal, the normal
-         minus
-         that distance's direction
+integers : int64[:], in this order
+    - slots, cells, faces, boundary faces, ring
+    - for each block, side, and row of BLOCK cells: places in the ring of the neighbour cell and of the side of the
+      neighbour at the same face (at the boundary its own); two int32 in an int64
+    - need[blocks]
+    - boundary sides: side before the modulo operation, then number of the boundary face
+    - for each block and side: face f, or ~f where the normal of the face points inwards
+floats : float64[:], in this order
+    - for each block, side, and row of BLOCK cells: outward normal, length / area, vector from the centre to the middle
+      of the side, weights of the difference across the side in the gradient
+    - boundary sides: outward normal; faces: length
+    - for each block, side, and row of BLOCK cells: 1 / area, 1 / distance to the next centre along the normal,
+      normal minus the vector to the next centre over that distance
 """
 
 import numpy as np
@@ -39,7 +42,7 @@ _WX, _WY, _DX, _DY, _SIDE = WX * BLOCK, WY * BLOCK, DX * BLOCK, DY * BLOCK, MEAS
 
 @njit
 def blocks(integers):
-    """Number of blocks of the cells."""
+    """Number of blocks of BLOCK cells."""
     return (integers[1] + BLOCK - 1) // BLOCK
 
 
@@ -53,28 +56,33 @@ def edges_before(edges, first, side):
 
 @njit
 def ring_place(side, ring):
-    """Place in the ring of the cell of a boundary side."""
+    """Place in the ring of blocks of the cell that has a boundary side."""
     return (side // (4 * BLOCK)) % ring * BLOCK + side % BLOCK
 
 
 @njit
 def gather(values, where, out):
-    """out[i] = values[where[i]]."""
+    """Write values[where[i]] to out[i] for a block."""
     for i in range(BLOCK):
         out[i] = values[where[i]]
 
 
 @njit
 def put_inward(edges, number, flux, length, through):
-    """Inward flows through the boundary sides `edges`, all of the same side number of a block, from outward fluxes."""
+    """Write inward flows through boundary sides from outward fluxes; all sides have the same number k in a block.
+
+    edges, number : boundary sides and numbers of their boundary faces; length : of boundary faces [m]
+    """
     for q in range(edges.size):
         through[number[q]] = -flux[edges[q] % BLOCK] * length[number[q]]
 
 
 @njit
 def limit_three_sides(p, wide, cap, beyond, geo, out):
-    """Limited values at three sides of a block of cells, from the values beyond them.
+    """Limited values at three sides of a block of triangles, from the values beyond the sides.
 
+    p, beyond : values of cells and of neighbours; wide : factor of the range; cap : greatest allowed deviation; geo :
+    measures of the sides
     If the neighbours differ from the cell by `least` to `most`, a side rises by no more than wide most, -2 wide least
     and `cap`, and falls no further than wide least, -2 wide most and -cap. So no side of a local extremum differs from
     its cell. With wide = 1 all values at sides lie in the range of the neighbours.
@@ -97,7 +105,7 @@ def limit_three_sides(p, wide, cap, beyond, geo, out):
 
 @njit
 def limit_four_sides(p, wide, cap, beyond, geo, out):
-    """Limited values at four sides.
+    """Limited values at four sides of a block of cells; arguments as for `limit_three_sides`.
 
     Opposite sides of a rectangle are added first, so that mirror cells give mirror sums.
     """
@@ -126,7 +134,7 @@ def limit_four_sides(p, wide, cap, beyond, geo, out):
 
 @njit
 def limited_sides(j, floats, integers, values, wide, cap, shown, edges, scratch, sides):
-    """Limited values of block j at its sides.
+    """Write the limited values at the sides of all cells of block j to `sides`.
 
     values : float64[ring BLOCK]; wide, cap : see `limit_three_sides`; scratch : float64[4 BLOCK]
     sides : float64[4 ring BLOCK]

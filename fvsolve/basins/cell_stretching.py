@@ -1,9 +1,10 @@
-"""Cells that stretch as lines move: conversion between contents and values per area.
+"""Cells that stretch as grid lines move: conversion between amounts in cells and values per area.
 
-Contents are deviations over undeformed areas, (A U - A0 U0) / A0, see `moving_walls`; all columns of a grid stretch
+The states of such basins are changes of the amount in a cell over its undeformed area, (A U - A0 U0) / A0: U is a value
+per area, A the area, U0 and A0 are the values at rest and undeformed (`moving_walls`). All columns of a grid stretch
 alike, or all rows.
 
-wide : areas over undeformed areas; narrow : 1 / wide
+wide : A / A0; narrow : A0 / A
 """
 
 from fvsolve.jit import njit
@@ -11,7 +12,7 @@ from fvsolve.jit import njit
 
 @njit(forceinline=True)
 def deviations_of(basin, seen, y):
-    """Deviations of values per area: `seen` of the tables where walls move, because y then contains contents."""
+    """Deviations U - U0 of values per area: the table `seen` where walls move, else the states y themselves."""
     if basin["walls"] > 0:
         return seen
     return y
@@ -19,7 +20,7 @@ def deviations_of(basin, seen, y):
 
 @njit(forceinline=True)
 def row_across(basin, i):
-    """Index of the stretching row or column of cell i; on a mesh i itself."""
+    """Index of the row or column of cell i that stretches; on a mesh i itself."""
     if basin["nx"] == 0:
         return i
     return i // basin["nx"] if basin["turn"] == 1 else i % basin["nx"]
@@ -27,7 +28,7 @@ def row_across(basin, i):
 
 @njit(forceinline=True)
 def stretch_of_cell(plane, basin, i):
-    """Area of cell i over its undeformed area."""
+    """Area of cell i over its undeformed area; 1 without moving walls."""
     return plane[basin["stretch"] + row_across(basin, i)] if basin["walls"] > 0 else 1.0
 
 
@@ -40,42 +41,42 @@ def fill(value, values):
 
 @njit
 def multiply(values, factors, products):
-    """products = values * factors. products must be another array, or the loop is not vectorised."""
+    """Write values * factors to products; products must be another array, or the loop is not vectorised."""
     for i in range(products.size):
         products[i] = values[i] * factors[i]
 
 
 @njit
 def multiply_in_place(factors, values):
-    """values *= factors."""
+    """Multiply values by factors in place."""
     for i in range(values.size):
         values[i] *= factors[i]
 
 
 @njit
 def scale_in_place(factor, values):
-    """values *= factor."""
+    """Multiply all values by one factor in place."""
     for i in range(values.size):
         values[i] *= factor
 
 
 @njit
 def depth_deviations(rest, wide, narrow, content, seen):
-    """Deviations of depths from those at rest."""
+    """Write deviations U - U0 of depths from those at rest to `seen`; content : states (A U - A0 U0) / A0."""
     for i in range(seen.size):
         seen[i] = (content[i] - rest[i] * (wide[i] - 1.0)) * narrow[i]
 
 
 @njit
 def density_deviations(rest, wide, narrow, content, seen):
-    """Deviations of densities from that at rest."""
+    """Write deviations U - U0 of densities from that at rest to `seen`; content : states (A U - A0 U0) / A0."""
     for i in range(seen.size):
         seen[i] = (content[i] - rest * (wide[i] - 1.0)) * narrow[i]
 
 
 @njit
 def stretch_rates(wide, first, second, third):
-    """Convert three rates per area to rates of contents."""
+    """Convert three arrays of rates per area to rates of the states, by multiplying with `wide`."""
     multiply_in_place(wide, first)
     multiply_in_place(wide, second)
     multiply_in_place(wide, third)
@@ -83,7 +84,7 @@ def stretch_rates(wide, first, second, third):
 
 @njit
 def stretch_row_rates(columns, wide, first, j, rate_1, rate_2, rate_3):
-    """Convert three rates of row j of a grid from column `first` on.
+    """Convert three arrays of rates of row j of a grid, from column `first` on, to rates of the states.
 
     columns : True if columns stretch, False if rows do
     """

@@ -1,6 +1,7 @@
 """Diffusion and decay of scalars on a grid, added to rates.
 
-s_t = div(D depth grad c) - decay (s - depth ambient), for amounts s = depth c per area.
+s_t = div(D depth grad c) - decay (s - depth ambient), with c the value of a scalar, s = depth c its amount per area, D
+the diffusivity [m2/s], decay [1/s] and ambient the value at which it ends.
 """
 
 from fvsolve.basins.advection import THIN, stencil_values
@@ -9,13 +10,16 @@ from fvsolve.jit import inline, njit
 
 @njit
 def harmonic_mean(a, b):
-    """Harmonic mean, of depths or of cells per length: 0 if both are 0."""
+    """Harmonic mean of two depths or two numbers of cells per length: 0 if both are 0."""
     return 2.0 * a * b / (a + b) if a + b > 0.0 else 0.0
 
 
 @inline
 def put_conductances(across, a, b, to):
-    """Conductances of a row of faces: `across` times the depth between a and b, which are empty if the depth is 1."""
+    """Write conductances of a row of faces: `across` times the harmonic mean of the depths a and b on both sides.
+
+    Empty a and b stand for depth 1.
+    """
     if a.size == 0:
         for i in range(to.size):
             to[i] = across
@@ -26,9 +30,11 @@ def put_conductances(across, a, b, to):
 
 @inline
 def add_row_diffusion(kx, ky, p, wx, south, ws, here, north, wn, depth, rate, top):
-    """Add diffusion to the rates of a row. p : its values, with one beyond either end.
+    """Add diffusion to the rates of a row of cells with values `here`.
 
-    top : greatest rate by column so far
+    p : values of the row, with one beyond either end; south, north : values of the rows next to it
+    wx, ws, wn : conductances of faces across x, and of the southern and northern faces
+    top : greatest rate of each column so far [1/s]
     """
     w, e, ww, we = p, p[2:], wx, wx[1:]
     for i in range(rate.size):
@@ -47,11 +53,14 @@ def diffusion_work(nx, ny):
 
 @njit
 def grid_diffusion(nx, ny, begin, stop, kx, ky, diffusivity, factor, flow_x, flow_y, depth, outside, s, work, rate):
-    """Add the rates of diffusion to rows `begin` to `stop`; return the greatest rate 2 D (kx^2 + ky^2) of a cell [1/s].
+    """Add the rates of diffusion to rows `begin` to `stop` - 1; return the greatest rate of a cell [1/s].
 
-    There is no flux through the boundary, except where factor times a given flow enters: there the value on the face is
-    `outside`. (Flows of water, with depths, may be almost zero there: a value fixed for one sign only would jump.)
-    Arguments as for `grid_advection`; diffusivity in m2/s; work : float64[diffusion_work(nx, ny)]
+    This rate is 2 D (kx^2 + ky^2). There is no flux through the boundary, except where factor times a given flow
+    enters:
+    there the value on the face is `outside`. (Flows of water, with depths, may be almost zero there: a value fixed for
+    one
+    sign only would jump.)
+    diffusivity : D [m2/s]; work : float64[diffusion_work(nx, ny)]; other arguments as for `grid_advection`
     """
     c, rest = s, work[nx * ny :]
     if depth.size > 0:
@@ -92,6 +101,6 @@ def grid_diffusion(nx, ny, begin, stop, kx, ky, diffusivity, factor, flow_x, flo
 
 @njit
 def add_decay(decay, ambient, depth, s, rate):
-    """Add decay [1/s] towards an ambient value."""
+    """Add decay of the amounts s towards an ambient value to their rates; decay [1/s]."""
     for i in range(s.size):
         rate[i] -= decay * (s[i] - (depth[i] if depth.size > 0 else 1.0) * ambient)
