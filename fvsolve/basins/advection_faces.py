@@ -105,16 +105,18 @@ def gather_flows(faces, factor, flow, out):
 
 @njit
 def put_allowed(c, least, most, allowed):
-    """Write the greatest allowed deviation of side values from cell values of a block: the distance to the nearer bound."""
+    """Write the greatest allowed deviation of side values from the cells of a block: distance to the nearer bound."""
     for i in range(BLOCK):
         allowed[i] = max(min(c[i] - least, most - c[i]), 0.0)
 
 
 @njit
 def add_advection(count, c, d, cl, far, w):
-    """Subtract the advective outflow through one side of each cell of a block, beyond that of a uniform c, from the rates.
+    """Subtract the advective outflow through one side of each cell of a block from the rates.
 
-    count : factor of the outflow in the rate that limits the step; cl : values at the side, inside the cell
+    The outflow of a uniform c is left out here. count : factor of the outflow in the rate that limits the step; cl :
+        values
+    at the side, inside the cell
     """
     for i in range(BLOCK):
         q = far[PER_AREA * BLOCK + i] * w[_FLOW + i]

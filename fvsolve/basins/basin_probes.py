@@ -32,7 +32,7 @@ def observe_flows(t, y, out, handle, values):
 
 @njit
 def observe_dense_flows(t, y, out, handle, values):
-    """Write the values of the probes of flows through patches [m3/s] under other laws, with the density at the patch."""
+    """Write the values of probes of flows through patches [m3/s] under other laws, with the density at the patch."""
     tables = open_tables(handle)
     st, probes, at = tables.settings[0], tables.probes, tables.layout[0]["pressure"]
     for k in range(probes.size):

@@ -1,9 +1,9 @@
 """Fifth-order advection over a grid, as the difference from upwind rates.
 
-Values are linear (upwind5) or WENO-Z (Borges et al. 2008), written in differences, so that a uniform value stays
-uniform. The mean of a product over a face is the product of the means plus 1/12 and 1/180 of the products of the first
-and second Legendre coefficients along the face. The flux through a face minus the upwind flux is an excess, which
-`limit_excesses` may reduce.
+Values at faces are linear (upwind5) or WENO-Z (Borges et al. 2008), written in differences, so that a uniform value
+stays uniform. The mean of a product over a face is the product of the means plus 1/12 and 1/180 of the products of the
+first and second Legendre coefficients along the face. The flux through a face minus the upwind flux is an excess, which
+`limit_excesses` may reduce. Arguments as for `advection.grid_advection`; c : values of cells.
 """
 
 from fvsolve.jit import inline, njit
@@ -16,9 +16,9 @@ LEAST_CELLS = 5  # with fewer cells, values beyond a side are those of its last 
 
 @njit
 def ghost_means(known, o, a, b, c, d, e):
-    """Means of the two cells beyond a side, from the polynomial of degree 4 through the means of the cells inside.
+    """(nearest, next) mean beyond a side of the grid, by the polynomial of degree 4 through means of cells inside.
 
-    a : the nearest cell; o : value at the side, used in place of e if `known`
+    a .. e : means of the cells inside, a the nearest; o : value at the side, used in place of e if `known`
     """
     p, q, r, s = a - b, b - c, c - d, d - e
     if known:
@@ -29,13 +29,19 @@ def ghost_means(known, o, a, b, c, d, e):
 
 @njit
 def face_difference_linear(p, q, r, s):
-    """Value at the face after a cell minus its own, from the differences between it and two cells on either side."""
+    """Value at the face after a cell minus the mean of the cell, by the linear scheme.
+
+    p, q, r, s : successive differences of five cells in line, in the direction of the flow; the cell is the third
+    """
     return (24.0 * r + 11.0 * q - 2.0 * p - 3.0 * s) / 60.0
 
 
 @njit
 def face_difference_weno(p, q, r, s):
-    """Value at the face after a cell minus its own by WENO-Z, with one common divisor of all weights."""
+    """Value at the face after a cell minus the mean of the cell by WENO-Z, with one common divisor of all weights.
+
+    p, q, r, s : successive differences of five cells in line, in the direction of the flow; the cell is the third
+    """
     b0 = 13.0 / 12.0 * (q - p) ** 2 + 0.25 * (3.0 * q - p) ** 2 + SMALL
     b1 = 13.0 / 12.0 * (r - q) ** 2 + 0.25 * (r + q) ** 2 + SMALL
     b2 = 13.0 / 12.0 * (s - r) ** 2 + 0.25 * (s - 3.0 * r) ** 2 + SMALL
@@ -46,7 +52,10 @@ def face_difference_weno(p, q, r, s):
 
 @njit
 def face_excesses(scheme, factor, flow, a, b, c, d, e, g, q, excess):
-    """Values q at faces between c and d, and the flux in excess of that of the upwind value."""
+    """Write the values q at faces between cells c and d, and the flux minus the upwind flux, `excess`.
+
+    a, b, c, d, e, g : means of six cells in line, three on either side of each face
+    """
     if scheme == WENO5:
         for i in range(q.size):
             forward = factor * flow[i] > 0.0
@@ -67,7 +76,7 @@ def face_excesses(scheme, factor, flow, a, b, c, d, e, g, q, excess):
 
 @njit
 def pad_sides(nx, ny, factor, flow_x, flow_y, outside, c, v):
-    """Copy values to v, float64[ny + 6, nx + 6] in one array, with ghost cells beyond the sides."""
+    """Copy the means c to v, float64[ny + 6, nx + 6] as one array, with ghost cells beyond the sides of the grid."""
     wide = nx + 2 * GHOSTS
     for j in range(ny):
         to, fx = v[(j + GHOSTS) * wide :], flow_x[j * (nx + 1) :]
@@ -88,7 +97,11 @@ def pad_sides(nx, ny, factor, flow_x, flow_y, outside, c, v):
 
 @njit
 def ghost_values(n, known, o, v, at, step):
-    """Both values of `ghost_means` for the cells v[at], v[at + step], ... inward."""
+    """(nearest, next) mean beyond a side, from the cells v[at], v[at + step], ... inward; see `ghost_means`.
+
+    n : number of cells in line; with less than LEAST_CELLS, both means are the value o, or the nearest cell if not
+        `known`
+    """
     if n < LEAST_CELLS:
         return (o, o) if known else (v[at], v[at])
     return ghost_means(known, o, v[at], v[at + step], v[at + 2 * step], v[at + 3 * step], v[at + 4 * step])
@@ -96,7 +109,10 @@ def ghost_values(n, known, o, v, at, step):
 
 @inline
 def add_products(fa, fb, fc, fd, fe, qa, qb, qc, qd, qe, excess):
-    """Add the mean of products minus the product of means, from five faces in line along the side."""
+    """Add the mean of products f q over faces minus the product of the means of f and q to `excess`.
+
+    fa .. fe, qa .. qe : flows and values at five faces in line along the side; c is the face itself
+    """
     for i in range(excess.size):
         f1 = (82.0 * (fd[i] - fb[i]) - 11.0 * (fe[i] - fa[i])) / 120.0
         q1 = (82.0 * (qd[i] - qb[i]) - 11.0 * (qe[i] - qa[i])) / 120.0
@@ -107,7 +123,7 @@ def add_products(fa, fb, fc, fd, fe, qa, qb, qc, qd, qe, excess):
 
 @njit
 def extrapolate_rows(v, wide, rows):
-    """Extrapolate two rows before and after the rows of v, which start at row 2."""
+    """Extrapolate two rows before and after the rows of v, which start at row 2; wide : length of a row."""
     first, last = 2 * wide, (rows + 1) * wide
     for i in range(wide):
         v[wide + i], v[i] = ghost_values(rows, False, 0.0, v, first + i, wide)
@@ -131,7 +147,7 @@ def grid_excesses_work(nx, ny):
 
 @njit
 def grid_excesses(scheme, nx, ny, factor, flow_x, flow_y, outside, c, work, ax, ay):
-    """Fluxes through faces in excess of upwind, in ax ordered as flow_x and ay as flow_y."""
+    """Write the fluxes through faces minus the upwind fluxes to ax, ordered as flow_x, and ay, ordered as flow_y."""
     wide, m = nx + 2 * GHOSTS, nx + 1
     mx, my = m * (ny + 4), nx * (ny + 1)
     v, rest = work[: wide * (ny + 6)], work[wide * (ny + 6) :]
@@ -174,7 +190,7 @@ def grid_excesses(scheme, nx, ny, factor, flow_x, flow_y, outside, c, work, ax, 
 
 @njit
 def add_excesses(nx, ny, kx, ky, factor, ax, ay, rate):
-    """Add the excesses of their faces to the rates of all cells."""
+    """Add the excess fluxes ax, ay through the faces of each cell to the rates of all cells."""
     for j in range(ny):
         k, to = ky[j], rate[j * nx : (j + 1) * nx]
         aw, ae, south, north = ax[j * (nx + 1) :], ax[j * (nx + 1) + 1 :], ay[j * nx :], ay[(j + 1) * nx :]

@@ -1,6 +1,7 @@
 """Flux-corrected transport: excess fluxes limited so that an Euler step keeps values within bounds (Zalesak 1979).
 
-The result of upwind is within the bounds. Each cell accepts excess fluxes only up to its distance from the bounds.
+The result of upwind is within the bounds. Each cell accepts excess fluxes only up to its distance from the bounds. An
+excess is the flux of a higher order minus the upwind flux.
 """
 
 from fvsolve.jit import inline, njit
@@ -23,7 +24,10 @@ def sum_of_positive(a, b, c, d):
 
 @inline
 def row_fractions(step, factor, kx, ky, fw, fe, fs, fn, depth, least, most, s, rate, aw, ae, south, north, up, down):
-    """Fractions of the rises and falls of a row of cells, by flows through its faces, that keep the bounds."""
+    """Write the fractions `up` and `down` of the excess inflow and outflow of a row of cells that keep the bounds.
+
+    step : Euler step [s]; aw, ae, south, north : excess fluxes; rate : rates by upwind
+    """
     for i in range(s.size):
         scale = step * (factor * (kx[i] * ky))
         then = s[i] + step * rate[i]
@@ -35,9 +39,9 @@ def row_fractions(step, factor, kx, ky, fw, fe, fs, fn, depth, least, most, s, r
 
 @inline
 def limit_faces(factor, up, down, up_then, down_then, excess):
-    """Multiply excesses by the fraction that both cells of a face allow.
+    """Multiply the excesses of a row of faces by the fraction that both cells of a face allow.
 
-    The arrays *_then are those of the next cells.
+    up, down : fractions of the cells before the faces; up_then, down_then : of the cells behind them
     """
     for i in range(excess.size):
         forth = down[i] if down[i] < up_then[i] else up_then[i]
@@ -52,9 +56,9 @@ def limit_excesses_work(nx, ny):
 
 @njit
 def limit_excesses(nx, ny, kx, ky, factor, flow_x, flow_y, depth, least, most, step, s, rate, ax, ay, work):
-    """Limit the excesses ax, ay: s + step times the corrected rates lies between least and most times the depth.
+    """Limit the excesses ax, ay so that s + step times the corrected rates lies between least and most times the depth.
 
-    rate : float64[n]  rates by upwind
+    rate : float64[n]  rates by upwind; other arguments as for `advection.grid_advection`
     work : float64[limit_excesses_work(nx, ny)]
     """
     wide = nx + 2

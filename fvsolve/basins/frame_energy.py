@@ -1,11 +1,19 @@
 """Energy of the water in basins on bodies, in the inertial frame.
 
-Columns are point masses on the bed, at mid depth: T = M V^2 / 2 + V . (W x S + Q) + W . I W / 2 + W_z H + sum of rho
-q^2 / (2 h), U = M g z - d . (S, lever). d is gravity in axes of the basin, V the velocity of its origin. M, S, I are
-the moments of mass; Q and H are momentum and its moment relative to the basin. A liquid has no lever, and its stored
-energy in its own axes is that of `liquid_energy`. A body supplies the power -(F . V + T . W) with the load on it; see
-`frame_reaction`. The acceleration a of the origin along the normal changes the weight of the water, but does not act on
-columns that rise: so the law dissipates a d/dt (sum of dm h / 2), which may be negative.
+Columns of water are point masses on the bed, at mid depth. In axes of the basin the kinetic and potential energies are
+
+    T = M V^2 / 2 + V . (W x S + Q) + W . I W / 2 + W_z H + sum over cells of rho area q^2 / (2 h)
+    U = M g z - d . (S_x, S_y, lever)
+
+M : mass; V : velocity of the origin of the basin; W : angular velocity; S, I : first and second moments of mass
+Q, H : momentum relative to the basin, and its moment about z; q, h : flow per width and depth of a cell
+g, z : gravity, height of the origin; d : gravity in axes of the basin; lever : sum of mass times height above the
+    origin
+
+A liquid has no lever, and its stored energy in its own axes is that of `liquid_energy`. A body that is loaded with
+force F and torque T supplies the power -(F . V + T . W); see `frame_reaction`. The acceleration a of the origin along
+the normal changes the weight of the water, but does not act on columns that rise. So the model dissipates
+a d/dt (sum of mass h / 2), which may be negative.
 """
 
 from fvsolve.basins.basin_energy import basin_first_row as energy_row
@@ -29,7 +37,7 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def origin_velocity(tables, basin, b, out):
-    """Velocity of a basin's origin, in its own axes."""
+    """Velocity of the origin of basin b, in its own axes [m/s]."""
     row, tank = body_row(tables, basin["body"]), tables.layout[0]["tank"] + TANK_OUT * b
     x, y, z = basin_offset(tables, basin, out)
     u, v, w = cross(out, row + SPIN, x, y, z)
@@ -40,7 +48,7 @@ def origin_velocity(tables, basin, b, out):
 
 @njit
 def origin_acceleration(tables, basin, b, out):
-    """Solved accelerations of a basin's origin and of its rotation, in its own axes."""
+    """Acceleration of the origin of basin b [m/s2] and angular acceleration [rad/s2], in its own axes: six numbers."""
     row, tank = body_row(tables, basin["body"]), tables.layout[0]["tank"] + TANK_OUT * b
     x, y, z = basin_offset(tables, basin, out)
     u, v, w = cross(out, row + SPIN, x, y, z)
@@ -58,7 +66,10 @@ def origin_acceleration(tables, basin, b, out):
 
 @njit
 def body_load(tables, basin, b, out):
-    """Force and torque on the moving body: the load with locked joints and the inertial part along the normal."""
+    """Force [N] and torque [N m] of the water of basin b on its body, in axes of the basin: six numbers.
+
+    They are the load for zero joint accelerations plus the inertial part along the normal.
+    """
     ax, ay, az, wx, wy, wz = extra_accelerations(tables, basin, out)
     tank = tables.layout[0]["tank"] + TANK_OUT * b
     e, m = tank + EAST, tank + MOMENTS
@@ -72,9 +83,9 @@ def body_load(tables, basin, b, out):
 
 @njit
 def add_power(t, y, dydt, out, handle, power):
-    """Add the power supplied by bodies to the water in them.
+    """Add the power that bodies supply to the water in their basins to `power` [W].
 
-    Compute the rate of storage and the dissipation by the law.
+    The rate of storage, and the power dissipated by the model, are written too.
     """
     tables = open_tables(handle)
     plane = tables.plane
@@ -94,7 +105,7 @@ def add_power(t, y, dydt, out, handle, power):
 
 @njit
 def rise_moment(tables, basin, y, dydt):
-    """d/dt of the sum of dm h / 2 [kg m/s]."""
+    """d/dt of the sum over cells of mass times depth / 2 [kg m/s]; 0 for a liquid."""
     plane, total, n, o = tables.plane, 0.0, basin["n"], basin["y"]
     for i in range(n if basin["deep"] == 1 else 0):
         total += plane[basin["area"] + i] * max(plane[basin["plan"] + i] + y[o + i], 0.0) * dydt[o + i]
@@ -103,7 +114,7 @@ def rise_moment(tables, basin, y, dydt):
 
 @njit
 def energy_rate(tables, basin, b, y, dydt, out, vx, vy, vz):
-    """d/dt (T + U) [W]."""
+    """d/dt (T + U) of the water in basin b, see the module [W]; vx, vy, vz : result of `origin_velocity`."""
     plane, n, o, at, per_area = tables.plane, basin["n"], basin["y"], basin["frame"], mass_factor(tables, basin)
     m, wx, wy, wz = tables.layout[0]["tank"] + TANK_OUT * b, plane[at + WX], plane[at + WY], plane[at + WZ]
     ax, ay, az, bx, by, bz = origin_acceleration(tables, basin, b, out)
@@ -145,7 +156,7 @@ def energy_rate(tables, basin, b, y, dydt, out, vx, vy, vz):
 
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
-    """Write T + U [J] in place of the energy of stationary water; for a liquid, add it to its own stored energy."""
+    """Write T + U [J] in place of the energy of a fixed basin to `stored`; for a liquid, add it to the energy there."""
     tables = open_tables(handle)
     plane = tables.plane
     for b in range(tables.basins.size):

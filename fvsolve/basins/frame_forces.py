@@ -1,12 +1,12 @@
 """Coriolis and Euler forces on the water in basins on bodies, and the coupling of water and body accelerations.
 
-For the forces see `basin_frames`. If forces move the body, its acceleration must be solved together with that of the
-water in its basins. Lagrange's equations (70) are those of columns that are point masses at mid depth and slide along
-the bed. The force along the bed depends on the state alone, so flow rates are first computed with locked joints. The
-water then loads the body by its missing momentum (`frame_reaction`). Along the normal it acts by its mass and moments,
-together with those of bodies (`kernels.mechanism.basin_inertia`). After the accelerations are solved, the flow rates
-are corrected for them (`correct_for_bodies`). A liquid is such a layer without height. The total momentum is conserved
-to the order of the method.
+For the forces see `basin_frames`. If forces move the body, its acceleration is solved together with that of the water
+in its basins. Lagrange's equations ((70) of docs/course.md) are those of columns that are point masses at mid depth and
+slide along the bed. The force along the bed depends on the state alone, so the rates of flow are first computed for
+zero joint accelerations. The water then loads the body by its missing momentum (`frame_reaction`). Along the normal it
+acts by its mass and moments, together with the inertia of bodies (`kernels.mechanism.basin_inertia`). After the
+accelerations are solved, the rates of flow are corrected for them (`correct_for_bodies`). A liquid is a layer of this
+kind without height. The total momentum is conserved to the order of the method.
 """
 
 from fvsolve.basins.basin_frames import AZ, WZ
@@ -21,9 +21,9 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def add_frame_forces(t, y, dydt, out, handle):
-    """Add Coriolis and Euler forces to rates of flow, and the loads of the contents of basins to their bodies.
+    """Add Coriolis and Euler forces to the rates of flow, and the loads of the water in basins to their bodies.
 
-    Under law linear the inertia of a liquid is that at rest.
+    Under the linear density law, the inertia of a liquid is its inertia at rest.
     """
     tables = open_tables(handle)
     for b in range(tables.basins.size):
@@ -42,7 +42,7 @@ def add_frame_forces(t, y, dydt, out, handle):
 
 @njit
 def correct_for_bodies(t, y, dydt, out, handle):
-    """Correct the rates of flow for the accelerations of the body beyond those with locked joints."""
+    """Correct the rates of flow for the joint accelerations of the bodies that carry basins."""
     tables = open_tables(handle)
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]

@@ -1,4 +1,4 @@
-"""Momentum terms of the accelerated frame of a basin on a body (see `basin_frames`), added to rates of flow."""
+"""Momentum terms of the accelerated frame of a basin on a body (`basin_frames`), added to rates of flow."""
 
 from fvsolve.basins.basin_frames import CELL_POSITIONS
 from fvsolve.jit import inline, njit
@@ -6,11 +6,11 @@ from fvsolve.jit import inline, njit
 
 @njit
 def accelerate_flow(plane, basin, y, rates, first, own, twice, east, north, turn):
-    """Add 2 W q and depth times an acceleration to rates of flow.
+    """Add twice (q_y, -q_x) + depth (east + turn y, north - turn x) to the rates of the flow (q_x, q_y) of all cells.
 
-    The acceleration is uniform plus `turn` times the position.
-
-    Depth is the stored quantity per area (density for a liquid). own : 1 to include its deviation, 0 for its value at
+    twice : 2 W_z [1/s]; east, north : uniform acceleration [m/s2]; turn : Euler term [1/s2]; x, y : position of the
+        cell
+    depth is the stored quantity per area (density for a liquid). own : 1 to include its deviation, 0 for its value at
     rest
     """
     n, o, p, places = basin["n"], basin["y"], basin["plan"], int(plane[basin["frame"] + CELL_POSITIONS])
@@ -24,7 +24,7 @@ def accelerate_flow(plane, basin, y, rates, first, own, twice, east, north, turn
 
 @njit
 def accelerate_row(plane, basin, y, rates, first, row, own, twice, east, north, turn):
-    """Add the terms of `accelerate_flow` to a row of cells of a grid."""
+    """Add the terms of `accelerate_flow` to the rates of a row of cells of a grid."""
     n, nx, places = basin["n"], basin["nx"], int(plane[basin["frame"] + CELL_POSITIONS])
     at, level = row * nx, plane[places + nx + row]
     a, p, to = basin["y"] + at, basin["plan"] + at, first + n + at
@@ -37,7 +37,10 @@ def accelerate_row(plane, basin, y, rates, first, row, own, twice, east, north, 
 
 @inline
 def accelerate_arrays(x, rest, dh, qx, qy, own, twice, east, north, turn, rate_x, rate_y):
-    """Add the terms of `accelerate_flow` to the arrays of a row of cells."""
+    """Add the terms of `accelerate_flow` to the rates of a row of cells, given by its arrays.
+
+    x : positions; rest, dh : depths at rest and deviations; qx, qy : flows
+    """
     for i in range(rate_x.size):
         depth = max(rest[i] + own * dh[i], 0.0)
         rate_x[i] += twice * qy[i] + depth * east

@@ -1,4 +1,4 @@
-"""Force and torque that a fluid-filled basin exerts on its body with locked joints, and its mass moments."""
+"""Force and torque of the water in a basin on its body for zero joint accelerations, and its moments of mass."""
 
 from fvsolve.basins.basin_frames import (
     AX,
@@ -38,21 +38,24 @@ from fvsolve.kernels.mechanism.body_layout import (
 
 @njit
 def basin_offset(tables, basin, out):
-    """Vector from the origin of the body to that of a basin, in axes of the world [m]."""
+    """Vector from the origin of the body to the origin of the basin, in axes of the world [m]."""
     at = basin["frame"] + ORIGIN
     return rotate(out, body_row(tables, basin["body"]) + ATTITUDE, tables.plane[at : at + 3], 0)
 
 
 @njit(forceinline=True)
 def mass_factor(tables, basin):
-    """Mass per area over the stored quantity of cells: per depth [kg/m3], or per density of a liquid [m]."""
+    """Mass per area over the stored quantity: density [kg/m3] if that is a depth, thickness [m] for a liquid."""
     return tables.settings[0]["rho"] if basin["deep"] == 1 else basin["thickness"]
 
 
 @njit(fastmath={"reassoc"})
 def row_sums(deep, per_area, level, x, area, rest, surface, h, qx, qy, dh, dx, dy):
-    """Sums over a row: mass, its rate (1, x, xx), flow along x and y (1, x), rates of flow, mass times height.
+    """Sums over a row of cells: moments of mass, of its rate, of flow and of the rate of flow, and mass times height.
 
+    Returns the sums of mass, and of its rate, times 1, x, x^2 (6 numbers); flow along x; flow along y times 1, x; the
+    same
+    three numbers of the rates of flow; mass times height of its centre.
     The compiler may reorder these sums, so that it can use vector instructions.
     """
     r0 = r1 = r2 = d0 = d1 = d2 = p0 = v0 = v1 = p1 = f0 = f1 = g0 = 0.0
@@ -70,10 +73,11 @@ def row_sums(deep, per_area, level, x, area, rest, surface, h, qx, qy, dh, dx, d
 
 @njit
 def mass_moments(tables, basin, y, rates, first, own, twice, euler):
-    """Sums over cells, in axes of the basin.
+    """Sums over the cells of a basin, in axes of the basin: 18 numbers.
 
-    Returns the moments 1, x, y, xx, xy, yy of mass [kg ..], the sum of mass times height along the normal, the moments
-    x, y, xx, xy, yy of the rate of mass, momentum along x and y and its moment about z, and the rates of these three.
+    In this order: moments 1, x, y, xx, xy, yy of mass; sum of mass times height along the normal; moments x, y, xx, xy,
+    yy
+    of the rate of mass; momentum along x and y, its moment about z; rates of these three. Units are kg, m and s.
 
     On grids, the terms that `frame_forces.add_frame_forces` adds to other basins at once are added here, row by row.
     """
@@ -104,9 +108,9 @@ def mass_moments(tables, basin, y, rates, first, own, twice, euler):
 
 @njit
 def load_body(tables, basin, b, y, rates, first, own, twice, euler, out):
-    """Add the force and torque of the contents of a basin on its body with locked joints.
+    """Add the force and torque of the water in basin b for zero joint accelerations to the forces on its body.
 
-    Store its moments and axes.
+    The moments of mass, axes, origin and load of the basin are written to `out`, see `kernels.mechanism.basin_inertia`.
     """
     m, sx, sy, xx, xy, yy, lever, dx, dy, dxx, dxy, dyy, qx, qy, turn, fx, fy, spin = mass_moments(
         tables, basin, y, rates, first, own, twice, euler
@@ -150,13 +154,16 @@ def load_body(tables, basin, b, y, rates, first, own, twice, euler, out):
 
 @njit(forceinline=True)
 def vector_difference(out, i, j):
-    """Vector at i minus the vector at j."""
+    """Vector at out[i] minus the vector at out[j]."""
     return out[i] - out[j], out[i + 1] - out[j + 1], out[i + 2] - out[j + 2]
 
 
 @njit
 def extra_accelerations(tables, basin, out):
-    """Accelerations of a basin's origin and of its rotation minus those with locked joints, in axes of the world."""
+    """Acceleration of the origin of a basin and angular acceleration, minus their values for zero joint accelerations.
+
+    Six numbers in axes of the world [m/s2, rad/s2].
+    """
     row = body_row(tables, basin["body"])
     rx, ry, rz = basin_offset(tables, basin, out)
     wx, wy, wz = vector_difference(out, row + SPIN_RATE, row + SPIN_BIAS)

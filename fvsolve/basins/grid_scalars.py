@@ -1,4 +1,4 @@
-"""Rates of scalars in basins on grids; other terms are those of `basin_scalars`."""
+"""Rates of scalars in basins on grids by advection and diffusion; `basin_scalars` adds the other terms."""
 
 from fvsolve.basins.advection import add_fifth_order, grid_advection, grid_fastest
 from fvsolve.basins.basin_scalars import depth_count, flow_factor, prepare_scalars
@@ -24,13 +24,13 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit(forceinline=True)
 def on_grid(basin):
-    """True if the basin is a grid with scalars."""
+    """True if the basin is on a grid and contains scalars."""
     return basin["carried"] >= 0 and basin["nx"] > 0
 
 
 @njit(forceinline=True)
 def grid_arrays(tables, basin):
-    """1 / widths and heights of a grid, flows along x and y, depths from `prepare_scalars`, and a work array."""
+    """Arrays of a grid: 1 / widths, 1 / heights, flows along x and along y, depths (`prepare_scalars`), work array."""
     plane, work = tables.plane, tables.work
     flows = plane if has_given_flows(basin) else work
     nx, ny, k, f, toil = basin["nx"], basin["ny"], basin["spacing"], basin["flows"], basin["scalar_work"]
@@ -43,7 +43,7 @@ def grid_arrays(tables, basin):
 
 @njit
 def advect_on_grids(t, y, dydt, out, handle):
-    """Rates of all amounts by upwind or muscl."""
+    """Write the rates of the amounts of all scalars in grids by upwind or muscl."""
     tables = open_tables(handle)
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]
@@ -87,7 +87,10 @@ def advect_on_grids(t, y, dydt, out, handle):
 
 @njit
 def by_blocks(sums, at, scheme, limiter, begin, stop, kx, ky, factor, flow_x, flow_y, outside, y, work, rate):
-    """Rates by `grid_advection` at depth 1, block by block, with the requested stages formed in the same pass."""
+    """Write rates as `grid_advection` does for depth 1, block by block; form the requested stage sums in the same pass.
+
+    sums : see `kernels.stage_sums`; at : index in y of the first amount
+    """
     nx, ny, n, formed_ahead, formed_end = kx.size, ky.size, rate.size, begin, begin
     rows = max(sums[CELLS] // nx, 1)
     for row in range(begin, stop, rows):
@@ -109,7 +112,7 @@ def by_blocks(sums, at, scheme, limiter, begin, stop, kx, ky, factor, flow_x, fl
 
 @njit
 def add_fifth_order_on_grids(t, y, dydt, out, handle):
-    """Add the excess of upwind5 or weno5 over upwind to the rates of all amounts; weno5 keeps the bounds."""
+    """Add the difference of upwind5 or weno5 from upwind to the rates of all scalars in grids; weno5 keeps bounds."""
     tables = open_tables(handle)
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]
@@ -132,7 +135,7 @@ def add_fifth_order_on_grids(t, y, dydt, out, handle):
 
 @njit
 def diffuse_on_grids(t, y, dydt, out, handle):
-    """Add diffusion to the rates of all amounts."""
+    """Add diffusion to the rates of the amounts of all scalars in grids."""
     tables = open_tables(handle)
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]

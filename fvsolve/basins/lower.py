@@ -1,4 +1,4 @@
-"""Rows of tables for basins; loaded for models that contain a basin."""
+"""Tables of a model for basins; loaded for models that contain a basin."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fvsolve.kernels import dtypes as rec
 
 
 def lower_basins(draft) -> None:
-    """Fill the tables of basins and their patches, and add states for their cells."""
+    """Fill the tables of basins and of their patches, and add the states of their cells to the model."""
     case = draft.case
     draft.basins = [rows_class(case.nodes[name].physics_type)(case, name) for name in case.meshes]
     draft.basin_table = np.zeros(len(draft.basins), rec.BASIN)
@@ -28,16 +28,17 @@ def lower_basins(draft) -> None:
 
 
 def rows_class(physics: type) -> type:
-    """Class that fills the rows of a physics: from the module `lower` next to its declaration."""
+    """Class that fills the tables of a type of basin, from the module `lower` beside the declaration of the type."""
     home = physics.__module__.rpartition(".")[0]
     import_module(f"{home}.lower")
     return import_module("fvsolve.basins.lower_basin").BasinRows.physics[home]
 
 
 def basin_start(basins: list, size: int, attitudes: dict[str, np.ndarray] | None = None) -> np.ndarray:
-    """States at the start: deviations from the profile, zero unless a basin states a start.
+    """States at the start: deviations from the initial steady state, zero unless a basin has a given start.
 
-    attitudes : of bodies by name, instead of those at the start
+    size : number of states of the model
+    attitudes : rotation matrices of bodies by name, in place of those at the start
     """
     states = np.zeros(size)
     for basin in basins:

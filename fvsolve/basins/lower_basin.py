@@ -1,4 +1,4 @@
-"""Rows of tables for basins of all physics: cells, boundaries and patches."""
+"""Tables of a model for basins of all types: cells, boundaries and patches."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ VELOCITIES = {"u": U, "v": V, "speed": SPEED}
 
 
 class BasinRows:
-    """A basin of a model: its part, its mesh, and its row of the table once it is filled."""
+    """A basin of a model: its part of the case, its mesh, and its row of the table of basins once that is filled."""
 
     physics: ClassVar[dict[str, type[BasinRows]]] = {}  # by the package that declares it
     units: ClassVar[dict[str, str]] = {}  # of fields
@@ -63,38 +63,38 @@ class BasinRows:
     # defined by each physics --------------------------------------------------------------------------------
 
     def lower(self, draft, row) -> None:
-        """Fill the columns of the row that its law needs, and reserve the work arrays of its kernels."""
+        """Fill the columns of the row that only this type of basin has, and reserve the work arrays of its kernels."""
         raise NotImplementedError
 
     def pieces(self, valves: bool) -> Iterator[RhsTerms]:
-        """Terms of its right-hand side and its probes, in order. valves : True if there are valves in the network"""
+        """Terms of the right-hand side and probes of the basin, in order; valves : True if the network has valves."""
         raise NotImplementedError
 
     def scales(self) -> list[float]:
-        """Size of a small deviation of each quantity."""
+        """Size of a small deviation of each state quantity."""
         return [1.0] * len(self.quantities)
 
     def start(self, attitude: np.ndarray | None = None) -> np.ndarray:
-        """Deviations at the start : float64[quantities, n].
+        """Deviations from the steady state at the start : float64[quantities, n].
 
         attitude : rotation matrix of its body, where it differs from that at the start
         """
         return np.zeros((len(self.quantities), self.n))
 
     def fields(self, y: np.ndarray) -> dict[str, np.ndarray]:
-        """Fields in cells at deviations float64[quantities, n], SI."""
+        """Arrays for output by name, a value for each cell, at deviations y float64[quantities, n], in SI units."""
         return {}
 
     def ground(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Elevation of its bottom at points [m]."""
+        """Elevation of the bottom of the basin at points (x, y) [m]."""
         return np.full(x.shape, self.part.elevation or 0.0)
 
     def ranges(self) -> dict[str, tuple[float, float]]:
-        """Least and greatest values at the start that determine its waves, SI."""
+        """Least and greatest value at the start of each quantity that determines waves, by name, in SI units."""
         return {}
 
     def max_rate(self, y: np.ndarray) -> tuple[float, float]:
-        """Greatest rate [1/s] of its waves or flows at a model's state y, and the fraction of x in it."""
+        """Greatest rate of waves or flows at a state y of the model [1/s], and the fraction of it by motion along x."""
         velocity, speed = self.speeds(self.deviations(y))
         if not self.is_grid:
             left, right = self.mesh.left, self.mesh.right[: self.mesh.inner]
@@ -110,12 +110,12 @@ class BasinRows:
         return rate, float(along[worst]) / rate if rate > 0.0 else 1.0
 
     def speeds(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Velocity float64[n, 3] and wave speed float64[n] at deviations float64[quantities, n] [m/s]."""
+        """Velocity float64[n, 3] and wave speed float64[n] in cells at deviations y float64[quantities, n] [m/s]."""
         raise NotImplementedError
 
     @property
     def has_waves(self) -> bool:
-        """True if it has waves of its own, besides the transport of scalars."""
+        """True if the basin has waves, in addition to the transport of scalars."""
         return bool(self.quantities)
 
     @property
@@ -125,15 +125,15 @@ class BasinRows:
 
     @property
     def scheme(self) -> str:
-        """Scheme of its kernels."""
+        """Name of the scheme that the basin uses."""
         return SCHEMES[self.case.numerics.scheme].for_basin(self.is_grid).name
 
     def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
-        """Fill the columns of a probe that define its field; fields other than velocities belong to the physics."""
+        """Fill the columns of a probe of a velocity `field`; each type of basin adds its other quantities."""
         row["side"], row["scale"] = VELOCITIES[field], 1.0
 
     def mass(self) -> tuple[float, np.ndarray]:
-        """Mass of the profile at the start [kg], and mass per deviation of the first quantity : float64[n]."""
+        """Mass in the initial steady state [kg], and mass per deviation of the first quantity : float64[n]."""
         return 0.0, np.zeros(self.n)
 
     def weights(self, y: np.ndarray) -> np.ndarray:
@@ -141,7 +141,10 @@ class BasinRows:
         return np.tile(0.5 * self.mesh.area, (len(self.quantities), 1))
 
     def above(self, y: np.ndarray, datum: float) -> float:
-        """Energy at deviations y above that at rest and at P = 0 [J], with a surface at the datum or on the bed."""
+        """Energy at deviations y [J], above water at rest with its surface at the datum, or on a higher bed.
+
+        For a liquid the reference is the state with zero total pressure.
+        """
         return 0.0
 
     def notices(self, y: np.ndarray) -> list[Notice]:
@@ -149,19 +152,19 @@ class BasinRows:
         return []
 
     def watches(self, y: np.ndarray) -> list[Any]:
-        """Checks during a run from deviations y, see `lower_watch.ErrorWatch`."""
+        """Checks during a run that starts from deviations y, see `lower_watch.ErrorWatch`."""
         return []
 
     # ----------------------------------------------------------------------------------------------------------
 
     @property
     def reach(self) -> int:
-        """Stencil radius of the rates, in cells."""
+        """Number of cells on either side of a cell that its rate reads."""
         return SCHEMES[self.scheme].reach.behind
 
     @property
     def undivided_reason(self) -> str:
-        """Reason why its rows cannot be distributed over threads, "" if they can."""
+        """Reason why the rows of cells cannot be distributed over threads; "" if they can."""
         if not self.is_grid:
             return "its mesh is not a full rectangle"
         if self.moves:
@@ -169,12 +172,12 @@ class BasinRows:
         if self.part.on is not None:
             return "it is on a body"
         if self.scalars and self.is_fifth_order:
-            return f"its scalars use {self.scheme}"
+            return f"its scalars use the scheme {self.scheme}"
         if self.scalars and self.opening is not None:
             return f"scalars flow through its open boundary {self.opening}"
         if decaying := [name for name in self.scalars if self.case.scalars[name].decay > 0.0]:
             return f"{listing(decaying)} decays"
-        return "" if self.banded else f"rows of {self.part.physics} cannot be distributed"
+        return "" if self.banded else f"its physics {self.part.physics} cannot be distributed over threads"
 
     @property
     def forms_stages(self) -> bool:
@@ -191,19 +194,19 @@ class BasinRows:
 
     @cached_property
     def points(self) -> MeshPoints:
-        """Search for points of its mesh, and the cells read there."""
+        """Search for the cells at given points of the mesh."""
         from fvsolve.mesh.mesh_points import MeshPoints
 
         return MeshPoints(self.mesh)
 
     def formula(self, shape) -> np.ndarray:
-        """Means of a formula over cells : float64[n]; on grids by nine Gauss points, else values at centres."""
+        """Means of a formula over cells : float64[n]; by nine Gauss points on grids, else values at cell centres."""
         return means(samples(shape, self.mesh))
 
     def reflections(self) -> np.ndarray:
-        """Reflection coefficients of waves at boundary faces in the order of the kernels : float64[outer].
+        """Reflection coefficients of waves at boundary faces, in the order of the kernels : float64[outer].
 
-        Empty for walls only.
+        The array is empty if all boundaries are walls.
         """
         mesh, coefficients = self.mesh, np.ones(self.mesh.left.size)
         for name, patch in self.part.patches.items():
@@ -214,7 +217,7 @@ class BasinRows:
         return outer[self.ring()] if self.is_grid else outer
 
     def ring(self) -> np.ndarray:
-        """Numbers of a grid's boundary faces, relative to the first, in the order west, east, south, north."""
+        """Numbers of the boundary faces of a grid, counted from the first, in the order west, east, south, north."""
         mesh, grid = self.mesh, self.mesh.grid
         normal, left = mesh.normal[mesh.inner :], mesh.left[mesh.inner :]
         row, column = np.divmod(left, grid.nx)
@@ -224,26 +227,26 @@ class BasinRows:
         return np.lexsort((at, side))
 
     def reflection(self, patch) -> float:
-        """Reflection coefficient of waves at a patch."""
+        """Reflection coefficient of waves at a patch: 0 if it is open, 1 for a wall."""
         return 0.0 if patch.boundary == "open" else 1.0
 
     def is_open(self, patch: str) -> bool:
-        """True if there is flow through a patch without a link."""
+        """True if water flows through a patch without a link."""
         stated = self.part.patches.get(patch)
         return stated is not None and self.reflection(stated) != 1.0
 
     @property
     def opening(self) -> str | None:
-        """A patch with flow that does not belong to a link, if any."""
+        """Name of a patch through which water flows without a link; None if there is none."""
         return next((patch for patch in self.part.patches if self.is_open(patch)), None)
 
     def states_of(self, y: np.ndarray) -> np.ndarray:
-        """Its part of the states of a model : float64[quantities, n]."""
+        """States of the basin among the states y of the model : float64[quantities, n]."""
         at = int(self.row["y"])
         return y[at : at + len(self.quantities) * self.n].reshape(-1, self.n)
 
     def deviations(self, y: np.ndarray) -> np.ndarray:
-        """Its deviations in a state of a model : float64[quantities, n]."""
+        """Deviations in the cells of the basin at the states y of the model : float64[quantities, n]."""
         if not self.moves:
             return self.states_of(y)
         wide, rest = self.area_ratios(y), np.zeros((len(self.quantities), self.n))
@@ -252,27 +255,27 @@ class BasinRows:
 
     @property
     def walls(self) -> list[str]:
-        """Names of its patches that are moving walls."""
+        """Names of the patches that are moving walls."""
         return [name for name, patch in self.part.patches.items() if patch.moves]
 
     @property
     def moves(self) -> bool:
-        """True if it has moving walls."""
+        """True if the basin has moving walls."""
         return bool(self.walls)
 
     def area_ratios(self, y: np.ndarray) -> np.ndarray:
-        """Areas of cells over undeformed areas in a state of a model : float64[n]."""
+        """Areas of cells over undeformed areas at the states y of the model : float64[n]."""
         return 1.0 + sum((y[at] * per for at, per, _ in self.stretches), np.zeros(self.n))
 
     def vectors_at(self, fields: dict[str, np.ndarray], out: np.ndarray, layout) -> dict[str, np.ndarray]:
-        """Velocities of cells of a basin on a body, and its normal, along axes of the world : float64[n, 3] each."""
+        """Velocity in cells of a basin on a body, and its normal, by name, along axes of the world : float64[n, 3]."""
         from fvsolve.basins.lower_frames import axes_in_world
 
         axes = axes_in_world(self, out, layout)[1]
         return {"velocity": fields["velocity"] @ axes.T, "normal": np.tile(axes[:, 2], (self.n, 1))}
 
     def points_at(self, y: np.ndarray, out: np.ndarray, layout) -> np.ndarray:
-        """Corners of cells in a state of a model, on a body in the world : float64[p, 3] [m]."""
+        """Corners of cells at the states y of the model; in the world for a basin on a body : float64[p, 3] [m]."""
         x, z = np.ascontiguousarray(self.mesh.points.T)
         plan = self.mesh.points + sum((y[at] * weights for at, _, weights in self.stretches), np.zeros((1, 2)))
         points = np.column_stack([plan, self.ground(x, z)])
@@ -284,7 +287,7 @@ class BasinRows:
         return origin + points @ axes.T
 
     def at_rest(self) -> np.ndarray | float:
-        """Its first quantity at rest."""
+        """First state quantity of the cells at rest: depth [m] or density [kg/m3]."""
         raise NotImplementedError
 
     def thrust_at_rest(self) -> np.ndarray:
@@ -292,7 +295,7 @@ class BasinRows:
         raise NotImplementedError
 
     def lower_common(self, draft, row) -> None:
-        """Fill the columns common to all physics."""
+        """Fill the columns of the row that all types of basin have, and add the states."""
         numerics, mesh, before = self.case.numerics, self.mesh, draft.used_size()
         self.row, row["n"] = row, self.n
         row["kind"], row["deep"], row["given"] = (
@@ -309,7 +312,7 @@ class BasinRows:
             row["spacing"] = draft.to_plane(np.concatenate([1.0 / np.diff(grid.x), 1.0 / np.diff(grid.y)]))
         else:
             if self.scheme != SCHEMES[numerics.scheme].for_basin(True).name:
-                text = f"basin {self.name}: {numerics.scheme} needs a rectangle without holes; muscl is used there"
+                text = f"basin {self.name}: {numerics.scheme} needs a full rectangle as mesh; muscl is used here"
                 draft.warnings.append(Notice("scheme", f"nodes.{self.name}", text, "scheme"))
             floats, self.integers = lower_mesh(mesh)
             row["mesh"], row["faces"] = draft.to_plane(floats), mesh.left.size
@@ -346,7 +349,7 @@ class BasinRows:
         draft.warnings += [Notice("mesh", place, f"basin {self.name}: {note}", "mesh") for note in mesh.notes]
 
     def lower_scalars(self, draft, row) -> None:
-        """Reserve flows and work arrays of scalars, and their values beyond the boundary."""
+        """Reserve flows, work arrays and values beyond the boundary of scalars; warn if they may leave their bounds."""
         mesh, grid = self.mesh, self.mesh.grid
         row["outside"] = draft.to_work(len(self.scalars) * int(row["outer"]))
         if self.is_grid:
@@ -366,7 +369,7 @@ class BasinRows:
             draft.warnings.append(Notice("bounds", f"nodes.{self.name}", text + reason, key, value, limit))
 
     def bounds_violation(self, row) -> tuple[str, str, float | None, float | None] | None:
-        """Reason why scalars may leave the bounds of the case: (key, text, value, limit); None if they cannot."""
+        """Reason why scalars may leave their bounds: (key of the case, text, value, limit); None if they cannot."""
         numerics, method = self.case.numerics, METHODS.get(self.case.numerics.method)
         if row["scheme"] == rec.LINEAR:
             return "scheme", "upwind5 does not keep scalars within bounds; upwind, muscl and weno5 do", None, None
@@ -377,13 +380,13 @@ class BasinRows:
         if diffusing and not self.is_grid:
             return (
                 None,
-                f"{listing(diffusing)} diffuses on a mesh with oblique faces; a rectangle keeps them",
+                f"{listing(diffusing)} diffuses on a mesh with oblique faces; a rectangle keeps the bounds",
                 None,
                 None,
             )
         if self.max_divergence > ROUNDING * row["fastest"]:
             reason = f"the velocity has a divergence of up to {self.max_divergence:.3g} 1/s"
-            text = f"{reason}, which concentrates or dilutes scalars; a stream function has none"
+            text = f"{reason}, which concentrates or dilutes scalars; a velocity by a stream function has none"
             return "velocity", text, self.max_divergence, 0.0
         radius = ssp_radius(method)
         if numerics.courant > radius:
@@ -395,38 +398,38 @@ class BasinRows:
         return None
 
     def scalar_scale(self, name: str) -> float:
-        """Size of a small amount of a scalar per area."""
+        """Size of a small amount of a scalar per area, from its initial values."""
         given, scalar = self.part.scalars.get(name), self.case.scalars[name]
         values = np.abs([scalar.initial, scalar.ambient]) if given is None else np.abs(self.formula(given))
         return float(values.max()) or 1.0
 
     def depth_of(self, y: np.ndarray) -> np.ndarray:
-        """Depth over which amounts of scalars are distributed : float64[n]."""
+        """Depth over which amounts of scalars are distributed, at deviations y : float64[n]."""
         return np.ones(self.n)
 
     def start_scalars(self, y: np.ndarray) -> None:
-        """Write the amounts at the start into the states of a model."""
+        """Write the amounts of scalars at the start into the states y of the model."""
         for name, amounts in zip(self.scalars, self.amounts(y), strict=True):
             given = self.part.scalars.get(name)
             value = self.case.scalars[name].initial if given is None else self.formula(given)
             amounts[:] = value * self.depth_of(self.deviations(y))
 
     def amounts(self, y: np.ndarray) -> np.ndarray:
-        """Amounts per area in the states of a model : float64[scalars, n]."""
+        """Amounts of scalars per area among the states y of the model : float64[scalars, n]."""
         at = int(self.row["carried"])
         return y[at : at + len(self.scalars) * self.n].reshape(-1, self.n)
 
     def values(self, y: np.ndarray) -> dict[str, np.ndarray]:
-        """Values of scalars in cells, by name."""
+        """Values of scalars in cells at the states y of the model, by name."""
         depth = np.maximum(self.depth_of(self.deviations(y)), THIN) * (self.area_ratios(y) if self.moves else 1.0)
         return {name: amounts / depth for name, amounts in zip(self.scalars, self.amounts(y), strict=True)}
 
     def mass_per_depth(self) -> np.ndarray:
-        """Mass that contains a scalar, per depth : float64[n] [kg/m]."""
+        """Mass per depth in each cell : float64[n] [kg/m]; it gives the mass of a scalar from its amount per area."""
         return np.zeros(self.n)
 
     def lower_patch(self, draft, patch: str, row) -> None:
-        """Fill the row of a patch to which links may connect."""
+        """Fill the row of a patch in the table of patches: its cells, faces, sizes and inflow values."""
         cells = boundary_cells(self.mesh, patch)
         row["first"], row["count"] = len(draft.integers), cells.size
         draft.integers += cells.tolist()

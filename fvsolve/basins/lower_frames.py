@@ -1,4 +1,4 @@
-"""Rows of tables for basins on bodies."""
+"""Tables of a model for basins on bodies."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ def lower_frame(draft, basin, row) -> None:
     """Reserve the numbers of the frame of a basin, and store the undisturbed surface.
 
     The axes of the kernels have their origin in the middle of the basin. Accelerations along the normal are taken
-    there, and the mirror cells at walls neglect the Euler force beyond it. So the error is least, and independent of
-    the corner in which the drawing has its origin.
+    there,
+    and the mirror cells at walls neglect the Euler force beyond it. So the error is least, and independent of the
+    corner
+    where the drawing of the basin has its origin.
     """
     part, grid, middle = basin.part, basin.mesh.grid, basin.mesh.centroid
     places = [*(basin.mesh.centre - middle).T]
@@ -44,34 +46,40 @@ def lower_frame(draft, basin, row) -> None:
 
 
 def joint_load_probes(case) -> list[tuple[int, str]]:
-    """(number, body) of the probes of joint loads."""
+    """Probes of joint loads in a case: (number of the probe, name of the body) of each."""
     probes = enumerate(case.probes)
     return [(k, probe.name) for k, probe in probes if probe.part == "nodes" and probe.quantity.startswith("joint_")]
 
 
 def side_positions(basin) -> np.ndarray:
-    """Middles of sides of cells in the order of `cell_sides`, equal for both cells of a face : float64[2, sides]."""
+    """Middles of the sides of cells in the order of `cell_sides` : float64[2, sides] [m].
+
+    Both cells of a face have the same numbers.
+    """
     count = int(blocks(basin.integers) * basin.integers[0] * BLOCK)
     face = basin.integers[-count:]
     return basin.mesh.middle[np.where(face >= 0, face, ~face)].T
 
 
 def position_in_frame(draft, basin, patch: str) -> list[float]:
-    """Position of a patch in the axes of the kernels, z from the level at rest [m], and g depth at rest [J/kg]."""
+    """Position of a patch in the axes of the kernels, three numbers [m], and g times its depth at rest [J/kg].
+
+    z counts from the level at rest.
+    """
     place, part = draft.case.places[f"{basin.name}.{patch}"], basin.part
     own = part.rotation.T @ (np.array(place.at) - np.array(part.place))
     return [*(own[:2] - basin.mesh.centroid).tolist(), float(own[2]) - part.level, draft.case.gravity * place.depth]
 
 
 def potential_at_start(basin) -> np.ndarray:
-    """Gravity potential of cells above the middle of their basin, in the attitude of its body at the start [J/kg]."""
+    """Gravity potential of cells above the middle of their basin [J/kg], in the attitude of the body at the start."""
     pose, gravity = basin.case.poses[basin.part.on], basin.case.gravity
     up = (pose.attitude @ basin.part.rotation).T @ np.array([0.0, 0.0, gravity])
     return (basin.mesh.centre - basin.mesh.centroid) @ up[:2]
 
 
 def level_at_start(basin, attitude: np.ndarray | None = None) -> np.ndarray:
-    """Depth of water with a surface level in the world, in a tilted basin, with the volume it has at rest [m].
+    """Depth of water in cells of a tilted basin, with a horizontal surface and the volume of the water at rest [m].
 
     attitude : rotation matrix of its body, that of the start if omitted
     """
@@ -85,7 +93,7 @@ def level_at_start(basin, attitude: np.ndarray | None = None) -> np.ndarray:
 
 
 def axes_in_world(basin, out: np.ndarray, layout) -> tuple[np.ndarray, np.ndarray]:
-    """Origin float64[3] [m] and axes float64[3, 3], by columns, of a basin on a body, in the world."""
+    """Origin float64[3] [m] and axes float64[3, 3], as columns, of a basin on a body, in axes of the world."""
     from fvsolve.kernels.dtypes import BODY_OUT
     from fvsolve.kernels.mechanism.body_layout import ATTITUDE, POSITION
 

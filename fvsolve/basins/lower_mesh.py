@@ -13,7 +13,10 @@ if TYPE_CHECKING:
 
 
 def lower_mesh(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
-    """(float64[:] floats, int64[:] integers): geometry and neighbours; cells and faces keep their numbers."""
+    """Geometry and neighbours of the cells of a mesh: (float64[:] floats, int64[:] integers), see `cell_sides`.
+
+    Cells and faces keep their numbers.
+    """
     n, f, inner = len(mesh.area), len(mesh.left), mesh.inner
     slots, face, own, side = _sides(mesh)
     block, lane, count = own // cell_sides.BLOCK, own % cell_sides.BLOCK, -(-n // cell_sides.BLOCK)
@@ -44,9 +47,10 @@ def lower_mesh(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def lower_ends(mesh: Mesh, moves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(int64[blocks], int64[:]) of `moving_meshes`: blocks with moving corners in or next to them, and ends of sides.
+    """Blocks that move and the ends of sides: (int64[blocks], int64[:]), see `moving_meshes`.
 
-    moves : bool[p]  True if a corner moves
+    A block has the value 1 if a corner in it or next to it moves.
+    moves : bool[corners]  True if a corner moves
     """
     n, inner = len(mesh.area), mesh.inner
     slots, face, own, side = _sides(mesh)
@@ -71,7 +75,10 @@ def lower_ends(mesh: Mesh, moves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _sides(mesh: Mesh) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
-    """(greatest number of sides of a cell, and of each side its face, its cell and its number there)."""
+    """Greatest number of sides of a cell, and three arrays over all sides: face, cell, number of the side in the cell.
+
+    face is ~f where the cell is to the right of face f.
+    """
     n, f, inner = len(mesh.area), len(mesh.left), mesh.inner
     slots = 4 if (mesh.cells[:, 3] >= 0).any() else 3
     face = np.concatenate([np.arange(f), ~np.arange(inner)])  # ~f where the cell is on the right of it
@@ -84,18 +91,21 @@ def _sides(mesh: Mesh) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _by_block(table: np.ndarray) -> np.ndarray:
-    """Rows over slots in the order of memory."""
+    """Flatten a table with a row for each number of a side to the order of memory: by block, side, row and cell."""
     return table.reshape(len(table), -1, cell_sides.BLOCK).swapaxes(0, 1).ravel()
 
 
 def _side_direction(mesh: Mesh, face: np.ndarray) -> np.ndarray:
-    """Direction of a side from its cell, so that the sides of a rectangle are in order west, south, east, north."""
+    """Angle of the normal of each side, ordered so that the sides of a rectangle are west, south, east, north."""
     normal = np.where(face[:, None] >= 0, 1.0, -1.0) * mesh.normal[np.where(face >= 0, face, ~face)]
     return np.round(np.arctan2(-normal[:, 1], -normal[:, 0]), 9) % round(2.0 * np.pi, 9)
 
 
 def _measures(mesh: Mesh, face: np.ndarray, own: np.ndarray, n: int) -> np.ndarray:
-    """float64[MEASURES + DISTANCES, sides]: measures of every side, see `cell_sides`."""
+    """Measures of every side : float64[MEASURES + DISTANCES, sides], see `cell_sides`.
+
+    face, own : face (~f if the cell is to its right) and cell of each side; n : number of cells
+    """
     number = np.where(face >= 0, face, ~face)
     normal = np.where(face[:, None] >= 0, 1.0, -1.0) * mesh.normal[number]
     to_side = mesh.middle[number] - mesh.centre[own]

@@ -11,7 +11,7 @@ STENCIL_RADIUS = 3  # stencil radius of the fifth order
 
 
 def interior_pattern(basin) -> tuple[np.ndarray, np.ndarray]:
-    """(rates, states on which they depend) of all cells and their neighbours."""
+    """Pairs (rates, states on which they depend) of all cells and their neighbours, as two arrays of indices in y."""
     near, count = neighbours(basin), len(basin.quantities)
     pattern = kron(coo_array(np.ones((count, count), dtype=bool)), near).tocoo()
     at = int(basin.row["y"])
@@ -19,7 +19,10 @@ def interior_pattern(basin) -> tuple[np.ndarray, np.ndarray]:
 
 
 def scalar_pattern(basin) -> tuple[np.ndarray, np.ndarray]:
-    """(rates, states) of amounts of scalars: each depends on itself, and all on the flow states, if there are any."""
+    """Pairs (rates, states) of amounts of scalars, as two arrays of indices in y.
+
+    The rate of an amount depends on amounts of the same scalar, and on the flow states if the basin has any.
+    """
     near, count = scalar_neighbours(basin), len(basin.scalars)
     own = kron(eye_array(count, dtype=bool), near).tocoo()
     by_flow = kron(coo_array(np.ones((count, len(basin.quantities)), dtype=bool)), near).tocoo()
@@ -29,9 +32,11 @@ def scalar_pattern(basin) -> tuple[np.ndarray, np.ndarray]:
 
 
 def scalar_neighbours(basin) -> csr_array:
-    """Cells on which the rate of an amount depends : bool[n, n].
+    """Cells on which the rate of the amount in each cell depends : bool[n, n].
 
-    Fifth order on grids reads along its faces too, four cells from a side; flux correction (weno5) reads further.
+    Fifth order on grids reads along the faces of a cell too, up to four cells from a side; flux correction (weno5)
+    reads
+    further.
     """
     near = neighbours(basin)
     if basin.is_grid and basin.row["scheme"] in (rec.LINEAR, rec.WENO5):
@@ -44,32 +49,29 @@ def scalar_neighbours(basin) -> csr_array:
 
 
 def amount_states(basin, q: int, cells: np.ndarray) -> np.ndarray:
-    """States of the amounts of scalar q in cells."""
+    """Indices in y of the amounts of scalar q in some cells."""
     return int(basin.row["carried"]) + q * basin.n + cells
 
 
 def cells_read(near: csr_array, cells: np.ndarray) -> np.ndarray:
-    """Cells on which the rates of some cells depend, themselves included."""
+    """Cells on which the rates of some cells depend, including these cells; near : result of `neighbours`."""
     return np.unique(near[np.unique(cells)].indices)
 
 
 def cell_states(basin, cells: np.ndarray, quantities: int | None = None) -> np.ndarray:
-    """States of cells, of the first `quantities` quantities or of all."""
+    """Indices in y of the first `quantities` quantities of some cells, or of all quantities."""
     count = len(basin.quantities) if quantities is None else quantities
     return (int(basin.row["y"]) + np.arange(count)[:, None] * basin.n + cells).ravel()
 
 
 def all_states(basin) -> np.ndarray:
-    """All states of a basin."""
+    """Indices in y of all states of a basin."""
     own = int(basin.row["y"]) + np.arange(len(basin.quantities) * basin.n)
     return np.concatenate([own, int(basin.row["carried"]) + np.arange(len(basin.scalars) * basin.n)])
 
 
 def neighbours(basin) -> csr_array:
-    """Cells on which the rate of each cell depends : bool[n, n].
-
-    On grids along both axes, on other meshes all around.
-    """
+    """Cells on which the rate of each cell depends : bool[n, n]; on grids along both axes, else in all directions."""
     pattern, reach = csr_array(eye_array(basin.n, dtype=bool)), basin.reach
     edge = np.unique(basin.mesh.left[basin.mesh.inner :])
     if reach < STENCIL_RADIUS or not basin.has_wide_closure or not basin.row["outer_given"]:
@@ -86,7 +88,7 @@ def neighbours(basin) -> csr_array:
 
 
 def neighbour_rings(basin) -> list[csr_array]:
-    """Each cell and its next neighbours : bool[n, n] each; along x and along y for a grid, else in all directions."""
+    """Each cell and its next neighbours : list of bool[n, n]; along x and y for a grid, else in all directions."""
     mesh, patterns = basin.mesh, []
     left, right = mesh.left[: mesh.inner], mesh.right[: mesh.inner]
     across = np.abs(mesh.normal[: mesh.inner, 0]) > 0.5

@@ -1,4 +1,4 @@
-"""Rates of scalars in basins on meshes of any cells; other terms are those of `basin_scalars`."""
+"""Rates of scalars in basins on meshes of any cells; `basin_scalars` adds terms other than advection and diffusion."""
 
 from fvsolve.basins.advection_faces import advection_rates
 from fvsolve.basins.basin_scalars import depth_count, flow_factor, prepare_scalars
@@ -11,7 +11,7 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def advect_on_meshes(t, y, dydt, out, handle):
-    """Rates of all amounts by advection and diffusion."""
+    """Write the rates of the amounts of all scalars in basins on meshes, by advection and diffusion."""
     tables = open_tables(handle)
     plane, work, scalars, integers = tables.plane, tables.work, tables.scalars, tables.integers
     for b in range(tables.basins.size if dydt.size > 0 else 0):

@@ -1,14 +1,14 @@
 """Meshes of any cells between moving walls: measures of their sides at the present positions of corners.
 
-Corners move along one axis. So areas, and lengths times normals of sides, are linear in travels for cells of any shape.
-A side sweeps its length times the mean speed of its two corners, so a uniform state stays uniform (`moving_walls`). The
-measures of `cell_sides` are computed again for each state, in blocks where anything moves.
+Corners move along one axis. So areas, and lengths times normals of sides, are linear in the travels of walls for cells
+of any shape. A side sweeps its length times the mean speed of its two corners, so a uniform state stays uniform
+(`moving_walls`). The measures of `cell_sides` are computed again for each state, in blocks where corners move.
 
 places : float64[:]  x and y of corners, and their undeformed coordinate along the axis of motion; x and y of centres of
-         cells; scratch
-ends : int64[:]  number of blocks, and for each 1 if anything moves there; four corners of cells, two int32 to an int64,
-       a triangle's first corner again; by block, side and row of BLOCK as such pairs: corners where the side begins and
-       ends (equal for a missing side), cell beyond, -1 for none
+    cells; scratch
+ends : int64[:]  number of blocks, and for each 1 if corners move there; four corners of each cell, two int32 in an
+    int64, the first corner of a triangle again as fourth; then for each block, side and row of BLOCK cells, in such
+    pairs too: corners where the side begins and ends (equal for a missing side), cell beyond, -1 for none
 """
 
 from math import sqrt
@@ -55,7 +55,10 @@ def on_moving_mesh(basin):
 
 @njit(forceinline=True)
 def mesh_positions(plane, basin):
-    """(x, y, undeformed coordinate along the axis of motion) of corners, (x, y) of centres of cells, and scratch."""
+    """Arrays of a mesh: x, y and undeformed coordinate of corners; x and y of centres of cells; scratch.
+
+    The undeformed coordinate is that along the axis of motion [m].
+    """
     at, p, n = basin["places"], basin["corners"], basin["n"]
     x, y, drawn = plane[at : at + p], plane[at + p : at + 2 * p], plane[at + 2 * p : at + 3 * p]
     at += 3 * p
@@ -64,7 +67,7 @@ def mesh_positions(plane, basin):
 
 @njit(forceinline=True)
 def ends_of(integers, basin):
-    """(flags of moving blocks, corners of cells, ends of sides)."""
+    """Flags of blocks where corners move, corners of cells, and ends of sides: parts of `ends`, see the module."""
     ends = integers[basin["ends"] :]
     count = ends[0]
     return ends[1 : 1 + count], ends[1 + count :].view(np.int32), ends[1 + count + 2 * basin["n"] :].view(np.int32)
@@ -72,7 +75,7 @@ def ends_of(integers, basin):
 
 @njit
 def update_meshes(t, y, seen, out, handle):
-    """Compute corners, centres, sides and patches of meshes at y."""
+    """Compute corners, centres, sides and patches of all moving meshes at the states y."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_moving_mesh(tables.basins[b]):
@@ -85,7 +88,7 @@ def update_meshes(t, y, seen, out, handle):
 
 @njit
 def move_corners(tables, basin, y):
-    """Move corners with the walls."""
+    """Compute the positions of the corners of a mesh at the travels of its walls."""
     plane, walls = tables.plane, tables.walls
     x, north, drawn, _, _, _ = mesh_positions(plane, basin)
     along = north if basin["turn"] == 1 else x
@@ -98,7 +101,7 @@ def move_corners(tables, basin, y):
 
 @njit
 def put_centres(first, last, corners, x, y, cx, cy):
-    """Centroids of cells, see `mesh.shapes`."""
+    """Write the centroids (cx, cy) of the cells `first` to `last` - 1, see `mesh.shapes`."""
     for i in range(first, last):
         own = corners[4 * i : 4 * i + 4]
         a, b, c, d = own[0], own[1], own[2], own[3]
@@ -121,7 +124,7 @@ def gather_cells(area, cx, cy, scratch):
 
 @njit
 def gather_ends(start, stop, beyond, x, y, cx, cy, scratch):
-    """Read the ends of a side of each cell of a block, the centre beyond, and whether there is a cell."""
+    """Read the ends of a side of each cell of a block, and the centre of the cell beyond it, if there is a cell."""
     for i in range(BLOCK):
         a, b, other = start[i], stop[i], max(beyond[i], 0)
         scratch[_XA + i], scratch[_YA + i], scratch[_XB + i], scratch[_YB + i] = x[a], y[a], x[b], y[b]
@@ -130,7 +133,7 @@ def gather_ends(start, stop, beyond, x, y, cx, cy, scratch):
 
 @njit
 def put_side(scratch, geo):
-    """Measures of one side of each cell of a block, and sums over sides for the least-squares gradient."""
+    """Write the measures of one side of each cell of a block to geo; add to the sums for the least-squares gradient."""
     for i in range(BLOCK):
         xa, ya, xb, yb, cx, cy = (
             scratch[_XA + i], scratch[_YA + i], scratch[_XB + i], scratch[_YB + i], scratch[_CX + i], scratch[_CY + i]
@@ -159,7 +162,10 @@ def put_side(scratch, geo):
 
 @njit
 def put_distance(scratch, geo, far):
-    """Measures of a side of each cell that diffusion and flows of scalars need: 1 / area, 1 / distance, obliqueness."""
+    """Write the measures of a side that diffusion and flows of scalars need to far, for each cell of a block.
+
+    They are 1 / area, 1 / distance to the next centre, and obliqueness.
+    """
     for i in range(BLOCK):
         nx, ny = geo[_NX + i], geo[_NY + i]
         mirror_distance = 2.0 * (geo[_DX + i] * nx + geo[_DY + i] * ny)
@@ -174,7 +180,7 @@ def put_distance(scratch, geo, far):
 
 @njit
 def invert(scratch):
-    """Inverse of the least-squares matrix, which gives gradients from sums over sides."""
+    """Invert the least-squares matrix of each cell of a block in place; it gives gradients from sums over sides."""
     for i in range(BLOCK):
         xx, xy, yy = scratch[i], scratch[_XY + i], scratch[_YY + i]
         scale = 1.0 / max(xx * yy - xy * xy, TINY)
@@ -183,7 +189,7 @@ def invert(scratch):
 
 @njit
 def put_weights(scratch, geo):
-    """Weights of a side's difference in the gradient."""
+    """Write the weights of the difference across a side in the gradient of each cell of a block."""
     for i in range(BLOCK):
         wx, wy, cross = geo[_WX + i], geo[_WY + i], scratch[_XY + i]
         geo[_WX + i], geo[_WY + i] = scratch[i] * wx - cross * wy, scratch[_YY + i] * wy - cross * wx
@@ -191,7 +197,7 @@ def put_weights(scratch, geo):
 
 @njit
 def update_sides(tables, basin):
-    """Compute all measures of `cell_sides`, in blocks where anything moves."""
+    """Compute all measures of `cell_sides` in blocks where corners move."""
     floats, integers = tables.plane[basin["mesh"] :], tables.integers[basin["links"] :]
     x, y, _, cx, cy, scratch = mesh_positions(tables.plane, basin)
     area = tables.plane[basin["area"] :]
@@ -233,7 +239,7 @@ def update_sides(tables, basin):
 
 @njit
 def put_lengths(face, side_lengths, lengths):
-    """Lengths of faces, from the cells on their left."""
+    """Write the lengths of faces, read from the cells on their left."""
     for i in range(BLOCK):
         if face[i] >= 0:
             lengths[face[i]] = side_lengths[i]
@@ -241,7 +247,7 @@ def put_lengths(face, side_lengths, lengths):
 
 @njit
 def size_patch(tables, basin, patch):
-    """Sizes of a patch: lengths of its faces, area of its cells."""
+    """Write the sizes of a patch: lengths of its faces, area of the cells next to it."""
     plane, integers, area, length = tables.plane, tables.integers, 0.0, 0.0
     links = integers[basin["links"] :]
     at = basin["mesh"] + MEASURES * blocks(links) * links[0] * BLOCK + 2 * links[3] + links[2] - links[3]
@@ -257,7 +263,7 @@ def size_patch(tables, basin, patch):
 
 @njit
 def set_side_speeds(t, y, dydt, out, handle):
-    """Compute the speeds of all sides along their normals; the speeds limit the step."""
+    """Compute the speeds of all sides along their normals [m/s]; they raise out[RATE], the rate that limits steps."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_moving_mesh(tables.basins[b]):
@@ -266,9 +272,9 @@ def set_side_speeds(t, y, dydt, out, handle):
 
 @njit
 def put_speeds(tables, basin):
-    """Compute the speeds of sides from those of corners.
+    """Compute the speeds of sides from the speeds of their corners.
 
-    Return the greatest fraction of a cell swept by a side [1/s].
+    Return the greatest fraction of a cell that a side sweeps per time [1/s].
     """
     plane, slots, most = tables.plane, tables.integers[basin["links"]], 0.0
     v, across = plane[basin["lines"] :], _NY if basin["turn"] == 1 else _NX
@@ -287,7 +293,7 @@ def put_speeds(tables, basin):
 
 @njit(forceinline=True)
 def mesh_motion(tables, basin):
-    """Speeds of sides, array for pressures and energy losses on boundary faces, and stretching `wide` of cells."""
+    """Speeds of sides [m/s], array for pressures and energy losses on boundary faces, and area ratios A / A0 of cells."""
     sides, thrust, rows = basin["sides"], basin["thrust"], basin["stretch"]
     count = 4 * BLOCK * blocks(tables.integers[basin["links"] :])
     plane, thrust_array = tables.plane, tables.work[thrust : thrust + 2 * basin["outer"]]

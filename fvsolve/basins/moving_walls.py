@@ -1,11 +1,12 @@
 """Moving walls of basins, and the grid lines that move with them.
 
-The rate of the content of a cell is the sum of F - w U over its faces, with their speeds w (Reynolds' transport
-theorem, 71 to 73). So the states are contents over undeformed areas, (A U - A0 U0) / A0, and positions of walls are
-states too. Areas are then linear in the states; every Runge-Kutta method keeps this relation, and a uniform state stays
-uniform to round-off. All walls of a basin move along the same axis. Other functions read deviations U - U0 (`seen`)
-instead of contents, and present lines and areas in `plane`. On other meshes, corners take the place of grid lines (see
-`moving_meshes`).
+Let U be a quantity per area, A the area of a cell, F the flux through a face of the cell and w the speed of the face.
+The rate of the amount A U in a cell is the sum of F - w U over its faces (Reynolds' transport theorem, (71) to (73) of
+docs/course.md). So the states are changes of the amount over the undeformed area, (A U - A0 U0) / A0, with U0 at rest;
+travels of walls are states too. Areas are then linear in the states; every Runge-Kutta method keeps this relation, and
+a uniform state stays uniform to round-off. All walls of a basin move along the same axis. Other functions read
+deviations U - U0 (`seen`) in place of the states, and the present lines and areas in `plane`. On other meshes, corners
+take the place of grid lines (see `moving_meshes`).
 """
 
 from math import sqrt
@@ -36,10 +37,7 @@ VECTOR_MARGIN = 8  # additional speeds of lines that vector loops read beyond th
 
 @njit(forceinline=True)
 def stretching_counts(basin):
-    """Number of rows or columns of cells that stretch, and number of moving lines.
-
-    On a mesh, numbers of cells and corners.
-    """
+    """(number of rows or columns of cells that stretch, number of moving lines); on a mesh of cells and of corners."""
     if basin["nx"] == 0:
         return basin["n"], basin["corners"]
     count = basin["ny"] if basin["turn"] == 1 else basin["nx"]
@@ -48,10 +46,11 @@ def stretching_counts(basin):
 
 @njit
 def update_geometry(t, y, seen, out, handle):
-    """Compute lines and areas of basins at y, and the state as deviations, into `seen` of the tables.
+    """Compute lines and areas of basins at y, and write the deviations U - U0 to the table `seen`.
 
-    An empty argument `seen` means that kernels of rates follow. For cells whose kernel reads contents, only the
-    deviations next to patches and walls are then computed, unless scalars or friction need all.
+    An empty argument `seen` means that kernels of rates follow. For cells whose kernel reads the states themselves,
+    only
+    the deviations next to patches and walls are then computed, unless scalars or friction need all.
     """
     tables, done = open_tables(handle), 0
     for b in range(tables.basins.size):
@@ -71,20 +70,20 @@ def update_geometry(t, y, seen, out, handle):
 
 @njit(forceinline=True)
 def reads_contents(basin):
-    """True if the kernel of its rates reads contents: water on grids, row by row."""
+    """True if the kernel of the rates of a basin reads the states (A U - A0 U0) / A0: water on grids, row by row."""
     return basin["deep"] == 1 and basin["nx"] > 0
 
 
 @njit
 def copy(source, target):
-    """target = source."""
+    """Copy source to target."""
     for i in range(source.size):
         target[i] = source[i]
 
 
 @njit
 def stretch_cells(tables, basin, y):
-    """Compute the stretching of columns, rows or cells at the present positions of walls, and its reciprocal."""
+    """Write A / A0 of columns, rows or cells at the present travels of walls, and its reciprocal; update 1 / widths."""
     plane, walls, at = tables.plane, tables.walls, basin["stretch"]
     count, lines = stretching_counts(basin)
     wide, narrow = plane[at : at + count], plane[at + count : at + 2 * count]
@@ -102,7 +101,7 @@ def stretch_cells(tables, basin, y):
 
 @njit
 def factors_of(tables, basin, j):
-    """(wide, narrow) of the cells of row j of a grid, or of all cells of a mesh."""
+    """(A / A0, A0 / A) of the cells of row j of a grid, or of all cells of a mesh: two arrays."""
     plane, nx, at, (count, _) = tables.plane, basin["nx"], basin["stretch"], stretching_counts(basin)
     if nx == 0 or basin["turn"] == 0:
         return plane[at : at + count], plane[at + count : at + 2 * count]
@@ -114,7 +113,7 @@ def factors_of(tables, basin, j):
 
 @njit
 def deviations_of_rows(tables, basin, y):
-    """Compute areas, and U - U0 of all cells: ((A U - A0 U0) / A0 - U0 (A / A0 - 1)) A0 / A."""
+    """Compute areas, and deviations U - U0 = ((A U - A0 U0) / A0 - U0 (A / A0 - 1)) A0 / A of all cells of a basin."""
     plane, seen, n, first = tables.plane, tables.seen, basin["n"], basin["y"]
     rows, size = (basin["ny"], basin["nx"]) if basin["nx"] > 0 else (1, n)
     scalar_count = tables.scalars.size if basin["carried"] >= 0 else 0
@@ -132,7 +131,7 @@ def deviations_of_rows(tables, basin, y):
 
 @njit
 def deviations_at_patches(tables, b, y):
-    """Compute areas and U - U0 of the cells of water next to patches, moving walls included."""
+    """Compute areas, and deviations U - U0 of the cells of water next to patches, including moving walls."""
     plane, seen, basin, patches = tables.plane, tables.seen, tables.basins[b], tables.patches
     n, first = basin["n"], basin["y"]
     for p in range(patches.size):
@@ -156,7 +155,7 @@ def stretch_patches(tables, b):
 def stretch_patch(tables, basin, patch):
     """Compute the sizes of a patch on a side along which lines move, or next to cells that stretch.
 
-    Rates of contents are proportional to lengths over undeformed areas.
+    Rates of the states are proportional to lengths of faces over undeformed areas.
     """
     plane, integers, area, length = tables.plane, tables.integers, 0.0, 0.0
     for m in range(patch["count"]):
@@ -173,7 +172,7 @@ def stretch_patch(tables, basin, patch):
 
 @njit
 def speed_of(t, tables, wall, y):
-    """Speed of a wall along its axis [m/s], that of its mass, its body or its schedule."""
+    """Speed of a wall along its axis [m/s]: the speed of its mass, of its body or of its schedule."""
     if wall["mass"] >= 0:
         return motion(tables.masses[wall["mass"]], y)[1]
     if wall["body"] >= 0:
@@ -188,7 +187,7 @@ def speed_of(t, tables, wall, y):
 def set_line_speeds(t, y, dydt, out, handle):
     """Compute the speeds of all lines and the rates of the travels of walls; the speeds limit the step.
 
-    Sets the status NO_ROOM if a cell is narrower than ROOM times its undeformed width.
+    Sets the status NO_WIDTH if a cell is narrower than LEAST_WIDTH times its undeformed width.
     """
     tables = open_tables(handle)
     plane, walls = tables.plane, tables.walls
@@ -216,7 +215,7 @@ def set_line_speeds(t, y, dydt, out, handle):
 
 @njit
 def wall_of_row(tables, basin, i):
-    """Node of the wall that changes the width of column, row or cell i most per travel."""
+    """Node of the wall whose travel changes the width of column, row or cell i most."""
     index, most, (_, lines) = basin["wall"], -1.0, stretching_counts(basin)
     for k in range(basin["wall"], basin["wall"] + basin["walls"]):
         per = abs(tables.plane[tables.walls[k]["weights"] + lines + i])
@@ -227,9 +226,9 @@ def wall_of_row(tables, basin, i):
 
 @njit(forceinline=True)
 def grid_motion(tables, basin):
-    """Speeds of lines along x and along y, arrays for pressures on the boundary, stretching `wide` and its reciprocal.
+    """Speeds of lines along x and along y, array for pressures on the boundary, A / A0 of columns or rows, A0 / A.
 
-    Speeds along the axis without motion are empty.
+    The array of speeds along the axis without motion is empty.
     """
     plane, at, rows, (count, lines) = tables.plane, basin["lines"], basin["stretch"], stretching_counts(basin)
     speeds, no_speeds = plane[at : at + lines + VECTOR_MARGIN], plane[:0]
@@ -242,7 +241,7 @@ def grid_motion(tables, basin):
 
 @njit
 def impedance(tables, basin, i, y):
-    """Radiation impedance of one metre of wall next to cell i, force per speed [N s/m2]."""
+    """Radiation impedance of one metre of wall next to cell i: force per speed [N s/m2]."""
     st = tables.settings[0]
     if basin["deep"] == 0:
         return basin["density"] * basin["speed"] * basin["thickness"]
@@ -252,7 +251,7 @@ def impedance(tables, basin, i, y):
 
 @njit
 def push_body(out, tables, wall, force):
-    """Add an outward force on a wall to the forces on its body, through that body's origin."""
+    """Add the force on a wall, positive outward, to the forces on its body, through the origin of the body [N]."""
     row, along, force_along = (
         row_of_body(tables, wall["body"]),
         tables.basins[wall["basin"]]["turn"],
@@ -301,9 +300,9 @@ def add_wall_forces(t, y, dydt, out, handle):
 
 @njit
 def stretch_scalar_rates(t, y, dydt, out, handle):
-    """Convert rates of amounts of scalars per area to rates of contents.
+    """Convert rates of amounts of scalars per area s to rates of their states A s / A0.
 
-    Other rates are computed as rates of contents.
+    The rates of other states are computed in that form directly.
     """
     tables = open_tables(handle)
     for b in range(tables.basins.size if dydt.size > 0 else 0):
@@ -320,7 +319,7 @@ def stretch_scalar_rates(t, y, dydt, out, handle):
 
 @njit
 def observe_walls(t, y, out, handle, values):
-    """Probe values of walls: inward force on the water [N], power supplied to it [W], travel [m]."""
+    """Write the probe values of walls: inward force on the water [N], power supplied to the water [W], travel [m]."""
     tables = open_tables(handle)
     for p in range(tables.probes.size):
         probe = tables.probes[p]
@@ -346,7 +345,10 @@ def supplied_power(t, tables, k, y, out):
 
 @njit
 def wall_power(t, y, dydt, out, handle, power):
-    """Rows of `power` of walls, before those of basins: power supplied, and power dissipated by the law."""
+    """Write two powers of each wall to `power`, before those of basins [W]: supplied, and dissipated by the law.
+
+    Add the difference to the inflow power of the basin.
+    """
     tables = open_tables(handle)
     for k in range(tables.walls.size):
         work, dissipated = supplied_power(t, tables, k, y, out), dissipated_power(tables, tables.walls[k])
@@ -357,9 +359,9 @@ def wall_power(t, y, dydt, out, handle, power):
 
 @njit
 def dissipated_power(tables, wall):
-    """Power dissipated by law linear at a wall, whose motion does not carry density and momentum along [W].
+    """Power at a wall that the linear density law dissipates [W].
 
-    See `liquid_mesh`.
+    Under this law the motion of the wall does not carry density and momentum along, see `liquid_mesh`.
     """
     basin, total = tables.basins[wall["basin"]], 0.0
     for m in range(wall["count"]):

@@ -1,4 +1,4 @@
-"""Bands of basins: the rows that one thread steps, and flows through the boundary, to which all bands contribute."""
+"""Bands of basins, the rows that one thread steps; and flows through the boundary, to which all bands contribute."""
 
 from fvsolve.basins.basin_patches import put_open_flows
 from fvsolve.jit import njit
@@ -10,14 +10,14 @@ BAND_MARGIN = 5  # rows beyond a band that its rates read: three, or the five of
 
 @njit(forceinline=True)
 def band_cells(tables, b):
-    """(first, last + 1) of the cells of a basin in the band of this thread."""
+    """(first, last + 1) of the cells of basin b in the band of this thread."""
     wide = max(tables.basins[b]["nx"], 1)
     return wide * tables.bands[2 * b], wide * tables.bands[2 * b + 1]
 
 
 @njit(forceinline=True)
 def stencil_cells(tables, b):
-    """(first, last + 1) of the cells of the band and of the rows next to it that its rates read."""
+    """(first, last + 1) of the cells of basin b whose values the rates in the band of this thread read."""
     basin = tables.basins[b]
     begin, stop = max(tables.bands[2 * b] - BAND_MARGIN, 0), min(tables.bands[2 * b + 1] + BAND_MARGIN, basin["ny"])
     return (basin["nx"] * begin, basin["nx"] * stop) if basin["nx"] > 0 else (0, basin["n"])

@@ -1,9 +1,11 @@
 """Advection of values over a grid, of second or first order.
 
-F is the flow through a face [m2/s], q the value at the face, and c the cell's own value. The rate of a cell is kx ky
-times the sum of F (q - c) over the inflows, minus c times the divergence of F. So the rate of a uniform value is the
-value times the divergence, to the bit. The slope of an upwind cell uses the differences across the face and across the
-face behind the cell.
+F is the flow through a face [m2/s], q the value at the face, c the value of the cell; kx and ky are 1 / width and
+1 / height of the cell [1/m]. The rate of a cell is kx ky times the sum of F (q - c) over the inflows, minus c times the
+divergence of F. So the rate of a uniform value is the value times the divergence, to the last bit. The slope of an
+upwind cell uses the differences across the face and across the opposite face of that cell.
+
+Arguments: factor : factor on all flows; b, c, d, e : values of four cells in line, faces are between c and d.
 """
 
 from fvsolve.jit import inline, njit
@@ -13,21 +15,24 @@ from fvsolve.kernels.limiters import by_limiter, limited, slope
 
 @njit
 def limited_value(limiter, forward, b, c, d, e):
-    """Value at the face between cells c and d, from c if the flow is forward; b and e are the cells next to them."""
+    """Value at the face between cells c and d, from c if the flow is forward, else from d; with a limiter."""
     half = 0.5 * slope(limiter, c - b if forward else e - d, d - c)
     return c + half if forward else d - half
 
 
 @inline
 def put_face_values_limited(limiter, factor, flow, b, c, d, e, q):
-    """Values q at faces between c and d with a limiter."""
+    """Write the values q at faces between cells c and d, with a limiter."""
     for i in range(q.size):
         q[i] = limited_value(limiter, factor * flow[i] > 0.0, b[i], c[i], d[i], e[i])
 
 
 @njit
 def cell_rate(scale, own, fw, fe, fs, fn, qw, qe, qs, qn):
-    """Rate of a cell from flows and values at its four faces."""
+    """Rate of a cell from flows and values at its four faces; scale : kx ky, own : value of the cell.
+
+    w, e, s, n : west, east, south, north
+    """
     x = fw * (qw - own) - fe * (qe - own)
     y = fs * (qs - own) - fn * (qn - own)
     return scale * ((x + y) - own * ((fe - fw) + (fn - fs)))
@@ -35,7 +40,7 @@ def cell_rate(scale, own, fw, fe, fs, fn, qw, qe, qs, qn):
 
 @inline
 def put_face_values(scheme, limiter, factor, flow, b, c, d, e, q):
-    """Values q at faces between c and d, from the upwind side of factor times flow."""
+    """Write the values q at faces between cells c and d, from the upwind side of factor times flow."""
     if scheme == UPWIND:
         for i in range(q.size):
             low, high = c[i], d[i]  # read both first, so that the choice compiles without a branch
@@ -46,7 +51,7 @@ def put_face_values(scheme, limiter, factor, flow, b, c, d, e, q):
 
 @njit
 def single_face_value(scheme, limiter, forward, b, c, d, e):
-    """Value at a single face."""
+    """Value at a single face between cells c and d, from c if the flow is forward, else from d."""
     if scheme == UPWIND:
         return c if forward else d
     half = 0.5 * limited(limiter, c - b if forward else e - d, d - c)
@@ -55,7 +60,7 @@ def single_face_value(scheme, limiter, forward, b, c, d, e):
 
 @inline
 def row_values(scheme, limiter, nx, factor, flow, c, west, east, q):
-    """Values q at the nx + 1 faces of a row of cells c; west and east are values outside.
+    """Write the values q at the nx + 1 faces of a row of cells c; west and east are the values outside.
 
     The loop continues into the next row, where there is one, so that it fills whole vectors.
     """
@@ -74,7 +79,7 @@ def row_values(scheme, limiter, nx, factor, flow, c, west, east, q):
 
 @inline
 def north_values_and_rates_limited(limiter, factor, ky, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, rate):
-    """`north_values_and_rates` with a limiter."""
+    """Write values and rates as `north_values_and_rates` does, with a limiter."""
     fe, qe = fx[1:], qx[1:]
     for i in range(rate.size):
         q = limited_value(limiter, factor * fn[i] > 0.0, b[i], c[i], d[i], e[i])
@@ -84,7 +89,10 @@ def north_values_and_rates_limited(limiter, factor, ky, b, c, d, e, fx, qx, fs, 
 
 @inline
 def north_values_and_rates(scheme, limiter, factor, ky, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, rate):
-    """Values qn at the northern faces of a row of cells c, and rates of the row. ky : 1 / height of the row"""
+    """Write the values qn at the northern faces of a row of cells c, and the rates of the row.
+
+    ky : 1 / height of the row [1/m]; fx, fs, fn : flows through faces; qx, qs : values at other faces
+    """
     if scheme == UPWIND:
         fe, qe = fx[1:], qx[1:]
         for i in range(rate.size):
@@ -105,10 +113,11 @@ def second_order_work(nx, ny):
 def second_order_rates(
     scheme, limiter, nx, ny, begin, until, stop, fresh, kx, ky, factor, flow_x, flow_y, outside, c, work, rate
 ):  # fmt: skip
-    """Rates of rows `begin` to `until` for cell values c, by upwind or muscl; arguments as for `grid_advection`.
+    """Write the rates of rows `begin` to `until` - 1 for cell values c, by upwind or muscl, in flows times `factor`.
 
+    Arguments are as for `grid_advection`.
     fresh : False if the last call ended at `begin` with the same work; then its results are reused
-    stop : end of the last call
+    stop : first row after those of all calls
     """
     below, above, north = work[:nx], work[nx : 2 * nx], work[2 * nx : 3 * nx]
     rows, rest = work[3 * nx : 5 * nx], work[5 * nx :]
