@@ -75,8 +75,7 @@ def grid_advection(scheme, limiter, nx, ny, begin, stop, kx, ky, factor, flow_x,
     kx : float64[nx], ky : float64[ny]  1 / widths and heights of cells [1/m]
     factor : factor of either sign on all flows
     flow_x : float64[ny (nx + 1)], flow_y : float64[(ny + 1) nx]  flows through faces, row by row: velocity [m/s] times
-        face
-        length, [m2/s], if `depth` is empty; else with depth [m3/s]
+        face length, [m2/s], if `depth` is empty; else with depth [m3/s]
     depth : float64[nx ny]  depths of cells [m]; empty if s is the value c
     outside : float64[2 (nx + ny)]  values of inflow at boundary faces
     work : float64[advection_work(scheme, nx, ny)]; s, rate : float64[nx ny]

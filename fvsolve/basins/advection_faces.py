@@ -114,9 +114,8 @@ def put_allowed(c, least, most, allowed):
 def add_advection(count, c, d, cl, far, w):
     """Subtract the advective outflow through one side of each cell of a block from the rates.
 
-    The outflow of a uniform c is left out here. count : factor of the outflow in the rate that limits the step; cl :
-        values
-    at the side, inside the cell
+    The outflow of a uniform c is left out here.
+    count : factor of the outflow in the rate that limits the step; cl : values at the side, inside the cell
     """
     for i in range(BLOCK):
         q = far[PER_AREA * BLOCK + i] * w[_FLOW + i]
@@ -170,8 +169,7 @@ def advection_rates(
     diffusivity : [m2/s], 0 for none; factor : factor on all flows
     floats, integers : mesh, see `cell_sides`; least, most : bounds of c, infinite for none
     flow : float64[faces]  through faces, from the left to the right cell: velocity [m/s] times length, [m2/s]; with
-        depths
-        [m3/s]
+        depths [m3/s]
     depth : float64[cells]  [m]; empty if s is the value c
     outside : float64[boundary faces]  values of inflow; s, rate : float64[cells]
     work : float64[work_size(integers)]

@@ -47,8 +47,7 @@ def add_link_momentum(plane, patch, m, push, dydt, x, y):
     """Add the part of the momentum flux at face m of a patch that a wall would not transmit to the rates of its cell.
 
     A wall stops the flow, so the pressure on it is p + Z u_n, with u_n the velocity of the cell toward the wall and Z
-    the
-    impedance. With a flow at velocity v through the face it is p + Z (u_n - v).
+    the impedance. With a flow at velocity v through the face it is p + Z (u_n - v).
     push : Z v, v positive outward; x, y : indices in `dydt` of the momentum of the cell
     """
     at, count = patch["normals"], patch["faces"]

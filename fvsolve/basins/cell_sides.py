@@ -81,11 +81,13 @@ def put_inward(edges, number, flux, length, through):
 def limit_three_sides(p, wide, cap, beyond, geo, out):
     """Limited values at three sides of a block of triangles, from the values beyond the sides.
 
-    p, beyond : values of cells and of neighbours; wide : factor of the range; cap : greatest allowed deviation; geo :
-    measures of the sides
     If the neighbours differ from the cell by `least` to `most`, a side rises by no more than wide most, -2 wide least
-    and `cap`, and falls no further than wide least, -2 wide most and -cap. So no side of a local extremum differs from
-    its cell. With wide = 1 all values at sides lie in the range of the neighbours.
+    and
+    `cap`, and falls no further than wide least, -2 wide most and -cap. So no side of a local extremum differs from its
+    cell. With wide = 1 all values at sides lie in the range of the neighbours.
+
+    p, beyond : values of cells and of neighbours; geo : measures of the sides; out : values at the sides
+    wide : factor on the range of the neighbours; cap : greatest allowed deviation from the cell
     """
     back = 2.0 * wide
     for i in range(BLOCK):

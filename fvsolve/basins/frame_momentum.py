@@ -10,8 +10,9 @@ def accelerate_flow(plane, basin, y, rates, first, own, twice, east, north, turn
 
     twice : 2 W_z [1/s]; east, north : uniform acceleration [m/s2]; turn : Euler term [1/s2]; x, y : position of the
         cell
-    depth is the stored quantity per area (density for a liquid). own : 1 to include its deviation, 0 for its value at
-    rest
+
+    depth is the stored quantity per area (density for a liquid).
+    own : 1 to include the deviation of depth, 0 for its value at rest
     """
     n, o, p, places = basin["n"], basin["y"], basin["plan"], int(plane[basin["frame"] + CELL_POSITIONS])
     for row in range(basin["ny"]):

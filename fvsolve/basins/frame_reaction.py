@@ -54,8 +54,7 @@ def row_sums(deep, per_area, level, x, area, rest, surface, h, qx, qy, dh, dx, d
     """Sums over a row of cells: moments of mass, of its rate, of flow and of the rate of flow, and mass times height.
 
     Returns the sums of mass, and of its rate, times 1, x, x^2 (6 numbers); flow along x; flow along y times 1, x; the
-    same
-    three numbers of the rates of flow; mass times height of its centre.
+    same three numbers of the rates of flow; mass times height of its centre.
     The compiler may reorder these sums, so that it can use vector instructions.
     """
     r0 = r1 = r2 = d0 = d1 = d2 = p0 = v0 = v1 = p1 = f0 = f1 = g0 = 0.0
@@ -76,8 +75,7 @@ def mass_moments(tables, basin, y, rates, first, own, twice, euler):
     """Sums over the cells of a basin, in axes of the basin: 18 numbers.
 
     In this order: moments 1, x, y, xx, xy, yy of mass; sum of mass times height along the normal; moments x, y, xx, xy,
-    yy
-    of the rate of mass; momentum along x and y, its moment about z; rates of these three. Units are kg, m and s.
+    yy of the rate of mass; momentum along x and y, its moment about z; rates of these three. Units are kg, m and s.
 
     On grids, the terms that `frame_forces.add_frame_forces` adds to other basins at once are added here, row by row.
     """

@@ -14,10 +14,8 @@ def lower_frame(draft, basin, row) -> None:
     """Reserve the numbers of the frame of a basin, and store the undisturbed surface.
 
     The axes of the kernels have their origin in the middle of the basin. Accelerations along the normal are taken
-    there,
-    and the mirror cells at walls neglect the Euler force beyond it. So the error is least, and independent of the
-    corner
-    where the drawing of the basin has its origin.
+    there, and the mirror cells at walls neglect the Euler force beyond it. So the error is least, and independent of
+    the corner where the drawing of the basin has its origin.
     """
     part, grid, middle = basin.part, basin.mesh.grid, basin.mesh.centroid
     places = [*(basin.mesh.centre - middle).T]

@@ -35,8 +35,7 @@ def scalar_neighbours(basin) -> csr_array:
     """Cells on which the rate of the amount in each cell depends : bool[n, n].
 
     Fifth order on grids reads along the faces of a cell too, up to four cells from a side; flux correction (weno5)
-    reads
-    further.
+    reads further.
     """
     near = neighbours(basin)
     if basin.is_grid and basin.row["scheme"] in (rec.LINEAR, rec.WENO5):

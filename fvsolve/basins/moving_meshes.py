@@ -293,7 +293,7 @@ def put_speeds(tables, basin):
 
 @njit(forceinline=True)
 def mesh_motion(tables, basin):
-    """Speeds of sides [m/s], array for pressures and energy losses on boundary faces, and area ratios A / A0 of cells."""
+    """Speeds of sides [m/s], array for pressures and energy losses on boundary faces, area ratios A / A0 of cells."""
     sides, thrust, rows = basin["sides"], basin["thrust"], basin["stretch"]
     count = 4 * BLOCK * blocks(tables.integers[basin["links"] :])
     plane, thrust_array = tables.plane, tables.work[thrust : thrust + 2 * basin["outer"]]

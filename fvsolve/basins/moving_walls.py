@@ -49,8 +49,7 @@ def update_geometry(t, y, seen, out, handle):
     """Compute lines and areas of basins at y, and write the deviations U - U0 to the table `seen`.
 
     An empty argument `seen` means that kernels of rates follow. For cells whose kernel reads the states themselves,
-    only
-    the deviations next to patches and walls are then computed, unless scalars or friction need all.
+    only the deviations next to patches and walls are then computed, unless scalars or friction need all.
     """
     tables, done = open_tables(handle), 0
     for b in range(tables.basins.size):

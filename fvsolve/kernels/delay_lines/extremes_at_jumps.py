@@ -70,8 +70,8 @@ def store_smooth_values(t, y, state, handle):
 def extremes_at_jump(t, time, y, state, handle):
     """Update the extremes of probes and the first times below vapour pressure by the values beside a jump.
 
-    time : arrival time of the jump [s]; t : end of the step [s]; state : `out` at t with the jumps that have arrived so
-        far
+    time : arrival time of the jump [s]; t : end of the step [s]
+    state : `out` at t with the jumps that have arrived so far
     """
     tables = open_tables(handle)
     past, spare, marks, pipes, nodes = tables.past, tables.spare, tables.marks, tables.pipes, tables.nodes

@@ -86,8 +86,7 @@ def waves_along_line(t, out, tables, number, r, l):
 def sent_wave_linear(past, places, clock, ring, mask, jumps, wave, t):
     """Wave sent into a segment at t [kg/s], by linear interpolation between entries, with its jumps.
 
-    ring, mask : result of `ring_of`; clock : result of `reading_data`; jumps : offset in `past` of the head of its
-        jumps
+    ring, mask : result of `ring_of`; clock : result of `reading_data`; jumps : offset of the head of its jumps
     """
     last, latest, often, even = clock[0], clock[1], clock[2], clock[3]
     place = (t - latest) * often

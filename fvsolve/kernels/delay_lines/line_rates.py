@@ -81,8 +81,7 @@ def write_arrivals(past, places, clock, line, pipe, q, t):
     """Write both waves that arrive at t at the ends of segment q of a delay line, and its friction loss, into `past`.
 
     Three numbers [kg/s]: the backward wave at its beginning, the forward wave at its end, delta. In a line shorter than
-    a
-    step both waves hold for p' = 0 at its ends. Jumps travel through it as through any line.
+    a step both waves hold for p' = 0 at its ends. Jumps travel through it as through any line.
     """
     ring, mask = ring_of(places, line, q)
     k, w = stencil(past, clock, t - line["hold"])

@@ -203,10 +203,8 @@ def point_value(out, tables, k, number):
     """Value of a quantity of point k; number : index of the quantity in `POINT_QUANTITIES`.
 
     The parts of the acceleration are the terms of (65), relative to the axes of the parent of the body that contains
-    the
-    point. With the acceleration of the origin of the parent they add up to the acceleration of the point. If that body
-    is
-    joined to the world, its own axes take the place of those of a parent.
+    the point. With the acceleration of the origin of the parent they add up to the acceleration of the point. If that
+    body is joined to the world, its own axes take the place of those of a parent.
     """
     moved = point_at(out, tables, k, POSITION)
     if number < 6:

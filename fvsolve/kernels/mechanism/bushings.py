@@ -41,8 +41,7 @@ def gap_of(out, tables, bushing):
     """Gap of a bushing and its rate, six numbers in axes of the world.
 
     The gap is the position of `to` minus that of `from` [m]. The rate is the velocity of `to` relative to the axes of
-    the
-    body of `from` [m/s].
+    the body of `from` [m/s].
     """
     i = tables.points[bushing["from_point"]]["body"]
     x, y, z, u, v, w = point_at(out, tables, bushing["to_point"], POSITION)

@@ -66,8 +66,7 @@ def segment_energy(tables, out, here, segment, z, rise):
 
     The energy is the integral of V^2 / 2 + g (height - z - rise s) over the mass; s : distance along the segment [m].
     segment : (start r, direction t, mass moments m), see `fluid_loads`. With the rates of the moments in place of m,
-        the
-        result is the power that the inflow brings [W].
+        the result is the power that the inflow brings [W].
     z, rise : elevation of the start of the segment in the network at rest [m], and its increase per distance s
     """
     motion, g, (r, t, m) = tables.scratch, tables.settings[0]["gravity"], segment

@@ -158,8 +158,7 @@ def node_segment_rates(y, dydt, out, tables, i):
     """Rates d of the mass moments of the fluid at node i, from its inflow [kg/s, kg m/s, kg m2/s].
 
     In a tank the inflow counts at the surface. A node without volume has the rate -supply, because supplied fluid
-    leaves it
-    into the network.
+    leaves it into the network.
     """
     node = tables.nodes[i]
     if node["kind"] == TANK:

@@ -101,8 +101,7 @@ def moving_tank_pressures(t, y, dydt, out, handle):
     """Write the pressures at the bottoms of tanks on bodies, as deviations from the initial steady state; linear law.
 
     p' = rho (bottom pressure over density - its value in the initial steady state). A tank whose fluid has no weight
-    would
-    lose the fluid: it ends the run.
+    would lose the fluid: it ends the run.
     """
     tables = open_tables(handle)
     nodes, rho = tables.nodes, tables.settings[0]["rho"]
@@ -136,8 +135,7 @@ def moving_column_rates(t, y, dydt, out, handle):
     """Write the rates of the mass flow in rigid columns [kg/s2] on moving bodies and elsewhere, without friction.
 
     The rate is area / length times the driving pressure: pressure difference of the ends, plus density times the change
-    of
-    the drive since the start, plus the constant `offset` of the column.
+    of the drive since the start, plus the constant `offset` of the column.
     """
     tables = open_tables(handle)
     columns, p, at = tables.columns, tables.layout[0]["pressure"], tables.layout[0]["moving_segment"]
