@@ -82,9 +82,8 @@ def limit_three_sides(p, wide, cap, beyond, geo, out):
     """Limited values at three sides of a block of triangles, from the values beyond the sides.
 
     If the neighbours differ from the cell by `least` to `most`, a side rises by no more than wide most, -2 wide least
-    and
-    `cap`, and falls no further than wide least, -2 wide most and -cap. So no side of a local extremum differs from its
-    cell. With wide = 1 all values at sides lie in the range of the neighbours.
+    and `cap`, and falls no further than wide least, -2 wide most and -cap. So no side of a local extremum differs from
+    its cell. With wide = 1 all values at sides lie in the range of the neighbours.
 
     p, beyond : values of cells and of neighbours; geo : measures of the sides; out : values at the sides
     wide : factor on the range of the neighbours; cap : greatest allowed deviation from the cell

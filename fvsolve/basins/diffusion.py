@@ -57,8 +57,9 @@ def grid_diffusion(nx, ny, begin, stop, kx, ky, diffusivity, factor, flow_x, flo
 
     This rate is 2 D (kx^2 + ky^2). There is no flux through the boundary, except where factor times a given flow
     enters:
-    there the value on the face is `outside`. (Flows of water, with depths, may be almost zero there: a value fixed for
+    the value on the face is `outside` there. (Flows of water, with depths, may be almost zero there: a value fixed for
     one sign only would jump.)
+
     diffusivity : D [m2/s]; work : float64[diffusion_work(nx, ny)]; other arguments as for `grid_advection`
     """
     c, rest = s, work[nx * ny :]

@@ -57,7 +57,10 @@ CROWDED_COUNT = 1e6  # jumps travelling at one time; with so many, only a jump a
 
 @njit(forceinline=True)
 def solved_alone(tables, i):
-    """True if node i is solved without other nodes: its pressure is given, or is the sum of arriving waves over Y."""
+    """True if node i is solved without other nodes.
+
+    Then its pressure is given, or is the sum of the arriving waves over the admittance of its pipes.
+    """
     node = tables.nodes[i]
     return node["kind"] != JUNCTION or node["solve"] == ALONE
 

@@ -72,7 +72,10 @@ def kink_before(past, places, line, q, t, least):
 
 @njit
 def stretch_integrals(t, out, tables, number, q):
-    """Integrals over segment q of R - L [kg m/s], and of the energy of forward and of backward wave times rho A."""
+    """Integrals over segment q of R - L [kg m/s], and of the energy of forward and of backward wave times rho A.
+
+    R, L : forward and backward wave [kg/s]; rho A : density times area of the pipe [kg/m]
+    """
     past, line, st = tables.past, tables.delays[number], tables.settings[0]
     pipe, places, hold, share = tables.pipes[line["pipe"]], offsets_of(past), line["hold"], 1.0 - line["now"]
     first, flow = tables.nodes[pipe["from_node"]], pipe["flow"]

@@ -105,7 +105,7 @@ def sent_wave_linear(past, places, clock, ring, mask, jumps, wave, t):
 def waves_at_linear(t, past, places, clock, line, share):
     """Both waves as in `waves_at` at the time t of the last entry, by linear interpolation; used for envelopes.
 
-    The friction loss delta belongs to the waves that arrive at the ends of the segment at t.
+    The friction loss is that of the waves that arrive at the ends of the segment at t.
     """
     stretches, tau = line["stretches"], line["tau"]
     q = min(int(share * stretches), stretches - 1)

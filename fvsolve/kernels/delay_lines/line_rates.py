@@ -57,9 +57,9 @@ def has_friction(pipe):
 
 @njit(forceinline=True)
 def friction_loss(pipe, line, r, l):
-    """Friction loss delta [kg/s] in the middle of a segment, where waves r and l meet, by Newton's method.
+    """Friction loss in the middle of a segment, where waves r and l meet [kg/s], by Newton's method.
 
-    The equation is monotone in the flow.
+    It is subtracted from r and added to l. The equation is monotone in the flow.
     """
     if not has_friction(pipe):
         return 0.0
@@ -80,8 +80,8 @@ def friction_loss(pipe, line, r, l):
 def write_arrivals(past, places, clock, line, pipe, q, t):
     """Write both waves that arrive at t at the ends of segment q of a delay line, and its friction loss, into `past`.
 
-    Three numbers [kg/s]: the backward wave at its beginning, the forward wave at its end, delta. In a line shorter than
-    a step both waves hold for p' = 0 at its ends. Jumps travel through it as through any line.
+    Three numbers [kg/s]: the backward wave at its beginning, the forward wave at its end, the loss. In a line shorter
+    than a step both waves hold for zero pressure deviation p' at its ends. Jumps travel through it as through any line.
     """
     ring, mask = ring_of(places, line, q)
     k, w = stencil(past, clock, t - line["hold"])

@@ -135,7 +135,7 @@ def lagrange_four(x):
 def lagrange_three(x):
     """Lagrange weights of entries k - 1 .. k + 1 at the fraction x, in the order of `lagrange_six`, other weights 0.
 
-    They are used in the newest interval.
+    They are used between the two newest entries.
     """
     return 0.0, 0.5 * x * (x - 1.0), 1.0 - x * x, 0.5 * x * (x + 1.0), 0.0, 0.0
 

@@ -28,8 +28,8 @@ from fvsolve.kernels.table_handle import open_tables
 def body_energy_rate(body, out, here, gravity):
     """Rate of the kinetic and potential energy of a body [W]: m v . a + w . J alpha + m g v_z.
 
-    m : mass; v, a : velocity and acceleration of the centre of mass; w, alpha : angular velocity and acceleration; J :
-    inertia about the centre of mass; here : offset of the body in `out`
+    m : mass; v, a : velocity and acceleration of the centre of mass; w, alpha : angular velocity and acceleration
+    J : inertia about the centre of mass; here : offset of the body in `out`
     """
     x, y, z, u, v, w = centre_of(body, out, here)
     a, b, c = acceleration_at(out, here, here + ACCELERATION, x, y, z)

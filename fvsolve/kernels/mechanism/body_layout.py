@@ -62,8 +62,9 @@ def cross(a, i, x, y, z):
 
 @njit(forceinline=True)
 def freedom_velocity(work, s, x, y, z):
-    """Velocity of a point of a body per unit rate of one degree of freedom; (x, y, z) : its position from o.
+    """Velocity of a point of a body per unit rate of one degree of freedom.
 
+    (x, y, z) : position of the point from the reference point o of the module
     s : offset in `work` of the angular velocity and the velocity at o per unit rate of that degree of freedom
     """
     u, v, w = cross(work, s, x, y, z)

@@ -58,10 +58,10 @@ def gap_of(out, tables, bushing):
 
 @njit
 def deviation(out, tables, bushing, r, c):
-    """Entry (r, c) of the deviation of attitudes in axes of the world, R_to R_d' R_from'.
+    """Entry (r, c) of the deviation of attitudes R_to R_d' R_from' of a bushing since the start, in axes of the world.
 
-    R_to, R_from : attitudes of both bodies; R_d : attitude of the body of `to` in axes of the body of `from` at the
-        start
+    R_to, R_from : attitudes of both bodies
+    R_d : attitude of the body of `to` in axes of the body of `from` at the start
     """
     i, j = tables.points[bushing["from_point"]]["body"], tables.points[bushing["to_point"]]["body"]
     total = 0.0
@@ -79,7 +79,8 @@ def deviation(out, tables, bushing, r, c):
 def rotation_deviation(out, tables, bushing):
     """Rotation of the body of `to` relative to that of `from` since the start, seven numbers in axes of the world.
 
-    They are 2 eta eps (3 numbers), the relative angular velocity [rad/s] (3 numbers), and eps . eps; see the module.
+    They are 2 eta eps (3 numbers), the relative angular velocity [rad/s] (3 numbers), and eps . eps, with the Euler
+    parameters (eta, eps) of the rotation.
     """
     x = 0.5 * (deviation(out, tables, bushing, 2, 1) - deviation(out, tables, bushing, 1, 2))
     y = 0.5 * (deviation(out, tables, bushing, 0, 2) - deviation(out, tables, bushing, 2, 0))
@@ -119,7 +120,7 @@ def add_bushing_loads(t, y, dydt, out, handle):
 
 @njit
 def bushing_rate_limit(t, y, dydt, out, handle):
-    """Raise out[RATE], the rate that limits steps [1/s], to the bound for bushings; it is as in `body_rate_limit`."""
+    """Raise out[RATE], the rate that limits steps [1/s], to the bound for bushings (`mass_matrix.body_rate_limit`)."""
     tables = open_tables(handle)
     bushings, work, n = tables.bushings, tables.scratch, tables.freedoms.size
     stiffness, damping = 0.0, 0.0
@@ -180,7 +181,7 @@ def power_bushings(t, y, dydt, out, handle, power):
 def stored_bushings(t, y, dydt, out, handle, stored):
     """Write an entry of `stored` for each bushing [J]: change since the start of k gap^2 / 2 + 2 k_turn eps . eps.
 
-    k [N/m], k_turn [N m/rad] : stiffnesses of the bushing; eps : see the module
+    k [N/m], k_turn [N m/rad] : stiffnesses of the bushing; eps : vector of the Euler parameters of its rotation
     """
     tables = open_tables(handle)
     at = bushing_stored_row(tables, stored)

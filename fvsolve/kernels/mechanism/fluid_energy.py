@@ -64,9 +64,10 @@ def speed_squared_at(motion, r):
 def segment_energy(tables, out, here, segment, z, rise):
     """Energy of a segment of fluid that is due to the motion of its body [J].
 
-    The energy is the integral of V^2 / 2 + g (height - z - rise s) over the mass; s : distance along the segment [m].
-    segment : (start r, direction t, mass moments m), see `fluid_loads`. With the rates of the moments in place of m,
-        the result is the power that the inflow brings [W].
+    The energy is the integral of V^2 / 2 + g (height - z - rise s) over the mass; V : velocity in the world, s :
+    distance along the segment [m].
+    segment : (start r, direction t, mass moments m), see `fluid_loads`; with the rates of the moments in place of m,
+        the result is the power that the inflow brings [W]
     z, rise : elevation of the start of the segment in the network at rest [m], and its increase per distance s
     """
     motion, g, (r, t, m) = tables.scratch, tables.settings[0]["gravity"], segment
@@ -81,7 +82,10 @@ def segment_energy(tables, out, here, segment, z, rise):
 
 @njit(forceinline=True)
 def load_power(motion, load):
-    """Power -(F . v + T . W) that a body supplies to fluid [W]; load : force F and torque T of the fluid on it."""
+    """Power -(F . v + T . W) that a body supplies to fluid [W]; load : force F and torque T of the fluid on it.
+
+    v, W : velocity of the origin of the body, and angular velocity
+    """
     force = motion[BODY_VELOCITY] * load[0] + motion[BODY_VELOCITY + 1] * load[1] + motion[BODY_VELOCITY + 2] * load[2]
     return -(force + (motion[BODY_SPIN] * load[3] + motion[BODY_SPIN + 1] * load[4] + motion[BODY_SPIN + 2] * load[5]))
 
@@ -96,7 +100,10 @@ def segment_energy_rate(tables, out, here, segment, d, z, rise):
 
 @njit(forceinline=True)
 def path_velocity(motion, path):
-    """Velocity of a body integrated along a flow path (C, Z) on it, v . C + W . Z [m2/s]."""
+    """Velocity of a body integrated along a flow path (C, Z) on it, v . C + W . Z [m2/s].
+
+    C, Z : integrals of dr and r x dr along the path; v, W : velocity of the origin of the body, and angular velocity
+    """
     return load_power(motion, (-path[0], -path[1], -path[2], -path[3], -path[4], -path[5]))
 
 
@@ -104,7 +111,7 @@ def path_velocity(motion, path):
 def path_energy_rate(tables, out, here, path, change, flow, rate):
     """Rate of the energy M (v . C + W . Z) of a mass flow M along a flow path (C, Z) on a body [W].
 
-    path, change : (C, Z) and its rate; flow, rate : M [kg/s] and dM/dt [kg/s2]
+    path, change : (C, Z) and its rate; flow, rate : M [kg/s] and dM/dt [kg/s2]; v, W : see `path_velocity`
     """
     motion, g, up = tables.scratch, tables.settings[0]["gravity"], here + ATTITUDE + 6
     x, y, z = cross(motion, BODY_SPIN, motion[BODY_VELOCITY], motion[BODY_VELOCITY + 1], motion[BODY_VELOCITY + 2])

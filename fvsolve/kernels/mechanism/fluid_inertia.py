@@ -29,9 +29,9 @@ from fvsolve.kernels.mechanism.fluid_loads import (
 
 @njit
 def add_segment_inertia(out, tables, i, segment):
-    """Add the inertia of a straight segment of fluid on body i to M; velocities are linear along the segment.
+    """Add the inertia of a straight segment of fluid on body i to the mass matrix M in `scratch`.
 
-    segment : (start r, direction t, mass moments m), see `fluid_loads`
+    Velocities are linear along the segment. segment : (start r, direction t, mass moments m), see `fluid_loads`
     """
     r, t, m = segment
     work, n, here = tables.scratch, tables.freedoms.size, body_row(tables, i)
@@ -57,6 +57,7 @@ def add_segment_inertia(out, tables, i, segment):
 def path_component(out, work, here, s, flow_path):
     """Velocity of a body integrated along a flow path (C, Z), C . v + Z . w, per unit rate of one degree of freedom.
 
+    C, Z : integrals of dr and r x dr along the path; v, w : velocity of the origin of the body, and angular velocity
     s : offset in `work` of the angular velocity and the velocity at o per unit rate; here : offset of the body in `out`
     """
     u, v, w = freedom_velocity(work, s, out[here + ARM], out[here + ARM + 1], out[here + ARM + 2])
@@ -68,9 +69,9 @@ def path_component(out, work, here, s, flow_path):
 
 @njit
 def subtract_sliding_inertia(out, tables, i, flow_path, slides):
-    """Subtract from M the inertia of fluid that slides along a flow path (C, Z) on body i.
+    """Subtract the inertia of fluid that slides along a flow path on body i from the mass matrix M in `scratch`.
 
-    slides : mass of the fluid over its length squared [kg/m2]
+    flow_path : integrals of dr and r x dr along the path; slides : mass of the fluid over its length squared [kg/m2]
     """
     work, n, here = tables.scratch, tables.freedoms.size, body_row(tables, i)
     path, count = freedom_path(tables, nearest_free_body(tables, i))
@@ -84,7 +85,7 @@ def subtract_sliding_inertia(out, tables, i, flow_path, slides):
 
 @njit
 def add_pipe_inertia(y, out, tables, k):
-    """Add the fluid of pipe k to M: it moves with the body across the axis of the pipe and slides along the axis.
+    """Add the fluid of pipe k to the mass matrix M: it moves with its body, but slides along the axis of the pipe.
 
     Under the linear density law, the mass that pressure waves add does not slide.
     """
@@ -99,7 +100,7 @@ def add_pipe_inertia(y, out, tables, k):
 
 @njit
 def add_fluid_inertia(y, out, tables):
-    """Add the fluid of nodes, pipes and rigid columns on bodies that forces can move to M in `scratch`."""
+    """Add the fluid of nodes, pipes and rigid columns to the mass matrix M of bodies that forces can move."""
     nodes, segments, pipes, columns = tables.nodes, tables.moving_segments, tables.pipes, tables.columns
     if segments.size == 0:
         return

@@ -72,7 +72,10 @@ def inertia_times(r, t, m, x, y, z):
 
 @njit
 def segment_load(motion, r, t, m, d):
-    """Force and torque of a segment of fluid on its body; m, d : mass moments of the segment and their rates."""
+    """Force and torque of a segment of fluid on its body; r, t : start and direction of the segment.
+
+    m, d : integrals of 1, s and s^2 over the mass of the segment, s : distance from r; and their rates
+    """
     sx, sy, sz = m[0] * r[0] + m[1] * t[0], m[0] * r[1] + m[1] * t[1], m[0] * r[2] + m[1] * t[2]
     gx, gy, gz = as_tuple(motion[BODY_GRAVITY : BODY_GRAVITY + 3])
     ex, ey, ez = cross(motion, BODY_SPIN_RATE, sx, sy, sz)
@@ -93,7 +96,8 @@ def segment_load(motion, r, t, m, d):
 def flow_load(motion, path, change, flow, rate):
     """Force and torque of a mass flow along a flow path on its body.
 
-    path, change : (C, Z) and its rate; flow, rate : mass flow [kg/s] and its derivative [kg/s2]
+    path, change : integrals of dr and r x dr along the path, and their rates
+    flow, rate : mass flow [kg/s] and its derivative [kg/s2]
     """
     cx, cy, cz = cross(motion, BODY_SPIN, path[0], path[1], path[2])
     zx, zy, zz = cross(motion, BODY_SPIN, path[3], path[4], path[5])
@@ -123,14 +127,14 @@ def level_rate(dydt, tables, i):
 
 @njit(forceinline=True)
 def tank_path(tables, i, high):
-    """Flow path (C, Z) from the bottom of the tank at node i to the height `high` above it [m]."""
+    """Integrals of dr and r x dr along the flow path from the bottom of the tank at node i to the height `high` [m]."""
     r = tables.moving_segments[tables.nodes[i]["moving_segment"]]["start"]
     return 0.0, 0.0, high, r[1] * high, -r[0] * high, 0.0
 
 
 @njit(forceinline=True)
 def tank_paths(tables, i, j, a, b):
-    """Flow path (C, Z) of a flow from node i to node j inside the tanks there.
+    """Integrals of dr and r x dr along the flow path of a flow from node i to node j inside the tanks there.
 
     It leads down the tank at node i from height a [m], and up the tank at node j to height b [m].
     """
@@ -139,13 +143,13 @@ def tank_paths(tables, i, j, a, b):
 
 @njit(forceinline=True)
 def vertical_moments(mass, high):
-    """Mass moments (m0, m1, m2) of a mass [kg] that is distributed evenly over the height `high` above a bottom [m]."""
+    """Integrals of 1, s, s^2 over a mass [kg] that is distributed evenly over the height `high`; s : height [m]."""
     return mass, 0.5 * mass * high, mass * high * high / 3.0
 
 
 @njit
 def node_segment(y, tables, i):
-    """Segment (r, t, m) of the fluid stored at node i; its mass is 0 for a node without storage."""
+    """Segment of the fluid stored at node i: (start r, unit vector t, mass moments m); no mass without storage."""
     node = tables.nodes[i]
     r = as_tuple(tables.moving_segments[node["moving_segment"]]["start"])
     if node["kind"] == TANK:
@@ -155,7 +159,7 @@ def node_segment(y, tables, i):
 
 @njit
 def node_segment_rates(y, dydt, out, tables, i):
-    """Rates d of the mass moments of the fluid at node i, from its inflow [kg/s, kg m/s, kg m2/s].
+    """Rates of the mass moments of the fluid at node i, from its inflow [kg/s, kg m/s, kg m2/s].
 
     In a tank the inflow counts at the surface. A node without volume has the rate -supply, because supplied fluid
     leaves it into the network.
@@ -206,7 +210,7 @@ def pipe_segment(tables, k):
 
 @njit
 def pipe_moments(tables, y, k, length, share):
-    """Mass moments m of pipe k, and the sum over its cells of mass flow times length along the segment [kg m/s].
+    """Mass moments of pipe k, and the sum over its cells of mass flow times length along the segment [kg m/s].
 
     y : states with share = 1; or rates of states with share = 0, then the results are rates
     length : distance between the ends of the pipe [m]
@@ -223,7 +227,7 @@ def pipe_moments(tables, y, k, length, share):
 
 @njit(forceinline=True)
 def straight_path(r, t):
-    """Flow path (C, Z) of unit length from r along t."""
+    """Integrals of dr and r x dr along a flow path of unit length from r in the direction t."""
     return t[0], t[1], t[2], r[1] * t[2] - r[2] * t[1], r[2] * t[0] - r[0] * t[2], r[0] * t[1] - r[1] * t[0]
 
 
@@ -264,7 +268,10 @@ def pipe_load(y, dydt, tables, k):
 
 @njit
 def column_path(y, tables, column):
-    """Flow path (C, Z) of a rigid column, with the paths in tanks at its ends, in axes of its body."""
+    """Integrals of dr and r x dr along the flow path of a rigid column, in axes of its body.
+
+    The paths in tanks at the ends of the column are included.
+    """
     first, last = (
         tables.moving_segments[column["moving_segment"]]["start"],
         tables.moving_segments[column["moving_segment"] + column["moving_segments"] - 1]["end"],
@@ -280,7 +287,10 @@ def column_path(y, tables, column):
 
 @njit
 def column_segment(tables, column, k):
-    """Segment (r, t, m) number k of a rigid column; the mass of the column is distributed by length."""
+    """Segment number k of a rigid column: (start r, unit vector t, mass moments m).
+
+    The mass of the column is distributed by length.
+    """
     total = 0.0
     for m in range(column["moving_segments"]):
         total += segment_length(tables.moving_segments[column["moving_segment"] + m])

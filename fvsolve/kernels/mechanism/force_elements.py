@@ -25,7 +25,7 @@ def point_at(out, tables, k, base):
     """Position [m] and velocity [m/s] of point k, six numbers in axes of the world; (59) and (67) of docs/course.md.
 
     base : POSITION for the position from the origin of the world, or ARM for that from o (`body_layout`)
-    Points of the world have no velocity; all numbers are 0 for k < 0.
+    Points of the world have no velocity. All numbers are 0 for k < 0.
     """
     if k < 0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0

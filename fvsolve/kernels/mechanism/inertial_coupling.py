@@ -33,9 +33,10 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def path_acceleration(out, tables, segment, path):
-    """Acceleration of a body due to q'' alone, integrated along a flow path (C, Z) on it: C . a + Z . e [m2/s2].
+    """Acceleration of a body integrated along a flow path on it, C . a + Z . e [m2/s2].
 
-    a, e : acceleration of the origin and angular acceleration, minus their values for q'' = 0
+    C, Z : integrals of dr and r x dr along the path
+    a, e : acceleration of the origin and angular acceleration, minus their values for zero joint accelerations
     """
     here = body_row(tables, tables.moving_segments[segment]["body"])
     a, e, b, c = here + ACCELERATION, here + SPIN_RATE, here + BIAS, here + SPIN_BIAS
@@ -59,7 +60,7 @@ def accelerate_pipe_flow(y, dydt, out, tables, k):
 
 @njit
 def accelerate_network_flow(t, y, dydt, out, handle):
-    """Add the inertial forces of the accelerations of bodies, minus those for q'' = 0, to the rates of flow.
+    """Add the inertial forces of the accelerations of bodies to rates of flow, minus those for zero joint accelerations.
 
     Where a joint load is an output (`loads_body` = 2), the fluid loads are computed again with the new rates.
     """

@@ -93,7 +93,10 @@ def joint_velocities(body, first, y):
 
 @njit
 def set_free_body(body, y, own):
-    """Write attitude, position, velocity and bias acceleration of a free body; o is its centre of mass."""
+    """Write attitude, position, velocity and bias acceleration of a free body; `body_layout` defines these data.
+
+    The reference point o is its centre of mass.
+    """
     rotation_of_parameters(own, ATTITUDE, *joint_parameters(body, 3, y))
     cx, cy, cz = rotate(own, ATTITUDE, body["centre"], 0)
     at, x0 = body["y"], body["start"]
@@ -132,7 +135,7 @@ def set_joint_frame(body, out, tables, own):
 
 @njit
 def set_revolute(body, t, y, tables, own):
-    """Rotate a body by its revolute joint; add the velocity S q' and, if the joint is driven, S q''."""
+    """Rotate a body by its revolute joint; add the joint velocity and, for a driven joint, its acceleration."""
     angle, rate, change = joint_coordinate(body, t, y, tables)
     rotation_about_axis(tables.scratch, 0, angle, body["axis"])
     multiply_matrices(tables.scratch, 9, tables.scratch, 0, own, ATTITUDE)
@@ -144,7 +147,7 @@ def set_revolute(body, t, y, tables, own):
 
 @njit
 def set_prismatic(body, t, y, tables, own):
-    """Move a body by its prismatic joint; add the velocity S q' and, if the joint is driven, S q''."""
+    """Move a body by its prismatic joint; add the joint velocity and, for a driven joint, its acceleration."""
     travel, rate, change = joint_coordinate(body, t, y, tables)
     copy_joint_axes(tables, own)
     a, b, c = rotate(own, ATTITUDE, body["axis"], 0)
@@ -165,7 +168,10 @@ def copy_joint_axes(tables, own):
 
 @njit
 def add_joint_velocity(own, wx, wy, wz, vx, vy, vz):
-    """Add the joint velocity S q' = (w, v) to the velocity V of a body, and V x S q' to its bias acceleration."""
+    """Add the joint velocity S q' = (w, v) to the velocity V of a body, and V x S q' to its bias acceleration.
+
+    (w, v) : angular velocity and velocity at the reference point o, in axes of the world
+    """
     for k, w, v in ((0, wx, vx), (1, wy, vy), (2, wz, vz)):
         own[SPIN + k] += w
         own[VELOCITY_AT_O + k] += v
@@ -196,9 +202,9 @@ def set_jointed_body(body, t, y, out, tables, own):
 
 @njit
 def add_drive_acceleration(own, x, y, z, turns):
-    """Add the acceleration S q'' of a driven joint to the bias acceleration of a body.
+    """Add the acceleration of a driven joint to the bias acceleration of a body.
 
-    (x, y, z) : axis times q'' in axes of the world; turns : 1 for a revolute, 0 for a prismatic joint
+    (x, y, z) : axis times joint acceleration in axes of the world; turns : 1 for a revolute, 0 for a prismatic joint
     """
     if turns == 1:
         own[SPIN_BIAS] += x
@@ -212,10 +218,11 @@ def add_drive_acceleration(own, x, y, z, turns):
 
 @njit(forceinline=True)
 def origin_acceleration(out, here, wide, spin):
-    """Acceleration of the origin of a body from that at o: a + alpha x r + w x v.
+    """Acceleration of the origin of a body: a + alpha x r + w x v.
 
-    a : acceleration at o, at index `wide`; alpha : angular acceleration, at offset `spin` in the data of the body
-    r : origin minus o; w, v : angular velocity, and velocity of the origin; here : offset of the body in `out`
+    a : acceleration at the reference point o, at index `wide`; r : origin minus o
+    alpha : angular acceleration, at offset `spin` in the data of the body; here : offset of these data in `out`
+    w, v : angular velocity, and velocity of the origin
     """
     ax, ay, az = cross(out, here + spin, out[here + ARM], out[here + ARM + 1], out[here + ARM + 2])
     v = here + VELOCITY

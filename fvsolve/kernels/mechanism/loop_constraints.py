@@ -47,7 +47,7 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit(forceinline=True)
 def constraint_offset(tables):
-    """Offset of the matrix G in `scratch`."""
+    """Offset in `scratch` of the matrix G, which gives velocities along constrained directions."""
     return scratch_offsets(tables)[1] + LOAD_SIZE * tables.bodies.size
 
 
@@ -111,7 +111,10 @@ def add_pin_force(out, tables, pin, r, size):
 
 @njit
 def fill_constraint_rows(out, tables):
-    """Write G, Z and, in place of lambda, the right-hand sides to `scratch`; return the number of directions."""
+    """Write G, Z and the right-hand sides of the equations for the pin forces lambda to `scratch`, see the module.
+
+    Returns the number of constrained directions.
+    """
     pins, work, n, g = tables.pins, tables.scratch, tables.freedoms.size, constraint_offset(tables)
     rows = 0
     for k in range(pins.size):
@@ -140,7 +143,10 @@ def fill_constraint_rows(out, tables):
 
 @njit
 def multipliers(tables, rows):
-    """Solve Z' Z lambda = right-hand sides in place, by Cholesky factors Z' Z = C C'; rows : number of directions."""
+    """Solve Z' Z lambda = right-hand sides for the pin forces lambda in place, by the Cholesky factors Z' Z = C C'.
+
+    rows : number of constrained directions
+    """
     work, n, z = tables.scratch, tables.freedoms.size, constraint_offset(tables) + rows * tables.freedoms.size
     h, last = z + rows * n, z + rows * n + rows * rows
     for i in range(rows):
@@ -163,7 +169,7 @@ def multipliers(tables, rows):
 
 @njit
 def start_gaps(t, y, dydt, out, handle):
-    """Write n . gap of each constrained direction [m] in place of the pin forces in `out`, for `model.mechanism`."""
+    """Write the gap of each constrained direction [m] in place of the pin forces in `out`, for `model.mechanism`."""
     tables = open_tables(handle)
     pins, at = tables.pins, tables.layout[0]["pin"]
     for k in range(pins.size):

@@ -54,9 +54,9 @@ def scratch_offsets(tables):
 
 @inline
 def joint_columns(body, own, s):
-    """Write the columns S of a joint to s: angular velocity and velocity at o per unit rate of each degree of freedom.
+    """Write the angular velocity and the velocity at o per unit rate of each degree of freedom of a joint to s.
 
-    own : data of the body in `out`
+    They are the columns S of the joint. o : reference point, see `body_layout`; own : data of the body in `out`
     """
     kind, x, y, z = body["joint"], own[ARM], own[ARM + 1], own[ARM + 2]
     first = 0
@@ -85,7 +85,7 @@ def joint_columns(body, own, s):
 
 @inline
 def inertia_about_o(body, own, result):
-    """Write the inertia of a body about o, in axes of the world, as ten numbers.
+    """Write the inertia of a body about the reference point o (`body_layout`), in axes of the world, as ten numbers.
 
     The numbers are mass, mass times centre (3), and moments of inertia xx yy zz xy xz yz.
     """
@@ -118,9 +118,10 @@ def inertia_row(own, r, inertia):
 
 @njit(forceinline=True)
 def spatial_momentum(inertia, wx, wy, wz, vx, vy, vz):
-    """Inertia (ten numbers) times the spatial velocity (w, v): angular momentum about o, momentum; six numbers.
+    """Angular momentum about the point o, and momentum, of an inertia at angular velocity w and velocity v at o.
 
-    For a spatial acceleration in place of (w, v), the result is torque and force.
+    inertia : ten numbers, see `inertia_about_o`; the result has six numbers. For accelerations in place of (w, v), the
+    result is torque and force.
     """
     m, hx, hy, hz = inertia[0], inertia[1], inertia[2], inertia[3]
     xx, yy, zz, xy, xz, yz = inertia[4], inertia[5], inertia[6], inertia[7], inertia[8], inertia[9]
@@ -136,10 +137,10 @@ def spatial_momentum(inertia, wx, wy, wz, vx, vy, vz):
 
 @inline
 def bias_load(own, inertia, load):
-    """Write the load (torque about o, force) that a joint must supply to its body for q'' = 0, six numbers.
+    """Write the torque about o and the force that a joint must supply for zero joint accelerations, six numbers.
 
-    The load is I A + V x* I V - applied loads. I : inertia; V, A : spatial velocity, and acceleration for q'' = 0; x* :
-    spatial cross product of motion and force (Featherstone 2008)
+    They are I A + V x* I V - applied loads on the body. I : inertia; V, A : spatial velocity, and acceleration for q''
+    = 0 x* : spatial cross product of motion and force (Featherstone 2008); o : reference point, see `body_layout`
     """
     w, v, a, c = SPIN, VELOCITY_AT_O, SPIN_BIAS, BIAS_AT_O
     lx, ly, lz, px, py, pz = spatial_momentum(inertia, own[w], own[w + 1], own[w + 2], own[v], own[v + 1], own[v + 2])
@@ -155,7 +156,7 @@ def bias_load(own, inertia, load):
 
 @njit
 def fill_mass_matrix(y, out, tables):
-    """Write S, M and the forces of all degrees of freedom to `scratch`.
+    """Write joint columns S, mass matrix M and the forces of all degrees of freedom to `scratch`.
 
     The forces are minus those that are stored as rounding of the equilibrium at the start.
     """
@@ -202,7 +203,7 @@ def fill_mass_matrix(y, out, tables):
 
 @njit
 def factor_mass_matrix(tables):
-    """Factor M = L'L in place, row by row from the leaves of the tree; L has the sparsity of M.
+    """Factor the mass matrix M = L'L in place, row by row from the leaves of the tree; L has the sparsity of M.
 
     The diagonal contains the reciprocals of the diagonal of L, because later solutions divide by it.
     """
@@ -221,7 +222,7 @@ def factor_mass_matrix(tables):
 
 @njit
 def solve_factor(tables, at):
-    """Solve L' z = b in place, b at scratch[at], after `factor_mass_matrix`; |z|^2 = b' M^-1 b."""
+    """Solve L' z = b in place, b at scratch[at], with the mass matrix M = L'L factored; |z|^2 = b' M^-1 b."""
     freedoms, work, paths, n = tables.freedoms, tables.scratch, tables.integers, tables.freedoms.size
     b = work[at : at + n]
     for j in range(n - 1, -1, -1):
@@ -234,7 +235,7 @@ def solve_factor(tables, at):
 
 @njit
 def solve_mass_matrix(tables, at):
-    """Solve M x = b in place, b at scratch[at], after `factor_mass_matrix`."""
+    """Solve M x = b in place, b at scratch[at], with the mass matrix M factored."""
     freedoms, work, paths, n = tables.freedoms, tables.scratch, tables.integers, tables.freedoms.size
     solve_factor(tables, at)
     b = work[at : at + n]
@@ -327,7 +328,10 @@ def add_body_force(out, tables, i, px, py, pz, x, y, z, at):
 
 @njit
 def add_body_wrench(tables, i, tx, ty, tz, fx, fy, fz, at):
-    """Add the generalised forces of a torque (tx, ty, tz) about o and a force (fx, fy, fz) on body i to scratch[at]."""
+    """Add the generalised forces of a load on body i, per degree of freedom, to the vector at scratch[at].
+
+    (tx, ty, tz), (fx, fy, fz) : torque about the reference point o, and force, in axes of the world
+    """
     work, i = tables.scratch, nearest_free_body(tables, i)
     if i < 0:
         return
@@ -341,7 +345,10 @@ def add_body_wrench(tables, i, tx, ty, tz, fx, fy, fz, at):
 
 @njit
 def mobility(tables, at):
-    """Reciprocal of the effective mass in a direction b, b' M^-1 b; M is factored, b at scratch[at] is overwritten."""
+    """Reciprocal of the effective mass in a direction b, b' M^-1 b; M : factored mass matrix.
+
+    b : vector over degrees of freedom at scratch[at], which is overwritten
+    """
     work, total = tables.scratch, 0.0
     solve_factor(tables, at)
     for j in range(tables.freedoms.size):
@@ -386,7 +393,7 @@ def body_rate_limit(out, tables):
 
 @njit
 def start_mass_matrix(t, y, dydt, out, handle):
-    """Write the forces of the degrees of freedom and M to `scratch`, for the equilibrium at the start."""
+    """Write the forces of the degrees of freedom and the mass matrix to `scratch`, for the equilibrium at the start."""
     fill_mass_matrix(y, out, open_tables(handle))
 
 

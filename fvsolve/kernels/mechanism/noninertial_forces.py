@@ -40,6 +40,7 @@ THIN_LAYER = 1e-6  # thickness of a layer added at the surface to test if fluid 
 def set_body_motion(tables, out, i, wide, spin):
     """Write g - a_o, W, W' and the velocity of the origin of body i, in its own axes, to `scratch`.
 
+    a_o : acceleration of its origin; W, W' : its angular velocity and acceleration
     wide, spin : offsets of a_o and W' in the data of the body in `out`
     """
     here, motion = body_row(tables, i), tables.scratch
@@ -53,14 +54,17 @@ def set_body_motion(tables, out, i, wide, spin):
 
 @njit
 def speed_squared(motion, x, y, z):
-    """Square of the speed of rotation at r = (x, y, z), |W x r|^2 [m2/s2]; motion : see `set_body_motion`."""
+    """Square of the speed of rotation at r = (x, y, z), |W x r|^2 [m2/s2]; W : angular velocity of the body."""
     u, v, w = cross(motion, BODY_SPIN, x, y, z)
     return u * u + v * v + w * w
 
 
 @njit
 def segment_drive(motion, r1, r2, wx, wy, wz):
-    """Drive of a segment from r1 to r2 [J/kg], after `set_body_motion`; (wx, wy, wz) : integral of r x dr."""
+    """Work of gravity and inertial forces per mass along a segment of fluid from r1 to r2 [J/kg].
+
+    (wx, wy, wz) : integral of r x dr along the segment; motion : `scratch` after `set_body_motion`
+    """
     drive = dot(motion, BODY_GRAVITY, r2[0] - r1[0], r2[1] - r1[1], r2[2] - r1[2]) - dot(
         motion, BODY_SPIN_RATE, wx, wy, wz
     )
@@ -69,7 +73,10 @@ def segment_drive(motion, r1, r2, wx, wy, wz):
 
 @njit
 def set_segment_drives(t, y, dydt, out, handle):
-    """Write the drive of each moving segment of fluid, minus its drive at the start, to `out` [J/kg]."""
+    """Write the work of gravity and inertial forces per mass along each moving segment of fluid to `out` [J/kg].
+
+    The value at the start is subtracted.
+    """
     tables = open_tables(handle)
     segments, at, last = tables.moving_segments, tables.layout[0]["moving_segment"], -1
     for k in range(segments.size):
