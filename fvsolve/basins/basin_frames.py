@@ -63,7 +63,10 @@ def frame_component(out, row, plane, at, k, x, y, z):
 
 @njit
 def set_frame(tables, basin, out):
-    """Compute G, W, dW/dt and gravity alone in the axes of a basin, and store them in `plane`."""
+    """Compute the numbers of the frame of a basin in its axes, and store them in `plane`.
+
+    They are gravity minus acceleration of the origin, angular velocity, angular acceleration, and gravity alone.
+    """
     plane, at, row = tables.plane, basin["frame"], body_row(tables, basin["body"])
     rx, ry, rz = rotate(out, row + ATTITUDE, plane[at : at + 3], 0)
     ex, ey, ez = cross(out, row + SPIN_BIAS, rx, ry, rz)
@@ -88,7 +91,7 @@ def set_frame(tables, basin, out):
 def potential_coefficients(plane, at, per):
     """Coefficients (fx, fy, xx, xy, yy) of the potential phi of the frame at plane[at], multiplied by `per`.
 
-    per phi = x (fx + xx x + xy y) + y (fy + yy y)
+    per phi = x (fx + xx x + xy y) + y (fy + yy y); phi : potential of inertial and gravity forces [J/kg]
     """
     wx, wy, wz = plane[at + WX], plane[at + WY], plane[at + WZ]
     fx, fy = -per * plane[at + GX], -per * plane[at + GY]
@@ -97,7 +100,7 @@ def potential_coefficients(plane, at, per):
 
 @njit
 def tilt_bed(plane, basin):
-    """Write the bed elevation of a basin above the level at rest, with phi / g_n added."""
+    """Write the bed elevation of a basin above the level at rest, plus the frame potential over normal gravity."""
     at, n = basin["frame"], basin["n"]
     to, drawn = basin["plan"] + n, int(plane[at + REST_SURFACE])
     add_potential(plane, basin, 1.0 / plane[at + GN], plane[drawn : drawn + n], plane[to : to + n])
@@ -105,7 +108,7 @@ def tilt_bed(plane, basin):
 
 @njit
 def add_potential(plane, basin, per, values, lifted):
-    """Write the values of all cells of a basin plus per times phi to `lifted`."""
+    """Write values of all cells of a basin plus `per` times the potential of its frame to `lifted`."""
     n, nx, at = basin["n"], basin["nx"], int(plane[basin["frame"] + CELL_POSITIONS])
     phi = potential_coefficients(plane, basin["frame"], per)
     if nx == 0:

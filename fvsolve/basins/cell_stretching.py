@@ -62,21 +62,25 @@ def scale_in_place(factor, values):
 
 @njit
 def depth_deviations(rest, wide, narrow, content, seen):
-    """Write deviations U - U0 of depths from those at rest to `seen`; content : states (A U - A0 U0) / A0."""
+    """Write deviations of depths from those at rest to `seen`.
+
+    content : states, changes of the amount in a cell over its undeformed area
+    wide : ratio of present to undeformed area; narrow : 1 / wide
+    """
     for i in range(seen.size):
         seen[i] = (content[i] - rest[i] * (wide[i] - 1.0)) * narrow[i]
 
 
 @njit
 def density_deviations(rest, wide, narrow, content, seen):
-    """Write deviations U - U0 of densities from that at rest to `seen`; content : states (A U - A0 U0) / A0."""
+    """Write deviations of densities from that at rest to `seen`; arguments as for `depth_deviations`."""
     for i in range(seen.size):
         seen[i] = (content[i] - rest * (wide[i] - 1.0)) * narrow[i]
 
 
 @njit
 def stretch_rates(wide, first, second, third):
-    """Convert three arrays of rates per area to rates of the states, by multiplying with `wide`."""
+    """Convert three arrays of rates per area to rates of the states; wide : ratio of present to undeformed area."""
     multiply_in_place(wide, first)
     multiply_in_place(wide, second)
     multiply_in_place(wide, third)
@@ -84,9 +88,9 @@ def stretch_rates(wide, first, second, third):
 
 @njit
 def stretch_row_rates(columns, wide, first, j, rate_1, rate_2, rate_3):
-    """Convert three arrays of rates of row j of a grid, from column `first` on, to rates of the states.
+    """Convert three arrays of rates per area of row j of a grid, from column `first` on, to rates of the states.
 
-    columns : True if columns stretch, False if rows do
+    wide : present over undeformed areas; columns : True if columns stretch, False if rows do
     """
     if columns:
         stretch_rates(wide[first:], rate_1, rate_2, rate_3)

@@ -114,7 +114,7 @@ def rise_moment(tables, basin, y, dydt):
 
 @njit
 def energy_rate(tables, basin, b, y, dydt, out, vx, vy, vz):
-    """d/dt (T + U) of the water in basin b, see the module [W]; vx, vy, vz : result of `origin_velocity`."""
+    """Rate of kinetic and potential energy of the water in basin b [W]; vx, vy, vz : result of `origin_velocity`."""
     plane, n, o, at, per_area = tables.plane, basin["n"], basin["y"], basin["frame"], mass_factor(tables, basin)
     m, wx, wy, wz = tables.layout[0]["tank"] + TANK_OUT * b, plane[at + WX], plane[at + WY], plane[at + WZ]
     ax, ay, az, bx, by, bz = origin_acceleration(tables, basin, b, out)
@@ -156,7 +156,10 @@ def energy_rate(tables, basin, b, y, dydt, out, vx, vy, vz):
 
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
-    """Write T + U [J] in place of the energy of a fixed basin to `stored`; for a liquid, add it to the energy there."""
+    """Write kinetic plus potential energy of the water in basins on bodies to `stored` [J].
+
+    It replaces the energy of a fixed basin; for a liquid it is added to the energy there.
+    """
     tables = open_tables(handle)
     plane = tables.plane
     for b in range(tables.basins.size):

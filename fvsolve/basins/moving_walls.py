@@ -46,7 +46,7 @@ def stretching_counts(basin):
 
 @njit
 def update_geometry(t, y, seen, out, handle):
-    """Compute lines and areas of basins at y, and write the deviations U - U0 to the table `seen`.
+    """Compute lines and areas of basins at y; write deviations of values per area from those at rest to `tables.seen`.
 
     An empty argument `seen` means that kernels of rates follow. For cells whose kernel reads the states themselves,
     only the deviations next to patches and walls are then computed, unless scalars or friction need all.
@@ -69,7 +69,7 @@ def update_geometry(t, y, seen, out, handle):
 
 @njit(forceinline=True)
 def reads_contents(basin):
-    """True if the kernel of the rates of a basin reads the states (A U - A0 U0) / A0: water on grids, row by row."""
+    """True if the kernel of the rates reads the states (amounts in cells), not values per area: water on grids."""
     return basin["deep"] == 1 and basin["nx"] > 0
 
 
@@ -82,7 +82,10 @@ def copy(source, target):
 
 @njit
 def stretch_cells(tables, basin, y):
-    """Write A / A0 of columns, rows or cells at the present travels of walls, and its reciprocal; update 1 / widths."""
+    """Write the ratios of present to undeformed area of columns, rows or cells at the travels y of walls.
+
+    Their reciprocals and the table of 1 / widths are updated too.
+    """
     plane, walls, at = tables.plane, tables.walls, basin["stretch"]
     count, lines = stretching_counts(basin)
     wide, narrow = plane[at : at + count], plane[at + count : at + 2 * count]
@@ -100,7 +103,7 @@ def stretch_cells(tables, basin, y):
 
 @njit
 def factors_of(tables, basin, j):
-    """(A / A0, A0 / A) of the cells of row j of a grid, or of all cells of a mesh: two arrays."""
+    """Ratio of present to undeformed area, and its reciprocal : arrays for row j of a grid, or all cells of a mesh."""
     plane, nx, at, (count, _) = tables.plane, basin["nx"], basin["stretch"], stretching_counts(basin)
     if nx == 0 or basin["turn"] == 0:
         return plane[at : at + count], plane[at + count : at + 2 * count]
@@ -112,7 +115,10 @@ def factors_of(tables, basin, j):
 
 @njit
 def deviations_of_rows(tables, basin, y):
-    """Compute areas, and deviations U - U0 = ((A U - A0 U0) / A0 - U0 (A / A0 - 1)) A0 / A of all cells of a basin."""
+    """Compute areas and deviations U - U0 of all cells of a basin from the states (A U - A0 U0) / A0.
+
+    U, U0 : value per area, and its value at rest; A, A0 : present and undeformed area of a cell
+    """
     plane, seen, n, first = tables.plane, tables.seen, basin["n"], basin["y"]
     rows, size = (basin["ny"], basin["nx"]) if basin["nx"] > 0 else (1, n)
     scalar_count = tables.scalars.size if basin["carried"] >= 0 else 0
@@ -130,7 +136,7 @@ def deviations_of_rows(tables, basin, y):
 
 @njit
 def deviations_at_patches(tables, b, y):
-    """Compute areas, and deviations U - U0 of the cells of water next to patches, including moving walls."""
+    """Compute areas and deviations of values per area from those at rest, for cells of water at patches and walls."""
     plane, seen, basin, patches = tables.plane, tables.seen, tables.basins[b], tables.patches
     n, first = basin["n"], basin["y"]
     for p in range(patches.size):
@@ -225,9 +231,10 @@ def wall_of_row(tables, basin, i):
 
 @njit(forceinline=True)
 def grid_motion(tables, basin):
-    """Speeds of lines along x and along y, array for pressures on the boundary, A / A0 of columns or rows, A0 / A.
+    """Five arrays of a grid between moving walls, in this order.
 
-    The array of speeds along the axis without motion is empty.
+    - speeds of lines along x, then along y [m/s]; the array for the axis without motion is empty
+    - pressures on boundary faces; present over undeformed area of columns or rows, and the reciprocal
     """
     plane, at, rows, (count, lines) = tables.plane, basin["lines"], basin["stretch"], stretching_counts(basin)
     speeds, no_speeds = plane[at : at + lines + VECTOR_MARGIN], plane[:0]

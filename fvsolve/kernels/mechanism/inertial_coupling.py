@@ -60,9 +60,10 @@ def accelerate_pipe_flow(y, dydt, out, tables, k):
 
 @njit
 def accelerate_network_flow(t, y, dydt, out, handle):
-    """Add the inertial forces of the accelerations of bodies to rates of flow, minus those for zero joint accelerations.
+    """Add the inertial forces of the accelerations of bodies to rates of flow.
 
-    Where a joint load is an output (`loads_body` = 2), the fluid loads are computed again with the new rates.
+    The forces for zero joint accelerations are left out, because these rates contain them. Where a joint load is an
+    output (`loads_body` = 2), the fluid loads are computed again with the new rates.
     """
     tables = open_tables(handle)
     pipes, columns, segments = tables.pipes, tables.columns, tables.moving_segments
