@@ -409,7 +409,7 @@ def test_water_that_flows_from_a_place_which_moves_brings_what_moving_it_takes()
         steps.append(abs(found.step[-1]))
         assert abs(found.scheme["pipe"][-1]) < 1e-5 * found.throughput
         assert found.supplied["open"][-1] != 0.0 and found.supplied["rig"][-1] != 0.0
-    assert steps[1] < 0.1 * steps[0] or steps[0] < 1e-9 * found.through
+    assert steps[1] < 0.1 * steps[0] or steps[0] < 1e-9 * found.throughput
 
 
 UNFELT = {  # what bodies would not feel: change of the U-tube, place of the fault, words
