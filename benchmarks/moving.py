@@ -94,7 +94,7 @@ def table(title: str, scenes: dict, rounds: int, *what) -> None:
     timers, (cells, *more) = {}, what
     for name, (keys, joint) in scenes.items():
         model = model_of(cells, keys, joint, *more)
-        with model.run_data() as run_data:
+        with model.run_data() as slate:
             timers[name] = evaluation(model, initial_state(model).y, slate.handle), slate, model
     many = next(iter(timers.values()))[2].all_cells
     times, best = max(1, 60000 // many + 1) * 4, dict.fromkeys(timers, np.inf)
