@@ -1,9 +1,10 @@
-"""Exchange between bands of a state, each with its own arrays: halo values, greatest rate, sums.
+"""Exchange of data between bands of a state: states of other bands, greatest wave rate, partial sums.
 
-All bands make the same calls in the same order. A band writes its data, then all bands wait for each other before any
-band reads them, and again before any band overwrites them. `joint` of a band's handle holds the addresses. It is empty
-if there is a single band, and then none of these functions is called. Bands are threads, which share memory, or
-processes, whose exchange is a Python function (`solve.ranks`).
+A band is a part of the states that a thread or process of its own steps, with its own arrays. All bands make the same
+calls in the same order. A band writes its data, then all bands wait for each other before any band reads them, and
+again before any band overwrites them. The array `joint` of each band holds the addresses for this. It is empty for a
+single band, which calls none of these functions. Threads share memory; processes exchange data by a Python function
+(`solve.mpi_ranks`).
 """
 
 import numpy as np
@@ -26,7 +27,7 @@ SPIN_LIMIT = 2000  # polls at a barrier before the thread yields
 if COMPILING:
 
     def at_address(context, builder, kind, address, size):
-        """Array of numbers at an address."""
+        """Generate code for an array of `size` numbers that starts at a memory address, without a copy."""
         from numba.core import types
         from numba.np.arrayobj import make_array, populate_array
 
@@ -38,7 +39,7 @@ if COMPILING:
 
     @Intrinsic
     def floats_at(typingctx, address, size):
-        """float64[size] at an address."""
+        """View of the memory at an address as an array float64[size], without a copy."""
         from numba.core import types
 
         def generate(context, builder, kind, args):
@@ -48,7 +49,7 @@ if COMPILING:
 
     @Intrinsic
     def address_of(typingctx, array):
-        """Address of the first entry of an array."""
+        """Memory address of the first entry of an array."""
         from numba.core import types
         from numba.np.arrayobj import make_array
 
@@ -60,7 +61,7 @@ if COMPILING:
 
     @Intrinsic
     def store_release(typingctx, address, value):
-        """Store a number on which other bands wait, after all writes before it (release)."""
+        """Store an integer at an address, after all earlier writes are visible to other threads (release)."""
         from numba.core import types
 
         def generate(context, builder, kind, args):
@@ -72,7 +73,7 @@ if COMPILING:
 
     @Intrinsic
     def load_acquire(typingctx, address):
-        """Load such a number, before all reads after it (acquire)."""
+        """Load an integer from an address, before all later reads (acquire); counterpart of `store_release`."""
         from numba.core import types
 
         def generate(context, builder, kind, args):
@@ -83,7 +84,11 @@ if COMPILING:
 
     @Intrinsic
     def call_processes(typingctx, address, content, numbers, size):
-        """Call the function at an address, which exchanges with other processes."""
+        """Call the function at `address`, which exchanges an array with other processes.
+
+        content : kind of exchange, SEND_STATES, SEND_FLOWS, SEND_RATES or SEND_SUMS
+        numbers, size : memory address and length of the array
+        """
         from llvmlite import ir
         from numba.core import types
 
@@ -112,7 +117,7 @@ else:
     import time
 
     def floats_at(address, size):
-        """float64[size] at an address."""
+        """View of the memory at an address as an array float64[size], without a copy."""
         return np.ctypeslib.as_array((ctypes.c_double * int(size)).from_address(int(address)))
 
     def address_of(array):
@@ -120,25 +125,32 @@ else:
         return array.ctypes.data
 
     def store_release(address, value):
-        """Store a number on which other bands wait."""
+        """Store an integer at an address, on which other bands wait."""
         ctypes.c_int64.from_address(int(address)).value = int(value)
 
     def load_acquire(address):
-        """Load such a number."""
+        """Load an integer from an address; counterpart of `store_release`."""
         return ctypes.c_int64.from_address(int(address)).value
 
     def call_processes(address, content, numbers, size):
-        """Call the function at an address."""
+        """Call the function at `address`, which exchanges an array with other processes.
+
+        content : kind of exchange, SEND_STATES, SEND_FLOWS, SEND_RATES or SEND_SUMS
+        numbers, size : memory address and length of the array
+        """
         ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3)(int(address))(content, numbers, int(size))
 
     def yield_thread(address):
-        """Yield the processor to other threads."""
+        """Yield the processor to other threads; the address is not used."""
         time.sleep(0.0)
 
 
 @njit
 def barrier(joint):
-    """Wait until all bands arrive: poll first, then yield the processor, which a late band may need."""
+    """Wait until all bands have called this function: poll first, then yield the processor, which a late band may need.
+
+    joint : int64 array of this band with counters and memory addresses shared by all bands
+    """
     board, count = joint[BOARD], joint[BAND_COUNT]
     joint[TURNS] += 1
     turn = joint[TURNS]
@@ -153,9 +165,10 @@ def barrier(joint):
 
 @njit
 def get_runs(joint, content, values):
-    """Copy runs of states or flows from the bands that own them to the same places of `values`.
+    """Copy ranges of states or of flows through faces from the bands that own them into the same entries of `values`.
 
-    content : SEND_STATES or SEND_FLOWS. Each band shares the address of its array.
+    joint : int64 array of this band with counters and memory addresses shared by all bands
+    content : SEND_STATES or SEND_FLOWS
     """
     if joint[PROCESS_CALL] != 0:
         call_processes(joint[PROCESS_CALL], content, address_of(values), values.size)
@@ -178,14 +191,17 @@ def get_runs(joint, content, values):
 
 @njit
 def exchange_states(t, y, dydt, out, handle):
-    """Copy the states of other bands on which the rates of this band depend."""
+    """Copy into y the states of other bands on which the rates of this band depend."""
     joint = open_tables(handle).joint
     get_runs(joint, SEND_STATES, y)
 
 
 @njit
 def reduce_rate(t, y, dydt, out, handle):
-    """Set out[RATE] of each band to the greatest rate of all bands; NaN in any band becomes infinity in all."""
+    """Set out[RATE] of each band, the rate that limits the step [1/s], to the greatest of all bands.
+
+    NaN in any band becomes infinity in all bands.
+    """
     joint = open_tables(handle).joint
     if joint[PROCESS_CALL] != 0:
         call_processes(joint[PROCESS_CALL], SEND_RATES, address_of(out), 1)
@@ -203,10 +219,11 @@ def reduce_rate(t, y, dydt, out, handle):
 
 @njit
 def gather_sums(sums, spans, handle):
-    """Gather the sums of all bands in each band.
+    """Copy partial sums between bands, so that each band has all entries of `sums`.
 
-    spans : see `steppers.step_operations`; the first `joint[COMMON_SPANS]` of them are the same in all bands and are
-    written by band 0
+    spans : int64[q, 4]  blocks of states of this band (`row_blocks` in `steppers.step_operations`); columns 2 and 3 are
+        the first entry of the block in `sums` and its number of entries. The first `joint[COMMON_SPANS]` blocks are the
+        same in all bands and are written by band 0.
     """
     joint = open_tables(handle).joint
     if joint[PROCESS_CALL] != 0:

@@ -1,4 +1,4 @@
-"""Rigid columns under the laws log and table: driving pressures, node pressures and rates of flow."""
+"""Rigid columns under the density laws log and table: driving pressures, node pressures and rates of flow."""
 
 from fvsolve.jit import njit
 from fvsolve.kernels.barotropic_nodes import driving_pressure, mean_density
@@ -21,7 +21,10 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def driving_pressure_change(tables, out, k):
-    """Driving pressure of column k minus its value in the profile [Pa]."""
+    """Change of the driving pressure of rigid column k since the initial steady state [Pa].
+
+    The driving pressure contains the pressures at both ends, gravity and the motion of a body that carries the column.
+    """
     st, nodes, column = tables.settings[0], tables.nodes, tables.columns[k]
     i, j, at = column["from_node"], column["to_node"], tables.layout[0]["pressure"]
     p_i, p_j = nodes[i]["pressure"] + out[at + i], nodes[j]["pressure"] + out[at + j]
@@ -33,9 +36,11 @@ def driving_pressure_change(tables, out, k):
 
 @njit
 def add_column_rates_barotropic(t, y, tables, out, n):
-    """Add to `right` the rates of flow [kg/s2] that columns bring into each of n column junctions.
+    """Add d/dt of the flow that rigid columns bring into each column junction [kg/s2] to the right-hand side.
 
-    Columns controlled by valves are left out; the right side of pinned junctions is zero.
+    A column junction is a node at which columns join and all valves are closed; n is their number. The right-hand side
+    is that of the equations for their pressures, in scratch. Columns controlled by valves are left out. The entry of a
+    junction with held pressure is set to zero.
     """
     rows, _, _, right, pinned, _ = junction_work(tables, n)
     for k in range(tables.columns.size):
@@ -52,7 +57,11 @@ def add_column_rates_barotropic(t, y, tables, out, n):
 
 @njit
 def junction_pressures_barotropic(t, y, tables, out):
-    """Pressures of column junctions by iteration: driving pressures are nearly linear in the end pressures."""
+    """Solve the pressures of column junctions, nodes at which rigid columns join and all valves are closed.
+
+    Iteration with the matrix of the linear law, because driving pressures are nearly linear in the end pressures.
+    Writes pressure changes since the start [Pa] to `out`, or STATUS = NOT_CONVERGED.
+    """
     n = number_junctions(tables, out)
     if n == 0:
         return
@@ -80,9 +89,10 @@ def junction_pressures_barotropic(t, y, tables, out):
 
 @njit
 def column_pressures_barotropic(t, y, dydt, out, handle):
-    """Set the pressures of column junctions and of the valve-controlled ends of columns.
+    """Write the pressures of column junctions, and of the column ends whose flow nearly closed valves control.
 
-    The enthalpy at a controlled end is that of the far end, less the height difference, the body force and inertia.
+    The enthalpy at a controlled end is the enthalpy at the opposite end, less g times the rise, plus the drive of a
+    moving body. The pressure (L / A) dM/dt that accelerates a column of length L, area A and flow M is then subtracted.
     """
     tables = open_tables(handle)
     st, nodes, floats = tables.settings[0], tables.nodes, tables.floats
@@ -109,9 +119,10 @@ def column_pressures_barotropic(t, y, dydt, out, handle):
 
 @njit
 def apply_seating_drop(t, y, tables, out, k, x, index):
-    """Change p' of node x from that of a stationary column to that with column and valve in motion.
+    """Change p' of node x from its value for a column at rest to its value for a moving column and valve disc.
 
-    index : the seating valve that controls column k
+    p' : pressure change since the start [Pa], in `out`
+    k, index : numbers of the column, and of the valve near its seat that controls it
     """
     valve, pressure = tables.valves[index], tables.layout[0]["pressure"]
     still, ahead = head_drop(tables, out, index)[1], valve["from_node"] == x
@@ -123,7 +134,10 @@ def apply_seating_drop(t, y, tables, out, k, x, index):
 
 @njit
 def column_rates_barotropic(t, y, dydt, out, handle):
-    """d/dt of the flow in rigid columns: (A / L) (change of the driving pressure) - (drag - drag of the profile)."""
+    """Write d/dt of the flow in rigid columns [kg/s2] to `dydt`, from the changes of driving pressure and friction.
+
+    The rate is (A / L) (change of the driving pressure) - (drag - initial steady drag), with area A and length L.
+    """
     tables = open_tables(handle)
     for k in range(tables.columns.size if dydt.size > 0 else 0):
         at = tables.columns[k]["y"]

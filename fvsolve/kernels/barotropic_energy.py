@@ -1,9 +1,10 @@
-"""Power and stored energy of every part under the laws log and table.
+"""Power and stored energy of every part under the density laws log and table.
 
-A mass flow M carries the power M H, H = h(p) - h(p_ambient) + g z. A pipe stores M^2 / (2 m) + W(m) + m g z per length
-with dW/dm = h, W = m h - integral of A dp. A vessel of volume V stores m (h + g z) - (p - p_ambient) V, which is
-V (beta (exp(p / beta) - 1) - p) for a constant beta. A jet into a vessel loses M v^2 / 2. Rows as in
-`linear_energy.py`.
+h is the specific enthalpy, integral of dp / rho [J/kg], z the elevation above datum, m the mass per length of a pipe or
+the mass of a vessel. A mass flow M carries the power M H, H = h(p) - h(p_ambient) + g z. A pipe of area A stores M^2 /
+(2 m) + W(m) + m g z per length with dW/dm = h, W = m h - integral of A dp. A vessel of volume V stores m (h + g z) - (p
+- p_ambient) V. For a constant bulk modulus beta, z = 0 and gauge pressure p this is V (beta (exp(p / beta) - 1) - p). A
+jet of velocity v into a vessel loses M v^2 / 2. Entries of `power` and `stored` are those of `linear_energy.py`.
 """
 
 from fvsolve.jit import njit
@@ -40,13 +41,17 @@ MIN_CONTENT = 1e-6  # least mass per length, relative to that of a full pipe
 
 @njit
 def relative_enthalpy(st, floats, p):
-    """h(p) - h(p_ambient) [J/kg]."""
+    """Specific enthalpy above its value at ambient pressure, h(p) - h(p_ambient) [J/kg]."""
     return enthalpy(st, floats, p) - enthalpy(st, floats, st["ambient"])
 
 
 @njit
 def energy_head(st, floats, node, p):
-    """Energy per mass of fluid that enters a node at pressure p [J/kg], for any law."""
+    """Energy per mass of fluid that enters a node at pressure p [J/kg], under any density law.
+
+    It is (p - p_ambient) / rho + g z under the linear law, else h(p) - h(p_ambient) + g z, with the specific enthalpy h
+    and the elevation z above datum.
+    """
     height = st["gravity"] * (node["elevation"] - st["datum"])
     if st["law"] == LAW_LINEAR:
         return (p - st["ambient"]) / st["rho"] + height
@@ -55,7 +60,7 @@ def energy_head(st, floats, node, p):
 
 @njit
 def total_head(tables, out, i):
-    """H = h(p) - h(p_ambient) + g z of node i [J/kg]."""
+    """Energy per mass at node i, H = h(p) - h(p_ambient) + g z [J/kg]: specific enthalpy h and elevation z above datum."""
     st, node = tables.settings[0], tables.nodes[i]
     h = relative_enthalpy(st, tables.floats, node["pressure"] + out[tables.layout[0]["pressure"] + i])
     return h + st["gravity"] * (node["elevation"] - st["datum"])
@@ -63,7 +68,10 @@ def total_head(tables, out, i):
 
 @njit(forceinline=True)
 def profile_mass(profile, pipe, i, point):
-    """Mass per length of the profile [kg/m] at a Gauss point of cell i: a parabola through its faces and centre."""
+    """Mass per length of the initial steady state [kg/m] at a Gauss point of cell i.
+
+    A parabola through the values of `profile` at both faces and the centre of the cell.
+    """
     left, right, middle = profile[pipe["face"] + i], profile[pipe["face"] + i + 1], profile[pipe["center"] + i]
     s = GAUSS_POINTS[point]
     return middle + s * ((right - left) + 2.0 * s * ((left - middle) + (right - middle)))
@@ -71,13 +79,18 @@ def profile_mass(profile, pipe, i, point):
 
 @njit(forceinline=True)
 def mass_at_point(st, profile, pipe, i, point, change):
-    """Mass per length [kg/m] at a Gauss point of cell i; a cavity is never quite empty."""
+    """Mass per length [kg/m] at a Gauss point of cell i: initial steady value plus `change`, never quite zero."""
     return max(profile_mass(profile, pipe, i, point) + change, MIN_CONTENT * st["rho"] * pipe["area"])
 
 
 @njit
 def pipe_power_barotropic(st, floats, profile, pipe, z, r, l, dr, dl, rows):
-    """Write friction and rate of stored energy of a pipe; z : height of its `from` end [m]."""
+    """Write dissipation by friction to rows[1] and the rate of stored energy to rows[3], both of a pipe [W].
+
+    z : elevation of its `from` end above datum [m]
+    r, l : float64[cells]  forward and backward wave [kg/s]
+    dr, dl : float64[cells]  d/dt of both waves [kg/s2]
+    """
     n, c, width, dx = r.size, pipe["speed"], polynomial_width(st, r.size), pipe["dx"]
     base, reference = enthalpy(st, floats, st["ambient"]), st["rho"] * pipe["area"]
     friction, rate = 0.0, 0.0
@@ -97,7 +110,11 @@ def pipe_power_barotropic(st, floats, profile, pipe, z, r, l, dr, dl, rows):
 
 @njit
 def pipe_energy_barotropic(st, floats, profile, pipe, z, r, l, rows):
-    """Write the changes of kinetic and of elastic energy (with energy of height) of a pipe since the profile."""
+    """Write the energy changes of a pipe since the start [J]: kinetic to rows[0], elastic and potential to rows[1].
+
+    z : elevation of its `from` end above datum [m]
+    r, l : float64[cells]  forward and backward wave [kg/s]
+    """
     n, c, width, dx = r.size, pipe["speed"], polynomial_width(st, r.size), pipe["dx"]
     base = enthalpy(st, floats, st["ambient"])
     kinetic, elastic = 0.0, 0.0
@@ -117,7 +134,10 @@ def pipe_energy_barotropic(st, floats, profile, pipe, z, r, l, rows):
 
 @njit
 def jet_losses(profile, pipe, out, end, nodes):
-    """Power lost by jets into vessels at both ends of a pipe, M v^2 / 2 [W]."""
+    """Power lost by the jets from both ends of a pipe into tanks, chambers and reservoirs, M v^2 / 2 [W].
+
+    end : index in `out` of the four waves at the ends of the pipe (forward and backward at `from`, then at `to`) [kg/s]
+    """
     lost = 0.0
     for side in range(2):
         i = pipe["to_node"] if side == 1 else pipe["from_node"]
@@ -131,7 +151,7 @@ def jet_losses(profile, pipe, out, end, nodes):
 
 @njit
 def power_barotropic(t, y, dydt, out, handle, power):
-    """Fill `power` from a state, its rates and the values in `out`."""
+    """Fill `power` [W] for every part, in the order given in `linear_energy.py`, from a state and its rates."""
     tables = open_tables(handle)
     st, layout, nodes, pipes = tables.settings[0], tables.layout[0], tables.nodes, tables.pipes
     valves, columns, floats, profile = tables.valves, tables.columns, tables.floats, tables.profile
@@ -174,7 +194,11 @@ def power_barotropic(t, y, dydt, out, handle, power):
 
 @njit
 def power_pistons_barotropic(y, dydt, out, tables, power, at):
-    """Write the rows of pistons and the storage of their chambers, H dm - (p - p_ambient) dV."""
+    """Write leak loss, friction and zero of each piston [W] to power[at] and following entries.
+
+    Also write the rate of energy stored in each chamber, H dm/dt - (p - p_ambient) dV/dt [W], with energy per mass H
+    [J/kg], mass m and volume V.
+    """
     nodes, pistons = tables.nodes, tables.pistons
     pressure = tables.layout[0]["pressure"]
     for k in range(pistons.size):
@@ -194,14 +218,17 @@ def power_pistons_barotropic(y, dydt, out, tables, power, at):
 
 @njit
 def vessel_energy(st, floats, node, mass, volume, p):
-    """m (h + g z) - (p - p_ambient) V [J]."""
+    """Energy of a vessel, m (h + g z) - (p - p_ambient) V [J]: mass m, volume V, elevation z above datum.
+
+    h : specific enthalpy above its value at ambient pressure [J/kg]
+    """
     head = relative_enthalpy(st, floats, p) + st["gravity"] * (node["elevation"] - st["datum"])
     return mass * head - (p - st["ambient"]) * volume
 
 
 @njit
 def stored_barotropic(t, y, dydt, out, handle, stored):
-    """Fill `stored`, changes since the profile [J]."""
+    """Fill `stored` with the energy changes of every part since the start [J], in the order of `linear_energy.py`."""
     tables = open_tables(handle)
     st, layout, nodes, pipes = tables.settings[0], tables.layout[0], tables.nodes, tables.pipes
     columns, pistons, floats = tables.columns, tables.pistons, tables.floats
@@ -243,7 +270,7 @@ def stored_barotropic(t, y, dydt, out, handle, stored):
 
 @njit
 def vessel_power(dydt, out, tables, device):
-    """Rate of the energy of a vessel [W]: energy per mass, P / rho or h(p) - h(p_ambient) + g z, times dm/dt."""
+    """Rate of the energy stored in the vessel of a device [W]: energy per mass of the fluid that enters, times dm/dt."""
     i, nodes = device["node"], tables.nodes
     p = nodes[i]["pressure"] + out[tables.layout[0]["pressure"] + i]
     return energy_head(tables.settings[0], tables.floats, nodes[i], p) * dydt[nodes[i]["y"]]

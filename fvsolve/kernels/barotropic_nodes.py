@@ -1,7 +1,8 @@
-"""Nodes under the laws log and table: stagnation enthalpy is conserved, flows have the upstream density.
+"""Pressures and flows at nodes under the density laws log and table.
 
-A simple wave leads from the state extrapolated from the cells to the state at the pipe end, where
-h(p_end) + v^2 / 2 = h(p_node). A jet into a tank, chamber or reservoir loses its v^2 / 2.
+Stagnation enthalpy is conserved from pipe ends to nodes, and flows through valves have the upstream density. A simple
+wave leads from the state extrapolated from the cells to the state at the pipe end, where h(p_end) + v^2 / 2 =
+h(p_node), with specific enthalpy h and velocity v. A jet into a tank, chamber or reservoir loses its v^2 / 2.
 """
 
 import numpy as np
@@ -55,13 +56,16 @@ FLOW_ERROR = 0.01
 
 @njit
 def head_pressure(st, floats, head):
-    """Pressure [Pa] under a column of `head` [m] open to ambient: h(p) = h(ambient) + g head."""
+    """Pressure [Pa] under a column of `head` [m] open to ambient: h(p) = h(ambient) + g head, h : specific enthalpy."""
     return pressure_of_enthalpy(st, floats, enthalpy(st, floats, st["ambient"]) + st["gravity"] * head)
 
 
 @njit
 def known_pressures_barotropic(t, y, dydt, out, handle):
-    """Write the pressure deviations [Pa] of fixed nodes, tanks and chambers, and the stiffness of softened chambers."""
+    """Write the pressure changes since the start [Pa] of fixed nodes, tanks and chambers to `out`.
+
+    Also write dp/dm [Pa/kg], pressure rise per stored mass, of chambers that contain gas.
+    """
     tables = open_tables(handle)
     st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
     for i in range(nodes.size):
@@ -85,12 +89,14 @@ def known_pressures_barotropic(t, y, dydt, out, handle):
 
 @njit
 def end_flow(st, floats, pipe, m_inside, into_inside, p_node, still):
-    """(flow into the node [kg/s], its slope over p_node, mass per length [kg/m]) of a pipe end, by Newton.
+    """Flow from a pipe end into its node under the laws log and table, by Newton.
 
-    m_inside, into_inside : mass per length and flow towards the node, extrapolated from the cells [kg/m, kg/s]
-    still : True if the node is a vessel at rest, not a junction
+    Returns the flow into the node [kg/s], its derivative by p_node [kg/s per Pa], and the mass per length at the end
+    [kg/m]. A simple wave leads from the extrapolated state to the end: v + integral of dp / (rho c) is constant.
 
-    A simple wave leads from there to the state at the end: v + integral of dp / (rho c) is constant.
+    m_inside, into_inside : mass per length [kg/m] and mass flow towards the node [kg/s], extrapolated from the cells
+    p_node : pressure of the node [Pa]
+    still : True if the node is a tank, chamber or reservoir, False for a junction
     """
     p_inside = pressure_of_mass(st, floats, pipe, m_inside)
     v_inside = into_inside / m_inside
@@ -116,10 +122,11 @@ def end_flow(st, floats, pipe, m_inside, into_inside, p_node, still):
 
 @njit
 def end_inflows_barotropic(out, tables, slope, final):
-    """Write the change of flow from pipes into every node at the present pressures to out[net], its slope to `slope`.
+    """Write the change of flow from pipes into every node since the start [kg/s] to out[net], at present pressures.
 
-    On entry out[ends] holds both waves extrapolated from the cells at each end; `final` replaces them with the waves of
-    the solved end states.
+    slope : float64[nodes]  receives the derivative of this flow by the pressure of the node [kg/s per Pa]
+    On entry out[ends] holds both waves [kg/s], extrapolated from the cells to each end. If `final` is True, they are
+    replaced with the waves of the solved end states.
     """
     st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
     pipes, profile = tables.pipes, tables.profile
@@ -150,7 +157,7 @@ def end_inflows_barotropic(out, tables, slope, final):
 
 @njit
 def outgoing_waves_barotropic(t, y, dydt, out, handle):
-    """Extrapolate both waves from the cells to both ends of every pipe, into out[ends]."""
+    """Extrapolate forward and backward wave [kg/s] from the cells to both ends of every pipe, into out[ends]."""
     tables = open_tables(handle)
     st, layout, pipes, work = tables.settings[0], tables.layout[0], tables.pipes, tables.scratch
     for i in range(pipes.size):
@@ -166,7 +173,7 @@ def outgoing_waves_barotropic(t, y, dydt, out, handle):
 
 @njit
 def mean_density(st, floats, p_i, p_j):
-    """Mean density dp / dh between two pressures [kg/m3]."""
+    """Mean density dp / dh between two pressures [kg/m3], h : specific enthalpy."""
     dp = p_i - p_j
     if abs(dp) > 1e-3:
         return dp / (enthalpy(st, floats, p_i) - enthalpy(st, floats, p_j))
@@ -175,7 +182,11 @@ def mean_density(st, floats, p_i, p_j):
 
 @njit
 def driving_pressure(st, floats, p_i, z_i, p_j, z_j):
-    """Driving pressure of a link, rho_mean (dh + g dz) [Pa], and upstream density [kg/m3]: p_i - p_j on one level."""
+    """(driving pressure of a link from node i to node j [Pa], upstream density [kg/m3]).
+
+    The driving pressure is rho_mean (h_i - h_j + g (z_i - z_j)), with specific enthalpy h and elevation z [m]. At equal
+    elevations it is p_i - p_j.
+    """
     dp = p_i - p_j
     if z_i != z_j:
         dh = enthalpy(st, floats, p_i) - enthalpy(st, floats, p_j)
@@ -185,7 +196,7 @@ def driving_pressure(st, floats, p_i, z_i, p_j, z_j):
 
 @njit
 def valve_driving_pressure(tables, out, k):
-    """(driving pressure of valve k [Pa], upstream density over reference density)."""
+    """(driving pressure of valve k [Pa], upstream density over reference density [-]), from the present pressures."""
     st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
     valve = tables.valves[k]
     i, j = valve["from_node"], valve["to_node"]
@@ -197,7 +208,12 @@ def valve_driving_pressure(tables, out, k):
 
 @njit
 def valve_target(tables, out, k, g):
-    """(M |M| of a valve by the square-root law, or its flow if the law has a laminar part; its conductance now)."""
+    """Flow that the law of valve k gives at the present pressures, and its conductance at upstream density [kg2/s2/Pa].
+
+    By the square-root law M |M| = G dp the first result is M |M| [kg2/s2]; if the law has a laminar part, it is the
+    flow M [kg/s].
+    g : conductance G at reference density [kg2/s2/Pa]
+    """
     valve = tables.valves[k]
     drop, denser = valve_driving_pressure(tables, out, k)
     dense = g * denser
@@ -210,7 +226,12 @@ def valve_target(tables, out, k, g):
 
 @njit
 def assemble_barotropic(cluster, out, tables, g, m, c, connected, slope, wide, a, s, lift, matrix, right):
-    """Newton system of a cluster's nodes, as in `node_clusters.assemble`, but with the slopes of the pipe ends."""
+    """Assemble Newton's linear system for the node pressures of a cluster (nodes that are solved together).
+
+    Arguments and results are those of `node_clusters.assemble`, except that the flows from pipe ends depend on
+    pressure.
+    slope : derivative of these flows into each node by its pressure [kg/s per Pa]
+    """
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
     integers, n = tables.integers, c.size
     matrix[:] = 0.0
@@ -234,11 +255,12 @@ def assemble_barotropic(cluster, out, tables, g, m, c, connected, slope, wide, a
 
 @njit
 def newton_step(cluster, out, tables, g, m, c, connected, slope, wide, work):
-    """Make a Newton step of a cluster; return its greatest relative change and whether it points to the root.
+    """Make a Newton step for the pressures and valve flows of a cluster (nodes that are solved together).
 
-    It points to the root if the errors of valve flows against their laws are so small (below the fraction FLOW_ERROR)
-    that the second-order error of Newton cannot reverse the imbalance of a node.
-    wide : see `restriction_step`
+    Returns the greatest relative change, and True if the step points to the root. It does if the errors of valve flows
+    against their laws are below the fraction FLOW_ERROR of the imbalance of the nodes. Then the second-order error of
+    Newton cannot reverse this imbalance.
+    wide : see `restrictions.restriction_step`
     """
     n, k = c.size, g.size
     matrix, right = work[: n * n], work[n * n : n * n + n]
@@ -263,7 +285,7 @@ def newton_step(cluster, out, tables, g, m, c, connected, slope, wide, work):
 
 @njit(forceinline=True)
 def largest_magnitude(a):
-    """Greatest magnitude of the entries."""
+    """Greatest magnitude of the entries of an array."""
     most = 0.0
     for i in range(a.size):
         most = max(most, abs(a[i]))
@@ -272,7 +294,10 @@ def largest_magnitude(a):
 
 @njit
 def limit_step(most, a, right):
-    """Limit a Newton step to a pressure rise of `most` [Pa], over which density grows by a factor e."""
+    """Scale a Newton step so that no pressure rises by more than `most` [Pa], over which density grows by a factor e.
+
+    a : changes of valve flows at constant drop [kg/s]; right : changes of node pressures [Pa]
+    """
     greatest = 0.0
     for r in range(right.size):
         greatest = max(greatest, right[r])
@@ -285,9 +310,9 @@ def limit_step(most, a, right):
 
 @njit
 def given_flows(t, y, out, tables):
-    """Write demands, inflows of junctions, and flows of valves between known pressures.
+    """Write demands, given inflows of junctions, and flows of valves between two nodes of known pressure to `out`.
 
-    The pressures of junctions are reset to those of the profile.
+    The pressures of junctions are reset to the initial steady state.
     """
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
     for i in range(nodes.size):
@@ -305,7 +330,7 @@ def given_flows(t, y, out, tables):
 
 @njit
 def is_undisturbed(cluster, tables, out):
-    """True if pipe ends bring exactly the flow of the profile into every node of a cluster."""
+    """True if the pipes bring exactly their initial steady flow into every node of a cluster (nodes solved together)."""
     for i in range(cluster["nodes"]):
         node = tables.integers[cluster["first_node"] + i]
         if out[tables.layout[0]["net"] + node] != 0.0:
@@ -315,7 +340,12 @@ def is_undisturbed(cluster, tables, out):
 
 @njit
 def node_work(tables):
-    """Work arrays of all clusters: (slope, c, connected, group of nodes; conductance, flow of valves; rest)."""
+    """Work arrays for solving all clusters (nodes solved together), as parts of `tables.scratch`.
+
+    Four arrays float64[nodes]: slope of the pipe flow into a node by its pressure [kg/s per Pa]; inflow c from all
+    links except valves [kg/s]; 1 if a node is connected to a known pressure, else 0; group number of isolated nodes.
+    Two arrays float64[valves]: conductance [kg2/s2/Pa]; flow [kg/s]. Last, the remaining scratch array.
+    """
     n, v, work = tables.nodes.size, tables.valves.size, tables.scratch
     g, m, rest = work[4 * n : 4 * n + v], work[4 * n + v : 4 * n + 2 * v], work[4 * n + 2 * v :]
     return (
@@ -331,8 +361,11 @@ def node_work(tables):
 
 @njit
 def cluster_work(tables):
-    """State of the iteration of each cluster: (done, last change, change before it, wide, sure).
+    """State of the Newton iteration of each cluster (nodes solved together): five arrays float64[clusters].
 
+    done : 1 if the cluster has converged
+    change, last_change : greatest relative change in the last step, and in the step before
+    wide : 1 while valves that pressure lifts are held wide open
     sure : 1 if the last step points to the root; it may point away until the flows of valves have reversed
     """
     n, v, n_clusters = tables.nodes.size, tables.valves.size, tables.clusters.size
@@ -348,9 +381,10 @@ def cluster_work(tables):
 
 @njit
 def begin_clusters(out, tables, space):
-    """Set valve flows and openings of all clusters before the first Newton step.
+    """Set flows and conductances of the valves of all clusters (nodes solved together) before the first Newton step.
 
-    A cluster counts as done if all is as in the profile; pipe ends are checked later.
+    A cluster counts as converged if all its values are those of the initial steady state; pipe ends are checked later.
+    space : work arrays of `node_work`
     """
     clusters, (_, c, connected, _, g, m, _), (done, change, _, wide, _) = tables.clusters, space, cluster_work(tables)
     a, b = 0, 0
@@ -367,7 +401,10 @@ def begin_clusters(out, tables, space):
 
 @njit
 def step_clusters(sweep, out, tables, space):
-    """Make a Newton step in every cluster that is disturbed and not done."""
+    """Make a Newton step in every cluster (nodes solved together) that is disturbed and has not converged.
+
+    sweep : number of the step, from 1; space : work arrays of `node_work`
+    """
     clusters, (slope, c, connected, _, g, m, rest), (done, change, last_change, wide, sure) = (
         tables.clusters, space, cluster_work(tables),
     )  # fmt: skip
@@ -392,7 +429,10 @@ def step_clusters(sweep, out, tables, space):
 
 @njit
 def check_clusters(out, tables, space):
-    """Mark converged clusters as done, each by its own last change; return True if any cluster is not done."""
+    """Mark clusters (nodes solved together) as converged, each by its own last change.
+
+    Returns True if any cluster has not converged. space : work arrays of `node_work`
+    """
     clusters, m, (done, change, last_change, wide, _), b, active = (
         tables.clusters, space[5], cluster_work(tables), 0, False,
     )  # fmt: skip
@@ -410,7 +450,10 @@ def check_clusters(out, tables, space):
 
 @njit
 def write_clusters(out, tables, space):
-    """Write the flows of the valves of all clusters."""
+    """Write the valve flows of all clusters (nodes solved together) to `out`, and pressures of isolated nodes.
+
+    space : work arrays of `node_work`
+    """
     clusters, (_, c, connected, group, g, m, _), change = tables.clusters, space, cluster_work(tables)[1]
     a, b = 0, 0
     for k in range(clusters.size):
@@ -421,10 +464,11 @@ def write_clusters(out, tables, space):
 
 @njit
 def solve_nodes_barotropic(t, y, dydt, out, handle):
-    """Solve all nodes by Newton: pressures of nodes, flows of valves, both waves at every pipe end.
+    """Solve all nodes under the laws log and table by Newton: node pressures, valve flows, waves at every pipe end.
 
-    In each sweep all clusters that are not done take a step, then all pipe ends are evaluated again. Each cluster stops
-    by its own change, so its result does not depend on other clusters. An undisturbed cluster is left as it is.
+    In each sweep, every cluster (nodes solved together) that has not converged makes a step; then all pipe ends are
+    evaluated again. Each cluster stops by its own change, so its result does not depend on other clusters. An
+    undisturbed cluster is left as it is.
     """
     tables = open_tables(handle)
     space = node_work(tables)

@@ -1,8 +1,9 @@
 """Rates and probes of pipes under the density laws log and table, with the full momentum flux.
 
-m_t + M_x = 0, M_t + (M^2 / m)_x + A p_x = -drag - m g slope. The waves r = (c m' + M') / 2, l = (c m' - M') / 2 are
-each reconstructed from the side they come from. The flux at a face is that of the state which both waves form there
-(a linearised Riemann solution with the reference wave speed c), minus the flux of the profile.
+m_t + M_x = 0, M_t + (M^2 / m)_x + A p_x = -drag - m g slope, with mass per length m [kg/m], mass flow M [kg/s] and area
+A. The waves r = (c m' + M') / 2 and l = (c m' - M') / 2 [kg/s] are each reconstructed from the side from which they
+come. m' and M' are changes since the initial steady state, c is the reference wave speed. The flux at a face is that of
+the state which both waves form there (a linearised Riemann solution), minus the initial steady flux.
 """
 
 from fvsolve.jit import njit
@@ -32,20 +33,27 @@ from fvsolve.kernels.tank_levels import tank_level
 
 @njit
 def momentum_flux(st, floats, pipe, m, flow):
-    """M^2 / m + integral of A dp [N]."""
+    """Momentum flux M^2 / m + integral of A dp [N] at the mass flow M = `flow` [kg/s] and the mass per length m [kg/m]."""
     return flow * flow / m + force_of_mass(st, floats, pipe, m)
 
 
 @njit
 def wall_force(pipe, reference, m, flow):
-    """Friction force per length [kg/s2] of a mass flow in a pipe with m [kg/m] mass per length."""
+    """Friction force per length [kg/s2] of a mass flow [kg/s] in a pipe with the mass per length m [kg/m].
+
+    reference : mass per length at the reference density [kg/m]
+    """
     friction = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], flow)
     return friction * (reference / m)
 
 
 @njit
 def pipe_rates_barotropic(st, floats, profile, pipe, r, l, ends, scratch, dr, dl):
-    """Write d/dt of both waves of a pipe; return the pipe's greatest rate (|v| + c) / dx [1/s]."""
+    """Write d/dt of both waves of a pipe [kg/s2] to dr and dl; return its greatest wave rate (|v| + c) / dx [1/s].
+
+    r, l : float64[cells]  forward and backward wave [kg/s]
+    ends : float64[4]  waves at the ends [kg/s]: forward and backward at `from`, then at `to`
+    """
     n, c, dx, flow = r.size, pipe["speed"], pipe["dx"], pipe["flow"]
     fr, fl = scratch[32 : 33 + n], scratch[40 + n : 41 + 2 * n]
     both_faces(st, pipe, r, l, ends[0], ends[1], ends[2], ends[3], scratch, fr, fl)
@@ -81,7 +89,10 @@ def pipe_rates_barotropic(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
 
 @njit
 def rates_barotropic(t, y, dydt, out, handle):
-    """Write d/dt of the waves in all pipe cells, unless `dydt` is empty; raise out[RATE] to their greatest rate."""
+    """Write d/dt of the waves in all pipe cells to `dydt`, and raise out[RATE] to the greatest wave rate [1/s].
+
+    Nothing is done if `dydt` is empty.
+    """
     tables = open_tables(handle)
     st, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
     for i in range(pipes.size if dydt.size > 0 else 0):
@@ -95,7 +106,7 @@ def rates_barotropic(t, y, dydt, out, handle):
 
 @njit
 def pipe_state_at(probe, index, y, out, tables):
-    """(mass per length [kg/m], mass flow [kg/s]) at the position of a probe in pipe `index`."""
+    """(mass per length [kg/m], mass flow [kg/s]) at the position of a probe in pipe number `index`."""
     pipe, at = tables.pipes[index], tables.layout[0]["ends"] + 4 * index
     r, l = out[at], out[at + 1]
     if probe["side"] > 0:
@@ -111,7 +122,10 @@ def pipe_state_at(probe, index, y, out, tables):
 
 @njit
 def pressure_or_head(st, floats, probe, p):
-    """Absolute or gauge pressure [Pa] of a probe, or its head (h(p) - h(ambient)) / g plus elevation [m]."""
+    """Value of a probe at the pressure p: a pressure, absolute or gauge [Pa], or a head [m].
+
+    The head is (h(p) - h(ambient)) / g plus elevation, h : specific enthalpy.
+    """
     if probe["head"] == 1:
         return (enthalpy(st, floats, p) - enthalpy(st, floats, st["ambient"])) / st["gravity"] + probe["offset"]
     return p + probe["offset"]
@@ -119,7 +133,7 @@ def pressure_or_head(st, floats, probe, p):
 
 @njit
 def valve_volume_flow(st, floats, tables, out, k):
-    """Volume flow of a valve [m3/s] at the upstream density."""
+    """Volume flow of valve k [m3/s] at the upstream density."""
     layout, nodes, valve = tables.layout[0], tables.nodes, tables.valves[k]
     flow = out[layout["valve"] + k]
     up = valve["from_node"] if flow >= 0.0 else valve["to_node"]
@@ -128,7 +142,11 @@ def valve_volume_flow(st, floats, tables, out, k):
 
 @njit
 def observe_barotropic(t, y, out, handle, values):
-    """Write the values of all probes; volume flows [m3/s] use the local density, of a valve the upstream one."""
+    """Write the values of all probes of nodes, pipes, valves and rigid columns, in SI units, to `values`.
+
+    Volume flows [m3/s] use the local density in pipes, the upstream density in valves, the reference density in
+    columns.
+    """
     tables = open_tables(handle)
     st, floats, layout, nodes = tables.settings[0], tables.floats, tables.layout[0], tables.nodes
     probes = tables.probes

@@ -1,8 +1,9 @@
 """Calls of compiled functions by address: each function is compiled once, and a model is a list of functions.
 
-Numba compiles every function again that a function calls; a call by address avoids this. All functions of a job have
-the same arguments: `t, y, dydt, out, handle`, and where they read a state also the vector that they fill. The law of
-a part is a set of functions named as in `HOOKS`, each with its own arguments. Exceptions raised in them are lost.
+Numba compiles every function again that a function calls; a call by address avoids this. All functions of a job, such
+as the right-hand side, have the same arguments: `t, y, dydt, out, handle`, and where they read a state also the vector
+that they fill. The law of a part, such as a pump, is a module with functions named as in `HOOKS`, each with arguments
+of its own. Exceptions raised in functions called by address are lost.
 """
 
 from __future__ import annotations
@@ -68,12 +69,12 @@ def _kinds() -> dict:
 
 
 def compile_as(function, letters: str):
-    """Compile a function for arguments of these types only; return it unchanged where JIT is off."""
+    """Compile a function for the argument types `letters` only (see `argument_types`); return it unchanged without JIT."""
     return declare_function(function, letters, argument_types)
 
 
 def function_address(function, letters: str):
-    """Address of a compiled function for the tables; the function itself where JIT is off.
+    """Memory address of a function compiled for the argument types `letters`; the function itself without JIT.
 
     The machine code stays in place as long as the function exists.
     """
@@ -81,7 +82,10 @@ def function_address(function, letters: str):
 
 
 def hook_of(law, name: str):
-    """Function of a law for a hook, None if the law has none; raises FvsolveError for a wrong number of arguments."""
+    """Function `name` of the module `law` of a part's law, None if the module has none.
+
+    name : key of `HOOKS`. Raises FvsolveError for a wrong number of arguments.
+    """
     function, expected = getattr(law, name, None), len(HOOKS[name][0])
     if function is None or function.__code__.co_argcount == expected:
         return function
@@ -90,14 +94,17 @@ def hook_of(law, name: str):
 
 
 def empty_calls(rows: int, columns: int) -> np.ndarray:
-    """Empty table for function addresses."""
+    """Table of zeros for function addresses, with a row for each job or law."""
     return np.zeros((rows, columns), dtype=np.int64 if COMPILING else object)
 
 
 if COMPILING:
 
     def call(letters: str, returned: str = ""):
-        """(signature, generator) of a call whose first argument is the address of the function."""
+        """Numba signature and code generator of a call whose first argument is the address of the function.
+
+        letters, returned : types of the other arguments and of the results, see `argument_types`
+        """
         from numba.core import types
 
         kinds = argument_types(letters)
@@ -114,82 +121,82 @@ if COMPILING:
 
     @Intrinsic
     def call_rates(typingctx, address, t, y, dydt, out, handle):
-        """Call the function at an address."""
+        """Call the function at `address`, which has the arguments of the right-hand side."""
         return call(RATES)
 
     @Intrinsic
     def call_reader(typingctx, address, t, y, out, handle, values):
-        """Call the function at an address."""
+        """Call the function at `address`, which reads a state and fills `values`."""
         return call(READS)
 
     @Intrinsic
     def call_energies(typingctx, address, t, y, dydt, out, handle, rows):
-        """Call the function at an address."""
+        """Call the function at `address`, which fills `rows` with powers [W] or stored energies [J]."""
         return call(ENERGIES)
 
     @Intrinsic
     def call_set(typingctx, address, t, y, out, tables, device):
-        """Call the hook at an address."""
+        """Call the function `set` of a device's law at `address`; see `HOOKS`."""
         return call(*HOOKS["set"])
 
     @Intrinsic
     def call_move(typingctx, address, t, y, dydt, out, tables, device):
-        """Call the hook at an address."""
+        """Call the function `move` of a device's law at `address`; see `HOOKS`."""
         return call(*HOOKS["move"])
 
     @Intrinsic
     def call_events(typingctx, address, t, y, out, tables, device, g):
-        """Call the hook at an address."""
+        """Call the function `events` of a device's law at `address`, which writes event functions to g; see `HOOKS`."""
         return call(*HOOKS["events"])
 
     @Intrinsic
     def call_value(typingctx, address, t, y, out, tables, device, quantity):
-        """Call the hook at an address."""
+        """Call the function `value` of a device's law at `address`: value of a quantity by its number; see `HOOKS`."""
         return call(*HOOKS["value"])
 
     @Intrinsic
     def call_outside(typingctx, address, out, tables, device):
-        """Call the hook at an address."""
+        """Call the function `outside` of a device's law at `address`, which checks the range of validity; see `HOOKS`."""
         return call(*HOOKS["outside"])
 
     @Intrinsic
     def call_power(typingctx, address, t, y, dydt, out, tables, device):
-        """Call the hook at an address."""
+        """Call the function `power` of a device's law at `address`, which returns three powers [W]; see `HOOKS`."""
         return call(*HOOKS["power"])
 
     @Intrinsic
     def call_stored(typingctx, address, y, tables, device):
-        """Call the hook at an address."""
+        """Call the function `stored` of a device's law at `address`, which returns its stored energy [J]; see `HOOKS`."""
         return call(*HOOKS["stored"])
 
     @Intrinsic
     def call_step(typingctx, address, out, tables, k, g, m, drop, denser, wide):
-        """Call the hook at an address."""
+        """Call the function `step` of the law of restriction k at `address`; see `restrictions.restriction_step`."""
         return call(*HOOKS["step"])
 
     @Intrinsic
     def call_slope(typingctx, address, out, tables, k, g, drop):
-        """Call the hook at an address."""
+        """Call the function `slope` of the law of restriction k at `address`: d flow / d drop [kg/s/Pa]; see `HOOKS`."""
         return call(*HOOKS["slope"])
 
     @Intrinsic
     def call_lift(typingctx, address, out, tables, k, g, drop, denser, wide):
-        """Call the hook at an address."""
+        """Call the function `lift` of the law of restriction k at `address`; see `restrictions.restriction_lift`."""
         return call(*HOOKS["lift"])
 
     @Intrinsic
     def call_bends(typingctx, address, tables, k, drop, g):
-        """Call the hook at an address."""
+        """Call the function `bends` of the law of restriction k at `address`: event functions, to g; see `HOOKS`."""
         return call(*HOOKS["bends"])
 
     @Intrinsic
     def call_lead(typingctx, address, t, y, tables, device, before, behind, drop, ahead):
-        """Call the hook at an address."""
+        """Call the function `lead` of a device's law at `address`, which returns dx/dt of its lift x; see `HOOKS`."""
         return call(*HOOKS["lead"])
 else:
 
     def call_rates(function, *arguments):
-        """Call a function."""
+        """Call a function with these arguments."""
         return function(*arguments)
 
     call_reader = call_energies = call_rates
@@ -199,9 +206,9 @@ else:
 
 @njit(forceinline=True)
 def derive_state(t, y, seen, out, handle):
-    """Write to `seen` the values that functions read in place of the state, in models where they differ.
+    """Write to `seen` the values that functions read in place of the state, in models where both differ.
 
-    seen : the array of the tables, or an empty part of it before rates, whose functions need less
+    seen : array `seen` of the tables. If it is empty, only values that the right-hand side needs are computed.
     """
     tables, k = open_tables(handle), 0
     while tables.calls[DERIVE, k] != 0:
@@ -211,7 +218,7 @@ def derive_state(t, y, seen, out, handle):
 
 @njit(forceinline=True)
 def run_job(job, t, y, dydt, out, handle):
-    """Call every function of a job with the arguments of the right-hand side."""
+    """Call every function of a job, such as RHS, in order, with the arguments of the right-hand side."""
     calls, k = open_tables(handle).calls, 0
     while calls[job, k] != 0:
         call_rates(calls[job, k], t, y, dydt, out, handle)
@@ -220,9 +227,10 @@ def run_job(job, t, y, dydt, out, handle):
 
 @njit
 def rhs_in_turn(t, y, dydt, out, handle):
-    """Call every function of the right-hand side; they read the states themselves, see `basins.stretch`.
+    """Call every function of the right-hand side in order: rates go to `dydt`, network values to `out`.
 
-    If `dydt` is empty and `out` depends on rates, the rates are computed in `work`.
+    The functions read the states themselves, see `basins.cell_stretching`. If `dydt` is empty and `out` depends on
+    rates, the rates are computed in a work array.
     """
     tables = open_tables(handle)
     derive_state(t, y, y[:0], out, handle)
@@ -234,14 +242,17 @@ def rhs_in_turn(t, y, dydt, out, handle):
 
 @njit
 def damp_in_turn(h, y, rates, quick, handle):
-    """Call every function that divides rates of a stage y by 1 + h r; quick : h r of the states that it divides."""
+    """Divide the rates of a stage y by 1 + h r, with the step h [s] and the rate r of fast linear decay [1/s].
+
+    quick : receives h r of the states whose rates are divided
+    """
     derive_state(0.0, y, open_tables(handle).seen, quick, handle)
     run_job(DAMP, h, y, rates, quick, handle)
 
 
 @njit
 def observe_in_turn(t, y, out, handle, values):
-    """Call every function that writes probe values."""
+    """Write all probe values to `values`: call every function that computes some of them."""
     tables, k = open_tables(handle), 0
     derive_state(t, y, tables.seen, out, handle)
     calls, seen = tables.calls, tables.seen if tables.seen.size > 0 else y
@@ -252,9 +263,9 @@ def observe_in_turn(t, y, out, handle, values):
 
 @njit
 def record_in_turn(t, y, out, handle, values):
-    """Write probe values, then call every function that records an accepted state.
+    """Write probe values to `values`, then call every function that records an accepted state.
 
-    Stops if a function has set the status AMENDED.
+    Stops if a function has set STATUS to AMENDED, because it has corrected the state.
     """
     tables, k = open_tables(handle), 0
     observe_in_turn(t, y, out, handle, values)
@@ -268,13 +279,13 @@ def record_in_turn(t, y, out, handle, values):
 
 @njit
 def solve_nodes_in_turn(t, y, out, handle, g):
-    """Solve the nodes before event functions are evaluated."""
+    """Solve node pressures and link flows at (t, y) into `out`, before event functions are evaluated; g is not used."""
     run_job(CLOSE, t, y, y[:0], out, handle)
 
 
 @njit
 def events_in_turn(t, y, handle, g):
-    """Call every function that writes event functions."""
+    """Write all event functions at (t, y) to g: call every function that computes some of them."""
     tables, k = open_tables(handle), 0
     calls, out = tables.calls, tables.spare
     derive_state(t, y, tables.seen, out, handle)
@@ -286,7 +297,7 @@ def events_in_turn(t, y, handle, g):
 
 @njit
 def power_in_turn(t, y, dydt, out, handle, power):
-    """Call every function that fills `power`."""
+    """Fill `power` [W]: call every function that computes some of its entries."""
     tables, k = open_tables(handle), 0
     derive_state(t, y, tables.seen, out, handle)
     calls, seen = tables.calls, tables.seen if tables.seen.size > 0 else y
@@ -297,7 +308,7 @@ def power_in_turn(t, y, dydt, out, handle, power):
 
 @njit
 def stored_in_turn(t, y, dydt, out, handle, stored):
-    """Call every function that fills `stored`."""
+    """Fill `stored` [J]: call every function that computes some of its entries."""
     tables, k = open_tables(handle), 0
     derive_state(t, y, tables.seen, out, handle)
     calls, seen = tables.calls, tables.seen if tables.seen.size > 0 else y

@@ -1,7 +1,8 @@
-"""Nodes under the density law mixture, where a pipe end may hold a cavity.
+"""Pressures and flows at nodes under the density law mixture, where a pipe end may hold a cavity.
 
-Differences from `barotropic_nodes.py`: the wave from the cells to the state at the end is the jump of `riemann.py`; a
-node has no effect on an end where the flow out of the pipe is supersonic; no pressure falls below the floor of the law.
+Differences from `barotropic_nodes.py`: a shock or a rarefaction (`riemann.py`) leads from the state in the cells to the
+state at the end. A node has no effect on an end where the flow out of the pipe is supersonic. No pressure falls below
+the floor pressure of the law.
 """
 
 from fvsolve.jit import njit
@@ -29,10 +30,13 @@ BISECTION_START = 30  # sweeps after which Newton steps are replaced by bisectio
 
 @njit
 def end_side(st, floats, pipe, inside, v_in, p_node, still):
-    """(state of an end, its velocity, slope of the velocity over p_node): h(p) + v^2 / 2 = h(p_node).
+    """State at a pipe end, where h(p) + v^2 / 2 = h(p_node), with specific enthalpy h and velocity v.
 
-    v_in, v : velocities towards the node
-    still : True if the node is a vessel at rest
+    Returns the state (see `riemann.state_at`), its velocity towards the node [m/s], and the derivative of this velocity
+    by p_node [m/s/Pa].
+
+    inside, v_in : state extrapolated from the cells, and its velocity towards the node [m/s]
+    still : True if the node is a tank, chamber or reservoir
 
     Where the flow runs into the node at more than half the speed of sound, or into a vessel at rest, the pressure of
     the end is that of the node: v^2 / 2 is lost.
@@ -62,9 +66,13 @@ def end_side(st, floats, pipe, inside, v_in, p_node, still):
 
 @njit
 def end_flow_of_state(st, floats, pipe, p_in, v_in, p_node, still):
-    """(flow into the node [kg/s], its slope over p_node, mass per length [kg/m]) of a pipe end.
+    """Flow from a pipe end into its node under the law mixture.
 
-    p_in, v_in : pressure and velocity towards the node, extrapolated from the cells
+    Returns the flow into the node [kg/s], its derivative by p_node [kg/s per Pa], and the mass per length at the end
+    [kg/m].
+
+    p_in, v_in : pressure [Pa] and velocity towards the node [m/s], extrapolated from the cells
+    still : True if the node is a tank, chamber or reservoir
     """
     inside = state_at(st, floats, pipe, p_in)
     side, v, slope = end_side(st, floats, pipe, inside, v_in, p_node, still)
@@ -76,17 +84,21 @@ def end_flow_of_state(st, floats, pipe, p_in, v_in, p_node, still):
 
 @njit
 def end_flow_cavitating(st, floats, pipe, m_inside, into_inside, p_node, still):
-    """`end_flow_of_state` from mass per length and mass flow extrapolated from the cells."""
+    """Results of `end_flow_of_state` from other data of the cells.
+
+    m_inside, into_inside : mass per length [kg/m] and mass flow towards the node [kg/s], extrapolated from the cells
+    """
     p = pressure_of_mass(st, floats, pipe, m_inside)
     return end_flow_of_state(st, floats, pipe, p, into_inside / m_inside, p_node, still)
 
 
 @njit
 def end_inflows_cavitating(out, tables, slope, final):
-    """Write the change of flow from pipes into every node at the present pressures to out[net], its slope to `slope`.
+    """Write the change of flow from pipes into every node since the start [kg/s] to out[net], at present pressures.
 
-    On entry out[ends] holds pressure and velocity [Pa, m/s] extrapolated from the cells at each end; `final` replaces
-    them with the waves of the solved end states.
+    slope : float64[nodes]  receives the derivative of this flow by the pressure of the node [kg/s per Pa]
+    On entry out[ends] holds pressure and velocity [Pa, m/s], extrapolated from the cells to each end. If `final` is
+    True, they are replaced with the waves of the solved end states [kg/s].
     """
     st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
     pipes = tables.pipes
@@ -114,11 +126,15 @@ def end_inflows_cavitating(out, tables, slope, final):
 
 @njit
 def bound_steps(sweep, out, tables, before, low, high):
-    """Keep the Newton step of every node within the bounds of its root; write the relative change of each cluster.
+    """Keep the Newton step of every node within bounds of its root; write the relative change of each cluster.
 
-    The inflow of a node that is alone in its cluster falls as its pressure rises. So each step with a sure direction
-    bounds the root on one side; after LONG sweeps the interval is halved. Other nodes are kept above the floor, and
-    take half steps after LONG sweeps.
+    A cluster is a set of nodes that are solved together. The inflow of a node that is alone in its cluster falls as its
+    pressure rises. So each step with a sure direction bounds the root on one side. After BISECTION_START sweeps the
+    interval is halved. Nodes of larger clusters are kept above the floor pressure, and take half steps after
+    BISECTION_START sweeps.
+
+    before : float64[nodes]  pressure changes since the start, before the step [Pa]
+    low, high : float64[nodes]  bounds of the pressures [Pa]
     """
     st, nodes, clusters = tables.settings[0], tables.nodes, tables.clusters
     pressure, floor, (done, change, _, _, sure) = tables.layout[0]["pressure"], st["floor"], cluster_work(tables)
@@ -150,9 +166,10 @@ def bound_steps(sweep, out, tables, before, low, high):
 
 @njit
 def reset_bounds(tables, low, high, first):
-    """Reset the bounds of clusters that begin.
+    """Reset the pressure bounds of the nodes of clusters whose iteration begins.
 
-    They begin at the first sweep, and again when the search with lifted valves held wide open has ended.
+    It begins at the first sweep (`first` is True), and again after the search with lifted valves held wide open.
+    low, high : float64[nodes]  bounds of the pressures [Pa]
     """
     clusters, (_, change, _, _, _) = tables.clusters, cluster_work(tables)
     for c in range(clusters.size):
@@ -164,7 +181,10 @@ def reset_bounds(tables, low, high, first):
 
 @njit
 def solve_nodes_cavitating(t, y, dydt, out, handle):
-    """`solve_nodes_barotropic` with pressures above the floor; a cluster is done when its pressures do not change."""
+    """Solve all nodes under the law mixture, as `solve_nodes_barotropic`, with pressures above the floor pressure.
+
+    The iteration of a cluster (nodes solved together) ends when its pressures do not change.
+    """
     tables = open_tables(handle)
     space, n, work = node_work(tables), tables.nodes.size, tables.scratch
     pressure, last_pressure = tables.layout[0]["pressure"], space[3]
@@ -186,10 +206,10 @@ def solve_nodes_cavitating(t, y, dydt, out, handle):
 
 @njit
 def balance_junctions(t, y, dydt, out, handle):
-    """Distribute the imbalance of junctions to their pipe ends, in proportion to their content: mass is conserved.
+    """Distribute the flow imbalance of each junction over its pipe ends in proportion to their mass: mass is conserved.
 
     An imbalance above rounding is a failure at a junction full of liquid. Where a cavity lies, the demand may exceed
-    the inflow, because no flow towards a place can be faster than sound.
+    the inflow, because no flow towards the junction can be faster than sound.
     """
     tables = open_tables(handle)
     layout, nodes, pipes, profile = tables.layout[0], tables.nodes, tables.pipes, tables.profile

@@ -1,8 +1,9 @@
-"""Rates and probes of pipes under the density law mixture, where cavities open and close.
+"""Rates and cavity records of pipes under the density law mixture, where cavities open and close.
 
-m_t + M_x = 0, M_t + (M^2 / m + F)_x = -drag - m g slope, F the integral of A dp. Pressure and velocity are
-reconstructed from both sides of a face. The flux is that of the Riemann problem there (`riemann.py`), minus the flux of
-the profile. So each front moves at its own speed: sound in the liquid, or the edge of a cavity a thousand times slower.
+m_t + M_x = 0, M_t + (M^2 / m + F)_x = -drag - m g slope, with mass per length m [kg/m], mass flow M [kg/s], area A and
+F the integral of A dp [N]. Pressure and velocity are reconstructed from both sides of a face. The flux is that of the
+Riemann problem there (`riemann.py`), minus the initial steady flux. So each front moves at its own speed: sound in the
+liquid, or the edge of a cavity a thousand times slower.
 """
 
 from fvsolve.jit import njit
@@ -22,7 +23,10 @@ DRY = 1e-8  # below it the velocity of a cell goes to zero with its content
 
 @njit
 def cell_state(st, floats, profile, pipe, i, r, l):
-    """(pressure, velocity) of cell i, then (pressure, velocity) of its profile [Pa, m/s]."""
+    """(pressure, velocity) of cell i, then (pressure, velocity) of its initial steady state [Pa, m/s].
+
+    r, l : forward and backward wave of the cells [kg/s]; profile : values of the initial steady state
+    """
     m0, flow = profile[pipe["center"] + i], pipe["flow"]
     m, dry = m0 + (r[i] + l[i]) / pipe["speed"], DRY * st["rho"] * pipe["area"]
     p0, v0 = pressure_of_mass(st, floats, pipe, m0), flow / m0
@@ -34,9 +38,10 @@ def cell_state(st, floats, profile, pipe, i, r, l):
 
 @njit(forceinline=True)
 def extrapolate_ends(a, n):
-    """Extrapolate values of n cells by a cell at each end, with the next but one difference.
+    """Extrapolate values of n cells to a cell beyond each end of the pipe: write a[0] and a[n + 1].
 
-    A limiter takes the smaller of the two differences.
+    The difference used is that between the second and the third cell from the end; a limiter compares it with the
+    difference between the first and the second cell and takes the smaller one.
     """
     near, far = min(2, n), min(3, n)
     a[0] = a[1] - (a[far] - a[near] if n > 2 else a[near] - a[1])
@@ -45,7 +50,11 @@ def extrapolate_ends(a, n):
 
 @njit
 def fill_cells(st, floats, profile, pipe, first, r, l, p, v, dp, dv):
-    """Write pressures and velocities of cells from `first` on, their deviations, and a cell beyond each end."""
+    """Write pressures and velocities of the cells from number `first` on, and of an extrapolated cell beyond each end.
+
+    p, v : float64[cells + 2]  pressure and velocity [Pa, m/s]
+    dp, dv : float64[cells + 2]  their changes since the initial steady state
+    """
     n = p.size - 2
     for i in range(n):
         p[i + 1], v[i + 1], p0, v0 = cell_state(st, floats, profile, pipe, first + i, r, l)
@@ -56,7 +65,7 @@ def fill_cells(st, floats, profile, pipe, first, r, l, p, v, dp, dv):
 
 @njit(forceinline=True)
 def face_value(st, a, k, ahead):
-    """Value of an array at the face after cell k (ahead = 1) or before it (ahead = -1)."""
+    """Value at the face after cell k (ahead = 1) or before it (ahead = -1), reconstructed from the values a of cells."""
     if st["scheme"] == UPWIND:
         return a[k]
     return value_muscl(st["limiter"], a[k - ahead], a[k], a[k + ahead])
@@ -64,13 +73,15 @@ def face_value(st, a, k, ahead):
 
 @njit
 def face_state(st, floats, profile, pipe, i, k, ahead, p, v, dp, dv):
-    """(pressure, velocity, True if both are those of the profile) at face i, reconstructed from cell k - 1.
+    """(pressure [Pa], velocity [m/s], True if both are initial steady values) at face i, reconstructed from cell k - 1.
 
-    k : number of the cell in p, v, dp, dv, which start with the cell beyond the end
+    k : index of this cell in p, v, dp, dv, which start with the cell beyond the end (see `fill_cells`)
+    ahead : 1 if the face is after the cell, -1 if it is before it
 
-    The profile is added to the deviation, with two exceptions. The first: this would bring the gas pressure below half
-    of that in the cell. The second: a cavity lies at an end of the pipe, where no liquid has weight or friction to
-    compress it. A face has at most twice the content of a cell with gas, so that no more flows out than there is.
+    The reconstructed change is added to the steady pressure, except in two cases. First, if this would bring the gas
+    pressure below half its value in the cell. Second, if a cavity lies at an end of the pipe, where no liquid has
+    weight or friction to compress it. In these cases the pressure itself is reconstructed. A face has at most twice the
+    mass per length of a cell with gas, so that no more flows out than there is.
     """
     dp_face, dv_face = face_value(st, dp, k, ahead), face_value(st, dv, k, ahead)
     undisturbed = dp_face == 0.0 and dv_face == 0.0
@@ -87,7 +98,11 @@ def face_state(st, floats, profile, pipe, i, k, ahead, p, v, dp, dv):
 
 @njit
 def end_states(st, floats, profile, pipe, r, l, ends, scratch):
-    """Extrapolate pressure and velocity [Pa, m/s] from the cells to both ends of a pipe, into ends[4]."""
+    """Extrapolate pressure and velocity from the cells to both ends of a pipe.
+
+    r, l : float64[cells]  forward and backward wave [kg/s]
+    ends : float64[4]  receives pressure and velocity at the `from` end, then at the `to` end [Pa, m/s]
+    """
     n = r.size
     n_near = min(n, 3)
     p, v, dp, dv = scratch[: n_near + 2], scratch[5 : n_near + 7], scratch[10 : n_near + 12], scratch[15 : n_near + 17]
@@ -100,7 +115,11 @@ def end_states(st, floats, profile, pipe, r, l, ends, scratch):
 
 @njit
 def pipe_rates_cavitating(st, floats, profile, pipe, r, l, ends, scratch, dr, dl):
-    """Write d/dt of both waves of a pipe; return the pipe's greatest rate (|v| + c) / dx [1/s]."""
+    """Write d/dt of both waves of a pipe [kg/s2] to dr and dl; return its greatest wave rate (|v| + c) / dx [1/s].
+
+    r, l : float64[cells]  forward and backward wave [kg/s]
+    ends : float64[4]  waves at the ends [kg/s]: forward and backward at `from`, then at `to`
+    """
     n, c, dx, flow = r.size, pipe["speed"], pipe["dx"], pipe["flow"]
     p, v = scratch[: n + 2], scratch[n + 2 : 2 * n + 4]
     dp, dv = scratch[2 * n + 4 : 3 * n + 6], scratch[3 * n + 6 : 4 * n + 8]
@@ -134,7 +153,10 @@ def pipe_rates_cavitating(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
 
 @njit
 def end_flux(st, floats, profile, pipe, i, r, l):
-    """Deviations of mass flow and momentum flux at end face i, from both waves there."""
+    """(mass flow [kg/s], momentum flux [N]) at end face i as changes since the initial steady state.
+
+    r, l : forward and backward wave at this face [kg/s]
+    """
     if r == 0.0 and l == 0.0:
         return 0.0, 0.0
     m, total = profile[pipe["face"] + i] + (r + l) / pipe["speed"], pipe["flow"] + (r - l)
@@ -144,7 +166,7 @@ def end_flux(st, floats, profile, pipe, i, r, l):
 
 @njit
 def outgoing_states_cavitating(t, y, dydt, out, handle):
-    """Extrapolate pressure and velocity from the cells to both ends of every pipe, into out[ends]."""
+    """Extrapolate pressure and velocity [Pa, m/s] from the cells to both ends of every pipe, into out[ends]."""
     tables = open_tables(handle)
     st, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
     floats, profile, scratch = tables.floats, tables.profile, tables.scratch
@@ -155,7 +177,10 @@ def outgoing_states_cavitating(t, y, dydt, out, handle):
 
 @njit
 def rates_cavitating(t, y, dydt, out, handle):
-    """Write d/dt of the waves in all pipe cells, unless `dydt` is empty; raise out[RATE] to their greatest rate."""
+    """Write d/dt of the waves in all pipe cells to `dydt`, and raise out[RATE] to the greatest wave rate [1/s].
+
+    Nothing is done if `dydt` is empty.
+    """
     tables = open_tables(handle)
     st, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
     for i in range(pipes.size if dydt.size > 0 else 0):
@@ -171,7 +196,9 @@ def rates_cavitating(t, y, dydt, out, handle):
 def record_cavity(t, pipe, r, l, at, tables):
     """Record the cavities of a pipe in marks[at : at + 3].
 
-    These are: place of the first cavity (fraction of the length), greatest volume [m3] and its time.
+    The entries are: position of the first cavity (fraction of the length), greatest volume [m3], time of this volume
+    [s].
+    r, l : float64[cells]  forward and backward wave [kg/s]
     """
     st, floats, profile, marks = tables.settings[0], tables.floats, tables.profile, tables.marks
     volume, first = 0.0, -1

@@ -1,9 +1,10 @@
 """Junctions of rigid columns whose valves are all closed: balance of flows, pressures, impulses.
 
-No flow leaves such a junction, so the flows into it add up to zero, and its pressure keeps them so:
-sum of (A / L) (P_far - P) = sum of friction terms. Flows that do not add up are equalised by an impulse J [Pa s] of
-pressure, dM = (A / L) J away from the junction: momentum is conserved (an inelastic impact). The rounding of the sum
-is removed in the same way. Columns controlled by valves have a given flow here.
+No flow leaves a junction of this kind, so the flows of its columns into it add up to zero, and its pressure P keeps
+them so: sum of (A / L) (P_far - P) = sum of friction terms, with area A, length L and pressure P_far at the far end of
+each column. Flows M that do not add up are equalised by an impulse J [Pa s] of pressure, dM = (A / L) J away from the
+junction: momentum is conserved (an inelastic impact). The rounding of the sum is removed in the same way. Columns
+controlled by valves have a given flow here.
 """
 
 from math import sqrt
@@ -33,7 +34,7 @@ def opens_by_event(tables, out, k):
 
 @njit
 def gate_area(tables, out, i):
-    """(sum of the square roots of the conductances of a node's valves, the sum at full opening).
+    """Present and full flow area of the valves at node i, as sums of square roots of conductances [kg/s/Pa^0.5].
 
     The second sum leaves out air valves and valves that only an event opens.
     """
@@ -48,21 +49,24 @@ def gate_area(tables, out, i):
 
 @njit
 def is_column_junction(tables, out, i):
-    """True if at least two columns join at node i and nothing else flows there."""
+    """True if at least two rigid columns join at node i and nothing else flows there."""
     node = tables.nodes[i]
     return node["gates"] >= 0 and node["columns"] > 1 and gate_area(tables, out, i)[0] == 0.0
 
 
 @njit
 def column_drag(column, flow):
-    """Friction of a column [kg/s2] at a flow [kg/s]."""
+    """Friction term of a rigid column [kg/s2] at a mass flow [kg/s]."""
     kind, loss, rough = column["friction"], column["loss"], column["rough"]
     return drag(kind, loss, rough, column["roughness"], column["reynolds"], flow)
 
 
 @njit(forceinline=True)
 def body_drive(tables, out, column):
-    """Energy per mass that the motion of its body gives a column since the start [J/kg]; 0 for a fixed column."""
+    """Change since the start of the energy per mass that the motion of its body gives a column [J/kg].
+
+    It is 0 for a fixed column.
+    """
     total, at = 0.0, tables.layout[0]["moving_segment"] + column["moving_segment"]
     for k in range(column["moving_segments"]):
         total += out[at + k]
@@ -71,13 +75,20 @@ def body_drive(tables, out, column):
 
 @njit(forceinline=True)
 def driving_offset(tables, out, column):
-    """Driving pressure of a column in addition to that of its ends [Pa]."""
+    """Driving pressure of a column in addition to the pressure changes of its ends [Pa].
+
+    It contains the initial driving pressure not balanced by friction, and the motion of the column's body.
+    """
     return column["offset"] + tables.settings[0]["rho"] * body_drive(tables, out, column)
 
 
 @njit
 def pressure_at(tables, out, i, extra, solved):
-    """p' of node i; of a junction, until nodes are `solved`, an estimate from its pipes and `extra` inflow [kg/s]."""
+    """Pressure change of node i since the start [Pa].
+
+    If nodes are not `solved` yet, the value of a junction is an estimate from the waves of its pipes and `extra` inflow
+    [kg/s].
+    """
     layout, node = tables.layout[0], tables.nodes[i]
     if node["kind"] != JUNCTION or solved:
         return out[layout["pressure"] + i]
@@ -86,9 +97,10 @@ def pressure_at(tables, out, i, extra, solved):
 
 @njit
 def has_pressure_reference(tables, out, i, k, seen):
-    """True if columns other than k, not controlled by valves, join junction i to a node of another kind.
+    """True if rigid columns other than k join junction i to a node that is not a column junction, also indirectly.
 
-    seen[] : 1 for the nodes that these columns join
+    Columns that valves control are left out.
+    seen : float64[nodes]  work array; 1 for the nodes that these columns join
     """
     columns, controlled = tables.columns, tables.layout[0]["valve_controlled"]
     seen[:] = 0.0
@@ -108,7 +120,10 @@ def has_pressure_reference(tables, out, i, k, seen):
 
 @njit
 def is_pinned(tables, out, i, seen):
-    """True if junction i is the first of a connected group in which no node sets the level of pressure."""
+    """True if column junction i is the first of a connected group in which no node sets the level of pressure.
+
+    The pressure of a pinned junction is held. seen : float64[nodes]  work array
+    """
     if has_pressure_reference(tables, out, i, -1, seen):
         return False
     for j in range(i):
@@ -119,7 +134,15 @@ def is_pinned(tables, out, i, seen):
 
 @njit
 def junction_work(tables, n):
-    """Work arrays in scratch: (row of each node, marks of nodes, matrix, right side, pinned, given)."""
+    """Work arrays for n column junctions, as parts of `tables.scratch`.
+
+    rows : float64[nodes]  number of each node as a column junction, -1 for other nodes
+    marks : float64[nodes]  marks of nodes
+    matrix : float64[n * n]  matrix of the equations for the pressures [m]
+    right : float64[n]  right-hand side, then solution
+    pinned : float64[n]  1 for a junction whose pressure is held
+    given : float64[n]  flow rates of columns that valves control [kg/s2]
+    """
     n_nodes, work = tables.nodes.size, tables.scratch
     at = 2 * n_nodes + n * n
     right, pinned, given = work[at : at + n], work[at + n : at + 2 * n], work[at + 2 * n : at + 3 * n]
@@ -128,7 +151,7 @@ def junction_work(tables, n):
 
 @njit
 def number_junctions(tables, out):
-    """Number the column junctions in scratch, -1 for other nodes; return their count."""
+    """Number the column junctions in node order, in scratch (-1 for other nodes); return their count."""
     rows, n = tables.scratch, 0
     for i in range(tables.nodes.size):
         rows[i] = -1.0
@@ -140,9 +163,10 @@ def number_junctions(tables, out):
 
 @njit
 def assemble_junctions(tables, out, n, k):
-    """Matrix of n column junctions: sums of A / L of their columns [m], except valve-controlled columns and column k.
+    """Assemble the matrix for the pressures of n column junctions: sums of A / L of their columns [m].
 
-    Clears the right side and marks pinned junctions.
+    Valve-controlled columns and column k (-1: none) are left out. Clears the right-hand side and marks pinned
+    junctions. A : area, L : length of a column
     """
     rows, seen, matrix, right, pinned, _ = junction_work(tables, n)
     columns, controlled = tables.columns, tables.layout[0]["valve_controlled"]
@@ -166,7 +190,7 @@ def assemble_junctions(tables, out, n, k):
 
 @njit
 def assemble_with_given(tables, out, n):
-    """`assemble_junctions` with the given rates on the right side."""
+    """Call `assemble_junctions`, and copy the flow rates of valve-controlled columns [kg/s2] to the right-hand side."""
     assemble_junctions(tables, out, n, -1)
     _, _, _, right, _, given = junction_work(tables, n)
     for r in range(n):
@@ -175,7 +199,10 @@ def assemble_with_given(tables, out, n):
 
 @njit
 def solve_junctions(tables, out, n):
-    """right <- matrix^-1 right; a pinned row keeps its value on the right side."""
+    """Solve the linear equations of n column junctions; the solution replaces the right-hand side in scratch.
+
+    The solution of a pinned junction is its value on the right-hand side. STATUS is NO_SOLUTION for a singular matrix.
+    """
     _, _, matrix, right, pinned, _ = junction_work(tables, n)
     for r in range(n):
         if pinned[r] > 0.0:
@@ -187,15 +214,15 @@ def solve_junctions(tables, out, n):
 
 @njit
 def value_at(rows, right, i):
-    """Solution at node i, 0 if it is not a column junction."""
+    """Entry of `right` for node i, 0 if it is not a column junction; rows : see `junction_work`."""
     return right[int(rows[i])] if rows[i] >= 0.0 else 0.0
 
 
 @njit
 def balance_junction_flows(tables, out):
-    """Make the flows into column junctions add up to zero, by impulses.
+    """Make the flows into each column junction add up to zero, by pressure impulses (inelastic impact of the columns).
 
-    Changes out[column] and out[net], which hold flows and changes since the profile.
+    Changes out[column], the flows of columns, and out[net], the changes of net inflow of nodes since the start [kg/s].
     """
     n = number_junctions(tables, out)
     if n == 0:
@@ -219,7 +246,7 @@ def balance_junction_flows(tables, out):
 
 @njit
 def gate_inflow(tables, i):
-    """Flow into a node through its valves in the profile [kg/s]."""
+    """Flow into node i through its valves in the initial steady state [kg/s]."""
     node, valves, total = tables.nodes[i], tables.valves, 0.0
     for e in range(node["gate_count"]):
         k = tables.integers[node["gates"] + e]
@@ -229,7 +256,10 @@ def gate_inflow(tables, i):
 
 @njit
 def add_flow_sums(tables, out, rows, right):
-    """Add to right[] the flows of columns into column junctions [kg/s]; exactly zero in the state of the start."""
+    """Add the sum of the flows of columns into each column junction [kg/s] to `right`; exactly zero at the start.
+
+    rows : see `junction_work`
+    """
     nodes, columns, at = tables.nodes, tables.columns, tables.layout[0]["column"]
     for i in range(rows.size):
         if rows[i] >= 0.0:
@@ -245,10 +275,11 @@ def add_flow_sums(tables, out, rows, right):
 
 @njit
 def add_column_rates(y, tables, out, n, skip, solved):
-    """Add to the right side the rates of flow of columns into column junctions at p' = 0 there [kg/s2].
+    """Add d/dt of the flows of columns into n column junctions [kg/s2] to the right-hand side of their equations.
 
-    Valve-controlled columns and column `skip` are left out. Until nodes are `solved`, flows come from the state and
-    pressures are estimates.
+    The rates are those at unchanged junction pressures. Valve-controlled columns and column `skip` are left out. Before
+    nodes are `solved`, flows come from the state and pressures are estimates. The entry of a pinned junction becomes
+    its pressure change since the start [Pa].
     """
     rows, _, _, right, pinned, _ = junction_work(tables, n)
     layout, columns = tables.layout[0], tables.columns
@@ -273,9 +304,10 @@ def add_column_rates(y, tables, out, n, skip, solved):
 
 @njit
 def far_end_pressure(y, tables, out, k, end, solved):
-    """(p' at the far end of column k while its flow is constant, its fall per d/dt of that flow [Pa s2/kg]).
+    """Pressure change at the far end of column k at constant flow [Pa], and its fall per d/dt of this flow [Pa s2/kg].
 
-    end : 1 or -1, the near end is the `to` or `from` end
+    end : 1 if the near end is the `to` end, -1 if it is the `from` end
+    solved : True if the pressures of nodes are solved, False if they are estimates
     """
     column = tables.columns[k]
     i = column["from_node"] if end == 1 else column["to_node"]

@@ -1,12 +1,14 @@
 """Flow of a rigid column whose only outlet valves are nearly closed: it follows the valves, not its inertia.
 
-If a column ends at a node without storage, only the valves of that node control it. Where these are nearly closed
-(below a thousandth of their full area), its time constant goes to zero with their area F, and its flow follows them:
-I = sum of F sqrt(dP), with the decelerating pressure (L / A) dI/dt = (L / A) sum of dF/dt sqrt(dP). When the last valve
-closes, no flow is possible: the column is stationary, and the node has the pressure of its far end.
+If a column ends at a node without storage, only the valves of that node control its flow I [kg/s]. Where they are
+nearly closed (below a thousandth of their full area), the time constant of the column goes to zero with their area F
+(square root of the conductance G = 2 rho (Cd A_valve)^2). The flow then follows them: I = sum of F sqrt(dP), with the
+decelerating pressure (L / A) dI/dt = (L / A) sum of dF/dt sqrt(dP). dP is the drop of a valve, L and A are length and
+area of the column. When the last valve closes, no flow is possible: the column is stationary, and the node has the
+pressure of its far end.
 
 A column also follows a disc that leaves its seat, if this disc is its only outlet, or the stem of a regulating valve.
-Lift x and flow start as powers of time, and dP = M^2 / (G x^2), there 0 / 0, would relax at an infinite rate. Until x
+Lift x and flow M start as powers of time, and dP = M^2 / (G x^2), there 0 / 0, would relax at an infinite rate. Until x
 has grown, dP drives both: (L / A) sqrt(G dP) dx/dt(dP) + dP = the stationary drop. The momentum of the column is
 conserved.
 """
@@ -36,10 +38,10 @@ RATE_INTERVAL = 1e-7  # interval over which the rate of an area is measured [s]
 
 @njit
 def is_controlled(tables, out, i):
-    """True if valves at node i control its column.
+    """True if the valves at node i control the flow of the rigid column there.
 
-    The node joins a single column and valves. These are closed, or nearly closed with known rates of area, or the only
-    valve is near its seat.
+    The node joins a single column and valves. All valves are closed, or they are nearly closed with known rates of
+    area, or the only valve is near its seat.
     """
     node = tables.nodes[i]
     if node["gates"] < 0 or node["columns"] > 1:
@@ -63,7 +65,7 @@ def area_rate_known(tables, out, i):
 
 @njit
 def find_control_end(tables, out, k):
-    """1 or -1 if valves control column k at its `to` or `from` end, else 0.
+    """End of rigid column k at which valves control its flow: 1 for `to`, -1 for `from`, 0 for none.
 
     If the far end is a column junction, it must have a pressure reference besides this column.
     """
@@ -81,7 +83,7 @@ def find_control_end(tables, out, k):
 
 @njit
 def find_controlled_columns(tables, out):
-    """Find the columns that their valves control; write the controlled end of each to `out`: `find_control_end`."""
+    """Write for each rigid column the end at which valves control its flow to `out`: results of `find_control_end`."""
     at, n = tables.layout[0]["valve_controlled"], tables.columns.size
     out[at : at + n] = 0.0
     for k in range(n):
@@ -90,13 +92,18 @@ def find_controlled_columns(tables, out):
 
 @njit
 def control_end(tables, out, k):
-    """1 or -1 if valves control column k at its `to` or `from` end, else 0."""
+    """End of rigid column k at which valves control its flow, stored in `out`: 1 for `to`, -1 for `from`, 0 for none."""
     return int(out[tables.layout[0]["valve_controlled"] + k])
 
 
 @njit
 def stationary_pressure(y, tables, out, k, end, solved):
-    """(p' at the controlled end of a column without driving pressure, fall of p' per d/dt of its flow [Pa s2/kg])."""
+    """Pressure change since the start at the controlled end of column k, as if the column were at rest [Pa].
+
+    The second result is the fall of this pressure per d/dt of the flow [Pa s2/kg].
+    end : 1 or -1, the controlled end is the `to` or `from` end
+    solved : True if the pressures of nodes are solved, False if they are estimates
+    """
     column = tables.columns[k]
     p, softness = far_end_pressure(y, tables, out, k, end, solved)
     inertia = column["length"] / column["area"]
@@ -105,9 +112,11 @@ def stationary_pressure(y, tables, out, k, end, solved):
 
 @njit
 def lift_drop(drop, still, slope, heavy):
-    """(drop across the valve that controls a column, dx/dt), by Newton on the root r: r^2 + heavy r dx/dt(r^2) = drop.
+    """Drop across a valve disc that controls a column [Pa], and the rate dx/dt of its lift [1/s], by Newton.
 
-    drop : the stationary drop; still : dx/dt at it; slope : of dx/dt over the drop; heavy : (L / A) sqrt(G)
+    The drop is r^2, with the root r of r^2 + heavy r dx/dt(r^2) = drop.
+    drop : drop with the column at rest [Pa]; still : dx/dt at this drop [1/s]
+    slope : derivative of dx/dt by the drop [1/s/Pa]; heavy : (L / A) sqrt(G), length, area of the column, conductance
     Newton starts above the root, because the cubic is convex from its greatest root on.
     """
     if drop <= 0.0 or still == 0.0:
@@ -126,14 +135,20 @@ def lift_drop(drop, still, slope, heavy):
 
 @njit
 def seating_valve(tables, i):
-    """Valve that is the only outlet of the column at node i and controls it from its seat; -1 for none."""
+    """Number of the valve near its seat that is the only outlet of the column at node i and controls it; -1 for none."""
     k = tables.integers[tables.nodes[i]["gates"]]
     return k if controls_column(tables, k) else -1
 
 
 @njit
 def seating_drop(t, y, tables, out, k, index, stationary, inertia, other, drop):
-    """(drop across the valve `index` that controls column k, dx/dt), from p' of a stationary column and its drop."""
+    """Drop across valve `index`, which controls column k near its seat [Pa], and the rate dx/dt of its lift [1/s].
+
+    stationary : pressure change since the start at the controlled end, as if the column were at rest [Pa]
+    inertia : pressure per d/dt of the flow, L / A of the column or more [Pa s2/kg]
+    other : pressure change since the start at the opposite end of the valve [Pa]
+    drop : drop across the valve for the column at rest [Pa]
+    """
     valve, column = tables.valves[index], tables.columns[k]
     device, heavy = tables.devices[valve["device"]], inertia * sqrt(valve["conductance"])
     ahead = valve["from_node"] == column["from_node"] or valve["from_node"] == column["to_node"]
@@ -149,10 +164,14 @@ def seating_drop(t, y, tables, out, k, index, stationary, inertia, other, drop):
 
 @njit
 def relaxed_root(y, tables, out, k, index, way, root, slope, heavy):
-    """Square root of the drop for a given step, relaxed where the step does not resolve the exchange of lift and flow.
+    """Square root of the valve drop for a fixed time step that does not resolve the exchange of lift and flow.
 
-    r = r0 + (M / sqrt(G) - x r0) / max(x, x1), x1 = 2 h 2 r0 (1 / heavy + r0 slope): M relaxes to x sqrt(G) r0 over at
-    least two steps, and not faster than by itself. The sum x / slope + (L / A) M is not changed by this.
+    r = r0 + (M / sqrt(G) - x r0) / max(x, x1), x1 = 2 h 2 r0 (1 / heavy + r0 slope), with `root` r0, flow M, lift x,
+    conductance G at full lift and step h. M relaxes to x sqrt(G) r0 over at least two steps, and not faster than by
+    itself. The sum x / slope + (L / A) M is not changed by this.
+
+    slope, heavy : see `lift_drop`
+    way : 1 if the flow of the column from `from` to `to` passes the valve in its own direction, else -1
     """
     dense, column = tables.valves[index]["conductance"], tables.columns[k]
     x = sqrt(conductance(tables, out, index) / dense)
@@ -163,7 +182,7 @@ def relaxed_root(y, tables, out, k, index, way, root, slope, heavy):
 
 @njit
 def seating_flow(t, y, tables, out, k, end, index, solved):
-    """`controlled_flow` of a column that a valve controls from its seat."""
+    """Results of `controlled_flow` for column k, which valve `index` controls near its seat."""
     valve, column = tables.valves[index], tables.columns[k]
     side = 1.0 if valve["from_node"] == (column["to_node"] if end == 1 else column["from_node"]) else -1.0
     stationary, inertia = stationary_pressure(y, tables, out, k, end, solved)
@@ -177,7 +196,12 @@ def seating_flow(t, y, tables, out, k, end, index, solved):
 
 @njit
 def gate_flow(t, tables, out, x, p, solved):
-    """(flow out of node x through its valves at p', its rate by the change of their areas, d rate / dp)."""
+    """Flow out of node x through its valves [kg/s], and the rate of this flow by the change of their areas [kg/s2].
+
+    The third result is the derivative of this rate by the pressure [kg/s2/Pa].
+    p : pressure change of the node since the start [Pa]
+    solved : True if the pressures of nodes are solved, False if they are estimates
+    """
     flow, rate, rise = 0.0, 0.0, 0.0
     for e in range(tables.nodes[x]["gate_count"]):
         k = tables.integers[tables.nodes[x]["gates"] + e]
@@ -193,7 +217,7 @@ def gate_flow(t, tables, out, x, p, solved):
 
 @njit
 def zero_flow_pressure(tables, out, x, index, solved):
-    """p' of node x at which there is no flow through its valve `index`."""
+    """Pressure change of node x since the start [Pa] at which there is no flow through its valve `index`."""
     valve = tables.valves[index]
     side = 1.0 if valve["from_node"] == x else -1.0
     other = pressure_at(tables, out, valve["to_node"] if side > 0.0 else valve["from_node"], 0.0, solved)
@@ -202,7 +226,7 @@ def zero_flow_pressure(tables, out, x, index, solved):
 
 @njit
 def zero_flow_range(tables, out, x, solved):
-    """(least, greatest) `zero_flow_pressure` of all valves of node x."""
+    """(least, greatest) `zero_flow_pressure` of all valves of node x [Pa]."""
     least, most = 1e300, -1e300
     for e in range(tables.nodes[x]["gate_count"]):
         level = zero_flow_pressure(tables, out, x, tables.integers[tables.nodes[x]["gates"] + e], solved)
@@ -212,7 +236,12 @@ def zero_flow_range(tables, out, x, solved):
 
 @njit
 def opening_pressure(t, tables, out, x, stationary, inertia, solved):
-    """p' of node x whose valves open: the only root of p - stationary + inertia rate(p), by bounded Newton."""
+    """Pressure change since the start of node x, whose valves open and control a column [Pa], by bounded Newton.
+
+    It is the only root p of p - stationary + inertia rate(p) = 0, with the rate of `gate_flow`.
+    stationary : pressure change as if the column were at rest [Pa]
+    inertia : pressure per d/dt of the flow [Pa s2/kg]
+    """
     low, high = zero_flow_range(tables, out, x, solved)
     low, high, p = min(low, stationary), max(high, stationary), stationary
     for _ in range(200):
@@ -230,9 +259,11 @@ def opening_pressure(t, tables, out, x, stationary, inertia, solved):
 
 @njit
 def closing_pressure(t, tables, out, x, way, start, stationary, inertia, solved):
-    """(p' of node x whose valves close on a flow in direction `way`, True if a root exists), by Newton from outside.
+    """(pressure change since the start of node x, whose valves close on a flow [Pa], True if a root exists).
 
-    way : 1 for flow out of the node, -1 into it
+    way : direction of the flow, 1 out of the node, -1 into it
+    start : pressure at which Newton starts, outside all roots [Pa]
+    stationary, inertia : see `opening_pressure`
     p - stationary + inertia rate(p) is convex there; flows tend to its outermost root.
     """
     p = start
@@ -250,8 +281,9 @@ def closing_pressure(t, tables, out, x, way, start, stationary, inertia, solved)
 
 @njit
 def controlled_pressure(t, tables, out, x, own, stationary, inertia, solved):
-    """p' of node x whose valves control a column that brings the flow `own` [kg/s].
+    """Pressure change since the start [Pa] of node x, whose valves control a column that brings the flow `own` [kg/s].
 
+    stationary, inertia : see `opening_pressure`
     Closing valves may allow a flow in either direction: the direction of the present flow is tried first.
     """
     flow, rate, _ = gate_flow(t, tables, out, x, stationary, solved)
@@ -274,10 +306,11 @@ def controlled_pressure(t, tables, out, x, own, stationary, inertia, solved):
 
 @njit
 def controlled_rate(t, y, tables, out, k, end):
-    """d/dt of the flow out of column k that its valves control; its state keeps its direction to the end.
+    """d/dt of the flow of column k out of its end that valves control [kg/s2]; the flow keeps its direction.
 
     At the switch to valve control the state has an error of about 1 %. Below the fraction SWITCH_LOSS of the flow it is
     relaxed to zero instead of changing sign.
+    end : 1 or -1, the controlled end is the `to` or `from` end
     """
     flow, rate, _ = controlled_flow(t, y, tables, out, k, end, True)
     column = tables.columns[k]
@@ -290,7 +323,12 @@ def controlled_rate(t, y, tables, out, k, end):
 
 @njit
 def controlled_flow(t, y, tables, out, k, end, solved):
-    """(flow out of column k through the valves that control it, its rate, p' of that end)."""
+    """Flow of column k out of its controlled end [kg/s], d/dt of this flow [kg/s2], pressure change of the end [Pa].
+
+    The pressure change is relative to the start.
+    end : 1 or -1, the controlled end is the `to` or `from` end
+    solved : True if the pressures of nodes are solved, False if they are estimates
+    """
     column, limit = tables.columns[k], tables.clock[0]["limit"]
     x = column["to_node"] if end == 1 else column["from_node"]
     if seating_valve(tables, x) >= 0:

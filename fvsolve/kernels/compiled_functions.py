@@ -17,10 +17,10 @@ COMPILE_MARCH = "from fvsolve.steppers.time_loop import compiled; compiled()"
 
 
 class Functions:
-    """Compiled functions of a model: `rhs`, `observe`, `record`, `events`, and `energies` when they are first used.
+    """Compiled functions of a model: `rhs`, `observe`, `record`, `events`, and `energies`, compiled at first use.
 
     calls : int64[jobs, n]  addresses of functions, a row for each job
-    hooks : int64[laws, hooks]  addresses of the functions of parts' laws; both stand behind the handle of a model
+    hooks : int64[laws, hooks]  addresses of the functions of parts' laws; the handle of a model contains both arrays
     """
 
     def __init__(self, cast: ModelFeatures) -> None:
@@ -47,20 +47,23 @@ class Functions:
         ]
 
     def store_hooks(self, *hooks: str) -> None:
-        """Write the addresses of these hooks of all laws to `hooks`."""
+        """Write the addresses of the law functions with these names (keys of `calls.HOOKS`) of all laws to `hooks`."""
         for row, law in zip(self.hooks, self.cast.modules(), strict=True):
             for hook in hooks:
                 if (function := calls.hook_of(law, hook)) is not None:
                     row[HOOK[hook]] = calls.function_address(function, calls.HOOKS[hook][0])
 
     def compile_job(self, job: int, functions: list, in_turn):
-        """Store all functions of a job; return the compiled function that calls them in turn."""
+        """Store the addresses of all functions of a job; return `in_turn`, compiled, which calls them in turn."""
         self.store_addresses(job, functions)
         return calls.compile_as(in_turn, calls.ARGUMENTS[job].lower())
 
     @functools.cached_property
     def energies(self) -> tuple:
-        """(power, stored), functions of (t, y, dydt, out, handle, rows)."""
+        """Compiled functions (power, stored), which fill an array with powers [W] or stored energies [J].
+
+        Their arguments are (t, y, dydt, out, handle, rows).
+        """
         self.store_hooks(*ENERGY_HOOKS)
         power, stored = self.cast.functions("power"), self.cast.functions("stored")
         return self.compile_job(calls.POWER, power, calls.power_in_turn), self.compile_job(
@@ -72,7 +75,7 @@ functions = compile_once(Functions)
 
 
 def compile_readers(cast: ModelFeatures) -> tuple:
-    """(record, events) of a model, compiled together with all functions that they call."""
+    """Compiled functions (record, events) of a model; all functions that they call are compiled too."""
     for function in cast.functions("observe", "record", "events"):
         calls.function_address(function, calls.READS)
     for law in cast.modules():
@@ -85,7 +88,7 @@ def compile_readers(cast: ModelFeatures) -> tuple:
 
 @compile_once
 def fused_step_function(needed: bool):
-    """Fused step of upwind and Euler under the linear law if `needed`, else an unused function of that type."""
+    """Compiled combined step of upwind scheme and Euler method if `needed`, else a placeholder with the same arguments."""
     step_function = unused_step
     if needed:
         from fvsolve.kernels.fused_step import fused_step_linear as step_function

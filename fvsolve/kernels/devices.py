@@ -1,4 +1,4 @@
-"""Loops over all devices of a model that call the hooks of their laws."""
+"""Loops over all devices of a model, which call the functions of the devices' laws by address."""
 
 from fvsolve.jit import njit
 from fvsolve.kernels.calls import (
@@ -23,7 +23,7 @@ TEMPORARY = 2  # result of a hook `outside`: to be reported, but it ends by itse
 
 @njit
 def set_devices(t, y, dydt, out, handle):
-    """Conductances, speeds, pressures and stiffness set by devices before the nodes are solved."""
+    """Write conductances, speeds, pressures and stiffness that devices set to `out`, before the nodes are solved."""
     tables = open_tables(handle)
     for k in range(tables.devices.size):
         device = tables.devices[k]
@@ -34,7 +34,7 @@ def set_devices(t, y, dydt, out, handle):
 
 @njit
 def device_rates(t, y, dydt, out, handle):
-    """d/dt of the states of devices, unless `dydt` is empty; raise out[RATE] to their greatest rates."""
+    """Write d/dt of the states of devices to `dydt`, unless it is empty; raise out[RATE] to their greatest rate [1/s]."""
     tables = open_tables(handle)
     for k in range(tables.devices.size):
         device = tables.devices[k]
@@ -45,7 +45,7 @@ def device_rates(t, y, dydt, out, handle):
 
 @njit
 def device_events(t, y, out, handle, g):
-    """Event functions of devices, from a state with solved nodes."""
+    """Write the event functions of devices to g, from a state with solved nodes."""
     tables = open_tables(handle)
     for k in range(tables.devices.size):
         device = tables.devices[k]
@@ -56,7 +56,7 @@ def device_events(t, y, out, handle, g):
 
 @njit
 def observe_devices(t, y, out, handle, values):
-    """Values of the probes of devices."""
+    """Write the values of the probes of devices to `values`."""
     tables = open_tables(handle)
     probes = tables.probes
     for k in range(probes.size):
@@ -69,9 +69,9 @@ def observe_devices(t, y, out, handle, values):
 
 @njit
 def record_devices(t, y, out, handle, values):
-    """First time at which each device leaves the range of validity of its law.
+    """Record the first time at which each device leaves the range of validity of its law.
 
-    Temporary violations are recorded apart from others.
+    Temporary violations, which end by themselves, are recorded apart from others.
     """
     tables = open_tables(handle)
     marks, devices = tables.marks, tables.devices
@@ -86,7 +86,7 @@ def record_devices(t, y, out, handle, values):
 
 @njit
 def power_devices(t, y, dydt, out, handle, power):
-    """Rows of devices in `power` [W]: power supplied, rate of stored energy, dissipation."""
+    """Write for each device the power supplied, the rate of stored energy and the dissipation [W] to `power`."""
     tables = open_tables(handle)
     devices, at = tables.devices, device_power_row(tables, power)
     for k in range(devices.size):
@@ -99,7 +99,7 @@ def power_devices(t, y, dydt, out, handle, power):
 
 @njit
 def stored_devices(t, y, dydt, out, handle, stored):
-    """Rows of devices in `stored`: changes since the profile [J]."""
+    """Write for each device the change of its stored energy since the start [J] to `stored`."""
     tables = open_tables(handle)
     devices, first = tables.devices, device_stored_row(tables, stored)
     for k in range(devices.size):

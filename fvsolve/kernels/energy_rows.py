@@ -1,4 +1,7 @@
-"""First rows of parts that stand at the end of `power` and `stored`: bushings first, basins last."""
+"""Index of the first entry of each kind of part at the end of the energy arrays `power` and `stored`.
+
+The order is: bushings, bodies, devices, moving walls, basins.
+"""
 
 from fvsolve.jit import njit
 
@@ -8,47 +11,47 @@ BUSHING_ROWS, BODY_ROWS, DEVICE_ROWS, WALL_ROWS, BASIN_ROWS = 2, 3, 3, 2, 5
 
 @njit(forceinline=True)
 def basin_power_row(tables, power):
-    """First row of the basins in `power`."""
+    """Index of the first entry of basins in `power`."""
     return power.size - BASIN_ROWS * tables.basins.size
 
 
 @njit(forceinline=True)
 def wall_power_row(tables, power):
-    """First row of the moving walls in `power`."""
+    """Index of the first entry of moving walls in `power`."""
     return basin_power_row(tables, power) - WALL_ROWS * tables.walls.size
 
 
 @njit(forceinline=True)
 def device_power_row(tables, power):
-    """First row of the devices in `power`."""
+    """Index of the first entry of devices in `power`."""
     return wall_power_row(tables, power) - DEVICE_ROWS * tables.devices.size
 
 
 @njit(forceinline=True)
 def body_power_row(tables, power):
-    """First row of the bodies in `power`."""
+    """Index of the first entry of bodies in `power`."""
     return device_power_row(tables, power) - BODY_ROWS * tables.bodies.size
 
 
 @njit(forceinline=True)
 def bushing_power_row(tables, power):
-    """First row of the bushings in `power`."""
+    """Index of the first entry of bushings in `power`."""
     return body_power_row(tables, power) - BUSHING_ROWS * tables.bushings.size
 
 
 @njit(forceinline=True)
 def device_stored_row(tables, stored):
-    """First row of the devices in `stored`."""
+    """Index of the first entry of devices in `stored`."""
     return stored.size - tables.basins.size - tables.devices.size
 
 
 @njit(forceinline=True)
 def body_stored_row(tables, stored):
-    """First row of the bodies in `stored`."""
+    """Index of the first entry of bodies in `stored`."""
     return device_stored_row(tables, stored) - tables.bodies.size
 
 
 @njit(forceinline=True)
 def bushing_stored_row(tables, stored):
-    """First row of the bushings in `stored`."""
+    """Index of the first entry of bushings in `stored`."""
     return body_stored_row(tables, stored) - tables.bushings.size

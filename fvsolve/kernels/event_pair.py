@@ -7,9 +7,10 @@ LEAST = 1e-300
 
 @njit(forceinline=True)
 def event_pair(tables, g, at, left):
-    """g[at], g[at + 1] <- left, -left, of which exactly one is below zero; at zero the other rule is due.
+    """Write `left` and -`left` to g[at] and g[at + 1], event functions for the switch from a rule to another and back.
 
-    left : distance to the end of the present rule, below zero while armed[at]; it must leave zero when the rule changes
+    left : distance to the end of the first rule, negative while it holds (armed[at] > 0) and positive while the second
+        rule holds. Zero becomes a tiny number beyond the end of the present rule, so that the switch takes place.
     """
     if left == 0.0:
         left = LEAST if tables.armed[at] > 0.0 else -LEAST

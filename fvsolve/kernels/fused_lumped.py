@@ -9,7 +9,7 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def begin_lumped(t, y, dydt, out, handle):
-    """`begin_network` and `known_pressures_linear` in a single call; only pipes would act between them."""
+    """Do the work of `begin_network` and `known_pressures_linear` in a single call, for models without pipes."""
     tables = open_tables(handle)
     clear_outputs(out, tables)
     open_scheduled(t, out, tables)

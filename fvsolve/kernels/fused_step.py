@@ -16,10 +16,15 @@ BLOCK = 512
 
 @njit
 def fused_cells(h, k, flow, half, base, r, l, r_new, l_new, least, greatest):
-    """Advance cells by h; return how many lie below and above their envelope.
+    """Advance a block of n pipe cells by the step h [s]; return the numbers of cells below and above their envelope.
 
-    r starts with the cell before them, l ends with the cell behind. NaN counts as below and above, so the search for it
-    costs nothing.
+    k : wave speed over cell length [1/s]
+    flow : initial steady mass flow [kg/s]
+    half : half of the friction coefficient of |M| M [1/kg]; base : half of the initial steady drag [kg/s2]
+    r, l : float64[n + 1]  waves [kg/s]; r starts with the cell before the block, l ends with the cell behind it
+    r_new, l_new : float64[n]  receive the new waves [kg/s]
+    least, greatest : float64[n]  envelope of r + l [kg/s]
+    NaN counts as below and above, so the search for it costs nothing.
     """
     here, beyond, low, high = r[1:], l[1:], 0, 0
     for i in range(r_new.size):
@@ -35,7 +40,11 @@ def fused_cells(h, k, flow, half, base, r, l, r_new, l_new, least, greatest):
 
 @njit
 def fused_block(t, h, pipe, index, at, r, l, r_new, l_new, tables):
-    """Advance cells of a pipe from cell `at` on and update its envelope at t; return 0 if all cells are finite."""
+    """Advance cells of pipe number `index` from cell `at` on and update their envelope; return 0 if all are finite.
+
+    t : time after the step [s]; h : step [s]
+    r, l, r_new, l_new : waves before and after the step, see `fused_cells`
+    """
     e, a, b = tables.envelope, pipe["cell"] + at, pipe["cell"] + at + r_new.size
     k, half, base = pipe["speed"] / pipe["dx"], 0.5 * pipe["loss"], 0.5 * pipe["drag"]
     low, high = fused_cells(h, k, pipe["flow"], half, base, r, l, r_new, l_new, e[0, a:b], e[2, a:b])
@@ -44,10 +53,10 @@ def fused_block(t, h, pipe, index, at, r, l, r_new, l_new, tables):
 
 @njit
 def fused_step_linear(t, h, y, y_new, out, handle, values):
-    """Write y_new at t from y a step h earlier and its solved nodes in `out`; then `out` of y_new, and the records.
+    """Advance y by the step h to y_new at time t, by the upwind scheme and Euler; update `out`, probes and records.
 
-    For models whose states are pipes alone, without friction or with a given factor. STATUS is NOT_FINITE if a value is
-    not finite.
+    On entry `out` holds the solved nodes of y. For models whose states are pipes alone, without friction or with a
+    given friction factor. STATUS is NOT_FINITE if a value is not finite.
     """
     tables = open_tables(handle)
     pipes, pad, bad = tables.pipes, tables.scratch[:4], 0

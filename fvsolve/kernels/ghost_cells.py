@@ -1,8 +1,8 @@
 """Closures at pipe ends: the value of the outgoing wave there, and ghost cells beyond an end.
 
 A wave leaves through one end and enters through the other. Where it leaves, a polynomial through the last cells gives
-its value at the end. Where it enters, the value from the node is the datum of the polynomial. (A closure from cells
-alone is slightly unstable; with the datum no growing mode is known: tests/limits/test_ends.py.)
+its value at the end. Where it enters, the polynomial passes through the value from the node (the datum). A closure from
+cells alone is slightly unstable; with the datum no growing mode is known (tests/step_limits/test_ends.py).
 """
 
 from fractions import Fraction
@@ -18,7 +18,7 @@ GHOSTS = 3
 
 
 def solve_fractions(matrix, right):
-    """Rows of right * matrix^-1, computed in fractions."""
+    """Matrix product right matrix^-1 as lists of floats, computed exactly in fractions."""
     n = len(matrix)
     rows = [list(row) + [Fraction(int(i == j)) for j in range(n)] for i, row in enumerate(matrix)]
     for i in range(n):
@@ -38,7 +38,11 @@ def cell_averages(cell, degree):
 
 
 def end_weights():
-    """Weights of the value at an end and of three ghost cells beyond it, by degree; nearest cell first."""
+    """Weights of cells in the value of a wave at a pipe end and in three ghost cells beyond it, by polynomial degree.
+
+    Three arrays, nearest cell first: end value [degree, cell]; ghost cells where the wave leaves [degree, ghost, cell];
+    ghost cells where it enters [degree, ghost, k], with the end value as k = 0 and then cells.
+    """
     value = np.zeros((MAX_DEGREE + 1, MAX_DEGREE + 1))
     leaving = np.zeros((MAX_DEGREE + 1, GHOSTS, MAX_DEGREE + 1))
     entering = np.zeros((MAX_DEGREE + 1, GHOSTS, MAX_DEGREE + 1))
@@ -57,10 +61,15 @@ END_VALUE, END_LEAVING, END_ENTERING = end_weights()
 
 
 def difference_rows(weights, degree):
-    """Weights of a linear scheme in F[i] - F[i+1]: (inside [6], enter [3, 6], leave [2, 5]), see `dtypes.SETTINGS`.
+    """Weights of cells in the difference F[i] - F[i+1] of face values, for a linear scheme; see `dtypes.SETTINGS`.
 
-    weights : of cells i-2 .. i+2 and on, from the side that the wave comes from, in the value at face i
-    degree : of the polynomials at the ends
+    inside : [6]  for cell i inside a pipe: weights of cells i-3 .. i+2
+    enter : [3, 6]  for the three cells at the end where the wave enters: weights of the end value and of five cells
+    leave : [2, 5]  for the two cells at the end where the wave leaves: weights of five cells
+
+    weights : float64[5]  weights of cells u-2 .. u+2, in the direction of the wave, in the value at the face after cell
+        u
+    degree : degree of the polynomials at the ends
     """
     inside = np.append(weights, 0.0) - np.append(0.0, weights)
     unit = np.eye(6)
@@ -76,7 +85,10 @@ def difference_rows(weights, degree):
 
 @njit
 def edge_cells(c, right, edge):
-    """Values of the five cells nearest to the left (0) or right (1) end, nearest first; the last cell is repeated."""
+    """Write the values of the five cells of c nearest to the left (0) or right (1) end, nearest first, to edge[5].
+
+    If there are fewer cells, the last one is repeated.
+    """
     n = c.size
     for k in range(5):
         m = min(k, n - 1)
@@ -85,20 +97,31 @@ def edge_cells(c, right, edge):
 
 @njit
 def end_degree(degree, n):
-    """Degree of the polynomial for n cells: below five cells fifth order would be unstable, third order is not."""
+    """Degree of the end polynomial for n cells, at most `degree`.
+
+    Below five cells fifth order would be unstable, third order is not.
+    """
     return min(min(degree, 2) if n < 5 else degree, n - 1)
 
 
 @njit
 def roughness(d1, d2, d3, d4, small):
-    """Smoothness indicator from 0, smooth, to 1, a jump: high undivided differences over low ones."""
+    """Smoothness indicator of cell values, from 0 (smooth) to 1 (a jump): high undivided differences over low ones.
+
+    d1, d2 : low differences; d3, d4 : high differences; small : square of a negligible difference
+    """
     ratio = 4.0 * (d3 * d3 + d4 * d4) / (d1 * d1 + d2 * d2 + small)
     return ratio * ratio / (1.0 + ratio * ratio)
 
 
 @njit
 def leaving_ghosts(edge, n, family, degree, limiter, small, ghosts):
-    """Three ghost cells beyond an end where the wave leaves, nearest first, from the five `edge` cells of n."""
+    """Write three ghost cells beyond the end where a wave leaves, nearest first, to ghosts[3].
+
+    edge : float64[5]  cells nearest to this end; n : number of cells of the pipe
+    family, degree, limiter : scheme family, degree of the polynomial, and limiter
+    small : square of a negligible value
+    """
     if family == UPWIND or family == LINEAR or family == SHORT:
         d = end_degree(degree, n)
         for g in range(3):
@@ -125,7 +148,11 @@ def leaving_ghosts(edge, n, family, degree, limiter, small, ghosts):
 
 @njit
 def entering_ghosts(edge, n, family, degree, datum, small, ghosts):
-    """Three ghost cells beyond an end where the wave enters with the value `datum`, nearest first."""
+    """Write three ghost cells beyond the end where a wave enters with the value `datum`, nearest first, to ghosts[3].
+
+    edge : float64[5]  cells nearest to this end; n : number of cells of the pipe
+    family, degree : scheme family, degree of the polynomial; small : square of a negligible value
+    """
     if family == UPWIND or family == LINEAR or family == SHORT:
         d = min(min(degree, 2) if n < 5 else degree, n)
         for g in range(3):
@@ -149,7 +176,11 @@ def entering_ghosts(edge, n, family, degree, datum, small, ghosts):
 
 @njit
 def end_value(c, right, family, degree, limiter, small, scratch):
-    """Value at the left (0) or right (1) end of the wave that leaves there."""
+    """Value of a wave at the left (0) or right (1) end of a pipe, through which it leaves, from its cell averages c.
+
+    family, degree, limiter : scheme family, degree of the polynomial, and limiter
+    small : square of a negligible value
+    """
     n, edge, ghosts = c.size, scratch[:5], scratch[5:8]
     edge_cells(c, right, edge)
     if family == UPWIND or family == LINEAR or family == SHORT:

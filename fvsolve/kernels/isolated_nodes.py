@@ -1,7 +1,7 @@
-"""Isolated nodes, which only closed valves join to the rest: detection and pressure.
+"""Detection and pressure of isolated nodes, which only closed valves join to the rest of the network.
 
 No flow passes there, so any pressure would satisfy the balance. The pressure chosen is that at which equal small leaks
-would balance: sum of sqrt|dP| over the closed valves, each with the sign of its drop, is zero. P = p + rho g z.
+would balance: sum of sqrt|dP| over the closed valves, each with the sign of its drop dP, is zero. P = p + rho g z.
 """
 
 from math import sqrt
@@ -14,13 +14,16 @@ DEMAND_ROUNDING = 1e-9  # relative demand that an isolated node may have: roundi
 
 @njit(forceinline=True)
 def inner_row(nodes, i):
-    """Row of a node in its cluster, -1 if its pressure is known."""
+    """Number of node i within its cluster (nodes solved together), -1 if its pressure is known."""
     return nodes[i]["row"] if nodes[i]["kind"] == JUNCTION else -1
 
 
 @njit
 def find_connected(cluster, tables, g, connected):
-    """connected[i] = 1 if open valves join node i of a cluster to a pipe or to a known pressure, else 0."""
+    """Set connected[i] to 1 if open valves join node i of a cluster to a pipe or to a known pressure, else to 0.
+
+    cluster : nodes that are solved together; g : conductances of its valves [kg2/s2/Pa], 0 if closed
+    """
     nodes, valves, integers = tables.nodes, tables.valves, tables.integers
     for i in range(connected.size):
         connected[i] = 1.0 if nodes[integers[cluster["first_node"] + i]]["admittance"] > 0.0 else 0.0
@@ -41,7 +44,7 @@ def find_connected(cluster, tables, g, connected):
 
 @njit
 def total_pressure(tables, out, i):
-    """P = p + rho g z of a node [Pa]."""
+    """Potential P = p + rho g z of node i [Pa]."""
     node, settings = tables.nodes[i], tables.settings[0]
     lift = settings["rho"] * settings["gravity"] * node["elevation"]
     return node["pressure"] + out[tables.layout[0]["pressure"] + i] + lift
@@ -49,7 +52,12 @@ def total_pressure(tables, out, i):
 
 @njit
 def leak_balance(cluster, tables, out, g, group, number, level):
-    """(sum of sqrt|dP| into a group of nodes at P = `level`, least and greatest P behind its closed valves)."""
+    """Sum of sqrt|dP| of leaks into a group of isolated nodes at the potential `level` [Pa].
+
+    Two more results: the least and greatest potential P [Pa] behind the closed valves of the group.
+    g : conductances of the valves of the cluster (nodes solved together), 0 if closed
+    group, number : group number of each node, and number of this group
+    """
     nodes, valves, integers = tables.nodes, tables.valves, tables.integers
     total, low, high = 0.0, 1e300, -1e300
     for e in range(g.size):
@@ -67,7 +75,10 @@ def leak_balance(cluster, tables, out, g, group, number, level):
 
 @njit
 def group_by_open_valves(cluster, tables, g, group):
-    """Give nodes that open valves join to each other the same group number."""
+    """Write the same group number to group[i] for all isolated nodes i that open valves join to each other.
+
+    g : conductances of the valves of the cluster (nodes solved together); -1 marks an open valve at isolated nodes
+    """
     nodes, valves, integers = tables.nodes, tables.valves, tables.integers
     for i in range(group.size):
         group[i] = i
@@ -81,7 +92,11 @@ def group_by_open_valves(cluster, tables, g, group):
 
 @njit
 def isolated_pressures(cluster, tables, out, g, connected, group):
-    """Set the pressures of isolated nodes of a cluster by bisection, group by group until no pressure changes."""
+    """Set the pressures of isolated nodes of a cluster by bisection, group by group until no pressure changes.
+
+    cluster : nodes that are solved together; g : conductances of its valves, 0 if closed, -1 if open but isolated
+    connected : float64[n]  0 for isolated nodes; group : float64[n]  receives the group number of each node
+    """
     layout, integers = tables.layout[0], tables.integers
     group_by_open_valves(cluster, tables, g, group)
     for _ in range(200):
@@ -112,7 +127,11 @@ def isolated_pressures(cluster, tables, out, g, connected, group):
 
 @njit
 def check_demand(cluster, tables, out, c, connected, group, scale):
-    """Set the status if an isolated group has a demand; c : inflow of its nodes [kg/s]."""
+    """Set STATUS to NO_SOLUTION if a group of isolated nodes has a demand.
+
+    c : float64[n]  given inflow of the nodes of the cluster [kg/s]; scale : flow to which rounding is relative [kg/s]
+    connected, group : see `isolated_pressures`
+    """
     for number in range(group.size):
         total = 0.0
         for i in range(group.size):

@@ -15,14 +15,14 @@ LEAST = 1e-280
 
 @njit
 def minmod(a, b):
-    """Smaller of two differences of equal sign, else zero."""
+    """Minmod limiter as (numerator, denominator): smaller of two differences of equal sign, else zero."""
     s = a if abs(a) < abs(b) else b
     return s if a * b > 0.0 else 0.0, 1.0
 
 
 @njit
 def van_leer(a, b):
-    """Harmonic mean 2 a b / (a + b) of two differences of equal sign, else zero (van Leer 1974)."""
+    """Van Leer limiter as (numerator, denominator): harmonic mean 2 a b / (a + b), zero for unequal signs (1974)."""
     ab = a * b
     alike = ab > LEAST
     return 2.0 * ab if alike else 0.0, a + b if alike else 1.0
@@ -30,7 +30,10 @@ def van_leer(a, b):
 
 @njit
 def monotonized_central(a, b):
-    """Central difference, at most twice the smaller difference, else zero (van Leer 1977)."""
+    """Monotonized central limiter as (numerator, denominator), for two differences (van Leer 1977).
+
+    The central difference, at most twice the smaller difference; zero for differences of unequal sign.
+    """
     s = a if abs(a) < abs(b) else b
     c = 0.5 * (a + b)
     m = 2.0 * s if 2.0 * abs(s) < abs(c) else c
@@ -45,14 +48,14 @@ def unknown_limiter(a, b):
 
 @njit
 def slope(limiter, a, b):
-    """Slope by a limiter from two differences."""
+    """Slope by a limiter function from two differences."""
     numerator, denominator = limiter(a, b)
     return numerator / denominator
 
 
 @njit
 def half_slopes(limiter, a, b, c, d):
-    """Halves of the slopes from two pairs of differences, with a single division."""
+    """(half slope from the differences a and b, half slope from c and d) by a limiter, with a single division."""
     (p, s), (q, t) = limiter(a, b), limiter(c, d)
     r = 1.0 / (s * t)
     return 0.5 * p * (t * r), 0.5 * q * (s * r)
@@ -60,7 +63,10 @@ def half_slopes(limiter, a, b, c, d):
 
 @inline
 def by_limiter(work, code, *given):
-    """Call `work` with the limiter of a code; each limiter gives vectorised code of its own."""
+    """Call `work` with the limiter function of a code; each limiter gives vectorised code of its own.
+
+    given : further arguments of `work`
+    """
     if code == MINMOD:
         return work(minmod, *given)
     if code == VAN_LEER:
@@ -72,5 +78,5 @@ def by_limiter(work, code, *given):
 
 @njit
 def limited(code, a, b):
-    """Slope by the code of a limiter; zero for FLAT."""
+    """Limited slope from the differences a and b by the limiter of a code; zero for FLAT."""
     return 0.0 if code == FLAT else by_limiter(slope, code, a, b)

@@ -1,20 +1,24 @@
-"""Power and stored energy of every part under the linear law.
+"""Power and stored energy of every part under the linear density law.
 
-P = p - p_ambient + rho g z, z above the datum of the settings. A mass flow M at a port carries the power P M / rho. A
-pipe stores A P^2 / (2 rho c^2) + M^2 / (2 rho A) per length, a chamber V p^2 / (2 beta), a tank its mass times g z, a
-rigid column M^2 L / (2 rho A). Friction dissipates M drag / (rho A) per length. Squares are averaged over a cell from
-the values at three Gauss points of a polynomial of the scheme's degree through neighbouring cells. Stored energies are
-changes since the profile, a cross term and a square: no small difference of large numbers.
+P = p - p_ambient + rho g z is the potential [Pa], z the elevation above datum. A mass flow M at a port carries the
+power P M / rho. A pipe of area A and wave speed c stores A P^2 / (2 rho c^2) + M^2 / (2 rho A) per length. A chamber of
+volume V stores V p^2 / (2 beta) with gauge pressure p, a tank its mass times g z, a rigid column of length L M^2 L / (2
+rho A). Friction dissipates M drag / (rho A) per length. Squares are averaged over a cell from the values at three Gauss
+points of a polynomial of the scheme's degree through neighbouring cells. Stored energies are changes since the initial
+steady state, a cross term and a square: no small difference of large numbers.
 
-Rows of `power` [W], table by table:
-NODE : supply, rate of storage
-PIPE : inflow of power, friction, jets, rate of storage, creep, residual of the linear law
-VALVE : loss; COLUMN : inflow of power, friction, rate of storage; MASS : rate of storage
-BRACE : power absorbed by a spring or damper, or supplied by a force; STOP : rate of storage, loss
+Entries of `power` [W], for every part of a kind in turn:
+NODE : power supplied from outside, rate of stored energy
+PIPE : inflow of power, friction, loss of jets, rate of stored energy, dissipation by creep, residual of the density law
+VALVE : loss
+COLUMN : inflow of power, friction, rate of stored energy
+MASS : rate of stored energy
+BRACE : power absorbed by a spring or damper, or supplied by a force
+STOP : rate of stored energy, loss
 PISTON : leak, friction, residual of the linear law where a volume changes
 
-Rows of `stored` [J]: node; pipe kinetic, elastic with height (delay line: forward, backward wave); column; mass;
-brace; stop.
+Entries of `stored` [J]: each node; kinetic and elastic (with potential) energy of each pipe, or energy of the forward
+and the backward wave of a delay line; each column, mass, brace, stop.
 """
 
 import numpy as np
@@ -35,7 +39,10 @@ MAX_WIDTH = 5  # cells of the widest polynomial
 
 
 def point_weights():
-    """Weights of w cells in the value at each Gauss point of their cell i : float64[w, i, point, cell]."""
+    """Interpolation weights of w neighbouring cells in the value at the Gauss points of their cell i.
+
+    float64[w, i, point, cell], from averages of cells to values of the polynomial through them
+    """
     weights = np.zeros((MAX_WIDTH + 1, MAX_WIDTH, 3, MAX_WIDTH))
     for w in range(1, MAX_WIDTH + 1):
         for i in range(w):
@@ -64,7 +71,7 @@ def polynomial_width(settings, n):
 
 @njit(forceinline=True)
 def at_point(c, width, i, point):
-    """Value at a Gauss point of cell i, from the polynomial through `width` cells around it."""
+    """Value at a Gauss point of cell i, from the polynomial through the averages c of `width` cells around it."""
     first = min(max(i - width // 2, 0), c.size - width)
     total = 0.0
     for k in range(width):
@@ -74,26 +81,31 @@ def at_point(c, width, i, point):
 
 @njit(forceinline=True)
 def gauge_pressure(tables, out, i):
-    """p - p_ambient of node i [Pa]."""
+    """Gauge pressure p - p_ambient of node i [Pa]."""
     start = tables.nodes[i]["pressure"] - tables.settings[0]["ambient"]
     return start + out[tables.layout[0]["pressure"] + i]
 
 
 @njit(forceinline=True)
 def total_pressure(tables, out, i):
-    """P = p - p_ambient + rho g z of node i [Pa]."""
+    """Potential P = p - p_ambient + rho g z of node i [Pa]."""
     return gauge_pressure(tables, out, i) + height_pressure(tables.settings[0], tables.nodes[i])
 
 
 @njit(forceinline=True)
 def height_pressure(st, node):
-    """rho g z of a node [Pa]."""
+    """Hydrostatic pressure rho g z of a node at the elevation z above datum [Pa]."""
     return st["rho"] * st["gravity"] * (node["elevation"] - st["datum"])
 
 
 @njit
 def pipe_power(st, pipe, start, r, l, dr, dl, rows):
-    """Write friction and rate of stored energy of a pipe; start : P of the profile at its `from` end [Pa]."""
+    """Write dissipation by friction to rows[1], zero to rows[2] and the rate of stored energy to rows[3] of a pipe [W].
+
+    start : potential P of the initial steady state at the `from` end [Pa]
+    r, l : float64[cells]  forward and backward wave [kg/s]
+    dr, dl : float64[cells]  d/dt of both waves [kg/s2]
+    """
     n, width, per = r.size, polynomial_width(st, r.size), 1.0 / (st["rho"] * pipe["area"])
     fall, flow = pipe["drag"] / pipe["area"], pipe["flow"]
     friction, rate = 0.0, 0.0
@@ -111,7 +123,11 @@ def pipe_power(st, pipe, start, r, l, dr, dl, rows):
 
 @njit
 def pipe_energy(st, pipe, start, r, l, rows):
-    """Write the changes of kinetic and of elastic energy (with energy of height) of a pipe since the profile."""
+    """Write the energy changes of a pipe since the start [J]: kinetic to rows[0], elastic and potential to rows[1].
+
+    start : potential P of the initial steady state at the `from` end [Pa]
+    r, l : float64[cells]  forward and backward wave [kg/s]
+    """
     n, width, per = r.size, polynomial_width(st, r.size), 0.5 / (st["rho"] * pipe["area"])
     fall, flow = pipe["drag"] / pipe["area"], pipe["flow"]
     kinetic, elastic = 0.0, 0.0
@@ -126,7 +142,7 @@ def pipe_energy(st, pipe, start, r, l, rows):
 
 @njit
 def power_linear(t, y, dydt, out, handle, power):
-    """Fill `power` from a state, its rates and the values in `out`."""
+    """Fill `power` [W] for every part under the linear law, from a state, its rates and the values in `out`."""
     tables = open_tables(handle)
     st, layout, nodes, pipes = tables.settings[0], tables.layout[0], tables.nodes, tables.pipes
     valves, columns, per = tables.valves, tables.columns, 1.0 / tables.settings[0]["rho"]
@@ -171,7 +187,10 @@ def power_linear(t, y, dydt, out, handle, power):
 
 @njit
 def power_masses(t, y, dydt, out, tables, power, at):
-    """Write the rows of masses, braces and stops from row `at` on; return the row after them."""
+    """Write the power entries [W] of masses, then of springs, dampers and forces, then of stops, from power[at] on.
+
+    Returns the index after them. The entries are listed at the top of this file.
+    """
     layout, masses, braces, stops = tables.layout[0], tables.masses, tables.braces, tables.stops
     armed = tables.armed
     for i in range(masses.size):
@@ -204,7 +223,10 @@ def power_masses(t, y, dydt, out, tables, power, at):
 
 @njit(forceinline=True)
 def piston_side(tables, piston, side):
-    """(node, area signed by the change of volume with travel, swept mass per travel) of a side of a piston."""
+    """(chamber node, signed area [m2], swept mass per travel [kg/m]) of side 0 (A) or 1 (B) of a piston.
+
+    The area is positive where the volume of the chamber grows with travel.
+    """
     if side == 1:
         return piston["b"], -piston["area_b"], piston["sweep_b"]
     return piston["a"], piston["area_a"], piston["sweep_a"]
@@ -212,7 +234,11 @@ def piston_side(tables, piston, side):
 
 @njit
 def power_pistons(y, dydt, out, tables, power, at):
-    """Write the rows of pistons and the storage of their chambers: V p^2 / (2 beta), and height of the mass."""
+    """Write leak loss, friction and residual of the linear law of each piston [W] to power[at] and following entries.
+
+    Also write the rate of energy stored in the chambers: V p^2 / (2 beta), with volume V and gauge pressure p, and
+    potential energy of the mass.
+    """
     st, layout, nodes, pistons = tables.settings[0], tables.layout[0], tables.nodes, tables.pistons
     per = 1.0 / st["rho"]
     for k in range(pistons.size):
@@ -238,7 +264,7 @@ def power_pistons(y, dydt, out, tables, power, at):
 
 @njit
 def stored_linear(t, y, dydt, out, handle, stored):
-    """Fill `stored`, changes since the profile [J]."""
+    """Fill `stored` with the energy changes of every part since the start [J] under the linear law."""
     tables = open_tables(handle)
     st, layout, nodes, pipes = tables.settings[0], tables.layout[0], tables.nodes, tables.pipes
     columns, pistons, per = tables.columns, tables.pistons, 1.0 / tables.settings[0]["rho"]
@@ -280,7 +306,7 @@ def stored_linear(t, y, dydt, out, handle, stored):
 
 @njit
 def tank_energy(st, floats, node, rho, change):
-    """Change of the energy g z m of a tank by a change of mass [J]: integral of g (z + level) dm."""
+    """Change of the potential energy g z m of a tank by a `change` of its mass [J]: integral of g (z + level) dm."""
     level, z = node["level"], node["elevation"] - st["datum"]
     if node["shape"] < 0:
         return st["gravity"] * change * (z + level + 0.5 * change / (rho * node["area"]))
@@ -291,7 +317,10 @@ def tank_energy(st, floats, node, rho, change):
 
 @njit
 def level_moment(floats, shape, rows, level):
-    """Integral of z A(z) dz from the first level of a shaped tank to `level` [m4]."""
+    """Integral of z A(z) dz from the first level of a shaped tank to `level` [m4], with surface area A at the level z.
+
+    floats[shape:] holds `rows` levels [m], then areas [m2].
+    """
     total = 0.0
     for k in range(rows):
         z0 = floats[shape + k]
@@ -310,7 +339,7 @@ def level_moment(floats, shape, rows, level):
 
 @njit
 def stored_masses(y, out, tables, stored, at):
-    """Write the rows of masses, braces and stops from row `at` on."""
+    """Write the energy changes since the start [J] of masses, springs, dampers, forces and stops from stored[at] on."""
     masses, braces, stops = tables.masses, tables.braces, tables.stops
     for i in range(masses.size):
         stored[at] = 0.0

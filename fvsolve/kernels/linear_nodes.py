@@ -1,7 +1,8 @@
-"""Nodes under the linear density law: pressures and flows from the waves that arrive.
+"""Pressures and flows at nodes under the linear density law, from the waves that arrive.
 
-With the outgoing wave w at a pipe end and node deviation p' the pipe brings 2 w - Y p' [kg/s] into the node,
-Y = area / speed. At a node without storage these flows and those of its other links add up to zero.
+p' is the pressure change of a node since the initial steady state. A pipe end with the outgoing wave w and the
+admittance Y = area / speed [kg/s per Pa] brings the flow 2 w - Y p' [kg/s] into its node, in addition to its initial
+flow. At a node without storage the flows of pipe ends and other links add up to zero.
 """
 
 from fvsolve.jit import njit
@@ -20,7 +21,7 @@ from fvsolve.kernels.valves import (
 
 @njit(forceinline=True)
 def stored_pressures(t, y, out, tables):
-    """Write the pressure deviations [Pa] of fixed nodes, tanks and chambers."""
+    """Write the pressure changes since the start [Pa] of fixed nodes, tanks and chambers to `out`."""
     settings, layout, nodes = tables.settings[0], tables.layout[0], tables.nodes
     for i in range(nodes.size):
         node = nodes[i]
@@ -36,7 +37,11 @@ def stored_pressures(t, y, out, tables):
 
 @njit(forceinline=True)
 def junction_flows(t, out, tables):
-    """Change of flow into each node without storage at p' = 0, minus its demand, in out[net]."""
+    """Add the change of given flow into each junction since the start to out[net]; write its demand to out[supply].
+
+    The demand is written as a negative supply. out[net] then holds the change of inflow at unchanged pressure of the
+    junction [kg/s].
+    """
     layout, nodes = tables.layout[0], tables.nodes
     for i in range(nodes.size):
         if nodes[i]["kind"] == JUNCTION:
@@ -47,7 +52,7 @@ def junction_flows(t, out, tables):
 
 @njit
 def known_pressures_linear(t, y, dydt, out, handle):
-    """Write pressure deviations of nodes with storage or given pressure, and flows from outside into other nodes."""
+    """Write pressure changes of nodes with storage or given pressure [Pa], and the given flows into junctions [kg/s]."""
     tables = open_tables(handle)
     stored_pressures(t, y, out, tables)
     junction_flows(t, out, tables)
@@ -55,7 +60,7 @@ def known_pressures_linear(t, y, dydt, out, handle):
 
 @njit(forceinline=True)
 def solve_free_nodes(out, tables):
-    """Pressures of nodes without valves: p' = (sum of inflows) / Y."""
+    """Write the pressure changes of junctions without valves [Pa]: sum of inflows over the admittance of their pipes."""
     layout, nodes = tables.layout[0], tables.nodes
     for i in range(nodes.size):
         if nodes[i]["kind"] == JUNCTION and nodes[i]["solve"] == ALONE:
@@ -64,7 +69,7 @@ def solve_free_nodes(out, tables):
 
 @njit(forceinline=True)
 def valve_side(out, layout, nodes, i):
-    """Pressure deviation of a node at unchanged valve flow, and its fall per unit of outflow."""
+    """(pressure change of node i at unchanged valve flow [Pa], its fall per outflow through the valve [Pa s/kg])."""
     if nodes[i]["kind"] != JUNCTION:
         return out[layout["pressure"] + i], 0.0
     return out[layout["net"] + i] / nodes[i]["admittance"], 1.0 / nodes[i]["admittance"]
@@ -72,7 +77,10 @@ def valve_side(out, layout, nodes, i):
 
 @njit(forceinline=True)
 def solve_single_valves(out, tables):
-    """Solve valves that join at most a node without storage at each end, and no other valve: closed roots."""
+    """Solve every valve whose end nodes without storage join no other valve: its flow and the pressures of these nodes.
+
+    The root has a closed form, or bounded Newton finds it if the law of the valve has a laminar part.
+    """
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
     for k in range(valves.size):
         valve = valves[k]
@@ -97,7 +105,7 @@ def solve_single_valves(out, tables):
 
 @njit
 def solve_nodes_linear(t, y, dydt, out, handle):
-    """Pressures of nodes without storage and flows of valves, except clusters, where several valves join."""
+    """Solve the pressures of junctions and the flows of valves, except where several valves join (see `node_clusters`)."""
     tables = open_tables(handle)
     solve_free_nodes(out, tables)
     solve_single_valves(out, tables)

@@ -8,7 +8,7 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def outgoing_waves_linear(t, y, dydt, out, handle):
-    """Write the outgoing waves of all pipes to out[ends]; add their flow into nodes to out[net]."""
+    """Write the outgoing waves of all pipes to out[ends]; add their flow into nodes at unchanged pressure to out[net]."""
     tables = open_tables(handle)
     settings, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
     scratch = tables.scratch
@@ -29,7 +29,10 @@ def outgoing_waves_linear(t, y, dydt, out, handle):
 
 @njit
 def incoming_waves_linear(t, y, dydt, out, handle):
-    """Write the waves from the nodes into pipes: incoming = Y p' - outgoing."""
+    """Write the waves from nodes into pipes to out[ends]: incoming wave = Y p' - outgoing wave [kg/s].
+
+    p' : pressure change of the node since the start [Pa]; Y : admittance of the pipe [kg/s per Pa]
+    """
     tables = open_tables(handle)
     layout, pipes = tables.layout[0], tables.pipes
     for i in range(pipes.size):
@@ -45,7 +48,7 @@ def incoming_waves_linear(t, y, dydt, out, handle):
 
 @njit
 def wave_rates(t, y, dydt, out, handle):
-    """d/dt of the waves in all pipe cells, unless `dydt` is empty."""
+    """Write d/dt of the waves in all pipe cells [kg/s2] to `dydt`, unless it is empty."""
     tables = open_tables(handle)
     settings, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
     if dydt.size == 0:

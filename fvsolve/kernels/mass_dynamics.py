@@ -1,14 +1,13 @@
 """Masses on an axis, with pistons, springs, dampers, forces and stops, which may act on bodies too.
 
-These functions enclose those of the fluid: first pressures of moving chambers and the flows swept by their pistons,
-then the fluid, then forces and accelerations. The state of a chamber is its excess mass e over the content of its
-volume V at the density m0 / V0 of the start. So the pressure itself is integrated, not a small difference of two large
-masses:
-p - p0 = beta e / (rho0 V) under the law linear, ln(rho / rho_0) = ln(1 + e V0 / (m0 V)) under log and table.
-For a piston between points of bodies the state is the mass itself, which a closed chamber conserves to the last bit.
-The force of a spring, stop or piston follows from its travel in `out`: on the axis from the positions of two masses,
-between bodies from two points, written by `kernels.mechanism.force_elements`. Its two masses are then the same fixed
-frame, on which the net force is zero.
+First the pressures of moving chambers and the flows swept by their pistons are computed, then the fluid, then forces
+and accelerations. The state of a chamber is its excess mass e: its mass minus the mass in its present volume V at the
+initial density m0 / V0. So the pressure itself is integrated, not a small difference of two large masses: p - p0 = beta
+e / (rho0 V) under the linear density law, ln(rho / rho_0) = ln(1 + e V0 / (m0 V)) under log and table. The index 0
+marks initial values. For a piston between points of bodies the state is the mass itself, which a closed chamber
+conserves to the last bit. The force of a spring, stop or piston follows from its change of length (travel) in `out`: on
+the axis from the positions of two masses, between bodies from two points, written by
+`kernels.mechanism.force_elements`. Its two masses are then the same fixed frame, on which the net force is zero.
 """
 
 from math import log, log1p, sqrt
@@ -41,7 +40,7 @@ def motion(mass, y):
 
 @njit(forceinline=True)
 def relative_motion(tables, y, i, j):
-    """(change of the distance from mass i to mass j, its rate) [m, m/s]."""
+    """(change of the distance from mass i to mass j since the start [m], its rate [m/s])."""
     x_i, v_i = motion(tables.masses[i], y)
     x_j, v_j = motion(tables.masses[j], y)
     return x_j - x_i, v_j - v_i
@@ -49,14 +48,20 @@ def relative_motion(tables, y, i, j):
 
 @njit(forceinline=True)
 def travel_of(out, tables, k):
-    """(change of length, its rate) of element k: springs, dampers and forces first, then stops, then pistons."""
+    """(change of length since the start [m], its rate [m/s]) of force element k.
+
+    Springs, dampers and forces are numbered first, then stops, then pistons.
+    """
     at = tables.layout[0]["travel"] + 2 * k
     return out[at], out[at + 1]
 
 
 @njit
 def write_travels(y, out, tables):
-    """Write the travel of all elements on the axis to `out`; those between points are written already."""
+    """Write the change of length of all force elements between masses, and its rate, to `out`.
+
+    Elements between points of bodies are written by `kernels.mechanism.force_elements`.
+    """
     braces, stops, pistons = tables.braces, tables.stops, tables.pistons
     at = tables.layout[0]["travel"]
     for k in range(braces.size):
@@ -75,19 +80,19 @@ def write_travels(y, out, tables):
 
 @njit(forceinline=True)
 def stop_travel(out, tables, k):
-    """(travel, its rate) of stop k."""
+    """(change of length since the start [m], its rate [m/s]) of stop k."""
     return travel_of(out, tables, tables.braces.size + k)
 
 
 @njit(forceinline=True)
 def piston_travel(out, tables, k):
-    """(travel, its rate) of piston k."""
+    """(travel since the start [m], its rate [m/s]) of piston k."""
     return travel_of(out, tables, tables.braces.size + tables.stops.size + k)
 
 
 @njit(forceinline=True)
 def contact_force(stiffness, damping, depth, speed):
-    """Force of an active contact at `depth`, which grows at `speed` [N]; it never pulls.
+    """Force of a closed contact [N] at `depth` [m], which grows at `speed` [m/s]; it never pulls.
 
     There is no jump at depth 0, which difference quotients would turn into an infinite slope.
     """
@@ -96,7 +101,7 @@ def contact_force(stiffness, damping, depth, speed):
 
 @njit
 def leak_flow(tables, piston, p_a, p_b):
-    """Mass flow from A to B past the piston [kg/s], at the upstream density."""
+    """Mass flow from chamber A to chamber B past the piston [kg/s], at the upstream density."""
     st = tables.settings[0]
     rho = st["rho"]
     if st["law"] != LAW_LINEAR:
@@ -106,7 +111,11 @@ def leak_flow(tables, piston, p_a, p_b):
 
 @njit
 def chamber_state(tables, node, volume, excess):
-    """(deviation of pressure [Pa], stiffness [Pa/kg]) of a moving chamber with the present `volume`."""
+    """(pressure change since the start [Pa], stiffness dp/dm [Pa/kg]) of a moving chamber.
+
+    volume : present volume [m3]
+    excess : mass minus the mass in this volume at the initial density [kg]
+    """
     st, floats = tables.settings[0], tables.floats
     if st["law"] == LAW_LINEAR:
         stiffness = node["stiffness"] * node["volume"] / volume
@@ -120,9 +129,10 @@ def chamber_state(tables, node, volume, excess):
 
 @njit(forceinline=True)
 def excess_of(y, tables, piston, i, sweep, x):
-    """Excess mass of chamber i [kg]: its state.
+    """Excess mass of chamber i [kg]: its mass minus the mass in its present volume at the initial density.
 
-    Between points of bodies it is the mass that has entered, minus the content of the swept volume.
+    It is the state of the chamber. Between points of bodies the state is the mass that has entered.
+    sweep : swept mass per travel [kg/m]; x : travel of the piston since the start [m]
     """
     state = y[tables.nodes[i]["y"]]
     return state - sweep * x if piston["line"] >= 0 else state
@@ -130,7 +140,10 @@ def excess_of(y, tables, piston, i, sweep, x):
 
 @njit
 def piston_chambers(t, y, dydt, out, handle):
-    """Write pressure and stiffness of moving chambers, and the flow that piston and leak take from each."""
+    """Write pressure and stiffness of moving chambers, and the flow that piston and leak take from each, to `out`.
+
+    Pressure change since the start [Pa], stiffness dp/dm [Pa/kg], flow [kg/s].
+    """
     tables = open_tables(handle)
     layout, nodes, pistons = tables.layout[0], tables.nodes, tables.pistons
     write_travels(y, out, tables)
@@ -157,7 +170,7 @@ def piston_chambers(t, y, dydt, out, handle):
 
 @njit(forceinline=True)
 def add_push(out, tables, k, i, j, change, start):
-    """Write the force of element k, `start` at the start plus `change`; add it to mass j, and reversed to mass i."""
+    """Write the force of element k, `start` + `change` [N]; add `change` to mass j, and subtract it from mass i."""
     layout = tables.layout[0]
     out[layout["push"] + k] = start + change
     out[layout["net_force"] + i] -= change
@@ -166,7 +179,10 @@ def add_push(out, tables, k, i, j, change, start):
 
 @njit
 def forces(t, y, out, tables):
-    """Write the net force on every mass; forces that have not changed since the start add exactly zero."""
+    """Write all element forces and the net force on every mass [N] to `out`.
+
+    Forces that have not changed since the start add exactly zero.
+    """
     layout, masses, braces = tables.layout[0], tables.masses, tables.braces
     stops, pistons, armed = tables.stops, tables.pistons, tables.armed
     for i in range(masses.size):
@@ -200,7 +216,7 @@ def forces(t, y, out, tables):
 
 @njit(forceinline=True)
 def add_stiffness(tables, i, j, stiffness, damping):
-    """Add stiffness and damping of an element to those of its two masses, per mass [1/s2, 1/s], in scratch."""
+    """Add stiffness and damping of an element between masses i and j, per mass [1/s2, 1/s], to sums of both in scratch."""
     masses, work = tables.masses, tables.scratch
     lightness = masses[i]["lightness"] + masses[j]["lightness"]
     for mass in (i, j):
@@ -210,7 +226,7 @@ def add_stiffness(tables, i, j, stiffness, damping):
 
 @njit
 def push_stiffness(out, tables, k):
-    """Present (stiffness, damping) of element k: spring, active stop, or piston between its chambers."""
+    """Present (stiffness [N/m], damping [N s/m]) of element k: spring, closed stop, or piston between its chambers."""
     braces, stops, pistons, armed = tables.braces, tables.stops, tables.pistons, tables.armed
     if k < braces.size:
         return braces[k]["stiffness"], braces[k]["damping"]
@@ -228,7 +244,10 @@ def push_stiffness(out, tables, k):
 
 @njit
 def mechanical_rate(out, tables):
-    """Greatest rate of a mass [1/s], c / 2 + sqrt(c^2 / 4 + k): k of all springs and fluid, c of all dampers."""
+    """Greatest rate of a mass [1/s], c / 2 + sqrt(c^2 / 4 + k).
+
+    k : stiffness of all elements at the mass, with chambers, per mass [1/s2]; c : their damping per mass [1/s]
+    """
     masses, braces, stops, pistons, work = tables.masses, tables.braces, tables.stops, tables.pistons, tables.scratch
     for i in range(2 * masses.size):
         work[i] = 0.0
@@ -250,9 +269,9 @@ def mechanical_rate(out, tables):
 
 @njit
 def mass_rates(t, y, dydt, out, handle):
-    """Write net forces, d/dt of positions and velocities; raise out[RATE].
+    """Write net forces to `out`, d/dt of positions and velocities to `dydt`; raise out[RATE] to `mechanical_rate`.
 
-    The status is NO_VOLUME if a piston has used up its chamber.
+    STATUS is NO_VOLUME if a piston has used up its chamber.
     """
     tables = open_tables(handle)
     layout, nodes, masses = tables.layout[0], tables.nodes, tables.masses
@@ -273,7 +292,7 @@ def mass_rates(t, y, dydt, out, handle):
 
 @njit
 def observe_masses(t, y, out, handle, values):
-    """Values of the probes of masses, elements and pistons."""
+    """Write the values of the probes of masses, force elements and pistons to `values`."""
     tables = open_tables(handle)
     layout, masses, pistons, probes = tables.layout[0], tables.masses, tables.pistons, tables.probes
     for k in range(probes.size):
@@ -305,7 +324,7 @@ def record_masses(t, y, out, handle, values):
 
 @njit
 def mass_events(t, y, out, handle, g):
-    """Write the remaining distance to each side of a stop."""
+    """Write the event functions of stops to g: remaining free travel to each of their two sides [m]."""
     tables = open_tables(handle)
     stops = tables.stops
     write_travels(y, out, tables)

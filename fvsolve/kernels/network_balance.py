@@ -1,7 +1,9 @@
 """Network balances common to all density laws: net flows, rates of storage, rate limits of nodes and valves.
 
-out = [rate, status, where, -, p' of nodes, supply into nodes from outside [kg/s], net flow into nodes [kg/s], four
-wave values of each pipe (r and l at `from`, r and l at `to`), valve flows, column flows].
+`out` holds: wave rate, status, number of a faulty node and two more (`dtypes.OUT_HEAD`); pressure changes of nodes
+since the start [Pa]; supply into nodes from outside [kg/s]; net flow into nodes [kg/s]; four wave values of each pipe
+(forward and backward at `from`, then at `to`) [kg/s]; valve flows, column flows [kg/s]; further values of
+`dtypes.LAYOUT`.
 """
 
 from fvsolve.jit import njit
@@ -30,7 +32,7 @@ def begin_network(t, y, dydt, out, handle):
 
 @njit
 def begin_basins(t, y, dydt, out, handle):
-    """Clear outputs of a model of basins without links: there is no flow between nodes."""
+    """Clear the outputs of a model of basins without links: there is no flow between nodes."""
     tables = open_tables(handle)
     clear_outputs(out, tables)
     out[RATE] = tables.settings[0]["rate"]
@@ -38,7 +40,7 @@ def begin_basins(t, y, dydt, out, handle):
 
 @njit(forceinline=True)
 def net_flows(out, tables):
-    """Net flow into every node from its links [kg/s]; total, including the profile."""
+    """Write the net flow into every node from its links [kg/s] to out[net]: total flow, not its change since the start."""
     layout, pipes, nodes = tables.layout[0], tables.pipes, tables.nodes
     valves, columns = tables.valves, tables.columns
     net = layout["net"]
@@ -63,7 +65,7 @@ def net_flows(out, tables):
 
 @njit(forceinline=True)
 def stiffness_of(nodes, layout, out, i):
-    """Present pressure per stored mass [Pa/kg] of node i, 0 without storage."""
+    """Present pressure rise per stored mass [Pa/kg] of node i, 0 for a node without storage."""
     kind = nodes[i]["kind"]
     if kind >= MOVING or (kind == CHAMBER and nodes[i]["row"] >= 0):  # a chamber softened by gas
         return out[layout["stiffness"] + nodes[i]["row"]]
@@ -72,7 +74,7 @@ def stiffness_of(nodes, layout, out, i):
 
 @njit(forceinline=True)
 def stored_rates(y, dydt, out, tables):
-    """d/dt of stored masses, and supplies.
+    """Write d/dt of the stored mass of every node to `dydt`, and the supply from outside to `out` [kg/s].
 
     A supply is the outflow of a reservoir, the spill of a full tank (negative), or the unmet demand from a dry tank.
     """
@@ -95,7 +97,7 @@ def stored_rates(y, dydt, out, tables):
 
 @njit(forceinline=True)
 def node_rate_limit(out, tables):
-    """Greatest rate of waves over cells, and of stored masses with the pipes at their nodes [1/s]."""
+    """Greatest rate that limits the step [1/s]: of waves through cells, or of stored masses with pipes at their node."""
     layout, nodes = tables.layout[0], tables.nodes
     rate = tables.settings[0]["rate"]
     for i in range(nodes.size):
@@ -106,7 +108,7 @@ def node_rate_limit(out, tables):
 
 @njit
 def balance_network(t, y, dydt, out, handle):
-    """Write net flows into nodes and rates of storage; set out[RATE] to their greatest rate."""
+    """Write net flows into nodes and rates of storage; set out[RATE] to the greatest rate of cells and nodes [1/s]."""
     tables = open_tables(handle)
     net_flows(out, tables)
     stored_rates(y, dydt, out, tables)
@@ -115,7 +117,7 @@ def balance_network(t, y, dydt, out, handle):
 
 @njit
 def valve_rate_limit(t, y, dydt, out, handle):
-    """Raise out[RATE] to the greatest rate at which stored masses equalise through valves."""
+    """Raise out[RATE] to the greatest rate [1/s] at which the masses of two nodes equalise through a valve."""
     tables = open_tables(handle)
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
     rate = out[RATE]

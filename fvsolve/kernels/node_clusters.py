@@ -1,8 +1,10 @@
-"""Clusters of nodes without storage that several valves join: Newton on pressures and flows together, linear law.
+"""Clusters, sets of nodes without storage that several valves join: Newton on pressures and flows, linear density law.
 
-Valve: M |M| = G (dp0 + p_i' - p_j'); node: c_i - Y_i p_i' = flow that leaves it through valves (gradient method of
-Todini and Pilati 1988). The unknown flows are total flows, not deviations: far from the profile, where a valve is
-nearly closed, a deviation would lose all but its rounding. A cluster in which nothing has changed is not solved.
+Valve from node i to node j: M |M| = G (dp0 + p_i' - p_j'), with flow M [kg/s], conductance G and initial drop dp0.
+Node: c_i - Y_i p_i' = flow that leaves it through valves, with the other inflow c_i at p_i' = 0 and the admittance Y_i
+of its pipes. p' is the pressure change since the initial steady state. Both are solved together (gradient method of
+Todini and Pilati 1988). The unknown flows are total flows, not changes: where a valve is nearly closed, a change would
+lose all but its rounding. A cluster in which nothing has changed is not solved.
 """
 
 from math import sqrt
@@ -20,9 +22,9 @@ FAILED_CHANGE = 1e-5  # relative change of flow above which Newton has failed; s
 
 @njit
 def solve_dense(a, b, n):
-    """b <- a^-1 b by elimination with partial pivoting; return the sign of det a, 0 if singular. Overwrites a and b.
+    """Solve a x = b by elimination with partial pivoting; x replaces b. Returns the sign of det a, 0 if a is singular.
 
-    a : float64[n * n]  row by row
+    a : float64[n * n]  matrix row by row, overwritten
     """
     sign = 1.0
     for i in range(n):
@@ -59,7 +61,11 @@ def has_converged(change, last_change):
 
 @njit
 def total_inflows(cluster, tables, out, c):
-    """c <- flow into each node of a cluster from all links but its valves, at p' = 0; True if nothing has changed."""
+    """Write the flow into each node of a cluster from all links but its valves, at unchanged pressure, to c [kg/s].
+
+    Returns True if these flows have not changed since the start.
+    cluster : nodes that are solved together
+    """
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
     integers, unchanged = tables.integers, True
     for i in range(c.size):
@@ -87,7 +93,7 @@ def total_inflows(cluster, tables, out, c):
 
 @njit
 def row_in_cluster(cluster, tables, i):
-    """Row of node i in this cluster, -1 if it does not belong to it."""
+    """Number of node i within a cluster (nodes solved together), -1 if it does not belong to it."""
     row = inner_row(tables.nodes, i)
     if row < 0 or row >= cluster["nodes"] or tables.integers[cluster["first_node"] + row] != i:
         return -1
@@ -96,9 +102,12 @@ def row_in_cluster(cluster, tables, i):
 
 @njit
 def add_valve(i, j, m, a, s, lift, n, matrix, right):
-    """Add a valve from row i to row j (-1: known pressure) to the balances of its nodes.
+    """Add a valve from node i to node j to the linear equations for the pressure steps of n nodes.
 
-    lift : dM / dp_i at constant drop
+    i, j : numbers in the cluster (nodes solved together), -1 for a known pressure
+    m : flow [kg/s]
+    a, s : terms of its change, dM = a + s d(drop) [kg/s, kg/s/Pa]
+    lift : derivative of the flow by the upstream pressure at constant drop [kg/s/Pa]
     """
     if i >= 0:
         right[i] -= m + a
@@ -113,7 +122,15 @@ def add_valve(i, j, m, a, s, lift, n, matrix, right):
 
 @njit
 def assemble(cluster, tables, out, g, m, c, connected, a, s, lift, matrix, right, wide):
-    """Linear system for the change of the pressures, with the changes of valve flows eliminated."""
+    """Assemble the linear equations for the pressure steps of a cluster (nodes solved together).
+
+    The changes of valve flows are eliminated. Arrays with an entry for each valve or each of n nodes:
+    g, m : conductance [kg2/s2/Pa] and flow [kg/s] of valves
+    c : inflow of nodes from other links [kg/s]; connected : 0 for isolated nodes
+    a, s, lift : receive the terms of each change of flow, see `add_valve`
+    matrix, right : float64[n * n], float64[n]  receive the equations
+    wide : see `restrictions.restriction_step`
+    """
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
     integers, n = tables.integers, c.size
     for i in range(matrix.size):
@@ -140,7 +157,7 @@ def assemble(cluster, tables, out, g, m, c, connected, a, s, lift, matrix, right
 
 @njit
 def add_couplings(cluster, tables, out, n, matrix, right):
-    """Add the instantaneous flow between the ends of short delay lines."""
+    """Add the instantaneous flow between the ends of short delay lines to the equations of a cluster of n nodes."""
     layout, nodes, integers = tables.layout[0], tables.nodes, tables.integers
     for k in range(cluster["couples"]):
         line = tables.delays[integers[cluster["first_couple"] + k]]
@@ -152,8 +169,11 @@ def add_couplings(cluster, tables, out, n, matrix, right):
 
 @njit
 def apply_step(cluster, tables, out, m, a, s, lift, right):
-    """Apply a Newton step; return the greatest relative change of flows and pressures.
+    """Apply a Newton step to pressures and valve flows; return the greatest relative change of both.
 
+    cluster : nodes that are solved together
+    m : flows of valves [kg/s], updated; right : pressure steps of nodes [Pa]
+    a, s, lift : terms of the changes of flow, see `add_valve`
     A change of flow by the rounding of pressures does not count. Flows are compared with at least the flow at 1 Pa.
     """
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
@@ -180,9 +200,9 @@ def apply_step(cluster, tables, out, m, a, s, lift, right):
 
 @njit
 def prepare_cluster(cluster, tables, out, g, m):
-    """Set conductances and start flows of the valves of a cluster, and p' = 0 in its nodes.
+    """Write conductances g and start flows m of the valves of a cluster (nodes solved together); reset its pressures.
 
-    True if no conductance, no speed and no pressure at the valves has changed.
+    Returns True if no conductance, pump speed and pressure at the valves has changed since the initial steady state.
     """
     layout, valves = tables.layout[0], tables.valves
     integers, unchanged = tables.integers, True
@@ -208,9 +228,9 @@ def prepare_cluster(cluster, tables, out, g, m):
 
 @njit
 def solve_cluster(out, tables, index):
-    """Solve the pressures of a cluster and the flows of its valves.
+    """Solve the pressures of cluster number `index` (nodes solved together) and the flows of its valves.
 
-    The iteration starts from the profile, so the result depends on (t, y) alone.
+    The iteration starts from the initial steady state, so the result depends on (t, y) alone.
     """
     integers, cluster = tables.integers, tables.clusters[index]
     n, k, work = cluster["nodes"], cluster["valves"], tables.scratch
@@ -245,7 +265,7 @@ def solve_cluster(out, tables, index):
 
 @njit
 def has_backflow(cluster, tables, m):
-    """True if a valve that is lifted by its upstream pressure carries backflow."""
+    """True if a valve of a cluster that its upstream pressure lifts carries backflow; m : flows of its valves [kg/s]."""
     for e in range(m.size):
         if has_lifted_backflow(tables, tables.integers[cluster["first_valve"] + e], m[e]):
             return True
@@ -254,8 +274,9 @@ def has_backflow(cluster, tables, m):
 
 @njit
 def close_unstable(cluster, tables, g, m):
-    """Close lifted valves that carry backflow and cannot stay open; True if there are any.
+    """Close lifted valves that carry backflow and cannot stay open (g = 0); True if there are any.
 
+    g, m : conductances and flows of the valves of a cluster (nodes solved together)
     Newton, which starts from wide open valves, has reached a matrix with a negative determinant: at smaller lifts the
     imbalance would be even greater.
     """
@@ -268,7 +289,10 @@ def close_unstable(cluster, tables, g, m):
 
 @njit
 def zero_isolated(cluster, tables, g, m, connected):
-    """Set the flow of valves at nodes that are not connected to zero; conductance -1 marks open valves."""
+    """Set the flow m of valves at isolated nodes to zero, and their conductance g to -1 if they are open, else 0.
+
+    connected : 0 for the isolated nodes of the cluster (nodes solved together)
+    """
     for e in range(g.size):
         if not is_connected(cluster, tables, e, connected):
             m[e] = 0.0
@@ -277,7 +301,7 @@ def zero_isolated(cluster, tables, g, m, connected):
 
 @njit
 def is_connected(cluster, tables, e, connected):
-    """True if valve e of a cluster lies between connected nodes or known pressures."""
+    """True if valve e of a cluster (nodes solved together) lies between connected nodes or known pressures."""
     valve = tables.valves[tables.integers[cluster["first_valve"] + e]]
     i, j = inner_row(tables.nodes, valve["from_node"]), inner_row(tables.nodes, valve["to_node"])
     return (i < 0 or connected[i] > 0.0) and (j < 0 or connected[j] > 0.0)
@@ -285,8 +309,11 @@ def is_connected(cluster, tables, e, connected):
 
 @njit
 def write_cluster(cluster, tables, out, g, m, c, connected, group, change):
-    """Write the flows of a cluster, the pressures of isolated nodes, and the status if Newton has failed.
+    """Write the valve flows of a cluster, the pressures of its isolated nodes, and STATUS if Newton has failed.
 
+    g, m : conductances and flows [kg/s] of valves; c : inflow of nodes from other links [kg/s]
+    connected, group : 0 for isolated nodes; work array for their groups
+    change : last relative change of Newton
     Flows that are rounding (dead ends) become zero: their sign does not depend on the pressures.
     """
     scale = 1e-300
@@ -307,7 +334,7 @@ def write_cluster(cluster, tables, out, g, m, c, connected, group, change):
 
 @njit
 def solve_clusters(t, y, dydt, out, handle):
-    """Solve pressures of the nodes of all clusters and flows of their valves."""
+    """Solve the pressures of all clusters (nodes without storage that several valves join) and their valve flows."""
     tables = open_tables(handle)
     for k in range(tables.clusters.size):
         if tables.clusters[k]["inverse"] < 0:

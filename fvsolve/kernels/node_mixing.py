@@ -1,8 +1,9 @@
 """Scalars at nodes: inflows are mixed by mass, instantly.
 
-A node has a single value. With storage it is the value of the content, at a given pressure or flow a given value for
-inflow from outside, and elsewhere the mean of all inflows. A pipe end also exchanges g (c_cell - value),
-g = 2 D m / dx.
+A node has a single value of each scalar. With storage it is the value of the stored mass. At a given pressure or flow
+it is the given value of inflow from outside, and elsewhere the mean of all inflows. A pipe end also exchanges the
+amount g (c_cell - c_node) [kg/s] by diffusion, g = 2 D m / dx, with the values c_cell in the end cell and c_node at the
+node, diffusivity D [m2/s], mass per length m [kg/m] and cell length dx.
 """
 
 from fvsolve.jit import njit
@@ -41,7 +42,7 @@ def cell_value(y, tables, q, p, i):
 
 @njit(forceinline=True)
 def end_cell(tables, p, right, k):
-    """Index of the k-th cell from an end of pipe p; the last cell if there are fewer."""
+    """Index of the k-th cell from the `from` (0) or `to` (1) end of pipe p; the last cell if there are fewer."""
     n = tables.pipes[p]["cells"]
     k = min(k, n - 1)
     return n - 1 - k if right == 1 else k
@@ -49,13 +50,16 @@ def end_cell(tables, p, right, k):
 
 @njit(forceinline=True)
 def bounded(value, scalar):
-    """The value, limited to the bounds of the scalar."""
+    """Value limited to the bounds `least` and `greatest` of the scalar."""
     return min(max(value, scalar["least"]), scalar["greatest"])
 
 
 @njit
 def outlet_values(y, out, tables, q):
-    """Value of a scalar in the water that leaves each pipe through each end: from a limited slope, within bounds."""
+    """Write the value of scalar q in the water that leaves each pipe through each end to `out`.
+
+    It follows from a limited slope, within the bounds of the scalar.
+    """
     st, scalar, at = tables.settings[0], tables.scalars[q], tables.layout[0]["edge"]
     pipes, limiter = tables.pipes, st["limiter"]
     for p in range(pipes.size):
@@ -74,7 +78,10 @@ def outlet_values(y, out, tables, q):
 
 @njit(forceinline=True)
 def end_conductance(y, tables, q, p, right):
-    """g = 2 D m / dx of an end of pipe p [kg/s]."""
+    """Diffusive exchange of scalar q between node and end cell of pipe p per difference of values, 2 D m / dx [kg/s].
+
+    D : diffusivity [m2/s]; m : mass per length [kg/m]; dx : length of the cell [m]; right : 0 or 1, `from` or `to` end
+    """
     scalar, pipe = tables.scalars[q], tables.pipes[p]
     if scalar["diffusivity"] == 0.0:
         return 0.0
@@ -83,9 +90,10 @@ def end_conductance(y, tables, q, p, right):
 
 @njit
 def pipe_inflows(y, out, tables, q, amount, weight, cells, count):
-    """Sum the inflows of all nodes from pipes: amount of scalar and weight (mass flow and conductance).
+    """Sum the inflows of scalar q from pipes into every node.
 
-    cells, count : sum and number of the values in pipe cells beside the node
+    amount, weight : float64[nodes]  amount of scalar [kg/s], and mass flow plus diffusive conductance [kg/s]
+    cells, count : float64[nodes]  sum and number of the values in pipe cells beside the node
     """
     pipes, edge = tables.pipes, tables.layout[0]["edge"]
     for i in range(amount.size):
@@ -107,7 +115,7 @@ def pipe_inflows(y, out, tables, q, amount, weight, cells, count):
 
 @njit(forceinline=True)
 def given_value(t, tables, q, i):
-    """Value of the inflow from outside at node i."""
+    """Value of scalar q in the inflow from outside at node i."""
     scalar, kind = tables.scalars[q], tables.nodes[i]["kind"]
     place = tables.integers[scalar["places"] + i]
     return schedule_value(tables, place, t) if place >= 0 and not has_storage(kind) else scalar["initial"]
@@ -115,13 +123,13 @@ def given_value(t, tables, q, i):
 
 @njit(forceinline=True)
 def has_storage(kind):
-    """True if a node of this kind stores an amount."""
+    """True if a node of this kind stores an amount of scalar: a tank or a chamber."""
     return kind == TANK or kind == CHAMBER
 
 
 @njit(forceinline=True)
 def mixes(y, out, tables, i):
-    """True if the value at node i is that of the present inflow: the node has no volume, or is dry."""
+    """True if the value of a scalar at node i is that of the present inflow: the node has no volume, or is dry."""
     node = tables.nodes[i]
     if not has_storage(node["kind"]):
         return node["kind"] == JUNCTION
@@ -131,7 +139,10 @@ def mixes(y, out, tables, i):
 
 @njit
 def start_values(t, y, out, tables, q, amount, weight, cells, count):
-    """Write the values of all nodes as far as they do not depend on other nodes."""
+    """Write the values of scalar q at all nodes, as far as they do not depend on other nodes.
+
+    amount, weight, cells, count : sums of `pipe_inflows`; a supply from outside is added to the first two
+    """
     nodes, layout, scalar = tables.nodes, tables.layout[0], tables.scalars[q]
     at = layout["value"] + q * nodes.size
     for i in range(nodes.size):
@@ -151,7 +162,10 @@ def start_values(t, y, out, tables, q, amount, weight, cells, count):
 
 @njit
 def mix_nodes(t, y, out, tables, q):
-    """Write the value of scalar q at every node, in sweeps over nodes without volume until no value changes."""
+    """Write the value of scalar q at every node, in sweeps over nodes without volume until no value changes.
+
+    Raises out[RATE] to the rate at which inflow replaces stored mass [1/s].
+    """
     nodes, valves, layout, scratch = tables.nodes, tables.valves, tables.layout[0], tables.scratch
     n, at = nodes.size, layout["value"] + q * nodes.size
     amount, weight, total, share = scratch[:n], scratch[n : 2 * n], scratch[2 * n : 3 * n], scratch[3 * n : 4 * n]
@@ -183,7 +197,10 @@ def mix_nodes(t, y, out, tables, q):
 
 @njit(forceinline=True)
 def record_loss(out, tables, q, k, lost):
-    """Subtract the decay `lost` [kg/s] of the k-th state or states of scalar q from the ledger."""
+    """Subtract the decay `lost` [kg/s] of state k of scalar q from the ledger, the record of losses for balances.
+
+    A scalar has a single entry there, or an entry for each state.
+    """
     scalar, at = tables.scalars[q], tables.layout[0]["loss"] + tables.scalars[q]["loss"]
     if scalar["losses"] == 1:
         out[at] -= lost
@@ -193,7 +210,7 @@ def record_loss(out, tables, q, k, lost):
 
 @njit
 def exchange_amounts(t, y, dydt, out, tables, q):
-    """Write the flows of scalar q through pipe ends and into nodes, rates of storage in nodes, and the ledger."""
+    """Write flows of scalar q through pipe ends and into nodes, rates of storage in nodes, gains and losses [kg/s]."""
     nodes, pipes, valves, layout = tables.nodes, tables.pipes, tables.valves, tables.layout[0]
     scalar, n = tables.scalars[q], nodes.size
     value, inflow, gain = layout["value"] + q * n, layout["scalar_inflow"] + q * n, layout["gain"] + q * n

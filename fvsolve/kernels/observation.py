@@ -1,4 +1,4 @@
-"""Observation of a state: probes, extremes, times of first occurrence, events of tanks. Changes no state."""
+"""Observation of a state: probes, extremes, times of first occurrence, events of tanks. No state is changed."""
 
 from fvsolve.jit import njit
 from fvsolve.kernels.calls import CLOSE, run_job
@@ -25,7 +25,10 @@ STOP_HERE = -2.0  # in out[WHERE]: the run must end
 
 @njit(forceinline=True)
 def wave_sum(probe, pipe, sign, index, y, out, tables):
-    """r + l or r - l at a probe of a pipe: at an end from the node, inside from a polynomial over cells."""
+    """r + sign l at a probe of a pipe [kg/s], with forward wave r, backward wave l and sign 1 or -1.
+
+    At an end from the node, inside from a polynomial over cells. index : number of the pipe
+    """
     at = tables.layout[0]["ends"] + 4 * index
     if probe["side"] < 0:
         return out[at] + sign * out[at + 1]
@@ -40,7 +43,7 @@ def wave_sum(probe, pipe, sign, index, y, out, tables):
 
 @njit
 def observe_linear(t, y, out, handle, values):
-    """values[k] = scale * quantity + offset for every probe."""
+    """Write the values of all probes of nodes, pipes, valves and rigid columns to `values`: scale * quantity + offset."""
     tables = open_tables(handle)
     layout, probes = tables.layout[0], tables.probes
     for k in range(probes.size):
@@ -70,7 +73,10 @@ def observe_linear(t, y, out, handle, values):
 
 @njit(forceinline=True)
 def update_extremes(envelope, c, t, value):
-    """Update the least and greatest value of column c, and their times, with a value."""
+    """Update column c of an envelope with a value at time t.
+
+    envelope : float64[4, n]  least value, its time, greatest value, its time
+    """
     if value < envelope[0, c]:
         envelope[0, c], envelope[1, c] = value, t
     if value > envelope[2, c]:
@@ -79,7 +85,10 @@ def update_extremes(envelope, c, t, value):
 
 @njit(forceinline=True)
 def count_new_extremes(r, l, least, greatest):
-    """Count the cells below and above their extremes so far; NaN counts as below and above."""
+    """(number of cells with r + l below `least`, number above `greatest`); NaN counts as below and above.
+
+    r, l : forward and backward wave of cells [kg/s]
+    """
     low, high = 0, 0
     for i in range(r.size):
         s = r[i] + l[i]
@@ -90,7 +99,10 @@ def count_new_extremes(r, l, least, greatest):
 
 @njit
 def update_minima(t, r, l, least, t_least):
-    """Update least values and their times of many cells, without a branch; return how many are not finite."""
+    """Update least values of r + l of cells and their times, without a branch; return how many waves are not finite.
+
+    r, l : forward and backward wave of cells [kg/s]; t : present time [s]
+    """
     bad = 0
     for i in range(r.size):
         s = r[i] + l[i]
@@ -103,7 +115,7 @@ def update_minima(t, r, l, least, t_least):
 
 @njit
 def update_maxima(t, r, l, greatest, t_greatest):
-    """Update greatest values and their times, as `update_minima` does for the least."""
+    """Update greatest values of r + l of cells and their times; return how many waves are not finite."""
     bad = 0
     for i in range(r.size):
         s = r[i] + l[i]
@@ -116,7 +128,7 @@ def update_maxima(t, r, l, greatest, t_greatest):
 
 @njit
 def count_below(r, l, boiling):
-    """Number of cells below vapour pressure: r + l below `boiling`."""
+    """Number of cells below vapour pressure: sum of the waves r + l below `boiling` [kg/s]."""
     count = 0
     for i in range(r.size):
         count += (r[i] + l[i]) < boiling[i]
@@ -127,7 +139,9 @@ def count_below(r, l, boiling):
 def update_envelope(t, r, l, at, low, high, index, tables):
     """Update the envelope of r + l from cell `at` on; record the first time that pipe `index` is below vapour pressure.
 
-    low, high : numbers of cells outside their extremes. Returns 0 if all values are finite.
+    r, l : forward and backward wave of these cells [kg/s]
+    low, high : numbers of cells below and above the envelope so far
+    Returns 0 if all values are finite.
     """
     e, profile, marks = tables.envelope, tables.profile, tables.marks
     b, bad = at + r.size, 0
@@ -143,7 +157,10 @@ def update_envelope(t, r, l, at, low, high, index, tables):
 
 @njit
 def record_pipe(t, r, l, pipe, index, tables):
-    """Update the envelope of r + l of a pipe; most blocks have no new extreme and are only compared."""
+    """Update the envelope of r + l of pipe number `index`; most blocks have no new extreme and are only compared.
+
+    r, l : float64[cells]  forward and backward wave [kg/s]
+    """
     start, at, envelope = 0, pipe["cell"], tables.envelope
     while start < r.size:
         stop = min(start + BLOCK, r.size)
@@ -166,9 +183,10 @@ def record_pipes(t, y, out, handle, values):
 
 @njit
 def record_nodes(t, y, out, handle, values):
-    """Update extremes of probes and first times of marks, after an accepted step and after `record_pipes`.
+    """Update extremes of probes and first times of low pressures and tank limits, after an accepted step.
 
-    marks : first times of pipes below vapour pressure, nodes below it, tanks dry, tanks spilling; NaN for never
+    Runs after `record_pipes`. The array `marks` holds the first times [s] at which pipes, then nodes, are below vapour
+    pressure, tanks are dry, tanks spill; NaN for never.
     """
     tables = open_tables(handle)
     pipes, nodes, extremes = tables.pipes, tables.nodes, tables.extremes
@@ -194,7 +212,10 @@ def record_nodes(t, y, out, handle, values):
 
 @njit
 def tank_events(t, y, out, handle, g):
-    """Event functions of tanks at bottom and rim; at a limit they need the net flow, so nodes are solved first."""
+    """Write the event functions of tanks at bottom and rim to g.
+
+    At a limit they need the net flow, so nodes are solved first.
+    """
     tables = open_tables(handle)
     # event functions of devices have solved the nodes
     nodes, armed, solved = tables.nodes, tables.armed, tables.devices.size > 0

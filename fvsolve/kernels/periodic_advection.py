@@ -8,9 +8,10 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def rhs_periodic(t, y, dydt, out, handle):
-    """du_j/dt = F[j] - F[j+1], a forward wave that passes a cell per unit of time; `noise` is the small number of WENO.
+    """Write du_j/dt = F[j] - F[j+1] for values u of cells in a ring, with face values F of a forward wave.
 
-    scratch : float64[2 n + 7]  window of values, then faces
+    The wave passes a cell per unit of time; `noise` of the pipe record is the small number of WENO.
+    scratch : float64[2 n + 7]  window of values, then face values
     """
     tables = open_tables(handle)
     settings, scratch, n = tables.settings[0], tables.scratch, y.size

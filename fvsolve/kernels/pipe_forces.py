@@ -1,7 +1,7 @@
 """Forces of the fluid on pipe legs between bends and dead ends.
 
-The force is the rate of momentum loss of the fluid, - d/dt of the integral of M dx [N], which acts on ends and wall in
-addition to the force of the profile; positive from `from` to `to`.
+The force is the rate of momentum loss of the fluid, - d/dt of the integral of M dx [N], with mass flow M. It acts on
+ends and wall in addition to the initial steady force; positive from `from` to `to`.
 """
 
 from fvsolve.jit import njit
@@ -16,7 +16,7 @@ from fvsolve.kernels.unsteady_friction.relaxation_terms_barotropic import add_un
 
 @njit
 def read_forces(dydt, tables, values):
-    """values[k] = - sum of dM/dt dx over the cells of the pipe, for every force probe."""
+    """Write the force of the fluid on the pipe [N] for every force probe: - sum of dM/dt dx over cells, mass flow M."""
     for k in range(tables.probes.size):
         probe = tables.probes[k]
         if probe["kind"] == PIPE_FORCE:
@@ -29,7 +29,7 @@ def read_forces(dydt, tables, values):
 
 @njit
 def observe_forces_linear(t, y, out, handle, values):
-    """Forces on pipes under the linear law."""
+    """Write the forces of the fluid on pipes [N] to `values`, under the linear law."""
     tables = open_tables(handle)
     at = tables.layout[0]["forces"]
     dydt = tables.work[at : at + y.size]
@@ -40,7 +40,7 @@ def observe_forces_linear(t, y, out, handle, values):
 
 @njit
 def observe_forces_barotropic(t, y, out, handle, values):
-    """Forces on pipes under the laws log and table."""
+    """Write the forces of the fluid on pipes [N] to `values`, under the laws log and table."""
     tables = open_tables(handle)
     at = tables.layout[0]["forces"]
     dydt = tables.work[at : at + y.size]
@@ -51,7 +51,7 @@ def observe_forces_barotropic(t, y, out, handle, values):
 
 @njit
 def observe_forces_cavitating(t, y, out, handle, values):
-    """Forces on pipes under the law mixture, with cavities."""
+    """Write the forces of the fluid on pipes [N] to `values`, under the law mixture, with cavities."""
     tables = open_tables(handle)
     at = tables.layout[0]["forces"]
     dydt = tables.work[at : at + y.size]

@@ -1,7 +1,8 @@
-"""Rates of a pipe under the linear density law: two waves, each reconstructed from the side it comes from.
+"""Rates of a pipe under the linear density law: two waves, each reconstructed from the side from which it comes.
 
-State, for each cell: forward r = (c m' + M') / 2 and backward l = (c m' - M') / 2 [kg/s], from deviations of mass per
-length m = rho A and mass flow M from the profile. r_t + c r_x = -drag'/2, l_t - c l_x = drag'/2.
+State, for each cell: forward wave r = (c m' + M') / 2 and backward wave l = (c m' - M') / 2 [kg/s], from the changes of
+mass per length m = rho A and mass flow M since the initial steady state, with wave speed c. r_t + c r_x = -drag' / 2,
+l_t - c l_x = drag' / 2, with the change drag' of wall friction [kg/s2].
 """
 
 from fvsolve.jit import njit
@@ -24,7 +25,11 @@ def scheme_family(settings, n):
 
 @njit
 def wave_faces(settings, family, small, backward, c, left, right, scratch, f):
-    """Values of a wave at all faces, from its cells c and three ghost cells beyond each end."""
+    """Write the values of a wave at all faces to f, from its cells c and three ghost cells beyond each end.
+
+    left, right : float64[3]  ghost cells, nearest first; backward : 1 for the backward wave
+    family : scheme family; small : square of a negligible value
+    """
     n = c.size
     if n <= 5:
         pad = scratch[: n + 6]
@@ -47,7 +52,12 @@ def wave_faces(settings, family, small, backward, c, left, right, scratch, f):
 
 @njit
 def both_faces(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, fr, fl):
-    """Face values of both waves; at the ends those given: incoming from the node, outgoing from the cells."""
+    """Write the face values of forward wave (fr) and backward wave (fl), all [kg/s].
+
+    r, l : float64[cells]  forward and backward wave of cells
+    r_in, l_in : waves that enter from the nodes at the `from` and the `to` end
+    r_out, l_out : waves that leave at the `to` and the `from` end, extrapolated from cells
+    """
     n, small = r.size, pipe["noise"]
     family, degree, limiter = scheme_family(settings, n), settings["degree"], settings["limiter"]
     edge, ghosts, beyond = scratch[16:21], scratch[21:24], scratch[24:27]
@@ -65,7 +75,7 @@ def both_faces(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, fr, fl):
 
 @njit
 def rates_from_faces(k, fr, fl, dr, dl):
-    """Write dr, dl from face values, without friction."""
+    """Write d/dt of forward and backward wave (dr, dl) from face values fr, fl, without friction; k = wave speed / dx."""
     for i in range(dr.size):
         dr[i] = -k * (fr[i + 1] - fr[i])
         dl[i] = k * (fl[i + 1] - fl[i])
@@ -73,7 +83,7 @@ def rates_from_faces(k, fr, fl, dr, dl):
 
 @njit
 def convolve(e0, e1, e2, e3, e4, e5, c, d):
-    """d[i] = sum of e_k c[i+k], in pairs from the outside in: the mirror image has the same bits."""
+    """d[i] = sum of e_k c[i+k], in pairs from the outside in, so that the mirror image has the same bits."""
     c1, c2, c3, c4, c5 = c[1:], c[2:], c[3:], c[4:], c[5:]
     for i in range(d.size):
         d[i] = (e0 * c[i] + e5 * c5[i]) + ((e1 * c1[i] + e4 * c4[i]) + (e2 * c2[i] + e3 * c3[i]))
@@ -81,7 +91,11 @@ def convolve(e0, e1, e2, e3, e4, e5, c, d):
 
 @njit
 def rates_linear(settings, k, backward, c, datum, edge, d):
-    """k (F[i] - F[i+1]) along a wave by a linear scheme, for at least five cells, from weights of cells."""
+    """Write k (F[i] - F[i+1]) along a wave to d, by a linear scheme with face values F, from its cells c.
+
+    k : wave speed / dx [1/s]; backward : 1 for the backward wave; there must be at least five cells
+    datum : value of the wave at the end where it enters [kg/s]; edge : float64[5]  work array
+    """
     n, inside, enter, leave = c.size, settings["inside"], settings["enter"], settings["leave"]
     e0, e1, e2, e3, e4, e5 = k * inside[0], k * inside[1], k * inside[2], k * inside[3], k * inside[4], k * inside[5]
     if backward == 1:
@@ -104,8 +118,11 @@ def rates_linear(settings, k, backward, c, datum, edge, d):
 
 @njit
 def subtract_friction(k, flow, loss, base, r, l, dr, dl):
-    """Subtract loss |M| M - drag from rates that hold -k and k times the differences of face values.
+    """Subtract the friction loss |M| M minus the initial steady drag from the rates of both waves.
 
+    dr, dl : float64[cells]  rates; on entry -k and k times the differences of face values [kg/s2], k = wave speed / dx
+    flow : initial steady mass flow [kg/s]; base : half of the initial steady drag [kg/s2]
+    loss : coefficient of |M| M [1/kg], M : mass flow
     Averaged over two Gauss points of a cell: fourth order, and no kink of the law is missed.
     """
     half, spread = 0.25 * loss, GAUSS / k
@@ -135,9 +152,10 @@ def subtract_friction_rough(k, pipe, base, r, l, dr, dl):
 
 @njit
 def subtract_friction_hazen(k, flow, loss, rough, base, r, l, dr, dl):
-    """`subtract_friction` for Hazen-Williams, whose power is evaluated once for both points.
+    """`subtract_friction` for Hazen-Williams, whose power is evaluated once for both Gauss points.
 
-    M (M^2 + 1.852 d^2)^0.426 is the mean of |M|^0.852 M over M - d and M + d with a relative error of 0.43 (d/M)^4.
+    M (M^2 + 1.852 d^2)^0.426 is the mean of |M|^0.852 M over M - d and M + d with a relative error of 0.43 (d/M)^4. M :
+    mass flow at the centre, M - d and M + d at the Gauss points
     """
     spread, half, quarter = GAUSS / k, 0.5 * rough, 0.25 * loss
     for i in range(r.size):
@@ -155,7 +173,12 @@ def subtract_friction_hazen(k, flow, loss, rough, base, r, l, dr, dl):
 
 @njit
 def rates_upwind(k, flow, loss, base, r, l, r_in, l_in, dr, dl):
-    """Rates of the first-order upwind scheme with friction, in a single loop without face arrays."""
+    """Write d/dt of both waves by the first-order upwind scheme with friction, in a single loop without face arrays.
+
+    k : wave speed / dx [1/s]; flow : initial steady mass flow M [kg/s]
+    loss : coefficient of |M| M [1/kg]; base : half of the initial steady drag [kg/s2]
+    r, l, dr, dl : float64[cells]  forward and backward wave [kg/s], their rates; r_in, l_in : waves from the nodes
+    """
     n = r.size
     half = 0.5 * loss
     m = flow + (r[0] - l[0])
@@ -176,7 +199,11 @@ def rates_upwind(k, flow, loss, base, r, l, r_in, l_in, dr, dl):
 
 @njit(forceinline=True)
 def pipe_rates(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, dr, dl):
-    """d/dt of both waves of a pipe from its cells and the four wave values at its ends."""
+    """Write d/dt of forward and backward wave of a pipe to dr and dl, from its cells and four wave values at its ends.
+
+    r, l : float64[cells]  waves of cells [kg/s]
+    r_in, l_out : forward and backward wave at the `from` end; r_out, l_in : at the `to` end
+    """
     n = r.size
     k = pipe["speed"] / pipe["dx"]
     base = 0.5 * pipe["drag"]

@@ -1,7 +1,7 @@
-"""Values at faces from cell averages, biased to the side that a wave comes from.
+"""Values at faces from cell averages, biased to the side from which a wave comes.
 
-Every loop reads a window P and writes F: face j lies between P[j+2] and P[j+3]. A forward wave uses P[j] .. P[j+4], a
-backward wave P[j+5] .. P[j+1].
+Every loop reads a window P of cell averages and writes face values F: face j lies between P[j+2] and P[j+3]. A forward
+wave uses P[j] .. P[j+4], a backward wave P[j+5] .. P[j+1].
 """
 
 from fvsolve.jit import inline, njit
@@ -11,7 +11,10 @@ from fvsolve.kernels.limiters import by_limiter, limited, slope
 
 @njit
 def value_weno5(a, b, c, d, e, small):
-    """Fifth-order WENO-Z value at the face after c (Borges et al. 2008); `small` prevents a division by zero."""
+    """Fifth-order WENO-Z value at the face after cell c (Borges et al. 2008), from the averages of five cells a .. e.
+
+    small : square of a negligible value, which prevents a division by zero
+    """
     p0 = (2.0 * a - 7.0 * b + 11.0 * c) / 6.0
     p1 = (-b + 5.0 * c + 2.0 * d) / 6.0
     p2 = (2.0 * c + 5.0 * d - e) / 6.0
@@ -30,34 +33,37 @@ def value_weno5(a, b, c, d, e, small):
 
 @njit
 def value_muscl(limiter, b, c, d):
-    """Second-order value at the face after c with a limited slope."""
+    """Second-order value at the face after cell c with a limited slope, from the averages of cells b, c, d."""
     return c + 0.5 * limited(limiter, c - b, d - c)
 
 
 @njit
 def faces_linear(w0, w1, w2, w3, w4, w5, p, f):
-    """F[j] = sum of w_k P[j+k]."""
+    """Write face values of a linear scheme: f[j] = sum of w_k p[j+k]."""
     for j in range(f.size):
         f[j] = (w0 * p[j] + w1 * p[j + 1]) + (w2 * p[j + 2] + w3 * p[j + 3]) + (w4 * p[j + 4] + w5 * p[j + 5])
 
 
 @inline
 def muscl_forward(limiter, p, f):
-    """Limited second-order face values of forward waves."""
+    """Write limited second-order face values of a forward wave to f; face j lies between p[j+2] and p[j+3]."""
     for j in range(f.size):
         f[j] = p[j + 2] + 0.5 * slope(limiter, p[j + 2] - p[j + 1], p[j + 3] - p[j + 2])
 
 
 @inline
 def muscl_backward(limiter, p, f):
-    """Limited second-order face values of backward waves."""
+    """Write limited second-order face values of a backward wave to f; face j lies between p[j+2] and p[j+3]."""
     for j in range(f.size):
         f[j] = p[j + 3] - 0.5 * slope(limiter, p[j + 4] - p[j + 3], p[j + 3] - p[j + 2])
 
 
 @njit
 def faces_weno5(small, backward, p, f):
-    """Fifth-order WENO-Z face values."""
+    """Write fifth-order WENO-Z face values to f; face j lies between p[j+2] and p[j+3].
+
+    backward : 1 for a backward wave; small : square of a negligible value
+    """
     if backward == 1:
         for j in range(f.size):
             f[j] = value_weno5(p[j + 5], p[j + 4], p[j + 3], p[j + 2], p[j + 1], small)
@@ -68,7 +74,10 @@ def faces_weno5(small, backward, p, f):
 
 @njit
 def faces(settings, scheme, small, backward, p, f):
-    """Values at the faces of window `p`; `scheme` is the scheme family for this number of cells."""
+    """Write face values to f by a scheme family; face j lies between the cell averages p[j+2] and p[j+3].
+
+    backward : 1 for a backward wave; small : square of a negligible value
+    """
     if scheme == UPWIND:
         for j in range(f.size):
             f[j] = p[j + 3] if backward == 1 else p[j + 2]

@@ -1,4 +1,4 @@
-"""Restrictions: present conductance, Newton step of each law, slope and events."""
+"""Restrictions (valves, pumps, orifices): conductance, Newton step, slope and events of each law."""
 
 from math import sqrt
 
@@ -14,7 +14,7 @@ from fvsolve.kernels.valves import LEAST, flow_slope, transition_of, valve_condu
 
 @njit(forceinline=True)
 def open_scheduled(t, out, tables):
-    """Write the conductances of restrictions that no device opens and closes to out[conductance]."""
+    """Write the conductances [kg2/s2/Pa] of restrictions that follow schedules, without a device, to out[conductance]."""
     valves, at = tables.valves, tables.layout[0]["conductance"]
     for k in range(valves.size):
         if valves[k]["device"] < 0:
@@ -29,17 +29,22 @@ def conductance(tables, out, k):
 
 @njit
 def conductance_at(t, tables, out, k):
-    """Conductance at another time t close to the present; for a restriction with a device the present value."""
+    """Conductance of restriction k at another time t close to the present one [kg2/s2/Pa].
+
+    For a restriction with a device it is the present value.
+    """
     return valve_conductance(tables, k, t) if tables.valves[k]["device"] < 0 else conductance(tables, out, k)
 
 
 @njit
 def restriction_step(tables, out, k, g, m, drop, denser, wide):
-    """a, s with dM = a + s d(drop) for the next Newton step of restriction k with flow m [kg/s] at a drop [Pa].
+    """(a, s) of the change of flow a + s d(drop) in the next Newton step of restriction k [kg/s, kg/s/Pa].
 
-    g : present conductance, above zero; denser : upstream density over reference density, 1 under the linear law
-    wide : start with restrictions that pressure lifts wide open; where two flows are possible, Newton then comes from
-    above
+    m, drop : present flow [kg/s] and drop [Pa]
+    g : present conductance [kg2/s2/Pa], above zero
+    denser : upstream density over reference density, 1 under the linear law
+    wide : True to start with wide open restrictions where pressure lifts them; where two flows are possible, Newton
+        then comes from above
     """
     valve = tables.valves[k]
     if valve["hooks"] >= 0:
@@ -49,7 +54,7 @@ def restriction_step(tables, out, k, g, m, drop, denser, wide):
 
 @njit
 def root_step(tables, k, g, m, drop, denser):
-    """`restriction_step` for the square-root law M |M| = G dp."""
+    """(a, s) of `restriction_step` for the square-root law M |M| = G dp, flow M, conductance G, drop dp."""
     valve, g = tables.valves[k], g * denser
     if drop < 0.0:
         g *= valve["back"]
@@ -66,7 +71,7 @@ def root_step(tables, k, g, m, drop, denser):
 
 @njit
 def head_drop(tables, out, k):
-    """(density at the `from` end [kg/m3], density times difference of specific energy over restriction k [Pa])."""
+    """(density at the `from` end [kg/m3], this density times the drop of specific energy over restriction k [Pa])."""
     st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
     valve = tables.valves[k]
     i, j = valve["from_node"], valve["to_node"]
@@ -81,7 +86,7 @@ def head_drop(tables, out, k):
 
 @njit
 def restriction_slope(tables, out, k, drop):
-    """d flow / d drop of restriction k at a drop [kg/s/Pa]."""
+    """Derivative of the flow of restriction k by its drop, at a drop [Pa], [kg/s/Pa]."""
     valve, g = tables.valves[k], conductance(tables, out, k)
     if valve["hooks"] >= 0:
         return call_slope(tables.hooks[valve["hooks"], SLOPE], out, tables, k, g, drop)
@@ -90,7 +95,7 @@ def restriction_slope(tables, out, k, drop):
 
 @njit
 def root_slope(tables, k, g, drop):
-    """`restriction_slope` for the square-root law."""
+    """`restriction_slope` for the square-root law with conductance g [kg2/s2/Pa]."""
     valve = tables.valves[k]
     if drop < 0.0:
         g *= valve["back"]
@@ -109,7 +114,10 @@ def is_lifted(tables, k):
 
 @njit
 def restriction_lift(tables, out, k, g, drop, denser, wide):
-    """d flow / d upstream pressure at constant drop of restriction k [kg/s/Pa]; 0 if pressure does not lift it."""
+    """Derivative of the flow of restriction k by its upstream pressure at constant drop [kg/s/Pa].
+
+    It is 0 if pressure does not lift the restriction. Arguments as in `restriction_step`.
+    """
     if not is_lifted(tables, k):
         return 0.0
     return call_lift(tables.hooks[tables.valves[k]["hooks"], LIFT], out, tables, k, g, drop, denser, wide)
@@ -123,7 +131,7 @@ def has_lifted_backflow(tables, k, m):
 
 @njit
 def restriction_events(t, y, out, handle, g):
-    """Event functions of restrictions with kinks in their law, from solved nodes."""
+    """Write the event functions of restrictions with kinks in their law to g, from solved nodes."""
     tables = open_tables(handle)
     nodes, valves, pressure = tables.nodes, tables.valves, tables.layout[0]["pressure"]
     for k in range(valves.size):
@@ -135,5 +143,5 @@ def restriction_events(t, y, out, handle, g):
 
 @njit
 def step_at(hook, out, handle, k, g, m, drop, denser):
-    """`restriction_step` of restriction k by the step function of its law, for calls from Python."""
+    """(a, s) of `restriction_step` by the compiled function `hook` of its law, for calls from Python."""
     return call_step(hook, out, open_tables(handle), k, g, m, drop, denser, False)

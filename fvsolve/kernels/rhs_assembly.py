@@ -1,7 +1,8 @@
 """Assembly of the right-hand side of a model: a list of its functions, phase by phase.
 
 Each function has the arguments (t, y, dydt, out, handle) and may read what earlier phases have written. With an empty
-dydt it computes `out` alone. A band of rows is a handle whose tables are parts of these: no function depends on it.
+dydt it computes `out` alone. Bands of a state (`band_exchange`) use the same functions, each with a handle to its own
+parts of the tables.
 """
 
 from __future__ import annotations
@@ -17,9 +18,9 @@ KERNELS = "fvsolve.kernels"
 
 @dataclass(frozen=True)
 class RhsTerms:
-    """Functions that a component adds to a model, as `module: function`, "" for none; the phases first, in order.
+    """Functions that a component adds to a model, as `module: function`, "" for none; phases come first, in order.
 
-    home : package of the modules
+    package : package of the modules
     """
 
     exchange: str = ""  # exchange of states between bands
@@ -216,10 +217,11 @@ class ModelFeatures:
     """Features of a model, which decide on the functions of its right-hand side.
 
     family : kernels of the density law, "linear", "barotropic" or "cavitating"
-    laws : modules of the laws of parts, in the order of the rows of `hooks`
-    basins, carried : components of basins, and of the scalars in them; see `basins.lower_pieces`
+    laws : names of the modules of parts' laws, in the order of the rows of `hooks`
+    basins, carried : terms of basins, and of the scalars that they carry; see `basins.basin_terms`
     alone : True if there are only basins, and no link
-    bands, together : True if threads step bands of the state, and if several bands have an open boundary
+    bands : True if threads or processes step bands of the state
+    boundary_exchange : True if several bands have an open boundary
     """
 
     family: str
@@ -247,7 +249,7 @@ class ModelFeatures:
     forces: bool = False
 
     def components(self) -> Iterator[RhsTerms]:
-        """Components of the model, in the order in which functions of a phase run."""
+        """Terms of the model, in the order in which functions of a phase run."""
         if self.bands:
             yield BANDS
         if self.boundary_exchange:
@@ -308,7 +310,7 @@ class ModelFeatures:
         yield ALWAYS
 
     def modules(self) -> list:
-        """Modules of the laws of parts."""
+        """Modules of the laws of parts, loaded."""
         return [import_module(name) for name in self.laws]
 
     def packages(self) -> list[str]:
@@ -316,7 +318,10 @@ class ModelFeatures:
         return [*self.laws, *(member.package for member in self.basins)]
 
     def functions(self, *jobs: str) -> list:
-        """Functions of jobs, job by job; modules that a model does not need are not loaded."""
+        """Functions of the model for these jobs, job by job; modules that the model does not need are not loaded.
+
+        jobs : names of fields of `RhsTerms`
+        """
         members = dict.fromkeys(self.components())  # components that several basins need, once
         return [
             load_function(member.package, name) for job in jobs for member in members if (name := getattr(member, job))
@@ -324,6 +329,6 @@ class ModelFeatures:
 
 
 def load_function(home: str, name: str):
-    """Load a function by package and `module: function`."""
+    """Load a function by its `module: function` within the package `home`."""
     module, function = name.split(": ")
     return getattr(import_module(f"{home}.{module}"), function)

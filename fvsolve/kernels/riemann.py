@@ -1,9 +1,10 @@
 """Riemann problem of a pipe under the law mixture: two states, and a wave to either side.
 
-Across a shock [v]^2 = [F] [-1 / m], F the integral of A dp (Rankine-Hugoniot for mass and momentum); across a
-rarefaction dv = dp / (rho c). The law is convex (1 / m falls ever less steeply with F), so there are no other waves.
-The pressure between the waves stays above the floor of the law however fast the states part: a cavity opens there.
-A state is (pressure p [Pa], mass per length m [kg/m], F [N], m c [kg/s], the integral of dp / (rho c) up to p [m/s]).
+Across a shock [v]^2 = [F] [-1 / m], with brackets for the differences of velocity v, pressure integral F (of A dp) and
+1 over mass per length m (Rankine-Hugoniot for mass and momentum); across a rarefaction dv = dp / (rho c). The law is
+convex (1 / m falls ever less steeply with F), so there are no other waves. The pressure between the waves stays above
+the floor pressure of the law however fast the states part: a cavity opens there. A state is a tuple of pressure p [Pa],
+mass per length m [kg/m], F [N], m c [kg/s] with sound speed c, and the integral of dp / (rho c) up to p [m/s].
 """
 
 from math import exp, log, sqrt
@@ -21,7 +22,7 @@ UNBOUNDED = 1e300
 def isothermal_integral(st, compliance, x):
     """Integral of sqrt((a + b / x + gas / x^2) / rho_ref) dx [m/s]: dp / (rho c) without the stretch of the wall.
 
-    a = 1 / beta + compliance, b = compliance gas; closed form by sqrt(R), R = a x^2 + b x + gas.
+    x is the gas pressure, a = 1 / beta + compliance, b = compliance gas; closed form by sqrt(R), R = a x^2 + b x + gas.
     """
     a, gas = 1.0 / st["beta"] + compliance, st["gas"]
     b = compliance * gas
@@ -32,7 +33,10 @@ def isothermal_integral(st, compliance, x):
 
 @njit
 def state_at(st, floats, pipe, p):
-    """State of a pipe at a pressure."""
+    """State of a pipe at the pressure p [Pa], under the law mixture.
+
+    Tuple of pressure [Pa], mass per length m [kg/m], integral of A dp [N], m c [kg/s], integral of dp / (rho c) [m/s].
+    """
     m, dm = mass_of_pressure(st, floats, pipe, p)
     over = p - st["reference"]
     force = pipe["area"] * over * (1.0 + 0.5 * pipe["compliance"] * over)
@@ -49,7 +53,7 @@ def is_isothermal(st):
 
 @njit
 def stretch_factor(st, floats, pipe, p):
-    """Integrand of dp / (rho c) over that of `isothermal_integral` at a pressure: 1 but for the stretch of the wall."""
+    """Exact integrand of dp / (rho c) over that of `isothermal_integral` at a pressure; 1 for a rigid wall."""
     x = p - st["floor"]
     plain = 1.0 / st["beta"] + pipe["compliance"] + st["gas"] / x * (pipe["compliance"] + 1.0 / x)
     return sqrt(st["rho"] / plain) / impedance(st, floats, pipe, p)
@@ -57,7 +61,10 @@ def stretch_factor(st, floats, pipe, p):
 
 @njit
 def rarefaction_change(st, floats, pipe, low, high):
-    """Integral of dp / (rho c) between two states [m/s]."""
+    """Integral of dp / (rho c) between two states [m/s], the velocity change in a rarefaction.
+
+    low, high : states of `state_at`
+    """
     if not is_isothermal(st):
         return velocity_change(st, floats, pipe, low[0], high[0])
     return (
@@ -69,7 +76,10 @@ def rarefaction_change(st, floats, pipe, low, high):
 
 @njit
 def wave_jump(st, floats, pipe, side, to):
-    """(velocity that a wave subtracts on its way from a state to another [m/s], its slope over the second pressure)."""
+    """Velocity that a wave subtracts on its way from state `side` to state `to` [m/s], and its slope [m/s/Pa].
+
+    The slope is the derivative by the pressure of `to`. side, to : states of `state_at`
+    """
     area = pipe["area"] * area_ratio(st, pipe["compliance"], to[0])
     if abs(to[0] - side[0]) <= NEAR * (to[0] - st["floor"]):
         return (to[2] - side[2]) * 0.5 * (1.0 / side[3] + 1.0 / to[3]), area / to[3]
@@ -82,9 +92,11 @@ def wave_jump(st, floats, pipe, side, to):
 
 @njit
 def star_state(st, floats, pipe, left, v_l, right, v_r):
-    """(state between the waves of two states, its velocity after the left and after the right wave), by Newton.
+    """State between the two waves of a Riemann problem, and its velocity after the left and after the right wave.
 
-    Both velocities are equal, except where the states part so fast that a vacuum remains between them.
+    left, right : states of `state_at`; v_l, v_r : their velocities [m/s]
+    By Newton. Both resulting velocities are equal, except where the states part so fast that a vacuum remains between
+    them.
     """
     floor, low, high = st["floor"], st["floor"], UNBOUNDED
     both = right[3] * left[0] + left[3] * right[0] + left[3] * right[3] * (v_l - v_r) / pipe["area"]
@@ -110,7 +122,10 @@ def star_state(st, floats, pipe, left, v_l, right, v_r):
 
 @njit(forceinline=True)
 def intermediate_pressure(floor, low, high, p):
-    """Pressure between two bounds, of which one may be unknown, by the ratio of gas pressures."""
+    """Pressure between the bounds `low` and `high`, of which one may be unknown, by the ratio of gas pressures [Pa].
+
+    floor : lowest pressure of the density law; p : present pressure, used where a bound is unknown
+    """
     if low <= floor:
         return floor + max(FALL * (p - floor), LEAST)
     if high >= UNBOUNDED:
@@ -120,7 +135,10 @@ def intermediate_pressure(floor, low, high, p):
 
 @njit
 def sonic_state(st, floats, pipe, side, v0, end):
-    """(state, velocity) where the rarefaction from a state to `end` has the speed of sound, by bisection."""
+    """(state, velocity [m/s]) inside a rarefaction, where the flow has the speed of sound, by bisection.
+
+    side, v0 : state of `state_at` before the rarefaction, and its velocity [m/s]; end : state behind it
+    """
     floor = st["floor"]
     low, high = log(end[0] - floor), log(side[0] - floor)
     state, v = side, v0
@@ -139,7 +157,11 @@ def sonic_state(st, floats, pipe, side, v0, end):
 
 @njit
 def sample_wave(st, floats, pipe, side, v0, end, v):
-    """(m, v, F) at a face from the wave between a state and `end`; the wave runs left and leaves v >= 0 behind it."""
+    """(mass per length m [kg/m], velocity [m/s], pressure integral F [N]) at a face from the wave between two states.
+
+    side, v0 : state of `state_at` before the wave, and its velocity; end, v : state and velocity behind the wave
+    The wave runs left and leaves v >= 0 behind it.
+    """
     if end[0] > side[0]:
         if end[1] * v >= side[1] * v0 and end[1] > side[1]:
             return side[1], v0, side[2]
@@ -153,7 +175,11 @@ def sample_wave(st, floats, pipe, side, v0, end, v):
 
 @njit
 def face_flux(st, floats, pipe, p_l, v_l, p_r, v_r):
-    """Flux of mass [kg/s] and of momentum M^2 / m + F [N] between two states; p [Pa], v [m/s]."""
+    """Flux of mass M [kg/s] and of momentum M^2 / m + F [N] between a left and a right state.
+
+    p_l, v_l, p_r, v_r : pressures [Pa] and velocities [m/s] of both states
+    m : mass per length [kg/m]; F : integral of A dp [N]
+    """
     left, right = state_at(st, floats, pipe, p_l), state_at(st, floats, pipe, p_r)
     middle, after, ahead = star_state(st, floats, pipe, left, v_l, right, v_r)
     m, v, force = middle[1], 0.5 * (after + ahead), middle[2]

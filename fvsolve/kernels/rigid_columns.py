@@ -1,4 +1,7 @@
-"""Rigid columns: a flow each, which valves (`column_valve_control`) or junctions (`column_junctions`) may control."""
+"""Rigid columns, each with a single flow, which valves (`column_valve_control`) or junctions may control.
+
+Junctions of columns: `column_junctions`.
+"""
 
 from fvsolve.jit import njit
 from fvsolve.kernels.column_junctions import (
@@ -26,7 +29,7 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def column_inflows(t, y, dydt, out, handle):
-    """Write the flows of rigid columns to out[column]; add their changes since the profile to out[net]."""
+    """Write the flows of rigid columns [kg/s] to out[column]; add their changes since the start to out[net]."""
     tables = open_tables(handle)
     layout, columns = tables.layout[0], tables.columns
     find_controlled_columns(tables, out)
@@ -43,7 +46,10 @@ def column_inflows(t, y, dydt, out, handle):
 
 @njit
 def add_controlled_rates(t, y, tables, out, n):
-    """given <- rates of flow [kg/s2] that valve-controlled columns bring into each of n column junctions."""
+    """Write d/dt of the flow that valve-controlled columns bring into each of n column junctions [kg/s2] to `given`.
+
+    `given` is a work array, see `column_junctions.junction_work`.
+    """
     rows, _, _, _, _, given = junction_work(tables, n)
     given[:] = 0.0
     for k in range(tables.columns.size):
@@ -56,7 +62,10 @@ def add_controlled_rates(t, y, tables, out, n):
 
 @njit
 def junction_pressures(t, y, tables, out):
-    """Set the pressures of column junctions, at which the sum of flows into each stays zero."""
+    """Write the pressures of column junctions, at which the sum of flows into each stays zero, to `out`.
+
+    A column junction joins rigid columns, and otherwise only closed valves.
+    """
     n = number_junctions(tables, out)
     if n == 0:
         return
@@ -72,7 +81,7 @@ def junction_pressures(t, y, tables, out):
 
 @njit
 def column_pressures(t, y, dydt, out, handle):
-    """Set the pressures of column junctions and of valve-controlled ends of columns.
+    """Write the pressures of column junctions, and of the column ends whose flow nearly closed valves control.
 
     At the controlled end of a stationary column it is the pressure of the far end plus the weight between them. A flow
     through a vanishing area would not determine it.
@@ -89,7 +98,7 @@ def column_pressures(t, y, dydt, out, handle):
 
 @njit
 def column_rates(t, y, dydt, out, handle):
-    """d/dt of the flow in rigid columns under the linear law."""
+    """Write d/dt of the flow in rigid columns [kg/s2] to `dydt`, under the linear law."""
     tables = open_tables(handle)
     columns, pressure = tables.columns, tables.layout[0]["pressure"]
     for k in range(columns.size if dydt.size > 0 else 0):
@@ -101,9 +110,10 @@ def column_rates(t, y, dydt, out, handle):
 
 @njit
 def column_rate(t, y, tables, out, k, change):
-    """d/dt of the flow of a column: (A / L) (change of driving pressure) - (drag - drag of the profile).
+    """d/dt of the flow of column k [kg/s2]: (A / L) (change of driving pressure) - (drag - initial steady drag).
 
-    The rate of a stationary or valve-controlled column follows from its valves. If a valve controls it from its seat,
+    change : change of the pressure difference and of the body force along it since the start [Pa]
+    The rate of a stationary or valve-controlled column follows from its valves. If a valve controls it near its seat,
     the node pressure beside the valve contains this and the general formula holds.
     """
     column, end = tables.columns[k], control_end(tables, out, k)
@@ -118,6 +128,7 @@ def column_rate(t, y, tables, out, k, change):
 def column_rate_limit(t, y, dydt, out, handle):
     """Raise out[RATE] to the greatest rate [1/s] at which valves alone brake a column, (A / L) dp / dM.
 
+    A, L : area and length of the column; dp / dM : slope of the drop of its valves over their flow
     Clears out[CLOSING]; discs, which are evaluated later, write there how fast they close on a column.
     """
     tables = open_tables(handle)

@@ -1,8 +1,8 @@
 """Scalars in pipes, carried by the mass flow of the mass equation.
 
-State of a cell: amount per length s = m c, m the mass per length, s_t + (M c - D m c_x)_x = -decay (s - m ambient).
-Flows at faces are summed from the `from` end, M[i+1] = M[i] - dx dm[i]/dt, with dm/dt of the waves. So a uniform c
-remains uniform.
+State of a cell: amount per length s = m c [kg/m], with mass per length m and value c of the scalar. s_t + (M c - D m
+c_x)_x = -decay (s - m ambient), with mass flow M [kg/s] and diffusivity D [m2/s]. Flows at faces are summed from the
+`from` end, M[i+1] = M[i] - dx dm[i]/dt, with dm/dt of the waves. So a uniform c remains uniform.
 """
 
 from fvsolve.jit import inline, njit
@@ -14,14 +14,20 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def cell_masses(base, slowness, r, l, m):
-    """m[i], mass per length of cells [kg/m]: that of the profile plus (r + l) / speed."""
+    """Write the mass per length of cells [kg/m] to m: initial steady value `base` plus (r + l) / speed.
+
+    slowness : 1 / wave speed [s/m]; r, l : forward and backward wave [kg/s]
+    """
     for i in range(m.size):
         m[i] = base[i] + slowness * (r[i] + l[i])
 
 
 @njit
 def face_flows(first, last, slowness, dr, dl, flow):
-    """Mass flow at all faces [kg/s], from that at the `from` end on; slowness = dx / speed."""
+    """Write the mass flow at all faces [kg/s], from the flow `first` at the `from` end on, to `flow`.
+
+    last : flow at the `to` end; slowness : dx / wave speed [s]; dr, dl : d/dt of both waves in cells [kg/s2]
+    """
     flow[0] = first
     for i in range(dr.size - 1):
         flow[i + 1] = flow[i] - slowness * (dr[i] + dl[i])
@@ -30,14 +36,14 @@ def face_flows(first, last, slowness, dr, dl, flow):
 
 @njit
 def concentrations(s, m, c):
-    """c = s / m."""
+    """Write the values of a scalar in cells to c: amounts per length s over masses per length m."""
     for i in range(c.size):
         c[i] = s[i] / m[i]
 
 
 @inline
 def inner_slopes(limiter, c, d):
-    """Limited differences over all cells except those at the ends."""
+    """Write limited differences of c over all cells except those at the ends to d."""
     here, next, inside = c[1:], c[2:], d[1:]
     for i in range(c.size - 2):
         inside[i] = slope(limiter, here[i] - c[i], next[i] - here[i])
@@ -45,9 +51,10 @@ def inner_slopes(limiter, c, d):
 
 @njit
 def inner_fluxes(conductance, c, d, m, flow, f):
-    """f[i + 1] through the face after cell i: flow times the upstream value, minus D m c_x.
+    """Write the flux of a scalar after cell i to f[i + 1]: flow times upstream value, minus D m c_x [kg/s].
 
-    conductance : D / (2 dx), multiplied with the sum of both masses [kg/s]
+    conductance : D / (2 dx), multiplied with the sum of both masses per length m; D : diffusivity, dx : cell length
+    c, d : values of the scalar in cells and their limited differences
     """
     next, bend, mass, through, f = c[1:], d[1:], m[1:], flow[1:], f[1:]
     for i in range(c.size - 1):
@@ -58,7 +65,7 @@ def inner_fluxes(conductance, c, d, m, flow, f):
 
 @njit
 def amount_rates(k, f, ds):
-    """ds from the fluxes f through all faces."""
+    """Write d/dt of amounts per length to ds, from the fluxes f through all faces; k = 1 / dx."""
     after = f[1:]
     for i in range(ds.size):
         ds[i] = k * (f[i] - after[i])
@@ -66,7 +73,11 @@ def amount_rates(k, f, ds):
 
 @njit
 def subtract_decay(decay, ambient, s, m, ds):
-    """Subtract the decay from ds; return its sum."""
+    """Subtract the decay of a scalar from the rates ds of its amounts per length; return its sum over cells [kg/m/s].
+
+    decay : rate [1/s]; ambient : value to which it decays
+    s, m : amount and mass per length of cells [kg/m]
+    """
     lost = 0.0
     for i in range(s.size):
         fades = decay * (s[i] - ambient * m[i])
@@ -77,7 +88,7 @@ def subtract_decay(decay, ambient, s, m, ds):
 
 @njit
 def greatest_velocity(m, flow):
-    """Greatest |M| of faces over the least m of cells [m/s]."""
+    """Upper bound of the velocity in a pipe [m/s]: greatest |mass flow| of faces over least mass per length of cells."""
     least, most = m[0], abs(flow[m.size])
     for i in range(m.size):
         least, most = min(least, m[i]), max(most, abs(flow[i]))
@@ -86,7 +97,10 @@ def greatest_velocity(m, flow):
 
 @njit
 def pipe_scalar_rates(y, dydt, out, tables, p):
-    """Write rates of all scalars in pipe p; add the decay to the ledger, raise out[RATE]."""
+    """Write d/dt of the amounts of all scalars in pipe p to `dydt`; raise out[RATE] to the rate of transport [1/s].
+
+    Also subtract the decay from the record of losses.
+    """
     st, layout, pipe, scratch = tables.settings[0], tables.layout[0], tables.pipes[p], tables.scratch
     n, o, dx = pipe["cells"], pipe["y"], pipe["dx"]
     base, r, l = tables.profile[pipe["center"] :], y[o : o + n], y[o + n : o + 2 * n]
@@ -132,7 +146,7 @@ def pipe_scalar_rates(y, dydt, out, tables, p):
 
 @njit
 def clear_losses(t, y, dydt, out, handle):
-    """Clear the rows of decay in the ledger."""
+    """Clear the entries of decay in the record of gains and losses."""
     tables = open_tables(handle)
     for q in range(tables.scalars.size):
         if tables.scalars[q]["losses"] > 0:
@@ -141,7 +155,7 @@ def clear_losses(t, y, dydt, out, handle):
 
 @njit
 def pipe_outlet_values(t, y, dydt, out, handle):
-    """Values of all scalars in the water that leaves pipes."""
+    """Write the values of all scalars in the water that leaves pipes to `out`."""
     tables = open_tables(handle)
     for q in range(tables.scalars.size):
         outlet_values(y, out, tables, q)
@@ -149,7 +163,7 @@ def pipe_outlet_values(t, y, dydt, out, handle):
 
 @njit
 def mix_scalars(t, y, dydt, out, handle):
-    """Write values at all nodes, flows of scalars into them, and rates of storage unless `dydt` is empty."""
+    """Write values of scalars at all nodes, flows of scalars into them, and rates of storage unless `dydt` is empty."""
     tables = open_tables(handle)
     for q in range(tables.scalars.size):
         mix_nodes(t, y, out, tables, q)
@@ -158,7 +172,7 @@ def mix_scalars(t, y, dydt, out, handle):
 
 @njit
 def scalar_rates(t, y, dydt, out, handle):
-    """Rates of all amounts in pipes, unless `dydt` is empty."""
+    """Write d/dt of the amounts of all scalars in pipes to `dydt`, unless it is empty."""
     tables = open_tables(handle)
     for p in range(tables.pipes.size if dydt.size > 0 else 0):
         pipe_scalar_rates(y, dydt, out, tables, p)
@@ -166,7 +180,7 @@ def scalar_rates(t, y, dydt, out, handle):
 
 @njit
 def observe_scalars(t, y, out, handle, values):
-    """values[k] of every scalar probe: at a node, at a pipe end, or between the centres of two cells."""
+    """Write the value of every scalar probe to `values`: at a node, at a pipe end, or between the centres of two cells."""
     tables = open_tables(handle)
     layout, pipes, nodes = tables.layout[0], tables.pipes, tables.nodes.size
     for k in range(tables.probes.size):

@@ -1,8 +1,9 @@
 """Sums of stages, computed for a block of rows together with its rates, while both lie in the cache.
 
 The function that computes the rates of a large basin also forms their stage y + h sum a_j k_j just before, and the end
-of the step just after. So each array passes through memory once for each stage. `sums` of a handle describes the sums;
-steps write there before they call for rates (`steppers.erk`). Values equal those of sums over all rows, to the bit.
+of the step just after. y is the state, h the step, a_j and k_j are weights and rates of stages. So each array passes
+through memory once for each stage. `sums` of a handle describes the sums; steps write there before they call for rates
+(`steppers.erk`). Values equal those of sums over all rows, to the bit.
 """
 
 from fvsolve.jit import njit
@@ -23,14 +24,17 @@ OFF, CHECK, STAGE, STAGE_AND_END = range(
 
 @njit(forceinline=True)
 def copy(source, target):
-    """target = source, by a plain loop: slice assignment of numba checks for overlaps first."""
+    """Copy `source` into `target` by a plain loop: slice assignment of numba checks for overlaps first."""
     for i in range(target.size):
         target[i] = source[i]
 
 
 @njit
 def combine(begin, end, y, h, weights, count, k, out):
-    """out = y + h sum of weights[j] k[j] over j < count, of [begin:end]; three terms in a pass where possible."""
+    """Write y + h sum over j < count of weights[j] k[j] to `out`, for the states begin .. end - 1.
+
+    Three terms are added in a pass where possible.
+    """
     first, second, copied = -1, -1, False
     y, out = y[begin:end], out[begin:end]
     base = y
@@ -61,7 +65,7 @@ def combine(begin, end, y, h, weights, count, k, out):
 
 @njit(forceinline=True)
 def count_not_finite(begin, end, y):
-    """Number of values of [begin:end] that are not finite or have no finite square; integers are vectorised."""
+    """Number of values y[begin:end] that are not finite or have no finite square; integers are vectorised."""
     bad = 0
     for i in range(begin, end):
         bad += not abs(y[i]) < HUGE
@@ -70,8 +74,10 @@ def count_not_finite(begin, end, y):
 
 @njit
 def request_sums(sums, mode, y, h, weights, count, k, to, last):
-    """Request a sum in `to` from the function that computes the next rates: weights of `count` earlier stages.
+    """Request the sum y + h sum of weights[j] k[j], written to `to`, from the function that computes the next rates.
 
+    sums : int64 array that describes the request; mode : CHECK, STAGE or STAGE_AND_END
+    weights, count, k : weights and number of earlier stages, and their rates
     last : weights of all stages at the end of the step
     """
     sums[MODE], sums[NOW], sums[TO], sums[RATES] = mode, address_of(y), address_of(to), address_of(k)
@@ -82,7 +88,10 @@ def request_sums(sums, mode, y, h, weights, count, k, to, last):
 
 @njit
 def sum_runs(sums, first, last, y, h, weights, count, k, to):
-    """Form the runs `first` to `last`, which no other function forms, or not in time."""
+    """Form the sums of the runs of states `first` to `last` - 1, which no rate function forms, or not in time.
+
+    y, h, weights, count, k, to : see `request_sums`
+    """
     at = HEAD + sums[BASINS]
     for r in range(first, last):
         combine(sums[at + 2 * r], sums[at + 2 * r + 1], y, h, weights, count, k, to)
@@ -90,7 +99,7 @@ def sum_runs(sums, first, last, y, h, weights, count, k, to):
 
 @njit(forceinline=True)
 def requested_mode(tables, b):
-    """Mode of the sums of basin b."""
+    """Mode of the requested sums of basin b: OFF, CHECK, STAGE or STAGE_AND_END."""
     if tables.sums.size == 0 or tables.sums[HEAD + b] == 0:
         return OFF
     return tables.sums[MODE]
@@ -98,9 +107,10 @@ def requested_mode(tables, b):
 
 @njit
 def form_rows(sums, behind, at, width, begin, stop, left, right):
-    """Form columns `left` to `right` of rows `begin` to `stop` of a quantity at offset `at`, rows of `width` cells.
+    """Form the requested sums for cells of a basin: columns left .. right - 1 of rows begin .. stop - 1.
 
     behind : True for the end of the step instead of the stage
+    at, width : offset of the quantity in the state, and number of cells in a row
     """
     size, stages = sums[SIZE], sums[STAGES]
     y, to, h = floats_at(sums[NOW], size), floats_at(sums[TO], size), floats_at(address_of(sums) + 8 * STEP, 1)[0]
@@ -115,7 +125,10 @@ def form_rows(sums, behind, at, width, begin, stop, left, right):
 
 @njit
 def check_rows(sums, y, at, width, begin, stop, left, right):
-    """Count the values that are not finite in such rows of y."""
+    """Count the values of y that are not finite, in columns left .. right - 1 of rows begin .. stop - 1 of a basin.
+
+    at, width : offset of the quantity in the state, and number of cells in a row. The count is added to sums[BAD].
+    """
     if left == 0 and right == width:
         sums[BAD] += count_not_finite(at + width * begin, at + width * stop, y)
         return
@@ -125,7 +138,10 @@ def check_rows(sums, y, at, width, begin, stop, left, right):
 
 @njit
 def form_checked_runs(sums):
-    """Form the stage again in cells that all bands read, where the end of the step has replaced it."""
+    """Form the stage again in cells that all bands read, where the end of the step has replaced it.
+
+    A band is a part of the state that a thread steps.
+    """
     size, stages = sums[SIZE], sums[STAGES]
     y, to, h = floats_at(sums[NOW], size), floats_at(sums[TO], size), floats_at(address_of(sums) + 8 * STEP, 1)[0]
     k, weights = floats_at(sums[RATES], stages * size).reshape((stages, size)), floats_at(sums[WEIGHTS], stages)

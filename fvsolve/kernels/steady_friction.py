@@ -25,7 +25,7 @@ LAMINAR, TURBULENT = 2000.0, 4000.0  # Reynolds numbers; both laws are blended b
 def factor_turbulent(reynolds, roughness):
     """Darcy factor of Colebrook, 1/sqrt(f) = -2 log10(e/3.7 + 2.51/(Re sqrt(f))), by two steps of Halley from Haaland.
 
-    reynolds [-]; roughness : relative to the diameter [-]
+    reynolds : Reynolds number Re [-]; roughness : roughness e relative to the diameter [-]
     """
     a, b = roughness / 3.7, 2.51 / reynolds
     x = -0.9 * TWO_OVER_LN10 * log(a**1.11 + 6.9 / reynolds)
@@ -39,7 +39,10 @@ def factor_turbulent(reynolds, roughness):
 
 @njit
 def factor_times_reynolds(reynolds, roughness):
-    """f Re: 64 below Re 2000, Colebrook above 4000, a smooth blend between, so that the drop is monotone."""
+    """Darcy factor times Reynolds number: 64 below Re 2000, Colebrook above 4000, a smooth blend between.
+
+    So the drop is a monotone function of the flow. roughness : relative to the diameter [-]
+    """
     if reynolds <= LAMINAR:
         return 64.0
     turbulent = factor_turbulent(reynolds, roughness) * reynolds
@@ -52,7 +55,7 @@ def factor_times_reynolds(reynolds, roughness):
 
 @njit(fastmath={"contract"})
 def power_of_square(square):
-    """(M^2)^0.426 = |M|^0.852 from M^2 >= 0, relative error 2e-14 for 1e-150 <= |M| <= 1e150.
+    """|M|^0.852 = (M^2)^0.426 from `square` = M^2 >= 0, relative error 2e-14 for 1e-150 <= |M| <= 1e150.
 
     The mantissa in [1, 2) goes through a Chebyshev interpolation polynomial, the exponent through a table. Without
     branch and call a loop over cells is vectorised by four, and a product and its sum are a single instruction.
@@ -68,15 +71,17 @@ def power_of_square(square):
 
 @njit
 def drag_hazen(loss, rough, flow):
-    """loss |M| M + rough |M|^0.852 M."""
+    """Hazen-Williams friction loss |M| M + rough |M|^0.852 M per length and time [kg/s2] of the mass flow M [kg/s]."""
     return loss * (abs(flow) * flow) + rough * (power_of_square(flow * flow) * flow)
 
 
 @njit
 def drag(kind, loss, rough, roughness, reynolds, flow):
-    """Momentum loss by wall and fittings per length and time [kg/s2] of a mass flow [kg/s].
+    """Momentum loss by wall and fittings per length and time [kg/s2] of a mass flow M [kg/s].
 
-    loss |M| M + rough f(Re) |M| M, or for Hazen-Williams loss |M| M + rough |M|^0.852 M.
+    It is loss |M| M + rough f(Re) |M| M, or for Hazen-Williams loss |M| M + rough |M|^0.852 M.
+    kind : FRICTION_FACTOR, FRICTION_ROUGH or FRICTION_HAZEN
+    roughness : relative to the diameter [-]; reynolds : Reynolds number per mass flow [s/kg]
     """
     if kind == FRICTION_HAZEN:
         return drag_hazen(loss, rough, flow)
@@ -89,7 +94,10 @@ def drag(kind, loss, rough, roughness, reynolds, flow):
 
 @njit
 def drag_slope(kind, loss, rough, roughness, reynolds, flow):
-    """d drag / d flow [1/s]: a difference quotient where the factor depends on roughness, else exact."""
+    """Derivative of `drag` by the mass flow [1/s], for a positive or negative flow.
+
+    A difference quotient where the friction factor depends on roughness, else exact.
+    """
     size = abs(flow)
     slope = 2.0 * loss * size
     if kind == FRICTION_ROUGH:

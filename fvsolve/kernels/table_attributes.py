@@ -20,14 +20,14 @@ register_model(Tables)(models.OpaqueModel)
 
 
 def handle_address(context, builder, kind, args):
-    """Address of the first word of a handle."""
+    """Generate code for the memory address of the first word of a handle."""
     base = make_array(kind.args[0])(context, builder, args[0]).data
     return builder.bitcast(base, context.get_value_type(kind.return_type))
 
 
 @infer_getattr
 class TableOf(AttributeTemplate):
-    """Type of `tables.name`."""
+    """Numba type of `tables.name`."""
 
     key = Tables
 
@@ -37,7 +37,10 @@ class TableOf(AttributeTemplate):
 
 @lower_getattr_generic(Tables)
 def load_table(context, builder, kind, value, name):
-    """Array of a table; its address, rows and columns are three words of the handle, which never change."""
+    """Generate code that loads the array of a table from a handle.
+
+    Its address, rows and columns are three words of the handle, which never change.
+    """
     member, word = getattr(table_types(), name), context.get_value_type(types.intp)
     base, first = builder.bitcast(value, word.as_pointer()), 3 * HandleTables._fields.index(name)
 

@@ -1,4 +1,4 @@
-"""Handle of a model: a small array with the addresses of its tables.
+"""Handle of a model: a small array with the memory addresses of its tables.
 
 To pass twenty arrays from function to function costs half a microsecond of copying at each step and seconds of
 compilation. A handle costs nothing: compiled code loads a table where it uses it. The owner of a handle must keep its
@@ -13,11 +13,11 @@ from fvsolve.kernels.dtypes import HandleTables
 if COMPILING:
 
     def addresses_of(tables: tuple) -> tuple:
-        """Address, rows and columns of each table, in sequence."""
+        """Memory address, rows and columns of each table, in sequence."""
         return tuple(x for a in tables for x in (a.ctypes.data, a.shape[0], a.shape[-1]))
 
     def handle_of(places: tuple) -> np.ndarray:
-        """Handle of the tables at these addresses: int64[3 n]."""
+        """Handle of the tables at these addresses (results of `addresses_of`): int64[3 n]."""
         return np.array(places, dtype=np.int64)
 
     def empty_handle() -> np.ndarray:
@@ -37,7 +37,7 @@ else:
         return tuple(tables)
 
     def handle_of(places: tuple) -> HandleTables:
-        """Handle of these tables."""
+        """Handle of these tables, with None for tables that are missing."""
         return HandleTables(*places, *[None] * (len(HandleTables._fields) - len(places)))
 
     def empty_handle() -> np.ndarray:
@@ -55,10 +55,12 @@ def make_handle(tables: tuple):
 
 
 def linked_handles(shared: tuple, sharp: tuple, written: tuple, called: tuple):
-    """Handle of the tables of a model and of the arrays of a run.
+    """Handle of the tables of a model, the arrays of a run and the addresses of functions.
 
-    The array `sharp` of the run receives a second handle, with some of the tables replaced.
-    shared, sharp : addresses of the tables of the model, and of those used where the jump of a delay line arrives
+    The array `sharp` of the run receives a second handle, with some of the tables replaced, for the time at which a
+    jump of a delay line arrives.
+    shared, sharp : addresses of the tables of the model, without and with these replacements
+    written, called : arrays that the run writes, and tables of function addresses
     """
     own = addresses_of((*written, *called))
     if written.sharp.size > 0:

@@ -7,8 +7,9 @@ from fvsolve.jit import njit
 
 @njit
 def level_of_volume(floats, shape, rows, volume):
-    """Level of a shaped tank: area linear between levels, so a quadratic in each row; prism outside the table.
+    """Level [m] of a shaped tank that contains `volume` [m3].
 
+    The surface area is linear between levels, so the volume is a quadratic there; beyond the table the tank is a prism.
     floats[shape:] holds `rows` levels [m], areas [m2] and volumes below them [m3].
     """
     k = 0
@@ -29,7 +30,7 @@ def level_of_volume(floats, shape, rows, volume):
 
 @njit(forceinline=True)
 def tank_level(node, floats, rho, stored):
-    """Level [m] of a tank whose mass deviates by `stored` [kg] from that of the profile."""
+    """Level [m] of a tank whose mass differs by `stored` [kg] from its initial steady mass."""
     if node["shape"] < 0:
         return node["level"] + stored / (rho * node["area"])
     return level_of_volume(floats, node["shape"], node["shapes"], (node["mass"] + stored) / rho)

@@ -1,6 +1,6 @@
 """Event functions of a tank at its bottom and its rim.
 
-A free tank fills and empties. A held tank stays as it is, and the deficit or surplus of flow is a supply. A tank that
+A free tank fills and empties. A held tank keeps its level, and the deficit or surplus of flow is a supply. A tank that
 leaves its limit is free again, though still there. Held and left are flags, so that each rule is smooth during a step.
 """
 
@@ -22,15 +22,16 @@ def mass_per_metre(node):
 
 @njit(forceinline=True)
 def is_near(node, distance):
-    """True if a tank is at a limit from which it is `distance` [kg] away."""
+    """True if a tank is at its bottom or rim, from which it is `distance` [kg] of stored mass away."""
     return distance <= NEAR * mass_per_metre(node)
 
 
 @njit
 def limit_events(node, armed, g, k, distance, away):
-    """Write g[k], g[k + 1], events of holding a tank at a limit and of leaving it.
+    """Write two event functions of a tank: g[k] for being held at a limit (bottom or rim), g[k + 1] for leaving it.
 
-    distance : to the limit [kg]; away : net flow away from it [kg/s]
+    distance : stored mass between the tank and the limit [kg]; away : net flow away from the limit [kg/s]
+    armed : flags; armed[k] > 0 while the tank is held, armed[k + 1] > 0 after it has left the limit
     """
     if not is_near(node, distance):
         g[k] = g[k + 1] = distance

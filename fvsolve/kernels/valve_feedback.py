@@ -10,17 +10,18 @@ from fvsolve.kernels.restrictions import head_drop, restriction_slope
 
 @njit
 def node_impedance(tables, i):
-    """Pressure rise at a junction per flow into it [Pa s/kg], 1 / admittance of its pipes; 0 for other nodes."""
+    """Pressure rise at junction i per flow into it [Pa s/kg], 1 / admittance of its pipes; 0 for other nodes."""
     node = tables.nodes[i]
     return 1.0 / node["admittance"] if node["kind"] == JUNCTION and node["admittance"] > 0.0 else 0.0
 
 
 @njit
 def loop_rate(out, tables, k, i, speed):
-    """Rate [1/s] of restriction k whose opening x moves by dx/dt = -speed p' with the pressure at node i.
+    """Rate of the feedback loop [1/s] of restriction k, whose opening x follows the pressure p at node i.
 
-    p' follows dM/dx = sqrt(G dP), reduced because the drop falls as the flow rises, through pipes or through stored
-    mass.
+    speed : fall of dx/dt per pressure, dx/dt = -speed p' [1/s/Pa], p' : pressure change
+    The pressure follows the flow M: dM/dx = sqrt(G dP), with conductance G and drop dP, reduced because the drop falls
+    as the flow rises, through pipes or through stored mass.
     """
     layout, valve = tables.layout[0], tables.valves[k]
     drop = head_drop(tables, out, k)[1]

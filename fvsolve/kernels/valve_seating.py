@@ -1,8 +1,8 @@
 """Valves near their seat that control the single rigid column connected to them.
 
-A disc controls its column from its seat on, a stem also down to its seat (flag armed[event + 4], of a stem + 6). This
-ends when its lift exceeds CONTROL_LIFT and a given step resolves the exchange between lift and flow:
-`kernels.column_valve_control`. A disc that moves to its seat may slam.
+A disc controls its column from its seat on, the stem of a regulating valve also down to its seat. The flag is
+armed[event + 4], of a stem armed[event + 6]. Control ends when the lift exceeds CONTROL_LIFT and a given step resolves
+the exchange between lift and flow: `kernels.column_valve_control`. A disc that moves to its seat may slam.
 """
 
 from math import sqrt
@@ -16,7 +16,7 @@ CONTROL_LIFT = 1e-4  # lift up to which a valve controls its column, at least
 
 @njit
 def controls_column(tables, k):
-    """True if restriction k controls the rigid column of which it is the only outlet."""
+    """True if restriction k is near its seat and controls the rigid column of which it is the only outlet."""
     if tables.valves[k]["device"] < 0:
         return False
     device = tables.devices[tables.valves[k]["device"]]
@@ -25,9 +25,9 @@ def controls_column(tables, k):
 
 @njit
 def control_limit(out, tables, device, speed):
-    """Lift above which a valve does not control its column; 0 if it is not the only outlet of a column.
+    """Lift above which the valve of a device does not control its column; 0 if it is not the only outlet of a column.
 
-    speed : d(dx/dt) / d(drop) [1/Pa/s]
+    speed : derivative of dx/dt by the drop [1/s/Pa], x : lift
     """
     valve, columns, limit = tables.valves[device["valve"]], tables.columns, 0.0
     for k in range(columns.size):
@@ -42,9 +42,11 @@ def control_limit(out, tables, device, speed):
 
 @njit
 def column_control_limit(out, tables, device, mobility, speed):
-    """Such a lift at a column with A / L = `mobility`: CONTROL_LIFT, or more until a given step resolves the exchange.
+    """Lift above which a valve does not control a column with A / L = `mobility` [m], area over length.
 
-    The rate of the exchange is (2 dP / x) (speed + (A / L) / sqrt(G dP)).
+    It is CONTROL_LIFT, or more until a given step resolves the exchange between lift x and flow. The rate of this
+    exchange is (2 dP / x) (speed + (A / L) / sqrt(G dP)), with drop dP and conductance G.
+    speed : derivative of dx/dt by the drop [1/s/Pa]
     """
     root = sqrt(abs(head_drop(tables, out, device["valve"])[1]))
     rate = 2.0 * root * (root * speed + mobility / sqrt(tables.valves[device["valve"]]["conductance"]))
@@ -53,9 +55,10 @@ def column_control_limit(out, tables, device, mobility, speed):
 
 @njit
 def control_events(out, tables, device, g, x, share, speed):
-    """Write g: event functions of the lift x at which control of the column ends or, at a fraction of it, begins.
+    """Write two event functions of the lift x to g: for the end of control of a column, and for its begin.
 
-    share : this fraction; 0 if the valve does not take control again
+    Control ends at the lift of `control_limit`, and begins at the fraction `share` of it; never if `share` is 0.
+    speed : derivative of dx/dt by the drop [1/s/Pa]
     """
     at, most = device["controls_column"], control_limit(out, tables, device, speed)
     if tables.armed[at] > 0.0:

@@ -1,6 +1,7 @@
 """Valve equation, alone and with pipe ends.
 
-M |M| = G dp with G = 2 rho (Cd A)^2, which is q = Cd A sqrt(2 dp / rho), equation (79).
+M |M| = G dp with G = 2 rho (Cd A)^2, which is q = Cd A sqrt(2 dp / rho), equation (79). M is the mass flow, q the
+volume flow, dp the drop, Cd A the effective area.
 """
 
 from math import exp, log, sqrt
@@ -13,7 +14,12 @@ LEAST = 1e-4  # chords are not steeper than at a drop of LEAST squared [Pa], the
 
 @njit(forceinline=True)
 def relative_area(kind, floats, table, size, opening):
-    """Relative flow area at a stem position: linear, equal-percentage (rangeability 50, shut at 0), or a table."""
+    """Relative flow area at a stem position `opening`, by characteristic `kind`.
+
+    0 : linear
+    1 : equal-percentage, rangeability 50, shut at 0
+    else : table of `size` openings, then areas, from floats[table] on
+    """
     if kind == 0:
         return opening
     if kind == 1:
@@ -30,13 +36,13 @@ def relative_area(kind, floats, table, size, opening):
 
 @njit(forceinline=True)
 def valve_conductance(tables, index, t):
-    """G = 2 rho (Cd A)^2 at time t [kg2/s2/Pa]."""
+    """Conductance G = 2 rho (Cd A)^2 of valve `index` at time t [kg2/s2/Pa]."""
     return conductance_of(tables, index, schedule_value(tables, tables.valves[index]["schedule"], t))
 
 
 @njit(forceinline=True)
 def conductance_of(tables, index, opening):
-    """G = 2 rho (Cd A)^2 at an opening [kg2/s2/Pa]."""
+    """Conductance G = 2 rho (Cd A)^2 of valve `index` at an opening [kg2/s2/Pa]."""
     valve = tables.valves[index]
     area = relative_area(valve["characteristic"], tables.floats, valve["table"], valve["table_size"], opening)
     return valve["conductance"] * area * area
@@ -50,7 +56,11 @@ def transition_of(valve, g):
 
 @njit(forceinline=True)
 def flow_at_drop(conductance, transition, drop):
-    """Mass flow at a pressure drop; below `transition` [kg/s] an odd polynomial with a bounded slope, C2 joined."""
+    """Mass flow of a valve at a pressure drop [kg/s], sqrt(conductance * drop) with the sign of the drop.
+
+    Below the flow `transition` [kg/s] it is an odd polynomial with a bounded slope, joined with continuous second
+    derivative.
+    """
     if conductance <= 0.0:
         return 0.0
     size = conductance * abs(drop)
@@ -64,7 +74,7 @@ def flow_at_drop(conductance, transition, drop):
 
 @njit(forceinline=True)
 def flow_slope(conductance, transition, drop):
-    """d flow / d drop [kg/s per Pa]."""
+    """Derivative of the mass flow of a valve by its drop [kg/s per Pa]; law as in `flow_at_drop`."""
     if conductance <= 0.0:
         return 0.0
     size = conductance * abs(drop)
@@ -76,8 +86,10 @@ def flow_slope(conductance, transition, drop):
 
 @njit(forceinline=True)
 def valve_step(g, transition, m, drop):
-    """a, s with dM = a + s d(drop) for the next Newton step of a valve with flow m [kg/s] at a drop [Pa].
+    """(a, s) of the change of flow a + s d(drop) in the next Newton step of a valve [kg/s, kg/s/Pa].
 
+    g : conductance [kg2/s2/Pa]; m, drop : present flow [kg/s] and drop [Pa]
+    transition : flow below which the law is laminar [kg/s]
     The chord of the square root replaces its slope: between the present flow and the flow of the law at this drop it is
     finite and never too steep.
     """
@@ -91,10 +103,12 @@ def valve_step(g, transition, m, drop):
 
 @njit(forceinline=True)
 def flow_change(conductance, impedance, flow, surplus, target):
-    """Exact root x of |M + x| (M + x) = G (dp0 + dp' - Z x): change of the flow M of a valve between pipe ends.
+    """Change x [kg/s] of the flow M of a valve between pipe ends: exact root of |M + x| (M + x) = G (dp0 + dp' - Z x).
 
-    conductance G [kg2/s2/Pa]; impedance Z of both ends together [Pa s/kg], zero for given pressures
-    target = G (dp0 + dp'); surplus = target - |M| M, computed so that it is zero if nothing changes: then x is zero too
+    conductance : G [kg2/s2/Pa]; flow : initial steady flow M [kg/s]
+    impedance : Z of both pipe ends together [Pa s/kg], zero for given pressures
+    target : G (dp0 + dp') [kg2/s2], with initial drop dp0 and its change dp' at unchanged flow
+    surplus : target - |M| M, computed so that it is zero if nothing changes: then x is zero too
     """
     if conductance <= 0.0:
         return -flow
@@ -110,9 +124,11 @@ def flow_change(conductance, impedance, flow, surplus, target):
 
 @njit
 def flow_change_laminar(conductance, transition, impedance, flow, base, drop):
-    """x with M + x = law(drop - Z x): a law with a laminar part and pipe ends, by bounded Newton.
+    """Change x [kg/s] of the flow M of a valve between pipe ends: root of M + x = law(drop - Z x), by bounded Newton.
 
-    base : law(dp0) of the profile minus M, so that x is zero if nothing changes
+    The law is that of `flow_at_drop`, with a laminar part below the flow `transition` [kg/s].
+    conductance, impedance, flow : see `flow_change`; drop : drop at unchanged flow [Pa]
+    base : flow of the law at the initial drop minus M, so that x is zero if nothing changes
     """
     if conductance <= 0.0:
         return -flow

@@ -1,4 +1,4 @@
-"""Argument type of vectors in calls by address: an address and a length.
+"""Argument type of vectors in calls by address: a memory address and a length.
 
 Numba passes an array as seven words, of which five are equal for all vectors. Four arrays in a call then cost more than
 a small function of the right-hand side.
@@ -12,7 +12,7 @@ from numba.core.types.npytypes import Array
 
 
 class Vector(Array):
-    """Contiguous vector of numbers; an array except in how it is passed."""
+    """Numba type of a contiguous vector of numbers; it differs from an array only in how it is passed."""
 
     def __init__(self, dtype: types.Type) -> None:
         super().__init__(dtype, 1, "C", name=f"vector({dtype})")
@@ -20,21 +20,21 @@ class Vector(Array):
 
 @register_default(Vector)
 class VectorModel(ArrayModel):
-    """Array whose other five words are set by the called function."""
+    """Data model of `Vector`: an array whose other five words are set by the called function."""
 
     def get_argument_type(self) -> tuple:
-        """Address and length."""
+        """Types of the two words that are passed: address and length."""
         return self._of("data").get_argument_type(), self._of("nitems").get_argument_type()
 
     def _of(self, field: str):
         return self.get_model(self.get_field_position(field))
 
     def as_argument(self, builder, value) -> tuple:
-        """Words that are passed for an array."""
+        """Two words that are passed for an array: address and length."""
         return self.get(builder, value, "data"), self.get(builder, value, "nitems")
 
     def from_argument(self, builder, value):
-        """Array from its two words: without reference count, a single row without gaps."""
+        """Array from its two words, address and length: without reference count, a single row without gaps."""
         data, count = value
         size = count.type(self.fe_type.dtype.bitwidth // 8)
         empty = cgutils.get_null_value(self.get_value_type())
@@ -49,5 +49,5 @@ class VectorModel(ArrayModel):
 @lower_cast(Array, Vector)
 @lower_cast(Vector, Array)
 def identity_cast(context, builder, from_type, to_type, value):
-    """The words of an array and a vector are equal: nothing is converted."""
+    """Convert an array to a vector or back: the words are equal, so nothing is converted."""
     return value
