@@ -1,7 +1,9 @@
 """Density laws log, table and mixture: density, enthalpy, mass per length, pressure force and wave speed of a pipe.
 
-Each function calls the function of the same name of the law that the scene uses (`dispatch_law`); each law has its own
+Each function calls the function of the same name of the law that the model uses (`dispatch_law`); each law has its own
 file. The law `linear` is not among them: its kernels use pressures as states and are 20 times as fast.
+
+Arguments common to these functions: `st`, record of settings; `floats`, numbers of the model; `pipe`, record of a pipe.
 """
 
 from fvsolve.jit import inline, njit
@@ -11,10 +13,10 @@ from fvsolve.kernels.dtypes import LAW_LOG, LAW_MIXTURE, LAW_TABLE
 
 @inline
 def dispatch_law(of_log, of_table, of_mixture, of_unknown, st, floats, *arguments):
-    """Call the function of the law that a scene uses; for an unknown code the result is NaN.
+    """Call the function of the law that a model uses; for an unknown code the result is NaN.
 
-    Functions are passed as module attributes: numba would store the address of a bare name, and a function with such
-    an address is not cached.
+    Functions are passed as module attributes: numba would store the address of a bare name, and a function with an
+    address of this kind is not cached.
     """
     code = st["law"]
     if code == LAW_LOG:
@@ -28,7 +30,7 @@ def dispatch_law(of_log, of_table, of_mixture, of_unknown, st, floats, *argument
 
 @njit
 def log_density(st, floats, p):
-    """(ln(rho / rho_ref), d ln rho / dp [1/Pa]) at a pressure."""
+    """(ln(rho / rho_ref), d ln rho / dp [1/Pa]) at the pressure p [Pa], with density rho."""
     return dispatch_law(
         log_law.log_density, table_law.log_density, mixture_law.log_density, unknown_law.two_not_a_number, st, floats, p
     )
@@ -36,7 +38,7 @@ def log_density(st, floats, p):
 
 @njit
 def density(st, floats, p):
-    """rho [kg/m3] at a pressure."""
+    """Density rho [kg/m3] at the pressure p [Pa]."""
     return dispatch_law(
         log_law.density, table_law.density, mixture_law.density, unknown_law.not_a_number, st, floats, p
     )
@@ -44,7 +46,7 @@ def density(st, floats, p):
 
 @njit
 def enthalpy(st, floats, p):
-    """h = integral of dp / rho from the reference pressure [J/kg]."""
+    """Specific enthalpy h at the pressure p: integral of dp / rho from the reference pressure [J/kg]."""
     return dispatch_law(
         log_law.enthalpy, table_law.enthalpy, mixture_law.enthalpy, unknown_law.not_a_number, st, floats, p
     )
@@ -52,7 +54,7 @@ def enthalpy(st, floats, p):
 
 @njit
 def pressure_of_enthalpy(st, floats, h):
-    """Pressure [Pa] at which `enthalpy` is h."""
+    """Pressure [Pa] at which the specific enthalpy is h [J/kg]."""
     functions = (
         log_law.pressure_of_enthalpy,
         table_law.pressure_of_enthalpy,
@@ -64,7 +66,10 @@ def pressure_of_enthalpy(st, floats, h):
 
 @njit
 def pressure_of_log(st, floats, compliance, q):
-    """Pressure [Pa] at which ln(rho / rho_ref) + ln(A / A_ref) is q; compliance of the wall, 0 for a vessel [1/Pa]."""
+    """Pressure [Pa] at which ln(rho / rho_ref) + ln(A / A_ref) is q, with density rho and area A.
+
+    compliance : relative area change of the wall per pressure [1/Pa], 0 for a vessel
+    """
     functions = (
         log_law.pressure_of_log,
         table_law.pressure_of_log,
@@ -76,7 +81,7 @@ def pressure_of_log(st, floats, compliance, q):
 
 @njit
 def pressure_of_mass(st, floats, pipe, m):
-    """Pressure [Pa] of a pipe that contains m [kg/m]."""
+    """Pressure [Pa] of a pipe that contains the mass per length m [kg/m]."""
     functions = (
         log_law.pressure_of_mass,
         table_law.pressure_of_mass,
@@ -88,7 +93,7 @@ def pressure_of_mass(st, floats, pipe, m):
 
 @njit
 def mass_of_pressure(st, floats, pipe, p):
-    """Mass per length m = rho A [kg/m] and dm/dp of a pipe at a pressure."""
+    """Mass per length m = rho A [kg/m] and dm/dp [kg/m/Pa] of a pipe at the pressure p, with density rho and area A."""
     functions = (
         log_law.mass_of_pressure,
         table_law.mass_of_pressure,
@@ -100,7 +105,7 @@ def mass_of_pressure(st, floats, pipe, p):
 
 @njit
 def wall_area(st, floats, pipe, p):
-    """Area A of a pipe at a pressure [m2]."""
+    """Area of a pipe at the pressure p [m2]."""
     return dispatch_law(
         log_law.wall_area, table_law.wall_area, mixture_law.wall_area, unknown_law.not_a_number, st, floats, pipe, p
     )
@@ -108,7 +113,7 @@ def wall_area(st, floats, pipe, p):
 
 @njit
 def thrust(st, floats, pipe, p):
-    """Integral of A dp from the reference pressure [N]."""
+    """Pressure force in a pipe: integral of A dp from the reference pressure to p [N], A : area of the pipe."""
     return dispatch_law(
         log_law.thrust, table_law.thrust, mixture_law.thrust, unknown_law.not_a_number, st, floats, pipe, p
     )
@@ -116,14 +121,17 @@ def thrust(st, floats, pipe, p):
 
 @njit
 def force_of_mass(st, floats, pipe, m):
-    """`thrust` at the pressure of a pipe that contains m [kg/m] [N]; called often."""
+    """Pressure force (`thrust`) in a pipe that contains the mass per length m [kg/m], in [N]; called often."""
     functions = log_law.force_of_mass, table_law.force_of_mass, mixture_law.force_of_mass, unknown_law.not_a_number
     return dispatch_law(*functions, st, floats, pipe, m)
 
 
 @njit
 def impedance(st, floats, pipe, p):
-    """rho c = sqrt(rho / (d ln m / dp)) of a pipe at a pressure [kg/m2/s]."""
+    """Impedance rho c = sqrt(rho / (d ln m / dp)) of a pipe at the pressure p [kg/m2/s].
+
+    rho : density, c : wave speed, m : mass per length
+    """
     return dispatch_law(
         log_law.impedance, table_law.impedance, mixture_law.impedance, unknown_law.not_a_number, st, floats, pipe, p
     )
@@ -131,7 +139,10 @@ def impedance(st, floats, pipe, p):
 
 @njit
 def velocity_change(st, floats, pipe, p_from, p_to):
-    """Integral of dp / (rho c) [m/s]: decrease of the velocity in a simple wave."""
+    """Decrease of the velocity in a simple wave from pressure p_from to p_to: integral of dp / (rho c) [m/s].
+
+    rho : density, c : wave speed
+    """
     functions = (
         log_law.velocity_change,
         table_law.velocity_change,
@@ -143,7 +154,7 @@ def velocity_change(st, floats, pipe, p_from, p_to):
 
 @njit
 def local_speed(st, floats, pipe, p):
-    """Wave speed c of a pipe at a pressure [m/s]."""
+    """Wave speed of a pipe at the pressure p [m/s]."""
     return dispatch_law(
         log_law.local_speed,
         table_law.local_speed,

@@ -1,12 +1,14 @@
 """Density law `mixture`: liquid with free gas, and vapour if the law has a floor, as a single barotropic law.
 
-x = p - floor > 0 is the pressure of the gas. Volumes are divided by the volume of liquid at the reference pressure:
+x = p - floor > 0 is the pressure of the gas; the floor is the vapour pressure or 0. Volumes are divided by the volume
+of liquid at the reference pressure. beta is the bulk modulus of the liquid, `gas` the amount of gas, `saturation` the
+gas pressure at which all gas is dissolved:
 
     rho_ref / rho = 1 - (p - p_ref) / beta + gas (x^-k - x^(1-k) / saturation),   k = 1 / (gas exponent),
 
-There is free gas while x < saturation (it dissolves by Henry's law; an infinite saturation means no dissolution).
-The area is linear in pressure, A = A_ref (1 + compliance (p - p_ref)). So with k = 1 the pressure of a given mass is
-the root of a quadratic.
+There is free gas while x < saturation (it dissolves by Henry's law; an infinite saturation means no dissolution). The
+area is linear in pressure, A = A_ref (1 + compliance (p - p_ref)). So with k = 1 the pressure of a given mass is the
+root of a quadratic.
 """
 
 from math import exp, log, sqrt
@@ -17,7 +19,7 @@ from fvsolve.kernels.density.no_inline import law_njit, prevent_inlining
 
 @law_njit
 def free_gas(st, x):
-    """(volume of free gas over that of liquid, its decrease with pressure [1/Pa]) at a pressure x of the gas [Pa]."""
+    """Volume of free gas over volume of liquid [-], and its decrease with pressure [1/Pa], at a gas pressure x [Pa]."""
     if x >= st["saturation"]:
         return 0.0, 0.0
     k, share = st["gas_power"], x / st["saturation"]
@@ -27,7 +29,7 @@ def free_gas(st, x):
 
 @law_njit
 def relative_volume(st, p):
-    """(rho_ref / rho, its decrease with pressure [1/Pa])."""
+    """(rho_ref / rho, its decrease with pressure [1/Pa]) of the mixture at the pressure p [Pa], with density rho."""
     prevent_inlining()
     size, fall = free_gas(st, p - st["floor"])
     return 1.0 - (p - st["reference"]) / st["beta"] + size, 1.0 / st["beta"] + fall
@@ -35,7 +37,7 @@ def relative_volume(st, p):
 
 @law_njit
 def gas_integral(st, x):
-    """Integral of the volume of free gas over pressure [Pa], apart from a constant."""
+    """Integral of the relative volume of free gas over the gas pressure up to x [Pa], apart from a constant."""
     k, at, s = st["gas_power"], min(x, st["saturation"]), st["saturation"]
     if k == 1.0:
         return st["gas"] * (log(at) - at / s)
@@ -44,20 +46,20 @@ def gas_integral(st, x):
 
 @inline
 def log_density(st, floats, p):
-    """(ln(rho / rho_ref), d ln rho / dp [1/Pa]) at a pressure."""
+    """(ln(rho / rho_ref), d ln rho / dp [1/Pa]) at the pressure p [Pa], with density rho."""
     size, fall = relative_volume(st, p)
     return -log(size), fall / size
 
 
 @inline
 def density(st, floats, p):
-    """rho [kg/m3] at a pressure."""
+    """Density rho [kg/m3] at the pressure p [Pa]."""
     return st["rho"] / relative_volume(st, p)[0]
 
 
 @law_njit
 def enthalpy(st, floats, p):
-    """h = integral of dp / rho from the reference pressure [J/kg]."""
+    """Specific enthalpy h at the pressure p: integral of dp / rho from the reference pressure [J/kg]."""
     prevent_inlining()
     dp, floor = p - st["reference"], st["floor"]
     gas = gas_integral(st, p - floor) - gas_integral(st, st["reference"] - floor)
@@ -66,7 +68,10 @@ def enthalpy(st, floats, p):
 
 @law_njit
 def pressure_of_enthalpy(st, floats, h):
-    """Pressure [Pa] at which `enthalpy` is h, by Newton on p, or on ln x where a step would pass the floor."""
+    """Pressure p [Pa] at which the specific enthalpy is h [J/kg], by Newton.
+
+    Newton on p, or on the logarithm of the gas pressure where a step would pass the floor pressure.
+    """
     prevent_inlining()
     floor, beta = st["floor"], st["beta"]
     lift = h * st["rho"]
@@ -84,7 +89,11 @@ def pressure_of_enthalpy(st, floats, h):
 
 @inline
 def gas_root(st, compliance, share, slope, rest):
-    """x where share (1 - dp / beta + slope / x + rest) = 1 + compliance dp, a quadratic with one positive root [Pa]."""
+    """Gas pressure x [Pa] with share (1 - dp / beta + slope / x + rest) = 1 + compliance dp, dp = p - p_ref.
+
+    It is the positive root of a quadratic, for a relative volume of gas slope / x + rest.
+    share : mass over that of liquid at the reference state; compliance : of the wall [1/Pa]; beta : bulk modulus
+    """
     low = st["reference"] - st["floor"]
     a = compliance + share / st["beta"]
     b = 1.0 - compliance * low - share * (1.0 + low / st["beta"] + rest)
@@ -94,10 +103,10 @@ def gas_root(st, compliance, share, slope, rest):
 
 @law_njit
 def pressure_of_mass_ratio(st, compliance, share):
-    """Pressure [Pa] of a pipe that contains `share` times rho_ref A_ref [-]; compliance 0 for a vessel.
+    """Pressure [Pa] of a pipe that contains `share` times rho_ref A_ref [-]; compliance 0 for a vessel [1/Pa].
 
-    If the gas is not isothermal, its tangent in 1 / x replaces it, and the root is iterated until it is constant. This
-    converges because the volume of gas is concave in 1 / x.
+    If the gas is not isothermal, its tangent in 1 / x replaces it, x : gas pressure, and the root is iterated until it
+    is constant. This converges because the volume of gas is concave in 1 / x.
     """
     prevent_inlining()
     floor, gas, saturation = st["floor"], st["gas"], st["saturation"]
@@ -120,38 +129,41 @@ def pressure_of_mass_ratio(st, compliance, share):
 
 @inline
 def pressure_of_log(st, floats, compliance, q):
-    """Pressure [Pa] at which ln(rho / rho_ref) + ln(A / A_ref) is q; A is the area of the wall."""
+    """Pressure [Pa] at which ln(rho / rho_ref) + ln(A / A_ref) is q, with density rho and area A of the pipe.
+
+    compliance : relative area change of the wall per pressure [1/Pa]
+    """
     return pressure_of_mass_ratio(st, compliance, exp(q))
 
 
 @inline
 def pressure_of_mass(st, floats, pipe, m):
-    """Pressure [Pa] of a pipe that contains m [kg/m]."""
+    """Pressure [Pa] of a pipe that contains the mass per length m [kg/m]."""
     return pressure_of_mass_ratio(st, pipe["compliance"], m / (st["rho"] * pipe["area"]))
 
 
 @inline
 def area_ratio(st, compliance, p):
-    """A / A_ref of a pipe at a pressure."""
+    """Area of a pipe at the pressure p over its area at the reference pressure [-]."""
     return 1.0 + compliance * (p - st["reference"])
 
 
 @inline
 def wall_area(st, floats, pipe, p):
-    """Area of a pipe at a pressure [m2]."""
+    """Area of a pipe at the pressure p [m2]."""
     return pipe["area"] * area_ratio(st, pipe["compliance"], p)
 
 
 @inline
 def thrust(st, floats, pipe, p):
-    """Integral of A dp from the reference pressure [N]."""
+    """Pressure force in a pipe: integral of A dp from the reference pressure to p [N], A : area of the pipe."""
     x = pipe["compliance"] * (p - st["reference"])
     return pipe["area"] * (p - st["reference"]) * (1.0 + 0.5 * x)
 
 
 @law_njit
 def mass_of_pressure(st, floats, pipe, p):
-    """Mass per length m = rho A [kg/m] and dm/dp of a pipe at a pressure."""
+    """Mass per length m = rho A [kg/m] and dm/dp [kg/m/Pa] of a pipe at the pressure p, with density rho and area A."""
     prevent_inlining()
     size, fall = relative_volume(st, p)
     stretch = area_ratio(st, pipe["compliance"], p)
@@ -161,13 +173,16 @@ def mass_of_pressure(st, floats, pipe, p):
 
 @inline
 def force_of_mass(st, floats, pipe, m):
-    """`thrust` at the pressure of a pipe that contains m [kg/m] [N]: momentum flux by pressure."""
+    """Pressure force (`thrust`) in a pipe that contains the mass per length m [kg/m], in [N]."""
     return thrust(st, floats, pipe, pressure_of_mass(st, floats, pipe, m))
 
 
 @law_njit
 def impedance(st, floats, pipe, p):
-    """rho c = sqrt(rho / (d ln rho / dp + d ln A / dp)) of a pipe at a pressure [kg/m2/s]."""
+    """Impedance rho c = sqrt(rho / (d ln rho / dp + d ln A / dp)) of a pipe at the pressure p [kg/m2/s].
+
+    rho : density, c : wave speed, A : area
+    """
     prevent_inlining()
     size, fall = relative_volume(st, p)
     return sqrt(st["rho"] / (fall + size * pipe["compliance"] / area_ratio(st, pipe["compliance"], p)))
@@ -181,7 +196,10 @@ GAUSS_WEIGHTS = (0.3626837833783620, 0.3137066458778873, 0.2223810344533745, 0.1
 
 @law_njit
 def velocity_change_panel(st, floats, pipe, p_from, p_to):
-    """Integral of dp / (rho c) [m/s] between two pressures whose gas pressures differ by a factor of two at most."""
+    """Integral of dp / (rho c) [m/s] between two pressures whose gas pressures differ by a factor of two at most.
+
+    Eight Gauss points; rho : density, c : wave speed.
+    """
     middle, half, total = 0.5 * (p_from + p_to), 0.5 * (p_to - p_from), 0.0
     for i in range(4):
         far = GAUSS_POINTS[i] * half
@@ -192,7 +210,10 @@ def velocity_change_panel(st, floats, pipe, p_from, p_to):
 
 @law_njit
 def velocity_change(st, floats, pipe, p_from, p_to):
-    """Integral of dp / (rho c) [m/s] in panels: x at most doubles in a panel, and all gas is dissolved at an end."""
+    """Integral of dp / (rho c) from p_from to p_to [m/s] in panels; rho : density, c : wave speed.
+
+    The gas pressure at most doubles in a panel, and a panel ends where all gas is dissolved.
+    """
     prevent_inlining()
     low, high = min(p_from, p_to), max(p_from, p_to)
     sign = 1.0 if p_to >= p_from else -1.0
@@ -213,5 +234,5 @@ def velocity_change(st, floats, pipe, p_from, p_to):
 
 @inline
 def local_speed(st, floats, pipe, p):
-    """Wave speed c of a pipe at a pressure [m/s]."""
+    """Wave speed of a pipe at the pressure p [m/s]."""
     return impedance(st, floats, pipe, p) * relative_volume(st, p)[0] / st["rho"]

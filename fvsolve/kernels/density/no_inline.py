@@ -6,7 +6,7 @@ if COMPILING:
 
     @Intrinsic
     def prevent_inlining(typingctx):
-        """Prevent LLVM from inlining the function that contains this call; halves its share of the compile time."""
+        """Prevent LLVM from inlining the function that contains this call; halves the compile time of that function."""
         from numba.core import types
 
         def generate(context, builder, kind, args):
@@ -21,7 +21,7 @@ else:
 
 
 def law_njit(function):
-    """`njit` for functions that only functions of this folder call: without wrappers for Python and C.
+    """Compile by `njit` a function that only functions of this folder call: without wrappers for Python and C.
 
     `forceinline` is set explicitly: numba otherwise takes it from the first caller that compiles the function, and
     `prevent_inlining` forbids it.

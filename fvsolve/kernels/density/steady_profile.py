@@ -1,4 +1,4 @@
-"""Steady profile of a pipe with friction, and its weight along the slope."""
+"""Initial steady state of a pipe with friction under a barotropic density law, and the weight along its slope."""
 
 from fvsolve.jit import inline, njit
 from fvsolve.kernels.density import density, enthalpy, mass_of_pressure, pressure_of_enthalpy
@@ -6,7 +6,7 @@ from fvsolve.kernels.density import density, enthalpy, mass_of_pressure, pressur
 
 @inline
 def rise_at(profile, pipe, x):
-    """Rise [m] of a pipe from its `from` end over a distance x along it."""
+    """Rise [m] of a pipe from its `from` end over a distance x [m] along it."""
     if pipe["rise"] < 0:
         return pipe["slope"] * x
     share = x / (0.5 * pipe["dx"])
@@ -17,7 +17,11 @@ def rise_at(profile, pipe, x):
 
 @njit
 def add_slope_force(st, profile, pipe, r, l, dr, dl):
-    """Add the weight along a pipe of variable slope, - m' g dz/dx, to d/dt of both waves of its cells."""
+    """Add the weight along a pipe of variable slope, - m' g dz/dx [kg/s2], to d/dt of both waves of its cells.
+
+    m' : change of the mass per length since the initial steady state [kg/m]; z : elevation
+    r, l, dr, dl : float64[cells]  forward and backward wave [kg/s] and their rates
+    """
     at, weight = pipe["rise"], st["gravity"] / (pipe["dx"] * pipe["speed"])
     for i in range(r.size):
         force = -weight * (profile[at + 2 * i + 2] - profile[at + 2 * i]) * (r[i] + l[i])
@@ -27,7 +31,10 @@ def add_slope_force(st, profile, pipe, r, l, dr, dl):
 
 @njit
 def mass_of_bernoulli(st, floats, pipe, bernoulli, flow):
-    """Mass per length [kg/m] at which h(p) + v^2 / 2 is `bernoulli` [J/kg], v = flow / m; the subsonic solution."""
+    """Mass per length m [kg/m] at which h(p) + v^2 / 2 is `bernoulli` [J/kg]; the subsonic solution.
+
+    h : specific enthalpy; v = flow / m : velocity, with the mass flow [kg/s]
+    """
     p = pressure_of_enthalpy(st, floats, bernoulli)
     m, dm = mass_of_pressure(st, floats, pipe, p)
     for _ in range(50):
@@ -42,10 +49,13 @@ def mass_of_bernoulli(st, floats, pipe, bernoulli, flow):
 
 @njit
 def profile_along(st, floats, profile, pipe, start, z, flow, faces, centers):
-    """Steady profile of a pipe with friction: d(h + v^2/2 + g z)/dx = -drag m_ref / m^2, by RK4 over half cells.
+    """Write the initial steady state along a pipe with friction: d(h + v^2/2 + g z)/dx = -drag m_ref / m^2.
 
-    start : h + v^2/2 + g z at the `from` end [J/kg]; z : elevation there. Writes the mass per length at faces and
-    centres [kg/m]; returns h + v^2/2 + g z at the `to` end.
+    By the classical Runge-Kutta method over half cells.
+    h : specific enthalpy, v : velocity, m : mass per length, m_ref : its reference value
+    start : h + v^2/2 + g z at the `from` end [J/kg]; z : elevation there [m]; flow : mass flow [kg/s]
+    faces, centers : receive the mass per length at faces and cell centres [kg/m]
+    Returns h + v^2/2 + g z at the `to` end [J/kg].
     """
     pull = pipe["drag"] * st["rho"] * pipe["area"]
     g, half, b = st["gravity"], 0.5 * pipe["dx"], start

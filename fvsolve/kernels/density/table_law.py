@@ -12,7 +12,10 @@ from fvsolve.kernels.density.no_inline import law_njit, prevent_inlining
 
 @njit(forceinline=True)
 def hermite(floats, values, slopes, k, s, step):
-    """Cubic polynomial through two values with two slopes, at s in [0, 1] of interval k."""
+    """Cubic Hermite polynomial at s in [0, 1] of interval k of a table, through two values with two slopes.
+
+    values, slopes : offsets of the table's values and slopes in `floats`; step : width of the interval
+    """
     r = 1.0 - s
     v0, v1 = floats[values + k], floats[values + k + 1]
     d0, d1 = floats[slopes + k] * step, floats[slopes + k + 1] * step
@@ -21,7 +24,7 @@ def hermite(floats, values, slopes, k, s, step):
 
 @njit
 def log_density(st, floats, p):
-    """(ln(rho / rho_ref), d ln rho / dp [1/Pa]) at a pressure."""
+    """(ln(rho / rho_ref), d ln rho / dp [1/Pa]) at the pressure p [Pa], with density rho."""
     n, o, step = st["table_size"], st["table"], st["table_step"]
     x = (p - st["table_start"]) / step
     if x <= 0.0:
@@ -38,13 +41,13 @@ def log_density(st, floats, p):
 
 @inline
 def density(st, floats, p):
-    """rho [kg/m3] at a pressure."""
+    """Density rho [kg/m3] at the pressure p [Pa]."""
     return elastic_wall.density(st, log_density(st, floats, p)[0])
 
 
 @njit
 def enthalpy(st, floats, p):
-    """h = integral of dp / rho from the reference pressure [J/kg]."""
+    """Specific enthalpy h at the pressure p: integral of dp / rho from the reference pressure [J/kg]."""
     n, o, step = st["table_size"], st["table"], st["table_step"]
     x = (p - st["table_start"]) / step
     k = 0 if x <= 0.0 else (n - 1 if x >= n - 1.0 else -1)
@@ -57,7 +60,7 @@ def enthalpy(st, floats, p):
 
 @law_njit
 def pressure_of_enthalpy(st, floats, h):
-    """Pressure [Pa] at which `enthalpy` is h."""
+    """Pressure [Pa] at which the specific enthalpy is h [J/kg], by Newton."""
     prevent_inlining()
     p = st["reference"] + st["rho"] * h
     for _ in range(30):
@@ -70,7 +73,10 @@ def pressure_of_enthalpy(st, floats, h):
 
 @law_njit
 def pressure_of_log(st, floats, compliance, q):
-    """Pressure [Pa] at which ln(rho / rho_ref) + compliance (p - p_ref) is q."""
+    """Pressure p [Pa] at which ln(rho / rho_ref) + compliance (p - p_ref) is q, by Newton, with density rho.
+
+    compliance : relative area change of the wall per pressure [1/Pa]
+    """
     prevent_inlining()
     p = st["reference"] + q / (1.0 / st["beta"] + compliance)
     for _ in range(30):
@@ -84,45 +90,45 @@ def pressure_of_log(st, floats, compliance, q):
 
 @inline
 def pressure_of_mass(st, floats, pipe, m):
-    """Pressure [Pa] of a pipe that contains m [kg/m]."""
+    """Pressure [Pa] of a pipe that contains the mass per length m [kg/m]."""
     return pressure_of_log(st, floats, pipe["compliance"], log(elastic_wall.mass_ratio(st, pipe, m)))
 
 
 @inline
 def mass_of_pressure(st, floats, pipe, p):
-    """Mass per length m = rho A [kg/m] and dm/dp of a pipe at a pressure."""
+    """Mass per length m = rho A [kg/m] and dm/dp [kg/m/Pa] of a pipe at the pressure p, with density rho and area A."""
     value, slope = log_density(st, floats, p)
     return elastic_wall.mass(st, pipe, p, value, slope)
 
 
 @inline
 def wall_area(st, floats, pipe, p):
-    """Area of a pipe at a pressure [m2]."""
+    """Area of a pipe at the pressure p [m2]."""
     return elastic_wall.area(st, pipe, p)
 
 
 @inline
 def thrust(st, floats, pipe, p):
-    """Integral of A dp from the reference pressure [N]."""
+    """Pressure force in a pipe: integral of A dp from the reference pressure to p [N], A : area of the pipe."""
     return elastic_wall.thrust(st, pipe, p)
 
 
 @inline
 def force_of_mass(st, floats, pipe, m):
-    """`thrust` at the pressure of a pipe that contains m [kg/m] [N]: momentum flux by pressure."""
+    """Pressure force (`thrust`) in a pipe that contains the mass per length m [kg/m], in [N]."""
     return thrust(st, floats, pipe, pressure_of_mass(st, floats, pipe, m))
 
 
 @inline
 def impedance(st, floats, pipe, p):
-    """rho c of a pipe at a pressure [kg/m2/s]."""
+    """Impedance rho c of a pipe at the pressure p [kg/m2/s]: density times wave speed."""
     value, slope = log_density(st, floats, p)
     return elastic_wall.impedance(st, pipe, value, slope)
 
 
 @njit
 def velocity_change(st, floats, pipe, p_from, p_to):
-    """Integral of dp / (rho c) [m/s] by three Gauss points."""
+    """Integral of dp / (rho c) from p_from to p_to [m/s] by three Gauss points; rho : density, c : wave speed."""
     middle, half = 0.5 * (p_from + p_to), 0.5 * (p_to - p_from)
     low, high = middle - elastic_wall.GAUSS_POINT * half, middle + elastic_wall.GAUSS_POINT * half
     here, there = impedance(st, floats, pipe, low), impedance(st, floats, pipe, high)
@@ -131,6 +137,6 @@ def velocity_change(st, floats, pipe, p_from, p_to):
 
 @inline
 def local_speed(st, floats, pipe, p):
-    """Wave speed c of a pipe at a pressure [m/s]."""
+    """Wave speed of a pipe at the pressure p [m/s]."""
     value, slope = log_density(st, floats, p)
     return elastic_wall.speed(st, pipe, value, slope)

@@ -1,9 +1,10 @@
-"""Power and stored energy of unsteady friction, added to the rows of its pipe.
+"""Power and stored energy of unsteady friction, added to the entries of its pipe.
 
-A term of gain g and rate n has a state z that follows the flow M. It stores g z^2 / (2 n) and dissipates g (M - z)^2,
-both divided by rho A and per length. The sum of dissipation and storage rate is M times the drag of the term. The rows
-are as in `linear_energy.py`: `friction` and `rate` of a pipe, and its kinetic energy. Under the laws log and table M is
-rho A times the velocity, at the reference density.
+An exponential term of gain g [1/s] and rate n [1/s] has a state z that follows the mass flow M [kg/s]. It stores g z^2
+/ (2 n) and dissipates g (M - z)^2, both divided by rho A (density times area) and per length. The sum of dissipation
+and rate of storage is M times the drag of the term, divided by rho A. The entries of a pipe are those of
+`linear_energy.py`: friction and rate of stored energy in `power`, kinetic energy in `stored`. Under the laws log and
+table M is rho A times the velocity, at the reference density.
 """
 
 from fvsolve.jit import njit
@@ -16,7 +17,11 @@ from fvsolve.kernels.unsteady_friction.relaxation_terms_barotropic import veloci
 
 @njit
 def input_flow(y, pipe, tables, change):
-    """Fill `change` with the flow that the terms follow in each cell: deviation from the profile's flow [kg/s]."""
+    """Write the flow that the states of unsteady friction follow in each cell to `change` [kg/s].
+
+    It is the change of the mass flow since the initial steady state; under the laws log and table the change of
+    velocity times reference mass per length.
+    """
     st, n, o = tables.settings[0], pipe["cells"], pipe["y"]
     r, l = y[o : o + n], y[o + n : o + 2 * n]
     if st["law"] == LAW_LINEAR:
@@ -27,7 +32,7 @@ def input_flow(y, pipe, tables, change):
 
 @njit(forceinline=True)
 def profile_input(st, profile, pipe, i):
-    """Quantity that the terms follow, in cell i of the profile [kg/s]."""
+    """Initial steady value, in cell i, of the flow that the states of unsteady friction follow [kg/s]."""
     if st["law"] == LAW_LINEAR:
         return pipe["flow"]
     return pipe["flow"] * (st["rho"] * pipe["area"] / profile[pipe["center"] + i])
@@ -35,7 +40,10 @@ def profile_input(st, profile, pipe, i):
 
 @njit
 def relaxation_power(st, floats, profile, pipe, change, y, dydt):
-    """Dissipation and rate of storage of all terms of a pipe [W]."""
+    """(dissipation, rate of stored energy) of all exponential terms of unsteady friction in a pipe [W].
+
+    change : float64[cells]  flow that the states of the terms follow, see `input_flow`
+    """
     n, width = change.size, polynomial_width(st, change.size)
     taken, rate = 0.0, 0.0
     for k in range(pipe["terms"]):
@@ -55,7 +63,7 @@ def relaxation_power(st, floats, profile, pipe, change, y, dydt):
 
 @njit
 def relaxation_energy(st, floats, profile, pipe, y):
-    """Change of the energy stored in all terms of a pipe since the profile [J]."""
+    """Change since the start of the energy stored in all exponential terms of unsteady friction in a pipe [J]."""
     n, width, total = pipe["cells"], polynomial_width(st, pipe["cells"]), 0.0
     for k in range(pipe["terms"]):
         at = pipe["memory"] + k * n
@@ -70,7 +78,7 @@ def relaxation_energy(st, floats, profile, pipe, y):
 
 @njit
 def add_power(t, y, dydt, out, handle, power):
-    """Add the power of unsteady friction of all pipes to their power rows."""
+    """Add dissipation and rate of stored energy of unsteady friction to the entries of all pipes in `power` [W]."""
     tables = open_tables(handle)
     st, pipes, at = tables.settings[0], tables.pipes, NODE * tables.nodes.size
     for i in range(pipes.size):
@@ -85,7 +93,7 @@ def add_power(t, y, dydt, out, handle, power):
 
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
-    """Add the energy stored by unsteady friction of all pipes to their storage rows."""
+    """Add the change of energy stored by unsteady friction since the start to the entries of all pipes in `stored` [J]."""
     tables = open_tables(handle)
     st, pipes, nodes = tables.settings[0], tables.pipes, tables.nodes
     for i in range(pipes.size):

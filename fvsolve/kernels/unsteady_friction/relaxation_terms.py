@@ -1,9 +1,10 @@
 """Unsteady friction by relaxation variables, under the linear density law.
 
-The weighting function is W(tau) = sum of m_k exp(-n_k tau), tau = nu t / R^2. In addition to the quasi-steady drag
-(Zielke 1968) the wall exerts the sum over k of (4 nu / R^2) m_k (M - z_k) per length. Each z_k follows the flow,
-dz_k/dt = (n_k nu / R^2) (M - z_k). The equations are linear in cell averages, so they are exact for them. Storage
-(4 nu / R^2) m_k z_k^2 / (2 n_k nu / R^2), dissipation (4 nu / R^2) m_k (M - z_k)^2, both divided by rho A: the friction
+The weighting function of the flow history is W(tau) = sum of m_k exp(-n_k tau), tau = nu t / R^2, with kinematic
+viscosity nu and pipe radius R. In addition to the quasi-steady drag (Zielke 1968) the wall exerts the drag sum over k
+of (4 nu / R^2) m_k (M - z_k) per length, M : mass flow. Each state z_k follows the flow, dz_k/dt = (n_k nu / R^2) (M -
+z_k). The equations are linear in cell averages, so they are exact for them. Each term stores (4 nu / R^2) m_k z_k^2 /
+(2 n_k nu / R^2) and dissipates (4 nu / R^2) m_k (M - z_k)^2, both divided by rho A (density times area): the friction
 is passive where no m_k is negative.
 """
 
@@ -13,7 +14,10 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def relaxation_rate(gain, rate, flow, z, dz, pull):
-    """Write dz/dt = rate (flow - z) of a single term and add gain (flow - z) to `pull`."""
+    """Write dz/dt = rate (flow - z) of the states z of a single exponential term, and add gain (flow - z) to `pull`.
+
+    flow, z, dz, pull : float64[cells]; rate, gain [1/s]
+    """
     for i in range(z.size):
         lag = flow[i] - z[i]
         dz[i] = rate * lag
@@ -22,9 +26,10 @@ def relaxation_rate(gain, rate, flow, z, dz, pull):
 
 @njit
 def relaxation_rates(pipe, floats, flow, y, dydt, pull):
-    """Write the rates of all terms of a pipe and their drag.
+    """Write the rates of all exponential terms of unsteady friction in a pipe to `dydt`, and their drag to `pull`.
 
-    flow, pull : float64[cells]  deviation of the flow [kg/s], and drag [kg/s2]
+    flow : float64[cells]  change of the mass flow since the start [kg/s]
+    pull : float64[cells]  drag per length [kg/s2]
     """
     n, at = flow.size, pipe["memory"]
     for i in range(n):
@@ -37,7 +42,10 @@ def relaxation_rates(pipe, floats, flow, y, dydt, pull):
 
 @njit
 def subtract_drag(pull, dr, dl):
-    """Subtract a drag [kg/s2] from the rates of both waves."""
+    """Subtract half of a drag `pull` [kg/s2] from the rate of the forward wave; add half to that of the backward wave.
+
+    dr, dl : float64[cells]  rates of both waves [kg/s2]
+    """
     for i in range(pull.size):
         s = 0.5 * pull[i]
         dr[i] -= s
@@ -46,14 +54,17 @@ def subtract_drag(pull, dr, dl):
 
 @njit
 def wave_difference(r, l, flow):
-    """flow = r - l."""
+    """Write the change of the mass flow in cells, forward wave minus backward wave, r - l [kg/s], to `flow`."""
     for i in range(r.size):
         flow[i] = r[i] - l[i]
 
 
 @njit
 def add_unsteady_friction(t, y, dydt, out, handle):
-    """Add the unsteady friction of all pipes to the rates, under the linear law."""
+    """Add the unsteady friction of all pipes to the rates of their waves, and write the rates of its states.
+
+    Linear density law; nothing is done if `dydt` is empty.
+    """
     tables = open_tables(handle)
     pipes, floats, scratch = tables.pipes, tables.floats, tables.scratch
     for i in range(pipes.size):

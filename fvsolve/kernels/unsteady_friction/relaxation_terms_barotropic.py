@@ -1,6 +1,7 @@
 """Unsteady friction under the density laws log and table.
 
-The terms follow the velocity, u = (rho A)_ref M / m. Then v times the drag is a rate of storage plus a dissipation.
+The states of the exponential terms follow u = (rho A)_ref M / m, the velocity M / m times the reference mass per
+length, with mass flow M and mass per length m. Then velocity times drag is a rate of storage plus a dissipation.
 """
 
 from fvsolve.jit import njit
@@ -11,7 +12,12 @@ from fvsolve.kernels.unsteady_friction.relaxation_terms import relaxation_rates,
 
 @njit
 def velocity_change(pipe, profile, reference, r, l, change):
-    """Write change = deviation of reference M / m from the profile [kg/s], cell averages by two Gauss points."""
+    """Write the change of reference M / m since the initial steady state to `change` [kg/s].
+
+    Cell averages by two Gauss points.
+    reference : reference mass per length [kg/m]; M : mass flow, m : mass per length
+    r, l : float64[cells]  forward and backward wave [kg/s]
+    """
     n, c, flow = r.size, pipe["speed"], pipe["flow"]
     for i in range(n):
         low, high = max(i - 1, 0), min(i + 1, n - 1)
@@ -25,7 +31,10 @@ def velocity_change(pipe, profile, reference, r, l, change):
 
 @njit
 def add_unsteady_friction_barotropic(t, y, dydt, out, handle):
-    """Add the unsteady friction of all pipes to the rates."""
+    """Add the unsteady friction of all pipes to the rates of their waves, and write the rates of its states.
+
+    Laws log, table and mixture; nothing is done if `dydt` is empty.
+    """
     tables = open_tables(handle)
     pipes, floats, scratch = tables.pipes, tables.floats, tables.scratch
     for i in range(pipes.size):

@@ -1,11 +1,12 @@
 """Viscoelastic pipe walls (Kelvin-Voigt elements) under the linear density law.
 
-An element of compliance J and time constant tau has the strain d eps/dt = (J sigma - eps) / tau. The hoop stress is
-sigma = c D p / (2 e), and the bore grows by 2 eps A (Covas et al. 2005). Let w = r + l, the pressure times A / a, and
-u = 2 rho a eps A / G with G = c D K J / e and K = rho a^2. Then du/dt = (w - u) / tau. The mass flow into the bore,
-G du/dt, is subtracted in equal halves from the rates of both waves. All values are deviations from the profile, whose
-pressure is in equilibrium with its strain. Storage G u^2 / 2, dissipation G (w - u)^2 / tau, both divided by rho A:
-the wall is passive, for no J is negative.
+An element of compliance J [1/Pa] and time constant tau [s] has the strain eps, d eps/dt = (J sigma - eps) / tau. The
+hoop stress is sigma = c D p / (2 e), with restraint factor c, diameter D and wall thickness e. The bore grows by 2 eps
+A (Covas et al. 2005), A : area. Let w = r + l, the sum of both waves, which is the pressure times A / a with wave speed
+a, and u = 2 rho a eps A / G with G = c D K J / e and K = rho a^2. Then du/dt = (w - u) / tau. The mass flow into the
+bore, G du/dt, is subtracted in equal halves from the rates of both waves. All values are changes since the initial
+steady state, whose pressure is in equilibrium with its strain. An element stores G u^2 / 2 and dissipates G (w - u)^2 /
+tau, both divided by rho A: the wall is passive, for no J is negative.
 """
 
 from fvsolve.jit import njit
@@ -15,14 +16,14 @@ from fvsolve.kernels.unsteady_friction.relaxation_terms import relaxation_rate
 
 @njit
 def wave_sum(r, l, w):
-    """w = r + l."""
+    """Write the sum of forward and backward wave r + l [kg/s], a measure of pressure, to w."""
     for i in range(r.size):
         w[i] = r[i] + l[i]
 
 
 @njit
 def wall_rates(pipe, floats, w, y, dydt, taken):
-    """Write the rates of the elements of a pipe; subtract half of the mass flow into them from the rate of each wave.
+    """Write the rates of the wall elements of a pipe; subtract half the mass flow into them from the rate of each wave.
 
     w : float64[cells]  sum of both waves [kg/s]; taken : float64[cells]  work array
     """
@@ -40,7 +41,10 @@ def wall_rates(pipe, floats, w, y, dydt, taken):
 
 @njit
 def add_wall_creep(t, y, dydt, out, handle):
-    """Subtract the wall creep of all pipes from the rates of both waves; write the rates of the elements."""
+    """Subtract the wall creep of all pipes from the rates of both waves, and write the rates of the wall elements.
+
+    Linear density law; nothing is done if `dydt` is empty.
+    """
     tables = open_tables(handle)
     pipes, floats, scratch = tables.pipes, tables.floats, tables.scratch
     for i in range(pipes.size):

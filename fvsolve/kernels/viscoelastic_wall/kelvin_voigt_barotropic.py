@@ -1,8 +1,8 @@
 """Creep of viscoelastic pipe walls under the density laws log, table and mixture.
 
-The Kelvin-Voigt elements follow w = (A / a) (p - p0). p0 is the pressure of the profile, a the wave speed at the
-reference state; under the linear law w = r + l. The additional volume of the bore holds liquid of the reference
-density. Its mass is subtracted from the mass of the same cell only.
+The Kelvin-Voigt elements follow w = (A / a) (p - p0), with area A, pressure p, initial steady pressure p0 and the wave
+speed a at the reference state; under the linear law w is the sum of both waves. The additional volume of the bore holds
+liquid of the reference density. Its mass is subtracted from the mass of the same cell only.
 """
 
 from fvsolve.jit import njit
@@ -15,7 +15,11 @@ from fvsolve.kernels.viscoelastic_wall.kelvin_voigt import wall_rates
 
 @njit
 def wall_pressure(st, floats, profile, pipe, r, l, w):
-    """Write w = (A / a) (p - p0) [kg/s], averaged over each cell by two Gauss points."""
+    """Write w = (A / a) (p - p0) [kg/s] to w, averaged over each cell by two Gauss points.
+
+    A : area, a : wave speed, p, p0 : present and initial steady pressure
+    r, l : float64[cells]  forward and backward wave [kg/s]
+    """
     n, c, least = r.size, pipe["speed"], DRY * st["rho"] * pipe["area"]
     for i in range(n):
         low, high = max(i - 1, 0), min(i + 1, n - 1)
@@ -28,7 +32,10 @@ def wall_pressure(st, floats, profile, pipe, r, l, w):
 
 @njit
 def add_wall_creep_barotropic(t, y, dydt, out, handle):
-    """Subtract the wall creep of all pipes from the rates of both waves; write the rates of the elements."""
+    """Subtract the wall creep of all pipes from the rates of both waves, and write the rates of the wall elements.
+
+    Laws log, table and mixture; nothing is done if `dydt` is empty.
+    """
     tables = open_tables(handle)
     pipes, floats, scratch = tables.pipes, tables.floats, tables.scratch
     for i in range(pipes.size):

@@ -1,9 +1,11 @@
-"""Power and stored energy of viscoelastic walls, added to the rows of their pipes.
+"""Power and stored energy of viscoelastic walls, added to the entries of their pipes.
 
-An element of gain g and rate n has a state u that follows w. It stores g u^2 / (2 n) and dissipates g (w - u)^2, both
-divided by rho A and per length. The sum of dissipation and storage rate is w times the mass flow into the element.
-The work against P of the profile is stored too, P = p - p_ambient + rho g z as in `linear_energy.py`, with the
-reference density. The rows of a pipe are `creep` and `rate` (power), and its elastic energy (storage).
+A wall element of gain g and rate n [1/s] has a state u that follows w, the pressure change times area over wave speed
+[kg/s]. It stores g u^2 / (2 n) and dissipates g (w - u)^2, both divided by rho A (density times area) and per length.
+The sum of dissipation and rate of storage is w times the mass flow g (w - u) into the element, divided by rho A. The
+work against the initial steady potential P = p - p_ambient + rho g z is stored too, with the reference density. The
+entries of a pipe are those of `linear_energy.py`: creep and rate of stored energy in `power`, elastic energy in
+`stored`.
 """
 
 from fvsolve.jit import njit
@@ -23,7 +25,10 @@ from fvsolve.kernels.viscoelastic_wall.kelvin_voigt import wave_sum
 
 @njit
 def creep_power(st, floats, pipe, w, y, dydt):
-    """Dissipation and rate of storage of all elements of a pipe [W], without the work against the profile."""
+    """(dissipation, rate of stored energy) of all wall elements of a pipe [W], without work against initial pressure.
+
+    w : float64[cells]  pressure change times area over wave speed [kg/s]
+    """
     n, width, taken, rate = w.size, polynomial_width(st, w.size), 0.0, 0.0
     for k in range(pipe["elements"]):
         gain, at = floats[pipe["element"] + 2 * k], pipe["strain"] + k * n
@@ -41,7 +46,10 @@ def creep_power(st, floats, pipe, w, y, dydt):
 
 @njit
 def creep_energy(st, floats, pipe, y):
-    """Change of the energy stored in all elements of a pipe since the profile, without work against the profile [J]."""
+    """Change since the start of the energy stored in all wall elements of a pipe [J], without work against P.
+
+    P : initial steady potential, p - p_ambient + rho g z
+    """
     n, width, sum_ = pipe["cells"], polynomial_width(st, pipe["cells"]), 0.0
     for k in range(pipe["elements"]):
         at = pipe["strain"] + k * n
@@ -54,9 +62,10 @@ def creep_energy(st, floats, pipe, y):
 
 @njit(forceinline=True)
 def bore_growth(st, floats, pipe, i, g, y):
-    """Sum over all elements of g u / n at a Gauss point of cell i [kg/s]; of rates, its time derivative.
+    """Sum over all wall elements of g u / n at a Gauss point of cell i [kg/s]; of rates, its time derivative.
 
-    Multiplied by dx / speed it is the mass of reference density in the additional volume of the bore.
+    g, n, u : gain, rate and state of an element. Multiplied by dx / speed the sum is the mass of reference density in
+        the additional volume of the bore.
     """
     n, width, sum_ = pipe["cells"], polynomial_width(st, pipe["cells"]), 0.0
     for k in range(pipe["elements"]):
@@ -68,9 +77,9 @@ def bore_growth(st, floats, pipe, i, g, y):
 
 @njit
 def work_against_profile(st, floats, pipe, node, y):
-    """Energy stored in elements as work against P of the profile [J], or its rate [W] where y are rates.
+    """Energy stored in wall elements as work against initial steady potential P [J], or its rate [W] if y are rates.
 
-    node : node at the `from` end of the pipe
+    P = p - p_ambient + rho g z; node : node at the `from` end of the pipe
     """
     start, fall = (node["pressure"] - st["ambient"]) + height_pressure(st, node), pipe["drag"] / pipe["area"]
     sum_ = 0.0
@@ -83,7 +92,7 @@ def work_against_profile(st, floats, pipe, node, y):
 
 @njit
 def add_power(t, y, dydt, out, handle, power):
-    """Add the power of the walls of all pipes to the power rows of the pipes."""
+    """Add dissipation and rate of stored energy of all viscoelastic walls to the entries of their pipes in `power` [W]."""
     tables = open_tables(handle)
     st, pipes, at = tables.settings[0], tables.pipes, NODE * tables.nodes.size
     for i in range(pipes.size):
@@ -100,7 +109,7 @@ def add_power(t, y, dydt, out, handle, power):
 
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
-    """Add the energy stored in the walls of all pipes to the storage rows of the pipes."""
+    """Add the change of energy stored in viscoelastic walls since the start to the entries of pipes in `stored` [J]."""
     tables = open_tables(handle)
     st, floats, pipes, nodes = tables.settings[0], tables.floats, tables.pipes, tables.nodes
     for i in range(pipes.size):

@@ -1,9 +1,10 @@
 """Power and stored energy of viscoelastic walls under the density laws log, table and mixture.
 
-Mass that leaves a cell carries h(p) - h(p_ambient) + g z - v^2 / 2 [J/kg], with the enthalpy h. In the additional
-volume of the bore it is liquid of the reference density and carries P / rho. The elements dissipate and store their
-share of P (`wall_energy.py`). The difference is a property of the density law, at most a fraction p / K of the
-energy that passes. It has its own row.
+Mass that leaves a cell carries h(p) - h(p_ambient) + g z - v^2 / 2 [J/kg], with specific enthalpy h, elevation z and
+velocity v. In the additional volume of the bore it is liquid of the reference density and carries P / rho, P = p -
+p_ambient + rho g z. The elements dissipate and store their share of P (`wall_energy.py`). The difference is a property
+of the density law, at most a fraction p / K (K : bulk modulus) of the energy that passes. It has its own entry in
+`power`, the residual of the density law.
 """
 
 from fvsolve.jit import njit
@@ -18,20 +19,26 @@ from fvsolve.kernels.viscoelastic_wall.wall_energy import bore_growth, creep_ene
 
 @njit(forceinline=True)
 def gravity_potential(st, profile, pipe, z, i, g):
-    """Gravity potential g z at a Gauss point of cell i [J/kg]; z : height of the `from` end of the pipe [m]."""
+    """Gravity potential [J/kg] at Gauss point g of cell i; z : elevation of the `from` end of the pipe above datum [m]."""
     return st["gravity"] * (z + rise_at(profile, pipe, (i + 0.5 + GAUSS_POINTS[g]) * pipe["dx"]))
 
 
 @njit(forceinline=True)
 def profile_pressure(st, floats, profile, pipe, z, i, g):
-    """P of the profile at a Gauss point of cell i [Pa]."""
+    """Initial steady potential P = p - p_ambient + rho g z [Pa] at Gauss point g of cell i of a pipe.
+
+    z : as argument, elevation of the `from` end of the pipe above datum [m]
+    """
     p = pressure_of_mass(st, floats, pipe, profile_mass(profile, pipe, i, g))
     return p - st["ambient"] + st["rho"] * gravity_potential(st, profile, pipe, z, i, g)
 
 
 @njit
 def work_against_profile_barotropic(st, floats, profile, pipe, z, y):
-    """Energy stored in elements as work against P of the profile [J], or its rate [W] where y are rates."""
+    """Energy stored in wall elements as work against initial steady potential P [J], or its rate [W] if y are rates.
+
+    P = p - p_ambient + rho g z; z : as argument, elevation of the `from` end of the pipe above datum [m]
+    """
     sum_ = 0.0
     for i in range(pipe["cells"]):
         for g in range(3):
@@ -45,7 +52,11 @@ def work_against_profile_barotropic(st, floats, profile, pipe, z, y):
 
 @njit
 def density_law_power(st, floats, profile, pipe, z, w, y, dydt):
-    """Energy flow of the mass that leaves the cells into the bore, minus its energy there [W]."""
+    """Energy flow of the mass that leaves the cells of a pipe into the additional bore, minus its energy there [W].
+
+    z : elevation of the `from` end of the pipe above datum [m]
+    w : float64[cells]  pressure change times area over wave speed [kg/s]
+    """
     n, o, width, sum_ = w.size, pipe["y"], polynomial_width(st, w.size), 0.0
     r, l = y[o : o + n], y[o + n : o + 2 * n]
     for i in range(n):
@@ -62,7 +73,10 @@ def density_law_power(st, floats, profile, pipe, z, w, y, dydt):
 
 @njit
 def add_power_barotropic(t, y, dydt, out, handle, power):
-    """Add the power of the walls of all pipes, and the difference of the density law, to the power rows."""
+    """Add the power of viscoelastic walls to the entries of their pipes in `power` [W].
+
+    These are dissipation, rate of stored energy, and residual of the density law.
+    """
     tables = open_tables(handle)
     st, pipes, nodes, at = tables.settings[0], tables.pipes, tables.nodes, NODE * tables.nodes.size
     floats, profile = tables.floats, tables.profile
@@ -81,7 +95,7 @@ def add_power_barotropic(t, y, dydt, out, handle, power):
 
 @njit
 def add_stored_barotropic(t, y, dydt, out, handle, stored):
-    """Add the energy stored in the walls of all pipes to the storage rows of the pipes."""
+    """Add the change of energy stored in viscoelastic walls since the start to the entries of pipes in `stored` [J]."""
     tables = open_tables(handle)
     st, floats, pipes, nodes = tables.settings[0], tables.floats, tables.pipes, tables.nodes
     for i in range(pipes.size):
