@@ -60,7 +60,7 @@ def energy_head(st, floats, node, p):
 
 @njit
 def total_head(tables, out, i):
-    """Energy per mass at node i, H = h(p) - h(p_ambient) + g z [J/kg]: specific enthalpy h and elevation z above datum."""
+    """Energy per mass at node i, H = h(p) - h(p_ambient) + g z [J/kg]: specific enthalpy h, elevation z above datum."""
     st, node = tables.settings[0], tables.nodes[i]
     h = relative_enthalpy(st, tables.floats, node["pressure"] + out[tables.layout[0]["pressure"] + i])
     return h + st["gravity"] * (node["elevation"] - st["datum"])
@@ -270,7 +270,7 @@ def stored_barotropic(t, y, dydt, out, handle, stored):
 
 @njit
 def vessel_power(dydt, out, tables, device):
-    """Rate of the energy stored in the vessel of a device [W]: energy per mass of the fluid that enters, times dm/dt."""
+    """Rate of the energy stored in the vessel of a device [W]: energy per mass of entering fluid times dm/dt."""
     i, nodes = device["node"], tables.nodes
     p = nodes[i]["pressure"] + out[tables.layout[0]["pressure"] + i]
     return energy_head(tables.settings[0], tables.floats, nodes[i], p) * dydt[nodes[i]["y"]]

@@ -330,7 +330,7 @@ def given_flows(t, y, out, tables):
 
 @njit
 def is_undisturbed(cluster, tables, out):
-    """True if the pipes bring exactly their initial steady flow into every node of a cluster (nodes solved together)."""
+    """True if pipes bring exactly their initial steady flow into every node of a cluster (nodes solved together)."""
     for i in range(cluster["nodes"]):
         node = tables.integers[cluster["first_node"] + i]
         if out[tables.layout[0]["net"] + node] != 0.0:

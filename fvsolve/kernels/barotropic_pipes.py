@@ -33,7 +33,7 @@ from fvsolve.kernels.tank_levels import tank_level
 
 @njit
 def momentum_flux(st, floats, pipe, m, flow):
-    """Momentum flux M^2 / m + integral of A dp [N] at the mass flow M = `flow` [kg/s] and the mass per length m [kg/m]."""
+    """Momentum flux M^2 / m + integral of A dp [N] at mass flow M = `flow` [kg/s] and mass per length m [kg/m]."""
     return flow * flow / m + force_of_mass(st, floats, pipe, m)
 
 

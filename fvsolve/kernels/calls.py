@@ -18,8 +18,8 @@ from fvsolve.kernels.dtypes import AMENDED, STATUS, table_types
 from fvsolve.kernels.table_handle import open_tables
 
 # Jobs: rows of `calls`, each ended by a zero. CLOSE, the first phases of RHS, must run before event functions.
-# SEE derives from a state the values that the functions of all jobs but RHS read, where these are not the state itself
-# (`basins.walls`). DAMP divides the rates of a stage by 1 + h r, r their fast part (`steppers.semi_implicit`).
+# DERIVE derives from a state the values that the functions of all jobs but RHS read, where these are not the state itself
+# (`basins.moving_walls`). DAMP divides the rates of a stage by 1 + h r, r their fast part (`steppers.semi_implicit`).
 RHS, CLOSE, OBSERVE, RECORD, EVENTS, POWER, STORED, DERIVE, DAMP, JOBS = range(10)
 RATES, READS, ENERGIES = "tVVVH", "tVVHV", "tVVVHV"  # argument types of the functions of jobs
 ARGUMENTS = dict.fromkeys((RHS, CLOSE, DERIVE, DAMP), RATES)
@@ -69,7 +69,7 @@ def _kinds() -> dict:
 
 
 def compile_as(function, letters: str):
-    """Compile a function for the argument types `letters` only (see `argument_types`); return it unchanged without JIT."""
+    """Compile a function for argument types `letters` only (see `argument_types`); return it unchanged without JIT."""
     return declare_function(function, letters, argument_types)
 
 
@@ -90,7 +90,9 @@ def hook_of(law, name: str):
     if function is None or function.__code__.co_argcount == expected:
         return function
     error = f"{law.__name__}.{name} has {function.__code__.co_argcount} arguments"
-    raise FvsolveError(f"{error}. Expected {expected} (see kernels.calls.HOOKS), or another name")
+    raise FvsolveError(
+        f"{error}. Expected {expected}, listed in kernels.calls.HOOKS. Try these, or rename the function"
+    )
 
 
 def empty_calls(rows: int, columns: int) -> np.ndarray:
@@ -156,17 +158,17 @@ if COMPILING:
 
     @Intrinsic
     def call_outside(typingctx, address, out, tables, device):
-        """Call the function `outside` of a device's law at `address`, which checks the range of validity; see `HOOKS`."""
+        """Call the function `outside` of a device's law at `address`: check of the range of validity; see `HOOKS`."""
         return call(*HOOKS["outside"])
 
     @Intrinsic
     def call_power(typingctx, address, t, y, dydt, out, tables, device):
-        """Call the function `power` of a device's law at `address`, which returns three powers [W]; see `HOOKS`."""
+        """Call the function `power` of a device's law at `address`: three powers [W]; see `HOOKS`."""
         return call(*HOOKS["power"])
 
     @Intrinsic
     def call_stored(typingctx, address, y, tables, device):
-        """Call the function `stored` of a device's law at `address`, which returns its stored energy [J]; see `HOOKS`."""
+        """Call the function `stored` of a device's law at `address`: stored energy [J]; see `HOOKS`."""
         return call(*HOOKS["stored"])
 
     @Intrinsic
@@ -176,7 +178,7 @@ if COMPILING:
 
     @Intrinsic
     def call_slope(typingctx, address, out, tables, k, g, drop):
-        """Call the function `slope` of the law of restriction k at `address`: d flow / d drop [kg/s/Pa]; see `HOOKS`."""
+        """Call the function `slope` of the law of restriction k at `address`: d flow / d drop [kg/s/Pa]."""
         return call(*HOOKS["slope"])
 
     @Intrinsic

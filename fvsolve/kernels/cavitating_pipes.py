@@ -65,7 +65,7 @@ def fill_cells(st, floats, profile, pipe, first, r, l, p, v, dp, dv):
 
 @njit(forceinline=True)
 def face_value(st, a, k, ahead):
-    """Value at the face after cell k (ahead = 1) or before it (ahead = -1), reconstructed from the values a of cells."""
+    """Value at the face after cell k (ahead = 1) or before it (ahead = -1), reconstructed from cell values a."""
     if st["scheme"] == UPWIND:
         return a[k]
     return value_muscl(st["limiter"], a[k - ahead], a[k], a[k + ahead])
@@ -218,7 +218,7 @@ def record_cavity(t, pipe, r, l, at, tables):
 
 @njit
 def record_cavities(t, y, out, handle, values):
-    """Record the cavities of all pipes after an accepted step."""
+    """Record the cavities of all pipes in `marks` after an accepted step, see `record_cavity`."""
     tables = open_tables(handle)
     pipes, at = tables.pipes, tables.marks.size - 3 * tables.pipes.size
     for i in range(pipes.size):

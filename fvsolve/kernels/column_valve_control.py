@@ -54,7 +54,10 @@ def is_controlled(tables, out, i):
 
 @njit
 def area_rate_known(tables, out, i):
-    """True if the rate of area of each valve at node i is known: by schedule, from its seat, or zero until an event."""
+    """True if d/dt of the flow area of each valve at node i is known.
+
+    It is known from a schedule, near the seat, or as zero until an event opens the valve.
+    """
     node = tables.nodes[i]
     for e in range(node["gate_count"]):
         k = tables.integers[node["gates"] + e]
@@ -92,7 +95,7 @@ def find_controlled_columns(tables, out):
 
 @njit
 def control_end(tables, out, k):
-    """End of rigid column k at which valves control its flow, stored in `out`: 1 for `to`, -1 for `from`, 0 for none."""
+    """End of rigid column k at which valves control its flow, read from `out`: 1 `to`, -1 `from`, 0 for none."""
     return int(out[tables.layout[0]["valve_controlled"] + k])
 
 
@@ -135,7 +138,7 @@ def lift_drop(drop, still, slope, heavy):
 
 @njit
 def seating_valve(tables, i):
-    """Number of the valve near its seat that is the only outlet of the column at node i and controls it; -1 for none."""
+    """Number of the valve near its seat that is the only outlet of the column at node i and controls it; else -1."""
     k = tables.integers[tables.nodes[i]["gates"]]
     return k if controls_column(tables, k) else -1
 

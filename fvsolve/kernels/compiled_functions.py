@@ -88,7 +88,7 @@ def compile_readers(cast: ModelFeatures) -> tuple:
 
 @compile_once
 def fused_step_function(needed: bool):
-    """Compiled combined step of upwind scheme and Euler method if `needed`, else a placeholder with the same arguments."""
+    """Compiled combined step of upwind scheme and Euler method if `needed`, else a placeholder with equal arguments."""
     step_function = unused_step
     if needed:
         from fvsolve.kernels.fused_step import fused_step_linear as step_function
@@ -97,4 +97,4 @@ def fused_step_function(needed: bool):
 
 @njit
 def unused_step(t, h, y, y_new, out, handle, values):
-    """Placeholder; it is never called."""
+    """Placeholder with the arguments of `fused_step_linear`; it is never called."""

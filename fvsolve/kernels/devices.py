@@ -34,7 +34,7 @@ def set_devices(t, y, dydt, out, handle):
 
 @njit
 def device_rates(t, y, dydt, out, handle):
-    """Write d/dt of the states of devices to `dydt`, unless it is empty; raise out[RATE] to their greatest rate [1/s]."""
+    """Write d/dt of device states to `dydt`, unless it is empty; raise out[RATE] to their greatest rate [1/s]."""
     tables = open_tables(handle)
     for k in range(tables.devices.size):
         device = tables.devices[k]

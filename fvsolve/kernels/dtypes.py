@@ -1,8 +1,8 @@
 """Record types of the tables of a model, and of the arrays that its runs write.
 
-The `tables` of a model are these arrays by name, `tables.nodes[i]["mass"]` in Python and in compiled code. Compiled
-code also finds the arrays of a run among them, `tables.armed`. Their types are part of every compiled signature, so
-they are fixed here once, and a new model compiles nothing.
+The `tables` of a model are arrays of parameters by name, `tables.nodes[i]["mass"]` in Python and in compiled code.
+Compiled code also finds the arrays of a run among them, `tables.armed`. Their types are part of every compiled
+signature, so they are fixed here once, and a new model compiles nothing.
 """
 
 import functools
@@ -445,7 +445,7 @@ LAYOUT = np.dtype(
     align=True,
 )
 BODY_OUT = 45  # numbers of each body in `out`
-GN = 14  # index of g_n among the numbers of a frame, see `basins.frames`
+GN = 14  # index of g_n among the numbers of a frame, see `basins.basin_frames`
 TANK_OUT = 24  # numbers in `out` of each basin on a body, see `mechanism.basin_inertia`
 RATE, STATUS, WHERE, CLOSING, ARRIVES = 0, 1, 2, 3, 4  # first entries of `out`
 OUT_HEAD = 5
@@ -481,7 +481,7 @@ PIPE_FORCE = 25  # on a whole pipe
 
 BASIN = np.dtype(
     [
-        ("kind", "i8"),  # code of its physics, see `basins.kinds`
+        ("kind", "i8"),  # code of its physics, see `basins.physics_codes`
         ("deep", "i8"),  # 1: its first quantity is a depth above that in `plan`, which carries scalars
         ("given", "i8"),  # 1: flows through its faces follow a given velocity, in `plane`; others are in `work`
         ("scheme", "i8"),
@@ -522,15 +522,15 @@ BASIN = np.dtype(
         ("unsplit", "f8"),  # rate of its cells for the step limit over the rate from the kernels
         ("rest", "f8"),  # p - p_ambient + rho g z of the profile, the same in all cells [Pa]
         ("wall", "i8"),  # first of its moving walls
-        ("walls", "i8"),  # number of its moving walls; with any, its states are contents, see `basins.walls`
+        ("walls", "i8"),  # number of its moving walls; with any, its states are contents, see `basins.moving_walls`
         ("drawn", "i8"),  # offset in `plane` of areas of cells as drawn; `area` is that of present areas
         ("stretch", "i8"),  # offset in `plane` of present over drawn areas; of a grid for its columns or rows
         ("lines", "i8"),  # offset in `plane` of speeds of grid lines, or of corners of a mesh [m/s]
-        ("thrust", "i8"),  # offset in `work` of forces on faces of the boundary, see `free_surface.grid`
+        ("thrust", "i8"),  # offset in `work` of forces on boundary faces, see `free_surface.surface_grid`
         ("turn", "i8"),  # 0 if grid lines move along x, 1 if along y
         ("body", "i8"),  # body that carries it; -1 for none
         ("loads_body", "i8"),  # 1 if its load acts on that body: forces move the body, or the joint load is an output
-        ("frame", "i8"),  # offset in `plane` of the position and motion of its axes; see `basins.frames`
+        ("frame", "i8"),  # offset in `plane` of the position and motion of its axes; see `basins.basin_frames`
         ("corners", "i8"),  # number of corners of a mesh
         ("places", "i8"),  # offset in `plane` of positions of corners, then of centres of cells, see `moving_meshes`
         ("sides", "i8"),  # offset in `plane` of normal speeds of sides, by block, side of four and cell [m/s]
@@ -647,7 +647,7 @@ INTEGERS = ("integers", "bands", "joint", "sums", "sharp", "calls", "hooks")  # 
 
 @functools.cache
 def table_types() -> HandleTables:
-    """Numba types of the tables behind a handle."""
+    """Numba types of all tables of a handle, by name of the table."""
     from numba import from_dtype, types
 
     def of(name):

@@ -1,4 +1,4 @@
-"""Pair of complementary event functions for a switch between two rules."""
+"""Pair of event functions of opposite sign for a switch between two rules."""
 
 from fvsolve.jit import njit
 

@@ -33,7 +33,7 @@ def solve_fractions(matrix, right):
 
 
 def cell_averages(cell, degree):
-    """Averages of 1, x, x^2, ... over the unit cell [cell, cell + 1]."""
+    """Averages of the powers 1, x, ..., x^degree over the unit cell from `cell` to `cell` + 1, as fractions."""
     return [Fraction((cell + 1) ** (k + 1) - cell ** (k + 1), k + 1) for k in range(degree + 1)]
 
 

@@ -1,7 +1,7 @@
 """Slope limiters and their selection by code.
 
 A limiter is a function of the two differences beside a cell. Its slope is a fraction (numerator, denominator), zero is
-0 / 1. Kernels that need several slopes at a place divide once for all of them.
+0 / 1. Kernels that need several slopes for a cell divide once for all of them.
 """
 
 from math import nan

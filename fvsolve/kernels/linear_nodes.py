@@ -52,7 +52,7 @@ def junction_flows(t, out, tables):
 
 @njit
 def known_pressures_linear(t, y, dydt, out, handle):
-    """Write pressure changes of nodes with storage or given pressure [Pa], and the given flows into junctions [kg/s]."""
+    """Write pressure changes of nodes with storage or given pressure [Pa], and given flows into junctions [kg/s]."""
     tables = open_tables(handle)
     stored_pressures(t, y, out, tables)
     junction_flows(t, out, tables)
@@ -60,7 +60,7 @@ def known_pressures_linear(t, y, dydt, out, handle):
 
 @njit(forceinline=True)
 def solve_free_nodes(out, tables):
-    """Write the pressure changes of junctions without valves [Pa]: sum of inflows over the admittance of their pipes."""
+    """Write the pressure changes of junctions without valves [Pa]: sum of inflows over admittance of their pipes."""
     layout, nodes = tables.layout[0], tables.nodes
     for i in range(nodes.size):
         if nodes[i]["kind"] == JUNCTION and nodes[i]["solve"] == ALONE:
@@ -105,7 +105,7 @@ def solve_single_valves(out, tables):
 
 @njit
 def solve_nodes_linear(t, y, dydt, out, handle):
-    """Solve the pressures of junctions and the flows of valves, except where several valves join (see `node_clusters`)."""
+    """Solve pressures of junctions and flows of valves, except where several valves join (see `node_clusters`)."""
     tables = open_tables(handle)
     solve_free_nodes(out, tables)
     solve_single_valves(out, tables)

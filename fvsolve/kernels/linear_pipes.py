@@ -8,7 +8,7 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def outgoing_waves_linear(t, y, dydt, out, handle):
-    """Write the outgoing waves of all pipes to out[ends]; add their flow into nodes at unchanged pressure to out[net]."""
+    """Write the outgoing waves of pipes to out[ends]; add their flow into nodes at unchanged pressure to out[net]."""
     tables = open_tables(handle)
     settings, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
     scratch = tables.scratch

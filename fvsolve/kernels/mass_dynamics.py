@@ -216,7 +216,7 @@ def forces(t, y, out, tables):
 
 @njit(forceinline=True)
 def add_stiffness(tables, i, j, stiffness, damping):
-    """Add stiffness and damping of an element between masses i and j, per mass [1/s2, 1/s], to sums of both in scratch."""
+    """Add stiffness and damping of an element, per mass [1/s2, 1/s], to the sums of its masses i and j in scratch."""
     masses, work = tables.masses, tables.scratch
     lightness = masses[i]["lightness"] + masses[j]["lightness"]
     for mass in (i, j):

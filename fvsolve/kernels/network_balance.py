@@ -40,7 +40,7 @@ def begin_basins(t, y, dydt, out, handle):
 
 @njit(forceinline=True)
 def net_flows(out, tables):
-    """Write the net flow into every node from its links [kg/s] to out[net]: total flow, not its change since the start."""
+    """Write the net flow into every node from its links [kg/s] to out[net]: total flow, not change since the start."""
     layout, pipes, nodes = tables.layout[0], tables.pipes, tables.nodes
     valves, columns = tables.valves, tables.columns
     net = layout["net"]
@@ -97,7 +97,7 @@ def stored_rates(y, dydt, out, tables):
 
 @njit(forceinline=True)
 def node_rate_limit(out, tables):
-    """Greatest rate that limits the step [1/s]: of waves through cells, or of stored masses with pipes at their node."""
+    """Greatest rate that limits the step [1/s]: of waves through cells, or of a stored mass with pipes at its node."""
     layout, nodes = tables.layout[0], tables.nodes
     rate = tables.settings[0]["rate"]
     for i in range(nodes.size):

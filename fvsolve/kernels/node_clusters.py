@@ -265,7 +265,7 @@ def solve_cluster(out, tables, index):
 
 @njit
 def has_backflow(cluster, tables, m):
-    """True if a valve of a cluster that its upstream pressure lifts carries backflow; m : flows of its valves [kg/s]."""
+    """True if a valve of a cluster that upstream pressure lifts carries backflow; m : flows of its valves [kg/s]."""
     for e in range(m.size):
         if has_lifted_backflow(tables, tables.integers[cluster["first_valve"] + e], m[e]):
             return True

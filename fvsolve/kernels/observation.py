@@ -43,7 +43,7 @@ def wave_sum(probe, pipe, sign, index, y, out, tables):
 
 @njit
 def observe_linear(t, y, out, handle, values):
-    """Write the values of all probes of nodes, pipes, valves and rigid columns to `values`: scale * quantity + offset."""
+    """Write values of all probes of nodes, pipes, valves and rigid columns to `values`: scale * quantity + offset."""
     tables = open_tables(handle)
     layout, probes = tables.layout[0], tables.probes
     for k in range(probes.size):
@@ -173,7 +173,7 @@ def record_pipe(t, r, l, pipe, index, tables):
 
 @njit
 def record_pipes(t, y, out, handle, values):
-    """Update envelopes of pipes, and first times below vapour pressure, after every accepted step."""
+    """Update pressure envelopes of all pipes, and first times below vapour pressure, after every accepted step."""
     tables = open_tables(handle)
     pipes = tables.pipes
     for i in range(pipes.size):

@@ -1,4 +1,4 @@
-"""Linear advection on a periodic row of cells, with the reconstruction of pipes."""
+"""Linear advection in a ring of cells, with the face values of the schemes for pipes."""
 
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import OK, RATE, STATUS, WHERE

@@ -75,7 +75,7 @@ def both_faces(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, fr, fl):
 
 @njit
 def rates_from_faces(k, fr, fl, dr, dl):
-    """Write d/dt of forward and backward wave (dr, dl) from face values fr, fl, without friction; k = wave speed / dx."""
+    """Write d/dt of forward and backward wave (dr, dl) from face values fr, fl, no friction; k = wave speed / dx."""
     for i in range(dr.size):
         dr[i] = -k * (fr[i + 1] - fr[i])
         dl[i] = k * (fl[i + 1] - fl[i])
@@ -137,7 +137,10 @@ def subtract_friction(k, flow, loss, base, r, l, dr, dl):
 
 @njit
 def subtract_friction_rough(k, pipe, base, r, l, dr, dl):
-    """`subtract_friction` for a friction factor that follows from roughness."""
+    """Subtract friction as `subtract_friction` does, with a friction factor that follows from the wall roughness.
+
+    k : wave speed / dx [1/s]; base : half of the initial steady drag [kg/s2]
+    """
     loss, rough = pipe["loss"], pipe["rough"]
     e, reynolds, flow, spread = pipe["roughness"], pipe["reynolds"], pipe["flow"], GAUSS / k
     for i in range(r.size):
@@ -152,10 +155,10 @@ def subtract_friction_rough(k, pipe, base, r, l, dr, dl):
 
 @njit
 def subtract_friction_hazen(k, flow, loss, rough, base, r, l, dr, dl):
-    """`subtract_friction` for Hazen-Williams, whose power is evaluated once for both Gauss points.
+    """Subtract Hazen-Williams friction as `subtract_friction` does, with one evaluation of the power for two points.
 
-    M (M^2 + 1.852 d^2)^0.426 is the mean of |M|^0.852 M over M - d and M + d with a relative error of 0.43 (d/M)^4. M :
-    mass flow at the centre, M - d and M + d at the Gauss points
+    M (M^2 + 1.852 d^2)^0.426 is the mean of |M|^0.852 M over M - d and M + d with a relative error of 0.43 (d/M)^4. M
+    is the mass flow at the centre of a cell, M - d and M + d are its values at the Gauss points.
     """
     spread, half, quarter = GAUSS / k, 0.5 * rough, 0.25 * loss
     for i in range(r.size):

@@ -14,7 +14,7 @@ from fvsolve.kernels.valves import LEAST, flow_slope, transition_of, valve_condu
 
 @njit(forceinline=True)
 def open_scheduled(t, out, tables):
-    """Write the conductances [kg2/s2/Pa] of restrictions that follow schedules, without a device, to out[conductance]."""
+    """Write conductances [kg2/s2/Pa] of restrictions that follow schedules, without a device, to out[conductance]."""
     valves, at = tables.valves, tables.layout[0]["conductance"]
     for k in range(valves.size):
         if valves[k]["device"] < 0:
@@ -125,7 +125,7 @@ def restriction_lift(tables, out, k, g, drop, denser, wide):
 
 @njit
 def has_lifted_backflow(tables, k, m):
-    """True if the upstream pressure lifts restriction k and its flow m is negative."""
+    """True if the upstream pressure lifts restriction k and its flow m [kg/s] is negative."""
     return m < 0.0 and is_lifted(tables, k)
 
 

@@ -88,7 +88,7 @@ def subtract_decay(decay, ambient, s, m, ds):
 
 @njit
 def greatest_velocity(m, flow):
-    """Upper bound of the velocity in a pipe [m/s]: greatest |mass flow| of faces over least mass per length of cells."""
+    """Upper bound of velocity in a pipe [m/s]: greatest |mass flow| of faces over least mass per length of cells."""
     least, most = m[0], abs(flow[m.size])
     for i in range(m.size):
         least, most = min(least, m[i]), max(most, abs(flow[i]))
@@ -180,7 +180,7 @@ def scalar_rates(t, y, dydt, out, handle):
 
 @njit
 def observe_scalars(t, y, out, handle, values):
-    """Write the value of every scalar probe to `values`: at a node, at a pipe end, or between the centres of two cells."""
+    """Write the values of scalar probes to `values`: at a node, at a pipe end, or between the centres of two cells."""
     tables = open_tables(handle)
     layout, pipes, nodes = tables.layout[0], tables.pipes, tables.nodes.size
     for k in range(tables.probes.size):

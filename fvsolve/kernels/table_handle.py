@@ -33,7 +33,7 @@ if COMPILING:
 else:
 
     def addresses_of(tables: tuple) -> tuple:
-        """The tables themselves: without compilation nothing is copied."""
+        """Tables themselves, as a tuple: without compilation nothing is replaced with addresses."""
         return tuple(tables)
 
     def handle_of(places: tuple) -> HandleTables:
@@ -50,7 +50,7 @@ else:
 
 
 def make_handle(tables: tuple):
-    """Handle of these tables."""
+    """Handle of a tuple of tables, in the order of `HandleTables`."""
     return handle_of(addresses_of(tables))
 
 

@@ -16,7 +16,7 @@ LEAST = 1e-300
 
 @njit(forceinline=True)
 def mass_per_metre(node):
-    """Mass per metre of level of a tank [kg/m], for its least area."""
+    """Mass per metre of water level of a tank [kg/m]; its area counts as at least MIN_AREA."""
     return node["density"] * max(node["area"], MIN_AREA)
 
 
@@ -46,7 +46,7 @@ def limit_events(node, armed, g, k, distance, away):
 
 
 def overshoot_correction(node, armed, stored: float) -> float:
-    """Correction of the stored mass of a held tank that event location has left beyond its limit [kg]."""
+    """Mass [kg] to add to a held tank that event location has left below its bottom or above its rim; else 0."""
     k = EVENTS * int(node["row"])
     if armed[k + BOTTOM] > 0.0 and stored < 0.0 and is_near(node, -stored):
         return -stored

@@ -1,1 +1,1 @@
-"""Unsteady friction; imported and compiled only for scenes that use it."""
+"""Unsteady friction; imported and compiled only for models that use it."""

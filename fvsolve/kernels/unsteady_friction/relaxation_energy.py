@@ -93,7 +93,7 @@ def add_power(t, y, dydt, out, handle, power):
 
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
-    """Add the change of energy stored by unsteady friction since the start to the entries of all pipes in `stored` [J]."""
+    """Add the change of energy stored by unsteady friction since the start to the entries of pipes in `stored` [J]."""
     tables = open_tables(handle)
     st, pipes, nodes = tables.settings[0], tables.pipes, tables.nodes
     for i in range(pipes.size):

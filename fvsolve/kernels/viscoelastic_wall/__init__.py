@@ -1,1 +1,1 @@
-"""Viscoelastic pipe walls; imported and compiled only for scenes that contain such walls."""
+"""Viscoelastic pipe walls; imported and compiled only for models that contain them."""

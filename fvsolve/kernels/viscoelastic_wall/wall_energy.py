@@ -92,7 +92,7 @@ def work_against_profile(st, floats, pipe, node, y):
 
 @njit
 def add_power(t, y, dydt, out, handle, power):
-    """Add dissipation and rate of stored energy of all viscoelastic walls to the entries of their pipes in `power` [W]."""
+    """Add dissipation and rate of stored energy of viscoelastic walls to the entries of their pipes in `power` [W]."""
     tables = open_tables(handle)
     st, pipes, at = tables.settings[0], tables.pipes, NODE * tables.nodes.size
     for i in range(pipes.size):

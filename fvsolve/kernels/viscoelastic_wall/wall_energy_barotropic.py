@@ -19,7 +19,7 @@ from fvsolve.kernels.viscoelastic_wall.wall_energy import bore_growth, creep_ene
 
 @njit(forceinline=True)
 def gravity_potential(st, profile, pipe, z, i, g):
-    """Gravity potential [J/kg] at Gauss point g of cell i; z : elevation of the `from` end of the pipe above datum [m]."""
+    """Gravity potential [J/kg] at Gauss point g of cell i; z : elevation of the pipe's `from` end above datum [m]."""
     return st["gravity"] * (z + rise_at(profile, pipe, (i + 0.5 + GAUSS_POINTS[g]) * pipe["dx"]))
 
 
