@@ -191,7 +191,10 @@ def get_runs(joint, content, values):
 
 @njit
 def exchange_states(t, y, dydt, out, handle):
-    """Copy into y the states of other bands on which the rates of this band depend."""
+    """Copy into y the states of other bands on which the rates of this band depend.
+
+    A band is a part of the states that a thread or process of its own steps.
+    """
     joint = open_tables(handle).joint
     get_runs(joint, SEND_STATES, y)
 
@@ -200,7 +203,7 @@ def exchange_states(t, y, dydt, out, handle):
 def reduce_rate(t, y, dydt, out, handle):
     """Set out[RATE] of each band, the rate that limits the step [1/s], to the greatest of all bands.
 
-    NaN in any band becomes infinity in all bands.
+    A band is a part of the states that a thread or process of its own steps. NaN in any band becomes infinity in all.
     """
     joint = open_tables(handle).joint
     if joint[PROCESS_CALL] != 0:

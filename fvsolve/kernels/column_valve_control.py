@@ -115,11 +115,12 @@ def stationary_pressure(y, tables, out, k, end, solved):
 
 @njit
 def lift_drop(drop, still, slope, heavy):
-    """Drop across a valve disc that controls a column [Pa], and the rate dx/dt of its lift [1/s], by Newton.
+    """Drop across a valve disc that controls a column [Pa], and the rate dx/dt of its lift x [1/s], by Newton.
 
     The drop is r^2, with the root r of r^2 + heavy r dx/dt(r^2) = drop.
     drop : drop with the column at rest [Pa]; still : dx/dt at this drop [1/s]
-    slope : derivative of dx/dt by the drop [1/s/Pa]; heavy : (L / A) sqrt(G), length, area of the column, conductance
+    slope : derivative of dx/dt by the drop [1/s/Pa]
+    heavy : (L / A) sqrt(G), with length L and area A of the column, and conductance G of the valve at full lift
     Newton starts above the root, because the cubic is convex from its greatest root on.
     """
     if drop <= 0.0 or still == 0.0:

@@ -87,7 +87,7 @@ def update_extremes(envelope, c, t, value):
 def count_new_extremes(r, l, least, greatest):
     """(number of cells with r + l below `least`, number above `greatest`); NaN counts as below and above.
 
-    r, l : forward and backward wave of cells [kg/s]
+    r, l : forward and backward wave of cells [kg/s]; their sum is a measure of the pressure change
     """
     low, high = 0, 0
     for i in range(r.size):
@@ -101,7 +101,8 @@ def count_new_extremes(r, l, least, greatest):
 def update_minima(t, r, l, least, t_least):
     """Update least values of r + l of cells and their times, without a branch; return how many waves are not finite.
 
-    r, l : forward and backward wave of cells [kg/s]; t : present time [s]
+    r, l : forward and backward wave of cells [kg/s]; their sum is a measure of the pressure change
+    t : present time [s]; least, t_least : float64[cells]  least values so far and their times
     """
     bad = 0
     for i in range(r.size):
@@ -115,7 +116,11 @@ def update_minima(t, r, l, least, t_least):
 
 @njit
 def update_maxima(t, r, l, greatest, t_greatest):
-    """Update greatest values of r + l of cells and their times; return how many waves are not finite."""
+    """Update greatest values of r + l of cells and their times; return how many waves are not finite.
+
+    r, l : forward and backward wave of cells [kg/s]; their sum is a measure of the pressure change
+    t : present time [s]; greatest, t_greatest : float64[cells]  greatest values so far and their times
+    """
     bad = 0
     for i in range(r.size):
         s = r[i] + l[i]
@@ -139,7 +144,7 @@ def count_below(r, l, boiling):
 def update_envelope(t, r, l, at, low, high, index, tables):
     """Update the envelope of r + l from cell `at` on; record the first time that pipe `index` is below vapour pressure.
 
-    r, l : forward and backward wave of these cells [kg/s]
+    r, l : forward and backward wave of these cells [kg/s]; their sum is a measure of the pressure change
     low, high : numbers of cells below and above the envelope so far
     Returns 0 if all values are finite.
     """
@@ -159,7 +164,7 @@ def update_envelope(t, r, l, at, low, high, index, tables):
 def record_pipe(t, r, l, pipe, index, tables):
     """Update the envelope of r + l of pipe number `index`; most blocks have no new extreme and are only compared.
 
-    r, l : float64[cells]  forward and backward wave [kg/s]
+    r, l : float64[cells]  forward and backward wave [kg/s]; their sum is a measure of the pressure change
     """
     start, at, envelope = 0, pipe["cell"], tables.envelope
     while start < r.size:
