@@ -1,10 +1,15 @@
 """Power and stored energy of every part under the density laws log and table.
 
 h is the specific enthalpy, integral of dp / rho [J/kg], z the elevation above datum, m the mass per length of a pipe or
-the mass of a vessel. A mass flow M carries the power M H, H = h(p) - h(p_ambient) + g z. A pipe of area A stores M^2 /
-(2 m) + W(m) + m g z per length with dW/dm = h, W = m h - integral of A dp. A vessel of volume V stores m (h + g z) - (p
-- p_ambient) V. For a constant bulk modulus beta, z = 0 and gauge pressure p this is V (beta (exp(p / beta) - 1) - p). A
-jet of velocity v into a vessel loses M v^2 / 2. Entries of `power` and `stored` are those of `linear_energy.py`.
+the mass of a vessel, V the volume of a vessel, A the area of a pipe.
+
+    power of a mass flow M      M H,  H = h(p) - h(p_ambient) + g z
+    energy of a pipe per length M^2 / (2 m) + W(m) + m g z,  dW/dm = h,  W = m h - integral of A dp
+    energy of a vessel          m (h + g z) - (p - p_ambient) V
+    loss of a jet into a vessel M v^2 / 2,  v : velocity
+
+For a constant bulk modulus beta, z = 0 and gauge pressure p, a vessel stores V (beta (exp(p / beta) - 1) - p). Entries
+of `power` and `stored` are those of `linear_energy.py`.
 """
 
 from fvsolve.jit import njit

@@ -1,8 +1,12 @@
 """Scalars in pipes, carried by the mass flow of the mass equation.
 
-State of a cell: amount per length s = m c [kg/m], with mass per length m and value c of the scalar. s_t + (M c - D m
-c_x)_x = -decay (s - m ambient), with mass flow M [kg/s] and diffusivity D [m2/s]. Flows at faces are summed from the
-`from` end, M[i+1] = M[i] - dx dm[i]/dt, with dm/dt of the waves. So a uniform c remains uniform.
+State of a cell: amount per length s = m c [kg/m], with mass per length m and value c of the scalar. Its equation, with
+mass flow M [kg/s] and diffusivity D [m2/s], is
+
+    s_t + (M c - D m c_x)_x = -decay (s - m ambient)
+
+Flows at faces are summed from the `from` end, M[i+1] = M[i] - dx dm[i]/dt, with dm/dt of the waves. So a uniform c
+remains uniform.
 """
 
 from fvsolve.jit import inline, njit

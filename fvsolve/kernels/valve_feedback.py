@@ -17,11 +17,11 @@ def node_impedance(tables, i):
 
 @njit
 def loop_rate(out, tables, k, i, speed):
-    """Rate of the feedback loop [1/s] of restriction k, whose opening x follows the pressure p at node i.
+    """Rate of the feedback loop [1/s] of restriction k, whose opening x follows the pressure at node i.
 
-    speed : fall of dx/dt per pressure, dx/dt = -speed p' [1/s/Pa], p' : pressure change
+    speed : rate dx/dt per fall of the pressure, dx/dt = -speed p' [1/s/Pa], p' : pressure change
     The pressure follows the flow M: dM/dx = sqrt(G dP), with conductance G and drop dP, reduced because the drop falls
-    as the flow rises, through pipes or through stored mass.
+    as the flow rises. The node responds by its pipes or by its stored mass.
     """
     layout, valve = tables.layout[0], tables.valves[k]
     drop = head_drop(tables, out, k)[1]

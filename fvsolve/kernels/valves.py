@@ -1,7 +1,7 @@
 """Valve equation, alone and with pipe ends.
 
-M |M| = G dp with G = 2 rho (Cd A)^2, which is q = Cd A sqrt(2 dp / rho), equation (79). M is the mass flow, q the
-volume flow, dp the drop, Cd A the effective area.
+M |M| = G dp with G = 2 rho (Cd A)^2, which is q = Cd A sqrt(2 dp / rho), equation (79) of docs/course.md. M is the mass
+flow, q the volume flow, dp the drop, Cd A the effective area.
 """
 
 from math import exp, log, sqrt
