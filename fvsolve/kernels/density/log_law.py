@@ -1,4 +1,4 @@
-"""Density law `log`: p = p_ref + beta ln(rho / rho_ref) with a constant bulk modulus beta, from (80) of docs/course.md."""
+"""Density law `log`: p = p_ref + beta ln(rho / rho_ref), constant bulk modulus beta, from (80) of docs/course.md."""
 
 from math import expm1, log, log1p
 
