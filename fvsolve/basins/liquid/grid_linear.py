@@ -1,10 +1,10 @@
-"""Pressure waves of a liquid on a grid, law `linear`.
+"""Pressure waves of a liquid on a rectangular grid of cells, density law `linear`.
 
-r_t + div m = 0, m_t + c^2 grad r = 0: deviation of density r [kg/m3], whose pressure is c^2 r, and mass-flow densities
-m [kg/(m2 s)]. Along each direction the waves (c r + m) / 2 and (c r - m) / 2 are reconstructed upwind, which is
-Godunov's flux. The system is linear, so one direction at a time has the full order of the scheme. A row of cells is
-read once: for its own faces, then for those towards the rows before it; the waves of rows are stored in a ring of
-`RING` slots.
+r_t + div m = 0, m_t + c^2 grad r = 0: deviation of density r [kg/m3], whose pressure is c^2 r, wave speed c [m/s], and
+mass-flow densities m [kg/(m2 s)]. Along each direction the waves (c r + m) / 2 and (c r - m) / 2 are reconstructed
+upwind, which is Godunov's flux. The system is linear, so one direction at a time has the full order of the scheme. A
+row of cells is read once: for its own faces, then for those towards the rows before it; the waves of rows are stored in
+a ring buffer of `RING` rows.
 """
 
 from fvsolve.basins.cell_stretching import stretch_row_rates
@@ -32,20 +32,23 @@ SIDE_WORK = 2 * SIDE_VALUES + 2 * CLOSURE_CELLS + GHOSTS  # length of the work a
 
 @njit
 def value_upwind5(a, b, c, d, e):
-    """Linear fifth-order value at the face after c."""
+    """Fifth-order upwind value at the face between c and d, from the averages a to e of five consecutive cells."""
     return ((2.0 * a - 13.0 * b) + (47.0 * c + 27.0 * d) - 3.0 * e) * (1.0 / 60.0)
 
 
 @inline
 def faces_limited(limiter, b, c, d, f):
-    """Values at faces after cells c with a limiter."""
+    """Write to f the values at the faces between cells c and d, with limited slopes (MUSCL)."""
     for i in range(f.size):
         f[i] = c[i] + 0.5 * slope(limiter, c[i] - b[i], d[i] - c[i])
 
 
 @njit
 def faces(scheme, limiter, small, a, b, c, d, e, f):
-    """Values at faces after cells c, from two cells before and two behind."""
+    """Write to f the values at the faces between cells c and d, upwind from c.
+
+    a, b, c, d, e : averages of five consecutive cells; small : see `value_weno5`
+    """
     if scheme == UPWIND:
         for i in range(f.size):
             f[i] = c[i]
@@ -61,13 +64,19 @@ def faces(scheme, limiter, small, a, b, c, d, e, f):
 
 @njit
 def scheme_for(scheme, n, first, second):
-    """Scheme for n cells between two kinds of sides: muscl for fewer than five cells, except between walls."""
+    """Scheme for a row of n cells between two sides of given kinds.
+
+    It is MUSCL for fewer than five cells, except between walls or under `UPWIND`.
+    """
     return scheme if (first == WALLS and second == WALLS) or n >= CLOSURE_CELLS or scheme == UPWIND else MUSCL
 
 
 @njit
 def side_kind(reflect):
-    """Kind of a side: WALLS, all faces walls; MIRRORS, full reflection, some with reversed sign; else OPEN."""
+    """Kind of a side by the reflection coefficients of its faces.
+
+    WALLS if all are 1, MIRRORS if all are 1 or -1, else OPEN.
+    """
     kind = WALLS
     for k in range(reflect.size):
         if abs(reflect[k]) != 1.0:
@@ -79,20 +88,23 @@ def side_kind(reflect):
 
 @njit
 def mirrored_cell(j, n):
-    """Index of the cell whose mirror image is at j, with mirrors at 0 and n."""
+    """Index of the cell whose mirror image is at index j, with mirrors before cell 0 and after cell n - 1."""
     q = j % (2 * n)
     return q if q < n else 2 * n - 1 - q
 
 
 @njit
 def is_reversed(j, n):
-    """True if the image at j is reversed."""
+    """True if the image at index j is reversed, so that the forward and the backward wave change places."""
     return j % (2 * n) >= n
 
 
 @inline
 def mirror(n, forward, backward):
-    """Fill three values beyond either end of [3 : n + 3] of two waves: each mirrors the opposite wave."""
+    """Fill the three ghost cells beyond both ends of a row of n cells between walls: each wave mirrors the opposite.
+
+    forward, backward : float64[n + 6]  waves; the cells are at [3 : n + 3]
+    """
     for k in range(GHOSTS):
         forward[2 - k], backward[2 - k] = backward[3 + k], forward[3 + k]
         forward[n + 3 + k], backward[n + 3 + k] = backward[n + 2 - k], forward[n + 2 - k]
@@ -100,13 +112,16 @@ def mirror(n, forward, backward):
 
 @njit
 def close_side(kind, scheme, limiter, small, reflect, n, entering, leaving, first, step, spare):
-    """Write three values beyond a side of n cells, which start at `first` with `step`.
+    """Fill the three ghost cells of both waves beyond a side of a row of n cells that is not a wall.
 
-    `reflect` is its reflection coefficient.
+    On MIRRORS they are mirror images times the reflection coefficient. On OPEN sides the outgoing wave is extrapolated
+    by a polynomial. The incoming wave is extrapolated with its value at the side as an additional datum, as at the ends
+    of pipes. Kinds are those of whole sides: mixed on one side, `upwind5` would grow by 1e-4 per cell travel time.
 
-    On OPEN sides the outgoing wave is extrapolated by a polynomial. The incoming wave has its own value at the side as
-    datum, as at the ends of pipes. Kinds are those of whole sides: mixed on one side, `upwind5` would grow by 1e-4 per
-    cell travel time.
+    kind : MIRRORS or OPEN; reflect : reflection coefficient of the side
+    entering, leaving : incoming and outgoing wave; the cell next to the side is at `first`, further cells follow by
+    `step`
+    spare : work array
     """
     incoming, outgoing, ghosts = (
         spare[:CLOSURE_CELLS],
@@ -140,7 +155,10 @@ def close_side(kind, scheme, limiter, small, reflect, n, entering, leaving, firs
 
 @njit
 def close_row(kind, scheme, limiter, small, reflect, n, entering, leaving, first, step, spare):
-    """Close the southern or northern side of n rows of waves in the ring; `first` is the row next to the side."""
+    """Fill the three rows of ghost cells beyond the southern or northern side of a grid of n rows, in the ring of rows.
+
+    first : row next to the side; step : 1 or -1, direction into the grid; other arguments as in `close_side`
+    """
     incoming, outgoing, rest = spare[:SIDE_VALUES], spare[SIDE_VALUES : 2 * SIDE_VALUES], spare[2 * SIDE_VALUES :]
     wide = reflect.size
     for i in range(wide):
@@ -155,21 +173,24 @@ def close_row(kind, scheme, limiter, small, reflect, n, entering, leaving, first
 
 @inline
 def reflect_waves(reflect, leaving, entering):
-    """Incoming waves at the faces of a side: outgoing waves times the reflection coefficients."""
+    """Write the incoming waves at the faces of a side: outgoing waves times the reflection coefficients."""
     for i in range(entering.size):
         entering[i] = reflect[i] * leaving[i]
 
 
 @inline
 def put_inward(k, entering, leaving, inward):
-    """Inward flows through the faces of a side, from waves. k : 1 / lengths of faces"""
+    """Write the inward mass flows per thickness through the faces of a side [kg/(m s)], from the waves at them.
+
+    k : 1 / lengths of the faces [1/m]
+    """
     for i in range(inward.size):
         inward[i] = (entering[i] - leaving[i]) / k[i]
 
 
 @inline
 def put_waves(half, r, m, forward, backward):
-    """Both waves of a row of cells. half : c / 2"""
+    """Write the waves (c r + m) / 2 and (c r - m) / 2 of a row of cells. half : c / 2"""
     for i in range(r.size):
         a, b = half * r[i], 0.5 * m[i]
         forward[i], backward[i] = a + b, a - b
@@ -177,7 +198,10 @@ def put_waves(half, r, m, forward, backward):
 
 @inline
 def put_row_rates(c, k, forward, backward, rate_r, rate_m, rate_t):
-    """Rates of a row of cells from faces i and i + 1."""
+    """Write the rates of a row of cells from the waves at the faces along it; cell i is between faces i and i + 1.
+
+    k : 1 / widths of the cells [1/m]; rate_r, rate_m, rate_t : rates of density, and of flows along and across the row
+    """
     f, b = forward[1:], backward[1:]
     for i in range(rate_r.size):
         rate_r[i] = k[i] * ((forward[i] - backward[i]) - (f[i] - b[i]))
@@ -187,7 +211,10 @@ def put_row_rates(c, k, forward, backward, rate_r, rate_m, rate_t):
 
 @inline
 def add_column_rates(c, k, f0, b0, f1, b1, rate_r, rate_m):
-    """Add the rates of a row of cells between two rows of faces."""
+    """Add to the rates of a row of cells the fluxes through the rows of faces before and after it.
+
+    k : 1 / height of the row [1/m]; f0, b0, f1, b1 : forward and backward waves before and after the row
+    """
     ck = c * k
     for i in range(rate_r.size):
         rate_r[i] += k * ((f0[i] - b0[i]) - (f1[i] - b1[i]))
@@ -196,7 +223,7 @@ def add_column_rates(c, k, f0, b0, f1, b1, rate_r, rate_m):
 
 @njit
 def max_spacing_rate(kx, ky):
-    """Greatest sum of 1/width and 1/height over the cells [1/m]."""
+    """Greatest sum 1 / width + 1 / height over the cells [1/m]. kx, ky : 1 / widths of columns, 1 / heights of rows"""
     x, y = 0.0, 0.0
     for i in range(kx.size):
         x = max(x, kx[i])
@@ -207,25 +234,28 @@ def max_spacing_rate(kx, ky):
 
 @njit
 def first_row_read(begin, ny):
-    """First row read for the faces of a band."""
+    """First row of cells read for the faces of a band of rows that begins at row `begin` of ny."""
     return max(min(begin - GHOSTS, ny - CLOSURE_CELLS), 0)
 
 
 @njit
 def row_needed(j, ny):
-    """Last row + 1 read for the faces before row j."""
+    """Number of rows of cells that must be read before the faces between rows j - 1 and j are computed."""
     return min(max(j + GHOSTS, CLOSURE_CELLS), ny)
 
 
 @njit
 def work_size(nx, ny):
-    """Length of the work array of `grid_rates`."""
+    """Length of the work array of `grid_rates` for nx columns and ny rows."""
     return (2 * RING + 4) * nx + 2 * (nx + 2 * GHOSTS) + 2 * (nx + 1) + SIDE_WORK
 
 
 @njit
 def put_moving_row(c, ny, j, up, down, along, moves):
-    """Convert waves at a row of moving faces to fluxes; write the pressures on walls."""
+    """Convert the waves `up` and `down` at the moving faces before row j to mass and momentum fluxes.
+
+    On walls it also writes the pressures. along : flow densities along the faces; moves : as in `grid_rates`
+    """
     nx, count = up.size, moves[2].size // 2
     if j == 0 or j == ny:
         at, speed = 2 * ny + (nx if j > 0 else 0), moves[1][j]
@@ -241,18 +271,22 @@ def grid_rates(
     c, small, scheme, limiter, nx, ny, begin, stop, kx, ky, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y,
     moves,
 ):  # fmt: skip
-    """Rates of the cells of rows `begin` to `stop`; returns the greatest c (kx + ky) of all cells [1/s].
+    """Write the rates of the cells of rows `begin` to `stop`; return the greatest c (kx + ky) of all cells [1/s].
 
-    Rows are those of the whole grid; the next `EDGE` rows beyond a side and beyond the band are read too.
+    Rows are counted over the whole grid; up to three rows beyond the band are read too.
     c : wave speed [m/s]; small : square of a negligible flow density [kg2/(m4 s2)]
     kx, ky : float64[nx], float64[ny]  1/width of columns, 1/height of rows [1/m]
-    reflect : float64[2 (nx + ny)]  reflection coefficients of sides: west, east, south, north; empty: walls
-    through : float64[2 (nx + ny)]  inward flows through boundary faces [kg/(m s)], in that order, or empty
+    reflect : float64[2 (nx + ny)]  reflection coefficients of the faces of the sides west, east, south, north;
+        1 for walls, empty if all are walls
+    r, mx, my : float64[nx ny]  deviation of density [kg/m3], mass-flow densities along x and y [kg/(m2 s)]
+    through : float64[2 (nx + ny)]  inward flows through boundary faces [kg/(m s)], in the order of `reflect`, or empty
     work : float64[work_size(nx, ny)]
-    moves : None, or a tuple: speeds of lines along x and along y [m/s], float64[nx + 1] and float64[ny + 1], empty if
-    they
-    do not move; array for pressures on boundary faces, as in `liquid_mesh.liquid_rates`; density at rest [kg/m3];
-    stretching `wide` of columns or rows, see `basins.cell_stretching`
+    rate_r, rate_x, rate_y : float64[nx ny]  rates of r, mx, my
+    moves : None without moving walls, else a tuple of
+        speeds of the grid lines x = constant and y = constant [m/s], float64[nx + 1] and float64[ny + 1], empty if at
+        rest array for pressures on boundary faces and energy losses there, as in `liquid_mesh.liquid_rates`
+        density at rest [kg/m3]
+        `wide` : area over undeformed area of columns or rows, see `basins.cell_stretching`
     """
     row_rates(
         c,
@@ -284,7 +318,7 @@ def grid_rates(
 
 @njit
 def side_kinds_of(reflect, nx, ny):
-    """Kinds of the western, eastern, southern and northern side."""
+    """Kinds (WALLS, MIRRORS or OPEN) of the western, eastern, southern and northern side."""
     south, north = reflect[2 * ny : 2 * ny + nx], reflect[2 * ny + nx :]
     return side_kind(reflect[:ny]), side_kind(reflect[ny : 2 * ny]), side_kind(south), side_kind(north)
 
@@ -294,8 +328,9 @@ def row_rates(
     c, small, scheme, limiter, nx, ny, begin, stop, row, until, kx, ky, reflect, side_kinds, r, mx, my, through, work,
     rate_r, rate_x, rate_y, moves,
 ):  # fmt: skip
-    """Rates of rows `row` to `until` of a band, from `begin` on in order; the next row may be incomplete.
+    """Write the rates of rows `row` to `until` of the band `begin` to `stop`; calls follow in order from `begin` on.
 
+    The rates of row `until` may be incomplete until the next call.
     side_kinds : see `side_kinds_of`; other arguments as in `grid_rates`
     """
     wide, f = nx + 2 * GHOSTS, nx + 1

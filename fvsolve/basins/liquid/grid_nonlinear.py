@@ -1,14 +1,15 @@
-"""Pressure waves of a liquid on a grid, laws `log` and `table`, with the full momentum flux.
+"""Pressure waves of a liquid on a rectangular grid, density laws `log` and `table`, with the full momentum flux.
 
-r_t + div m = 0, m_t + div(m m / rho) + grad p = 0, p = rho0 c0^2 ln(rho / rho0), c = c0 sqrt(rho0 / rho): deviation of
-density r = rho - rho0 [kg/m3], mass-flow densities m [kg/(m2 s)]. With w = 2 (c0 - c), u - 2 c is constant along u + c
-and u + 2 c along u - c. The waves (w + u) / 2 and (w - u) / 2 are reconstructed upwind. The state that both give at a
+r_t + div m = 0, m_t + div(m m / rho) + grad p = 0: deviation of density r = rho - rho0 [kg/m3] and mass-flow densities
+m [kg/(m2 s)]. Law `log` is p = rho0 c0^2 ln(rho / rho0), c = c0 sqrt(rho0 / rho), with density rho0 and wave speed c0
+at rest. With w = 2 (c0 - c) and velocity u, u - w is constant along dx/dt = u - c and u + w along dx/dt = u + c
+(Riemann invariants). The waves (w + u) / 2 and (w - u) / 2 are reconstructed upwind. The state that both give at a
 face solves the Riemann problem with two simple waves (Osher and Solomon 1982), for subsonic flow. The velocity along a
 face is reconstructed from the upwind side of the flow. Fifth order is that of the waves: products of averages are of
-second order, with an error proportional to the Mach number. Sides, rows and slots: see `grid_linear`.
+second order, with an error proportional to the Mach number. Sides and the ring of rows: see `grid_linear`.
 
-Under `table`, p, c and w = integral of c / rho are read (see `riemann_invariants`). A table of None is known at
-compile time, so that each law compiles and runs only its own code.
+Under `table`, p, c and w = integral of c / rho d rho are read from a table (see `riemann_invariants`). A table of None
+is known at compile time, so that each law compiles and runs only its own code.
 """
 
 from math import sqrt
@@ -48,9 +49,9 @@ from fvsolve.kernels.reconstruction import value_weno5
 
 @njit(forceinline=True)
 def log1p_vector(y):
-    """ln(1 + y) by the artanh of its fourth root, to round-off for y from -1/2 to 1.
+    """ln(1 + y) to round-off, for y from -1/2 to 1: 8 artanh((x - 1) / (x + 1)), x the fourth root of 1 + y.
 
-    Without a call, so that loops vectorise.
+    It calls no library function, so that loops vectorise.
     """
     s = sqrt(1.0 + y)
     q = 1.0 + sqrt(s)
@@ -63,7 +64,11 @@ def log1p_vector(y):
 
 @inline
 def put_primitives(c0, rho, table, kx, ky, r, mx, my, w, u, v, top):
-    """w and both velocities of a row [m/s]; top[i] the greatest (|u| + c) kx + (|v| + c) ky so far."""
+    """Write the invariant w and both velocities u, v of a row of cells [m/s], and update `top`.
+
+    top : float64[nx]  greatest (|u| + c) kx + (|v| + c) ky so far in each column [1/s]
+    c0, rho, table, kx, ky : as in `grid_rates`, with ky of this row
+    """
     if table is not None:
         for i in range(w.size):
             w[i], slope = invariant(table, r[i])
@@ -87,21 +92,27 @@ def put_primitives(c0, rho, table, kx, ky, r, mx, my, w, u, v, top):
 
 @inline
 def subtract_potential(c0, rho, table, phi, w):
-    """Subtract a potential from the invariants of a row: those of a liquid at rest are then uniform."""
+    """Subtract the effect of a potential phi [J/kg] from the invariants w of a row of cells.
+
+    In a liquid at rest they are uniform afterwards.
+    """
     for i in range(w.size):
         w[i] = invariant_at_potential(c0, rho, table, w[i], -phi[i])
 
 
 @njit(forceinline=True)
 def log1p_small(q):
-    """ln(1 + q) to q^9 / 9, for small q such as the potential between a cell and its sides over c^2."""
+    """ln(1 + q) by its series to q^9 / 9, for small q such as the change of a potential within a cell over c^2."""
     high = 1.0 / 5.0 - q * (1.0 / 6.0 - q * (1.0 / 7.0 - q * (1.0 / 8.0)))
     return q * (1.0 - q * (1.0 / 2.0 - q * (1.0 / 3.0 - q * (1.0 / 4.0 - q * high))))
 
 
 @njit(forceinline=True)
 def stiffness(c0, rho, table, r):
-    """(1 / c^2, rho c^2) of a cell: at rest, the pressure falls by rho c^2 ln(1 + phi / c^2) over a small height."""
+    """(1 / c^2, rho c^2) of a cell with deviation of density r.
+
+    In a liquid at rest, pressure falls by about rho c^2 ln(1 + phi / c^2) where a potential rises by phi.
+    """
     if table is None:
         bulk = rho * c0 * c0
         return (rho + r) / bulk, bulk
@@ -111,9 +122,10 @@ def stiffness(c0, rho, table, r):
 
 @inline
 def balance_row(c0, rho, table, k, step, r, phi, low, high, rate):
-    """Subtract from the rates of a row of cells the pressures that would keep them at rest, at both faces.
+    """Subtract from the momentum rates of a row of cells the pressures at both faces that would keep the cells at rest.
 
-    phi, low, high : potential of cells and of faces before and after; k : every `step`-th value is that of a cell
+    r : deviations of density; phi, low, high : potential [J/kg] of the cells and of the faces before and after them
+    k : 1 / spacing of the cells, read at every `step`-th place
     """
     for i in range(rate.size):
         per, bulk = stiffness(c0, rho, table, r[i])
@@ -122,7 +134,7 @@ def balance_row(c0, rho, table, k, step, r, phi, low, high, rate):
 
 @inline
 def faces_upwind_limited(limiter, forward, backward, b, c, d, e, f):
-    """`faces_upwind` with a limiter."""
+    """Write to f the values at faces with limited slopes from the upwind side; see `faces_upwind`."""
     for i in range(f.size):
         on, jump = forward[i] > backward[i], d[i] - c[i]
         rise = c[i] - b[i] if on else e[i] - d[i]
@@ -132,7 +144,10 @@ def faces_upwind_limited(limiter, forward, backward, b, c, d, e, f):
 
 @njit
 def faces_upwind(scheme, limiter, small, forward, backward, a, b, c, d, e, g, f):
-    """Values at faces between c and d, upwind by the flow (forward minus backward wave)."""
+    """Write to f the values at faces between cells c and d, reconstructed from the upwind side of the flow.
+
+    The velocity is the forward minus the backward wave at a face. a, b, c, d, e, g : averages of six consecutive cells
+    """
     if scheme == UPWIND:
         for i in range(f.size):
             f[i] = c[i] if forward[i] > backward[i] else d[i]
@@ -152,10 +167,12 @@ def faces_upwind(scheme, limiter, small, forward, backward, a, b, c, d, e, g, f)
 
 @inline
 def put_fluxes(c0, rho, table, forward, backward, along, speeds, step, phi):
-    """Convert waves and tangential velocity at faces to fluxes of mass, of normal and of tangential momentum.
+    """Convert values at faces to fluxes, in place.
 
-    speeds : None, or every `step`-th value is the speed of a face, which sweeps the content it passes
-    phi : None, or a potential at the faces, subtracted from the waves; under law log c^2 is c0^2 (1 + y)^2 + phi there
+    forward, backward, along : waves and velocity along the face; afterwards fluxes of mass and of momentum normal to
+    and along the face
+    speeds : None, or speeds of moving faces, read at every `step`-th place; the flux is then relative to the face
+    phi : None, or the potential at the faces [J/kg], whose effect was subtracted from the waves and is added again
     """
     if table is not None:
         for i in range(forward.size):
@@ -182,14 +199,22 @@ def put_fluxes(c0, rho, table, forward, backward, along, speeds, step, phi):
 
 @inline
 def relative_waves(speeds, step, forward, seen):
-    """Forward waves minus the speeds of moving faces, for the upwind side relative to the face."""
+    """Write to `seen` the forward waves minus the speeds of moving faces.
+
+    Their difference from the backward waves is then the velocity relative to the face, which defines the upwind side.
+    speeds : read at every `step`-th place
+    """
     for i in range(seen.size):
         seen[i] = forward[i] - speeds[step * i]
 
 
 @inline
 def put_row_rates(k, mass, push, along, rate_r, rate_m, rate_t):
-    """Rates of a row of cells from faces i and i + 1."""
+    """Write the rates of a row of cells from the fluxes at the faces along it; cell i is between faces i and i + 1.
+
+    k : 1 / widths of the cells [1/m]; mass, push, along : fluxes of mass and of momentum normal to and along the faces
+    rate_r, rate_m, rate_t : rates of density, and of flows along and across the row
+    """
     m, p, t = mass[1:], push[1:], along[1:]
     for i in range(rate_r.size):
         rate_r[i] = k[i] * (mass[i] - m[i])
@@ -199,7 +224,10 @@ def put_row_rates(k, mass, push, along, rate_r, rate_m, rate_t):
 
 @inline
 def add_column_rates(k, m0, p0, t0, m1, p1, t1, rate_r, rate_m, rate_t):
-    """Add the rates of a row of cells between two rows of faces."""
+    """Add to the rates of a row of cells the fluxes through the rows of faces before (0) and after it (1).
+
+    k : 1 / height of the row [1/m]; m, p, t : fluxes of mass and of momentum normal to and along the faces
+    """
     for i in range(rate_r.size):
         rate_r[i] += k * (m0[i] - m1[i])
         rate_m[i] += k * (p0[i] - p1[i])
@@ -208,7 +236,7 @@ def add_column_rates(k, m0, p0, t0, m1, p1, t1, rate_r, rate_m, rate_t):
 
 @njit
 def work_size(nx, ny):
-    """Length of the work array of `grid_rates`."""
+    """Length of the work array of `grid_rates` for nx columns and ny rows."""
     return (3 * RING + 6 + 3) * nx + 3 * (nx + 2 * GHOSTS) + 3 * (nx + 1) + SIDE_WORK
 
 
@@ -217,12 +245,13 @@ def grid_rates(
     c0, rho, table, small, scheme, limiter, nx, ny, begin, stop, kx, ky, reflect, r, mx, my, through, work, rate_r,
     rate_x, rate_y, moves, phi,
 ):  # fmt: skip
-    """Rates of the cells of rows `begin` to `stop`; returns the greatest (|u| + c) kx + (|v| + c) ky [1/s].
+    """Write the rates of the cells of rows `begin` to `stop`; return the greatest (|u| + c) kx + (|v| + c) ky [1/s].
 
     c0, rho : wave speed [m/s] and density [kg/m3] at rest
-    table : of `riemann_invariants`, or None for law `log`; small : square of a negligible velocity
-    Other arguments are those of `grid_linear.grid_rates`; work : float64[work_size(nx, ny)], nx + 1 more if lines move
-    phi : None, or a potential [J/kg] of cells, of faces between columns and of faces between rows
+    table : table of `riemann_invariants`, or None for law `log`; small : square of a negligible velocity [m2/s2]
+    work : float64[work_size(nx, ny)], longer by nx + 1 if lines move
+    phi : None, or the potential [J/kg] of cells, of faces between columns and of faces between rows, three arrays
+    Other arguments are those of `grid_linear.grid_rates`
     """
     wide, f, size = nx + 2 * GHOSTS, nx + 1, RING * nx
     up, down, aside, work = work[:size], work[size : 2 * size], work[2 * size : 3 * size], work[3 * size :]

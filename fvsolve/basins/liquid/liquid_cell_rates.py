@@ -36,21 +36,24 @@ def on_mesh(basin):
 
 @njit(forceinline=True)
 def states_of(tables, basin, y):
-    """Deviations of density and both mass-flow densities of cells."""
+    """States of the cells of a basin: deviations of density [kg/m3], mass-flow densities along x and y [kg/(m2 s)]."""
     n, o, seen = basin["n"], basin["y"], deviations_of(basin, tables.seen, y)
     return seen[o : o + n], seen[o + n : o + 2 * n], seen[o + 2 * n : o + 3 * n]
 
 
 @njit(forceinline=True)
 def rates_of(tables, basin, dydt):
-    """Arrays for the rates of cells (of contents if walls move); unused work arrays if no rates are needed."""
+    """Arrays for the rates of the three states of cells; work arrays whose content is not used if `dydt` is empty.
+
+    If walls move, the states are masses and momenta per undeformed area, see `basins.cell_stretching`.
+    """
     n, (to, first) = basin["n"], (dydt, basin["y"]) if dydt.size > 0 else (tables.work, basin["boundary_rates"])
     return to[first : first + n], to[first + n : first + 2 * n], to[first + 2 * n : first + 3 * n]
 
 
 @njit(forceinline=True)
 def boundary_arrays(tables, basin):
-    """Reflection coefficients of the boundary, array for flows through it, and work array."""
+    """Three arrays of a basin: reflection coefficients of its boundary faces, flows through them, and work array."""
     plane, work, outer, through = tables.plane, tables.work, basin["outer_given"], basin["through"]
     reflect = plane[basin["reflect"] : basin["reflect"] + outer]
     return reflect, work[through : through + outer], work[basin["work"] :]
@@ -58,21 +61,28 @@ def boundary_arrays(tables, basin):
 
 @njit(forceinline=True)
 def spacing_of(plane, basin):
-    """1 / widths of columns and rows."""
+    """1 / widths of the columns and 1 / heights of the rows of a grid [1/m], two arrays."""
     k, nx, ny = basin["spacing"], basin["nx"], basin["ny"]
     return plane[k : k + nx], plane[k + nx : k + nx + ny]
 
 
 @njit
 def finish_liquid(tables, b, rate, out):
-    """Record flows through an open boundary, and the rate that limits the step."""
+    """Write the flows of basin b through open patches to `out`, and raise the greatest rate [1/s] there to `rate`.
+
+    The greatest rate limits the time step.
+    """
     put_open_flows(tables, b, tables.basins[b]["thickness"], out)
     out[RATE] = max(out[RATE], rate)
 
 
 @njit
 def by_blocks(tables, b, kx, ky, reflect, r, mx, my, through, work, y, rate_r, rate_x, rate_y):
-    """Compute `grid_linear.grid_rates` block by block, with the requested stages formed in the same pass."""
+    """Compute `grid_linear.grid_rates` block of rows by block of rows, and return its result.
+
+    The sums of Runge-Kutta stages requested in `tables.sums` are formed in the same pass, while the rows are in the
+    cache.
+    """
     basin, sums, nx, ny = tables.basins[b], tables.sums, tables.basins[b]["nx"], tables.basins[b]["ny"]
     begin, stop = tables.bands[2 * b], tables.bands[2 * b + 1]
     formed_ahead, rows, side_kinds = begin, max(sums[CELLS] // nx, 1), grid_linear.side_kinds_of(reflect, nx, ny)
@@ -98,9 +108,9 @@ def by_blocks(tables, b, kx, ky, reflect, r, mx, my, through, work, y, rate_r, r
 
 @njit
 def linear_grid_rates(tables, b, y, dydt, out, moves, raised):
-    """Rates under law linear on a grid. moves : as in `grid_linear.grid_rates`.
+    """Write the rates of basin b, a grid, under law linear.
 
-    raised : None, or densities to use instead
+    moves : as in `grid_linear.grid_rates`; raised : None, or deviations of density that replace those in y
     """
     basin = tables.basins[b]
     kx, ky = spacing_of(tables.plane, basin)
@@ -122,7 +132,7 @@ def linear_grid_rates(tables, b, y, dydt, out, moves, raised):
 
 @njit
 def waves_on_grids(t, y, dydt, out, handle):
-    """Rates under law linear on grids."""
+    """Write the rates of all liquids on grids, without moving walls and not on a body, under law linear."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_grid(tables.basins[b]) and needs_rates(tables.basins[b], dydt):
@@ -131,7 +141,10 @@ def waves_on_grids(t, y, dydt, out, handle):
 
 @njit
 def nonlinear_grid_rates(tables, b, table, y, dydt, out, moves, phi):
-    """Rates with the full momentum flux on a grid, from a table of its waves or, without table, under law log."""
+    """Write the rates of basin b, a grid, with the full momentum flux.
+
+    table : table of `riemann_invariants`, or None for law log; moves, phi : as in `grid_nonlinear.grid_rates`
+    """
     basin = tables.basins[b]
     kx, ky = spacing_of(tables.plane, basin)
     (r, mx, my), (rate_r, rate_x, rate_y) = states_of(tables, basin, y), rates_of(tables, basin, dydt)
@@ -146,7 +159,7 @@ def nonlinear_grid_rates(tables, b, table, y, dydt, out, moves, phi):
 
 @njit
 def rates_on_grids(t, y, dydt, out, handle):
-    """Rates under law log on grids."""
+    """Write the rates of all liquids on grids, without moving walls and not on a body, under law log."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_grid(tables.basins[b]) and needs_rates(tables.basins[b], dydt):
@@ -155,9 +168,10 @@ def rates_on_grids(t, y, dydt, out, handle):
 
 @njit
 def mesh_rates(tables, b, table, y, dydt, out, moves, raised, phi):
-    """Rates on a mesh, from a table of its waves or, without table, under laws linear and log.
+    """Write the rates of basin b on a mesh of any cells.
 
-    moves, phi : as in `liquid_rates`; raised : None, or densities to use instead of the states
+    table : table of `riemann_invariants`, or None for laws linear and log; moves, phi : as in `liquid_rates`
+    raised : None, or deviations of density that replace those in y
     """
     basin = tables.basins[b]
     (r, mx, my), (rate_r, rate_x, rate_y) = states_of(tables, basin, y), rates_of(tables, basin, dydt)
@@ -174,7 +188,7 @@ def mesh_rates(tables, b, table, y, dydt, out, moves, raised, phi):
 
 @njit
 def rates_on_meshes(t, y, dydt, out, handle):
-    """Rates on meshes of any cells, under laws linear and log."""
+    """Write the rates of all liquids on meshes, without moving walls and not on a body, under laws linear and log."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_mesh(tables.basins[b]) and needs_rates(tables.basins[b], dydt):

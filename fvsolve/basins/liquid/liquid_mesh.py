@@ -1,8 +1,8 @@
-"""Pressure waves of a liquid on any mesh, under all its laws.
+"""Pressure waves of a liquid on a mesh of any cells, under all density laws.
 
-States, waves and their fluxes are those of the grid (`grid_linear` and `grid_nonlinear`): across a side (w + u) / 2
-comes from inside and (w - u) / 2 from beyond. Under `linear` w = c r and u = m; under `log` u = m / rho and w = 2 (c0 -
-c); under `table` w is read from the table.
+States, waves and their fluxes are those of a grid (`grid_linear` and `grid_nonlinear`): across a side the wave
+(w + u) / 2 comes from inside the cell and (w - u) / 2 from the cell beyond. Under `linear` w = c r and u = m; under
+`log` u = m / rho and w = 2 (c0 - c); under `table` w is read from a table.
 """
 
 from math import sqrt
@@ -43,7 +43,10 @@ ROWS = 16
 
 @njit
 def put_primitives(law, c0, rho, table, r, mx, my, w, u, v, c):
-    """w, both velocities (mass-flow densities under law linear) and wave speed of a block of cells."""
+    """Write the invariant w, both velocities u, v and the wave speed c of a block of cells [m/s].
+
+    Under law linear u, v are the mass-flow densities and w is c r [kg/(m2 s)].
+    """
     if table is not None:
         for i in range(r.size):
             w[i], slope = invariant(table, r[i])
@@ -64,7 +67,12 @@ def put_primitives(law, c0, rho, table, r, mx, my, w, u, v, c):
 
 @njit
 def put_ghosts(law, c0, rho, table, edges, ring, nx, ny, number, reflect, w, u, v, shown_w, shown_u, shown_v, moves):
-    """Values beyond the boundary: mirror images with reflection coefficients 1 and -1, equal values at 0 (open)."""
+    """Write the values beyond boundary sides, from which gradients in cells are computed.
+
+    They are mirror images at reflection coefficients 1 and -1, and equal to those of the cell at 0 (open).
+    edges : boundary sides; nx, ny : outward normals; number : numbers of the boundary faces; reflect : their reflection
+    coefficients; w, u, v : values of cells; shown_w, shown_u, shown_v : values beyond; moves : as in `liquid_rates`
+    """
     for q in range(edges.size):
         i = ring_place(edges[q], ring)
         r = reflect[number[q]] if reflect.size > 0 else 1.0
@@ -81,9 +89,10 @@ def put_ghosts(law, c0, rho, table, edges, ring, nx, ny, number, reflect, w, u, 
 
 @njit
 def put_reflections(law, c0, rho, table, edges, nx, ny, number, reflect, wl, ul, vl, w, moves):
-    """Write the reflected wave beyond boundary sides: w - u beyond is `reflect` times w + u inside.
+    """Write the values beyond boundary sides to `w`: w - u there is the reflection coefficient times w + u inside.
 
-    A moving wall reflects waves so that u at the wall is its own.
+    A moving wall reflects waves so that the normal velocity at the wall is the speed of the wall.
+    wl, ul, vl : values at the sides from inside; other arguments as in `put_ghosts`
     """
     for q in range(edges.size):
         i = edges[q] % BLOCK
@@ -97,9 +106,9 @@ def put_reflections(law, c0, rho, table, edges, nx, ny, number, reflect, wl, ul,
 
 @njit
 def add_side_linear(c0, wl, ul, vl, geo, w):
-    """Subtract from the rates of a block of cells the outflow through one side of each.
+    """Subtract the outflow through one side of each cell of a block from the rates in `w`, under law linear.
 
-    wl, ul, vl : values at the side from inside; those from beyond are in w
+    wl, ul, vl : values at the side from inside; `w` contains the values from beyond; geo : geometry of the side
     """
     for i in range(BLOCK):
         nx, ny, reach = geo[_NX + i], geo[_NY + i], geo[_REACH + i]
@@ -115,9 +124,10 @@ def add_side_linear(c0, wl, ul, vl, geo, w):
 
 @njit
 def add_side_linear_moving(c0, rho, wl, ul, vl, geo, w, speeds):
-    """Subtract the outflow through moving sides, F(U) - speed U.
+    """Subtract the outflow through one moving side of each cell, flux - speed * quantity, under law linear.
 
-    Tangential momentum is not carried by a moving side.
+    Tangential momentum has no flux under this law, so only the sweep of the side transfers it between cells.
+    speeds : speeds of the sides along their outward normals [m/s]; other arguments as in `add_side_linear`
     """
     for i in range(BLOCK):
         nx, ny, reach, speed = geo[_NX + i], geo[_NY + i], geo[_REACH + i], speeds[i]
@@ -138,10 +148,12 @@ def add_side_linear_moving(c0, rho, wl, ul, vl, geo, w, speeds):
 
 @njit
 def add_side_nonlinear(c0, rho, table, u0, v0, c, wl, ul, vl, geo, w, speeds, phi):
-    """Subtract the outflow through one side of each cell with the full momentum flux.
+    """Subtract the outflow through one side of each cell of a block from the rates in `w`, with the full momentum flux.
 
-    u0, v0, c : of the cells, for the step; speeds : of the sides, or None
-    phi : None, or a potential at the sides, subtracted from the waves; its force on cells is that of `balance_side`
+    u0, v0, c : velocities and wave speed of the cells, for the limit of the time step
+    speeds : speeds of moving sides along their outward normals [m/s], or None
+    phi : None, or the potential at the sides [J/kg], whose effect was subtracted from the waves and is added again
+    Other arguments as in `add_side_linear`
     """
     bulk, per = rho * c0 * c0, 0.5 / c0
     for i in range(BLOCK):
@@ -175,7 +187,7 @@ def add_side_nonlinear(c0, rho, table, u0, v0, c, wl, ul, vl, geo, w, speeds, ph
 
 @njit
 def put_stiffness(c0, rho, table, r, phi, w):
-    """1 / c^2, rho c^2 and potential of a block of cells."""
+    """Write 1 / c^2, rho c^2 and the potential phi [J/kg] of a block of cells to `w`, for `balance_side`."""
     for i in range(r.size):
         w[_PER + i], w[_BULK + i] = stiffness(c0, rho, table, r[i])
         w[_PHI + i] = phi[i]
@@ -183,7 +195,10 @@ def put_stiffness(c0, rho, table, r, phi, w):
 
 @njit
 def balance_side(phi, geo, w):
-    """Subtract from the rates of a block of cells the pressures that would keep them at rest, at one side of each."""
+    """Subtract from the rates of a block of cells the pressures that would keep them at rest, at one side of each cell.
+
+    phi : potential at the sides [J/kg]
+    """
     for i in range(BLOCK):
         push = geo[_REACH + i] * w[_BULK + i] * log1p_small(w[_PER + i] * (phi[i] - w[_PHI + i]))
         w[_RX + i] -= push * geo[_NX + i]
@@ -192,7 +207,10 @@ def balance_side(phi, geo, w):
 
 @njit
 def close_walls(edges, number, reflect, geo, w, thrust):
-    """Set the mass flow through walls to zero; write the pressure on them, and the energy lost by their motion."""
+    """Cancel the mass flow through walls; write the pressure on boundary sides and the energy lost there by motion.
+
+    thrust : pressures of all boundary faces, then losses, as in `liquid_rates`
+    """
     count = thrust.size // 2
     for q in range(edges.size):
         i = edges[q] % BLOCK
@@ -204,14 +222,14 @@ def close_walls(edges, number, reflect, geo, w, thrust):
 
 @njit
 def clear(w):
-    """Set rates and sum to zero."""
+    """Set the rates of a block of cells, and their sums for the limit of the time step, to zero."""
     for i in range(BLOCK):
         w[_RR + i], w[_RX + i], w[_RY + i], w[_FAST + i] = 0.0, 0.0, 0.0, 0.0
 
 
 @njit
 def put_rates(w, rate_r, rate_x, rate_y):
-    """Rates of a block of cells, and the greatest sum so far in each lane."""
+    """Copy the rates of a block of cells to their arrays; update the greatest sum for the limit of the time step."""
     for i in range(BLOCK):
         w[_TOP + i] = max(w[_TOP + i], w[_FAST + i])
     for i in range(rate_r.size):
@@ -220,7 +238,7 @@ def put_rates(w, rate_r, rate_x, rate_y):
 
 @njit
 def work_size(integers):
-    """Length of the work array of `liquid_rates`."""
+    """Length of the work array of `liquid_rates`. integers : as there"""
     return 16 * integers[4] * BLOCK + 3 * integers[3] + ROWS * BLOCK
 
 
@@ -229,19 +247,26 @@ def liquid_rates(
     law, c0, rho, table, scheme, wide_by, floats, integers, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y,
     moves, phi,
 ):  # fmt: skip
-    """Rates of all cells; returns the greatest sum of L (|u| + c) / (2 A) [1/s].
+    """Write the rates of all cells of a mesh; return the greatest sum of L (|u| + c) / (2 A) over the sides of a cell.
 
+    The sum [1/s] limits the time step: length L of a side, area A of the cell, velocity u normal to the side, wave
+    speed c.
     law : LAW_LINEAR or LAW_LOG; c0, rho : wave speed [m/s] and density [kg/m3] at rest
-    table : of `riemann_invariants` in place of a law, or None
-    scheme : UPWIND or MUSCL; wide_by : allowed excess of values at sides over the range of neighbours, 1 for none
+    table : table of `riemann_invariants` in place of a law, or None
+    scheme : UPWIND or MUSCL; wide_by : factor on the range of the neighbours that limits values at sides, 1 for no
+    excess
+    floats, integers : geometry and neighbours, see `basins.cell_sides`; n cells, b boundary faces
     reflect : float64[b]  reflection coefficients, -1 to 1, empty for walls
     r : float64[n]  deviation of density [kg/m3]; mx, my : mass-flow densities [kg/(m2 s)]
     through : float64[b]  inward flows through the boundary [kg/(m s)], or empty
     work : float64[work_size(integers)]
-    moves : None, or a tuple: speeds of sides along their normals [m/s], see `moving_meshes`; array float64[2 b] for
-    pressures above that at rest on boundary faces [Pa], then for energy lost there by law linear,
-    speed (c^2 r^2 - m^2) [kg^2/(m3 s3)]; stretching `wide`, see `basins.cell_stretching`
-    phi : None, or under laws with the full momentum flux a potential [J/kg] of cells, padded, and of sides
+    rate_r, rate_x, rate_y : float64[n]  rates of r, mx, my
+    moves : None without moving walls, else a tuple of
+        speeds of sides along their outward normals [m/s], see `moving_meshes`
+        float64[2 b]  pressures on boundary faces above that at rest [Pa], then under law linear
+            speed (c^2 r^2 - |m|^2) there [kg^2/(m3 s3)], which over 2 rho is the energy lost
+        `wide` : areas of cells over undeformed areas, see `basins.cell_stretching`
+    phi : None, or under laws with the full momentum flux the potential [J/kg] of cells (padded to blocks) and of sides
     """
     slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]
     count, first_order = blocks(integers), scheme == UPWIND

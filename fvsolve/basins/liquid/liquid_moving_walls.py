@@ -28,14 +28,14 @@ def on_mesh(basin):
 
 @njit(forceinline=True)
 def line_motion(tables, basin):
-    """Motion of grid lines in the form for kernels of liquids."""
+    """Motion of the grid lines of a basin: the tuple `moves` of `grid_linear.grid_rates`."""
     along, across, thrust, wide, _ = moving_walls.grid_motion(tables, basin)
     return along, across, thrust, basin["density"], wide
 
 
 @njit
 def waves_on_moving_grids(t, y, dydt, out, handle):
-    """Rates under law linear on grids."""
+    """Write the rates of all liquids between moving walls on grids, under law linear."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_grid(tables.basins[b]):
@@ -44,7 +44,7 @@ def waves_on_moving_grids(t, y, dydt, out, handle):
 
 @njit
 def rates_on_moving_grids(t, y, dydt, out, handle):
-    """Rates under law log on grids."""
+    """Write the rates of all liquids between moving walls on grids, under law log."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_grid(tables.basins[b]):
@@ -53,7 +53,7 @@ def rates_on_moving_grids(t, y, dydt, out, handle):
 
 @njit
 def table_on_moving_grids(t, y, dydt, out, handle):
-    """Rates under law table on grids."""
+    """Write the rates of all liquids between moving walls on grids, under law table."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_grid(tables.basins[b]):
@@ -63,7 +63,7 @@ def table_on_moving_grids(t, y, dydt, out, handle):
 
 @njit
 def rates_on_moving_meshes(t, y, dydt, out, handle):
-    """Rates under laws linear and log on meshes."""
+    """Write the rates of all liquids between moving walls on meshes of any cells, under laws linear and log."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_mesh(tables.basins[b]):
@@ -72,7 +72,7 @@ def rates_on_moving_meshes(t, y, dydt, out, handle):
 
 @njit
 def table_on_moving_meshes(t, y, dydt, out, handle):
-    """Rates under law table on meshes."""
+    """Write the rates of all liquids between moving walls on meshes of any cells, under law table."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_mesh(tables.basins[b]):
@@ -82,7 +82,10 @@ def table_on_moving_meshes(t, y, dydt, out, handle):
 
 @njit
 def displaced_potential(tables, wall):
-    """Outward force of the potential other than pressure in the volume swept by a wall: rho g z of the contents [N]."""
+    """Gravitational energy of the volume swept by a wall, per distance moved along its axis [N], positive outward.
+
+    It is rho g z times the area of the wall, with the elevation z above the datum.
+    """
     basin, length = tables.basins[wall["basin"]], 0.0
     for m in range(wall["count"]):
         length += tables.plane[wall["lengths"] + m]
@@ -91,7 +94,10 @@ def displaced_potential(tables, wall):
 
 @njit
 def add_power(t, y, dydt, out, handle, power):
-    """Correct the rate of storage for changing areas: in less space the same mass has a higher density."""
+    """Correct the rate of change of the stored energy [W] in `power` for moving walls.
+
+    In a smaller area the same mass has a higher density and energy; walls also displace potential energy.
+    """
     tables = open_tables(handle)
     st, plane = tables.settings[0], tables.plane
     for b in range(tables.basins.size):
@@ -113,7 +119,7 @@ def add_power(t, y, dydt, out, handle, power):
 
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
-    """Add the potential energy of the mass displaced by walls."""
+    """Add the potential energy of the mass displaced by walls [J] to the stored energy of their basins."""
     tables = open_tables(handle)
     first = stored.size - tables.basins.size
     for k in range(tables.walls.size):

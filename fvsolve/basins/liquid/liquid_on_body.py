@@ -1,9 +1,10 @@
-"""Rates of a liquid in a basin on a body, in its accelerated frame.
+"""Rates of a liquid in a basin on a body, in the accelerated frame of the basin.
 
-Under law linear, p + rho phi is reconstructed instead of p (`basin_frames`), so the rates are those of a liquid without
-acceleration. With the full momentum flux, the invariants are reduced by phi. At faces phi is added again, and the
-pressures that would keep a cell at rest are subtracted from the forces on it. Beyond an open side the liquid rests in
-the same axes, with its pressure at rest at their origin.
+phi is the potential of gravity and inertial forces in that frame [J/kg] (`basin_frames`). Under law linear, p + rho phi
+is reconstructed instead of the pressure p, so the rates are those of a liquid without acceleration. With the full
+momentum flux, the invariants are reduced by phi. At faces phi is added again, and the pressures that would keep a cell
+at rest are subtracted from the forces on it. Beyond an open side the liquid rests in the same axes, with its pressure
+at rest at their origin.
 """
 
 from fvsolve.basins.basin_frames import (
@@ -35,7 +36,10 @@ def on_mesh(basin):
 
 @njit
 def equivalent_densities(tables, basin, y):
-    """Deviations of density plus those equivalent to rho phi, in `work`; returns their offset."""
+    """Write deviations of density plus rho phi / c^2 to `tables.work`, and return their offset there.
+
+    rho phi / c^2 is the deviation of density whose pressure is rho phi.
+    """
     at, n, o = int(tables.plane[basin["frame"] + POTENTIALS]), basin["n"], basin["y"]
     per = basin["density"] / (basin["speed"] * basin["speed"])
     add_potential(tables.plane, basin, per, y[o : o + n], tables.work[at : at + n])
@@ -44,7 +48,7 @@ def equivalent_densities(tables, basin, y):
 
 @njit
 def grid_potentials(tables, basin):
-    """phi [J/kg] of cells, of faces between columns and of faces between rows, in `work`."""
+    """Potential phi [J/kg] of cells, of faces between columns and of faces between rows: three views of `work`."""
     plane, at, nx, ny = tables.plane, int(tables.plane[basin["frame"] + CELL_POSITIONS]), basin["nx"], basin["ny"]
     x, y, lines = plane[at : at + nx], plane[at + nx : at + nx + ny], at + nx + ny
     across, along = plane[lines : lines + nx + 1], plane[lines + nx + 1 : lines + nx + ny + 2]
@@ -59,7 +63,7 @@ def grid_potentials(tables, basin):
 
 @njit
 def mesh_potentials(tables, basin):
-    """phi [J/kg] of cells and of sides, in `work`."""
+    """Potential phi [J/kg] of the cells and of the sides of cells of a mesh: two views of `tables.work`."""
     plane, at, n = tables.plane, int(tables.plane[basin["frame"] + CELL_POSITIONS]), basin["n"]
     integers = tables.integers[basin["links"] :]
     side_count, work = blocks(integers) * integers[0] * BLOCK, tables.work[int(plane[basin["frame"] + POTENTIALS]) :]
@@ -72,7 +76,7 @@ def mesh_potentials(tables, basin):
 
 @njit
 def waves_on_accelerated_grids(t, y, dydt, out, handle):
-    """Rates under law linear on grids."""
+    """Write the rates of all liquids on bodies and on grids, under law linear."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_grid(tables.basins[b]):
@@ -82,7 +86,7 @@ def waves_on_accelerated_grids(t, y, dydt, out, handle):
 
 @njit
 def rates_on_accelerated_grids(t, y, dydt, out, handle):
-    """Rates under law log on grids."""
+    """Write the rates of all liquids on bodies and on grids, under law log."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_grid(tables.basins[b]):
@@ -91,7 +95,7 @@ def rates_on_accelerated_grids(t, y, dydt, out, handle):
 
 @njit
 def table_on_accelerated_grids(t, y, dydt, out, handle):
-    """Rates under law table on grids."""
+    """Write the rates of all liquids on bodies and on grids, under law table."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
@@ -103,7 +107,7 @@ def table_on_accelerated_grids(t, y, dydt, out, handle):
 
 @njit
 def rates_on_accelerated_meshes(t, y, dydt, out, handle):
-    """Rates under laws linear and log on meshes."""
+    """Write the rates of all liquids on bodies and on meshes of any cells, under laws linear and log."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
@@ -116,7 +120,7 @@ def rates_on_accelerated_meshes(t, y, dydt, out, handle):
 
 @njit
 def table_on_accelerated_meshes(t, y, dydt, out, handle):
-    """Rates under law table on meshes."""
+    """Write the rates of all liquids on bodies and on meshes of any cells, under law table."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]

@@ -1,4 +1,4 @@
-"""Patches of a liquid: their pressures, and the flows of links in the cells next to them."""
+"""Patches of a liquid (parts of its boundary joined to a node): pressures, and the effect of the flows of links."""
 
 from math import log1p
 
@@ -15,7 +15,7 @@ OWN_CODE = physics_code(__package__)
 
 @njit
 def mean_deviation(tables, patch, y):
-    """Mean deviation of density in the cells next to a patch, by area."""
+    """Area-weighted mean of the deviation of density in the cells next to a patch [kg/m3]."""
     basin, total = tables.basins[patch["basin"]], 0.0
     for m in range(patch["count"]):
         i = tables.integers[patch["first"] + m]
@@ -25,7 +25,11 @@ def mean_deviation(tables, patch, y):
 
 @njit
 def patch_pressures(t, y, dydt, out, handle):
-    """Deviation of the pressure at every patch from the profile, and its slope with mass [Pa/kg]."""
+    """Write the pressure at every patch and its slope to the node of the patch in `out`, under laws linear and log.
+
+    The pressure is the deviation from the steady start [Pa]; the slope is per mass in the cells next to the patch
+    [Pa/kg].
+    """
     tables = open_tables(handle)
     layout = tables.layout[0]
     for k in range(tables.patches.size):
@@ -49,7 +53,7 @@ def patch_pressures(t, y, dydt, out, handle):
 
 @njit
 def patch_flows(t, y, dydt, out, handle):
-    """Add the flows through patches to the rates of the cells next to them."""
+    """Add the mass and momentum of the flows through patches to the rates of the cells next to them."""
     tables = open_tables(handle)
     for k in range(tables.patches.size if dydt.size > 0 else 0):
         patch = tables.patches[k]

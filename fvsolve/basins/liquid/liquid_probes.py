@@ -14,7 +14,10 @@ PRESSURE = FIRST_OWN
 
 @njit
 def observe_liquid(t, y, out, handle, values):
-    """Write values[k] of the probes of cells: scale * pressure over its slope at rest + offset, or velocities."""
+    """Write the values of the probes in cells of liquids: pressures [Pa] or velocities [m/s].
+
+    A pressure is `scale` times the first result of `read_liquid` plus `offset`.
+    """
     tables = open_tables(handle)
     for k in range(tables.probes.size):
         probe = tables.probes[k]
@@ -26,7 +29,11 @@ def observe_liquid(t, y, out, handle, values):
 
 @njit
 def read_liquid(tables, probe, y):
-    """Weighted sums of density deviations (under law log c0^2-scaled pressure), and of velocities [m/s]."""
+    """Sums over the cells of a probe, with its weights: deviation of density [kg/m3] and velocities u, v [m/s].
+
+    Under law log the first is not the deviation of density but pressure above that at rest over c0^2, which is
+    rho0 ln(rho / rho0).
+    """
     basin, law, total, u, v = tables.basins[probe["index"]], tables.settings[0]["law"], 0.0, 0.0, 0.0
     n, o = basin["n"], basin["y"]
     for m in range(probe["count"]):

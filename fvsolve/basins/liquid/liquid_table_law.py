@@ -17,7 +17,7 @@ OWN_CODE = physics_code(__package__)
 
 @njit
 def rates_on_grids(t, y, dydt, out, handle):
-    """Rates on grids."""
+    """Write the rates of all liquids on grids, without moving walls and not on a body, under law table."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
@@ -27,7 +27,7 @@ def rates_on_grids(t, y, dydt, out, handle):
 
 @njit
 def rates_on_meshes(t, y, dydt, out, handle):
-    """Rates on meshes of any cells."""
+    """Write the rates of all liquids on meshes, without moving walls and not on a body, under law table."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
@@ -37,7 +37,11 @@ def rates_on_meshes(t, y, dydt, out, handle):
 
 @njit
 def patch_pressures(t, y, dydt, out, handle):
-    """Deviation of the pressure at every patch from the profile, and its slope with mass [Pa/kg]."""
+    """Write the pressure at every patch and its slope to the node of the patch in `out`, under law table.
+
+    The pressure is the deviation from the steady start [Pa]; the slope is per mass in the cells next to the patch
+    [Pa/kg].
+    """
     tables = open_tables(handle)
     layout = tables.layout[0]
     for k in range(tables.patches.size):
@@ -55,7 +59,7 @@ def patch_pressures(t, y, dydt, out, handle):
 
 @njit
 def observe_pressures(t, y, out, handle, values):
-    """Pressures in cells [Pa]."""
+    """Write the values of the pressure probes in cells of liquids [Pa], under law table."""
     tables = open_tables(handle)
     probes = tables.probes
     for k in range(probes.size):

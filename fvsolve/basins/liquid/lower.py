@@ -1,4 +1,4 @@
-"""Rows of tables for a liquid between two plates: waves about rest at a pressure."""
+"""Rows of the tables of a model for a liquid between two plates, which deviates from rest at a given pressure."""
 
 from __future__ import annotations
 
@@ -28,9 +28,10 @@ SMALL = 1e-9  # negligible velocity over the wave speed
 
 
 class LiquidRows(BasinRows):
-    """Mass and momentum with bulk modulus, states density [kg/m3] and mass flows per area [kg/(m2 s)].
+    """Rows of the tables of a model for a liquid with bulk modulus K and wave speed a.
 
-    Law linear: p = a^2 (rho - rho0). Laws log, p = K ln(rho / rho0), and table have the full momentum flux.
+    States are deviation of density rho - rho0 [kg/m3] and mass flows per area along x and y [kg/(m2 s)]. Law linear:
+    p = a^2 (rho - rho0). Laws log, p = K ln(rho / rho0), and table have the full momentum flux.
     """
 
     units = {"pressure": "Pa", "velocity": "m/s"}
@@ -68,7 +69,7 @@ class LiquidRows(BasinRows):
             )
 
     def rates(self) -> str:
-        """Term of the rates of its cells."""
+        """Compiled function that computes the rates of the cells, as `module: function`."""
         shape = "grids" if self.is_grid else "meshes"
         if self.moves or self.part.on is not None:
             module, motion = ("liquid_moving_walls", "moving") if self.moves else ("liquid_on_body", "accelerated")
@@ -111,7 +112,10 @@ class LiquidRows(BasinRows):
             row["work"] = draft.to_work(liquid_mesh.work_size(self.integers))
 
     def lower_waves(self, draft, row) -> None:
-        """Table of its waves. A wall cannot make the wave speed greater than that of the fluid."""
+        """Append the table of Riemann invariants of the liquid to the arrays of the model (law table).
+
+        A fault is added if the wave speed is greater than the speed of sound: walls can only reduce it.
+        """
         if self.waves.speed > (1.0 + 1e-9) * self.waves.fluid_speed:
             speed, sound = (draft.case.amount(value, "velocity", 6) for value in (self.speed, self.waves.fluid_speed))
             draft.fault(f"nodes.{self.name}.wave_speed", f"{speed} is faster than sound in the fluid, {sound}; "
@@ -119,7 +123,7 @@ class LiquidRows(BasinRows):
         row["table"] = draft.to_plane(self.waves.table())
 
     def pressure(self, deviation: np.ndarray) -> np.ndarray:
-        """Pressure above that at rest [Pa] at deviations of the density."""
+        """Pressure above the pressure at rest [Pa] at deviations of density from rest [kg/m3]."""
         if self.linear:
             return self.speed**2 * deviation
         if self.waves is not None:
@@ -127,7 +131,7 @@ class LiquidRows(BasinRows):
         return self.density * self.speed**2 * np.log1p(deviation / self.density)
 
     def deviation(self, pressure: np.ndarray) -> np.ndarray:
-        """Deviations of the density at pressures above that at rest [Pa]."""
+        """Deviations of density from rest [kg/m3] at pressures above the pressure at rest [Pa]."""
         if self.linear:
             return pressure / self.speed**2
         if self.waves is not None:
@@ -145,7 +149,10 @@ class LiquidRows(BasinRows):
         return states
 
     def pressure_at_start(self) -> np.ndarray:
-        """Pressure above that at rest at the middle while its body does not accelerate: dp / rho = - d(phi) [Pa]."""
+        """Hydrostatic pressure of cells above the pressure at rest at the middle of the basin : float64[n] [Pa].
+
+        It holds on a body that does not accelerate: dp / rho = -d(phi) with the gravity potential phi.
+        """
         from fvsolve.basins.lower_frames import potential_at_start
 
         phi = potential_at_start(self)

@@ -1,6 +1,7 @@
-"""Riemann invariants of a liquid under law `table`, as tables for kernels.
+"""Riemann invariants of a liquid under law `table`, as tables for compiled functions.
 
-The mass in a fixed volume changes by d ln rho = (1 / (rho a^2) + compliance) dp, with elastic walls as in pipes.
+The mass in a fixed volume changes by d ln rho = (1 / (rho a^2) + compliance) dp: speed of sound a of the fluid, and
+compliance of elastic walls as in pipes [1/Pa].
 """
 
 from __future__ import annotations
@@ -24,12 +25,14 @@ PANELS = 8  # panels of the integral per interval of the fluid
 
 
 class RiemannInvariants:
-    """w = integral of c / rho, c^2 = dp / drho, from rest at a pressure, and related quantities.
+    """Invariant w = integral of c / rho d rho from rest at `pressure` [Pa], c^2 = dp / drho, and related quantities.
 
     The range is that of the fluid's table, extended by its length at both ends with constant compressibility. It ends
-    where the compliance of walls gives ln(rho / rho at rest) = STRETCH, because even steps of density must resolve the
-    neighbourhood of rest. density [kg/m3], speed [m/s] : at rest; compliance : of walls, so that the speed is
-    `wave_speed` [1/Pa]
+    where the compliance of walls gives ln(rho / rho at rest) = MAX_STRETCH, because even steps of density must resolve
+    the neighbourhood of rest.
+
+    wave_speed : wave speed at rest including walls [m/s], None for the speed of sound of the fluid
+    density, speed : density [kg/m3] and wave speed [m/s] at rest; compliance : compliance of the walls [1/Pa]
     """
 
     def __init__(self, fluid, pressure: float, wave_speed: float | None = None) -> None:
@@ -56,19 +59,19 @@ class RiemannInvariants:
         self.ends = max(self.ends[0], pressure - extension), min(self.ends[1], pressure + extension)
 
     def stretch(self, p):
-        """ln(rho / rho at rest)."""
+        """ln(rho / rho at rest) at a pressure p [Pa]."""
         return self.strain(p) - self.strain(self.rest) + self.compliance * (p - self.rest)
 
     def deviation(self, p):
-        """Density minus density at rest [kg/m3]."""
+        """Density at a pressure p [Pa] minus density at rest [kg/m3]."""
         return self.density * np.expm1(self.stretch(p))
 
     def impedance(self, p):
-        """rho c [kg/(m2 s)]."""
+        """rho c at a pressure p [Pa] [kg/(m2 s)]."""
         return np.sqrt(self.density * np.exp(self.stretch(p)) / (self.compressibility(p) + self.compliance))
 
     def pressure(self, deviation: np.ndarray) -> np.ndarray:
-        """Pressure [Pa] at deviations of the density, by Newton iteration."""
+        """Pressure [Pa] at deviations of density from rest [kg/m3], by Newton iteration."""
         target = np.log1p(deviation / self.density)
         p = np.interp(target, self.stretch(self.grid), self.grid)
         for _ in range(4):
@@ -77,12 +80,12 @@ class RiemannInvariants:
 
     @cached_property
     def grid(self) -> np.ndarray:
-        """Ends of the panels of the integral of the invariant [Pa]."""
+        """Pressures [Pa] that divide the range into intervals of integration, including the pressure at rest."""
         return np.unique(np.append(np.linspace(*self.ends, PANELS * self.interval_count + 1), self.rest))
 
     @cached_property
     def invariant(self) -> CubicHermiteSpline:
-        """w as a function of pressure [m/s], each panel by six Gauss points."""
+        """Invariant w [m/s] as a function of pressure [Pa], integrated with six Gauss points per interval of `grid`."""
         nodes, weights = np.polynomial.legendre.leggauss(6)
         half = 0.5 * np.diff(self.grid)
         places = self.grid[:-1, None] + half[:, None] * (1.0 + nodes)
@@ -97,7 +100,7 @@ class RiemannInvariants:
         return p
 
     def table(self) -> np.ndarray:
-        """Table for `basins.liquid.riemann_invariants` : float64[...]."""
+        """Table that `basins.liquid.riemann_invariants` reads : float64[...]."""
         per_r, first_r, r = self.places(self.deviation(np.array(self.ends)))
         per_w, first_w, w = self.places(self.invariant(np.array(self.ends)))
         p, q = self.pressure(r), self.pressure_of(w)
@@ -109,14 +112,18 @@ class RiemannInvariants:
         return np.concatenate([head, of_r.ravel(), np.hstack(of_w).ravel()])
 
     def places(self, ends) -> tuple[float, int, np.ndarray]:
-        """(1 / step, number of the first, values between two ends in even steps counted from 0)."""
+        """Multiples of an even step between two ends, as (1 / step, number of the first multiple, the multiples)."""
         step = (ends[1] - ends[0]) / max(REFINEMENT * self.interval_count, 3 * LEAST_INTERVALS)
         first = math.ceil(ends[0] / step)
         return 1.0 / step, first, step * np.arange(first, math.floor(ends[1] / step) + 1)
 
 
 def cubics(value: np.ndarray, slope: np.ndarray, first: int) -> np.ndarray:
-    """Coefficients of s in [0, 1] from values and slopes per interval, straight at both ends : float64[n - 1, 4]."""
+    """Coefficients of a cubic in s from 0 to 1 per interval, from values and slopes per interval at n points.
+
+    The first and last interval are straight. first : number of the first point, counted from rest, where the value is 0
+    Returns float64[n - 1, 4], constant term first.
+    """
     value[-first] = 0.0
     (f, g), (d, e) = ((both[:-1], both[1:]) for both in (value, slope))
     coefficients = np.column_stack([f, d, 3.0 * (g - f) - 2.0 * d - e, 2.0 * (f - g) + d + e])

@@ -1,7 +1,9 @@
 """Waves of a liquid at moving walls, and fluxes through moving faces.
 
-A wall that moves outward at `speed` reflects waves so that the velocity at the wall is its own. Under law `linear` the
-mass flow is m = speed (rho + r), so that no mass passes. Waves are c r and m, or w and u if `full`, see `grid_linear`.
+A wall that moves outward at `speed` reflects waves so that the velocity at the wall is `speed`. Under law `linear` the
+mass flow is m = speed (rho + r), so that no mass passes. Waves are (c r + m) / 2 and (c r - m) / 2 under that law, and
+(w + u) / 2 and (w - u) / 2 if `full` (full momentum flux), see `grid_linear` and `grid_nonlinear`. c : wave speed
+[m/s]; rho : density at rest [kg/m3]; r : deviation of density
 """
 
 from fvsolve.jit import inline, njit
@@ -11,13 +13,20 @@ GHOSTS = 3  # number of ghost cells beyond a side
 
 @njit(forceinline=True)
 def wall_flow(full, c, rho, speed, arriving):
-    """m, or u if `full`, at a moving wall. arriving : c r + m, or w + u, across the wall from inside"""
+    """Outward mass-flow density m (velocity u if `full`) at a wall that moves outward at `speed` [m/s].
+
+    arriving : c r + m (w + u if `full`) from inside, twice the outgoing wave
+    """
     return speed if full else speed * (arriving + rho * c) / (c + speed)
 
 
 @njit
 def mirror_at_walls(full, c, rho, n, first, last, forward, backward):
-    """Fill three values beyond either end of [3 : n + 3] of two waves. first, last : speeds of the walls there"""
+    """Fill the three ghost cells beyond both ends of a row of n cells between moving walls.
+
+    first, last : speeds of the walls before and after the row, along the row [m/s]
+    forward, backward : float64[n + 6]  waves; the cells are at [3 : n + 3]
+    """
     for k in range(GHOSTS):
         low, high = 2 - k, n + 3 + k
         a, b = backward[3 + k], forward[3 + k]
@@ -30,7 +39,7 @@ def mirror_at_walls(full, c, rho, n, first, last, forward, backward):
 
 @njit
 def correct_mirror_row(full, c, rho, speed, entering, leaving, n):
-    """Correct a mirrored row beyond a side for the speed of a wall that moves outward."""
+    """Correct the n waves of a mirrored row of ghost cells for a wall that moves outward at `speed` [m/s]."""
     for i in range(n):
         m = wall_flow(full, c, rho, speed, 2.0 * entering[i])
         entering[i], leaving[i] = entering[i] - m, leaving[i] + m
@@ -38,14 +47,17 @@ def correct_mirror_row(full, c, rho, speed, entering, leaving, n):
 
 @njit
 def reflect_at_wall(full, c, rho, speed, leaving, entering, n):
-    """Waves reflected at faces of a moving wall."""
+    """Write the waves reflected at n faces of a wall that moves outward at `speed` [m/s] to `entering`."""
     for i in range(n):
         entering[i] = leaving[i] - wall_flow(full, c, rho, speed, 2.0 * leaving[i])
 
 
 @njit
 def put_wall_pressure(c, speed, forward, backward, along, n, thrust, loss):
-    """Pressure on faces of a wall under law `linear`, and the energy lost there; see `liquid_mesh`."""
+    """Write the pressure on n faces of a moving wall under law `linear`, and the energy lost there.
+
+    along : mass-flow densities along the wall; thrust, loss : see `moves` of `liquid_mesh.liquid_rates`
+    """
     for i in range(n):
         x, m = forward[i] + backward[i], forward[i] - backward[i]
         thrust[i], loss[i] = c * x, speed * (x * x - m * m - along[i] * along[i])
@@ -53,16 +65,20 @@ def put_wall_pressure(c, speed, forward, backward, along, n, thrust, loss):
 
 @njit
 def put_wall_flux(push, n, thrust, mass, along):
-    """Pressure on faces of a wall with the full momentum flux, which is the flux because no mass passes."""
+    """Write the pressure on n faces of a wall with the full momentum flux, and set the other fluxes to 0.
+
+    No mass passes a wall, so its momentum flux `push` is the pressure.
+    """
     for i in range(n):
         thrust[i], mass[i], along[i] = push[i], 0.0, 0.0
 
 
 @inline
 def put_moving_fluxes(c, rho, speeds, step, forward, backward):
-    """Fluxes of mass and momentum from waves at faces, minus the content swept by the faces.
+    """Convert waves at moving faces to fluxes of mass and momentum relative to the faces, under law `linear`.
 
-    speeds : every `step`-th value is that of a face
+    forward, backward : waves; afterwards fluxes of mass and of momentum
+    speeds : speeds of the faces [m/s], read at every `step`-th place
     """
     per = 1.0 / c
     for i in range(forward.size):
@@ -72,7 +88,12 @@ def put_moving_fluxes(c, rho, speeds, step, forward, backward):
 
 @inline
 def put_row_rates(k, speeds, mass, push, along, rate_r, rate_m, rate_t):
-    """Rates of a row of cells from faces i and i + 1; momentum along faces is not carried by moving faces."""
+    """Write the rates of a row of cells from the fluxes at the moving faces along it, under law `linear`.
+
+    Cell i is between faces i and i + 1. The faces sweep over the momentum along them, so its flux is -speed times its
+    mean over both cells. k : 1 / widths [1/m]; mass, push : fluxes of mass and momentum; along : momentum along faces,
+    by cell
+    """
     m, p, last = mass[1:], push[1:], rate_r.size - 1
     for i in range(rate_r.size):
         rate_r[i] = k[i] * (mass[i] - m[i])
@@ -88,9 +109,10 @@ def put_row_rates(k, speeds, mass, push, along, rate_r, rate_m, rate_t):
 
 @inline
 def add_column_rates(k, s0, s1, m0, p0, m1, p1, before, here, after, rate_r, rate_m, rate_t):
-    """Add the rates of a row of cells between two rows of faces.
+    """Add to the rates of a row of cells the fluxes through the rows of moving faces before (0) and after it (1).
 
-    before, here, after : momentum along the faces in three rows
+    k : 1 / height of the row [1/m]; s, m, p : speeds, mass and momentum fluxes of the faces
+    before, here, after : momentum along the faces in the row before, in this row and in the row after
     """
     for i in range(rate_r.size):
         rate_r[i] += k * (m0[i] - m1[i])

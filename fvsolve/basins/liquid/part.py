@@ -1,4 +1,4 @@
-"""Keys and fields of a liquid between two plates."""
+"""Keys of the case file for a liquid between two plates, and its output fields."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fvsolve.parts.value import Quantity, positive
 
 
 class LiquidStart(VelocityStart):
-    """Start of a liquid that is not at rest."""
+    """Keys of the table `start` of a liquid that is not at rest at the start."""
 
     pressure: Annotated[
         SpatialField | None, SpatialFieldKey("pressure_drop", "pressure of a liquid above the pressure at rest [Pa]")
@@ -18,7 +18,7 @@ class LiquidStart(VelocityStart):
 
 
 class Liquid(Physics, name="liquid"):
-    """r_t + div m = 0, m_t + div(m m / r) + grad p(r) = 0."""
+    """Basin of a liquid: r_t + div m = 0, m_t + div(m m / r) + grad p(r) = 0; density r, mass-flow density m."""
 
     states: ClassVar[dict[str, str]] = {"density": "kg/m3", "flow_x": "kg/(m2 s)", "flow_y": "kg/(m2 s)"}
     fields: ClassVar[dict[str, str]] = {"pressure": "pressure", **VELOCITY_FIELDS}

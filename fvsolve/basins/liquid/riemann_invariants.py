@@ -1,10 +1,11 @@
 """Riemann invariants of a liquid of any density law, by cubics on uniform grids.
 
-w = integral of c / rho over the density from rest; r [kg/m3] and p [Pa] are deviations from rest. A table contains
+w = integral of c / rho d rho from the density at rest; deviations r of density [kg/m3] and p of pressure [Pa] from
+rest. A table contains
     1/dr, first interval, number of further intervals, offset, 1/dw, first interval, number of further intervals, offset
-and four coefficients of s in [0, 1] per interval: of w over r, then of r and of p over w. Intervals are counted from
-rest, where all values are 0 to the bit. The first and the last are straight and have no end. Built by
-`lower_invariants`.
+for grids of steps dr and dw, and four coefficients of s in [0, 1] per interval: of w over r, then of r and of p over w.
+Intervals are counted from rest, where all values are exactly 0. The first and the last interval are straight and have
+no end. `lower_invariants` builds the table.
 """
 
 from math import sqrt
@@ -17,9 +18,10 @@ W_OF_R, OF_W = 0, 4  # places of both grids in it
 
 @njit(forceinline=True)
 def locate(table, grid, x, size):
-    """(offset of the cubics of the interval of x, each `size` floats, position s in it).
+    """(offset in the table of the cubics of the interval that contains x, position s of x in that interval).
 
-    NaN gives the first interval and NaN.
+    grid : place of the grid in the head of the table; size : number of coefficients per interval
+    NaN gives the first interval and s = NaN.
     """
     z, first, last = x * table[grid], table[grid + 1], table[grid + 2]
     k = z - first
@@ -31,7 +33,7 @@ def locate(table, grid, x, size):
 
 @njit(forceinline=True)
 def invariant(table, r):
-    """(w, dw/dr = c / rho) at a deviation of density."""
+    """(w, dw/dr = c / rho) at a deviation r of density from rest."""
     k, s = locate(table, W_OF_R, r, 4)
     b, c, d = table[k + 1], table[k + 2], table[k + 3]
     return table[k] + s * (b + s * (c + s * d)), table[W_OF_R] * (b + s * (2.0 * c + 3.0 * s * d))
@@ -39,7 +41,7 @@ def invariant(table, r):
 
 @njit(forceinline=True)
 def state(table, w):
-    """(r, p) at the invariant w."""
+    """(deviation of density r [kg/m3], deviation of pressure p [Pa]) from rest at the invariant w."""
     k, s = locate(table, OF_W, w, 8)
     r = table[k] + s * (table[k + 1] + s * (table[k + 2] + s * table[k + 3]))
     return r, table[k + 4] + s * (table[k + 5] + s * (table[k + 6] + s * table[k + 7]))
@@ -47,7 +49,7 @@ def state(table, w):
 
 @njit(forceinline=True)
 def speed(table, rho, w):
-    """Wave speed c at the invariant w."""
+    """Wave speed c [m/s] at the invariant w. rho : density at rest"""
     k, s = locate(table, OF_W, w, 8)
     b, c, d = table[k + 1], table[k + 2], table[k + 3]
     dense = rho + table[k] + s * (b + s * (c + s * d))
@@ -56,9 +58,10 @@ def speed(table, rho, w):
 
 @njit(forceinline=True)
 def invariant_at_potential(c0, rho, table, w, phi):
-    """Invariant of a liquid at rest, w, after its potential is raised by phi [J/kg]: dp / rho = c dw = -d(phi).
+    """Invariant of a liquid at rest where the potential is higher by phi [J/kg] than where the invariant is w.
 
-    Without table, law log: the new c^2 is the old c^2 plus phi. Else a midpoint rule, with an error of (phi / c^2)^3.
+    It satisfies c dw = dp / rho = -d(phi). Law log (table None): exact, the new c^2 is the old c^2 plus phi. Law table:
+    midpoint rule, relative error (phi / c^2)^3.
     """
     if table is None:
         c = c0 - 0.5 * w
@@ -68,7 +71,7 @@ def invariant_at_potential(c0, rho, table, w, phi):
 
 @njit(forceinline=True)
 def pressure(table, rho, r):
-    """(p, dp/dr = c^2) at a deviation from the density rho at rest."""
+    """(deviation of pressure p [Pa], dp/dr = c^2) at a deviation r of density. rho : density at rest"""
     w, slope = invariant(table, r)
     c = (rho + r) * slope
     return state(table, w)[1], c * c
