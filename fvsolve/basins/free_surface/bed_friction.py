@@ -1,8 +1,9 @@
-"""Friction of water on its bed: rates of unit flows, and the division of stages by it.
+"""Friction of water on its bed: its part of the rates of unit flows, and the division of stage rates by 1 + h R.
 
-Manning -g n^2 |q| q / h^(7/3), Darcy -(f / 8) |q| q / h^2, with |q| q / h^2 as |u| u. In thin water the decay rate r of
-a flow is unbounded. SSP methods divide stages by it (`steppers.semi_implicit`); implicit methods solve for it. Other
-explicit methods cap it smoothly at FASTEST, r -> r / (1 + r / FASTEST); thin films are then too fast.
+Rate of the unit flow q [m2/s] in water of depth h: Manning -g n^2 |q| q / h^(7/3), Darcy -(f / 8) |q| q / h^2, both
+-r q with the decay rate r [1/s]. In thin water r is unbounded. SSP methods divide the rates of stages
+(`steppers.semi_implicit`); implicit methods solve for the friction. Other explicit methods cap r smoothly,
+r -> r / (1 + r / RATE_CAP); thin films are then too fast.
 """
 
 from math import sqrt
@@ -17,9 +18,9 @@ TINY = 1e-300
 
 @njit(forceinline=True)
 def cube_root(x):
-    """x^(1/3) to the last bits: a root of x^(1/4) x^(1/16) x^(1/64) by Halley's iteration.
+    """x^(1/3) to round-off: first estimate x^(1/4) x^(1/16) x^(1/64), then Halley's iteration.
 
-    Unlike a power, it vectorises.
+    Unlike a power function, it vectorises.
     """
     a = sqrt(sqrt(x))
     b = sqrt(sqrt(a))
@@ -32,7 +33,10 @@ def cube_root(x):
 
 @njit(forceinline=True)
 def drag_per_flow(law, g, value, depth):
-    """Rate of friction over unit flow [1/m2] at a depth."""
+    """Decay rate r of a flow by friction over its unit flow |q| [1/m2], in water of a given depth [m].
+
+    law, value : MANNING and n [s/m^(1/3)], or DARCY and f [-]
+    """
     h = max(depth, 0.0)
     wet = max(h, THIN)
     share = 2.0 * h / (h * h + wet * wet)
@@ -43,11 +47,11 @@ def drag_per_flow(law, g, value, depth):
 
 @njit
 def add_friction(law, g, coefficient, depth0, dh, qx, qy, content_x, content_y, rate_x, rate_y):
-    """Add -r q to the rates of unit flows.
+    """Add the friction -r q to the rates of n cells; r is the decay rate of the flow [1/s].
 
-    law, coefficient : MANNING n [s/m^(1/3)] or DARCY f [-], float64[n] or float64[1] for all
-    depth0, dh : depth of the profile and deviation from it [m]; qx, qy : unit flows [m2/s]
-    content_x, content_y : quantities whose rates these are: unit flows, or contents of cells
+    law, coefficient : MANNING and n [s/m^(1/3)], or DARCY and f [-]; float64[n], or float64[1] for all cells
+    depth0, dh : depth at rest and deviation from it [m]; qx, qy : unit flows [m2/s]
+    content_x, content_y : quantities q of rate_x, rate_y: unit flows, or unit flows times the stretching of cells
     """
     is_uniform = coefficient.size == 1
     for i in range(dh.size):
@@ -59,9 +63,10 @@ def add_friction(law, g, coefficient, depth0, dh, qx, qy, content_x, content_y, 
 
 @njit
 def add_capped_friction(law, g, coefficient, cap, depth0, dh, qx, qy, content_x, content_y, rate_x, rate_y):
-    """Friction capped as r / (1 + r / cap); returns the greatest decay rate 2 r of errors of the flow [1/s].
+    """Add friction with a capped decay rate, r / (1 + r / cap); return the greatest rate 2 r of errors of a flow [1/s].
 
-    The maximum over all cells prevents vectorisation, and then a power is faster than `cube_root`.
+    The maximum over all cells prevents vectorisation, and then a power is faster than `cube_root`. Arguments: see
+    `add_friction`
     """
     most, is_uniform = 0.0, coefficient.size == 1
     for i in range(dh.size):
@@ -82,10 +87,12 @@ def add_capped_friction(law, g, coefficient, cap, depth0, dh, qx, qy, content_x,
 
 @njit
 def damp_flows(law, g, coefficient, h, depth0, dh, qx, qy, content_x, content_y, rate_x, rate_y, quick_x, quick_y):
-    """Divide rates of unit flows, which include friction -r q, by 1 + h R; quick_x, quick_y become h R.
+    """Divide the rates of unit flows q, which include friction -r q, by 1 + h R, and write h R to quick_x and quick_y.
 
-    R = r + r', with r' the rate of the flow Q that friction alone leaves after a step h: Q (1 + h r') = q + h (rate + r
-    q). R is the slope of friction between both flows along the flow, so the step ends at Q if all flows are collinear.
+    h is the time step and R = r + r'. Here r' is the decay rate of the flow Q that remains if the flow without
+    friction, q + h (rate + r q), is reduced implicitly by friction: Q (1 + h r') = q + h (rate + r q). R is the slope
+    of friction between q and Q, so the step ends at Q if all flows have one direction. Other arguments: see
+    `add_friction`
     """
     is_uniform = coefficient.size == 1
     for i in range(dh.size):

@@ -1,4 +1,4 @@
-"""Rows of tables for a free surface over a bed: the lake at rest, from which its states deviate."""
+"""Rows of the tables of a model for water with a free surface over a bed; states deviate from the lake at rest."""
 
 from __future__ import annotations
 
@@ -40,10 +40,11 @@ SHORE_COURANT_FACTOR = 6.0  # and to sixths of cells under fifth order with a sh
 
 
 def depth_at_start(level: np.ndarray, bed: np.ndarray) -> np.ndarray:
-    """Mean depth of water over cells with a uniform bed at its mean, from `samples` of both : float64[n] [m].
+    """Mean depth of the water in cells whose bed is replaced by its mean : float64[n] [m].
 
-    The mean of max(level - bed, 0). Water of uniform level that a bank cuts off in the cell gets that level over the
-    mean bed instead, because so it stays at rest. This correction decreases as the level follows the bed.
+    The mean of max(level - bed, 0). Where a bank in a cell separates water of uniform level, the depth is instead that
+    of this level over the mean bed, because the water then stays at rest. This correction decreases as the level
+    follows the bed. level, bed : `samples` of both in cells
     """
     deep = level - bed
     wet = deep > ROUNDING * (np.abs(level) + np.abs(bed))
@@ -58,7 +59,7 @@ def depth_at_start(level: np.ndarray, bed: np.ndarray) -> np.ndarray:
 
 
 class FreeSurfaceRows(BasinRows):
-    """Shallow water, states depth [m] and flows per width [m2/s]."""
+    """Rows of the tables of a model for shallow water; states are deviation of depth [m] and flows per width [m2/s]."""
 
     units = {"depth": "m", "surface": "m", "bed": "m", "velocity": "m/s"}
     deep, has_wide_closure, banded = True, False, True
@@ -124,20 +125,20 @@ class FreeSurfaceRows(BasinRows):
 
     @property
     def damped(self) -> bool:
-        """True if stages of steps are divided by friction; not if the body depends on the rates of the flow."""
+        """True if the rates of stages are divided by 1 + h R for friction; not if forces of the water move its body."""
         method, on = METHODS.get(self.case.numerics.method), self.part.on
         is_moved_by_forces = on is not None and any(free_joints(on, self.case.nodes))
         return self.rubs and method is not None and in_euler_steps(method) and not is_moved_by_forces
 
     @property
     def has_rate_cap(self) -> bool:
-        """True if the rate of friction is capped at FASTEST, so that explicit steps can follow it."""
+        """True if the decay rate of flows by friction is capped at RATE_CAP, so that explicit steps can follow it."""
         method = METHODS.get(self.case.numerics.method)
         return self.rubs and method is not None and method.explicit and not self.damped
 
     @property
     def rate_cap(self) -> float:
-        """Cap of the rate of friction [1/s]; infinite where steps need not follow it."""
+        """Cap of the decay rate of flows by friction [1/s]; infinite or NO_CAP without a cap."""
         if self.has_rate_cap:
             return RATE_CAP
         return NO_CAP if self.case.numerics.method == AUTO else math.inf

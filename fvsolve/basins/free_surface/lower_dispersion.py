@@ -1,9 +1,10 @@
 """Check that waves of a free surface are long enough for shallow-water theory.
 
-Waves of wavenumber k have the speed sqrt(g tanh(k h) / k), in shallow water sqrt(g h). e is the surface above that at
-rest, minus its mean. Its k is that of a single wave with the same ratio of e^2 to |grad psi|^2, where -div grad psi =
-e, with zero normal slope at walls. That is the mean of 1 / k^2 over its waves, weighted by their squares, so a steep
-front does not count as a short wave.
+Waves of wavenumber k [1/m] in water of depth h have the speed sqrt(g tanh(k h) / k), in shallow-water theory
+sqrt(g h). The wavenumber of a surface follows from its elevation e above that at rest, minus the mean:
+1 / k^2 = mean |grad psi|^2 / mean e^2, where -div grad psi = e with zero normal slope at walls. This is the mean of
+1 / k^2 over the waves of the surface, weighted by the squares of their amplitudes, so a steep front does not count as
+a short wave.
 """
 
 from __future__ import annotations
@@ -25,7 +26,11 @@ LEAST_AT_START, LEAST_IN_RUN = (
 
 
 class SurfaceWaves(NamedTuple):
-    """Fraction by which real waves are slower, wavenumber [1/m], mean depth of wet cells [m]."""
+    """Properties of the waves of a basin.
+
+    speed_error : fraction by which real waves are slower than in shallow-water theory; k : wavenumber [1/m]
+    depth : mean depth of wet cells [m]
+    """
 
     speed_error: float
     k: float
@@ -36,9 +41,9 @@ NO_WAVES = SurfaceWaves(0.0, math.nan, math.nan)
 
 
 def surface_waves(basin, y: np.ndarray, seen: float = LEAST_AT_START) -> SurfaceWaves:
-    """Waves of a basin at deviations y.
+    """Waves of a basin at deviations y from rest : float64[quantities, n].
 
-    `NONE` if the root mean square of the surface is below `seen` times the depth.
+    `NO_WAVES` if the root mean square of the surface is below `seen` times the mean depth.
     """
     depth, area = basin.depth + y[0], basin.mesh.area
     wet = depth > 0.0
@@ -56,7 +61,7 @@ def surface_waves(basin, y: np.ndarray, seen: float = LEAST_AT_START) -> Surface
 
 
 def waves_in_run(basin, y: np.ndarray) -> SurfaceWaves:
-    """Waves of a basin during a run."""
+    """Waves of a basin at deviations y during a run, with the larger threshold LEAST_IN_RUN."""
     return surface_waves(basin, y, LEAST_IN_RUN)
 
 
@@ -67,7 +72,7 @@ def is_even(basin) -> bool:
 
 
 def on_grid(basin, surface: np.ndarray) -> float:
-    """Mean of |grad psi|^2 on a uniform grid, by a cosine transform."""
+    """Area mean of |grad psi|^2 with -div grad psi = surface, on a grid of equal rectangles, by a cosine transform."""
     from scipy.fft import dctn
 
     grid = basin.mesh.grid
@@ -79,7 +84,7 @@ def on_grid(basin, surface: np.ndarray) -> float:
 
 
 def on_mesh(basin, surface: np.ndarray) -> float:
-    """Mean of |grad psi|^2 on any mesh, by differences across faces."""
+    """Area mean of |grad psi|^2 with -div grad psi = surface, on a mesh of any cells, by differences across faces."""
     from scipy.sparse import coo_array
     from scipy.sparse.linalg import spsolve
 
@@ -96,7 +101,7 @@ def on_mesh(basin, surface: np.ndarray) -> float:
 
 
 def notice(basin, waves: tuple[float, float, float], when: str = "") -> Notice:
-    """Notice that waves are too short, with the time. waves : values of `SurfaceWaves`"""
+    """Notice that waves are too short for shallow-water theory. waves : a `SurfaceWaves`; when : text of the time"""
     wrong, k, depth = waves
     long, deep = (basin.case.amount(value, "length", 3) for value in (2.0 * math.pi / k, depth))
     text = (
@@ -107,18 +112,18 @@ def notice(basin, waves: tuple[float, float, float], when: str = "") -> Notice:
 
 
 def notices(basin, y: np.ndarray) -> list[Notice]:
-    """Notice if waves of a basin are too short at deviations y."""
+    """List of the notice that waves at deviations y are too short for shallow-water theory; empty if they are not."""
     state = surface_waves(basin, y)
     return [notice(basin, state)] if state.speed_error > NOTICE_ERROR else []
 
 
 def watches(basin, y: np.ndarray) -> list[ErrorWatch]:
-    """Check of a run for waves that are too short; none if those at deviations y are."""
+    """List of the check for too short waves during a run; empty if there is already a notice at deviations y."""
     return [] if notices(basin, y) else [ErrorWatch(basin, waves_in_run, notice, NOTICE_ERROR)]
 
 
 def body_notices(basin) -> list[Notice]:
-    """Notice if water in a basin on a body is too deep for shallow-water theory, with the better model."""
+    """List of the notice that water in a basin on a body is too deep for shallow-water theory; empty if it is not."""
     mode = slowest(basin.part, basin.mesh) if basin.part.on else None
     if mode is None or mode.excess <= 100.0 * NOTICE_ERROR:
         return []

@@ -1,4 +1,4 @@
-"""Thin films of water with a wrong speed: under `upwind` on steep beds, or under a cap on friction."""
+"""Checks for thin films of water with a wrong speed: with `upwind` on steep beds, or with a cap on friction."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ REPEAT_FACTOR = 1.2  # factor on the error at the start above which a run gives 
 
 
 def slow_film_error(basin, y: np.ndarray) -> tuple[float, float, float]:
-    """(1 - speed over the correct speed, depth, fall of the bed between cells [m]) of the deepest film at deviations y.
+    """Error of the deepest film that is too slow at deviations y, as three numbers.
 
-    Both sides of a face use the higher bed. So the force on a film of depth h above a fall d > h is g h^2 / 2 instead
-    of g h d. Its speed is sqrt(h / (2 d)) of the correct one (Delestre et al. 2012, arXiv 1206.4986).
+    They are 1 - speed / correct speed, depth [m], and fall of the bed to the next cell [m]. Both sides of a face use
+    the higher bed. So the force on a film of depth h above a fall d > h is g h^2 / 2 instead of g h d, and its speed is
+    sqrt(h / (2 d)) of the correct one (Delestre et al. 2012, arXiv 1206.4986).
     """
     mesh, depth = basin.mesh, basin.depth_of(y)
     left, right = mesh.left[: mesh.inner], mesh.right[: mesh.inner]
@@ -35,10 +36,11 @@ def slow_film_error(basin, y: np.ndarray) -> tuple[float, float, float]:
 
 
 def fast_film_error(basin, y: np.ndarray) -> tuple[float, float, float]:
-    """(speed over the correct speed - 1, mean depth [m], mean rate of friction [1/s]), all means over the flow.
+    """Mean error of films that are too fast at deviations y, as three numbers.
 
-    Friction that balances a slope at r (u) = C u is capped at r / (1 + r / FASTEST): u^2 is 1 + r / FASTEST times too
-    great.
+    They are speed / correct speed - 1, depth [m], and decay rate of the flow by friction [1/s], all averaged with the
+    flow as weight. If friction at the rate r = C u balances a slope and is capped as r / (1 + r / RATE_CAP), then u^2
+    is too great by the factor 1 + r / RATE_CAP.
     """
     depth, part = basin.depth_of(y), basin.part
     flow = np.where(depth > DRY_DEPTH, np.hypot(y[1], y[2]) * basin.mesh.area, 0.0)
@@ -52,7 +54,7 @@ def fast_film_error(basin, y: np.ndarray) -> tuple[float, float, float]:
 
 
 def slow_film_notice(basin, error: tuple[float, float, float], when: str = "") -> Notice:
-    """Notice that films are too slow, with the time."""
+    """Notice that films are too slow. error : result of `slow_film_error`; when : text of the time"""
     deep, fall = (basin.case.amount(value, "length", 3) for value in error[1:])
     text = (
         f"{basin.name}: films down a slope{when}: under upwind {deep} of water, where the bed falls by {fall} from "
@@ -63,7 +65,7 @@ def slow_film_notice(basin, error: tuple[float, float, float], when: str = "") -
 
 
 def fast_film_notice(basin, error: tuple[float, float, float], when: str = "") -> Notice:
-    """Notice that films are too fast, with the time."""
+    """Notice that films are too fast. error : result of `fast_film_error`; when : text of the time"""
     remedy = 'method = "rodas-5p"' if basin.part.on is not None else 'method = "ssp-rk3" or "ssp-rk2"'
     deep, method = basin.case.amount(error[1], "length", 3), basin.case.numerics.method
     text = (
@@ -74,7 +76,7 @@ def fast_film_notice(basin, error: tuple[float, float, float], when: str = "") -
 
 
 def watches(basin, y: np.ndarray) -> list[ErrorWatch]:
-    """Checks of a run for films with greater errors than at the deviations y."""
+    """Checks during a run for films with a greater error than at the deviations y at its start."""
     return [
         ErrorWatch(basin, look, notice, max(NOTICE_ERROR, REPEAT_FACTOR * look(basin, y)[0]))
         for look, notice in film_checks(basin)
@@ -82,11 +84,11 @@ def watches(basin, y: np.ndarray) -> list[ErrorWatch]:
 
 
 def notices(basin, y: np.ndarray) -> list[Notice]:
-    """Notices of films at deviations y."""
+    """Notices of films whose speed is wrong at deviations y."""
     return [notice(basin, error) for look, notice in film_checks(basin) if (error := look(basin, y))[0] > NOTICE_ERROR]
 
 
 def film_checks(basin) -> list[tuple]:
-    """Kinds of films with a wrong speed in a basin: (function for the greatest error, function for its notice)."""
+    """Checks for films that apply to a basin, as pairs (function for the error, function for its notice)."""
     pairs = [(slow_film_error, slow_film_notice)] if basin.scheme == "upwind" else []
     return [*pairs, (fast_film_error, fast_film_notice)] if basin.has_rate_cap else pairs

@@ -1,4 +1,4 @@
-"""Keys and fields of water with a free surface."""
+"""Keys of the case file for water with a free surface, and its output fields."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fvsolve.parts.value import VALUE, Quantity, UsualRange, anything, nonnegati
 
 
 class SurfaceStart(VelocityStart):
-    """Start of water that is not at rest."""
+    """Keys of the table `start` of water that is not at rest at the start."""
 
     level: Annotated[
         SpatialField | None, SpatialFieldKey("length", "level of the free surface above the elevation [m]")
@@ -20,7 +20,10 @@ class SurfaceStart(VelocityStart):
 
 
 class FreeSurface(Physics, name="free-surface"):
-    """h_t + div q = 0, q_t + div(q q / h + g h^2 / 2) = -g h grad(bed) - friction."""
+    """Basin of shallow water: h_t + div q = 0, q_t + div(q q / h + g h^2 / 2) = -g h grad(bed) - friction.
+
+    Depth h [m], flow per width q [m2/s].
+    """
 
     states: ClassVar[dict[str, str]] = {"depth": "m", "flow_x": "m2/s", "flow_y": "m2/s"}
     fields: ClassVar[dict[str, str]] = {"depth": "level", "surface": "level", "bed": "level", **VELOCITY_FIELDS}
@@ -63,7 +66,12 @@ class FreeSurface(Physics, name="free-surface"):
 
     @classmethod
     def rest(cls, basin, mean, cells, area) -> dict[str, Any]:
-        """Profile at a patch: mean height of the bed under water there, or of its lowest cells if all are dry."""
+        """Elevation [m], depth [m] and pressure (None) of the node of a patch at rest.
+
+        The elevation is the mean height of the bed in those of `cells` that are under water, or in the lowest if all
+        are dry.
+        mean : function for cell means of a field; cells : indices of the cells next to the patch; area : their weights
+        """
         bed = mean(basin.bed)
         cells = cells[bed[cells] <= max(bed[cells].min(), np.nextafter(basin.level, -np.inf))]
         height = float(np.average(bed[cells], weights=area[cells]))

@@ -28,7 +28,11 @@ OWN_CODE = physics_code(__package__)
 
 @njit
 def through_faces(begin, stop, kx, ky, flow_x, flow_y):
-    """Convert flows per width to flows through faces of rows `begin` to `stop`."""
+    """Convert flows per width [m2/s] to flows through the faces [m3/s] of rows `begin` to `stop` of a grid, in place.
+
+    kx, ky : 1 / widths of columns, 1 / heights of rows [1/m]
+    flow_x, flow_y : flows through the faces normal to x and to y
+    """
     nx = kx.size
     for j in range(begin, stop):
         high = 1.0 / ky[j]
@@ -42,7 +46,7 @@ def through_faces(begin, stop, kx, ky, flow_x, flow_y):
 
 @njit
 def add_bed_friction(tables, b, a, z, y, rates, out):
-    """Add friction to rates of cells `a` to `z` of water; where friction is capped, it limits the step."""
+    """Add bed friction to the rates of cells `a` to `z` of basin b; capped friction also limits the time step."""
     basin = tables.basins[b]
     n, o, seen, roughness = (
         basin["n"],
@@ -66,7 +70,7 @@ def add_bed_friction(tables, b, a, z, y, rates, out):
 
 @njit
 def damp_stages(h, y, rates, quick, handle):
-    """Divide rates of a stage of all basins by friction over a step h."""
+    """Divide the rates of a stage in all basins that need it by 1 + h R for friction; see `bed_friction.damp_flows`."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
@@ -84,14 +88,17 @@ def damp_stages(h, y, rates, quick, handle):
 
 @njit
 def finish_water(tables, b, rate, out):
-    """Record flows through an open boundary, and the rate that limits the step."""
+    """Write the flows of basin b through open patches, and its rate [1/s], which limits the time step, to `out`."""
     put_open_flows(tables, b, tables.settings[0]["rho"], out)
     out[RATE] = max(out[RATE], tables.basins[b]["unsplit"] * rate)
 
 
 @njit
 def finish_block(tables, b, row, block_stop, first, last, y, rates, out):
-    """Add friction to rates of columns `first` to `last` of these rows; then form the end of the step, or check it."""
+    """Add bed friction to the rates of columns `first` to `last` of rows `row` to `block_stop`.
+
+    Then form the state at the end of the step in these cells, or check that it is finite, as `tables.sums` requests.
+    """
     basin, sums, nx = tables.basins[b], tables.sums, tables.basins[b]["nx"]
     if basin["friction"] != NO_DRAG:
         if first == 0 and last == nx:
@@ -108,7 +115,10 @@ def finish_block(tables, b, row, block_stop, first, last, y, rates, out):
 
 @njit
 def by_blocks(tables, b, g, kx, ky, reflect, plan, dh, qx, qy, through, work, y, rates, out):
-    """Compute `surface_grid.grid_rates` block by block, with friction; form the requested stages in the same pass."""
+    """Compute `surface_grid.grid_rates` and friction block by block, and return the greatest rate [1/s].
+
+    The sums of Runge-Kutta stages requested in `tables.sums` are formed in the same pass.
+    """
     basin, empty, most = tables.basins[b], tables.work[:0], 0.0
     nx, ny, n, begin, stop = basin["nx"], basin["ny"], basin["n"], tables.bands[2 * b], tables.bands[2 * b + 1]
     for first in range(0, nx, surface_grid.MAX_COLUMNS):
@@ -135,7 +145,10 @@ def by_blocks(tables, b, g, kx, ky, reflect, plan, dh, qx, qy, through, work, y,
 
 @njit
 def on_grid(tables, b, y, dydt, out, moves):
-    """Rates of cells of a rectangle, of contents if walls move. moves : None, or as in `surface_grid.grid_rates`"""
+    """Write the rates of the cells of basin b, a grid. moves : None, or as in `surface_grid.grid_rates`
+
+    If walls move, the rates are those of depths and flows times the stretching of cells.
+    """
     st, plane, work, basin = tables.settings[0], tables.plane, tables.work, tables.basins[b]
     n, o, at, k, f = basin["n"], basin["y"], basin["plan"], basin["spacing"], basin["flows"]
     nx, ny, through, g = basin["nx"], basin["ny"], basin["through"], normal_gravity(st, plane, basin)
@@ -168,7 +181,7 @@ def on_grid(tables, b, y, dydt, out, moves):
 
 @njit
 def rates_on_grids(t, y, dydt, out, handle):
-    """Rates of cells of rectangles without moving walls."""
+    """Write the rates of all basins of water on grids without moving walls."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
@@ -178,7 +191,10 @@ def rates_on_grids(t, y, dydt, out, handle):
 
 @njit
 def on_mesh(tables, b, y, dydt, out, moves):
-    """Rates of cells of any mesh, of contents if walls move. moves : None, or as in `surface_mesh.shallow_rates`"""
+    """Write the rates of the cells of basin b, a mesh. moves : None, or as in `surface_mesh.shallow_rates`
+
+    If walls move, the rates are those of depths and flows times the stretching of cells.
+    """
     st, plane, work, integers = tables.settings[0], tables.plane, tables.work, tables.integers
     basin = tables.basins[b]
     n, o, at, f, through = basin["n"], basin["y"], basin["plan"], basin["flows"], basin["through"]
@@ -219,7 +235,7 @@ def on_mesh(tables, b, y, dydt, out, moves):
 
 @njit
 def rates_on_meshes(t, y, dydt, out, handle):
-    """Rates of cells of any mesh without moving walls."""
+    """Write the rates of all basins of water on meshes of any cells without moving walls."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]

@@ -1,6 +1,7 @@
 """Power and stored energy of water with a free surface.
 
-The stored energy per area is rho (g h^2 / 2 + g h z_bed + |q|^2 / (2 h)). For the rows see `basin_energy`.
+The stored energy per area is rho (g h^2 / 2 + g h z + |q|^2 / (2 h)): depth h [m], elevation z of the bed [m], flow per
+width q [m2/s]. For the rows of the array `power` see `basin_energy`.
 """
 
 from math import sqrt
@@ -19,14 +20,14 @@ OWN_CODE = physics_code(__package__)
 
 @njit(forceinline=True)
 def velocity_factor(depth):
-    """Velocity over unit flow at a depth [1/m]."""
+    """Velocity over unit flow [1/m] at a depth [m]: 1 / depth, but towards 0 below the depth THIN."""
     wet = max(depth, THIN)
     return 2.0 * depth / (depth * depth + wet * wet)
 
 
 @njit
 def add_power(t, y, dydt, out, handle, power):
-    """Write the rows of its basins: losses at patches, friction, rate of storage."""
+    """Write losses at patches, power of friction and rate of storage [W] of all basins of water to `power`."""
     tables = open_tables(handle)
     patches, layout = tables.patches, tables.layout[0]
     for b in range(tables.basins.size):
@@ -42,7 +43,10 @@ def add_power(t, y, dydt, out, handle, power):
 
 @njit
 def water_power(st, basin, plane, y, dydt, rows):
-    """Friction, capped as in the rates, and rate of storage of water with a free surface."""
+    """Write the power of friction to rows[2] and the rate of storage to rows[3] of a basin [W].
+
+    Friction is capped as in the rates of the cells.
+    """
     n, o = basin["n"], basin["y"]
     depths, surface = plane[basin["plan"] :], plane[basin["plan"] + n :]
     weight, rest, area = st["rho"] * st["gravity"], rest_potential(st, basin), plane[basin["area"] :]
@@ -62,7 +66,10 @@ def water_power(st, basin, plane, y, dydt, rows):
 
 @njit
 def drag_power(st, basin, depth, flow, square):
-    """Power of bed friction per area [W/m2]. square : of the velocity"""
+    """Power dissipated by bed friction per area [W/m2].
+
+    depth [m]; flow : unit flow [m2/s]; square : square of the velocity [m2/s2]
+    """
     if basin["friction"] == NO_DRAG:
         return 0.0
     rate = drag_per_flow(basin["friction"], st["gravity"], basin["roughness"], depth) * flow
@@ -71,7 +78,7 @@ def drag_power(st, basin, depth, flow, square):
 
 @njit
 def patch_loss(tables, patch, flow, y):
-    """Power lost by `flow` [kg/s] into the cells at a patch, or out of them [W]; see `surface_patches`."""
+    """Power lost where `flow` [kg/s] enters the cells at a patch, or leaves them if negative [W]."""
     st, basin, plane, integers = (
         tables.settings[0],
         tables.basins[patch["basin"]],
@@ -102,7 +109,7 @@ def patch_loss(tables, patch, flow, y):
 
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
-    """Write the stored energy of its basins."""
+    """Write the stored energy [J] of all basins of water to `stored`, relative to that at rest."""
     tables = open_tables(handle)
     st, basins, plane = tables.settings[0], tables.basins, tables.plane
     weight = st["rho"] * st["gravity"]

@@ -1,8 +1,8 @@
-"""Fifth-order values of shallow water at faces, where it is deep enough.
+"""Fifth-order values of shallow water at faces, where the water is deep enough.
 
-Depth, surface and unit flows are reconstructed from cell means; velocities are their quotients. The integral of h de/dx
-over a cell is exact for cubics: the product of the parabolas through both face values and the mean, plus the products
-of third differences with second differences.
+Depth h, surface e and unit flows are reconstructed from cell means; velocities are unit flows over depth. The integral
+of h de/dx over a cell is exact for cubics: the product of the parabolas through both face values and the mean, plus
+the products of third differences with second differences.
 """
 
 from math import sqrt
@@ -18,13 +18,16 @@ LEAST_DEPTH_RATIO = 0.5  # shallowest of five depths over the deepest, below whi
 
 @njit
 def value_upwind5(a, b, c, d, e):
-    """Fifth-order value at the face after c."""
+    """Fifth-order upwind value at the face between c and d, from the averages a to e of five consecutive cells."""
     return ((2.0 * a - 13.0 * b) + (47.0 * c + 27.0 * d) - 3.0 * e) / 60.0
 
 
 @njit
 def put_smooth_flags(p, q, r, s, t, deep):
-    """Set `deep` to 1 where the shallowest of five cells has more than the fraction STEEP of the deepest, else to 0."""
+    """Set `deep` to 1 where the least of five depths exceeds LEAST_DEPTH_RATIO times the greatest, else to 0.
+
+    p, q, r, s, t : depths in five consecutive cells
+    """
     for i in range(deep.size):
         least = min(min(min(p[i], q[i]), min(s[i], t[i])), r[i])
         most = max(max(max(p[i], q[i]), max(s[i], t[i])), r[i])
@@ -33,7 +36,10 @@ def put_smooth_flags(p, q, r, s, t, deep):
 
 @njit
 def put_fifth(scheme, p, q, r, s, t, deep, low, high):
-    """Values at both faces of a row of cells r, where `deep` is 1."""
+    """Write the values at the face before (low) and after (high) each cell r where `deep` is 1.
+
+    p, q, r, s, t : averages of five consecutive cells; scheme : WENO5 or LINEAR
+    """
     if scheme == WENO5:
         for i in range(deep.size):
             a = value_weno5(t[i], s[i], r[i], q[i], p[i], SMALL)
@@ -48,7 +54,10 @@ def put_fifth(scheme, p, q, r, s, t, deep, low, high):
 
 @njit
 def put_velocities(g, deep, side):
-    """Velocities from unit flows where `deep` is 1, and wave speeds."""
+    """Convert unit flows at faces to velocities where `deep` is 1, and write wave speeds, in place.
+
+    side : rows of depth, surface, unit flows and wave speed of the faces, at the distance STRIDE
+    """
     for i in range(deep.size):
         depth = max(side[i], 0.0)
         wet = max(depth, THIN)
@@ -58,7 +67,11 @@ def put_velocities(g, deep, side):
 
 @njit
 def put_push(h, deep, hl, hr, el, er, ph, qh, sh, th, pe, qe, re, se, te, push):
-    """Integral of h de/dx over cells where `deep` is 1, from values at both faces and the means of five cells."""
+    """Write the integrals of h de/dx over the cells where `deep` is 1 [m2].
+
+    h, re : mean depth and surface of a cell; hl, hr, el, er : depth and surface at the faces before and after it
+    ph, qh, sh, th, pe, qe, se, te : means of depth and surface in the two cells on either side
+    """
     for i in range(push.size):
         h2, e2 = 3.0 * ((hl[i] + hr[i]) - 2.0 * h[i]), 3.0 * ((el[i] + er[i]) - 2.0 * re[i])
         h3, e3 = 0.5 * ((th[i] - ph[i]) - 2.0 * (sh[i] - qh[i])), 0.5 * ((te[i] - pe[i]) - 2.0 * (se[i] - qe[i]))
@@ -68,7 +81,11 @@ def put_push(h, deep, hl, hr, el, er, ph, qh, sh, th, pe, qe, re, se, te, push):
 
 @njit
 def put_smooth(g, scheme, p, q, r, s, t, sides, deep):
-    """Replace limited values at both faces of a row of cells r by fifth-order values, from two cells on either side."""
+    """Replace the limited values at both faces of a row of cells by fifth-order values where the water is deep enough.
+
+    p, q, r, s, t : blocks of the cells two and one before, of the cells, and one and two after; see `surface_rows`
+    sides : values at both faces; deep : work array, 1 where the values are replaced
+    """
     low, high = sides, sides[HIGH:]
     put_smooth_flags(p, q, r, s, t, deep)
     for f in range(4):

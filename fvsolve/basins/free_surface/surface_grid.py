@@ -54,20 +54,23 @@ MOVING = WORK + 3 * STRIDE
 
 @njit
 def copy(source, target):
-    """target = source[: target.size]."""
+    """Copy the first target.size values of `source` to `target`."""
     for i in range(target.size):
         target[i] = source[i]
 
 
 @njit
 def ring_offset(j, i):
-    """Offset of cell i of row j in the ring."""
+    """Offset of cell i of row j in the ring buffer of rows."""
     return (j & (RING - 1)) * BLOCK + GHOSTS + i
 
 
 @njit
 def factors_of(j, left, right, moves, scratch):
-    """(wide, narrow) of columns of row j, see `basins.cell_stretching`."""
+    """Area over undeformed area, and its reciprocal, of the columns `left` to `right` of row j, two arrays.
+
+    moves : as in `grid_rates`; scratch : work array
+    """
     wide, narrow = moves[3], moves[4]
     if moves[0].size > 0:
         return wide[left:right], narrow[left:right]
@@ -79,9 +82,10 @@ def factors_of(j, left, right, moves, scratch):
 
 @njit
 def put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, work, top, moves):
-    """Columns `first` to `last` of row j of cells with ghost cells.
+    """Write columns `first` to `last` of row j of cells, with ghost cells, to the ring buffer.
 
-    A row beyond the grid is computed from earlier rows.
+    A row beyond the grid is computed from earlier rows. fifth : True for fifth order; top : greatest rate of each
+    column so far [1/s]; other arguments as in `grid_rates`
     """
     ring = work[: RING * BLOCK]
     fields, left, right = FIELDS if fifth else FLOW_EAST // STRIDE, max(first - GHOSTS, 0), min(last + GHOSTS, nx)
@@ -123,9 +127,10 @@ def put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy,
 
 @njit
 def close_walls(g, speed, rest, side, f, thrust):
-    """Set the mass flow through a row of moving boundary faces to zero.
+    """Set the mass flow through a row of boundary faces of moving walls to zero, and write the thrust on them.
 
-    Write the thrust minus that of the depth at rest.
+    speed : speed of the faces [m/s]; rest : depths at rest of the cells; side : depths at the faces; f : fluxes
+    thrust : thrust minus that of the depth at rest, over density and length [m3/s2]
     """
     for i in range(thrust.size):
         if speed != 0.0:
@@ -138,21 +143,22 @@ def grid_rates(
     g, scheme, limiter, nx, ny, begin, stop, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y, through, work, rate_h,
     rate_x, rate_y, moves,
 ):  # fmt: skip
-    """Rates of the cells of rows `begin` to `stop`; returns the greatest (|u| + c) kx + (|v| + c) ky [1/s].
+    """Write the rates of the cells of rows `begin` to `stop`; return the greatest (|u| + c) kx + (|v| + c) ky [1/s].
 
-    Rows are those of the whole grid; neighbours within the stencil of the scheme are read too.
-    scheme : UPWIND, MUSCL, LINEAR (upwind5) or WENO5
+    Rows are counted over the whole grid; neighbours within the stencil of the scheme are read too.
+    g : gravity normal to the basin [m/s2]; scheme : UPWIND, MUSCL, LINEAR (upwind5) or WENO5
     kx float64[nx], ky float64[ny] : 1 / widths of columns and rows [1/m]
-    reflect : float64[2 (nx + ny)], 1 a wall and 0 open, west, east, south, north; or empty, walls all around
-    plan : float64[PLANS, n], depth of the profile at rest and its surface above the level [m]
-    dh, qx, qy : float64[n] deviation of depth from the profile [m], unit flows [m2/s]; their contents if lines move
-    flow_x : float64[ny (nx + 1)], flow_y : float64[(ny + 1) nx] flows of depth through faces [m2/s], or empty
-    through : float64[2 (nx + ny)]  inward flows through boundary faces [m3/s], in the order of reflect, or empty
+    reflect : float64[2 (nx + ny)]  1 for a wall and 0 for open, in the order west, east, south, north; empty: all walls
+    plan : float64[PLANS, n]  depth at rest and surface at rest above the level [m]
+    dh, qx, qy : float64[n]  deviation of depth from rest [m], unit flows [m2/s]; if lines move, times the stretching
+    flow_x : float64[ny (nx + 1)], flow_y : float64[(ny + 1) nx]  volume flows per width through faces [m2/s], or empty
+    through : float64[2 (nx + ny)]  inward flows through boundary faces [m3/s], in the order of `reflect`, or empty
     work : float64[WORK], fastest if aligned to a cache line; float64[MOVING] if lines move
-    moves : None, or a tuple: speeds of lines along x and along y [m/s], float64[nx + 9] and float64[ny + 9], empty if
-    they
-    do not move; array float64[2 (nx + ny)] for the thrust on boundary faces minus that at rest, over density [m2/s2];
-    stretching `wide` of columns or rows and its reciprocal `narrow`, see `basins.cell_stretching`
+    rate_h, rate_x, rate_y : float64[n]  rates of dh, qx, qy
+    moves : None without moving walls, else a tuple of
+        speeds of the grid lines x = constant and y = constant [m/s], float64[nx + 9] and float64[ny + 9], empty if at
+        rest float64[2 (nx + ny)]  thrust on boundary faces minus that at rest, over density and length [m3/s2]
+        `wide` : area over undeformed area of columns or rows, and its reciprocal `narrow`, see `basins.cell_stretching`
     """
     most = 0.0
     for first in range(0, nx, MAX_COLUMNS):
@@ -170,9 +176,10 @@ def column_rates(
     g, scheme, limiter, nx, ny, begin, stop, fresh, first, last, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y,
     through, work, rate_h, rate_x, rate_y, moves,
 ):  # fmt: skip
-    """Rates of columns `first` to `last`, at most MOST, row by row; arguments as in `grid_rates`.
+    """Write the rates of columns `first` to `last`, at most MAX_COLUMNS, row by row; return their greatest rate [1/s].
 
-    fresh : False if the last call ended at `begin` with the same work; then its results are reused
+    fresh : False if the last call ended at row `begin` with the same `work`; then its results are used again
+    Other arguments as in `grid_rates`
     """
     n, fifth = last - first, scheme == LINEAR or scheme == WENO5
     ring, at = work[: RING * BLOCK], RING * BLOCK

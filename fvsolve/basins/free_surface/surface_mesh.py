@@ -1,8 +1,8 @@
-"""Shallow water on any mesh: rates of depth and flow.
+"""Shallow water on a mesh of any cells: rates of depth and flow.
 
 The scheme is that of the grid (`surface_grid`), with least-squares gradients and a common limiter for all sides of a
-cell. Pressures are relative to that of the cell, and the force of the bed to its surface. So every term is zero where
-the surface is level: a lake at rest stays at rest, with dry islands too.
+cell. Pressures at sides are relative to the pressure in the cell, and the force of the bed is relative to the surface
+of the cell. So every term is zero where the surface is level: a lake at rest stays at rest, with dry islands too.
 """
 
 from math import sqrt
@@ -43,7 +43,10 @@ ROWS = 14
 
 @njit
 def put_primitives(g, depth0, surface0, dh, qx, qy, h, e, u, v, c):
-    """Depth, surface, both velocities and wave speed of cells."""
+    """Write depth h, surface e, velocities u, v and wave speed c of cells.
+
+    depth0, surface0 : depth and surface at rest [m]; dh, qx, qy : deviation of depth [m], unit flows [m2/s]
+    """
     for i in range(dh.size):
         depth = max(depth0[i] + dh[i], 0.0)
         wet = max(depth, THIN)
@@ -54,7 +57,12 @@ def put_primitives(g, depth0, surface0, dh, qx, qy, h, e, u, v, c):
 
 @njit
 def put_mirror_velocities(edges, ring, nx, ny, number, reflect, u, v, shown_u, shown_v, moves):
-    """Velocities beyond the boundary, mirrored; at a moving side u becomes 2 w - u."""
+    """Write mirrored velocities beyond boundary sides, from which gradients in cells are computed.
+
+    At a side that moves outward at the speed w, the normal velocity u becomes 2 w - u.
+    edges : boundary sides; nx, ny : outward normals; number : numbers of the boundary faces; reflect : 1 for walls, 0
+    for open faces; u, v : velocities of cells; shown_u, shown_v : velocities beyond; moves : as in `shallow_rates`
+    """
     for q in range(edges.size):
         i = ring_place(edges[q], ring)
         r = reflect[number[q]] if reflect.size > 0 else 1.0
@@ -67,7 +75,10 @@ def put_mirror_velocities(edges, ring, nx, ny, number, reflect, u, v, shown_u, s
 
 @njit
 def put_mirror_sides(edges, nx, ny, number, reflect, ul, vl, w, moves):
-    """Write mirrored velocities beyond boundary sides."""
+    """Write mirrored velocities beyond boundary sides to `w`, from the velocities ul, vl at the sides inside.
+
+    Other arguments: see `put_mirror_velocities`
+    """
     for q in range(edges.size):
         i = edges[q] % BLOCK
         r = reflect[number[q]] if reflect.size > 0 else 1.0
@@ -80,9 +91,11 @@ def put_mirror_sides(edges, nx, ny, number, reflect, ul, vl, w, moves):
 
 @njit
 def add_side_fluxes(g, h0, e0, c0, hl, el, ul, vl, geo, w, speeds):
-    """Subtract from the rates of a block of cells the outflow through one side of each (HLLC).
+    """Subtract the outflow through one side of each cell of a block (HLLC flux) from the rates in `w`.
 
-    speeds : of the sides [m/s], None if they do not move: the flux F(U) - w U is computed in moving axes
+    h0, e0, c0 : depth, surface and wave speed of the cells; hl, el, ul, vl : depth, surface and velocities at the side
+    from inside; `w` contains those from beyond; geo : geometry of the side
+    speeds : None, or speeds of moving sides along their outward normals [m/s]; the flux is then relative to the side
     """
     half = 0.5 * g
     for i in range(BLOCK):
@@ -113,7 +126,7 @@ def add_side_fluxes(g, h0, e0, c0, hl, el, ul, vl, geo, w, speeds):
 
 @njit
 def close_walls(g, edges, number, reflect, rest, h0, geo, w, thrust):
-    """Set the mass flow through walls to zero; write the thrust on them minus that of the depth at rest."""
+    """Set the mass flow through walls to zero; write the thrust on them minus the thrust of the depth at rest."""
     for q in range(edges.size):
         i = edges[q] % BLOCK
         thrust[number[q]] = w[_PUSH + i] + 0.5 * g * ((h0[i] - rest[i]) * (h0[i] + rest[i]))
@@ -124,35 +137,38 @@ def close_walls(g, edges, number, reflect, rest, h0, geo, w, thrust):
 
 @njit
 def clear(w):
-    """Set rates and sums to zero."""
+    """Set the rates of a block of cells, and their sums for the limit of the time step, to zero."""
     for i in range(BLOCK):
         w[_RH + i], w[_RX + i], w[_RY + i], w[_FAST + i], w[_OUTFLOW + i] = 0.0, 0.0, 0.0, 0.0, 0.0
 
 
 @njit
 def put_shores(h, shore):
-    """Allowed deviation of the surface at the sides of a block of cells: 0 where the bed is dry."""
+    """Write the allowed deviation of the surface at the sides from that in the cell: 0 in dry cells, else HUGE."""
     for i in range(BLOCK):
         shore[i] = HUGE if h[i] > 0.0 else 0.0
 
 
 @njit
 def put_max_rate(w, top):
-    """Greatest rate so far in each lane: half the sum of wave speeds over sides, or the total outflow."""
+    """Update the greatest rates that limit the step: half the sum of wave speeds over sides, or the outflow [1/s]."""
     for i in range(BLOCK):
         top[i] = max(top[i], max(0.5 * w[_FAST + i], w[_OUTFLOW + i]))
 
 
 @njit
 def put_rates(w, rate_h, rate_x, rate_y):
-    """Rates of a block of cells."""
+    """Copy the rates of a block of cells from `w` to their arrays."""
     for i in range(rate_h.size):
         rate_h[i], rate_x[i], rate_y[i] = w[_RH + i], w[_RX + i], w[_RY + i]
 
 
 @njit
 def put_flow(where, w, length, flow):
-    """Flows through the faces whose normal points outwards from these cells."""
+    """Write the flows through the faces whose normals point outwards from the cells of a block [m3/s].
+
+    where : face of each side, negative where the normal points inwards; length : lengths of faces [m]
+    """
     for i in range(BLOCK):
         if where[i] >= 0:
             flow[where[i]] = w[_MASS + i] * length[where[i]]
@@ -160,7 +176,7 @@ def put_flow(where, w, length, flow):
 
 @njit
 def work_size(integers):
-    """Length of the work array of `shallow_rates`."""
+    """Length of the work array of `shallow_rates`. integers : as there"""
     return 21 * integers[4] * BLOCK + 2 * integers[3] + ROWS * BLOCK
 
 
@@ -169,18 +185,24 @@ def shallow_rates(
     g, scheme, wide_by, floats, integers, reflect, plan, dh, qx, qy, flow, through, work, rate_h, rate_x, rate_y,
     moves,
 ):  # fmt: skip
-    """Rates of all cells.
+    """Write the rates of all cells of a mesh; return the greatest rate that limits the time step [1/s].
 
-    Returns the greatest of sum L (|u| + c) / (2 A) and of the outflow over a cell's volume [1/s].
-
-    Euler steps up to half of its inverse, 1 / (2 rate), leave no depth below zero.
-    scheme : UPWIND or MUSCL; wide_by : allowed excess of values at sides over the range of neighbours, 1 for none
-    reflect : float64[b], 1 wall, 0 open, empty for walls; plan : float64[PLANS, n]
+    It is the greatest of sum L (|u| + c) / (2 A) over the sides of a cell (length L, area A of the cell, normal
+    velocity u, wave speed c), and of the outflow from a cell over its volume. Explicit Euler steps up to 1 / (2 rate)
+    leave no depth below zero.
+    scheme : UPWIND or MUSCL; wide_by : factor on the range of the neighbours that limits values at sides, 1 for no
+    excess
+    floats, integers : geometry and neighbours, see `basins.cell_sides`; n cells, f faces, b boundary faces
+    reflect : float64[b]  1 for walls, 0 for open faces, empty if all are walls
+    plan : float64[PLANS, n]  depth at rest and surface at rest above the level [m]
+    dh, qx, qy : float64[n]  deviation of depth from rest [m], unit flows [m2/s]
     flow : float64[f]  volume flows through faces, left to right [m3/s], or empty; work : float64[work_size(integers)]
     through : float64[b]  inward volume flows through the boundary [m3/s], or empty
-    moves : None, or a tuple: speeds of sides along their normals [m/s], see `moving_meshes`; array float64[b] for the
-    thrust
-    on boundary faces minus that at rest, over density [m2/s2]; stretching `wide`, see `basins.cell_stretching`
+    rate_h, rate_x, rate_y : float64[n]  rates of dh, qx, qy
+    moves : None without moving walls, else a tuple of
+        speeds of sides along their outward normals [m/s], see `moving_meshes`
+        float64[b]  thrust on boundary faces minus that at rest, over density and length [m3/s2]
+        `wide` : areas of cells over undeformed areas, see `basins.cell_stretching`
     """
     slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]
     count, first_order = blocks(integers), scheme == UPWIND

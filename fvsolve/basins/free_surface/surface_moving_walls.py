@@ -16,7 +16,7 @@ def is_moving(basin):
 
 @njit
 def rates_on_moving_grids(t, y, dydt, out, handle):
-    """Rates of cells of rectangles."""
+    """Write the rates of all basins of water between moving walls on grids."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if is_moving(tables.basins[b]) and tables.basins[b]["nx"] > 0:
@@ -25,7 +25,7 @@ def rates_on_moving_grids(t, y, dydt, out, handle):
 
 @njit
 def rates_on_moving_meshes(t, y, dydt, out, handle):
-    """Rates of cells of any mesh."""
+    """Write the rates of all basins of water between moving walls on meshes of any cells."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if is_moving(tables.basins[b]) and tables.basins[b]["nx"] == 0:
@@ -34,7 +34,7 @@ def rates_on_moving_meshes(t, y, dydt, out, handle):
 
 @njit
 def add_power(t, y, dydt, out, handle, power):
-    """Subtract from the rate of storage the part due to changing areas, rho g h^2 / 2 dA/dt."""
+    """Subtract the part of the rate of storage due to changing areas A, rho g h^2 / 2 dA/dt [W], from `power`."""
     tables = open_tables(handle)
     st, plane = tables.settings[0], tables.plane
     for b in range(tables.basins.size):
@@ -47,7 +47,7 @@ def add_power(t, y, dydt, out, handle, power):
 
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
-    """Add the energy of the profile over the changes of areas."""
+    """Add the energy of the water at rest [J] on the area that cells have gained by motion of walls to `stored`."""
     tables = open_tables(handle)
     st, plane, first = tables.settings[0], tables.plane, stored.size - tables.basins.size
     weight = st["rho"] * st["gravity"]

@@ -1,4 +1,4 @@
-"""Patches of water with a free surface: their pressures, and the flows of links in the cells next to them."""
+"""Patches of water with a free surface: pressures at them, and the effect of the flows of links on the cells there."""
 
 from math import inf, sqrt
 
@@ -28,11 +28,11 @@ OWN_CODE = physics_code(__package__)
 
 @njit
 def water_at_patch(tables, patch, y):
-    """(rise of the surface, depth, volume, sum of area times weight squared) of the cells at a patch.
+    """(rise of the surface [m], depth [m], volume [m3], sum of area times weight squared [m4]) of the cells at a patch.
 
-    The weight of a cell is its area times `outflow_weight`, so that a dry bank does not count; the volume is the sum.
-    The rise is from the surface at rest (of a dry patch, from its lowest bed); in a basin on a body, from the level,
-    including phi.
+    Rise and depth are means with the weight area times `outflow_weight`, so that a dry bank does not count; the volume
+    is the sum of these weights. The rise is from the surface at rest (of a dry patch, from its lowest bed); in a basin
+    on a body it is from the level at rest.
     """
     basin, plane = tables.basins[patch["basin"]], tables.plane
     n, plan, low, lowest = basin["n"], basin["plan"], inf, 0.0
@@ -56,9 +56,10 @@ def water_at_patch(tables, patch, y):
 
 @njit
 def bottom_pressure_at_patch(plane, basin, patch, rise, depth):
-    """Bottom pressure over density at a patch on a body, minus that of the profile [J/kg], at rest in its frame.
+    """Deviation of the pressure at the bottom of a patch on a body from the steady start, over density [J/kg].
 
-    The surface is an equipotential, so its height over each position follows from phi. A dry position has no pressure.
+    The water is at rest in the frame of the basin, so its surface is an equipotential, and its height over any position
+    follows from the potential phi of gravity and inertial forces. A dry position has no pressure.
     """
     at, (fx, fy, xx, xy, yy) = patch["sizes"] + 2, potential_coefficients(plane, basin["frame"], 1.0)
     x, y, z, profile = plane[at], plane[at + 1], plane[at + 2], plane[at + 3]
@@ -68,7 +69,11 @@ def bottom_pressure_at_patch(plane, basin, patch, rise, depth):
 
 @njit
 def patch_pressures(t, y, dydt, out, handle):
-    """Deviation of the pressure at every patch from the profile, and its slope with mass [Pa/kg]."""
+    """Write pressure, its slope and available fraction of outflow at every patch to the node of the patch in `out`.
+
+    The pressure is the deviation from the steady start [Pa]; the slope is per mass in the cells next to the patch
+    [Pa/kg].
+    """
     tables = open_tables(handle)
     st, layout = tables.settings[0], tables.layout[0]
     for k in range(tables.patches.size):
@@ -92,7 +97,7 @@ def patch_pressures(t, y, dydt, out, handle):
 
 @njit
 def patch_flows(t, y, dydt, out, handle):
-    """Add the flows through patches to the rates of the cells next to them."""
+    """Add the mass and momentum of the flows through patches to the rates of the cells next to them."""
     tables = open_tables(handle)
     for k in range(tables.patches.size):
         patch = tables.patches[k]
@@ -104,7 +109,11 @@ def patch_flows(t, y, dydt, out, handle):
 
 @njit
 def add_patch_flow(tables, patch, demand, y, dydt, out):
-    """Add the flow through a patch to rates; in thin water the outflow may be smaller than the demand."""
+    """Add the flow through a patch to the rates of its cells; in thin water the outflow may be smaller than the demand.
+
+    demand : inflow that the links of the patch demand [kg/s], negative for outflow
+    The missing part of an outflow is written to `out` as a supply from outside.
+    """
     st, layout, integers, plane = tables.settings[0], tables.layout[0], tables.integers, tables.plane
     basin, rho = tables.basins[patch["basin"]], st["rho"]
     n, o, first = basin["n"], basin["y"], patch["first"]
@@ -148,7 +157,10 @@ def add_patch_flow(tables, patch, demand, y, dydt, out):
 
 @njit
 def limit_inflow_rate(t, y, dydt, out, handle):
-    """Limit the step by waves that valves may start: with the speed of the head across a valve, over a dry bed too."""
+    """Limit the time step by the waves that valves may start in the basin, also over a dry bed.
+
+    Their speed is sqrt(drop / rho), with the pressure drop across the valve.
+    """
     tables = open_tables(handle)
     st, valves, patches = tables.settings[0], tables.valves, tables.patches
     for k in range(valves.size):

@@ -13,7 +13,7 @@ DEPTH = FIRST_OWN
 
 @njit
 def observe_water(t, y, out, handle, values):
-    """Write values[k] of the probes of cells: scale * depth + offset, or velocities."""
+    """Write the values of the probes in cells of water: `scale` * depth + `offset` [m], or velocities [m/s]."""
     tables = open_tables(handle)
     for k in range(tables.probes.size):
         probe = tables.probes[k]
@@ -25,7 +25,10 @@ def observe_water(t, y, out, handle, values):
 
 @njit
 def read_water(tables, probe, y):
-    """Weighted sums of depths [m] and of velocities along x and y [m/s]; velocities fade to zero in thin water."""
+    """Sums over the cells of a probe, with its weights: depth [m], and velocities along x and y [m/s].
+
+    Velocities fade to zero in thin water.
+    """
     basin, total, u, v = tables.basins[probe["index"]], 0.0, 0.0, 0.0
     n, o = basin["n"], basin["y"]
     for m in range(probe["count"]):

@@ -1,9 +1,10 @@
 """Rows of shallow water: cells with ghost cells, limited values at faces, fluxes, rates.
 
-A block is a set of rows at the constant distance STRIDE, so that the compiler knows that they do not overlap. Cells
-have depth, surface, both velocities, wave speed and unit flows. Sides have the first five of these at the faces before
-and after a cell, and depth times the rise of the surface across the cell [m2]. Fluxes are those of depth, of normal
-momentum minus the pressure on the side before and on the side after, and of tangential momentum.
+Quantities of a row of cells are stored as rows of one array at the constant distance STRIDE, so that the compiler knows
+that they do not overlap. Cells have depth, surface, both velocities, wave speed and unit flows. Sides have the first
+five quantities at the faces before and after a cell, and depth times the rise of the surface across the cell [m2].
+Fluxes are those of depth, of normal momentum minus the pressure on the side before and on the side after, and of
+tangential momentum.
 """
 
 from math import sqrt
@@ -25,10 +26,13 @@ FIELDS, SIDES, FLUXES = 7, 11, 4  # rows of a block
 
 @inline
 def put_cells(g, depth0, surface0, dh, qx, qy, kx, ky, factors, cells, top):
-    """Depth, surface, velocities and wave speed of a row; top[i] becomes the greatest rate of its column so far.
+    """Write depth, surface, velocities and wave speed of a row of cells, and update `top`.
 
-    Velocity is q / h, replaced by 2 h q / (h^2 + THIN^2) below THIN.
-    factors : None, or (wide, narrow) of stretching cells, for contents dh, qx and qy; see `basins.cell_stretching`
+    Velocity is q / h, replaced by 2 h q / (h^2 + THIN^2) at depths h below THIN.
+    depth0, surface0 : depth and surface at rest [m]; dh, qx, qy : deviation of depth [m], unit flows [m2/s]
+    kx, ky : 1 / widths of the columns, 1 / height of the row [1/m]
+    factors : None, or (wide, narrow) of stretching cells; dh, qx and qy are then contents, see `basins.cell_stretching`
+    top : float64[n]  greatest rate (|u| + c) kx + (|v| + c) ky of each column so far [1/s]
     """
     for i in range(dh.size):
         rise = dh[i]
@@ -48,7 +52,7 @@ def put_cells(g, depth0, surface0, dh, qx, qy, kx, ky, factors, cells, top):
 
 @njit
 def put_flows(qx, qy, factors, cells):
-    """Unit flows of a row. factors : as in `put_cells`"""
+    """Write the unit flows of a row of cells [m2/s]. qx, qy, factors : as in `put_cells`"""
     for i in range(qx.size):
         per = 1.0 if factors is None else factors[1][i]
         cells[i + FLOW_EAST], cells[i + FLOW_NORTH] = qx[i] * per, qy[i] * per
@@ -56,9 +60,10 @@ def put_flows(qx, qy, factors, cells):
 
 @njit
 def put_ghost_end(fields, reach, wall, cells, first, step, cell_count):
-    """Ghost cells beyond cell `first` of a row, in direction `step`.
+    """Write `reach` ghost cells beyond cell `first` of a row, in direction `step` (1 or -1).
 
-    wall : 1 for mirror images, 0 for copies of that cell; cell_count : number of cells available to the mirror
+    fields : number of quantities; wall : 1 for mirror images, 0 for copies of cell `first`
+    cell_count : number of cells that can be mirrored
     """
     for f in range(fields):
         at = f * STRIDE + first
@@ -70,7 +75,10 @@ def put_ghost_end(fields, reach, wall, cells, first, step, cell_count):
 
 @njit
 def correct_ghost_end(fields, reach, speed, cells, first, step):
-    """Correct ghost cells beyond cell `first` for a wall that moves along the row: u becomes 2 speed - u."""
+    """Correct ghost cells beyond cell `first` for a wall that moves along the row at `speed`: u becomes u + 2 speed.
+
+    u is the velocity along the row after reflection at a wall at rest.
+    """
     for k in range(reach):
         at = first + step * (k + 1)
         cells[at + EAST] += 2.0 * speed
@@ -80,7 +88,7 @@ def correct_ghost_end(fields, reach, speed, cells, first, step):
 
 @njit
 def correct_ghost_row(n, fields, speed, cells):
-    """Correct a row of ghost cells for a wall that moves across it."""
+    """Correct n cells of a ghost row for a wall that moves across the row at `speed`: v becomes v + 2 speed."""
     for i in range(n):
         cells[i + NORTH] += 2.0 * speed
         if fields * STRIDE > FLOW_NORTH:
@@ -89,7 +97,10 @@ def correct_ghost_row(n, fields, speed, cells):
 
 @njit
 def put_ghost_row(n, fields, walls, last, mirror, cells):
-    """Row of ghost cells, from the last row and its mirror row. walls : float64[n] or empty, as in `put_ghost_end`"""
+    """Write a row of n ghost cells beyond the grid, from its last row and from the row to be mirrored.
+
+    walls : float64[n]  1 for mirror images, 0 for copies of the last row; empty for walls
+    """
     for f in range(fields):
         at = f * STRIDE
         a, b, p = last[at:], mirror[at:], cells[at:]
@@ -104,7 +115,10 @@ def put_ghost_row(n, fields, walls, last, mirror, cells):
 
 @inline
 def put_side(i, hl, el, ul, vl, hr, er, ur, vr, push, sides):
-    """Values at both faces of cell i and depth times the rise of its surface."""
+    """Write the values at both faces of cell i, and depth times the rise of its surface (push) [m2].
+
+    hl, el, ul, vl : depth, surface and velocities at the face before; hr, er, ur, vr : at the face after
+    """
     sides[i], sides[i + SURFACE], sides[i + EAST], sides[i + NORTH] = hl, el, ul, vl
     sides[i + HIGH], sides[i + (HIGH + SURFACE)], sides[i + (HIGH + EAST)], sides[i + (HIGH + NORTH)] = hr, er, ur, vr
     sides[i + PUSH] = push
@@ -112,7 +126,7 @@ def put_side(i, hl, el, ul, vl, hr, er, ur, vr, push, sides):
 
 @inline
 def put_sloped(limiter, n, before, here, after, sides):
-    """`put_limited` with a limiter."""
+    """Write the values at both faces of n cells with limited slopes; see `put_limited`."""
     for i in range(n):
         h, e, u, v = here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH]
         a, b = half_slopes(limiter, h - before[i], after[i] - h, e - before[i + SURFACE], after[i + SURFACE] - e)
@@ -124,7 +138,10 @@ def put_sloped(limiter, n, before, here, after, sides):
 
 @njit
 def put_limited(scheme, limiter, n, before, here, after, sides):
-    """Values at the sides of n cells from these and their neighbours: cell values, or with a limiter."""
+    """Write the values at both faces of n cells: the cell values under UPWIND, else with limited slopes.
+
+    before, here, after : values of the cells and of their neighbours before and after
+    """
     if scheme == UPWIND:
         for i in range(n):
             h, e, u, v = here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH]
@@ -135,11 +152,11 @@ def put_limited(scheme, limiter, n, before, here, after, sides):
 
 @inline
 def put_fluxes(g, n, normal, along, left, right, l, r, f, moves):
-    """Fluxes through a row of n faces (HLLC); tangential momentum is carried with the mass by the contact wave.
+    """Write the fluxes through a row of n faces to f (HLLC); tangential momentum is carried with the mass.
 
     normal, along : EAST and NORTH, or the reverse
-    left, right : values on either side; l, r : cells whose velocities and wave speeds bound those of the face
-    moves : speeds of the faces [m/s], None if they do not move: the flux F(U) - w U is computed in moving axes
+    left, right : values on either side; l, r : cells whose velocities and wave speeds bound the wave speeds at the face
+    moves : None, or speeds of moving faces [m/s]; the flux is then relative to the face
     """
     half = 0.5 * g
     for i in range(n):
@@ -165,9 +182,11 @@ def put_fluxes(g, n, normal, along, left, right, l, r, f, moves):
 
 @inline
 def put_rates(g, kx, ky, push_x, push_y, x, south, north, wide, dh, dx, dy):
-    """Rates of a row: fluxes in minus fluxes out, and the force of surface and pressure.
+    """Write the rates of a row of cells: inflow minus outflow, and the force of pressure and bed.
 
-    wide : None, or stretching of cells, for rates of contents; see `basins.cell_stretching`
+    x, south, north : fluxes through the faces along the row, and through those before and after it
+    push_x, push_y : depth times rise of the surface across the cells [m2]; dh, dx, dy : rates of depth and unit flows
+    wide : None, or area over undeformed area for rates of contents, see `basins.cell_stretching`
     """
     for i in range(dh.size):
         along, across = kx[i], ky
