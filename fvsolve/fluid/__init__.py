@@ -1,4 +1,4 @@
-"""Fluid properties at one state."""
+"""Properties of a fluid at its reference state."""
 
 from __future__ import annotations
 
@@ -23,8 +23,11 @@ USER = dict(density=None, bulk_modulus=None, viscosity=None, vapor_pressure=0.0,
 class Fluid:
     """A fluid at its reference state.
 
-    temperature [K], pressure [Pa] absolute, density [kg/m3], bulk_modulus = rho a^2 at constant entropy [Pa],
-    viscosity, dynamic [Pa s] (None where unknown), vapor_pressure [Pa] (0 without vapour pressure).
+    law : name of the density law; temperature [K], pressure [Pa] absolute, density [kg/m3]
+    bulk_modulus : rho a^2 at constant entropy, a the speed of sound [Pa]; viscosity : dynamic, None if unknown [Pa s]
+    vapor_pressure : absolute, 0 for a fluid without vapour pressure [Pa]; table : density over pressure for the law
+    "table"
+    source : source of the numbers; air : free gas for the law "mixture"
     """
 
     name: str
@@ -45,7 +48,7 @@ class Fluid:
         return math.sqrt(self.bulk_modulus / self.density)
 
     def plain(self) -> dict[str, Any]:
-        """Data for JSON: the liquid at its reference state, SI, and the source of its numbers."""
+        """Name, properties in SI and their source, as a dict for JSON."""
         keys = ("name", "density", "bulk_modulus", "sound_speed", "viscosity", "vapor_pressure", "source")
         return {key: getattr(self, key) for key in keys}
 
@@ -66,9 +69,9 @@ def properties(
 ) -> Fluid:
     """Properties of a CoolProp fluid, an oil, "INCOMP::..." or "user" at temperature [K] and pressure [Pa].
 
-    Given density [kg/m3], bulk_modulus [Pa], viscosity [Pa s] and vapor_pressure [Pa] replace
-    those of the fluid; "user" has no others. `air_fraction` and the rest of Air are for the law "mixture",
-    which without any is "log". Raises FluidError with the key at fault.
+    Given density [kg/m3], bulk_modulus [Pa], viscosity [Pa s] and vapor_pressure [Pa] replace the properties of the
+    fluid; a "user" fluid has no others. `air_fraction`, `gas_exponent`, `saturation_pressure` and `cavitation` are for
+    the law "mixture" (see `Air`), which equals the law "log" without them. Raises FluidError with the key at fault.
     """
     given = dict(density=density, bulk_modulus=bulk_modulus, viscosity=viscosity, vapor_pressure=vapor_pressure)
     given = {key: float(value) for key, value in given.items() if value is not None}
@@ -112,8 +115,8 @@ def _check_numbers(numbers: dict[str, float], law: str) -> None:
 
 def _missing(name: str, key: str) -> str:
     if name == "user":
-        return f'a "user" fluid needs density [kg/m3] and bulk_modulus [Pa]; {key} is missing'
-    return f'CoolProp has no compressibility for "{name}"; give {key}, for example "1.5 GPa"'
+        return f'a "user" fluid needs the keys `density` [kg/m3] and `bulk_modulus` [Pa]; `{key}` is missing'
+    return f'CoolProp has no compressibility for "{name}"; give the key `{key}`, for example "1.5 GPa"'
 
 
 def _not_liquid(name: str, boiling: float, temperature: float, pressure: float) -> str:

@@ -15,9 +15,10 @@ AIR_KEYS = ("air_fraction", "gas_exponent", "saturation_pressure", "cavitation")
 class Air:
     """Free gas in a liquid, and cavitation.
 
-    fraction : volume of free gas over that of the mixture, at 1 atm; exponent : polytropic exponent of the gas;
-    saturation_pressure : gas pressure at which all of it is dissolved, free gas falls linearly [Pa]; infinite for none;
-    cavitation : true if vapour pressure adds to the gas pressure and is the lower bound of pressure.
+    fraction : volume of free gas over that of the mixture, at 1 atm [-]; exponent : polytropic exponent of the gas [-]
+    saturation_pressure : pressure at which all gas is dissolved, after a linear decrease of free gas [Pa]; infinite if
+    gas does not dissolve
+    cavitation : True if vapour forms at vapour pressure, which is then the lower bound of pressure
     """
 
     fraction: float
@@ -26,7 +27,11 @@ class Air:
     cavitation: bool = False
 
     def gas(self, fluid, floor: float) -> float:
-        """Gas volume over the liquid volume at the reference pressure, times x^(1 / exponent), x = p - floor."""
+        """Constant G of the gas volume per volume of liquid at the reference pressure.
+
+        The volume at a pressure p is G (1 - x / s) / x^(1 / exponent), with x = p - floor and s = saturation_pressure -
+        floor [Pa]. floor : lower bound of the pressure [Pa]
+        """
         x, saturation = ATMOSPHERE - floor, self.saturation_pressure - floor
         liquid = 1.0 - (ATMOSPHERE - fluid.pressure) / fluid.bulk_modulus
         free = self.fraction / (1.0 - self.fraction) * liquid
@@ -34,14 +39,14 @@ class Air:
 
 
 def air_of(given: dict[str, float]) -> Air:
-    """Free gas and cavitation by the given keys."""
+    """Free gas and cavitation from the keys of [fluid] that are given; raises FluidError for a value out of range."""
     fraction, cavitation = given.get("air_fraction", 0.0), bool(given.get("cavitation"))
     if not 0.0 <= fraction < 1.0:
         raise FluidError("air_fraction", f"{fraction:g} is not a volume fraction; expected at least 0 and below 1")
     if cavitation and fraction == 0.0:
         raise FluidError(
             "cavitation",
-            "needs free gas, from which cavities grow; give air_fraction, for example 1e-7 for a degassed liquid",
+            "needs free gas, from which cavities grow; try `air_fraction = 1e-7` for a degassed liquid",
         )
     exponent, saturation = given.get("gas_exponent", 1.0), given.get("saturation_pressure", math.inf)
     if not 1.0 <= exponent <= 2.0:
@@ -50,19 +55,19 @@ def air_of(given: dict[str, float]) -> Air:
         raise FluidError("gas_exponent", f"{exponent:g} is not 1; with cavitation the gas is isothermal, expected 1")
     if saturation <= ATMOSPHERE:
         raise FluidError(
-            "saturation_pressure", f"{saturation:g} Pa is not above 1 atm, the pressure to which air_fraction refers"
+            "saturation_pressure", f"{saturation:g} Pa is not above 1 atm, the pressure to which `air_fraction` refers"
         )
     return Air(fraction, exponent, saturation, cavitation)
 
 
 def check_cavities(fluid) -> None:
-    """Raise FluidError for cavitation of a fluid without vapour pressure, or that boils at 1 atm."""
+    """Raise FluidError if `cavitation` is true for a fluid without vapour pressure, or for one that boils at 1 atm."""
     if fluid.air is None or not fluid.air.cavitation:
         return
     if fluid.vapor_pressure == 0.0:
-        raise FluidError("cavitation", f'needs the vapour pressure of "{fluid.name}"; give vapor_pressure')
+        raise FluidError("cavitation", f'needs the vapour pressure of "{fluid.name}"; give the key `vapor_pressure`')
     if fluid.vapor_pressure >= ATMOSPHERE:
         raise FluidError(
             "cavitation",
-            f"{fluid.name} boils at 1 atm, the pressure to which air_fraction refers; leave cavitation out",
+            f"{fluid.name} boils at 1 atm, the pressure to which `air_fraction` refers; leave out the key `cavitation`",
         )

@@ -14,7 +14,7 @@ OIL_WORDS = ("oil", "hydraulic oil", "mineral oil", "hydraulic fluid", "hlp", "h
 
 
 def coolprop_properties(name: str, temperature: float, pressure: float, law: str) -> dict[str, Any]:
-    """Fields of Fluid from CoolProp; None: density of a boiling fluid, bulk_modulus of INCOMP."""
+    """Fields of `Fluid` from CoolProp; density is None for a boiling fluid, bulk_modulus for an INCOMP fluid."""
     backend, _, rest = name.rpartition("::")
     if backend not in ("", "HEOS", "INCOMP"):
         raise FluidError(
@@ -101,7 +101,7 @@ def _check_temperature(name: str, temperature: float, least: float, greatest: fl
 
 
 def _vapor_pressure(state: Any, temperature: float) -> float:
-    """Pressure of the boiling liquid [Pa]; 0 above the critical temperature."""
+    """Vapour pressure at a temperature [Pa]; 0 above the critical temperature."""
     from CoolProp import CoolProp
 
     if temperature >= state.T_critical():
@@ -111,7 +111,10 @@ def _vapor_pressure(state: Any, temperature: float) -> float:
 
 
 def _incompressible_properties(name: str, temperature: float, pressure: float) -> dict[str, Any]:
-    """Density, viscosity and vapour pressure if available; INCOMP fluids have no compressibility."""
+    """Fields of `Fluid` of an INCOMP fluid: density, and viscosity and vapour pressure if CoolProp has them.
+
+    INCOMP fluids have no compressibility.
+    """
     from CoolProp.CoolProp import PropsSI
 
     bare = re.sub(r"(\[[^]]*\]|-[0-9.]+%)$", "", name.removeprefix("INCOMP::"))

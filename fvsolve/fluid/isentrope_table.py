@@ -50,7 +50,10 @@ class FluidTable:
         return hash((self.error, self.pressure.size))
 
     def numbers(self, density: float, pressure: float) -> list[float]:
-        """Four columns for kernels: ln(rho / density), its slope, enthalpy relative to `pressure` [J/kg], its slope."""
+        """Four columns for kernels, one after the other: ln(rho / density), its slope, enthalpy [J/kg], its slope.
+
+        Slopes are per pressure; enthalpy is relative to `pressure` [Pa].
+        """
         p, k = self.pressure, self.compressibility
         step = (p[-1] - p[0]) / (len(p) - 1)
         log_density = self.log_density - hermite_at(p, self.log_density, k, pressure)
@@ -66,7 +69,7 @@ class FluidTable:
 
 
 def hermite_at(grid, values, slopes, at):
-    """Cubic Hermite interpolant of a uniform table at the abscissas `at`."""
+    """Cubic Hermite interpolant at the abscissas `at`, from values and slopes on a uniform grid."""
     step = grid[1] - grid[0]
     k = np.clip(((at - grid[0]) / step).astype(int) if hasattr(at, "astype") else int((at - grid[0]) / step), 0,
                 len(grid) - 2)  # fmt: skip
@@ -77,9 +80,10 @@ def hermite_at(grid, values, slopes, at):
 
 
 def isentrope(state: Any, name: str, vapor_pressure: float) -> FluidTable:
-    """Table of the isentrope through the current state of CoolProp's `state`; raises FluidError for no liquid.
+    """Table of the isentrope through the current state of CoolProp's `state`.
 
     The number of intervals is doubled until the error at midpoints is at most `TARGET_ERROR`, or to INTERVALS[1].
+    Raises FluidError if the state is not liquid, or the table is not accurate enough.
     """
     temperature, pressure, entropy = state.T(), state.p(), state.smass()
     if not 0.0 < vapor_pressure < pressure:
@@ -102,7 +106,7 @@ def isentrope(state: Any, name: str, vapor_pressure: float) -> FluidTable:
 
 
 def _reach(state: Any, temperature: float, pressure: float) -> float:
-    """Upper end of the table [Pa]: `TABLE_PRESSURE`, or twice the pressure, within the limits of CoolProp."""
+    """Upper end of the table [Pa]: `TABLE_PRESSURE`, or twice `pressure` if higher, within the limits of CoolProp."""
     from CoolProp import CoolProp
 
     limits = [max(TABLE_PRESSURE, 2.0 * pressure), state.pmax()]
@@ -122,7 +126,10 @@ def _tabulate(state: Any, span: tuple[float, float], intervals: int, temperature
 
 
 def _march(state: Any, grid: np.ndarray, temperature: float, entropy: float) -> tuple[np.ndarray, np.ndarray]:
-    """ln rho and 1/(rho a^2) at the pressures of `grid`; Newton for T from the value before, ds/dT = cp/T."""
+    """ln rho and 1 / (rho a^2) [1/Pa] along the isentrope at the pressures of `grid`: two arrays.
+
+    At each pressure the temperature follows by Newton iteration from the previous one, ds/dT = cp/T. a : speed of sound
+    """
     from CoolProp import CoolProp
 
     log_density, compressibility = np.empty_like(grid), np.empty_like(grid)
@@ -142,14 +149,14 @@ def _march(state: Any, grid: np.ndarray, temperature: float, entropy: float) -> 
 
 
 def _monotone(table: FluidTable) -> bool:
-    """True if slopes are within [0, 3] times those of chords, so that the cubics rise (Fritsch, Carlson 1980)."""
+    """True if slopes are 0 to 3 times those of adjacent chords, so that the cubics rise (Fritsch, Carlson 1980)."""
     chord = np.diff(table.log_density) / np.diff(table.pressure)
     slopes = np.concatenate([table.compressibility[:-1] / chord, table.compressibility[1:] / chord])
     return bool(np.all(chord > 0.0) and np.all(slopes >= 0.0) and np.all(slopes <= 3.0))
 
 
 def value_or_none(read: Callable[[], float]) -> float | None:
-    """Value of a function of CoolProp; None if CoolProp has no model for it."""
+    """Value of a function of CoolProp; None if CoolProp has no model for it or the value is not finite."""
     try:
         value = read()
     except ValueError:

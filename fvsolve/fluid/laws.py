@@ -1,7 +1,7 @@
 """Density laws: density, head and mass of a fluid as functions of pressure.
 
-A law is one class here and one file of compiled functions in `kernels.density`; basins of liquid have their own
-(`basins.liquid.lower`). Other modules use the attributes and methods of `Law`, never the name of a law.
+A density law is one class here and one file of compiled functions in `kernels.density`; basins of liquid have their
+own functions (`basins.liquid.lower`). Other modules use the attributes and methods of `Law`, never the name of a law.
 """
 
 from __future__ import annotations
@@ -21,23 +21,24 @@ LAWS: dict[str, type[Law]] = {}  # name -> law, from the simplest to the most ge
 
 
 def law_names(fits: Callable[[type[Law]], bool]) -> str:
-    """Names of the laws for which `fits` is true, as text for a message."""
+    """Names of the density laws for which `fits` is true, as text for a message."""
     *others, last = (f'"{name}"' for name, law in LAWS.items() if fits(law))
     return f"{', '.join(others)} or {last}" if others else last
 
 
 def over_weight(rise, weight: float):
-    """rise / weight [m]; NaN for zero weight."""
+    """Height [m] of a pressure difference `rise` [Pa] over the specific weight `weight` [N/m3]; NaN for zero weight."""
     return rise / weight if weight > 0.0 else np.full(np.shape(rise), np.nan)[()]
 
 
 class Law:
-    """Density of one fluid as a function of pressure; heads count from ambient pressure, heights are z [m].
+    """Density law: density of one fluid as a function of pressure. Pressures are absolute, heads relative to ambient.
 
-    name, code : name in case files, code in kernels
+    name, code : name in case files, code in compiled functions
     linear : True if waves superpose: wave speed and impedance are constant, pressure is linear in mass and in head
     scalars : True if flows transport scalars
     tabulated : True if density is a table from CoolProp; keys : keys of [fluid] that only this law has
+    ambient : ambient pressure [Pa]; gravity [m/s2]; arguments z of methods are elevations [m]
     """
 
     name: ClassVar[str]
@@ -60,33 +61,36 @@ class Law:
 
     @classmethod
     def lower(cls, fluid, s, floats: list[float]) -> None:
-        """Write the parameters of the law for kernels: record `s` of `settings`, and its own `floats`."""
+        """Write the parameters of the law to record `s` of `settings`, and append its tables to `floats`."""
         s["law"], s["rho"], s["beta"], s["reference"] = cls.code, fluid.density, fluid.bulk_modulus, fluid.pressure
 
     @classmethod
     def check(cls, name: str, given: dict[str, float]) -> None:
-        """Raise FluidError for a fluid, or a property given for it, that the law does not allow."""
+        """Raise FluidError if the law does not allow the fluid `name`, or a property that replaces one of the fluid."""
 
     @classmethod
     def air(cls, given: dict[str, float]) -> Air | None:
-        """Free gas from the given keys; raises FluidError for a law without gas."""
+        """Free gas from the keys of [fluid] in `given`; raises FluidError for a law without gas."""
         for key in given:
             raise FluidError(key, f'law = "{cls.name}" has no free gas; use law = "mixture"')
         return None
 
     @property
     def cavitates(self) -> bool:
-        """True if cavities form: the floor (vapour pressure) is the lower bound of pressure."""
+        """True if vapour cavities form, so that vapour pressure is the lower bound of pressure."""
         return bool(self.st["floor"] > 0.0)
 
     @property
     def family(self) -> str:
-        """Family of kernels: states of "linear" are pressures, of "barotropic" masses; "cavitating" adds cavities."""
+        """Family of compiled functions: "linear", "barotropic" or "cavitating".
+
+        States are pressures in "linear" and masses in "barotropic"; "cavitating" adds cavities to "barotropic".
+        """
         return "linear" if self.linear else "cavitating" if self.cavitates else "barotropic"
 
     @property
     def cavity_pressure(self) -> float:
-        """Pressure [Pa] below which a place is a cavity.
+        """Pressure [Pa] below which a location counts as a cavity.
 
         Vapour pressure; with cavitation twice that: below it the vapour pressure exceeds the pressure of the gas.
         """
@@ -94,12 +98,12 @@ class Law:
 
     @property
     def open_density(self) -> float:
-        """Density [kg/m3] of what is open to ambient."""
+        """Density [kg/m3] at ambient pressure, for example in an open tank."""
         return float(self.density(self.ambient))
 
     @property
     def cavitation_keys(self) -> str:
-        """Keys that [fluid] needs before `cavitation = true`, as text for a message."""
+        """Text of a message: keys that [fluid] needs besides `cavitation = true`, with "and" at the end."""
         return 'law = "mixture" and '
 
     @property
@@ -108,12 +112,12 @@ class Law:
         return ""
 
     def wave_speed(self, row, pressure: np.ndarray) -> float:
-        """Wave speed of a pipe [m/s] as one number: that of liquid and wall."""
+        """Wave speed [m/s] of a pipe with elastic walls, as one number. row : row of the pipe in the tables"""
         return float(row["speed"])
 
 
 class LinearLaw(Law, name="linear"):
-    """Constant density of flow; stored mass is linear in pressure."""
+    """Law linear: flow of constant density; the mass stored in a volume is linear in pressure."""
 
     code, linear, scalars = rec.LAW_LINEAR, True, True
 
@@ -122,45 +126,54 @@ class LinearLaw(Law, name="linear"):
         return np.full(np.shape(pressure), self.rho)[()]
 
     def potential_of(self, pressure: float, z: float) -> float:
-        """Potential that is constant in a fluid at rest, as a pressure at z = 0 [Pa]."""
+        """Piezometric pressure [Pa] of `pressure` at elevation z [m]: constant in a fluid at rest."""
         return pressure + self.rho * self.gravity * z
 
     def pressure_of(self, potential: float, z: float) -> float:
-        """Pressure [Pa] of a potential [Pa] at z."""
+        """Pressure [Pa] at elevation z [m] for a piezometric pressure `potential` [Pa]."""
         return potential - self.rho * self.gravity * z
 
     def pressure_under(self, head: float) -> float:
-        """Pressure [Pa] under a column of `head` [m] open to ambient."""
+        """Pressure [Pa] under a liquid column of height `head` [m] whose surface is at ambient pressure."""
         return self.ambient + self.rho * self.gravity * head
 
     def head(self, pressure, z):
-        """Head [m] at pressures and heights."""
+        """Piezometric head [m] at pressures [Pa] and elevations z [m]."""
         return over_weight(pressure - self.ambient, self.rho * self.gravity) + z
 
     def mass_in(self, pressure: float, volume: float) -> float:
-        """Mass [kg] in a volume."""
+        """Mass [kg] of the fluid in a volume [m3] at a pressure [Pa]."""
         return self.rho * volume * (1.0 + (pressure - self.fluid.pressure) / self.fluid.bulk_modulus)
 
     def compliance(self, speed: float) -> float:
-        """Wall compliance (1/A) dA/dp [1/Pa] that gives a pipe a wave speed; 0 here: kernels use the speed alone."""
+        """Wall compliance (1/A) dA/dp [1/Pa] of a pipe of area A with a wave speed [m/s].
+
+        0 here: compiled functions of the law linear use the wave speed alone.
+        """
         return 0.0
 
     def area(self, row, pressure):
-        """Area [m2] of a pipe at pressures."""
+        """Cross-section [m2] of a pipe at pressures [Pa]. row : row of the pipe in the tables of the model"""
         return row["area"]
 
     def cell_pressure(self, row, start: np.ndarray, profile: np.ndarray, waves: np.ndarray) -> np.ndarray:
-        """Pressure [Pa] in the cells of a pipe: start pressure [Pa], profile and sum of both waves [kg/s] are given."""
+        """Pressure [Pa] in the cells of a pipe, from the pressure at the start [Pa] and the sum of both waves [kg/s].
+
+        profile : float64[:]  masses per length of the steady start for all pipes [kg/m], not used by the law linear
+        """
         return start + waves / row["admittance"]
 
     def mass_in_pipe(self, row, start: np.ndarray, profile: np.ndarray) -> float:
-        """Mass [kg] in a pipe at the start."""
+        """Mass [kg] in a pipe at the steady start.
+
+        start : float64[cells]  pressures [Pa]; profile : as in `cell_pressure`
+        """
         strain = (start - self.fluid.pressure) / (self.rho * row["speed"] ** 2)
         return float(np.sum(self.rho * row["area"] * row["dx"] * (1 + strain)))
 
 
 class DenseLaw(Law):
-    """Laws whose kernels have masses as states; the functions are those of `kernels.density`."""
+    """Density laws whose compiled functions (`kernels.density`) have masses as states: log, table and mixture."""
 
     @cached_property
     def kernels(self):
@@ -178,11 +191,11 @@ class DenseLaw(Law):
         return self.for_each(self.kernels.density, pressure)
 
     def enthalpy(self, pressure):
-        """Integral of dp / rho from the reference pressure [J/kg]."""
+        """Integral of dp / rho from the reference pressure to `pressure` [J/kg]."""
         return self.for_each(self.kernels.enthalpy, pressure)
 
     def pressure_of_enthalpy(self, h):
-        """Pressure [Pa] at which `enthalpy` is h."""
+        """Pressure [Pa] at which `enthalpy` is h [J/kg]."""
         return self.for_each(self.kernels.pressure_of_enthalpy, h)
 
     def potential_of(self, pressure: float, z: float) -> float:
@@ -215,13 +228,13 @@ class DenseLaw(Law):
 
 
 class LogLaw(DenseLaw, name="log"):
-    """p = p_ref + beta ln(rho / rho_ref): one bulk modulus."""
+    """Law log: p = p_ref + beta ln(rho / rho_ref), with a constant bulk modulus beta [Pa]."""
 
     code = rec.LAW_LOG
 
 
 class TableLaw(DenseLaw, name="table"):
-    """Density of CoolProp along the isentrope through the reference state."""
+    """Law table: density of CoolProp along the isentrope through the reference state."""
 
     code, tabulated = rec.LAW_TABLE, True
 
@@ -232,7 +245,7 @@ class TableLaw(DenseLaw, name="table"):
             raise FluidError("law", text)
         for key in ("density", "bulk_modulus"):
             if key in given:
-                text = f'law = "table" reads {key} from CoolProp; leave {key} out, or use law = "log"'
+                text = f'law = "table" reads {key} from CoolProp; leave out the key `{key}`, or use law = "log"'
                 raise FluidError(key, text)
 
     @classmethod
@@ -245,7 +258,7 @@ class TableLaw(DenseLaw, name="table"):
 
 
 class MixtureLaw(DenseLaw, name="mixture"):
-    """Liquid with free gas, and with vapour if `cavitation` is true; without free gas it is `log`."""
+    """Law mixture: liquid with free gas, and with vapour if `cavitation` is true; without gas it is the law log."""
 
     code, keys = rec.LAW_MIXTURE, AIR_KEYS
 
@@ -265,7 +278,7 @@ class MixtureLaw(DenseLaw, name="mixture"):
 
     @property
     def open_density(self) -> float:
-        """Density [kg/m3] of what is open to ambient."""
+        """Density [kg/m3] at ambient pressure, for example in an open tank."""
         return float(self.density(self.ambient))
 
     @property
@@ -277,7 +290,7 @@ class MixtureLaw(DenseLaw, name="mixture"):
         """Advice on strong expansion of gas, which fails without a lower bound of pressure."""
         if self.cavitates:
             return ""
-        return "; where much gas expands, give the fluid cavitation = true and a scheme for it (docs/cavitation)"
+        return "; where much gas expands, set `cavitation = true` in [fluid] and a scheme for it (docs/cavitation)"
 
     def wave_speed(self, row, pressure: np.ndarray) -> float:
         """Harmonic mean of the local wave speeds along the pipe [m/s]."""

@@ -2,7 +2,7 @@
 
 Viscosity: Walther's equation (ASTM D341) through 40 and 100 degC. Density: ASTM D1250 for lubricating oils, from the
 value at 15 degC. Compressibility: Tait's equation of an HLP 32 for all grades, made isentropic by
-1/K_s = 1/K_T - T a^2 / (rho cp).
+1/K_s = 1/K_T - T a^2 / (rho cp): bulk moduli K at constant entropy (s) and temperature (T), thermal expansion a.
 """
 
 from __future__ import annotations
@@ -71,7 +71,10 @@ def oil_properties(name: str, temperature: float, pressure: float) -> dict[str, 
 
 
 def density_1atm(oil: Oil, temperature: float) -> tuple[float, float]:
-    """(thermal expansion [1/K], density [kg/m3]) at 1 atm, rho = rho_15 exp(-a dt (1 + 0.8 a dt)), ASTM D1250."""
+    """(thermal expansion [1/K], density [kg/m3]) at 1 atm: rho = rho_15 exp(-a dt (1 + 0.8 a dt)), ASTM D1250.
+
+    rho_15, a : density and thermal expansion at 15 degC; dt : temperature above 15 degC [K]
+    """
     a, dt = EXPANSION / oil.density_15, temperature - ZERO - 15.0
     return a * (1.0 + 1.6 * a * dt), oil.density_15 * math.exp(-a * dt * (1.0 + 0.8 * a * dt))
 

@@ -42,7 +42,7 @@ def coolprop_version() -> str:
 
 
 def _read(path: Path, key: str) -> dict[str, Any] | None:
-    """Properties in a cache file; None where it is absent, damaged or of another key."""
+    """Properties in a cache file; None if it is absent or damaged, or was written for another key."""
     try:
         digest, body = path.read_text(encoding="utf-8").split("\n", 1)
         if digest != hashlib.sha256(body.encode()).hexdigest():

@@ -1,4 +1,4 @@
-"""Contacts between boundary faces other than at their common ends."""
+"""Search for boundary faces of a mesh that touch other than at their common ends."""
 
 from __future__ import annotations
 
@@ -12,12 +12,11 @@ BLOCK = 1 << 14  # number of segments per pass; the search ends after a pass wit
 
 
 def contacts(a: np.ndarray, b: np.ndarray, thin: np.ndarray) -> tuple[dict[str, np.ndarray], bool]:
-    """(pairs of the segments from float64[k, 2] a to b by kind of contact: int64[m, 2] each.
+    """Pairs of segments that touch other than at common ends, by kind, and True if all segments were searched.
 
-    True if all were searched).
-
-    same : both ends coincide, and neither segment is `thin`; middle : an end of the second lies within the first;
-    cross : they intersect
+    a, b : float64[k, 2]  ends of the segments; thin : bool[k]  True for segments that may coincide with another
+    Returns {"same": pairs, "middle": pairs, "cross": pairs}, each int64[m, 2]. same : both ends coincide, and neither
+    segment is thin; middle : an end of the second lies within the first; cross : the segments intersect
     """
     middle, length = 0.5 * (a + b), np.hypot(*(b - a).T)
     tree = cKDTree(middle)
@@ -30,7 +29,10 @@ def contacts(a: np.ndarray, b: np.ndarray, thin: np.ndarray) -> tuple[dict[str, 
 
 
 def _pairs(tree: cKDTree, middle: np.ndarray, length: np.ndarray, block: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers (i, j) of all candidates, i of the block and not shorter; the distance of middles is below its length."""
+    """Numbers i, j of pairs of segments that may touch: two arrays.
+
+    i is in `block` and not shorter than j, and the distance between their middles is below the length of i.
+    """
     near = tree.query_ball_point(middle[block], (1.0 + CONTACT_DISTANCE) * length[block], return_sorted=False)
     i = np.repeat(block, np.fromiter(map(len, near), np.int64, len(near)))
     j = np.concatenate(near).astype(np.int64)
@@ -61,7 +63,7 @@ def _distance(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 
 def _within(a: np.ndarray, b: np.ndarray, i: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """True if p lies on segment i, away from its ends."""
+    """True where point p lies on segment i, away from its ends."""
     along, to = b[i] - a[i], p - a[i]
     square = np.sum(along * along, axis=1)
     share = np.sum(along * to, axis=1) / square
@@ -73,7 +75,7 @@ def _within(a: np.ndarray, b: np.ndarray, i: np.ndarray, p: np.ndarray) -> np.nd
 
 
 def _on_both_sides(a: np.ndarray, b: np.ndarray, i: np.ndarray, j: np.ndarray) -> np.ndarray:
-    """True if the ends of segment j lie on different sides of the line through i."""
+    """True where the ends of segment j lie on different sides of the line through segment i."""
     along = b[i] - a[i]
     least = CONTACT_DISTANCE * np.sum(along * along, axis=1)
     start, stop = cross(along, a[j] - a[i]), cross(along, b[j] - a[i])

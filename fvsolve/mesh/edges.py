@@ -14,10 +14,11 @@ NO_NEIGHBOUR, CROWDED = -1, -2  # no mate: a boundary edge; more than one neighb
 
 @dataclass(frozen=True, eq=False)
 class Edges:
-    """Edges of all cells, by cell and corner, anticlockwise.
+    """Edges of all cells, by cell and corner, anticlockwise; an edge between two cells occurs twice.
 
-    cell : int64[e]; start, stop : int64[e]  points; key : int64[e]  equal for both directions
-    mate : int64[e]  index of the same edge in the neighbour, ALONE on the boundary, CROWDED where cells overlap
+    cell : int64[e]  cell of the edge; start, stop : int64[e]  points at its ends
+    key : int64[e]  number of the pair of points, equal for both directions
+    mate : int64[e]  index of the edge in the neighbour, NO_NEIGHBOUR on the boundary, CROWDED where cells overlap
     """
 
     cell: np.ndarray
@@ -28,20 +29,20 @@ class Edges:
 
     @cached_property
     def inner(self) -> np.ndarray:
-        """Edges with a mate, one of each pair, that of the cell with the lower number."""
+        """Indices of the edges between two cells, once each, in the cell with the lower number."""
         return np.flatnonzero(np.arange(self.mate.size) < self.mate)
 
     @cached_property
     def outer(self) -> np.ndarray:
-        """Edges on the boundary."""
+        """Indices of the edges on the boundary."""
         return np.flatnonzero(self.mate == NO_NEIGHBOUR)
 
     def pieces(self, cells: int) -> np.ndarray:
-        """Number of the connected piece of each cell : int64[cells]; cells are connected by faces only."""
+        """Number of the connected part to which each cell belongs : int64[cells]; only shared faces connect cells."""
         return connected_components(self.graph(cells), directed=False)[1].astype(np.int64)
 
     def order(self, cells: int) -> np.ndarray:
-        """Order of cells with neighbours close together (reverse Cuthill and McKee) : int64[cells]."""
+        """Order of the cells that places neighbours close together (reverse Cuthill-McKee) : int64[cells]."""
         graph = self.graph(cells)
         return reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True).astype(np.int64)
 
@@ -52,7 +53,7 @@ class Edges:
 
 
 def edges_of(cells: np.ndarray, points: int) -> Edges:
-    """Edges of int64[n, 4] cells over a number of points."""
+    """Edges of cells : int64[n, 4] corners, -1 last in a triangle. points : number of points"""
     stop = np.roll(cells, -1, axis=1)
     triangle = cells[:, 3] < 0
     stop[triangle, 2] = cells[triangle, 0]
@@ -78,5 +79,5 @@ def _mates(key: np.ndarray, start: np.ndarray) -> np.ndarray:
 
 
 def key_of(ends: np.ndarray, points: int) -> np.ndarray:
-    """Keys of int64[k, 2] pairs of points, as in Edges."""
+    """Keys of pairs of points, as in `Edges` : int64[k]. ends : int64[k, 2]; points : number of points"""
     return ends.min(axis=1) * points + ends.max(axis=1)

@@ -1,4 +1,4 @@
-"""Faults of the cells and the boundary of a mesh."""
+"""Checks of the cells and the boundary of a mesh; each fault is an entry of an error message."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ MAX_CELLS = 3
 
 @dataclass(frozen=True, eq=False)
 class Sketch:
-    """A mesh during reading, in the file's unit."""
+    """A mesh while it is read, with coordinates in the unit of the file, and texts that describe its places."""
 
     points: np.ndarray
     cells: np.ndarray
     unit: str
 
     def centre(self, c: int) -> np.ndarray:
-        """Mean of a cell's corners."""
+        """Mean of the corners of cell c."""
         return self.points[[p for p in self.cells[c] if p >= 0]].mean(axis=0)
 
     def show(self, c: int) -> str:
@@ -48,7 +48,10 @@ class Sketch:
 
 
 def shape_faults(sketch: Sketch) -> tuple[list[Fault], np.ndarray, np.ndarray]:
-    """(faults of single cells, bool[n] bad cells, bool[n] cells with a right turn, which if valid are clockwise)."""
+    """Faults of single cells, and two arrays bool[n]: True for cells with a fault, and for clockwise cells.
+
+    Clockwise cells are those with a right turn at a corner; this holds for cells without a fault.
+    """
     turn, _, side = corners(sketch.points, sketch.cells)
     long = side.max(axis=1, keepdims=True)
     left, right = turn > LEAST_HEIGHT * long**2, turn < -LEAST_HEIGHT * long**2
@@ -73,9 +76,9 @@ def shape_faults(sketch: Sketch) -> tuple[list[Fault], np.ndarray, np.ndarray]:
 
 
 def overlap_faults(sketch: Sketch, edges: Edges, number: np.ndarray) -> list[Fault]:
-    """Faults of faces with more than two cells, or with two on one side.
+    """Faults of faces shared by more than two cells, or by two cells on one side of the face.
 
-    number : int64  numbers of the cells of `edges`
+    number : int64[:]  numbers of the cells of `edges` in the file
     """
     crowded = np.flatnonzero(edges.mate == CROWDED)
     faces = np.unique(edges.key[crowded])
@@ -92,7 +95,7 @@ def overlap_faults(sketch: Sketch, edges: Edges, number: np.ndarray) -> list[Fau
 
 
 def contact_faults(sketch: Sketch, edges: Edges, named: np.ndarray) -> list[Fault]:
-    """Faults of boundary faces with contacts other than at their ends. named : bool[outer]  True for faces in a group
+    """Faults of boundary faces that touch other than at their ends. named : bool[outer]  True for faces in a group
 
     Two coincident faces are the sides of a thin wall if a group contains one of them.
     """
@@ -119,7 +122,7 @@ def contact_faults(sketch: Sketch, edges: Edges, named: np.ndarray) -> list[Faul
 
 
 def piece_faults(sketch: Sketch, edges: Edges) -> list[Fault]:
-    """Fault of a mesh that is not connected."""
+    """Fault of a mesh that consists of several parts without a common face; empty list if there is one part."""
     piece = edges.pieces(len(sketch.cells))
     size, first = np.bincount(piece), np.unique(piece, return_index=True)[1]
     if size.size == 1:
@@ -138,7 +141,10 @@ def piece_faults(sketch: Sketch, edges: Edges) -> list[Fault]:
 def assign_patches(
     sketch: Sketch, edges: Edges, lines: np.ndarray, groups: Mapping[str, np.ndarray]
 ) -> tuple[list[Fault], list[str], np.ndarray]:
-    """(faults, patch names, int64[outer] patch of each outer edge, -1 for edges in no group)."""
+    """Assign a patch to each boundary edge, by the groups of lines in the file.
+
+    Returns faults, names of patches, and int64[outer] the patch of each boundary edge, -1 for edges in no group.
+    """
     names = [*(name for name in groups if name != WALL), WALL]
     keys = edges.key[edges.outer]
     order = np.argsort(keys)
@@ -168,7 +174,7 @@ def assign_patches(
 
 
 def _line_location(sketch: Sketch, edges: Edges, ends: np.ndarray) -> str:
-    """Position of a line that is not a boundary face."""
+    """Text that says where a line lies that is not a boundary face. ends : int64[2]  its points"""
     if (ends < 0).any():
         return "a line ends at a point that belongs to no cell"
     where = sketch.face(ends).removeprefix("the face ")

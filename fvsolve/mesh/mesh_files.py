@@ -1,4 +1,4 @@
-"""Contents of a mesh file as arrays, read by meshio (the only module that imports it for reading)."""
+"""Content of a mesh file as arrays, read by meshio (the only module that imports it for reading)."""
 
 from __future__ import annotations
 
@@ -22,10 +22,12 @@ TAGS = ("gmsh:physical", "medit:ref", "su2:tag")  # names of group numbers in th
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """Contents of a file.
+    """Content of a mesh file.
 
-    points : float64[p, 3] as in the file; cells : int64[n, 4], -1 last in a triangle; lines : int64[k, 2]
-    groups : name -> int64 numbers of lines, in the order of the file; notes : remarks for the owner of the file
+    points : float64[p, 3]  coordinates in the unit of the file; cells : int64[n, 4]  points of cells, -1 last in a
+    triangle
+    lines : int64[k, 2]  points of lines; groups : name -> int64[:] numbers of lines, in the order of the file
+    notes : remarks about the file for the user
     """
 
     points: np.ndarray
@@ -73,7 +75,7 @@ def load_file(path: Path) -> Content:
 
 
 def _read_by_meshio(path: Path) -> tuple[Any, tuple[str, ...]]:
-    """(meshio's mesh, its messages)."""
+    """Mesh object of meshio, and the messages that meshio printed."""
     import meshio
 
     if not path.is_file():
@@ -102,7 +104,10 @@ def _single_line(text: str) -> str:
 
 
 def _bad_kinds(kinds: dict[str, int]) -> list[Fault]:
-    """Faults of cells of another dimension or order, or of a file without cells."""
+    """Faults of cells that are not triangles or quadrilaterals, or of a file without cells.
+
+    kinds : type of cell -> number of cells
+    """
     counts = ", ".join(f"{count} {kind}" for kind, count in kinds.items()) or "none"
     solid = [kind for kind in kinds if re.match("tetra|hexa|wedge|pyramid|polyhedron", kind)]
     other = [kind for kind in kinds if kind not in IGNORED and kind not in solid]
@@ -127,7 +132,7 @@ def _bad_rows(table: np.ndarray, least: int, points: int) -> np.ndarray:
 
 
 def _groups(file_mesh: Any) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
-    """Groups of lines by name, and notes on groups without a name in the file."""
+    """Lines of each group by name, and notes on groups that have only a number in the file."""
     name_of = {int(tag): name for name, (tag, dimension) in _named_groups(file_mesh.field_data)}
     members: dict[str, list[np.ndarray]] = {name: [] for name in name_of.values()}
     unnamed: set[int] = set()
@@ -149,14 +154,14 @@ def _groups(file_mesh: Any) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
 
 
 def _named_groups(field_data: Any) -> Iterable[tuple[str, np.ndarray]]:
-    """(name, (number, dimension)) of the groups of lines with a name in the file."""
+    """Groups of lines that have a name in the file, as (name, (number, dimension))."""
     for name, entry in (field_data or {}).items():
         if np.shape(entry) == (2,) and int(entry[1]) == 1:
             yield name, entry
 
 
 def _tagged_lines(cell_data: Any, k: int) -> Iterable[tuple[int, np.ndarray]]:
-    """(group number, lines of block k with that number); 0 means no group."""
+    """Numbers of groups in block k of the file, each with the lines of that group; 0 stands for no group."""
     for key in TAGS:
         if key in cell_data:
             tags = np.asarray(cell_data[key][k]).astype(np.int64)

@@ -16,7 +16,7 @@ INWARD_FRACTION = 1e-3  # of the distance from the outline to the centre of its 
 
 
 class MeshPoints:
-    """Search for points in a mesh."""
+    """Search for points in a mesh: cell that contains a point, and interpolation weights there."""
 
     def __init__(self, mesh: Mesh) -> None:
         from scipy.spatial import cKDTree
@@ -29,7 +29,7 @@ class MeshPoints:
         self.cells_of_points, self.first = order // 4, first  # cells at a point: around[first[p] : first[p + 1]]
 
     def cell(self, x: float, y: float) -> int:
-        """Number of the cell that contains a point, on an edge the lowest; -1 outside and in holes."""
+        """Number of the cell that contains the point (x, y) [m]; the lowest on an edge, -1 outside and in holes."""
         n = len(self.mesh.cells)
         if not np.all((self.low <= (x, y)) & ((x, y) <= self.high)):  # far points, whose distances overflow, and NaN
             return -1
@@ -49,7 +49,7 @@ class MeshPoints:
         return (left >= -self.near * np.hypot(along[..., 0], along[..., 1])).all(axis=1)
 
     def nearest(self, x: float, y: float) -> tuple[float, float]:
-        """Point inside nearest to a point outside."""
+        """Position (x, y) [m] inside the mesh that is nearest to a point outside."""
         mesh = self.mesh
         outer = slice(mesh.inner, None)
         a, b = (mesh.points[mesh.ends[outer, k]] for k in (0, 1))
@@ -61,11 +61,11 @@ class MeshPoints:
         return float(inside[0]), float(inside[1])
 
     def cell_weights(self, x: float, y: float) -> tuple[np.ndarray, np.ndarray]:
-        """Cells int64[k] and their weights float64[k], not negative, with sum 1, for a field at a point inside.
+        """Cells around a point inside, and their weights in the value of a field there : int64[k], float64[k].
 
-        Bilinear between centres on full grids. Else from the cells that share a corner with the cell of the point, or
-        with these cells. Exact for linear fields, except beyond the outermost centres, where the nearest position
-        between them is used.
+        Weights have the sum 1 and are not negative. Bilinear between centres on grids without holes. Otherwise the
+        cells share a corner with the cell of the point, or with a neighbour of that cell. Exact for linear fields,
+        except beyond the outermost centres, where the nearest position between centres is used.
         """
         grid = self.mesh.grid
         if grid is not None and len(self.mesh.cells) == grid.nx * grid.ny:
@@ -103,9 +103,9 @@ class MeshPoints:
 
 
 def _neighbour_columns(lines: np.ndarray, value: float) -> tuple[np.ndarray, np.ndarray]:
-    """Two columns int64[2] with a value between their centres, and their weights.
+    """Two columns with `value` between their centres, and their weights : int64[2], float64[2]. lines : grid lines [m]
 
-    Beyond the outermost centres, its own only.
+    Beyond the outermost centres the outermost column has weight 1.
     """
     centres = 0.5 * (lines[1:] + lines[:-1])
     k = int(np.clip(np.searchsorted(centres, value) - 1, 0, max(centres.size - 2, 0)))

@@ -15,8 +15,9 @@ class Quality:
     """Quality measures of a mesh.
 
     smallest, largest : areas of cells [m2]
-    angle : least angle at a corner [rad], in cell `sharpest`
-    ratio : greatest ratio of the areas of two neighbours, at face `steepest` (1 and -1 for a mesh without inner faces)
+    angle : least angle at a corner [rad]; sharpest : cell with this angle
+    ratio : greatest ratio of the areas of two neighbours [-]; steepest : face between them
+    A mesh without inner faces has ratio 1 and steepest -1.
     """
 
     smallest: float
@@ -28,7 +29,7 @@ class Quality:
 
 
 def quality(mesh: Mesh) -> Quality:
-    """Quality measures of a mesh."""
+    """Compute the quality measures of a mesh."""
     turn, straight, _ = corners(mesh.points, mesh.cells)
     angle = np.arctan2(turn, -straight).min(axis=1)
     sharpest = int(np.argmin(angle))

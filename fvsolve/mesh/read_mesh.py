@@ -1,4 +1,4 @@
-"""Mesh from a file, with all checks; clockwise cells are reversed, with a note."""
+"""Reading of a mesh from a file, with all checks; clockwise cells are reversed, with a note."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LARGE, SMALL = 1e4, 1e-3  # extents that suggest another unit [m]
 
 
 def read(path: str | Path, unit: str = "m") -> Mesh:
-    """Plane mesh of a file that meshio reads, with coordinates in `unit`.
+    """Read a plane mesh from a file of any format of meshio, with coordinates in `unit`.
 
     Triangles and quadrilaterals are cells, renumbered so that neighbours are close; physical groups of lines are
     patches. Raises MeshError with all faults that can be distinguished.
@@ -62,7 +62,7 @@ def read(path: str | Path, unit: str = "m") -> Mesh:
 
 
 def _factor(unit: str, path: Path) -> float:
-    """Metres per unit."""
+    """Length of `unit` [m]; raises MeshError for an unknown unit."""
     try:
         return find(unit, "length").read("1")
     except ValueError as error:
@@ -70,7 +70,7 @@ def _factor(unit: str, path: Path) -> float:
 
 
 def _place_faults(content: Content, unit: str) -> list[Fault]:
-    """Faults of points without finite coordinates, or not in one plane z = constant."""
+    """Faults of points whose coordinates are not finite, or that do not lie in one plane z = constant."""
     used = np.unique(content.cells[content.cells >= 0])
     points = content.points[used]
     invalid = used[~(np.abs(points) < FAR).all(axis=1)]  # nan too
@@ -96,7 +96,7 @@ def _place_faults(content: Content, unit: str) -> list[Fault]:
 
 
 def _renumber(lines: np.ndarray, used: np.ndarray) -> np.ndarray:
-    """Lines with numbers of the used points; -1 for a point that belongs to no cell."""
+    """Ends of lines as positions in the sorted array `used` of point numbers; -1 for a point that is not in it."""
     spot = np.minimum(np.searchsorted(used, lines), used.size - 1)
     return np.where(used[spot] == lines, spot, -1)
 
@@ -108,7 +108,7 @@ def _reversed(cells: np.ndarray) -> np.ndarray:
 
 
 def _notes(sketch: Sketch, factor: float, patch: np.ndarray, grouped: bool) -> list[str]:
-    """Notes on missing names of the boundary, and on a probable other unit."""
+    """Notes on boundary faces without a group, and on an extent that suggests another unit."""
     notes = []
     unnamed = int((patch < 0).sum())
     if not grouped:

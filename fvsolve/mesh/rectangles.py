@@ -1,4 +1,4 @@
-"""Rectangles of cells, graded, with holes, and patches on their sides."""
+"""Meshes of rectangles: graded grids of cells with holes, and patches on their sides."""
 
 from __future__ import annotations
 
@@ -26,10 +26,12 @@ def rectangle(
     patches: Mapping[str, Side] | None = None,
     holes: Sequence[Sequence[float]] = (),
 ) -> Mesh:
-    """Rectangle of a size [m] from its south-west corner, `origin` [m]; cells are numbered row by row.
+    """Mesh of a rectangle of a size [m] from its south-west corner, `origin` [m]; cells are numbered row by row.
 
-    cells : columns and rows; grading : last spacing over first, geometric between them, in x and y
-    patches : name -> a side, "west", "east", "south", "north", or (side, from, to) with coordinates along it [m]
+    size, cells, origin, grading : two values, along x and y; cells : numbers of columns and rows
+    grading : ratio of last to first spacing, geometric between them
+    patches : name -> a side, "west", "east", "south" or "north", or (side, from, to) with coordinates along the side
+    [m]
     holes : (x0, y0, x1, y1) on grid lines [m], removed; the remaining cells must be connected by faces
     Raises MeshError with all faults.
     """
@@ -92,7 +94,7 @@ def _list_text(given: Sequence) -> str:
 
 
 def _graded(start: float, size: float, cells: int, grading: float) -> np.ndarray:
-    """Grid lines whose spacings grow geometrically to `grading` times the first : float64[cells + 1]."""
+    """Grid lines whose spacings change geometrically to `grading` times the first : float64[cells + 1] [m]."""
     share = np.arange(cells + 1) / cells
     if grading != 1.0:
         rate = math.log(grading) / (cells - 1)
@@ -103,20 +105,20 @@ def _graded(start: float, size: float, cells: int, grading: float) -> np.ndarray
 
 
 def _line(lines: np.ndarray, value: float) -> int | None:
-    """Number of the grid line at a value, None if there is none near."""
+    """Number of the grid line at the position `value` [m]; None if no line is near."""
     k = int(np.argmin(np.abs(lines - value)))
     return k if abs(lines[k] - value) <= LINE_TOLERANCE * (lines[-1] - lines[0]) else None
 
 
 def _nearest(lines: np.ndarray, value: float) -> str:
-    """Text like '0.25 and 0.5', the lines on both sides of a value."""
+    """Text like '0.25 and 0.5', the positions of the grid lines on both sides of `value`."""
     k = int(np.clip(np.searchsorted(lines, value), 1, lines.size - 1))
     around = [lines[0]] if value < lines[0] else [lines[-1]] if value > lines[-1] else lines[k - 1 : k + 1]
     return " and ".join(f"{line:.9g}" for line in around)
 
 
 def _cut(solid: np.ndarray, lines: Sequence[np.ndarray], place: str, hole: Sequence[float]) -> list[Fault]:
-    """Remove a hole from `solid`; returns its faults."""
+    """Mark the cells of a hole as False in `solid` : bool[ny, nx]; return the faults of the hole."""
     names = ("x0", "y0", "x1", "y1")
     if len(hole) != 4 or not all(math.isfinite(v) for v in hole) or not (hole[0] < hole[2] and hole[1] < hole[3]):
         return [Fault(place, f"{_list_text(hole)}; expected [x0, y0, x1, y1] [m] with x0 below x1 and y0 below y1")]
@@ -136,7 +138,7 @@ def _cut(solid: np.ndarray, lines: Sequence[np.ndarray], place: str, hole: Seque
 
 
 def _corners(lines: Sequence[np.ndarray], solid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(float64[p, 2] points of cells, row by row; int64[n, 4] cells)."""
+    """Points of the cells of a grid, and the corners of each cell : float64[p, 2], int64[n, 4], row by row."""
     row, column = np.nonzero(solid)
     wide = lines[0].size
     first = row * wide + column
@@ -155,7 +157,7 @@ def _patches(
     edges: Edges,
     faults: list[Fault],
 ) -> tuple[list[str], np.ndarray]:
-    """(names, int64[outer] patch of each outer edge); faults are added to the list."""
+    """Names of the patches, and the patch of each boundary edge : int64[outer]; faults are appended to `faults`."""
     names = [*(name for name in given if name != WALL), WALL]
     patch = np.full(edges.outer.size, len(names))  # no patch yet
     a, b = points[edges.start[edges.outer]], points[edges.stop[edges.outer]]
@@ -179,7 +181,7 @@ def _patches(
 
 
 def _patch_range(place: str, side: str, span: list, lines: Sequence[np.ndarray], solid: np.ndarray) -> tuple | Fault:
-    """(from, to) on grid lines [m], or the fault of the span."""
+    """Start and end of a patch along a side, on grid lines [m], or the fault of its range `span`."""
     if side not in SIDES:
         return Fault(place, f'unknown side "{side}"; expected {", ".join(SIDES)}{did_you_mean(str(side), SIDES)}')
     along = lines[SIDES[side]]
@@ -189,7 +191,9 @@ def _patch_range(place: str, side: str, span: list, lines: Sequence[np.ndarray],
     if not span:
         return along[0], along[-1]
     if len(span) != 2 or not all(math.isfinite(value) for value in span) or not span[0] < span[1]:
-        return Fault(place, f"{_list_text(span)}; expected from below to, coordinates along the {side} side [m]")
+        return Fault(
+            place, f"{_list_text(span)}; expected two coordinates along the {side} side [m], the first below the second"
+        )
     first, last = (_line(along, value) for value in span)
     text = f"{span[0]:.9g} to {span[1]:.9g} m"
     if first is None or last is None or first == last:

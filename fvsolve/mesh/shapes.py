@@ -1,4 +1,4 @@
-"""Area, centroid, corners and faces of plane cells."""
+"""Area, centroid, corners and faces of plane cells, and the assembly of a mesh from them."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from fvsolve.mesh.mesh import Grid, Mesh
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """a_x b_y - a_y b_x over the last axis."""
+    """Cross product a_x b_y - a_y b_x of plane vectors over the last axis."""
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
 def area_and_centre(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(float64[n] signed areas, float64[n, 2] centroids); exact to the bit for rectangles.
+    """Signed areas and centroids of cells, exact for rectangles : float64[n], float64[n, 2].
 
-    With corners p0 to p3, and a1, a2 the areas on both sides of the diagonal p0 p2, A = a1 + a2:
+    With corners p0 to p3, and the areas a1, a2 on both sides of the diagonal p0 p2, A = a1 + a2:
     centroid = (p0 + p1 + p2 + p3) / 4 - ((p1 + p3) - (p0 + p2)) / 12 - (a1 - a2) (p3 - p1) / (6 A).
     A triangle is a quadrilateral whose p3 is p0.
     """
@@ -32,11 +32,10 @@ def area_and_centre(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, 
 
 
 def corners(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """float64[n, 4] each: at a corner, cross and scalar product of the sides into and out of it.
+    """Three arrays float64[n, 4] for the corners of cells.
 
-    Length of the side out of it.
-
-    A triangle has its first corner twice.
+    They are cross product and scalar product of the sides into and out of a corner, and the length of the side out of
+    it. In a triangle the fourth corner is the first again.
     """
     out = np.empty((3, len(cells), 4))
     for selected, count in ((cells[:, 3] < 0, 3), (cells[:, 3] >= 0, 4)):
@@ -64,7 +63,7 @@ def assemble(
     grid: Grid | None = None,
     notes: Sequence[str] = (),
 ) -> Mesh:
-    """Mesh of valid, anticlockwise cells. patch : int64[outer]  patch of each outer edge"""
+    """Mesh of valid, anticlockwise cells. patch : int64[outer]  number of the patch of each boundary edge"""
     area, centre = area_and_centre(points, cells)
     order = np.argsort(patch, kind="stable")
     chosen = np.concatenate([edges.inner, edges.outer[order]])

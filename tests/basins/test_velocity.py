@@ -129,7 +129,7 @@ def test_a_stream_function_from_a_file_leaves_no_divergence(tmp_path, mixed):
     "velocity, words",
     [
         ({"expression": "rotaton"}, 'unknown velocity "rotaton"; expected .*; did you mean "rotation"'),
-        ({"expression": "rotation", "centre": (0, 0)}, "needs angular_velocity as well"),
+        ({"expression": "rotation", "centre": (0, 0)}, "needs values of more parameters: angular_velocity"),
         ({"expression": "shear", "rate": 1.0, "slope": 2.0}, "has no parameter slope; expected rate, u, y0"),
         ({"expression": "swirl", "size": 0.0}, "not finite at"),
         ({"stream": np.zeros(3)}, r"expected a value for each of 20 corners"),

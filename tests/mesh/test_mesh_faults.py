@@ -37,7 +37,9 @@ BAD_RECTANGLES = {
     "patches.a: 0.3 to 0.31 m does not consist of whole faces of the west side; nearest is 0.25 to 0.5 m": dict(
         patches={"a": ("west", 0.3, 0.31)}
     ),
-    "patches.a: [0.5, 0.25]; expected from below to": dict(patches={"a": ("west", 0.5, 0.25)}),
+    "patches.a: [0.5, 0.25]; expected two coordinates along the west side [m], the first below the second": dict(
+        patches={"a": ("west", 0.5, 0.25)}
+    ),
     'patches.b: overlaps "a" on the west side, about 0.625 to 0.875 m': dict(
         patches={"a": ("west", 0.5, 1.0), "b": "west"}
     ),

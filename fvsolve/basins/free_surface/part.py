@@ -70,7 +70,8 @@ class FreeSurface(Physics, name="free-surface"):
 
         The elevation is the mean height of the bed in those of `cells` that are under water, or in the lowest if all
         are dry.
-        mean : function for cell means of a field; cells : indices of the cells next to the patch; area : their weights
+        mean : function from a formula to its means over all cells; cells : numbers of the cells behind the patch
+        area : areas of all cells [m2]
         """
         bed = mean(basin.bed)
         cells = cells[bed[cells] <= max(bed[cells].min(), np.nextafter(basin.level, -np.inf))]

@@ -119,7 +119,7 @@ class LiquidRows(BasinRows):
         if self.waves.speed > (1.0 + 1e-9) * self.waves.fluid_speed:
             speed, sound = (draft.case.amount(value, "velocity", 6) for value in (self.speed, self.waves.fluid_speed))
             draft.fault(f"nodes.{self.name}.wave_speed", f"{speed} is faster than sound in the fluid, {sound}; "
-                        "expected at most that, or another law")  # fmt: skip
+                        "expected at most that speed, or another density law")  # fmt: skip
         row["table"] = draft.to_plane(self.waves.table())
 
     def pressure(self, deviation: np.ndarray) -> np.ndarray:

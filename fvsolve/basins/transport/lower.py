@@ -1,4 +1,4 @@
-"""Rows of tables for scalars in a given velocity."""
+"""Rows of the tables of a model for scalars in a given velocity."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fvsolve.kernels.rhs_assembly import RhsTerms
 
 
 class TransportRows(BasinRows):
-    """A basin with a given velocity, which has only scalars as states; depth 1."""
+    """Rows of the tables of a model for a basin with a given velocity; its only states are scalars, its depth is 1."""
 
     given = banded = True
 
@@ -64,7 +64,11 @@ class TransportRows(BasinRows):
             row["through"] = draft.to_plane(inward[self.ring()] if self.is_grid else inward)
 
     def unsplit(self, row, passing: list[str]) -> float:
-        """Factor of the outflow of a cell in the rate, so that Euler steps of Courant number 1 keep bounds."""
+        """Factor on the rate of outflow of a cell that limits the time step.
+
+        With it explicit Euler steps of Courant number 1 keep scalars within their bounds.
+        passing : names of the patches with flow through them
+        """
         if row["scheme"] in (rec.UPWIND, rec.LINEAR):
             return 1.0
         return 3.0 if row["scheme"] == rec.MUSCL and self.is_grid and passing else 2.0

@@ -46,13 +46,13 @@ def shear(x, y, rate, y0=0.0, u=0.0):
 
 
 def parabolic(x, y, speed, south, north):
-    """Parabolic flow along a channel between two walls at y = south, north [m]; speed [m/s] is the mean."""
+    """Parabolic flow along x between walls at y = south and y = north [m]; speed [m/s] is the mean velocity."""
     s = (y - south) / (north - south)
     return speed * (north - south) * s * s * (3.0 - 2.0 * s)
 
 
 def cellular(x, y, speed, width, height, origin=(0.0, 0.0)):
-    """Vortices of width by height [m], alternately anticlockwise (first) and clockwise; speed [m/s] along x."""
+    """Vortices of width by height [m], alternately anticlockwise (first) and clockwise; speed [m/s]: greatest u."""
     s = np.sin(np.pi * (x - origin[0]) / width) * np.sin(np.pi * (y - origin[1]) / height)
     return speed * height / np.pi * s
 
@@ -66,9 +66,10 @@ EXPRESSIONS: dict[str, Callable[..., np.ndarray]] = {
 def face_flows(mesh: Mesh, velocity: Mapping) -> np.ndarray:
     """Flow through every face per depth, along its normal : float64[f] [m2/s].
 
-    velocity : one of {"expression": name, its parameters}, {"stream": float64[p] at the corners [m2/s]},
-    {"file": CSV with a header x, y, u, v or x, y, psi, with units or in SI, interpolated linearly}. All but those of u
-    and v have no divergence in any cell, to the bit. Raises ValueError for an expression, MeshError for a file.
+    velocity : {"expression": name, and its parameters}, {"stream": float64[p] stream function at the corners [m2/s]} or
+    {"file": CSV file with columns x, y, u, v or x, y, psi, with units in the header or in SI, interpolated linearly}.
+    All but the flows from u and v are exactly free of divergence in every cell. Raises ValueError for an expression,
+    MeshError for a file.
     """
     kinds = {"expression": _by_name, "stream": _by_corners, "file": _by_file}
     given = [kind for kind in kinds if kind in velocity]
@@ -78,9 +79,10 @@ def face_flows(mesh: Mesh, velocity: Mapping) -> np.ndarray:
 
 
 def grid_flows(mesh: Mesh, flows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(float64[ny (nx + 1)] east, float64[(ny + 1) nx] north): flows through the faces of a rectangle, row by row.
+    """Flows through the faces of a rectangle, row by row: two arrays, eastward and northward.
 
-    Raises ValueError for a mesh that is not a full rectangle.
+    eastward : float64[ny (nx + 1)]; northward : float64[(ny + 1) nx]. Raises ValueError for a mesh that is not a full
+    rectangle.
     """
     grid = mesh.grid
     if grid is None or (grid.index < 0).any():
@@ -106,12 +108,12 @@ def _by_name(mesh: Mesh, expression: str, **parameters) -> np.ndarray:
             raise ValueError(f'velocity "{expression}" has no parameter {name}; expected {listing(known)}{close}')
     missing = [name for name, p in known.items() if p.default is p.empty and name not in parameters]
     if missing:
-        raise ValueError(f'velocity "{expression}" needs {listing(missing)} as well')
+        raise ValueError(f'velocity "{expression}" needs values of more parameters: {listing(missing)}')
     return _by_corners(mesh, function(mesh.points[:, 0], mesh.points[:, 1], **parameters))
 
 
 def _by_corners(mesh: Mesh, stream: np.ndarray) -> np.ndarray:
-    """Differences of a stream function along faces, after rounding it so that they are exact."""
+    """Flows as differences of a stream function along faces, after rounding so that the differences are exact."""
     stream = np.asarray(stream, float)
     if stream.shape != (len(mesh.points),):
         raise ValueError(f"stream has shape {stream.shape}; expected a value for each of {len(mesh.points)} corners")
@@ -124,7 +126,7 @@ def _by_corners(mesh: Mesh, stream: np.ndarray) -> np.ndarray:
 
 
 def constant_along_walls(mesh: Mesh, stream: np.ndarray) -> np.ndarray:
-    """Stream function made constant along stretches of the outline where it differs by rounding only : float64[p]."""
+    """Stream function made constant along parts of the outline where it varies by rounding errors only : float64[p]."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -148,7 +150,10 @@ def is_outer_loop(mesh: Mesh) -> np.ndarray:
 
 
 def velocity_flows(mesh: Mesh, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Flows from velocities at the middles of faces : float64[f]; zero across the outline where it is rounding."""
+    """Flows through faces from velocities u, v at their middles : float64[f] [m2/s].
+
+    Flows across the outline that are rounding errors are set to zero.
+    """
     normal = u * mesh.normal[:, 0] + v * mesh.normal[:, 1]
     still = np.abs(normal) <= ROUNDED_CROSSFLOW * np.hypot(u, v).max()
     still[: mesh.inner] = False

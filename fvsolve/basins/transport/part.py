@@ -1,4 +1,4 @@
-"""Keys and fields of scalars in a given velocity."""
+"""Keys of the case file for scalars in a given velocity."""
 
 from __future__ import annotations
 
@@ -18,11 +18,13 @@ from fvsolve.units import show
 
 @dataclass(frozen=True)
 class Velocity:
-    """A given velocity, in one of the forms `way`: "u, v" | "stream" | "expression" | "file".
+    """A given velocity.
 
-    given : {"u": Formula, "v": Formula} | {"stream": Formula} | {"expression": name, its parameters} | {"file": path}
-    period : time after which it returns to its initial direction, cos(pi t / period) [s]
-    said : the table of the case
+    form : "u, v", "stream", "expression" or "file"
+    given : {"u": formula, "v": formula}, {"stream": formula}, {"expression": name, and its parameters} or {"file":
+    path}
+    period : period of the factor cos(pi t / period) on the velocity [s], None for a constant velocity
+    stated : the table as written in the case file
     """
 
     form: str
@@ -31,7 +33,7 @@ class Velocity:
     stated: dict[str, Any]
 
     def table(self) -> dict[str, Any]:
-        """Table of the case file."""
+        """Table as written in the case file."""
         return self.stated
 
 
@@ -46,7 +48,7 @@ PARAMETERS: dict[str, Value] = {  # of velocities by name
 
 
 class VelocityValue(Value):
-    """Value of the key `velocity`: { u, v } or { stream }, formulas of x and y, { expression, ... } or { file }."""
+    """Value of the key `velocity`: { u, v } or { stream } as formulas of x and y, { expression, ... } or { file }."""
 
     about = (
         "velocity field: { u, v } or { stream } as formulas of x and y in SI, { expression } with its parameters, or "
@@ -88,7 +90,10 @@ class VelocityValue(Value):
 
 
 class Transport(Physics, name="transport"):
-    """(d phi)_t + div(d w phi) = div(d D grad phi), velocity w given."""
+    """Basin with scalars phi in a given velocity w: (d phi)_t + div(d w phi) = div(d D grad phi).
+
+    Depth d [m], diffusivity D [m2/s].
+    """
 
     joined: ClassVar[bool] = False
 

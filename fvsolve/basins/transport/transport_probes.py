@@ -1,4 +1,4 @@
-"""Probes of a given velocity."""
+"""Probes of the flow in basins with a given velocity."""
 
 from fvsolve.basins.basin_scalars import flow_factor
 from fvsolve.basins.boundary_cells import patch_inflow
@@ -9,7 +9,7 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def observe_given_flows(t, y, out, handle, values):
-    """Write values[k] of the probes of the inflow through a patch by a given velocity [m3/s]."""
+    """Write the values of the probes of inflow through patches by a given velocity [m3/s]."""
     tables = open_tables(handle)
     for k in range(tables.probes.size):
         if tables.probes[k]["kind"] == GIVEN_FLOW:
