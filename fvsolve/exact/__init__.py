@@ -1,4 +1,4 @@
-"""Exact solutions that a case may name under `[exact]`."""
+"""Exact solutions, which a case file names under `[exact]`."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ NAMES = {  # name in the case file -> (module of this package, description)
 
 
 def find_faults(case) -> Iterator[tuple[tuple, str]]:
-    """(keys, message) of everything in a case that its exact solution does not cover.
+    """Everything in a case that its exact solution does not cover, as (keys, message).
 
-    Parts of other types are reported first; only without them the solution checks the keys of its parts.
+    Parts of other types are reported first; only without them does the solution check the keys of its parts.
     """
     module = _module(case.exact.name)
     yield from law_faults(case)
@@ -37,7 +37,7 @@ def find_faults(case) -> Iterator[tuple[tuple, str]]:
 
 
 def solution(case, start: ExactStart) -> Solution:
-    """Exact solution that a case names, from its flows and pressures at the start."""
+    """Exact solution named in a case, from the flows and pressures at the start."""
     return _module(case.exact.name).solution(case, start)
 
 

@@ -1,7 +1,8 @@
 """Rigid column between given pressures, with or without a valve in series; only quadratic losses.
 
-(L / A) dM/dt = D - K |M| M with constant D and K: tanh, coth, tan or a straight line in time on each interval between
-jumps of the opening.
+(L / A) dM/dt = D - K |M| M: mass flow M [kg/s], length L and area A of the column, drive D (difference of
+p + rho g z between the ends) and resistance K. Both are constant on each interval between jumps of the opening of the
+valve, where M is tanh, coth, tan or a straight line in time.
 """
 
 from __future__ import annotations
@@ -48,13 +49,13 @@ def find_faults(case):
 
 
 def columns_and_valves(case) -> tuple[list, list]:
-    """(columns, valves) as pairs (name, part)."""
+    """Columns of a case, and its valves and orifices: two lists of (name, part)."""
     columns = [item for item in case.links.items() if item[1].kind == "rigid-column"]
     return columns, [item for item in case.links.items() if item[1].kind in ("valve", "orifice")]
 
 
 def solution(case, start: ExactStart) -> Solution:
-    """Flow and node pressures of a case without faults."""
+    """Flow and node pressures of a case without faults, as functions of time."""
     [(name, column)], valves = columns_and_valves(case)
     rho, t0 = case.properties.density, case.numerics.start
     area = 0.25 * math.pi * column.diameter**2
@@ -95,14 +96,14 @@ def solution(case, start: ExactStart) -> Solution:
 
 
 def reservoir_beyond(case, end: str, valve) -> str:
-    """Reservoir at an end of the column, or on the other side of the valve there."""
+    """Reservoir at an end of the column, or beyond the valve at this end."""
     if case.nodes[end].kind == "reservoir":
         return end
     return valve.to if valve.from_ == end else valve.from_
 
 
 def orientation(column, valve) -> float:
-    """1 if valve and column have the same flow direction, else -1."""
+    """1 if valve and column have the same positive flow direction, else -1."""
     return 1.0 if valve.from_ == column.to or valve.to == column.from_ else -1.0
 
 
@@ -116,7 +117,7 @@ def _piecewise(pieces, t, law):
 
 
 def flow_after(m: float, drive: float, k: float, a: float, t: np.ndarray) -> np.ndarray:
-    """M(t) of M' = a (drive - k |M| M), M(0) = m."""
+    """Solution M at times t after the start of M' = a (drive - k |M| M) with M(0) = m."""
     if drive < 0.0 or (drive == 0.0 and m < 0.0):
         return -flow_after(-m, -drive, k, a, t)
     if k == 0.0:

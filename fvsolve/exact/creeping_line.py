@@ -1,9 +1,10 @@
 """Pipe with wall creep between a reservoir and a changing demand, by its Laplace transform.
 
-Storage of a wall of Kelvin-Voigt elements with compliance J and time tau, relative to the instantaneous storage of
-liquid and elastic wall: C(s) = 1 + sum of g / (1 + tau s), g = c D rho a^2 J / e (Covas et al. 2005). Waves propagate
-as exp(-G d) with G = (s / a) sqrt(C) and impedance (a / A) / sqrt(C). Unsteady laminar friction adds the factor of
-`laminar_line`.
+The storage of a wall of Kelvin-Voigt elements with compliance J [1/Pa] and retardation time tau [s], relative to the
+instantaneous storage of liquid and elastic wall, is C(s) = 1 + sum of g / (1 + tau s), g = c D rho a^2 J / e (Covas et
+al. 2005): Laplace variable s, wave speed a, density rho, diameter D, wall thickness e, restraint factor c. Waves
+propagate over a distance d as exp(-G d) with G = (s / a) sqrt(C), and with the impedance (a / A) / sqrt(C), A the area
+of the pipe. Unsteady laminar friction adds the factor of `laminar_line`.
 """
 
 from __future__ import annotations
@@ -30,13 +31,13 @@ def find_faults(case):
 
 
 def solution(case, start: ExactStart) -> Solution:
-    """Pressures and flows along the pipe of a case without faults."""
+    """Pressures and flows along the pipe of a case without faults, as functions of time."""
     [pipe] = case.links.values()
     return line_solution(case, start, CreepDeviation(case, pipe))
 
 
 class CreepDeviation(LineDeviation):
-    """Deviations from the start along a pipe with wall creep."""
+    """Deviations of pressure and flow from the start along a pipe with wall creep."""
 
     def __init__(self, case, pipe) -> None:
         super().__init__(case, pipe)

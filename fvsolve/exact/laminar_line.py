@@ -1,10 +1,12 @@
 """Laminar pipe between a reservoir and a changing demand, with the exact velocity profile.
 
-With the Laplace variable s and x = R sqrt(s / nu), momentum over the laminar profile is s M (I0(x) / I2(x)) = -A dp/dx
-(Zielke 1968). Waves propagate as exp(-G d), G = (s / a) sqrt(I0 / I2), with impedance Z = (a / A) sqrt(I0 / I2). If
-liquid and wall store C times their instantaneous storage, the roots are sqrt(C I0 / I2) and sqrt(I0 / (C I2)). For a
-demand with jumps the response is the series of all reflections; each is inverted after its pure delay exp(-s d / a) is
-split off (Talbot's contour). For a smooth demand the whole tanh is inverted along a Bromwich line.
+With the Laplace variable s and x = R sqrt(s / nu), radius R and kinematic viscosity nu, the momentum of the laminar
+profile is s M I0(x) / I2(x) = -A dp/dx (Zielke 1968): mass flow M, area A, modified Bessel functions I0 and I2. Waves
+propagate over a distance d as exp(-G d), G = (s / a) sqrt(I0 / I2), wave speed a, with the impedance
+Z = (a / A) sqrt(I0 / I2). If liquid and wall store C times their instantaneous storage, the roots are sqrt(C I0 / I2)
+and sqrt(I0 / (C I2)). For a demand with jumps the response is the series of all reflections; each is inverted after its
+pure delay exp(-s d / a) is split off (Talbot's contour). For a smooth demand the sum of all reflections is inverted
+along a Bromwich line.
 """
 
 from __future__ import annotations
@@ -54,20 +56,20 @@ def find_faults(case):
 
 
 def reynolds(case, pipe) -> float:
-    """Largest Reynolds number of the demand and of the flow reflected from the reservoir."""
+    """Largest Reynolds number of the demand and of the flow reflected at the reservoir."""
     demand = next(case.nodes[end].demand for end in (pipe.from_, pipe.to) if case.nodes[end].kind == "junction")
     flow = float(np.max(np.abs(demand.value)) + np.ptp(demand.value))
     return 4.0 * flow * case.properties.density / (math.pi * pipe.diameter * case.properties.viscosity)
 
 
 def solution(case, start: ExactStart) -> Solution:
-    """Pressures and flows along the pipe of a case without faults."""
+    """Pressures and flows along the pipe of a case without faults, as functions of time."""
     [(name, pipe)] = case.links.items()
     return line_solution(case, start, LineDeviation(case, pipe))
 
 
 def line_solution(case, start: ExactStart, line: LineDeviation) -> Solution:
-    """Pressures and flows of a case with a single pipe, from its deviations."""
+    """Pressures and flows of a case with a single pipe, from the deviations along it, as functions of time."""
     [(name, pipe)] = case.links.items()
     drop = start.pressure[pipe.to] - start.pressure[pipe.from_]
     flow = start.flow[name]
@@ -84,7 +86,7 @@ def line_solution(case, start: ExactStart, line: LineDeviation) -> Solution:
 
 
 class LineDeviation:
-    """Deviations from the start along a pipe; x is the distance from the reservoir."""
+    """Deviations of pressure and flow from the start along a pipe; x is the distance from the reservoir [m]."""
 
     def __init__(self, case, pipe) -> None:
         self.reversed = case.nodes[pipe.to].kind == "reservoir"
@@ -95,14 +97,14 @@ class LineDeviation:
         self.scale = 0.25 * pipe.diameter**2 * self.rho / (self.viscosity or 1.0)  # R^2 / nu [s]
 
     def waves(self, x, t):
-        """(pressure [Pa], mass flow [kg/s]) at distances x [m] and times t [s], arrays of equal shape."""
+        """Deviations of pressure [Pa] and mass flow [kg/s] at distances x [m] and times t [s], arrays of one shape."""
         t = np.minimum(t, self.end)
         if self.demand.kind == "smooth":
             return self._smooth_response(x, t)
         return self._jump_response(x, t)
 
     def fronts(self, t: float) -> np.ndarray:
-        """Distances from `from` of the fronts of all jumps at time t [m]."""
+        """Distances of the wave fronts of all jumps of the demand from the `from` end at time t [m]."""
         if self.demand.kind != "step":
             return np.zeros(0)
         places = []
@@ -114,18 +116,18 @@ class LineDeviation:
         return self.length - places if self.reversed else places
 
     def _demand_jumps(self):
-        """(time [s], change of the mass flow of the demand [kg/s]) of every jump after the start."""
+        """Jumps of the demand after the start: (time [s], change of the mass flow [kg/s]) of each."""
         times, values = self.demand.time, self.demand.value
         for k in range(1, len(times)):
             if times[k] >= self.t0:
                 yield float(times[k]), self.rho * float(values[k] - values[k - 1])
 
     def storage_ratio(self, s):
-        """Storage of liquid and wall relative to their instantaneous storage, C(s)."""
+        """Storage C(s) of liquid and wall relative to their instantaneous storage [-]. s : Laplace variable [1/s]"""
         return 1.0
 
     def ratio(self, s):
-        """Inertia of the flow relative to plug flow: I0(x) / I2(x), x = R sqrt(s / nu)."""
+        """Inertia of the laminar profile relative to plug flow, I0(x) / I2(x) with x = R sqrt(s / nu) [-]."""
         from scipy.special import ive
 
         x = np.sqrt(s * self.scale)
@@ -145,7 +147,10 @@ class LineDeviation:
         return p, m
 
     def _unit_jump(self, d, after):
-        """(pressure, flow) of a unit jump at a distance d and a time `after` its front, by a fixed Talbot contour."""
+        """Pressure and mass flow due to a jump of 1 kg/s at a distance d [m], `after` seconds after its front.
+
+        Inverse Laplace transform along a fixed Talbot contour.
+        """
         here = after > 0.0
         p, m = np.zeros(d.shape), np.zeros(d.shape)
         if not here.any():
@@ -180,7 +185,7 @@ class LineDeviation:
         return p.reshape(x.shape), m.reshape(x.shape)
 
     def _input(self):
-        """(s, transform of the change of mass flow, step of s) along the Bromwich line."""
+        """Points s of the Bromwich line, Laplace transform of the change of mass flow there, and step of s."""
         if not hasattr(self, "_bromwich_line"):
             span = self.end - self.t0
             step = 2.0 * math.pi / (PERIOD * span)
@@ -196,7 +201,7 @@ class LineDeviation:
         return self._bromwich_line
 
     def _transform(self, s):
-        """Transform of the change of mass flow: integral of its slope times exp(-s t), divided by s (Gauss points)."""
+        """Laplace transform of the change of mass flow: integral of its slope times exp(-s t), over s (Gauss points)."""
         times = self.demand.time
         places, weights = np.polynomial.legendre.leggauss(4)
         width, middle = np.diff(times), 0.5 * (times[1:] + times[:-1])

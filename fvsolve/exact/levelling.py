@@ -1,7 +1,9 @@
-"""Tanks and chambers on an orifice with the turbulent law: the pressure drop is a parabola in time.
+"""Two vessels joined by an orifice with the turbulent law: the pressure drop is a parabola in time.
 
-A drop d with flow q = Cd A sqrt(2 d / rho) and d' = -k q has a square root that is linear in time. It reaches zero at
-the finite time 2 sqrt(d0) / s, s = k Cd A sqrt(2 / rho) (Torricelli 1644). A laminar transition near zero is left out.
+The flow is q = Cd A sqrt(2 d / rho): pressure drop d, discharge coefficient Cd, area A of the orifice, density rho. It
+reduces the drop, d' = -k q, with the pressure per volume k [Pa/m3] of both vessels. So sqrt(d) is linear in time and
+reaches zero at the time 2 sqrt(d0) / s, s = k Cd A sqrt(2 / rho), d0 the drop at the start (Torricelli 1644). A laminar
+transition near zero is left out.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ def find_faults(case):
 
 
 def _find_faults(case):
-    """Faults of a case that is not a drop across a single orifice."""
+    """Faults of a case that is not two vessels joined by a single orifice."""
     yield from count_faults(case, list(case.links), "orifice or valve")
     name, start = case.exact.name, case.numerics.start
     for node, part in case.nodes.items():
@@ -32,7 +34,7 @@ def _find_faults(case):
         if getattr(part, "connection", None) is not None:
             yield ("nodes", node, "connection"), f'the exact solution "{name}" does not support a connection'
         if part.kind == "chamber" and part.initial_pressure is None:
-            yield ("nodes", node), f'the exact solution "{name}" needs an initial_pressure'
+            yield ("nodes", node), f'the exact solution "{name}" needs the key `initial_pressure`'
         if part.kind == "reservoir" and not constant_from(part.pressure or part.head, start):
             yield ("nodes", node), f'the exact solution "{name}" needs a constant pressure or head'
     for link, part in case.links.items():
@@ -45,7 +47,7 @@ def _find_faults(case):
 
 
 def solution(case, start: ExactStart) -> Solution:
-    """Pressures, levels and the flow of a case without faults."""
+    """Pressures, levels and flow of a case without faults, as functions of time."""
     (link, part), rho, t0 = next(iter(case.links.items())), case.properties.density, case.numerics.start
     ends, weight = (part.from_, part.to), rho * case.gravity
     area = part.flow_area() * float(value(part.opening, t0))
@@ -73,7 +75,7 @@ def solution(case, start: ExactStart) -> Solution:
 
 
 def initial_pressure(case, node: str) -> float:
-    """Stated pressure of a node at the start [Pa]."""
+    """Pressure of a node at the start, as stated in the case file [Pa]."""
     part = case.nodes[node]
     if part.kind == "tank":
         return case.ambient_pressure + case.properties.density * case.gravity * part.level
@@ -83,7 +85,7 @@ def initial_pressure(case, node: str) -> float:
 
 
 def pressure_per_volume(case, node: str) -> float:
-    """Pressure rise per volume of inflow [Pa/m3]."""
+    """Pressure rise of a tank, chamber or reservoir (0) per volume of inflow [Pa/m3]."""
     part = case.nodes[node]
     if part.kind == "tank":
         return case.properties.density * case.gravity / part.area

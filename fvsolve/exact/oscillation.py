@@ -1,6 +1,7 @@
 """Open tanks of constant area joined by a frictionless rigid column: a harmonic oscillation.
 
-D = P_from - P_to, M' = (A / L) D, D' = -g (1 / A_from + 1 / A_to) M; a reservoir has an infinite area.
+M' = (A / L) D, D' = -g (1 / A_from + 1 / A_to) M: mass flow M of the column of area A and length L, difference D of
+p + rho g z between its ends, areas A_from and A_to of the tanks (infinite for a reservoir).
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ def _find_faults(case):
 
 
 def solution(case, start: ExactStart) -> Solution:
-    """Levels, pressures and the flow of a case without faults."""
+    """Levels, pressures and flow of a case without faults, as functions of time."""
     name, column = next(iter(case.links.items()))
     rho, g, t0 = case.properties.density, case.gravity, case.numerics.start
     slope = 0.25 * math.pi * column.diameter**2 / column.length

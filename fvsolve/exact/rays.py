@@ -1,9 +1,10 @@
-"""Exact waves in frictionless pipes by ray tracing: linear law, reservoirs, junctions and valves.
+"""Exact waves in frictionless pipes by ray tracing: density law linear, reservoirs, junctions and valves.
 
-At each pipe end a characteristic arrives, P + Z M at `to`, P - Z M at `from` (P = p + rho g z, Z = a / A, M the mass
-flow). It left the other end one travel time before, where it was 2 P - incoming. The state at times t depends only on
-the states at t - s, with s a sum of travel times. These paths form a finite list, evaluated for all times together
-(d'Alembert; with one pipe and a valve, Allievi 1902).
+At each pipe end a characteristic arrives, P + Z M at `to` and P - Z M at `from`, with P = p + rho g z, Z = a / A (wave
+speed over area) and mass flow M. It left the other end one travel time before, where it was 2 P minus the
+characteristic that arrived there. The state at times t depends only on the states at times t - s, with s a sum of
+travel times. These paths form a finite list, evaluated for all times together (d'Alembert; with one pipe and a valve,
+Allievi 1902).
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ def find_faults(case):
 
 
 def solution(case, start: ExactStart) -> Solution:
-    """Pressures, flows and fields of a case without faults."""
+    """Pressures of nodes, flows of valves and fields of pipes of a case without faults, as functions of time."""
     rays = RayPaths(case, start)
     nodes = {name: (lambda t, n=name: rays.pressure(n, t)) for name in case.nodes}
     valves = {name: (lambda t, n=name: rays.valve_flow(n, t)) for name in rays.valves}
@@ -61,7 +62,7 @@ def solution(case, start: ExactStart) -> Solution:
 
 
 class RayPaths:
-    """Wave paths of a case: pipes, and groups of nodes; nodes joined by a valve form a group."""
+    """Wave paths of a case between groups of nodes; nodes joined by a valve form a group, other nodes a group each."""
 
     def __init__(self, case, start: ExactStart) -> None:
         self.case, self.rho, self.t0 = case, case.properties.density, case.numerics.start
@@ -86,13 +87,14 @@ class RayPaths:
         self.paths = {group: self._paths(group) for group in self.ends}
 
     def node(self, pipe: str, end: int) -> str:
-        """Node at an end of a pipe: 0 `from`, 1 `to`."""
+        """Node at an end of a pipe. end : 0 for `from`, 1 for `to`"""
         return self.pipes[pipe].to if end else self.pipes[pipe].from_
 
     def _paths(self, group: str) -> list[tuple[float, str, dict]]:
-        """Past states of groups that affect a group : list of (age [s], group, pipe end -> index of its source).
+        """Earlier states of groups of nodes on which the state of a group depends : list of (age [s], group, sources).
 
-        The oldest is first; the last is the group itself at age 0.
+        sources : (pipe, end) -> index in the list of the state from which the characteristic comes that arrives at this
+        end The oldest state is first; the last is the state of the group itself at age 0.
         """
         paths, place = [(0.0, group, {})], {(0, group): 0}
         for s, here, sources in paths:
@@ -115,7 +117,7 @@ class RayPaths:
     # characteristics and nodes ---------------------------------------------------------------------------------------
 
     def first(self, pipe: str, end: int, age: np.ndarray) -> np.ndarray:
-        """Characteristic from the initial state of a pipe, arriving at an end a time `age` [s] after the start."""
+        """Characteristic [Pa] from the initial state of a pipe that arrives at an end `age` seconds after the start."""
         p = [
             self.start.pressure[node] + self.weight * self.z[node] for node in (self.node(pipe, 0), self.node(pipe, 1))
         ]
@@ -124,7 +126,11 @@ class RayPaths:
         return p[end] + share * (p[1 - end] - p[end]) + sign * self.impedance[pipe] * self.rho * self.start.flow[pipe]
 
     def trace(self, group: str, t: np.ndarray) -> dict:
-        """Potentials of the nodes of a group, flows of its valves and outgoing characteristics, at times t."""
+        """State of a group of nodes at times t, as a dict of arrays over t.
+
+        It contains P = p + rho g z of the nodes [Pa] under ("node", name, 0), flows of the valves [m3/s] under
+        ("valve", name, 0), and outgoing characteristics [Pa] under ("sent", pipe, end).
+        """
         t = np.atleast_1d(np.asarray(t, dtype=float))
         span = max(float(t.max()) - self.t0, 0.0) + self.near
         size = max(256, BLOCK // len(self.paths[group]))
@@ -148,7 +154,7 @@ class RayPaths:
         return known[-1]
 
     def _node_state(self, group: str, now, arrived) -> dict:
-        """Potentials of the nodes of a group, flows of its valves and outgoing characteristics, for incoming ones."""
+        """State of a group of nodes at times `now`, as in `trace`, from the characteristics `arrived` there."""
         result, admittance, level = {}, {}, {}
         for node in (name for name, own in self.group.items() if own == group):
             ends = [end for end in arrived if self.node(*end) == node]
@@ -180,15 +186,15 @@ class RayPaths:
     # results ---------------------------------------------------------------------------------------------------------
 
     def pressure(self, node: str, t) -> np.ndarray:
-        """Pressure of a node [Pa]."""
+        """Pressure of a node at times t [Pa]."""
         return self.trace(self.group[node], t)["node", node, 0] - self.weight * self.z[node]
 
     def valve_flow(self, name: str, t) -> np.ndarray:
-        """Flow through a valve [m3/s]."""
+        """Flow through a valve at times t [m3/s]."""
         return self.trace(self.group[self.valves[name].to], t)["valve", name, 0]
 
     def inside(self, pipe: str, x, t) -> tuple[np.ndarray, np.ndarray]:
-        """Pressure [Pa] and flow [m3/s] in a pipe; x : distance from its `from` end [m]."""
+        """Pressure [Pa] and flow [m3/s] in a pipe at distances x from its `from` end [m] and times t [s]."""
         x, t = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(t, dtype=float))
         link = self.pipes[pipe]
         forward = self._outgoing(pipe, 0, t - x / self.speed[pipe], x)
@@ -198,7 +204,10 @@ class RayPaths:
         return p, 0.5 * (forward - backward) / (self.impedance[pipe] * self.rho)
 
     def _outgoing(self, pipe: str, end: int, when, x):
-        """Characteristic at a distance x from the end that it left at time `when`, or that of the initial state."""
+        """Characteristic [Pa] at a distance x [m] from an end of a pipe, which left this end at the times `when` [s].
+
+        If it left before the start, it follows from the initial state.
+        """
         age = when + x / self.speed[pipe] - self.t0
         early = self.first(pipe, 1 - end, age + self.travel[pipe] - x / self.speed[pipe])
         sent = when >= self.t0
@@ -209,7 +218,10 @@ class RayPaths:
         return result
 
     def kinks(self, pipe: str, t: float) -> np.ndarray:
-        """Places of kinks in a pipe at time t [m]: rays from kinks of schedules, or from an unbalanced start."""
+        """Positions of kinks of the field in a pipe at time t, from its `from` end [m].
+
+        They are on rays that start at kinks of schedules, or at an initial state that is not steady.
+        """
         places, length = [np.zeros(0)], self.pipes[pipe].length
         for group, times in self._kink_times().items():
             for end in (0, 1):
@@ -221,7 +233,7 @@ class RayPaths:
         return np.sort(np.concatenate(places))
 
     def _kink_times(self) -> dict[str, np.ndarray]:
-        """Group -> times of kinks of its schedules, or of the start if it is not in equilibrium."""
+        """Group of nodes -> times of the kinks of its schedules [s], and the start if its initial state is not steady."""
         parts = [(self.group[name], node) for name, node in self.case.nodes.items()]
         parts += [(self.group[valve.to], valve) for valve in self.valves.values()]
         result: dict[str, set[float]] = {}
@@ -234,7 +246,7 @@ class RayPaths:
         return {group: np.array(sorted(times)) for group, times in result.items() if times}
 
     def _is_steady(self, group: str) -> bool:
-        """True if the potentials of a group do not change at the start."""
+        """True if the pressures of a group of nodes do not change at the start."""
         after = self.trace(group, np.array([self.t0 + self.near]))
         return all(
             abs(float(after["node", node, 0][0]) - self.start.pressure[node] - self.weight * self.z[node])
@@ -244,7 +256,10 @@ class RayPaths:
 
 
 def valve_equation_flow(conductance, slack, drop) -> np.ndarray:
-    """Flow M with M |M| = G (drop - slack M): closed solution of the valve equation between pipe ends."""
+    """Mass flow M through a valve between two pipe ends, from M |M| = conductance (drop - slack M).
+
+    conductance : 2 rho (Cd A)^2 [kg m]; drop : pressure drop without flow [Pa]; slack : its decrease per flow
+    """
     b = conductance * slack
     size = np.abs(drop)
     root = np.sqrt(b * b + 4.0 * conductance * size)

@@ -1,4 +1,4 @@
-"""Values of schedules, independent of the kernels, so that tests can compare the two."""
+"""Values of schedules, computed independently of the compiled functions, so that tests can compare both."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 def value(schedule, t: np.ndarray, left: bool = False) -> np.ndarray:
-    """Values of a schedule at times t : float64[...] [SI]; at jumps the right limit, or the left limit if `left`."""
+    """Values of a schedule at times t [SI]; at jumps the right limit, or the left limit if `left` is true."""
     t = np.asarray(t, dtype=float)
     times, values = schedule.time, schedule.value
     if schedule.kind == "constant":

@@ -1,4 +1,4 @@
-"""Exact solution: values of probes over time, fields of pipes, and common checks."""
+"""Exact solution as values of probes over time and fields of pipes, and faults common to several solutions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ GAUSS = np.polynomial.legendre.leggauss(5)
 
 @dataclass(frozen=True)
 class ExactStart:
-    """Start of a case: pressures of nodes [Pa] and volume flows of links [m3/s], by name."""
+    """State at the start of a case: pressures of nodes [Pa] and volume flows of links [m3/s], by name."""
 
     pressure: dict[str, float]
     flow: dict[str, float]
@@ -23,11 +23,11 @@ class ExactStart:
 
 @dataclass(frozen=True)
 class Solution:
-    """Functions of time by name, and fields of pipes.
+    """Exact solution of a case: functions of time [s] by the name of a part, and fields of pipes.
 
     pressure : of nodes [Pa]; level : of tanks [m]; flow : of links [m3/s]; position, velocity : of masses [m], [m/s]
-    pipe : pipe(name, x, t) -> (pressure [Pa], flow [m3/s]) at places x [m from `from`] and times t, broadcast
-    kinks : kinks(name, t) -> places at which the field at time t is not smooth [m]
+    pipe : pipe(name, x, t) -> (pressure [Pa], flow [m3/s]) at positions x [m from `from`] and times t, broadcast
+    kinks : kinks(name, t) -> positions in a pipe at which the field at time t is not smooth [m from `from`]
     """
 
     case: object
@@ -56,13 +56,13 @@ class Solution:
         return self._converted(values, quantity, self.case.elevation(name) if quantity == "head" else 0.0)
 
     def averages(self, name: str, edges: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
-        """Averages of pressure [Pa] and flow [m3/s] between edges [m] of a pipe, by Gauss points between all kinks."""
+        """Averages of pressure [Pa] and flow [m3/s] of a pipe between `edges` [m], by Gauss points between kinks."""
         inner = self.kinks(name, t) if self.kinks is not None else np.zeros(0)
         cuts = np.unique(np.concatenate([edges, inner[(inner > edges[0]) & (inner < edges[-1])]]))
         return averages(lambda x: self.pipe(name, x, t), edges, cuts)
 
     def _force(self, pipe, t):
-        """Unbalanced force on a pipe without friction [N]: area times the change of its pressure difference."""
+        """Unbalanced axial force on a frictionless pipe [N]: area times change of pressure difference since the start."""
         start = np.array([self.case.numerics.start])
         rise, first = (self.pressure[pipe.to](at) - self.pressure[pipe.from_](at) for at in (t, start))
         return 0.25 * np.pi * pipe.diameter**2 * (rise - first)
@@ -79,7 +79,7 @@ class Solution:
         return self._converted(p, probe.quantity, here)
 
     def _converted(self, pressure, quantity: str, z: float):
-        """Convert a pressure to gauge pressure or head; other quantities are unchanged."""
+        """Convert a pressure [Pa] at elevation z [m] to gauge pressure [Pa] or head [m], as `quantity` requests."""
         case = self.case
         if quantity == "gauge_pressure":
             return pressure - case.ambient_pressure
@@ -89,7 +89,10 @@ class Solution:
 
 
 def averages(f: Callable, edges: np.ndarray, cuts: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
-    """Averages between edges of each value of f(x), by five Gauss points between cuts (which include the edges)."""
+    """Averages between `edges` of each value that f(x) returns, by five Gauss points between `cuts`.
+
+    cuts : positions where f is not smooth, including the edges; the edges if None
+    """
     cuts = edges if cuts is None else cuts
     width, middle = np.diff(cuts), 0.5 * (cuts[1:] + cuts[:-1])
     x = middle[:, None] + 0.5 * width[:, None] * GAUSS[0]
@@ -115,13 +118,16 @@ def reservoirs(case) -> dict[str, Law]:
 
 
 def law_faults(case):
-    """Fault of a density law that is not linear."""
+    """Fault of a case whose density law is not linear, as (keys, message)."""
     if not case.law.linear:
         yield ("fluid", "law"), f'the exact solution "{case.exact.name}" holds only with the law "linear"'
 
 
 def type_faults(case, nodes: tuple[str, ...], links: tuple[str, ...]):
-    """Faults of parts of other types."""
+    """Faults of nodes and links whose types an exact solution does not support, as (keys, message).
+
+    nodes, links : types that it supports
+    """
     name = case.exact.name
     for group, parts, known in (("nodes", case.nodes, nodes), ("links", case.links, links)):
         for part, item in parts.items():
@@ -133,13 +139,13 @@ def type_faults(case, nodes: tuple[str, ...], links: tuple[str, ...]):
 
 
 def count_faults(case, items: list, noun: str):
-    """Fault unless there is exactly one item; noun : its name in the message."""
+    """Fault unless a case has exactly one of `items`, as (keys, message). noun : name of an item in the message"""
     if len(items) != 1:
         yield ("exact", "name"), f'"{case.exact.name}" needs exactly one {noun}; the case has {len(items)}'
 
 
 def level_faults(exact: Solution):
-    """Faults of tanks that run dry or overflow before the end: the solution is not valid there."""
+    """Faults of tanks that run dry or overflow before the end of the run, after which a solution is not valid."""
     numerics = exact.case.numerics
     t = np.linspace(numerics.start, numerics.end, 2001)
     for name, level in exact.level.items():

@@ -1,6 +1,7 @@
 """Mass on linear springs and dampers between frames, under a constant force.
 
-m u'' = F - k u - c u', with u the displacement from the start and F the force there without damping.
+m u'' = F - k u - c u': mass m, displacement u from the start, force F at the start without damping, stiffness k of all
+springs, damping c of all dampers.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ def find_faults(case):
 
 
 def solution(case, start: ExactStart) -> Solution:
-    """Position and velocity of the mass of a case without faults."""
+    """Position [m] and velocity [m/s] of the mass of a case without faults, as functions of time."""
     name, mass = next(item for item in case.nodes.items() if item[1].kind == "mass")
     at = {body: part.initial_position for body, part in case.nodes.items() if part.domain == "translational"}
     stiffness = damping = force = 0.0
@@ -51,7 +52,7 @@ def solution(case, start: ExactStart) -> Solution:
         place, end, force = place + end, 0.0, 0.0
 
     def parts(t):
-        """(exp(-decay t) cosh(kappa t), exp(-decay t) sinh(kappa t) / kappa) after the start."""
+        """exp(-decay s) cosh(kappa s) and exp(-decay s) sinh(kappa s) / kappa, with the time s since the start."""
         s = np.asarray(t, dtype=float) - t0
         if abs(kappa) < 1e-12 * math.sqrt(stiffness / mass.mass):
             return np.exp(-decay * s), np.exp(-decay * s) * s

@@ -1,6 +1,6 @@
 """Conversion of text with units to SI numbers and back.
 
-A bare number is SI. Text is a number and a unit, `"304.8 mm"`. Spellings outside `UNITS` are read by pint.
+A bare number is in SI. Text is a number and a unit, `"304.8 mm"`. Spellings outside `UNITS` are read by pint.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ _NUMBER = re.compile(r"\s*([+-]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*
 
 
 def parse(given: Any, dimension: str) -> Any:
-    """SI value of a bare number or of text with a unit; for a pressure the pair (value, gauge).
+    """SI value of a bare number or of text with a unit.
 
-    A kinematic viscosity is returned as `Kinematic` [m2/s] if `dimension` is a viscosity.
-    Raises ValueError with the text found, the dimension expected and a suggestion.
+    A pressure is returned as (value, True for a gauge pressure), a kinematic viscosity as `Kinematic` [m2/s] if
+    `dimension` is "viscosity". Raises ValueError with the text found, the dimension expected and a suggestion.
     """
     if isinstance(given, str):
         value, unit = _parse_text(given, dimension)
@@ -52,7 +52,10 @@ class Kinematic(float):
 
 
 def find(spelling: str, dimension: str, number: str = "") -> Unit:
-    """Unit of a spelling that measures `dimension`; ValueError with a suggestion otherwise."""
+    """Unit with a given spelling that measures `dimension`; raises ValueError with a suggestion if there is none.
+
+    number : number before the unit, for the message
+    """
     if len(spelling) > LONGEST:  # pint would take minutes to read it
         raise ValueError(
             f"{show(f'{number} {spelling}'.strip())}: unknown unit of {len(spelling)} letters; {expected(dimension)}"
@@ -87,7 +90,7 @@ def find(spelling: str, dimension: str, number: str = "") -> Unit:
 
 
 def vacuum(given: Any, pressure: float, vapor_pressure: float = 0.0, ambient: float = 101325.0) -> str:
-    """Text for a given pressure whose absolute value `pressure` [Pa] is too low for a liquid."""
+    """Text of a message for a given pressure whose absolute value `pressure` [Pa] is too low for a liquid."""
     below = "a vacuum" if pressure <= 0 else f"not above the vapour pressure of {vapor_pressure:.4g} Pa"
     match = _NUMBER.fullmatch(given) if isinstance(given, str) else None
     number, spelling = match.groups() if match else (str(given), "Pa")
@@ -99,7 +102,7 @@ def vacuum(given: Any, pressure: float, vapor_pressure: float = 0.0, ambient: fl
 
 
 def convert(value_si: Any, dimension: str, unit: str, ambient: float = 101325.0) -> Any:
-    """SI value or array in `unit`; an absolute pressure in a gauge unit counts from `ambient` [Pa]."""
+    """Convert an SI value or array to `unit`; an absolute pressure in a gauge unit is relative to `ambient` [Pa]."""
     target = find(unit, dimension)
     if target.gauge and dimension == "pressure":
         value_si = value_si - ambient
@@ -107,13 +110,16 @@ def convert(value_si: Any, dimension: str, unit: str, ambient: float = 101325.0)
 
 
 def span(unit: str) -> str:
-    """Unit of differences of values in a unit: "bar" of "barg" and of "bara"."""
+    """Unit of a difference of two values in `unit`: "bar" for "barg" and for "bara"."""
     entry = UNITS.get(unit)
     return unit[:-1] if entry is not None and (entry.gauge or entry.absolute) else unit
 
 
 def likely(given: Any, dimension: str, least: float, greatest: float) -> str:
-    """'; did you mean "304.8 mm"?': `given` in a unit that puts it in the range `least` to `greatest` (SI)."""
+    """Text '; did you mean "304.8 mm"?' with the number of `given` in a unit in which it is usual, or empty text.
+
+    least, greatest : usual range of the quantity [SI]
+    """
     match = _NUMBER.fullmatch(given) if isinstance(given, str) else None
     number, spelling = match.groups() if match else (f"{given:g}", DIMENSIONS[dimension].si)
     fit = [unit for unit, weight in LIKELY.get(DIMENSIONS[dimension].base or dimension, {}).items()
@@ -123,13 +129,13 @@ def likely(given: Any, dimension: str, least: float, greatest: float) -> str:
 
 
 def expected(dimension: str) -> str:
-    """Text 'expected a length, for example "300 mm"'."""
+    """Text 'expected a length, for example "300 mm"' for a dimension."""
     words, example = DIMENSIONS[dimension].words, DIMENSIONS[dimension].example
     return f"expected {words}, for example {example if dimension == 'number' else show(example)}"
 
 
 def show(given: Any) -> str:
-    """Text of a value as in a case file, cut to 60 characters."""
+    """Text of a value as it stands in a case file, cut to 60 characters."""
     if isinstance(given, bool):
         return str(given).lower()
     text = f'"{given}"' if isinstance(given, str) else repr(given)
@@ -170,7 +176,7 @@ def _spellings(dimension: str) -> list[str]:
 
 @functools.lru_cache(maxsize=1024)
 def _canonical(spelling: str) -> str:
-    """Spelling as in the table: `m^3 / h`, `m³/h` and `m**3/h` are `m3/h`; `Pa.s` is `Pa s`."""
+    """Spelling as in `UNITS`: `m^3 / h`, `m³/h` and `m**3/h` are `m3/h`; `Pa.s` is `Pa s`."""
     text = spelling.strip().replace("**", "").replace("^", "")
     for old, new in (("²", "2"), ("³", "3"), ("µ", "u"), ("μ", "u"), ("°", "deg"), ("·", " "), ("*", " ")):
         text = text.replace(old, new)

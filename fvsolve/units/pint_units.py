@@ -1,4 +1,4 @@
-"""Units outside the table, read by pint, which is imported at the first such unit."""
+"""Units that are not in `UNITS`, read by pint, which is imported at the first such unit."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ BASE = {
 
 
 def pint_unit(spelling: str) -> Unit | None:
-    """Unit outside the table, by pint; None if pint does not know it."""
+    """Unit with a spelling that is not in `UNITS`, read by pint; None if pint cannot read it."""
     if not _SAFE_SPELLING.fullmatch(spelling):  # pint would compute 9**9**9
         return None
     import pint

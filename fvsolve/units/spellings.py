@@ -1,4 +1,4 @@
-"""Spellings and factors of units."""
+"""Dimensions and units: their spellings, and their factors to SI."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Unit:
-    """SI value = (number + offset) numerator / denominator; a gauge unit counts from ambient pressure.
+    """A unit: SI value = (number + offset) numerator / denominator.
 
-    An absolute unit counts from vacuum; a plain unit is absolute if the pressure is absolute.
+    gauge : True for pressures relative to ambient pressure; absolute : True if the spelling states an absolute pressure
+    A pressure unit with neither is absolute where the pressure is absolute.
     """
 
     dimension: str
@@ -23,7 +24,7 @@ class Unit:
     absolute: bool = False
 
     def si(self, number: Any) -> Any:
-        """SI value of a number (or array) in this unit; gauge for a gauge unit."""
+        """SI value of a number or array in this unit; for a gauge unit a gauge pressure."""
         return (number + self.offset) * self.numerator / self.denominator
 
     def read(self, number: str) -> float:
@@ -35,13 +36,16 @@ class Unit:
             return math.inf if float(number) != 0 else 0.0
 
     def number(self, si: Any) -> Any:
-        """Number (or array) in this unit of the SI value `si`."""
+        """Number or array in this unit of the SI value `si`; for a gauge unit of a gauge pressure."""
         return si * self.denominator / self.numerator - self.offset
 
 
 @dataclass(frozen=True)
 class Dimension:
-    """Text, SI unit and example of a dimension for messages; `base` : dimension with its spellings."""
+    """A dimension: words for messages, SI unit and example.
+
+    base : dimension whose spellings it uses, "" for its own; gauge : True if gauge units are allowed
+    """
 
     words: str
     si: str
