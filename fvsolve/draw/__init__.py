@@ -1,1 +1,1 @@
-"""Pictures of runs; the only package that imports matplotlib and PyVista."""
+"""Pictures of cases and runs; the only package that imports matplotlib and PyVista."""

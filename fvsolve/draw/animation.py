@@ -1,4 +1,4 @@
-"""Picture or animation file from the frames of a sheet."""
+"""Writing of a picture or animation file from the frames of a picture sheet."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ FRAME_TIME = 100  # duration of a frame [ms]
 
 
 def write_animation(stage: Any, count: int, out: Path) -> None:
-    """Write a single frame as a picture, several as .gif or .mp4; `stage.show(k)` draws frame k on its sheet."""
+    """Write a single frame as a picture, several frames as .gif or .mp4.
+
+    stage : object whose `show(k)` draws frame k on its `sheet`; count : number of frames
+    """
     from PIL import Image
 
     pictures = []

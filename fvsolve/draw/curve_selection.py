@@ -16,7 +16,11 @@ OF_PRESSURE = ("pressure", "gauge_pressure", "head", "level")  # equivalent quan
 
 @dataclass
 class DrawnLine:
-    """Curve of a column; names : its places; alike : other quantities of the place with an equivalent curve."""
+    """Curve of a column of history.csv.
+
+    names : places (part, and position on it) that the curve shows; alike : other quantities there with an equivalent
+    curve
+    """
 
     column: int
     names: list[str]
@@ -29,7 +33,7 @@ class DrawnLine:
 
 @dataclass
 class DrawnPanel:
-    """Curves of a quantity and unit."""
+    """Curves of a panel, which have the same quantity and unit."""
 
     quantity: str
     unit: str
@@ -37,10 +41,10 @@ class DrawnPanel:
 
 
 def select_curves(values: np.ndarray, probes, measured=()) -> tuple[list[DrawnPanel], list[tuple[str, str, float]]]:
-    """Panels of curves, and constant probes as (probe, unit, value).
+    """Panels with the curves to draw, and probes that are constant, as (probe, unit, value).
 
-    values : float64[k, n]; probes : (name, unit) of each column; measured : names of probes with measurements, which
-    are always drawn
+    values : float64[k, n]; probes : (name, unit) of each column
+    measured : names of probes with measurements, which are always drawn
     """
     swings = [_range_of(values[:, k]) for k in range(len(probes))]
     still = [k for k, (name, _) in enumerate(probes) if swings[k] is None and name not in measured]
@@ -68,7 +72,7 @@ def select_curves(values: np.ndarray, probes, measured=()) -> tuple[list[DrawnPa
 
 
 def _without_doubles(lines: list[DrawnLine], values: np.ndarray, probes, measured) -> list[DrawnLine]:
-    """Curves of a panel without coinciding ones, whose names are added to the curve that they coincide with."""
+    """Curves of a panel without those that coincide with another, whose places are added to the names of that curve."""
     seen = np.concatenate([values[:, line.column] for line in lines])
     tolerance = SAME_TOLERANCE * np.ptp(seen[np.isfinite(seen)]) if np.isfinite(seen).any() else 0.0
     result: list[DrawnLine] = []
@@ -87,7 +91,7 @@ def _without_doubles(lines: list[DrawnLine], values: np.ndarray, probes, measure
 
 
 def _place_and_quantity(probe: str) -> tuple[str, str]:
-    """Place and quantity of a probe: (`main at 0.5`, `pressure`) of `main.pressure@0.5`."""
+    """Place and quantity of a probe: (`main at 0.5`, `pressure`) for `main.pressure@0.5`."""
     path, _, spot = probe.partition("@")
     place, _, quantity = path.rpartition(".")
     return place + (f" at {spot}" if spot else ""), quantity
@@ -105,7 +109,7 @@ def _coincide(a: np.ndarray, b: np.ndarray, tolerance: float) -> bool:
 
 
 def _is_scaled(a: np.ndarray, b: np.ndarray) -> bool:
-    """True if b is a scaled by a positive factor and shifted; False if either is constant or not finite."""
+    """True if curve b is curve a times a positive factor plus a constant; False if either is constant or not finite."""
     low, high = int(a.argmin()), int(a.argmax())
     if not (np.isfinite(a).all() and np.isfinite(b).all() and a[low] < a[high]):
         return False

@@ -1,4 +1,4 @@
-"""Energy over time: supplied, stored, dissipated, and lost numerically."""
+"""Pictures of energies over time: supplied, stored, dissipated, and lost by numerical errors."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ COLOUR_MAPS = {"stored": "Blues", "dissipated": "Oranges", "supplied": "Greens"}
 
 @style.without_markup
 def energy_figure(t, supplied, stored, dissipated, numerical, title="", port=None, units=("s", None)):
-    """Figure with three panels over time: energy supplied by port, stored and dissipated by part, and lost numerically.
+    """Figure with three panels over time: energy supplied by ports, stored and dissipated by parts, lost numerically.
 
-    supplied, stored, dissipated, numerical : {name: float64[k]} [J], cumulative. Positive values are stacked upwards,
+    supplied, stored, dissipated, numerical : name -> float64[k] [J], cumulative. Positive values are stacked upwards,
     negative values downwards. Stored energy is drawn relative to its least value in the run. The gap between the areas
-    and the line above them is the remainder.
-    port : (name, integral of p q, its bound) for a fourth panel
+    and the line above them is the remainder of the energy balance.
+    port : (name, integral of pressure times flow at the port, lower bound of the integral) for a fourth panel
     units : unit of t, and (size [J], name) of the unit of energies, or None to choose it by size
     """
     figure = style.figure(8.2 if port is None else 9.8)
@@ -55,7 +55,10 @@ def energy_figure(t, supplied, stored, dissipated, numerical, title="", port=Non
 
 
 def _port_panel(axes, t, name, work, bound, given) -> None:
-    """Draw the integral of p q at a port and its lower bound; a bound far below is only stated in the legend."""
+    """Draw the supplied energy (integral of pressure times flow) at a port, and its lower bound.
+
+    A bound far below is only stated in the legend.
+    """
     span = max(np.ptp(work), np.max(np.abs(work)))
     far = span > 0.0 and np.max(bound) < -BOUND_DISTANCE * span
     size, unit = given or energy_unit(max(np.max(np.abs(work)), 0.0 if far else np.max(np.abs(bound))))
@@ -73,12 +76,15 @@ def _port_panel(axes, t, name, work, bound, given) -> None:
 
 
 def energy_unit(greatest: float) -> tuple[float, str]:
-    """(size [J], name) of the unit in which an energy is between 1 and 1000, else of the smallest unit."""
+    """Size [J] and name of the unit in which the energy `greatest` is at least 1, else of the smallest unit."""
     return next(((size, unit) for size, unit in ENERGY_UNITS if greatest >= size), ENERGY_UNITS[-1])
 
 
 def _stack(axes, t, kinds, size) -> None:
-    """Draw stacked areas of each kind, largest first; positive and negative values are stacked separately."""
+    """Draw stacked areas of energies, kind by kind; positive and negative values are stacked separately.
+
+    kinds : kind -> part -> float64[k] [J]; size : unit of the axis [J]
+    """
     import matplotlib
 
     up, down = np.zeros_like(t), np.zeros_like(t)
@@ -95,7 +101,7 @@ def _stack(axes, t, kinds, size) -> None:
 
 
 def _largest_parts(parts):
-    """Parts with the largest energies; all further parts as a sum."""
+    """Energies of the parts with the largest energies, and the sum of all other parts."""
     order = sorted(parts, key=lambda name: -np.max(np.abs(parts[name]), initial=0.0))
     if len(order) <= MAX_PARTS:
         return {name: parts[name] for name in order}

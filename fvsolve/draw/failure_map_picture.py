@@ -1,4 +1,4 @@
-"""Picture of a failure map, with a coloured square for each run."""
+"""Picture of a failure map: verdicts on runs with several methods and time steps, a coloured square for each run."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ DARK_VERDICTS = ("stable", "wrong", "blown up", "refused")  # verdicts with dark
 
 @style.without_markup
 def failure_map_figure(result, title: str = "", head: str = ""):
-    """Figure with a panel for each scheme: methods down, steps or values across, a bar at the predicted limit."""
+    """Figure with a panel for each scheme: a row for each method, a column for each time step or value of a key.
+
+    A bar in a row stands at the predicted stability limit. head : label of the columns if they are values of a key
+    """
     tall = 0.30 * len(result.methods)
     figure = style.figure(1.5 + len(result.schemes) * (tall + 0.75), width=max(7.0, 2.3 + 0.68 * len(result.values)))
     panels = figure.subplots(len(result.schemes), 1, squeeze=False)[:, 0]
@@ -31,7 +34,7 @@ def failure_map_figure(result, title: str = "", head: str = ""):
 
 
 def column_labels(result) -> list[str]:
-    """Labels of the columns: a step with its Courant number on a second line, or a value."""
+    """Labels of the columns: a time step with its Courant number on a second line, or a value."""
     if result.key != "step":
         return [f"{value:.4g}" if isinstance(value, float) else str(value) for value in result.values]
     if not result.wave_rate:
@@ -40,7 +43,7 @@ def column_labels(result) -> list[str]:
 
 
 def time_text(value: float) -> str:
-    """Text of a time in a suitable unit: 1.4 us, 3.75 ms, 2 s."""
+    """Text of a time [s] in a suitable unit: 1.4 us, 3.75 ms, 2 s."""
     for unit, factor in (("s", 1.0), ("ms", 1e3), ("us", 1e6)):
         if value * factor >= 1.0 or unit == "us":
             return f"{value * factor:.3g} {unit}"
@@ -78,7 +81,7 @@ def _panel(axes, result, scheme: str) -> None:
 
 
 def _error_text(square) -> str:
-    """Error as a percentage; "" without an error."""
+    """Error of a run as a percentage; "" without an error."""
     error = square.measures.error
     if not math.isfinite(error) or square.verdict in ("blown up", "refused", "not run"):
         return ""
@@ -86,7 +89,10 @@ def _error_text(square) -> str:
 
 
 def limit_place(result, squares) -> float | None:
-    """Position of the predicted limit across the columns of a row; None if it is not within them."""
+    """Position of the predicted stability limit in a row, in columns; None if it is beyond the last column or unknown.
+
+    squares : runs of the row
+    """
     limits = [square.limit for square in squares]
     if None in limits or any(square.step is None for square in squares):
         return None

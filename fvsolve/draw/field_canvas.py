@@ -1,4 +1,4 @@
-"""Pictures of basins and bodies from .vtu frames, with surfaces drawn by PyVista."""
+"""Pictures of basins and bodies from .vtu files, with surfaces drawn by PyVista."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ BOX_MARGINS = (62.0, 44.0, 50.0, 14.0)  # margins of a box: left, low, right, hi
 
 
 class FieldCanvas:
-    """Picture of a scene of basins and bodies: range of the field, bounding box and projection of all its frames."""
+    """Picture of basins and bodies; the range of the field, the bounding box and the projection hold for all frames."""
 
     def __init__(self, scene: DrawnScene, film: bool) -> None:
         import pyvista
@@ -93,7 +93,7 @@ class FieldCanvas:
             self.aspect = Projection("aslant", seen=WATER_VIEW)
 
     def _widen(self) -> None:
-        """Widen the box for parts at the edges of basins."""
+        """Widen the bounding box so that symbols of parts at the edges of basins fit."""
         for axis in (0, 1) if self.wet else ():
             at = self.scene.shown([part.at for part in self.scene.parts])[:, axis]
             low, high = self.box[2 * axis : 2 * axis + 2]
@@ -112,9 +112,9 @@ class FieldCanvas:
         camera.clipping_range = (0.1 * far, 2.5 * far)
 
     def _lines(self) -> np.ndarray:
-        """Pipes and bodies of the first frame on the sheet : float64[c, 2, 2].
+        """Segments of pipes and bodies of the first frame in picture coordinates : float64[c, 2, 2].
 
-        Sets `cover`, the points that names should not cover, and `labels`, the names of bodies.
+        Also sets `cover`, the points that names should not cover, and `labels`, the names of bodies.
         """
         self.cover, self.labels, segments = np.zeros((0, 2)), [], [np.zeros((0, 2, 2))]
         for file in self.scene.frames[0][1]:
@@ -132,7 +132,7 @@ class FieldCanvas:
         return np.concatenate(segments)
 
     def _bodies(self, lines: np.ndarray, line_body: np.ndarray) -> list[tuple[str, np.ndarray]]:
-        """(name, midpoint of the longest line) of each body with extent."""
+        """Name of each body with extent, and midpoint of its longest line. line_body : body of each line"""
         long, names = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1), []
         for k, name in enumerate(self.scene.bodies):
             own = np.flatnonzero(line_body == k)
@@ -190,7 +190,7 @@ class FieldCanvas:
         return None
 
     def _coloured(self, shape: Any, plane: bool) -> None:
-        """Draw a shape in the colours of its field, with contour lines if it is plane."""
+        """Draw a shape in the colours of the field, with contour lines if the shape is a surface."""
         (low, high), field, count = self.limits, self.scene.quantity.name, self.scene.contours
         self.plotter.add_mesh(shape, scalars=field, cmap=COLOUR_MAP, clim=self.limits, smooth_shading=True,
                               show_scalar_bar=False, lighting=not plane or self.wet,
@@ -206,7 +206,7 @@ class FieldCanvas:
 
 
 def main() -> None:
-    """Draw the pickled (scene, path) from standard input."""
+    """Read a pickled (scene, path) from standard input and write its picture or animation."""
     scene, out = pickle.load(sys.stdin.buffer)
     write_animation(FieldCanvas(scene, len(scene.frames) > 1), len(scene.frames), Path(out))
 

@@ -1,4 +1,4 @@
-"""Frames of a run as PyVista meshes in output units."""
+"""Frames of a run as PyVista meshes, with lengths and the drawn field in output units."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ TUBE_RADIUS = 0.008  # radius of a pipe as a fraction of the diagonal of the sce
 
 
 def field_extent(scene: DrawnScene) -> tuple[tuple[float, float], np.ndarray, bool]:
-    """Range of a field over all frames, their bounding box float64[6], and True if there is water.
+    """Range of the field over all frames, bounding box of all frames float64[6], and True if there is water.
 
-    Exits with a message if no frame has the field, since it runs in a process of its own.
+    The process exits with a message if no frame has the field, since the function runs in a process of its own.
     """
     known, lows, highs, boxes, wet, field = {}, [], [], [], False, scene.quantity.name
     for file in (file for _, files in scene.frames for file in files):
@@ -43,7 +43,7 @@ def field_extent(scene: DrawnScene) -> tuple[tuple[float, float], np.ndarray, bo
 
 
 def read_frame(file: str | Path, scene: DrawnScene) -> Any:
-    """Read a frame with its lengths and its field in output units; vectors become magnitudes."""
+    """Read a frame, with its lengths and the drawn field in output units; vectors become magnitudes."""
     import pyvista
 
     mesh, quantity = pyvista.read(file), scene.quantity
@@ -62,14 +62,14 @@ def read_frame(file: str | Path, scene: DrawnScene) -> Any:
 
 
 def array_unit(mesh: Any, field: str) -> str:
-    """Unit stored with an array, "-" if it has none."""
+    """Unit stored with the array of a field, "-" if it has none."""
     from vtkmodules.vtkCommonCore import vtkDataArray
 
     return mesh.GetCellData().GetArray(field).GetInformation().Get(vtkDataArray.UNITS_LABEL()) or "-"
 
 
 def mesh_box(mesh: Any) -> list[float]:
-    """Bounding box of a frame with its water: least and greatest x, y and z."""
+    """Bounding box of a frame with its water: least and greatest x, then y, then z."""
     bounds = list(mesh.bounds)
     if "surface" in mesh.cell_data:
         bounds[5] = max(bounds[5], float((mesh["depth"] + mesh.points[:, 2].max() if "normal" in mesh.cell_data
@@ -78,6 +78,6 @@ def mesh_box(mesh: Any) -> list[float]:
 
 
 def tubes(mesh: Any, box) -> Any:
-    """Tubes around the lines of a mesh."""
+    """Tubes around the lines of a mesh, with a radius in proportion to the bounding box of the scene."""
     reach = math.dist(box[::2], box[1::2])
     return mesh.extract_surface(algorithm=None).tube(radius=TUBE_RADIUS * max(reach, 1e-9))

@@ -11,13 +11,13 @@ POINT_SPACING, PADDING = 4.0, 3.0  # distance of points along lines, and free sp
 
 
 def place_labels(at, sizes, gaps, blocks, lines, within) -> list[tuple[float, float] | None]:
-    """Lower left corner of each name [pixels], None for a name without free space; the first names are placed first.
+    """Lower left corner of each name [pixels], None for a name without free space; names are placed in order.
 
-    at, sizes : float64[n, 2]  points, and sizes of the names
-    gaps : float64[n]          distance from a point to its name
+    at, sizes : float64[n, 2]  points, and width and height of the names [pixels]
+    gaps : float64[n]          distances from a point to its name [pixels]
     blocks : float64[b, 4]     boxes (left, low, right, high) that no name may cover
-    lines : float64[l, 2]      points that names should not cover, with a cost for each
-    within : box that contains all names
+    lines : float64[l, 2]      points that names should not cover; each covered point has a cost
+    within : box (left, low, right, high) that contains all names
     """
     taken = [np.asarray(block, float) for block in blocks]
     places: list[tuple[float, float] | None] = []
@@ -56,7 +56,7 @@ def _covered_points(box, points) -> int:
 
 
 def points_along(segments: np.ndarray) -> np.ndarray:
-    """Points along lines float64[c, 2, 2] at distances of about POINT_SPACING : float64[k, 2]."""
+    """Points along line segments at distances of about POINT_SPACING : float64[k, 2]. segments : float64[c, 2, 2]"""
     if not len(segments):
         return np.zeros((0, 2))
     lengths = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)

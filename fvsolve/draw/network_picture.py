@@ -19,7 +19,7 @@ BOX_MARGINS = (60.0, 40.0, 46.0, 16.0)  # margins of a network with a box [point
 
 
 class NetworkPicture:
-    """Picture of a scene of pipes; `show` draws a frame."""
+    """Picture of a network of pipes; `show` draws a frame."""
 
     def __init__(self, scene: DrawnScene, film: bool) -> None:
         self.scene, lines = scene, scene.pipes[0][1]
@@ -51,7 +51,7 @@ class NetworkPicture:
         self.sheet.legend(scene.parts)
 
     def _pipes(self, segments: np.ndarray):
-        """Draw pipes and their edges; returns the line collection that shows the field."""
+        """Draw pipes with dark edges; returns the line collection that shows the field."""
         from matplotlib.collections import LineCollection
 
         count = len(self.scene.names)
@@ -123,7 +123,7 @@ class NetworkPicture:
             axes.spines["left"].set_visible(False)
 
     def _height_lines(self) -> None:
-        """Draw lines from nodes down to the floor and the pipes projected on it, which show the heights."""
+        """Draw lines from the nodes down to the floor, and the pipes projected onto it, which show the heights."""
         from matplotlib.collections import LineCollection
 
         floor, points, lines = self.all[:, 2].min(), self.scene.shown(self.scene.pipes[0][0]), self.scene.pipes[0][1]

@@ -1,4 +1,4 @@
-"""Figures of the method `plot()` of cases, models, states and sweeps."""
+"""Figures drawn by the method `plot()` of cases, models, states and sweeps."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MAX_PANELS = 4  # greatest number of columns of a sweep that are drawn
 
 @style.without_markup
 def case_figure(case):
-    """Figure of nodes and links of a case, at their positions, or in columns by distance from the first node."""
+    """Figure of the nodes and links of a case, at their positions or in columns; see `node_positions`."""
     at = node_positions(case)
     figure = style.figure(4.5)
     axes = figure.subplots()
@@ -40,12 +40,12 @@ def case_figure(case):
 
 
 def link_nodes(link) -> list[str]:
-    """Names of the nodes that a link connects; a port of a node counts as the node."""
+    """Names of the nodes that a link connects; a port of a node is replaced by the node."""
     return [str(place).partition(".")[0] for place in link.ports.values()]
 
 
 def node_positions(case) -> dict[str, tuple[float, float]]:
-    """Drawn position of each node: its position if all nodes have one, else (distance from the first node, row)."""
+    """Position of each node in the figure: as stated if all nodes have one, else (links from the first node, row)."""
     given = {name: node.position for name, node in case.nodes.items()}
     if all(item is not None for item in given.values()):
         return {name: (float(item[0]), float(item[1])) for name, item in given.items()}
@@ -73,7 +73,7 @@ def node_positions(case) -> dict[str, tuple[float, float]]:
 
 @style.without_markup
 def model_figure(model):
-    """Figure of the heads at the nodes of a model at its start."""
+    """Figure of the heads at the nodes of a model at the start."""
     names, unit = model.node_names, model.case.unit_of("head")
     heads = [convert(node["head"], "head", unit) for node in model.checks["nodes"].values()]
     return bar_figure(names, heads, f"head at the start [{unit}]", model.case.title or model.case.name)
@@ -81,7 +81,7 @@ def model_figure(model):
 
 @style.without_markup
 def state_figure(state):
-    """Figure of all values of a state over their index."""
+    """Figure of all values of a state vector over their index."""
     figure = style.figure(3.0)
     axes = figure.subplots()
     axes.plot(state.y, color=style.COLOURS[0], linewidth=1.0)
@@ -114,7 +114,7 @@ def sweep_figure(sweep):
 
 
 def bar_figure(names, values, label: str, title: str):
-    """Bar chart with a bar for each name, at most MAX_NAMED_NODES."""
+    """Bar chart with a bar for each name, up to MAX_NAMED_NODES bars. label : label of the axis of values"""
     names, values = list(names)[:MAX_NAMED_NODES], list(values)[:MAX_NAMED_NODES]
     figure = style.figure(0.9 + 0.22 * max(len(names), 3))
     axes = figure.subplots()

@@ -1,4 +1,4 @@
-"""Symbols and names of parts on a sheet."""
+"""Drawing of the symbols and names of parts in a picture."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ EDGE_MARGIN = 5.0  # free margin of the sheet [pixels]
 
 
 def draw_parts(stage, scene: DrawnScene, segments: np.ndarray) -> tuple[int, int]:
-    """Draw symbols and names of the parts of a scene; returns the number of names drawn and of all names.
+    """Draw symbols and names of the parts of a scene; return the number of names drawn and the number of all names.
 
     stage : picture with `sheet`, `axes`, `aspect`, `half` (half width of a symbol [points]), `texts` that no name may
             cover, `cover` (float64[k, 2], points that names should not cover) and `labels` (other names with points)
-    segments : float64[c, 2, 2]  pipes on the sheet
+    segments : float64[c, 2, 2]  pipes in picture coordinates
     """
     if not (scene.parts or scene.pipes or stage.labels):
         return 0, 0
@@ -54,7 +54,10 @@ def draw_parts(stage, scene: DrawnScene, segments: np.ndarray) -> tuple[int, int
 
 
 def symbol_positions(scene: DrawnScene, aspect: Projection, axes, apart: float) -> dict[str, np.ndarray]:
-    """Positions of symbols [pixels]; parts not fixed by a pipe are moved if a link to them is shorter than `apart`."""
+    """Positions of symbols [pixels], by the key of the part.
+
+    A node whose position is not fixed is moved if a link to it is shorter than `apart` [pixels]. aspect : projection
+    """
     nodes = [part for part in scene.parts if not part.link]
     seen = axes.transData.transform(aspect.on_sheet(scene.shown([item.at for item in scene.parts])))
     at = {part.key: place for part, place in zip(scene.parts, seen, strict=True)}
@@ -93,7 +96,10 @@ class DrawnName:
 
 
 def _write_names(stage, scene: DrawnScene, segments, at, blocks, ties) -> tuple[int, int]:
-    """Write the names that have free space; returns the number of names written and of all names."""
+    """Write the names that have free space; return the number of names written and the number of all names.
+
+    at : positions of symbols [pixels]; blocks : boxes of symbols; ties : lines from parts to their ends
+    """
     from matplotlib.patheffects import withStroke
 
     axes, figure = stage.axes, stage.sheet.figure
@@ -130,7 +136,7 @@ def _write_names(stage, scene: DrawnScene, segments, at, blocks, ties) -> tuple[
 
 
 def _names_to_draw(scene: DrawnScene, at, pixels, half: float) -> list[DrawnName]:
-    """Names to draw, by priority: parts, pipes if they are few, plain junctions."""
+    """Names to draw, in order of priority: parts, then pipes if there are few, then plain junctions."""
     plain, small = {"color": style.INK, "fontsize": 8}, {"color": style.INK, "fontsize": 7.5}
     parts = [DrawnName(item.name, at[item.key], half + 3.0, plain) for item in scene.parts if not item.joint]
     joints = [DrawnName(item.name, at[item.key], 5.0, small) for item in scene.parts if item.joint]

@@ -1,4 +1,4 @@
-"""Figures of history.png and envelope.png."""
+"""Figures of history.png (probes over time) and envelope.png (extreme heads along pipes)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def history_figure(t, values, probes, time_unit="s", marks=(), measured=None, ti
     """Figure of probes over time, with a panel for each quantity and unit; constant probes are only named.
 
     t : float64[k] in `time_unit`; values : float64[k, n]; probes : (name, unit) of each column
-    marks : (time, cause); shaded from the first mark, since later results are not to be trusted
+    marks : (time, cause) of events after which results are not to be trusted; shaded from the first mark
     measured : probe -> (times, values), drawn dotted
     """
     probes = list(probes)
@@ -43,9 +43,9 @@ def history_figure(t, values, probes, time_unit="s", marks=(), measured=None, ti
 
 @style.without_markup
 def envelope_figure(envelope, units, title=""):
-    """Figure of least and maximum head along each of the longest pipes, with elevation and initial head.
+    """Figure of least and greatest head along each of the longest pipes, with elevation and initial head.
 
-    envelope : pipe -> quantity of envelope.csv -> float64[cells] in `units`
+    envelope : pipe -> quantity of envelope.csv -> float64[cells] in `units`; units : quantity -> unit
     """
     longest = sorted(envelope, key=lambda pipe: -envelope[pipe]["distance"][-1])[:MAX_PIPES]
     names = [pipe for pipe in envelope if pipe in longest]
@@ -72,12 +72,12 @@ def envelope_figure(envelope, units, title=""):
 
 
 def probe_quantity(probe: str) -> str:
-    """Quantity of a probe: `pressure` of `main.pressure@0.5`."""
+    """Quantity of a probe: `pressure` for `main.pressure@0.5`."""
     return probe.partition("@")[0].rpartition(".")[2]
 
 
 def thin_series(t, values, points=MAX_POINTS):
-    """Reduce a long series to the extremes of bins of rows, so that peaks remain and pictures stay small."""
+    """Reduce a series to at most about `points` rows: the extremes of equal bins of rows, so that peaks remain."""
     bins = points // 2
     if len(t) <= points:
         return t, values

@@ -1,4 +1,4 @@
-"""Pictures drawn in a second process, which imports matplotlib while the first computes.
+"""Pictures drawn in a second process, which imports matplotlib while the first process computes.
 
     python -m fvsolve.draw.plot_process
 
@@ -46,9 +46,10 @@ def draw_picture(picture: Picture) -> str:
 
 
 class PlotProcess:
-    """Draws pictures in a second process if `beside` and if that saves time, else in this process.
+    """Drawing of pictures in a second process if `second_process` is true and that saves time, else in this process.
 
-    The second process starts at once. Context manager: on exit it ends the process; no incomplete picture is left.
+    The second process starts at once. As a context manager it ends the process on exit, and no incomplete picture is
+    left.
     """
 
     def __init__(self, second_process: bool) -> None:
@@ -114,7 +115,7 @@ def processor_count() -> int:
 
 
 def draw_requests() -> None:
-    """Draw requested pictures until standard input ends."""
+    """Draw the pictures requested on standard input until it ends."""
     from fvsolve.draw import style
 
     requests, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")

@@ -1,4 +1,4 @@
-"""Projection of points in space to the picture plane, and axes of the projected scene."""
+"""Projection of points in space onto the picture plane, and axes of the projected scene."""
 
 from __future__ import annotations
 
@@ -23,10 +23,11 @@ PLAUSIBLE_SCALE = (0.3, 1.02)  # range of drawn length / length of pipes for a p
 
 
 class Projection:
-    """Parallel projection of points float64[n, 3] to the picture plane float64[n, 2].
+    """Parallel projection of points float64[n, 3] onto the picture plane float64[n, 2].
 
-    kind : "plan", "profile" or "aslant" (oblique view); rise : factor on heights
-    right, up, back : float64[3], axes of the picture and direction to the observer; begin : origin of a profile
+    kind : "plan", "profile" (elevation view) or "aslant" (oblique view); rise : factor on heights
+    along : horizontal axis of a profile; seen : direction to the observer of an oblique view
+    right, up, back : float64[3]  axes of the picture and direction to the observer; begin : origin of a profile
     """
 
     def __init__(self, kind: str, rise: float = 1.0, along=(1.0, 0.0), seen=NETWORK_VIEW) -> None:
@@ -48,7 +49,7 @@ class Projection:
 
 
 def choose_projection(points: np.ndarray, large: bool = False, slant: float = 1.0) -> Projection:
-    """Projection of a network: profile if straight in plan, plan if level, else oblique.
+    """Projection of a network: profile if it is straight in plan, plan if it is level, else oblique.
 
     large : True for many parts, seen from a steeper angle; slant : factor from units of height to units of length
     """
@@ -68,18 +69,21 @@ def choose_projection(points: np.ndarray, large: bool = False, slant: float = 1.
 
 
 def round_scale(value: float) -> float:
-    """Greatest of 1, 2 and 5 times a power of ten that does not exceed a value."""
+    """Greatest number 1, 2 or 5 times a power of ten that does not exceed `value`."""
     power = 10.0 ** math.floor(math.log10(value))
     return next(step * power for step in (5.0, 2.0, 1.0) if step * power <= value * (1.0 + 1e-9))
 
 
 def box_corners(low, high) -> np.ndarray:
-    """Corners of a box : float64[8, 3]."""
+    """Corners of a box from its corners low and high, float64[3] : float64[8, 3]."""
     return np.array([(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
 
 
 def fit_limits(axes, seen: np.ndarray, margins: tuple[float, float, float, float]) -> None:
-    """Set axis limits so that points float64[n, 2] fit with equal scales; margins [points]: left, low, right, high."""
+    """Set the limits of axes so that points fit with equal scales along both axes.
+
+    seen : float64[n, 2]  points in picture coordinates; margins : left, low, right and high margin [points]
+    """
     point = axes.figure.dpi / 72.0
     left, low, right, high = (point * margin for margin in margins)
     least, most = seen.min(axis=0), seen.max(axis=0)
@@ -92,9 +96,9 @@ def fit_limits(axes, seen: np.ndarray, margins: tuple[float, float, float, float
 
 
 def draw_box(axes, aspect: Projection, low, high, names: tuple[str, str, str]) -> list:
-    """Draw the axes of a box in oblique view, with ticks and names, and its floor in a light colour; returns the texts.
+    """Draw the axes of a box in oblique view with ticks and names, and the outline of its floor; return the texts.
 
-    low, high : float64[3], corners of the box; an edge without extent has no ticks
+    low, high : float64[3]  corners of the box; an edge of length 0 has no ticks; names : names of the three axes
     """
     from matplotlib.ticker import MaxNLocator
 

@@ -17,9 +17,9 @@ SHADES = ("#0b6aa8", "#3f8abc", "#74abd0", "#a9cce3", "#d6e7f2")
 
 @style.without_markup
 def region_figure(r: Callable, title: str = ""):
-    """Figure of the region |R(s)| <= 1 with s = h lambda; darker where a step damps more.
+    """Figure of the stability region |R(s)| <= 1, s = h lambda; colours are darker where a step damps more.
 
-    r : stability function R, for complex arrays
+    r : stability function R for complex arrays; h : time step, lambda : eigenvalue
     """
     left, right, high = _window(r)
     x, y = np.linspace(left, right, GRID_POINTS), np.linspace(-high, high, GRID_POINTS)

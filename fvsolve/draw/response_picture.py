@@ -9,9 +9,10 @@ from fvsolve.draw import style
 
 @style.without_markup
 def response_figure(w, h, labels: tuple[str, str], dips=(), poles=(), tolerance=0.0, title: str = "", note: str = ""):
-    """Bode plot of h over w with Re h below; bands with Re h < 0 are shaded, poles on the imaginary axis dotted.
+    """Bode plot of a response h over frequency, with the real part Re h below.
 
-    w : float64[k] [rad/s]; h : complex128[k]; labels : name and unit of h
+    Bands with Re h < 0 are shaded; poles on the imaginary axis are dotted lines.
+    w : float64[k]  angular frequency [rad/s]; h : complex128[k]; labels : name and unit of h
     dips : (low, high) of bands with Re h < 0 [rad/s]; poles : frequencies of poles [rad/s]
     tolerance : fraction of |h| below which Re h is drawn as zero; note : title of the panel of Re h
     """
@@ -45,7 +46,7 @@ def response_figure(w, h, labels: tuple[str, str], dips=(), poles=(), tolerance=
 
 
 def _logarithmic(axes, size) -> None:
-    """Set a logarithmic axis of at most six decades."""
+    """Make the vertical axis logarithmic, over at most six decades below the greatest value of `size`."""
     top, least = np.nanmax(size), np.nanmin(size)
     if not top > 0.0:
         return
@@ -55,7 +56,7 @@ def _logarithmic(axes, size) -> None:
 
 
 def _phase(axes, phase) -> None:
-    """Set an axis in degrees with lines at -90 and 90, the limits for a passive port."""
+    """Set the axis of the phase [deg], with lines at -90 and 90, the limits for a passive port."""
     for level in (-90.0, 90.0):
         axes.axhline(level, color=style.MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
     least, greatest = np.nanmin(phase), np.nanmax(phase)
@@ -65,7 +66,7 @@ def _phase(axes, phase) -> None:
 
 
 def _real(axes, real) -> None:
-    """Set the axis of Re h: logarithmic with at most six decades, on both sides of zero if it has negative values."""
+    """Make the axis of Re h logarithmic over at most six decades, on both sides of zero for negative values."""
     from matplotlib.ticker import NullLocator
 
     size = np.abs(real[np.isfinite(real)])

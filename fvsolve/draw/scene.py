@@ -1,4 +1,4 @@
-"""Scene: data of a run that are drawn as a picture or an animation."""
+"""Scene: data of a run that a picture or an animation shows."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import numpy as np
 
 @dataclass
 class DrawnPart:
-    """Part of a network with its position.
+    """Part of a network and its position.
 
     key : "nodes.NAME" or "links.NAME"
-    kinds : its kind and the kinds from which it is derived, nearest first
+    kinds : kind of the part and the kinds from which it is derived, nearest first
     at : position [m]; between : keys of the parts that a link connects
-    joint : True for a plain junction; held : True if pipes or a stated position fix its place
+    joint : True for a plain junction; held : True if pipes or a stated position fix its position
     own_place : True for a link that is not drawn at the middle of its ends
     """
 
@@ -32,7 +32,7 @@ class DrawnPart:
 
 @dataclass
 class DrawnUnit:
-    """Quantity with its output unit: shown value = factor * SI value + shift."""
+    """Quantity and its output unit: shown value = factor * SI value + shift."""
 
     name: str
     unit: str
@@ -48,9 +48,11 @@ class DrawnUnit:
 class DrawnScene:
     """Frames of a field with the parts, names and units of the picture.
 
+    quantity, length, height : units of the field, of lengths and of heights
     frames : (caption, files) of each time
     pipes : for networks, (points float64[p, 3] [m], lines int[c, 2], values float64[c] in SI, pipe int[c]) of each time
-    plan : "given", "laid out", "own scale" or "schematic"
+    plan : origin of plan positions: "given", "laid out" (by lengths), "own scale" or "schematic" (both not to scale)
+    contours : number of contour lines
     """
 
     title: str
@@ -73,5 +75,5 @@ class DrawnScene:
 
     @property
     def height_ratio(self) -> float:
-        """Factor on heights in their unit that gives equal scales of heights and lengths."""
+        """Factor on heights in their output unit that gives equal scales of heights and lengths."""
         return self.length.factor / self.height.factor

@@ -1,4 +1,4 @@
-"""Pictures of long sections and of phase planes."""
+"""Pictures of long sections (heads along a route) and of phase planes (a probe over another)."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ MAX_NAME_LENGTH = 22  # greatest number of letters of a name over a chainage
 
 @style.without_markup
 def section_figure(chainage, along, units, lines, seen, parted=(), beyond=(), posts=(), labels=(), title=""):
-    """Figure of heads along a section, with pipe, vapour line, pressure class and limits; shaded where cavities formed.
+    """Figure of heads along a route, with pipe, vapour line, pressure class and limits; shaded where cavities formed.
 
-    chainage, along["max_head"] ... : float64[n] in `units`; lines : name -> float64[n]
-    seen : `HeadWindow`, ends of the head axis and texts of the limits above and below it
-    parted : spans of chainage with cavities; beyond : (chainage, head, name) where a limit is violated
+    chainage : float64[n]; along : quantity of envelope.csv -> float64[n]; lines : name of a line -> float64[n]
+    units : unit of each quantity; seen : `HeadWindow`, ends of the head axis and texts of the limits above and below it
+    parted : spans of chainage with cavities; beyond : (chainage, head, name) of points where a limit is violated
     posts : chainages of vertical lines; labels : (chainage, names, True if a device is there)
     """
     figure = style.figure(9.2)
@@ -62,7 +62,10 @@ def section_figure(chainage, along, units, lines, seen, parted=(), beyond=(), po
 
 @style.without_markup
 def phase_figure(pairs, title=""):
-    """Figure with a phase plane for each pair of probes (name, unit, float64[k]); a dot marks the start."""
+    """Figure with a phase plane for each pair of probes; a dot marks the start.
+
+    pairs : two probes each, a probe as (name, unit, values : float64[k])
+    """
     across = min(len(pairs), 2)
     down = -(-len(pairs) // across)
     figure = style.figure(0.6 + (4.4 if across == 1 else 3.6) * down, width=5.6 if across == 1 else style.WIDTH)
@@ -81,7 +84,7 @@ def phase_figure(pairs, title=""):
 
 
 def _places(axes, posts, labels) -> None:
-    """Draw a vertical line at each chainage of `posts`, and the names of `labels`."""
+    """Draw a vertical line at each chainage of `posts`, and the names in `labels`; see `section_figure`."""
     for x in posts:
         axes.axvline(x, color=style.HAIR, linewidth=0.8, zorder=0)
     for x, names, stands in labels:
@@ -91,7 +94,7 @@ def _places(axes, posts, labels) -> None:
 
 
 def _thin_path(x, y) -> tuple:
-    """Reduce a long path to the extremes of both coordinates in bins of rows."""
+    """Reduce a long path (x, y) to the extremes of both coordinates in bins of rows."""
     rows = np.arange(len(x), dtype=float)
     indices = np.union1d(thin_series(rows, x)[0], thin_series(rows, y)[0]).astype(int)
     return x[indices], y[indices]

@@ -1,4 +1,4 @@
-"""Sheet of a picture of a field: title, axes, colour bar, symbols and their legend."""
+"""Sheet of a picture: title, axes, colour bar, symbols and their legend."""
 
 from __future__ import annotations
 
@@ -24,7 +24,11 @@ LEGEND_ROWS = 4  # rows of the legend
 
 
 class PictureSheet:
-    """Figure with its main axes; ruled : True if the axes have ticks outside."""
+    """Figure with one pair of main axes.
+
+    film : True for a frame of an animation, with a lower resolution; ruled : True if the axes have ticks outside
+    high : height of the figure [inch]
+    """
 
     def __init__(self, film: bool, ruled: bool = False, high: float = SIZE[1]) -> None:
         self.figure = style.figure(high, SIZE[0])
@@ -44,7 +48,7 @@ class PictureSheet:
             text.set_parse_math(False)
 
     def caption(self, title: str, below: str) -> None:
-        """Set the title and the line below it."""
+        """Set the title, and the smaller line below it."""
         for text, content in zip(self._captions, (title, below), strict=True):
             text.set_text(
                 visible(
@@ -53,7 +57,7 @@ class PictureSheet:
             )
 
     def bar(self, limits: tuple[float, float], label: str) -> list[str]:
-        """Draw the colour bar with the quantity and its unit; returns the texts of its ticks."""
+        """Draw the colour bar with a label; return the texts of its ticks. limits : values at the ends of the bar"""
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import Normalize
         from matplotlib.ticker import MaxNLocator
@@ -72,7 +76,7 @@ class PictureSheet:
         return [text.get_text() for tick, text in shown if low <= tick <= high]
 
     def legend(self, parts) -> None:
-        """Draw the legend: a symbol for each kind of part, with the name of the kind."""
+        """Draw the legend: the symbol and the name of each kind of part."""
         kinds = {part.kinds[0]: part for part in parts}
         place = self.figure.add_axes((0.5, 0.08 / self.high, 0.49, 0.8 / self.high))
         place.set_axis_off()
@@ -85,13 +89,16 @@ class PictureSheet:
             place.text(x + 0.03, y, kind.replace("-", " "), fontsize=8, color=style.INK, va="center", parse_math=False)
 
     def picture(self) -> np.ndarray:
-        """Pixels of the sheet : uint8[h, w, 3]."""
+        """Pixels of the sheet : uint8[height, width, 3]."""
         self.figure.canvas.draw()
         return np.asarray(self.figure.canvas.buffer_rgba())[:, :, :3].copy()
 
 
 def draw_symbol(axes, symbol: str, at, along=(1.0, 0.0), half: float = HALF_SYMBOL, shift=(0.0, 0.0)) -> None:
-    """Draw a symbol at a point of the axes, rotated to a direction and moved by `shift` [points]."""
+    """Draw a symbol at a point of the axes, rotated to the direction `along` and moved by `shift` [points].
+
+    half : half width of the symbol [points]
+    """
     from matplotlib.patches import Polygon
     from matplotlib.transforms import Affine2D, ScaledTranslation
 
@@ -107,7 +114,7 @@ def draw_symbol(axes, symbol: str, at, along=(1.0, 0.0), half: float = HALF_SYMB
 
 
 def colour_range(low: float, high: float) -> tuple[float, float]:
-    """Colour range of a field: its own range, or a band around the value of a uniform field."""
+    """Ends of the colour range of a field from `low` to `high`; a uniform field has a band around its value."""
     most = max(abs(low), abs(high))
     if most == 0.0:
         return 0.0, 1.0

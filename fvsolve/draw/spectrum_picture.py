@@ -1,4 +1,4 @@
-"""Picture of eigenvalues over a stability region."""
+"""Picture of eigenvalues in the stability region of a method."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from fvsolve.draw.region_picture import region_figure
 
 @style.without_markup
 def spectrum_figure(r: Callable, values: np.ndarray, field: np.ndarray | None = None, title: str = ""):
-    """Figure of eigenvalues times the step over the region |R(s)| <= 1.
+    """Figure of eigenvalues times the time step over the stability region |R(s)| <= 1.
 
-    values : eigenvalues times the step; field : boundary of the field of values times the step, or None
+    r : stability function R; values : eigenvalues times the time step
+    field : boundary of the field of values (numerical range) times the time step, or None
     """
     figure = region_figure(r, title)
     axes = figure.axes[0]
@@ -34,6 +35,6 @@ def spectrum_figure(r: Callable, values: np.ndarray, field: np.ndarray | None = 
 
 
 def closed_line(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Real and imaginary parts of points as a closed line."""
+    """Real and imaginary parts of complex points, with the first point repeated at the end."""
     line = np.append(points, points[:1])
     return line.real, line.imag

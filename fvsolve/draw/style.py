@@ -17,7 +17,7 @@ MAX_TITLE_LENGTH = 200  # greatest number of letters of a title
 
 
 def figure(height: float, width: float = WIDTH):
-    """Empty Figure with an Agg canvas; pyplot and its windows are never imported."""
+    """Empty figure with an Agg canvas, sizes in inch; pyplot and its windows are never imported."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -27,7 +27,7 @@ def figure(height: float, width: float = WIDTH):
 
 
 def without_markup(make: Callable) -> Callable:
-    """Decorator of functions that make a figure: `$` in texts is no markup, except in powers on logarithmic axes."""
+    """Decorator of functions that make a figure: `$` in texts is an ordinary letter, except on logarithmic axes."""
 
     @functools.wraps(make)
     def draw(*arguments, **keywords):
@@ -46,7 +46,7 @@ def without_markup(make: Callable) -> Callable:
 
 
 def style_axes(axes) -> None:
-    """Style axes: left and bottom lines only, and a light grid behind the curves."""
+    """Style axes: lines at the left and bottom only, and a light grid behind the curves."""
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
     for side in ("left", "bottom"):
@@ -72,7 +72,7 @@ def label_decades(axes) -> None:
 
 
 def legend(axes) -> None:
-    """Draw the legend to the right of the axes, where it covers no curve."""
+    """Draw the legend to the right of the axes, where it does not cover any curve."""
     if axes.get_legend_handles_labels()[0]:
         axes.legend(
             loc="upper left",

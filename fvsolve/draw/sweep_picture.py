@@ -1,4 +1,4 @@
-"""Pictures of an outcome of many runs over the varied keys."""
+"""Pictures of a result of many runs over the varied keys."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ KEY_WIDTH = 26  # letters of a line of a key
 
 @style.without_markup
 def outcome_figure(sweep, name: str, heads: Mapping[str, str]):
-    """Figure of a column of a `Sweep` over each varied key, or a map over two keys; failed runs have another colour.
+    """Figure of a column of a `Sweep` over each varied key, or as a map over two keys; failed runs differ in colour.
 
-    heads : key -> label of its axis
+    name : name of the column; heads : key -> label of its axis
     """
     if len(sweep.keys) == 2:
         return map_figure(sweep, [name], heads)
@@ -47,7 +47,7 @@ def outcome_figure(sweep, name: str, heads: Mapping[str, str]):
 
 
 def axis_positions(values: list) -> tuple[list[float], list[str]]:
-    """Positions of values on an axis, and texts of its ticks.
+    """Positions of values on an axis, and texts of the ticks.
 
     Numbers keep their value and have no texts; other values are numbered in order of first appearance.
     """
@@ -60,7 +60,10 @@ def axis_positions(values: list) -> tuple[list[float], list[str]]:
 
 @style.without_markup
 def map_figure(sweep, names, heads: Mapping[str, str]):
-    """Figure of columns of a `Sweep` over two keys, as maps of squares or as dots; runs that are not ok are crossed."""
+    """Figure of columns of a `Sweep` over two keys, as maps of squares or as dots; failed runs are crossed.
+
+    names : names of the columns; heads : key -> label of its axis
+    """
     across = min(len(names), 2)
     down = -(-len(names) // across)
     figure = style.figure(0.6 + (4.4 if across == 1 else 3.2) * down)
@@ -112,7 +115,7 @@ def _map(axes, sweep, name: str) -> None:
 
 @style.without_markup
 def sensitivity_figure(result):
-    """Figure of Sobol shares of the variance by key with their intervals, and of the mean and spread of effects."""
+    """Figure of the Sobol indices of each key with intervals, and of the mean and spread of elementary effects."""
     figure = style.figure(1.1 + 0.5 * max(len(result.keys), 3))
     panels = figure.subplots(1, 2, sharey=True)
     unit = result.outcome.rpartition(" ")[2] if result.outcome.endswith("]") else ""

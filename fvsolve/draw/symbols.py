@@ -1,9 +1,9 @@
-"""Symbols of the kinds of parts, as used for pipework and fluid power.
+"""Symbols of the kinds of parts, as in drawings of pipework and fluid power.
 
-A symbol is a text of strokes in a square from -1 to 1, with the flow along x. `M x y` and `L x y` move and draw to a
-point, `Z` closes a stroke, `O x y r` is a circle. Closed strokes are filled white; after `*` with ink, after `~` with
-water. A kind without a symbol has that of the kind from which it is derived (an orifice is a valve), else OTHER_NODE or
-OTHER_LINK: a new kind of part needs no entry here.
+A symbol is a text of strokes in a square from -1 to 1, with the flow along x. `M x y` moves and `L x y` draws to a
+point, `Z` closes a stroke, `O x y r` is a circle. Closed strokes are filled white, after `*` with ink, after `~` with
+the colour of water. A kind without a symbol uses the symbol of the kind from which it is derived (an orifice is a
+valve), else OTHER_NODE or OTHER_LINK: a new kind of part needs no entry here.
 """
 
 from __future__ import annotations
@@ -56,13 +56,13 @@ WATER = "#8ab6d6"
 
 
 def symbol_of(kinds: Sequence[str], link: bool) -> str:
-    """Symbol of a part; kinds : its kind and those from which it is derived, nearest first."""
+    """Symbol of a part. kinds : kind of the part and the kinds from which it is derived, nearest first"""
     return next((SYMBOLS[kind] for kind in kinds if kind in SYMBOLS), OTHER_LINK if link else OTHER_NODE)
 
 
 @cache
 def strokes(symbol: str) -> list[tuple[str, tuple[tuple[float, float], ...], bool]]:
-    """(fill, points, True if closed) of each stroke, in the order of drawing."""
+    """Strokes of a symbol in the order of drawing, as (fill, points, True if closed)."""
     result: list[tuple[str, list, bool]] = []
     words, at, fill = symbol.split(), 0, "white"
     while at < len(words):

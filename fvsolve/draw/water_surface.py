@@ -15,8 +15,8 @@ def water_mesh(mesh: Any, rise: float, fields: tuple[str, ...], least: float = W
     """Mesh of the water surface of a basin, cut at the shore, with `height` [m] above the bed at its points.
 
     The surface of wet cells is extrapolated over adjacent dry cells. If it lies above their bed, as at a front on level
-    ground, the shore is drawn at the middle of the dry cells. Cells deeper than `least` are wet. Fields at points are
-    means over wet cells. rise : factor on heights
+    ground, the shore is drawn at the middle of the dry cells. Cells deeper than `least` [m] are wet. Values of `fields`
+    at points are means over wet cells. rise : factor on heights
     """
     cells, wet = _cells(mesh), mesh.cell_data["depth"] > least
     up = depth_direction(mesh)
@@ -44,7 +44,10 @@ def water_mesh(mesh: Any, rise: float, fields: tuple[str, ...], least: float = W
 
 
 def water_sides(surface: Any, up: np.ndarray) -> Any:
-    """Vertical sides of the water, from the rim of its surface down to the bed; up : float64[3], scaled unit height."""
+    """Mesh of the vertical sides of the water, from the rim of its surface down to the bed.
+
+    up : float64[3]  direction of depth, with the factor on heights
+    """
     import pyvista
 
     rim = boundary_edges(surface)
@@ -55,7 +58,7 @@ def water_sides(surface: Any, up: np.ndarray) -> Any:
 
 
 def depth_direction(mesh: Any) -> np.ndarray:
-    """Direction of the depth of a basin : float64[3], upwards, or normal to the bed of a basin on a body."""
+    """Direction of depth in a basin : float64[3], vertical, or normal to the bed of a basin on a body."""
     return mesh.cell_data["normal"].mean(axis=0) if "normal" in mesh.cell_data else np.array([0.0, 0.0, 1.0])
 
 
@@ -93,7 +96,7 @@ def boundary_loops(mesh: Any) -> list[np.ndarray]:
 
 
 def raised_cells(mesh: Any) -> np.ndarray:
-    """Cells of a bed raised like a building, with walls steeper than WALL_SLOPE on all sides : bool[n]."""
+    """True for cells of the bed that are raised, with walls steeper than WALL_SLOPE around (buildings) : bool[n]."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -121,12 +124,12 @@ def raised_cells(mesh: Any) -> np.ndarray:
 
 
 def _cells(mesh: Any) -> list[tuple[np.ndarray, np.ndarray]]:
-    """(indices, corners) of the cells of each shape."""
+    """Indices and corners of the cells of each shape, as (int[k], int[k, 3 or 4])."""
     return [(np.flatnonzero(mesh.celltypes == kind), corners) for kind, corners in mesh.cells_dict.items()]
 
 
 def _at_points(cells, chosen: np.ndarray, values: np.ndarray, n: int) -> np.ndarray:
-    """Mean over the chosen cells around each point, NaN if there is none; chosen : bool[cells]."""
+    """Mean of cell values over the chosen cells around each of n points, NaN if there is none. chosen : bool[cells]"""
     total, count = np.zeros(n), np.zeros(n)
     for rows, corners in cells:
         mask = chosen[rows]
@@ -136,7 +139,10 @@ def _at_points(cells, chosen: np.ndarray, values: np.ndarray, n: int) -> np.ndar
 
 
 def _extended(cells, chosen: np.ndarray, at: np.ndarray, n: int) -> np.ndarray:
-    """Extrapolate point values: mean over the chosen cells around each point of the known values at their corners."""
+    """Extrapolated values at n points: mean over the chosen cells around a point of the finite values at their corners.
+
+    at : float64[n]  values at points, NaN if unknown; chosen : bool[cells]
+    """
     total, count = np.zeros(n), np.zeros(n)
     for rows, corners in cells:
         corners_chosen = corners[chosen[rows]]

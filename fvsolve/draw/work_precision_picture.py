@@ -1,4 +1,4 @@
-"""Work-precision diagrams: error against cost."""
+"""Work-precision diagrams: error over cost of schemes and methods."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FAILED_HEIGHT = 0.965  # vertical position of failed points, as a fraction of th
 
 @dataclass(frozen=True)
 class Curve:
-    """Points of a scheme and method from coarse to fine.
+    """Points of a scheme and method, from coarse to fine cells or steps.
 
     errors : a float64[n] for each row of panels; costs : a float64[n] for each column; failed : bool[n]
     """
@@ -31,9 +31,9 @@ class Curve:
 
 @style.without_markup
 def chart_figure(curves: Sequence[Curve], rows: Sequence[str], columns: Sequence[str], floors, title: str = ""):
-    """Figure with a panel for each kind of error and cost; shaded below the error floor, failed points at the top.
+    """Figure with a panel for each kind of error (rows) and of cost (columns).
 
-    rows, columns : names of the errors and of the costs; floors : error floor of each row
+    Panels are shaded below the error floor; failed points are at the top. floors : error floor of each row
     """
     figure = style.figure(0.9 + 3.1 * len(rows), width=9.5)
     grid = figure.subplots(len(rows), len(columns), sharex="col", sharey="row", squeeze=False)
@@ -75,7 +75,7 @@ def chart_figure(curves: Sequence[Curve], rows: Sequence[str], columns: Sequence
 
 
 def save_picture(figure, path, dpi: float | None = None) -> None:
-    """Write a picture; an SVG keeps text as text, and equal pictures give equal files."""
+    """Write a figure to a file; an SVG keeps its texts as text, and equal figures give equal files."""
     from matplotlib import rc_context
 
     with rc_context({"svg.fonttype": "none", "svg.hashsalt": "fvsolve"}):
@@ -111,7 +111,7 @@ def _curve(axes, curve: Curve, errors, costs, colour: str, marker: str) -> None:
 
 
 def _front(axes, curves, i: int, j: int, floor: float) -> None:
-    """Draw the Pareto front: least error reached up to each cost, down to the error floor."""
+    """Draw the Pareto front of panel (i, j): least error up to each cost, not below the error floor."""
     errors = np.concatenate([np.where(curve.failed, np.inf, curve.errors[i]) for curve in curves])
     costs = np.concatenate([curve.costs[j] for curve in curves])
     picked = np.lexsort((errors, costs))

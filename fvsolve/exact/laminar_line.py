@@ -201,7 +201,7 @@ class LineDeviation:
         return self._bromwich_line
 
     def _transform(self, s):
-        """Laplace transform of the change of mass flow: integral of its slope times exp(-s t), over s (Gauss points)."""
+        """Laplace transform of the change of mass flow: integral of its slope times exp(-s t), over s."""
         times = self.demand.time
         places, weights = np.polynomial.legendre.leggauss(4)
         width, middle = np.diff(times), 0.5 * (times[1:] + times[:-1])

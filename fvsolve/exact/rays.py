@@ -233,7 +233,7 @@ class RayPaths:
         return np.sort(np.concatenate(places))
 
     def _kink_times(self) -> dict[str, np.ndarray]:
-        """Group of nodes -> times of the kinks of its schedules [s], and the start if its initial state is not steady."""
+        """Group of nodes -> times of kinks of its schedules [s], and the start if its initial state is not steady."""
         parts = [(self.group[name], node) for name, node in self.case.nodes.items()]
         parts += [(self.group[valve.to], valve) for valve in self.valves.values()]
         result: dict[str, set[float]] = {}

@@ -62,7 +62,7 @@ class Solution:
         return averages(lambda x: self.pipe(name, x, t), edges, cuts)
 
     def _force(self, pipe, t):
-        """Unbalanced axial force on a frictionless pipe [N]: area times change of pressure difference since the start."""
+        """Unbalanced axial force on a frictionless pipe [N]: area times change of pressure drop since the start."""
         start = np.array([self.case.numerics.start])
         rise, first = (self.pressure[pipe.to](at) - self.pressure[pipe.from_](at) for at in (t, start))
         return 0.25 * np.pi * pipe.diameter**2 * (rise - first)

@@ -1,4 +1,4 @@
-"""Files of a run directory: writing and reading."""
+"""Writing and reading of the files of a run directory."""
 
 from fvsolve.output.directory import RunDirectory
 

@@ -1,6 +1,6 @@
-"""Lines that show bodies: from the origin to the centre of mass and the points, and along force elements.
+"""Lines that represent bodies in pictures: from the origin to the centre of mass and to the points, and force elements.
 
-A sloshing mass is shown as a line from its rest position to its position.
+A sloshing mass is a line from its rest position to its position.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ class BodyLines:
     """Points fixed to bodies or to the world, and lines between them.
 
     owner : int[p]         body of each point, -1 for the world
-    place : float64[p, 3]  its coordinates in the axes of the body [m]
-    lines : int[l, 2]      points of each line
+    place : float64[p, 3]  coordinates of each point in the axes of its owner [m]
+    lines : int[l, 2]      points at the ends of each line
     line_body : int32[l]   body of each line, -1 for none
     """
 
@@ -55,14 +55,18 @@ class BodyLines:
         self.lines, self.line_body = np.array(lines).reshape(-1, 2), np.array(line_body, dtype=np.int32)
 
     def at(self, out: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(points float64[p, 3] [m], speeds of midpoints of lines float64[l] [m/s]) at the body positions in `out`."""
+        """Points in world axes [m], and speeds of the midpoints of lines [m/s] : float64[p, 3], float64[l].
+
+        out : output array of the right-hand side, which contains the motion of the bodies
+        """
         points, speed = world_points(self.model, out, self.owner, self.place)
         return points, np.linalg.norm(speed[self.lines].mean(axis=1), axis=1)
 
 
 def world_points(model, out: np.ndarray, owner: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """World coordinates [m] and velocities [m/s] of points fixed to bodies, each float64[p, 3].
+    """World coordinates [m] and velocities [m/s] of points fixed to bodies : float64[p, 3] each.
 
+    out : output array of the right-hand side, which contains the motion of the bodies
     owner : int[p]         body of each point, -1 for the world
     place : float64[p, 3]  coordinates in the axes of the body [m]
     """

@@ -1,4 +1,4 @@
-"""Run directory: the sink that writes all files of a run, and functions that read and clear it."""
+"""Run directory: the object that writes all files of a run, and functions that read and clear the directory."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ PICTURE_PATTERNS = ("section-*.png", "view-*.png", "view-*.gif")  # the last two
 
 
 class RunDirectory:
-    """Sink of a run: streams history.csv and fields, replaces restart.npz at every checkpoint.
+    """Writer of the files of a run: appends to history.csv and the fields, replaces restart.npz at every checkpoint.
 
-    The run is unfinished while summary.json is absent. Raises RunError if the directory holds another run and
+    The run is unfinished while summary.json is absent. Raises RunError if the directory contains another run and
     neither `force` nor `resume` is set, or if its restart.npz does not fit the case.
     """
 
@@ -68,7 +68,7 @@ class RunDirectory:
         return summary["ok"] and summary["versions"] == self.identity and summary["t"] >= self.model.case.numerics.end
 
     def begin(self, model, state) -> None:
-        """Open the files: new empty ones, or those of the checkpoint, truncated to its time."""
+        """Open the files: new and empty ones, or those of an earlier part of the run, truncated to the checkpoint."""
         for name in (SUMMARY_FILE, *PICTURE_FILES):
             (self.folder / name).unlink(missing_ok=True)
         clear_reports(self.folder)
@@ -85,12 +85,15 @@ class RunDirectory:
             self.lines.continue_from(self.restart.frames)
 
     def rows(self, t, values) -> None:
-        """Append probe rows: `t : float64[k]` [s], `values : float64[k, probes]` in SI."""
+        """Append rows of probe values to history.csv. t : float64[k] [s]; values : float64[k, probes] in SI"""
         with self.report_write_errors():
             self.history.write(t, values)
 
     def field(self, t: float, frame: dict) -> None:
-        """Write a frame of all pipes, basins and bodies at time `t` [s]."""
+        """Write the fields of all pipes, basins and bodies at time `t` [s].
+
+        frame : pipe or basin -> quantity -> float64[cells] in SI
+        """
         with self.report_write_errors():
             if self.lines:
                 self.lines.write(self.fields.frames, frame)
@@ -98,12 +101,18 @@ class RunDirectory:
                 self.fields.write(t, frame)
 
     def share_basin_rows(self, comm, rows: dict) -> None:
-        """Make all ranks write frames of basins in parallel, each rank its rows; see `ParallelBasinWriter`."""
+        """Let every MPI rank write the fields of its own rows of a basin; see `ParallelBasinWriter`.
+
+        comm : MPI communicator; rows : basin -> first row of each rank, and the number of rows
+        """
         if self.fields:
             self.fields.pieces = ParallelBasinWriter(comm, rows)
 
     def checkpoint(self, state, extra: dict) -> None:
-        """Replace restart.npz: state, solver arrays and the number of rows and frames written so far."""
+        """Replace restart.npz by a checkpoint.
+
+        It contains the state, the arrays `extra` of the solver, and the numbers of rows and frames written so far.
+        """
         with self.report_write_errors():
             size = self.history.flush()
             frames = self.fields.frames if self.fields else 0
@@ -111,7 +120,7 @@ class RunDirectory:
             write_restart(self.folder / "restart.npz", restart, self.identity)
 
     def end(self, summary) -> None:
-        """Close the history and write envelope.csv and routes.csv; the caller writes summary.json last."""
+        """Close history.csv and write envelope.csv and routes.csv; the caller writes summary.json last."""
         with self.report_write_errors():
             self.history.close()
             if summary.envelope:
@@ -131,7 +140,7 @@ class RunDirectory:
 
     @contextlib.contextmanager
     def report_write_errors(self) -> Iterator[None]:
-        """Turn an OSError of the body into a RunError with the path."""
+        """Context manager that raises a RunError with the path in place of an OSError."""
         try:
             yield
         except OSError as error:
@@ -140,11 +149,11 @@ class RunDirectory:
                            "--resume, or choose another directory with --out DIR") from None  # fmt: skip
 
     def table(self):
-        """Read history.csv : float64[rows, 1 + probes], time and probes in the units of the file."""
+        """Contents of history.csv : float64[rows, 1 + probes], time and probes in the units of the file."""
         return read_table(self.folder / "history.csv")
 
     def envelope(self) -> dict:
-        """Read envelope.csv: pipe -> quantity -> float64[cells] in the units of the file; {} if there is no file."""
+        """Contents of envelope.csv: pipe -> quantity -> float64[cells] in the units of the file; {} without a file."""
         path = self.folder / "envelope.csv"
         return read_envelope(path) if path.is_file() else {}
 
@@ -183,9 +192,9 @@ class RunDirectory:
 
 
 def read_directory(folder: Path) -> tuple:
-    """(summary, table(), envelope(), folder) of a finished run; raises RunError if there is none.
+    """Read a finished run: its summary, functions for history.csv and envelope.csv, and the folder.
 
-    `table` and `envelope` are functions: they read history.csv and envelope.csv when called.
+    The functions read the files when called. Raises RunError if the folder contains no finished run.
     """
     summary = read_summary(folder / SUMMARY_FILE)
     return (

@@ -1,4 +1,4 @@
-"""envelope.csv: least and maximum pressure and head of each pipe cell, with their times."""
+"""envelope.csv: least and greatest pressure and head of each pipe cell, with their times."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ def envelope_columns(case) -> list[UnitColumn]:
 
 
 def with_initial_heads(summary, model) -> dict:
-    """Envelope of each pipe [SI] with the heads at the start, `initial_head` [m].
+    """Envelope of each pipe in SI, with the heads at the start as `initial_head` [m].
 
-    Cells and the observed points between cells are sorted by their distance along the pipe.
+    Cells, and observed points between cells, are sorted by their distance along the pipe.
     """
     envelopes = {}
     for k, pipe in enumerate(model.pipes):
@@ -53,9 +53,9 @@ def envelope_in_units(envelope: dict, case) -> dict:
 
 
 def write_envelope(path: Path, envelope: dict, case) -> None:
-    """Write a row for each cell: pipe, distance from its `from` end, elevation, extremes and their times.
+    """Write envelope.csv with a row for each cell: pipe, distance from its `from` end, elevation, extremes, times.
 
-    `envelope` maps a pipe to `float64[cells]` arrays named as in `ENVELOPE_QUANTITIES`, in units of the columns.
+    envelope : pipe -> name as in `ENVELOPE_QUANTITIES` -> float64[cells] in the units of the columns
     """
     columns = envelope_columns(case)
     with open(path, "w", encoding="utf-8", newline="") as file:
@@ -67,7 +67,7 @@ def write_envelope(path: Path, envelope: dict, case) -> None:
 
 
 def read_envelope(path: Path) -> dict:
-    """Read envelope.csv: pipe -> quantity -> float64[cells] in the units of the file; RunError if unreadable."""
+    """Read envelope.csv: pipe -> quantity -> float64[cells] in the units of the file; raises RunError if unreadable."""
     pipes: dict[str, list] = {}
     try:
         with open(path, encoding="utf-8", newline="") as file:

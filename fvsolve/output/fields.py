@@ -1,4 +1,4 @@
-"""fields.pvd and its .vtu frames: values of all cells at the output times.
+"""Fields of a run: the index fields.pvd and its .vtu files with the values of all cells at the output times.
 
 Pipes are chains of line cells along the network layout, with the elevation upwards. Cell data are in SI, pressures are
 absolute, and every array carries its unit as the VTK key UNITS_LABEL.
@@ -31,9 +31,9 @@ PVD_TAIL = "</Collection>\n</VTKFile>\n"
 
 
 class FieldSeries:
-    """Series of .vtu frames with their index fields.pvd, which is complete after each frame.
+    """Series of .vtu files with their index fields.pvd, which is complete after each frame (output time).
 
-    pieces : None, or the `ParallelBasinWriter` of basins whose rows are distributed over ranks
+    pieces : None, or the `ParallelBasinWriter` of basins whose rows are distributed over MPI ranks
     """
 
     def __init__(self, folder: Path, model):
@@ -66,7 +66,7 @@ class FieldSeries:
         (self.folder / "fields.pvd").write_bytes((PVD_HEAD + PVD_TAIL).encode())
 
     def continue_from(self, frames: int) -> None:
-        """Keep the first `frames` frames of a series and delete those after its checkpoint."""
+        """Keep the first `frames` frames of the series and delete later frames, to continue from a checkpoint."""
         index = self.folder / "fields.pvd"
         lines = index.read_text(encoding="utf-8").splitlines() if index.is_file() else []
         n = frames * (len(self.basins) + (1 if self.pipes else 0) + (1 if self.bodies else 0))
@@ -115,7 +115,7 @@ class FieldSeries:
         self.frames += 1
 
     def points_at(self, frame: dict) -> np.ndarray:
-        """Points of pipes at the time of a frame, points on bodies moved with them : float64[n, 3] [m]."""
+        """Points of the pipes in world axes at the time of a frame : float64[n, 3] [m]; points on bodies move."""
         if not (self.owner >= 0).any():
             return self.points
         from fvsolve.output.body_lines import world_points
@@ -130,7 +130,7 @@ class FieldSeries:
 
 
 def body_lines_of(model):
-    """Lines that show the bodies of a model; None if it has no bodies."""
+    """`BodyLines` that represent the bodies of a model in pictures; None if it has no bodies."""
     if not model.body_names:
         return None
     from fvsolve.output.body_lines import BodyLines
@@ -139,7 +139,7 @@ def body_lines_of(model):
 
 
 def write_frame(path: Path, points: np.ndarray, cells: list, data: dict[str, list], units: dict[str, str]) -> None:
-    """Write a .vtu file; `data` holds a list of arrays, one for each cell block.
+    """Write a .vtu file. data : name -> list of arrays, one for each block of cells; units : name -> unit
 
     meshio has no units, so UNITS_LABEL is inserted into the file afterwards.
     """
@@ -154,15 +154,15 @@ def write_frame(path: Path, points: np.ndarray, cells: list, data: dict[str, lis
 
 
 def unit_xml(units: dict[str, str], name: str) -> str:
-    """XML of the unit of an array; "" if it has no unit."""
+    """XML text of the unit of an array; "" if it has no unit."""
     return UNIT_XML.format(html.escape(units[name], quote=False)) if name in units else ""
 
 
 def pipe_geometry(model, plan: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Points float64[n, 3] [m] and lines int[cells, 2] of all pipes.
+    """Points [m] and lines of all pipes : float64[n, 3], int[cells, 2].
 
-    Pipes share the point of their common node; the point of a basin patch is its mean.
-    plan : part -> float64[2] [m]
+    Pipes share the point of their common node; the point of a basin patch is the mean of its faces.
+    plan : part -> plan position float64[2] [m]
     """
     places = {name: plan[network_layout.place(name)] for name in model.node_names}
     for basin in model.basins:
@@ -192,7 +192,8 @@ def pipe_geometry(model, plan: dict[str, np.ndarray]) -> tuple[np.ndarray, np.nd
 def points_on_bodies(model, points: np.ndarray) -> np.ndarray:
     """Body of each point of `pipe_geometry` : int[n], -1 for the world.
 
-    Points on a body are replaced by coordinates in the axes of the body, along a straight pipe.
+    The coordinates of points on a body are replaced, in place, by coordinates in the axes of the body, along a straight
+    pipe.
     """
     places = model.case.places
     ends = list(dict.fromkeys(end for pipe in model.pipes for end in (pipe.from_, pipe.to)))
@@ -216,7 +217,7 @@ def points_on_bodies(model, points: np.ndarray) -> np.ndarray:
 
 
 def basin_geometry(basin, origin: np.ndarray) -> tuple[np.ndarray, list]:
-    """Corners float64[p, 3] [m] of the cells of a basin at bed level, and blocks of cells of equal type, in order."""
+    """Corners of the cells of a basin at bed level [m], float64[p, 3], and blocks of successive cells of equal type."""
     mesh = basin.mesh
     points = drawn_points(basin, origin, mesh.points)
     three = mesh.cells[:, 3] < 0
@@ -227,18 +228,18 @@ def basin_geometry(basin, origin: np.ndarray) -> tuple[np.ndarray, list]:
 
 
 def drawn_points(basin, origin: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Points of a basin mesh, shifted by `origin`, at bed level : float64[p, 3] [m]."""
+    """Points of a basin mesh at bed level, shifted in plan by `origin` : float64[p, 3] [m]."""
     x, y = np.ascontiguousarray(points.T)
     return np.column_stack([origin[0] + x, origin[1] + y, basin.ground(x, y)])
 
 
 def split_blocks(values: np.ndarray, blocks: list) -> list[np.ndarray]:
-    """Split values of cells into the blocks of cells."""
+    """Split an array of cell values into one array for each block of cells."""
     return np.split(values, np.cumsum([len(cells) for _, cells in blocks])[:-1])
 
 
 def read_series(path: Path) -> list[tuple[float, Path]]:
-    """(time [s], file) of every frame of a .pvd file; raises RunError if it cannot be read."""
+    """Time [s] and file of every entry of a .pvd file; raises RunError if it cannot be read."""
     from xml.etree import ElementTree
 
     try:
@@ -249,14 +250,14 @@ def read_series(path: Path) -> list[tuple[float, Path]]:
 
 
 def read_pipes(path: Path, quantity: str) -> np.ndarray:
-    """Quantity of all pipe cells in a frame, in SI : float64[cells]; raises RunError if it cannot be read."""
+    """Read a quantity of all pipe cells from a .vtu file : float64[cells] in SI; raises RunError if unreadable."""
     return read_pipe_lines(path, quantity)[2]
 
 
 def read_pipe_lines(path: Path, quantity: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """(points float64[p, 3] [m], lines int[c, 2], a quantity float64[c] in SI, number of the pipe int[c]) of a frame.
+    """Read the pipes of a .vtu file: points [m], lines, values of a quantity in SI, number of the pipe of each line.
 
-    Raises RunError if the file cannot be read.
+    Returns float64[p, 3], int[c, 2], float64[c] and int[c]. Raises RunError if the file cannot be read.
     """
     from meshio import vtu  # meshio.read would print and exit on a damaged file
 

@@ -11,7 +11,7 @@ from fvsolve.output.unit_columns import UnitColumn, split_header, to_column_unit
 
 
 class HistoryFile:
-    """CSV file to which rows are appended; numbers are written so that they read back to the last bit."""
+    """CSV file to which rows are appended; numbers are written with all digits, so that they are read back exactly."""
 
     def __init__(self, path: Path, time: UnitColumn, columns: list[UnitColumn]):
         self.path = path
@@ -27,7 +27,7 @@ class HistoryFile:
         self._file.write(f"{headers}\n".encode())
 
     def continue_from(self, rows: int, size: int) -> None:
-        """Open the file of a checkpoint, truncated to `size` bytes; raises RunError if it is shorter."""
+        """Open the file of a checkpoint of `rows` rows, truncated to `size` bytes; raises RunError if it is shorter."""
         if not self.path.is_file() or self.path.stat().st_size < size:
             raise RunError(f"{self.path} is shorter than at its checkpoint; start the run again with --force")
         self._file = open(self.path, "r+b")
@@ -36,7 +36,7 @@ class HistoryFile:
         self.rows = rows
 
     def write(self, t: np.ndarray, values: np.ndarray) -> None:
-        """Append rows; `t : float64[k]` [s], `values : float64[k, n]` in SI."""
+        """Append rows. t : float64[k] [s]; values : float64[k, n] in SI"""
         times = self.time.from_si(t).tolist()
         table = to_column_units(self.columns, values).tolist()
         lines = [",".join(map(repr, [time, *row])) for time, row in zip(times, table, strict=True)]
@@ -57,7 +57,7 @@ class HistoryFile:
 
 
 def read_headers(path: Path) -> list[tuple[str, str]]:
-    """(name, unit) of every column of a table, `t` first; raises RunError if the file cannot be read."""
+    """Name and unit of every column of a table, `t` first; raises RunError if the file cannot be read."""
     import csv
 
     try:

@@ -1,4 +1,4 @@
-"""lines/NAME-000012.csv: fields of a basin along a line, one file for each frame."""
+"""lines/NAME-000012.csv: fields of a basin along a straight line, one file for each frame (output time)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LINE_FILE = re.compile(r"(.+)-(\d{6,})\.csv")
 
 
 class LineSeries:
-    """Writes one .csv for each line and frame, with the frame numbers of fields.pvd."""
+    """Writer of a .csv file for each line and frame, numbered like the frames of fields.pvd."""
 
     def __init__(self, folder: Path, model):
         self.folder = folder / "lines"
@@ -25,11 +25,11 @@ class LineSeries:
                       for name, line in model.case.output.lines.items()}  # fmt: skip
 
     def start(self) -> None:
-        """Start an empty series."""
+        """Create the folder of the files of a new run."""
         self.folder.mkdir(exist_ok=True)
 
     def continue_from(self, frames: int) -> None:
-        """Keep the first `frames` frames of every line and delete those after the checkpoint."""
+        """Keep the first `frames` frames of every line and delete later frames, to continue from a checkpoint."""
         for name in self.lines:
             if frames and not self.path(name, frames - 1).is_file():
                 raise RunError(f"{self.folder}: frames of {name} are missing; start the run again with --force")
@@ -37,17 +37,20 @@ class LineSeries:
         clear_lines(self.folder.parent, frames)
 
     def write(self, number: int, frame: dict) -> None:
-        """Write a frame of all lines; frame : basin -> field -> values of cells in SI."""
+        """Write the files of all lines for the frame `number`. frame : basin -> field -> values of cells in SI"""
         for name, line in self.lines.items():
             self.path(name, number).write_bytes(line.text(frame[line.basin]).encode())
 
     def path(self, name: str, number: int) -> Path:
-        """File of a line and frame."""
+        """Path of the file of a line and frame."""
         return self.folder / f"{name}-{number:06d}.csv"
 
 
 class LineSampler:
-    """Points on a line, with the cells and weights of each; points in holes of the mesh have no cells."""
+    """Points on a line in a basin, and the cells and weights that interpolate fields at each point.
+
+    Points in holes of the mesh have no cells.
+    """
 
     def __init__(self, line, basin, case) -> None:
         self.basin, fields = line.basin, basin.part.physics_type.fields
@@ -66,13 +69,13 @@ class LineSampler:
         self.columns += [column(name, "number", case, label) for name, label in labels.items()]
 
     def text(self, fields: dict[str, np.ndarray]) -> str:
-        """Text of the file of a frame; fields in SI."""
+        """CSV text of a frame: a row of position and fields for each point. fields : name -> values of cells in SI"""
         values = np.column_stack([self.places, *(self.along(column.name, fields) for column in self.columns[3:])])
         rows = [",".join(map(repr, row)) for row in to_column_units(self.columns, values).tolist()]
         return "\n".join([",".join(csv_quoted(column.header) for column in self.columns), *rows]) + "\n"
 
     def along(self, name: str, fields: dict[str, np.ndarray]) -> np.ndarray:
-        """Field at the points of the line, NaN in holes : float64[points]."""
+        """Values of a field at the points of the line, NaN in holes : float64[points]."""
         if name == "speed":
             return np.hypot(self.along("u", fields), self.along("v", fields))
         cells = fields["velocity"][:, VELOCITY_AXES[name]] if name in VELOCITY_AXES else fields[name]

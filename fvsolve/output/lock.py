@@ -1,4 +1,4 @@
-"""Lock of a folder, so that a single process writes to it.
+"""Lock of a folder, so that only one process writes to it.
 
 The operating system holds the lock on the file `.lock` and releases it when the process ends in any way.
 """
@@ -16,10 +16,10 @@ LOCK_FILE = ".lock"
 
 
 def lock_folder(folder: Path, writer: str) -> FileLock:
-    """Create a folder if needed and lock it; returns the lock.
+    """Create a folder if needed and lock it; return the lock.
 
-    writer : the other user of the folder in the message, such as "a run"
-    Raises RunError if another process holds the lock or the folder cannot be written.
+    writer : name of the possible other user of the folder in the message, such as "a run"
+    Raises RunError if another process has locked the folder, or it cannot be written.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""Sink of a run without a directory: rows are stored in memory."""
+"""Receiver of the results of a run without a directory: rows are stored in memory."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fvsolve.output.unit_columns import probe_columns, time_column, to_column_un
 
 
 class MemorySink:
-    """Stores the probe rows and the envelope of a run; ignores fields and checkpoints."""
+    """Receiver of the results of a run that stores probe rows and envelope in memory, not fields and checkpoints."""
 
     folder = None
     restart = None
@@ -26,7 +26,7 @@ class MemorySink:
         """Do nothing: there is no file to open."""
 
     def rows(self, t, values) -> None:
-        """Append probe rows: `t : float64[k]` [s], `values : float64[k, probes]` in SI."""
+        """Append rows of probe values. t : float64[k] [s]; values : float64[k, probes] in SI"""
         block = np.empty((len(t), 1 + len(self.columns)))
         block[:, 0], block[:, 1:] = self.time.from_si(np.asarray(t)), to_column_units(self.columns, np.asarray(values))
         self._blocks.append(block)
@@ -38,19 +38,19 @@ class MemorySink:
         """Do nothing: checkpoints are not stored."""
 
     def end(self, summary) -> None:
-        """Store the summary, from which `envelope` is made."""
+        """Store the summary of the run, from which `envelope` is computed."""
         self._summary = summary
 
     def close(self) -> None:
         """Do nothing: there is no file to close."""
 
     def table(self) -> np.ndarray:
-        """Time and probes in the units of the columns : float64[rows, 1 + probes]."""
+        """Time and probe values in the units of the columns : float64[rows, 1 + probes]."""
         return np.concatenate([np.empty((0, 1 + len(self.columns))), *self._blocks])
 
     @property
     def last(self) -> np.ndarray:
-        """Last row of the table."""
+        """Last row of the last block of rows : float64[1 + probes]."""
         return self._blocks[-1][-1]
 
     def envelope(self) -> dict:

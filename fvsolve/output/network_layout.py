@@ -20,7 +20,7 @@ BEND_SIZE = 0.15  # sideways bend of parallel links, as a fraction of their leng
 
 
 def plan_positions(case, lengths: dict[str, float]) -> dict[str, np.ndarray]:
-    """Plan position float64[2] [m] of every part that links connect; `lengths` : link -> length [m], if it has one."""
+    """Plan position [m] of every part that links connect : name -> float64[2]. lengths : link -> length [m]"""
     ports = {name: [place(port) for port in link.ports.values()] for name, link in case.links.items()}
     named = [part for ends in ports.values() for part in ends] + [place(part) for part in case.places]
     owners = dict.fromkeys(part for part in named if part not in case.nodes)
@@ -43,7 +43,10 @@ def plan_positions(case, lengths: dict[str, float]) -> dict[str, np.ndarray]:
 
 
 def cut_positions(case, stated: dict[str, tuple]) -> dict[str, tuple]:
-    """Positions of nodes that cut a pipe: on the straight line between its ends, in proportion to the lengths."""
+    """Positions of nodes that divide a pipe: on the straight line between its ends, in proportion to length.
+
+    stated : node -> position stated in the case
+    """
     result = {}
     for name, route in case.routes.items():
         if not is_cut(name, route.pipes):
@@ -60,12 +63,15 @@ def cut_positions(case, stated: dict[str, tuple]) -> dict[str, tuple]:
 
 
 def place(port: str) -> str:
-    """Part that owns a port: `cyl` of `cyl.A`."""
+    """Name of the part that owns a port: `cyl` for `cyl.A`."""
     return port.partition(".")[0]
 
 
 def link_path(start: np.ndarray, end: np.ndarray, fractions: np.ndarray, aside: float) -> np.ndarray:
-    """Points float64[k, 2] of a link at `fractions` of its length; parabolic bend of `aside` times BEND_SIZE."""
+    """Points of a link in plan at `fractions` of its length : float64[k, 2].
+
+    The link is a parabola with the sideways bend `aside` times BEND_SIZE.
+    """
     along = end - start
     normal = np.array([-along[1], along[0]])
     straight = start + fractions[:, None] * along
@@ -102,7 +108,10 @@ def _plan(count: int, edges: list[tuple[int, int, float]]) -> np.ndarray:
 
 
 def _distances(count: int, edges: list[tuple[int, int, float]]) -> np.ndarray:
-    """Lengths of the shortest paths between all nodes (Floyd 1962)."""
+    """Lengths of the shortest paths between all nodes : float64[count, count] (Floyd 1962).
+
+    edges : (node, node, length) of each link
+    """
     distance = np.full((count, count), np.inf)
     np.fill_diagonal(distance, 0.0)
     for i, j, length in edges:
@@ -115,7 +124,7 @@ def _distances(count: int, edges: list[tuple[int, int, float]]) -> np.ndarray:
 
 
 def _classical_scaling(distance: np.ndarray) -> np.ndarray:
-    """Classical scaling: least-squares plan for the given distances (Torgerson 1952)."""
+    """Plan positions by classical scaling, a least-squares fit to the given distances (Torgerson 1952)."""
     count = len(distance)
     centre = np.eye(count) - 1.0 / count
     values, vectors = np.linalg.eigh(-0.5 * centre @ distance**2 @ centre)
@@ -130,14 +139,17 @@ def _classical_scaling(distance: np.ndarray) -> np.ndarray:
 
 
 def _has_branches(distance: np.ndarray) -> float:
-    """0 for a chain of nodes, which stays straight, else 1."""
+    """1 if the network has branches, 0 for a chain of nodes, which stays straight."""
     farthest = np.unravel_index(np.argmax(distance), distance.shape)
     off = distance[farthest[0]] + distance[farthest[1]] - distance[farthest]
     return float(off.max() > 1e-9 * distance.max())
 
 
 def _minimise_stress(plan: np.ndarray, distance: np.ndarray) -> np.ndarray:
-    """Reduce the stress sum((|x_i - x_j| - d_ij)^2 / d_ij^2) by the Guttman transform with weights 1/d^2."""
+    """Plan positions x with less stress, sum((|x_i - x_j| - d_ij)^2 / d_ij^2), d_ij the given distance of two nodes.
+
+    Guttman transforms with weights 1 / d_ij^2, starting from `plan`.
+    """
     weight = np.where(distance > 0.0, 1.0 / np.where(distance > 0.0, distance, 1.0) ** 2, 0.0)
     laplacian = np.diag(weight.sum(1)) - weight
     inverse = np.linalg.pinv(laplacian)
@@ -151,7 +163,7 @@ def _minimise_stress(plan: np.ndarray, distance: np.ndarray) -> np.ndarray:
 
 
 def _oriented(plan: np.ndarray) -> np.ndarray:
-    """Rotate and shift a plan: longer side along x, first node to the left, lower left corner at the origin."""
+    """Plan rotated and shifted: longer side along x, first node to the left, lower left corner at the origin."""
     plan = plan - plan.mean(0)
     _, _, axes = np.linalg.svd(plan, full_matrices=False)
     plan = plan @ axes.T
@@ -160,7 +172,7 @@ def _oriented(plan: np.ndarray) -> np.ndarray:
 
 
 def _radial_plan(count: int, edges: list[tuple[int, int, float]]) -> np.ndarray:
-    """Plan of a large network: radius = path length from the first node, each branch in its own sector."""
+    """Plan of a large network: radius is the path length from the first node; each branch has its own sector."""
     reach, parent, order = _shortest_path_tree(count, edges)
     leaves = np.zeros(count)
     for i in reversed(order):
@@ -181,7 +193,10 @@ def _radial_plan(count: int, edges: list[tuple[int, int, float]]) -> np.ndarray:
 
 
 def _shortest_path_tree(count: int, edges: list[tuple[int, int, float]]) -> tuple[np.ndarray, list[int], list[int]]:
-    """Shortest paths from the first node (Dijkstra 1959): lengths, parents (-1: none), nodes in the order reached."""
+    """Shortest paths from the first node (Dijkstra 1959): path lengths, parents (-1 for none), nodes by length.
+
+    Parts of the network that are not connected to it have a first node each.
+    """
     near: list[list[tuple[int, float]]] = [[] for _ in range(count)]
     for i, j, length in edges:
         near[i].append((j, length))

@@ -1,6 +1,7 @@
-"""Parallel writing of basin frames: each rank writes a .vtu of its rows, rank 0 also the .pvtu index.
+"""Parallel writing of basin fields: each MPI rank writes a .vtu file of its rows, rank 0 also the .pvtu index.
 
-Rank 0 has the frame. The other ranks wait for a broadcast of a function to call and its arguments (`solve.mpi_ranks`).
+Rank 0 has the values of all cells. The other ranks wait for a broadcast of a function to call and its arguments
+(`solve.mpi_ranks`).
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ VTK_TYPES = {"f": "Float", "i": "Int", "u": "UInt"}
 
 
 class ParallelBasinWriter:
-    """Writer of the frames of basins whose rows are distributed over ranks.
+    """Writer of the fields of basins whose rows are distributed over MPI ranks.
 
     comm : MPI communicator of all ranks
     rows : basin -> int64[ranks + 1]  first row of each rank, then the number of rows
@@ -25,7 +26,10 @@ class ParallelBasinWriter:
         self.comm, self.rows = comm, rows
 
     def write(self, path: Path, basin, origin: np.ndarray, values: dict[str, np.ndarray], units: dict) -> None:
-        """Write the frame of a basin; raises OSError if a rank cannot write its piece."""
+        """Write the fields of a basin at one time; raises OSError if a rank cannot write its file.
+
+        origin : plan shift of the basin [m]; values : quantity -> values of all cells; units : quantity -> unit
+        """
         comm, rows = self.comm, self.rows[basin.name]
         layouts = {key: (item.shape[1:], item.dtype.str) for key, item in values.items()}
         comm.bcast((write_piece_of_rank, (str(path), basin.name, rows, origin, layouts, units)))
@@ -40,9 +44,9 @@ class ParallelBasinWriter:
 
 
 def write_piece_of_rank(comm, model, path: str, name: str, rows, origin, layouts: dict, units: dict) -> None:
-    """Receive the values of the cells of this rank, write its piece and send the fault, if any, to rank 0.
+    """Receive the values of the cells of this rank, write its file, and send an error, if any, to rank 0.
 
-    layouts : quantity -> (shape of the value of a cell, dtype)
+    layouts : quantity -> (shape of the value of a cell, dtype); other arguments as in `write_piece`
     """
     basin = next(item for item in model.basins if item.name == name)
     n = rows[comm.rank + 1] - rows[comm.rank]
@@ -53,13 +57,17 @@ def write_piece_of_rank(comm, model, path: str, name: str, rows, origin, layouts
 
 
 def rank_cells(basin, rows: np.ndarray, k: int) -> slice:
-    """Cells of rank k."""
+    """Range of the cells of rank k in a basin. rows : first row of each rank, then the number of rows"""
     wide = basin.mesh.grid.nx
     return slice(wide * int(rows[k]), wide * int(rows[k + 1]))
 
 
 def write_piece(path: Path, basin, origin, rows, k: int, values: dict, units: dict) -> tuple:
-    """Write the piece of rank k; returns the arguments of an OSError if that fails, else ()."""
+    """Write the .vtu file of rank k; returns the arguments of an OSError if that fails, else ().
+
+    path : .pvtu file; origin : plan shift of the basin [m]; rows : as in `rank_cells`; values : quantity -> values of
+    the cells of the rank; units : quantity -> unit
+    """
     corners = basin.mesh.cells[rank_cells(basin, rows, k)]
     first, last = int(corners.min()), int(corners.max())  # a piece has complete rows of points
     points = fields.drawn_points(basin, origin, basin.mesh.points[first : last + 1])
@@ -72,13 +80,13 @@ def write_piece(path: Path, basin, origin, rows, k: int, values: dict, units: di
 
 
 def piece_path(path: Path, k: int) -> Path:
-    """File of rank k: `pool.1-000012.vtu` of `pool-000012.pvtu`; no part can have a name with a dot."""
+    """Path of the file of rank k: `pool.1-000012.vtu` for `pool-000012.pvtu`; no part can have a name with a dot."""
     name, _, frame = path.stem.rpartition("-")
     return path.with_name(f"{name}.{k}-{frame}.vtu")
 
 
 def pvtu_text(path: Path, n: int, values: dict[str, np.ndarray], units: dict[str, str]) -> str:
-    """Text of a .pvtu file."""
+    """Text of the .pvtu index of the files of n ranks."""
     arrays = [
         f'<PDataArray type="{VTK_TYPES[array.dtype.kind]}{8 * array.dtype.itemsize}" Name="{key}" '
         f'NumberOfComponents="{array[:1].size}">\n{fields.unit_xml(units, key)}</PDataArray>'

@@ -1,4 +1,4 @@
-"""restart.npz: state and arrays from which a run continues with identical results, to the bit."""
+"""restart.npz: state and arrays from which a run continues with exactly the same results."""
 
 from __future__ import annotations
 
@@ -20,7 +20,12 @@ UNCHECKED_KEYS = ("title", "expect", "compare")
 
 @dataclass(frozen=True)
 class Restart:
-    """Checkpoint: state, arrays of the solver, and the numbers of rows, bytes and frames written so far."""
+    """Checkpoint of a run.
+
+    t : time [s]; y : state; memory : memory of step control, switches and delay lines; extra : arrays of the solver by
+    name
+    rows, history_bytes, frames : rows and bytes of history.csv, and frames of fields, written so far
+    """
 
     t: float
     y: np.ndarray
@@ -32,7 +37,7 @@ class Restart:
 
 
 def identity(case) -> dict[str, str]:
-    """Hash of the case without its end time, and versions; a run can only continue if all are equal."""
+    """Hash of the case without its end time, and versions of programs; a run can only continue if all are equal."""
     table = {key: value for key, value in case.table().items() if key not in UNCHECKED_KEYS}
     table["numerics"].pop("end")
     digest = hashlib.sha256(json.dumps(table, sort_keys=True, default=str).encode())
@@ -42,7 +47,7 @@ def identity(case) -> dict[str, str]:
 
 
 def versions(case) -> dict[str, str]:
-    """Versions on which the numbers of a run depend: programs, fluid data and target processor."""
+    """Versions on which the numbers of a run depend: programs, source of fluid data, and target processor."""
     return program_versions() | {"fluid": case.properties.source}
 
 
@@ -53,7 +58,7 @@ def program_versions() -> dict[str, str]:
 
 @functools.cache
 def _program_versions() -> tuple[tuple[str, str], ...]:
-    """Versions of the programs; they cannot change within a process, so they are cached."""
+    """Versions of the programs, as pairs; cached, because they cannot change within a process."""
     import fvsolve
     from fvsolve import jit
 
@@ -65,7 +70,10 @@ def _program_versions() -> tuple[tuple[str, str], ...]:
 
 
 def write_restart(path: Path, restart: Restart, who: dict[str, str]) -> None:
-    """Replace the checkpoint atomically: after a kill, either the old or the new file is complete."""
+    """Replace the checkpoint file; if the process is killed, either the old or the new file is complete.
+
+    who : result of `identity`
+    """
     arrays = {f"extra.{name}": np.asarray(value) for name, value in restart.extra.items()}
     arrays |= {"t": np.float64(restart.t), "y": restart.y, "memory": restart.memory}
     arrays["counts"] = np.array([restart.rows, restart.history_bytes, restart.frames])
@@ -77,7 +85,10 @@ def write_restart(path: Path, restart: Restart, who: dict[str, str]) -> None:
 
 
 def read_restart(path: Path, who: dict[str, str]) -> Restart:
-    """Read a checkpoint; raises RunError if it is damaged or belongs to another case or other versions."""
+    """Read a checkpoint file; raises RunError if it is damaged or belongs to another case or other versions.
+
+    who : expected result of `identity`
+    """
     try:
         with np.load(path) as file:
             arrays = {name: file[name] for name in file.files}

@@ -14,13 +14,19 @@ from fvsolve.output.unit_columns import column
 
 
 def route_envelopes(envelope: dict, case) -> dict[str, dict[str, Any]]:
-    """Route -> chainage, pipe and the quantities of the envelope, in its units : arrays along the route."""
+    """Envelopes along all routes: route -> "chainage", "pipe" or quantity -> array along the route.
+
+    envelope : pipe -> quantity -> float64[cells] in the units of envelope.csv, also of the result
+    """
     distances = column("distance", "length", case)
     return {name: joined_envelopes(envelope, legs(route, case.links), distances) for name, route in case.routes.items()}
 
 
 def joined_envelopes(envelope: dict, route, distances) -> dict[str, Any]:
-    """Envelopes of the pipes of a route in order; pipes followed backwards are reversed."""
+    """Envelopes of the pipes of a route in order: "chainage", "pipe" or quantity -> array along the route.
+
+    Pipes followed backwards are reversed. distances : column with the unit of lengths
+    """
     arrays: dict[str, list] = {"chainage": [], "pipe": []}
     for leg in route:
         turn = slice(None, None, -1) if leg.backwards else slice(None)
@@ -33,7 +39,7 @@ def joined_envelopes(envelope: dict, route, distances) -> dict[str, Any]:
 
 
 def write_routes(path: Path, envelope: dict, case) -> None:
-    """Write a row for each place along each route; `envelope` in the units of envelope.csv."""
+    """Write routes.csv with a row for each cell along each route. envelope : in the units of envelope.csv"""
     columns = envelope_columns(case)
     headers = ["route", column("chainage", "length", case).header, "pipe", *(item.header for item in columns)]
     with open(path, "w", encoding="utf-8", newline="") as file:

@@ -21,7 +21,7 @@ REQUIRED_KEYS = (
 
 
 def summary_data(summary, model) -> dict:
-    """Summary of a solver as plain data in SI; only the extremes are in the units of the probes."""
+    """Results of a run as plain data in SI for summary.json; only the extremes are in the units of the probes."""
     return {
         "title": model.case.title,
         "case": model.case.name,
@@ -75,7 +75,7 @@ def plain(value):
 
 
 def write_summary(path: Path, summary: dict) -> None:
-    """Write summary.json atomically: a directory that contains it holds a finished run."""
+    """Write summary.json in a single step: a directory that contains the file holds a finished run."""
     fresh = path.with_suffix(".json.tmp")
     fresh.write_text(json.dumps(plain(summary), indent=1) + "\n", encoding="utf-8")
     os.replace(fresh, path)
@@ -96,7 +96,10 @@ def read_summary(path: Path) -> dict:
 
 
 def _extremes(summary, model) -> dict:
-    """Extremes in units of the probes; None if reached after the time from which a diverged run is invalid."""
+    """Extremes of each probe and their times, in the unit of the probe.
+
+    They are None if reached after the time from which a diverged run is invalid.
+    """
     extremes = {}
     for col in probe_columns(model):
         least, t_min, greatest, t_max = (*summary.extremes[col.name],)

@@ -11,7 +11,7 @@ from fvsolve import units
 
 @dataclass(frozen=True)
 class UnitColumn:
-    """A named quantity in its output unit; gauge pressures are relative to `ambient` [Pa]."""
+    """Column of a table: name, dimension and output unit of a quantity. ambient : zero of gauge pressures [Pa]"""
 
     name: str
     dimension: str
@@ -36,7 +36,7 @@ class UnitColumn:
         return unit.si(value) + (self.ambient if is_gauge else 0.0)
 
     def span_from_si(self, value: float) -> float:
-        """Convert a difference of two values from SI to the unit of the column, without the zero offset."""
+        """Convert a difference of two values from SI to the unit of the column, without the offset of its zero."""
         if self.plain:
             return value
         unit = units.find(self.unit, self.dimension)
@@ -44,22 +44,22 @@ class UnitColumn:
 
     @property
     def span_unit(self) -> str:
-        """Unit of a difference of two values, for example bar for values in barg."""
+        """Unit of a difference of two values of the column, for example bar for values in barg."""
         return units.span(self.unit)
 
     @property
     def plain(self) -> bool:
-        """True if the unit of the column is the SI unit: values then stay unchanged to the bit."""
+        """True if the unit of the column is the SI unit, so that values need no conversion."""
         return self.dimension == "number" or self.unit == units.DIMENSIONS[self.dimension].si
 
 
 def column(name: str, dimension: str, case, label: str = "") -> UnitColumn:
-    """Column of a quantity in the unit of `case.output.units` (default: SI); `label` is the unit of a plain number."""
+    """Column of a quantity in the unit of `case.output.units` (default: SI). label : unit of a plain number"""
     return UnitColumn(name, dimension, label or case.unit_of(dimension), case.ambient_pressure)
 
 
 def time_column(case) -> UnitColumn:
-    """Time column, the first column of history.csv."""
+    """Column of the time, the first column of history.csv."""
     return column("t", "time", case)
 
 
@@ -75,7 +75,7 @@ def split_header(header: str) -> tuple[str, str]:
 
 
 def to_column_units(columns: list[UnitColumn], values: np.ndarray) -> np.ndarray:
-    """Convert `values : float64[k, n]` from SI to the units of the columns; returns `values` itself if all are SI."""
+    """Convert values : float64[k, n] from SI to the units of n columns; returns `values` itself if all units are SI."""
     if all(column.plain for column in columns):
         return values
     return np.column_stack([column.from_si(values[:, i]) for i, column in enumerate(columns)])
