@@ -72,7 +72,7 @@ def select_curves(values: np.ndarray, probes, measured=()) -> tuple[list[DrawnPa
 
 
 def _without_doubles(lines: list[DrawnLine], values: np.ndarray, probes, measured) -> list[DrawnLine]:
-    """Curves of a panel without those that coincide with another, whose places are added to the names of that curve."""
+    """Curves of a panel without duplicates, whose places are added to the names of the remaining curve."""
     seen = np.concatenate([values[:, line.column] for line in lines])
     tolerance = SAME_TOLERANCE * np.ptp(seen[np.isfinite(seen)]) if np.isfinite(seen).any() else 0.0
     result: list[DrawnLine] = []

@@ -69,7 +69,7 @@ class PlotProcess:
             )
 
     def draw(self, pictures: Iterable[Picture]) -> dict[Path, str]:
-        """Write pictures; returns path -> error text for those that could not be drawn."""
+        """Write pictures; returns path -> error text for pictures that could not be drawn."""
         pictures = list(pictures)
         try:
             faults = {picture.path: self._draw_by_process(picture) for picture in pictures}

@@ -15,7 +15,7 @@ AIR_KEYS = ("air_fraction", "gas_exponent", "saturation_pressure", "cavitation")
 class Air:
     """Free gas in a liquid, and cavitation.
 
-    fraction : volume of free gas over that of the mixture, at 1 atm [-]; exponent : polytropic exponent of the gas [-]
+    fraction : volume of free gas over volume of the mixture, at 1 atm; exponent : polytropic exponent of the gas
     saturation_pressure : pressure at which all gas is dissolved, after a linear decrease of free gas [Pa]; infinite if
     gas does not dissolve
     cavitation : True if vapour forms at vapour pressure, which is then the lower bound of pressure

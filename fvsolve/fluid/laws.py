@@ -66,7 +66,7 @@ class Law:
 
     @classmethod
     def check(cls, name: str, given: dict[str, float]) -> None:
-        """Raise FluidError if the law does not allow the fluid `name`, or a property that replaces one of the fluid."""
+        """Raise FluidError if the law does not allow the fluid `name`, or a property given for it."""
 
     @classmethod
     def air(cls, given: dict[str, float]) -> Air | None:

@@ -50,7 +50,7 @@ class Sketch:
 def shape_faults(sketch: Sketch) -> tuple[list[Fault], np.ndarray, np.ndarray]:
     """Faults of single cells, and two arrays bool[n]: True for cells with a fault, and for clockwise cells.
 
-    Clockwise cells are those with a right turn at a corner; this holds for cells without a fault.
+    A cell without a fault is clockwise if it has a right turn at a corner.
     """
     turn, _, side = corners(sketch.points, sketch.cells)
     long = side.max(axis=1, keepdims=True)

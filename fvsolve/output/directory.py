@@ -68,7 +68,7 @@ class RunDirectory:
         return summary["ok"] and summary["versions"] == self.identity and summary["t"] >= self.model.case.numerics.end
 
     def begin(self, model, state) -> None:
-        """Open the files: new and empty ones, or those of an earlier part of the run, truncated to the checkpoint."""
+        """Open the files: new files, or the files of an earlier part of the run, truncated to the checkpoint."""
         for name in (SUMMARY_FILE, *PICTURE_FILES):
             (self.folder / name).unlink(missing_ok=True)
         clear_reports(self.folder)

@@ -18,7 +18,7 @@ LOCK_FILE = ".lock"
 def lock_folder(folder: Path, writer: str) -> FileLock:
     """Create a folder if needed and lock it; return the lock.
 
-    writer : name of the possible other user of the folder in the message, such as "a run"
+    writer : name of another user of the folder in the message, for example "a run"
     Raises RunError if another process has locked the folder, or it cannot be written.
     """
     try:

@@ -20,10 +20,7 @@ class SurfaceStart(VelocityStart):
 
 
 class FreeSurface(Physics, name="free-surface"):
-    """Basin of shallow water: h_t + div q = 0, q_t + div(q q / h + g h^2 / 2) = -g h grad(bed) - friction.
-
-    Depth h [m], flow per width q [m2/s].
-    """
+    """Depth h, flow per width q: h_t + div q = 0, q_t + div(q q / h + g h^2 / 2) = -g h grad(bed) - friction."""
 
     states: ClassVar[dict[str, str]] = {"depth": "m", "flow_x": "m2/s", "flow_y": "m2/s"}
     fields: ClassVar[dict[str, str]] = {"depth": "level", "surface": "level", "bed": "level", **VELOCITY_FIELDS}
@@ -43,19 +40,20 @@ class FreeSurface(Physics, name="free-surface"):
     ]
     bed: Annotated[
         SpatialField | None,
-        SpatialFieldKey("length", "height of the bed above the elevation [m], free surface; default 0"),
+        SpatialFieldKey("length", "height of the bed of a free surface above the elevation [m]; default 0"),
     ] = None
     manning: Annotated[
         float | None,
         Quantity(
-            "number", nonnegative, "Manning's n [s/m^(1/3)], free surface; default: no friction",
+            "number", nonnegative, "Manning's n of the bed of a free surface [s/m^(1/3)]; default: no friction",
             UsualRange(0.005, 0.5, "glass to dense brush"), VALUE,
         ),
     ] = None  # fmt: skip
     factor: Annotated[
         float | None,
         Quantity(
-            "number", nonnegative, "Darcy friction factor, instead of manning [-], free surface; default: no friction",
+            "number", nonnegative,
+            "Darcy friction factor of the bed of a free surface, instead of `manning` [-]; default: no friction",
             UsualRange(0.002, 3.0, "glass to boulders"), VALUE,
         ),
     ] = None  # fmt: skip
@@ -68,8 +66,7 @@ class FreeSurface(Physics, name="free-surface"):
     def rest(cls, basin, mean, cells, area) -> dict[str, Any]:
         """Elevation [m], depth [m] and pressure (None) of the node of a patch at rest.
 
-        The elevation is the mean height of the bed in those of `cells` that are under water, or in the lowest if all
-        are dry.
+        The elevation is the mean height of the bed in the cells under water, or in the lowest cells if all are dry.
         mean : function from a formula to its means over all cells; cells : numbers of the cells behind the patch
         area : areas of all cells [m2]
         """

@@ -147,7 +147,7 @@ def by_blocks(tables, b, g, kx, ky, reflect, plan, dh, qx, qy, through, work, y,
 def on_grid(tables, b, y, dydt, out, moves):
     """Write the rates of the cells of basin b, a grid. moves : None, or as in `surface_grid.grid_rates`
 
-    If walls move, the rates are those of depths and flows times the stretching of cells.
+    If walls move, the states are depths and flows times the area of a cell over its undeformed area.
     """
     st, plane, work, basin = tables.settings[0], tables.plane, tables.work, tables.basins[b]
     n, o, at, k, f = basin["n"], basin["y"], basin["plan"], basin["spacing"], basin["flows"]
@@ -193,7 +193,7 @@ def rates_on_grids(t, y, dydt, out, handle):
 def on_mesh(tables, b, y, dydt, out, moves):
     """Write the rates of the cells of basin b, a mesh. moves : None, or as in `surface_mesh.shallow_rates`
 
-    If walls move, the rates are those of depths and flows times the stretching of cells.
+    If walls move, the states are depths and flows times the area of a cell over its undeformed area.
     """
     st, plane, work, integers = tables.settings[0], tables.plane, tables.work, tables.integers
     basin = tables.basins[b]

@@ -3,7 +3,7 @@
 h_t + (q_x)_x + (q_y)_y = 0, q_t + div(q q / h + g h^2 / 2) = -g h grad(bed). Depth h, surface e = h + bed and
 velocities are reconstructed; both sides of a face use the higher bed (hydrostatic reconstruction, Audusse et al. 2004).
 The pressure of a cell on its faces and the force of its bed are combined in g h (rise of e). So a lake at rest stays at
-rest to the bit, with dry islands too. The flux is that of Harten, Lax and van Leer with the contact wave (HLLC, Toro
+rest to the bit, with dry islands too. The flux is the HLLC flux (Harten, Lax and van Leer, with contact wave, Toro
 2001): tangential momentum is carried with the mass. The bounds of wave speeds are those of the cells on either side,
 which bound limited values too, so that no depth falls below zero.
 
@@ -130,7 +130,7 @@ def close_walls(g, speed, rest, side, f, thrust):
     """Set the mass flow through a row of boundary faces of moving walls to zero, and write the thrust on them.
 
     speed : speed of the faces [m/s]; rest : depths at rest of the cells; side : depths at the faces; f : fluxes
-    thrust : thrust minus that of the depth at rest, over density and length [m3/s2]
+    thrust : thrust minus the thrust of the depth at rest, over density and length [m3/s2]
     """
     for i in range(thrust.size):
         if speed != 0.0:

@@ -1,8 +1,8 @@
 """Shallow water on a mesh of any cells: rates of depth and flow.
 
-The scheme is that of the grid (`surface_grid`), with least-squares gradients and a common limiter for all sides of a
-cell. Pressures at sides are relative to the pressure in the cell, and the force of the bed is relative to the surface
-of the cell. So every term is zero where the surface is level: a lake at rest stays at rest, with dry islands too.
+The scheme is the same as on a grid (`surface_grid`), but with least-squares gradients and a common limiter for all
+sides of a cell. Pressures at sides are relative to the pressure in the cell, and the force of the bed to
+the surface of the cell. So every term is zero where the surface is level: a lake at rest stays at rest, with dry islands too.
 """
 
 from math import sqrt
@@ -94,7 +94,7 @@ def add_side_fluxes(g, h0, e0, c0, hl, el, ul, vl, geo, w, speeds):
     """Subtract the outflow through one side of each cell of a block (HLLC flux) from the rates in `w`.
 
     h0, e0, c0 : depth, surface and wave speed of the cells; hl, el, ul, vl : depth, surface and velocities at the side
-    from inside; `w` contains those from beyond; geo : geometry of the side
+    from inside; `w` contains the values from beyond; geo : geometry of the side
     speeds : None, or speeds of moving sides along their outward normals [m/s]; the flux is then relative to the side
     """
     half = 0.5 * g

@@ -3,7 +3,7 @@
 Quantities of a row of cells are stored as rows of one array at the constant distance STRIDE, so that the compiler knows
 that they do not overlap. Cells have depth, surface, both velocities, wave speed and unit flows. Sides have the first
 five quantities at the faces before and after a cell, and depth times the rise of the surface across the cell [m2].
-Fluxes are those of depth, of normal momentum minus the pressure on the side before and on the side after, and of
+There are fluxes of depth, of normal momentum minus the pressure on the side before and on the side after, and of
 tangential momentum.
 """
 
@@ -31,7 +31,8 @@ def put_cells(g, depth0, surface0, dh, qx, qy, kx, ky, factors, cells, top):
     Velocity is q / h, replaced by 2 h q / (h^2 + THIN^2) at depths h below THIN.
     depth0, surface0 : depth and surface at rest [m]; dh, qx, qy : deviation of depth [m], unit flows [m2/s]
     kx, ky : 1 / widths of the columns, 1 / height of the row [1/m]
-    factors : None, or (wide, narrow) of stretching cells; dh, qx and qy are then contents, see `basins.cell_stretching`
+    factors : None, or (wide, narrow) of stretching cells, see `basins.cell_stretching`; dh, qx and qy then refer to
+    undeformed areas
     top : float64[n]  greatest rate (|u| + c) kx + (|v| + c) ky of each column so far [1/s]
     """
     for i in range(dh.size):
@@ -184,9 +185,9 @@ def put_fluxes(g, n, normal, along, left, right, l, r, f, moves):
 def put_rates(g, kx, ky, push_x, push_y, x, south, north, wide, dh, dx, dy):
     """Write the rates of a row of cells: inflow minus outflow, and the force of pressure and bed.
 
-    x, south, north : fluxes through the faces along the row, and through those before and after it
+    x, south, north : fluxes through the faces along the row, and through the faces before and after the row
     push_x, push_y : depth times rise of the surface across the cells [m2]; dh, dx, dy : rates of depth and unit flows
-    wide : None, or area over undeformed area for rates of contents, see `basins.cell_stretching`
+    wide : None, or area over undeformed area of cells, if rates refer to the undeformed area
     """
     for i in range(dh.size):
         along, across = kx[i], ky

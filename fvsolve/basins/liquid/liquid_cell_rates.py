@@ -43,7 +43,7 @@ def states_of(tables, basin, y):
 
 @njit(forceinline=True)
 def rates_of(tables, basin, dydt):
-    """Arrays for the rates of the three states of cells; work arrays whose content is not used if `dydt` is empty.
+    """Arrays for the rates of the three states of cells; work arrays, read by no other function, if `dydt` is empty.
 
     If walls move, the states are masses and momenta per undeformed area, see `basins.cell_stretching`.
     """
@@ -110,7 +110,7 @@ def by_blocks(tables, b, kx, ky, reflect, r, mx, my, through, work, y, rate_r, r
 def linear_grid_rates(tables, b, y, dydt, out, moves, raised):
     """Write the rates of basin b, a grid, under law linear.
 
-    moves : as in `grid_linear.grid_rates`; raised : None, or deviations of density that replace those in y
+    moves : as in `grid_linear.grid_rates`; raised : None, or deviations of density to use instead of the state y
     """
     basin = tables.basins[b]
     kx, ky = spacing_of(tables.plane, basin)
@@ -171,7 +171,7 @@ def mesh_rates(tables, b, table, y, dydt, out, moves, raised, phi):
     """Write the rates of basin b on a mesh of any cells.
 
     table : table of `riemann_invariants`, or None for laws linear and log; moves, phi : as in `liquid_rates`
-    raised : None, or deviations of density that replace those in y
+    raised : None, or deviations of density to use instead of the state y
     """
     basin = tables.basins[b]
     (r, mx, my), (rate_r, rate_x, rate_y) = states_of(tables, basin, y), rates_of(tables, basin, dydt)

@@ -1,6 +1,6 @@
 """Pressure waves of a liquid on a mesh of any cells, under all density laws.
 
-States, waves and their fluxes are those of a grid (`grid_linear` and `grid_nonlinear`): across a side the wave
+States, waves and fluxes are as on a grid (`grid_linear` and `grid_nonlinear`): across a side the wave
 (w + u) / 2 comes from inside the cell and (w - u) / 2 from the cell beyond. Under `linear` w = c r and u = m; under
 `log` u = m / rho and w = 2 (c0 - c); under `table` w is read from a table.
 """
@@ -69,7 +69,7 @@ def put_primitives(law, c0, rho, table, r, mx, my, w, u, v, c):
 def put_ghosts(law, c0, rho, table, edges, ring, nx, ny, number, reflect, w, u, v, shown_w, shown_u, shown_v, moves):
     """Write the values beyond boundary sides, from which gradients in cells are computed.
 
-    They are mirror images at reflection coefficients 1 and -1, and equal to those of the cell at 0 (open).
+    They are mirror images at reflection coefficients 1 and -1, and the values of the cell at 0 (open).
     edges : boundary sides; nx, ny : outward normals; number : numbers of the boundary faces; reflect : their reflection
     coefficients; w, u, v : values of cells; shown_w, shown_u, shown_v : values beyond; moves : as in `liquid_rates`
     """

@@ -18,7 +18,7 @@ class LiquidStart(VelocityStart):
 
 
 class Liquid(Physics, name="liquid"):
-    """Basin of a liquid: r_t + div m = 0, m_t + div(m m / r) + grad p(r) = 0; density r, mass-flow density m."""
+    """Density r, mass-flow density m, pressure p: r_t + div m = 0, m_t + div(m m / r) + grad p(r) = 0."""
 
     states: ClassVar[dict[str, str]] = {"density": "kg/m3", "flow_x": "kg/(m2 s)", "flow_y": "kg/(m2 s)"}
     fields: ClassVar[dict[str, str]] = {"pressure": "pressure", **VELOCITY_FIELDS}

@@ -139,7 +139,7 @@ def constant_along_walls(mesh: Mesh, stream: np.ndarray) -> np.ndarray:
 
 
 def is_outer_loop(mesh: Mesh) -> np.ndarray:
-    """True for outline faces of the outer loop, False for those around holes : bool[outline faces]."""
+    """True for faces of the outer outline, False for outline faces around holes : bool[outline faces]."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

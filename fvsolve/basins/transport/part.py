@@ -90,10 +90,7 @@ class VelocityValue(Value):
 
 
 class Transport(Physics, name="transport"):
-    """Basin with scalars phi in a given velocity w: (d phi)_t + div(d w phi) = div(d D grad phi).
-
-    Depth d [m], diffusivity D [m2/s].
-    """
+    """Scalars phi in a given velocity w, depth d: (d phi)_t + div(d w phi) = div(d D grad phi), diffusivity D."""
 
     joined: ClassVar[bool] = False
 
