@@ -1,8 +1,8 @@
 """Shallow water on a mesh of any cells: rates of depth and flow.
 
 The scheme is the same as on a grid (`surface_grid`), but with least-squares gradients and a common limiter for all
-sides of a cell. Pressures at sides are relative to the pressure in the cell, and the force of the bed to
-the surface of the cell. So every term is zero where the surface is level: a lake at rest stays at rest, with dry islands too.
+sides of a cell. Pressures at sides are relative to the pressure in the cell, and the force of the bed to the surface
+of the cell. So every term is zero where the surface is level: a lake at rest stays at rest, with dry islands too.
 """
 
 from math import sqrt

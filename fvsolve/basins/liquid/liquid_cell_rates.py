@@ -24,13 +24,13 @@ OWN_CODE = physics_code(__package__)
 
 @njit(forceinline=True)
 def on_grid(basin):
-    """True for a rectangle of liquid without moving walls that is not on a body."""
+    """True for a basin of liquid on a rectangular grid, without moving walls and not on a body."""
     return basin["kind"] == OWN_CODE and basin["nx"] > 0 and basin["walls"] == 0 and basin["frame"] < 0
 
 
 @njit(forceinline=True)
 def on_mesh(basin):
-    """True for a liquid on any other mesh without moving walls that is not on a body."""
+    """True for a basin of liquid on a mesh other than a rectangular grid, without moving walls and not on a body."""
     return basin["kind"] == OWN_CODE and basin["nx"] == 0 and basin["walls"] == 0 and basin["frame"] < 0
 
 

@@ -16,13 +16,13 @@ def is_moving(basin):
 
 @njit(forceinline=True)
 def on_grid(basin):
-    """True for a liquid between moving walls on a rectangle."""
+    """True for a basin of liquid between moving walls on a rectangular grid."""
     return is_moving(basin) and basin["nx"] > 0
 
 
 @njit(forceinline=True)
 def on_mesh(basin):
-    """True for a liquid between moving walls on any other mesh."""
+    """True for a basin of liquid between moving walls on a mesh other than a rectangular grid."""
     return is_moving(basin) and basin["nx"] == 0
 
 

@@ -24,13 +24,13 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit(forceinline=True)
 def on_grid(basin):
-    """True for a rectangle of liquid on a body."""
+    """True for a basin of liquid on a body, with a rectangular grid."""
     return basin["kind"] == OWN_CODE and basin["nx"] > 0 and basin["frame"] >= 0
 
 
 @njit(forceinline=True)
 def on_mesh(basin):
-    """True for a liquid on any other mesh on a body."""
+    """True for a basin of liquid on a body, with a mesh other than a rectangular grid."""
     return basin["kind"] == OWN_CODE and basin["nx"] == 0 and basin["frame"] >= 0
 
 

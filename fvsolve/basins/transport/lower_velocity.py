@@ -171,7 +171,7 @@ def _by_file(mesh: Mesh, file: str | Path) -> np.ndarray:
 
 
 def _columns(path: Path) -> dict[str, np.ndarray]:
-    """Columns of a CSV file by name."""
+    """Columns of a CSV file of velocities or of a stream function : name -> float64[rows] in SI."""
     try:
         rows = read_rows(path)
         if set(rows.names) not in map(set, COLUMNS) or len(rows.names) not in map(len, COLUMNS):
