@@ -104,7 +104,7 @@ class Chart(Displayable):
     told: tuple[str, ...] = field(default=())
     left_out: tuple[str, ...] = field(default=())
 
-    picture = "fvsolve.studies.accuracy.chart_files:figure"
+    picture = "fvsolve.studies.accuracy.chart_files:chart_picture"
 
     def summary_line(self) -> str:
         return f"of {self.case!r}: {len(self.points)} points, {len(self.failed)} failed; default {self.default}"
