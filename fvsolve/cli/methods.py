@@ -1,4 +1,4 @@
-"""Output of `fvsolve methods`: table of all methods, or the tableau and properties of one method."""
+"""MethodOutput of `fvsolve methods`: table of all methods, or the tableau and properties of one method."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ MAX_COEFFICIENT = 40  # greatest length of a coefficient of R that is printed ex
 
 
 @dataclass(frozen=True)
-class Output:
-    """Output in two forms: plain values for JSON, and a function that prints text."""
+class MethodOutput:
+    """MethodOutput in two forms: plain values for JSON, and a function that prints text."""
 
     plain: dict
     show: Callable[[], None]
 
 
-def table_output() -> Output:
+def table_output() -> MethodOutput:
     """Table of all methods, explicit methods first."""
     all_facts = {name: analyse(method) for name, method in METHODS.items()}
-    return Output({name: facts.plain() for name, facts in all_facts.items()}, lambda: _table(all_facts))
+    return MethodOutput({name: facts.plain() for name, facts in all_facts.items()}, lambda: _table(all_facts))
 
 
-def method_output(name: str, out: Path | None) -> Output:
+def method_output(name: str, out: Path | None) -> MethodOutput:
     """Tableau, stability function R(s) and properties of a method; writes a picture of its stability region."""
     from fvsolve.draw.region_picture import region_figure
 
@@ -47,7 +47,7 @@ def method_output(name: str, out: Path | None) -> Output:
     path.parent.mkdir(parents=True, exist_ok=True)
     region_figure(facts.stability_function, f"{method.name}: |R(hλ)| ≤ 1").savefig(path)
     array = {"a": method.a, "b": method.b, "c": method.c, "error": method.error, "start_error": method.start_error}
-    return Output(facts.plain() | array | {"picture": str(path)}, lambda: _show(method, facts, path))
+    return MethodOutput(facts.plain() | array | {"picture": str(path)}, lambda: _show(method, facts, path))
 
 
 def _table(all_facts: dict[str, Facts]) -> None:

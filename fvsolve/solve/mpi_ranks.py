@@ -15,7 +15,7 @@ import numpy as np
 
 from fvsolve.kernels import band_exchange
 from fvsolve.solve.partition import Partition
-from fvsolve.solve.thread_team import COPIED, WRITTEN, Worker, band_functions, postponed_interrupts, yield_address
+from fvsolve.solve.thread_team import COPIED, WRITTEN, BandWorker, band_functions, postponed_interrupts, yield_address
 from fvsolve.steppers import loop_indices
 
 CALLBACK = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
@@ -58,7 +58,7 @@ class MpiRanks:
         self.callback_object = CALLBACK(self.exchange)  # kept as long as compiled code has its address
         self.callback, self.yield_address = ctypes.cast(self.callback_object, ctypes.c_void_p).value, yield_address()
         self.board = self.buffer = np.zeros(0)
-        self.member = Worker(self, comm.rank, loop.run_data, loop.stepper)
+        self.member = BandWorker(self, comm.rank, loop.run_data, loop.stepper)
         ranks = range(comm.size)
         self.exchanges = Exchange(comm, [cut.states(k) for k in ranks]), Exchange(comm, [cut.flows(k) for k in ranks])
         self.others = np.ones(cut.sum_count, dtype=bool)

@@ -51,8 +51,8 @@ def yield_address() -> int:
     return ctypes.cast(getattr(library, name), ctypes.c_void_p).value
 
 
-class Worker:
-    """Worker of a band: its arrays, and the handle through which compiled code reads them.
+class BandWorker:
+    """BandWorker of a band: its arrays, and the handle through which compiled code reads them.
 
     team : a `ThreadTeam` or `MpiRanks`, with the addresses and arrays for the exchange in `kernels.joint`
     """
@@ -163,9 +163,9 @@ class ThreadTeam:
         self.functions, self.join = band_functions(cut)
         self.board = aligned_zeros(band_exchange.LINE * cut.count)
         self.buffer = aligned_zeros(2 * cut.sum_count)
-        self.members = [Worker(self, 0, loop.run_data, loop.stepper)]
+        self.members = [BandWorker(self, 0, loop.run_data, loop.stepper)]
         self.members += [
-            Worker(self, k, RunData(loop.model), copy_integrator(loop.stepper)) for k in range(1, cut.count)
+            BandWorker(self, k, RunData(loop.model), copy_integrator(loop.stepper)) for k in range(1, cut.count)
         ]
         self.stale = True  # True where the workers do not have the present rows of the loop
         self.requests = [SimpleQueue() for _ in self.members]
@@ -175,7 +175,7 @@ class ThreadTeam:
         for thread in self.threads:
             thread.start()
 
-    def serve(self, member: Worker, requests: SimpleQueue) -> None:
+    def serve(self, member: BandWorker, requests: SimpleQueue) -> None:
         """Serve the requests of a thread: run the time loop for each, until the request is None."""
         while (task := requests.get()) is not None:
             start = time.thread_time()

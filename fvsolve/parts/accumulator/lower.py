@@ -175,7 +175,7 @@ class CompressorRows(ShapedRows, kind=""):
         """n p V / 2 (da / (1 + a) + dy / (rho V))^2 of the gas, g / (2 rho surface) dy^2 of the weight of the fluid."""
         st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
         at, mass, a, rho = int(row["data"]), int(node["y"]), float(y[row["y"]]), model.case.properties.density
-        u, change, _, _ = self.law.base_states(st, floats, node, at, float(y[mass]), a)
+        u, change, _, _ = self.law.vessel_state(st, floats, node, at, float(y[mass]), a)
         gas, p = floats[at + law.GAS_VOLUME] * math.exp(u), floats[at + self.law.GAS_PRESSURE] + change
         root = math.sqrt(0.5 * part.exponent * p * gas)
         total = super().energy_rows(model, part, row, y, out)[0][mass]
