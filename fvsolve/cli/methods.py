@@ -1,4 +1,4 @@
-"""MethodOutput of `fvsolve methods`: table of all methods, or the tableau and properties of one method."""
+"""Output of `fvsolve methods`: table of all methods, or the tableau and properties of one method."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MAX_COEFFICIENT = 40  # greatest length of a coefficient of R that is printed ex
 
 @dataclass(frozen=True)
 class MethodOutput:
-    """MethodOutput in two forms: plain values for JSON, and a function that prints text."""
+    """Output in two forms: plain values for JSON, and a function that prints text."""
 
     plain: dict
     show: Callable[[], None]
