@@ -509,9 +509,9 @@ def _preferred_folder() -> Path:
     if stated := os.environ.get("FVSOLVE_CACHE"):
         return Path(stated).expanduser().absolute()
     if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.package() / "AppData" / "Local") / "fvsolve" / "cache"
+        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "fvsolve" / "cache"
     if sys.platform == "darwin":
-        return Path.package() / "Library" / "Caches" / "fvsolve"
+        return Path.home() / "Library" / "Caches" / "fvsolve"
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fvsolve"
 
 
