@@ -58,8 +58,8 @@ def test_nothing_is_fetched_nothing_complains_and_the_head_line_plays(report, ch
         assert page.locator(f"{id} .scatterlayer path.js-line").count() >= 1
     names = legend(page, "#section-0").all_text_contents()
     assert {"maximum head", "minimum head", "initial head", "pipe", "vapour line", "head now"} <= set(names)
-    assert f"{HIGH}, greatest" in names
-    beyond = f"{HIGH}, greatest: from 5000 m"
+    assert f"{HIGH}, maximum" in names
+    beyond = f"{HIGH}, maximum: from 5000 m"
     assert set(page.locator("#section-0 .annotation-text").all_text_contents()) == {"top", "valve", beyond}
     legend(page, "#section-0").get_by_text("vapour line").click()
     assert page.evaluate("document.querySelector('#section-0').data.map(one => one.visible)").count("legendonly") == 1
