@@ -1,4 +1,4 @@
-"""Runs of a model: from a model and a state to a summary, with rows and frames written to a sink."""
+"""Runs of a model from an initial state: rows and frames of results go to an output sink; a summary is returned."""
 
 from fvsolve.solve.advance import advance
 from fvsolve.solve.run_summary import Mark, Summary

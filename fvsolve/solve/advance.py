@@ -19,16 +19,16 @@ from fvsolve.units import show
 
 
 def advance(model: Model, state: State, until: float, inputs: dict[str, float] | None = None) -> State:
-    """Advance `state` to the time `until` [s], with named schedules held at constant values.
+    """Advance `state` to the time `until` [s], with named inputs held at constant values; returns the new state.
 
-    inputs : {"valve.opening": 0.3, "spool.position": -0.1, "lake.head": 12.0, "gate.demand": 0.1}, SI
-    Raises FvsolveError for an unknown input or a value out of range, a time before that of the state, and a run that
-    cannot continue.
+    inputs : SI values, such as {"valve.opening": 0.3, "spool.position": -0.1, "lake.head": 12.0, "gate.demand": 0.1}
+    Raises FvsolveError for an unknown input or a value out of range, a time before the time of the state, and a run
+    that cannot continue.
     """
     if not isinstance(model, Model) or not isinstance(state, State):
         raise FvsolveError(f"advance takes a Model and a State, not {type(model).__name__} and {type(state).__name__}")
     if inputs is not None and not isinstance(inputs, Mapping):
-        raise FvsolveError(f"inputs = {show(inputs)} is not a table. Expected a number for each name")
+        raise FvsolveError(f"inputs = {show(inputs)} is not a dict. Expected a number for each name of an input")
     if isinstance(until, bool) or not isinstance(until, Real):
         raise FvsolveError(f"until = {show(until)} is not a time. Expected a finite number of seconds")
     if not math.isfinite(until):
@@ -65,7 +65,7 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
 
 
 def hold(model: Model, inputs: dict[str, float]) -> Model:
-    """Copy of a model with some schedules held at constant values."""
+    """Copy of a model with some inputs held at constant values: name of the input -> SI value."""
     if not inputs:
         return model
     tables = model.tables
@@ -99,7 +99,7 @@ def hold(model: Model, inputs: dict[str, float]) -> Model:
 
 
 def checked(name: str, value: float, target: Input) -> float:
-    """Value of an input [SI]; raises FvsolveError where it is not a number or not possible for the part."""
+    """Value of an input as a float; raises FvsolveError if it is not a number or out of the range of the input."""
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.item()
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real):

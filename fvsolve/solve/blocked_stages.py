@@ -1,4 +1,4 @@
-"""Stage sums in cache blocks: sums that the rates of a model form, and sums that steps form themselves."""
+"""Division of the stage sums of a Runge-Kutta step into blocks of basin rows that fit into the processor cache."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ LEAST_STATES = 2**17  # least number of states of a basin: smaller basins stay i
 
 
 def blocked_sums(cut: Partition, k: int) -> np.ndarray:
-    """Table `sums` of band k, see `kernels.sums`; empty if no stages are formed in blocks : int64[...]."""
+    """Table `sums` of `kernels.stage_sums` for band k : int64[n]; empty if no basin is large enough for blocks."""
     model = cut.model
     blocked_basins = [
         b
@@ -40,14 +40,17 @@ def blocked_sums(cut: Partition, k: int) -> np.ndarray:
 
 
 def rows_at(model, b: int, q: int, first: int, stop: int) -> tuple[int, int]:
-    """(first, one beyond the last) state of rows of a quantity of a basin."""
+    """First state and last state + 1 of the rows from `first` to `stop` - 1 of quantity q of basin b."""
     basin = model.tables.basins[b]
     at, nx = int(basin["y"] + q * basin["n"]), int(basin["nx"])
     return at + nx * first, at + nx * stop
 
 
 def cells_at(model, b: int, q: int, first: int, stop: int) -> list[tuple[int, int]]:
-    """Runs of states, within these rows, of cells that all bands read."""
+    """Ranges (first, last + 1) of states of cells that all bands read, within the rows from `first` to `stop` - 1.
+
+    b : number of the basin; q : number of the quantity
+    """
     begin, end = rows_at(model, b, q, first, stop)
     at = begin - int(model.tables.basins[b]["nx"]) * first
     cells = at + np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *common_cells(model, b)]))

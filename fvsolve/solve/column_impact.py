@@ -1,4 +1,4 @@
-"""Collision and separation of rigid columns at nodes without other flow: pressure impulses, admission of air."""
+"""Collision and separation of rigid water columns at nodes without other flow: pressure impulses, admission of air."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ ROUNDING = 1e-9  # relative to a small flow: columns that separate more slowly s
 
 
 def shut_places(model: Model, out: np.ndarray) -> list[int]:
-    """Nodes that join rigid columns and otherwise only shut valves."""
+    """Numbers of the nodes that join only rigid columns and shut valves."""
     places, nodes, at = [], model.tables.nodes, model.layout["conductance"]
     for i in np.flatnonzero(nodes["gates"] >= 0):
         if not out[at + gates_of(model, i)].any():
@@ -20,13 +20,13 @@ def shut_places(model: Model, out: np.ndarray) -> list[int]:
 
 
 def gates_of(model: Model, i: int) -> np.ndarray:
-    """Valves at such a node."""
+    """Numbers of the valves at node i, a junction of rigid columns and valves."""
     row = model.tables.nodes[i]
     return model.tables.integers[row["gates"] : row["gates"] + row["gate_count"]]
 
 
 def air_valve_of(model: Model, i: int) -> int | None:
-    """Number of the first event function, opening, of the air valve at a node; None without an air valve."""
+    """Number of the opening event of the air valve at node i; None without an air valve."""
     valves, devices = model.tables.valves, model.tables.devices
     for device in valves["device"][gates_of(model, i)]:
         if device >= 0 and devices[device]["row"] >= 0:
@@ -35,7 +35,10 @@ def air_valve_of(model: Model, i: int) -> int | None:
 
 
 def flow_before(run_data: RunData, t: float, y: np.ndarray) -> np.ndarray:
-    """Flow of the columns just before t, less the flow of the profile [kg/s]; at the start, their states."""
+    """Mass flow of each rigid column just before t, minus its initial steady flow : float64[columns] [kg/s].
+
+    At the start time of the run it is the state of each column.
+    """
     model = run_data.model
     before, columns = model.new_out(), model.tables.columns
     if t <= model.case.numerics.start:
@@ -47,11 +50,12 @@ def flow_before(run_data: RunData, t: float, y: np.ndarray) -> np.ndarray:
 
 
 def impact_impulses(model: Model, carried: np.ndarray, out: np.ndarray, places: list[int]) -> np.ndarray:
-    """Flow [kg/s] that a pressure impulse J stops at each node; negative where columns separate.
+    """Mass flow that the pressure impulse J [Pa s] at each node stops [kg/s]; negative where columns separate.
 
-    sum of A / L (J - J_far) = sum of the inflows of the columns: momentum is conserved. Columns that are controlled by
-    their valves keep their flow.
-    carried : float64[columns]  result of `flow_before`
+    J follows from the momentum: at each node, the sum over its columns of A / L (J - J_far) is the sum of their
+    inflows, with area A [m2] and length L [m] of a column and the impulse J_far at its far end. Columns whose flow a
+    valve controls keep their flow. The result is J times the sum of A / L.
+    carried : float64[columns]  result of `flow_before`; places : nodes from `shut_places`
     """
     sums = np.array([model.tables.nodes["inflow"][i] - gate_inflow(model.tables, i) for i in places])
     matrix = np.zeros((len(places), len(places)))
@@ -71,7 +75,7 @@ def impact_impulses(model: Model, carried: np.ndarray, out: np.ndarray, places: 
 
 
 def separate(run_data: RunData, t: float, y: np.ndarray, out: np.ndarray) -> int | None:
-    """Opening event of the air valve where columns separate fastest; None where no columns separate."""
+    """Number of the opening event of the air valve where columns separate fastest; None if no columns separate."""
     model = run_data.model
     places = shut_places(model, out)
     events = [air_valve_of(model, i) for i in places]

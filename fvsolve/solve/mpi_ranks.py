@@ -1,7 +1,7 @@
 """MPI processes that step bands of a state in parallel.
 
-Rank 0 runs the case; the other ranks follow. Each receives what Python may have changed on rank 0, runs the time loop
-together with rank 0, and sends its rows afterwards. So decisions by clock or signal are made only on rank 0.
+Rank 0 runs the case; the other ranks follow. Each rank receives the data that Python may have changed on rank 0, runs
+the time loop together with rank 0, and then sends the rows of its band. So only rank 0 decides by clock or signal.
 """
 
 from __future__ import annotations
@@ -24,7 +24,10 @@ CLOSE_MESSAGE = CLOSE, None
 
 
 class Exchange:
-    """Exchange of array entries between ranks, with buffers for them."""
+    """Exchange of array entries between ranks, with receive buffers.
+
+    runs : for each rank int64[r, 3], the ranges that it reads, (rank that sends them, first, last + 1)
+    """
 
     def __init__(self, comm, runs: list[np.ndarray]) -> None:
         me, self.comm = comm.rank, comm
@@ -44,13 +47,13 @@ class Exchange:
 
 
 def places(runs: np.ndarray, owner: int) -> np.ndarray:
-    """All places in the runs of an owner : int64[n]."""
+    """All indices in the ranges of `runs` that belong to the rank `owner` : int64[n]."""
     mine = runs[runs[:, 0] == owner]
     return np.concatenate([np.zeros(0, dtype=np.int64), *(np.arange(begin, stop) for _, begin, stop in mine)])
 
 
 class MpiRanks:
-    """Bands of all ranks, on a single rank: the loop of rank 0 calls, the other ranks `serve`."""
+    """Member of a group of MPI ranks that step bands: rank 0 uses its method `call`, the other ranks `serve`."""
 
     def __init__(self, loop, cut: Partition, comm) -> None:
         self.loop, self.cut, self.comm, self.seconds = loop, cut, comm, 0.0
@@ -70,7 +73,11 @@ class MpiRanks:
         self.stale = True
 
     def exchange(self, request: int, address: int, size: int) -> None:
-        """Exchange values of the given kind within a step; compiled code on all ranks must call it."""
+        """Exchange values between all ranks within a step; the compiled code of every rank calls it.
+
+        request : kind of values, a code of `kernels.band_exchange`: states, flows, greatest rate or sums
+        address, size : memory address and number of the float64 values, which are replaced
+        """
         try:
             values = np.ctypeslib.as_array((ctypes.c_double * size).from_address(address))
             if request in (band_exchange.SEND_STATES, band_exchange.SEND_FLOWS):
@@ -87,13 +94,16 @@ class MpiRanks:
             self.comm.Abort(1)
 
     def greatest(self, rate: float) -> float:
-        """Greatest rate of all ranks; infinite if a rank has NaN."""
+        """Greatest of the values `rate` of all ranks [1/s]; infinity if a rank has NaN."""
         from mpi4py import MPI
 
         return self.comm.allreduce(math.inf if math.isnan(rate) else float(rate), MPI.MAX)
 
     def call(self, functions: tuple, where: int) -> int:
-        """Run the time loop on all ranks; returns a code of `steppers.slots`."""
+        """Run the time loop on all ranks; returns a code of `steppers.loop_indices`.
+
+        functions, where : compiled functions, and index of the first ledger rate, from `RunLoop.functions`
+        """
         loop = self.loop
         now = loop.progress[loop_indices.NOW]
         runs = [(0, loop.model.y_size)] if self.stale else self.cut.common_states()
@@ -111,7 +121,7 @@ class MpiRanks:
         return code
 
     def gather(self, name: str, at) -> None:
-        """Send the rows of all ranks to rank 0."""
+        """Send to rank 0 the entries of the bands of all ranks in row `at` of the integrator's array `name`."""
         values = getattr(self.loop.stepper, name)[at]
         if self.comm.rank > 0:
             for rows in self.rows[self.comm.rank]:
@@ -122,7 +132,7 @@ class MpiRanks:
                 self.comm.Recv(values[rows], k)
 
     def gather_states(self, at: int) -> None:
-        """Send row `at` of the states of all ranks to rank 0."""
+        """Send to rank 0 the bands of all ranks of the stored state number `at`."""
         with postponed_interrupts():
             self.comm.bcast((SEND_STATES, int(at)))
             self.gather("y", at)
@@ -133,7 +143,7 @@ class MpiRanks:
             self.comm.bcast(CLOSE_MESSAGE)
 
     def serve(self, functions: tuple, where: int) -> None:
-        """Execute the requests of rank 0 until it ends the run."""
+        """Execute the requests of rank 0 until it ends the run; arguments as in `call`."""
         stepper = self.loop.stepper
         while True:
             request, argument = self.comm.bcast(None)

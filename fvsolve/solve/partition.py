@@ -20,10 +20,11 @@ from fvsolve.steppers.tableau import method_named
 
 @dataclass(frozen=True)
 class Partition:
-    """Basins of a model divided into `many` bands.
+    """Basins of a model divided into bands of rows.
 
+    count : number of bands
     basins : numbers of the divided basins
-    firsts : int64[basins, many + 1]  first row of each band, then the number of rows
+    firsts : int64[basins, count + 1]  for each divided basin the first row of each band, then the number of rows
     """
 
     model: Model
@@ -33,12 +34,12 @@ class Partition:
 
     @property
     def sum_count(self) -> int:
-        """Number of partial sums of all bands together."""
+        """Number of partial sums of all bands: one for each range of common states and each row of each quantity."""
         rows = self.model.tables.basins["ny"][[*self.basins]] * [quantities(self.model, b) for b in self.basins]
         return len(self.common_states()) + int(sum(rows))
 
     def common_states(self) -> list[tuple[int, int]]:
-        """(first, one beyond the last) of each run of states that all bands step."""
+        """Ranges (first, last + 1) of the states that every band steps."""
         runs, start = [], 0
         for b in sorted(self.basins, key=lambda b: self.model.tables.basins[b]["y"]):
             row = self.model.tables.basins[b]
@@ -48,7 +49,10 @@ class Partition:
         return [run for run in runs if run[1] > run[0]] or [(0, 0)]
 
     def row_blocks(self, k: int) -> np.ndarray:
-        """Table `row_blocks` of `steppers.step` for band k, states that all bands step first : int64[q, 4]."""
+        """Blocks of states that band k steps : int64[q, 4]; blocks that every band steps come first.
+
+        Each row: first state, last state + 1, number of the first partial sum, number of partial sums.
+        """
         alike = self.common_states()
         blocks, first = [(*run, m, 1) for m, run in enumerate(alike)], len(alike)
         for rows, b in zip(self.firsts, self.basins, strict=True):
@@ -61,7 +65,7 @@ class Partition:
         return np.array(blocks, dtype=np.int64)
 
     def bands(self, k: int) -> np.ndarray:
-        """(first, one beyond the last) row of every basin in band k, flat : int64[2 basins]."""
+        """First row and last row + 1 of band k in each basin : int64[2 basins]; an undivided basin has all its rows."""
         table = self.model.tables.basins
         rows_of = np.zeros((len(table), 2), dtype=np.int64)
         rows_of[:, 1] = np.where(table["nx"] > 0, table["ny"], table["n"])
@@ -70,7 +74,7 @@ class Partition:
         return rows_of.ravel()
 
     def states(self, k: int) -> np.ndarray:
-        """Runs of states that band k reads from other bands, (owner, first, one beyond the last) : int64[r, 3]."""
+        """Ranges of states that band k reads from other bands : int64[r, 3], (other band, first, last + 1)."""
         parts = []
         for rows, b in zip(self.firsts, self.basins, strict=True):
             basin = self.model.tables.basins[b]
@@ -82,7 +86,10 @@ class Partition:
         return np.concatenate(parts)
 
     def flows(self, k: int) -> np.ndarray:
-        """Runs of flows through open boundaries, in `work`, that band k reads from other bands : int64[r, 3]."""
+        """Ranges of flows through open boundaries that band k reads from other bands : int64[r, 3].
+
+        Each row: other band, first and last + 1 index in the array `work`.
+        """
         parts = [np.zeros((0, 3), dtype=np.int64)]
         for rows, b in zip(self.firsts, self.basins, strict=True):
             basin = self.model.tables.basins[b]
@@ -116,13 +123,20 @@ def common_cells(model: Model, b: int):
 
 
 def runs(cells: np.ndarray, nx: int, rows: np.ndarray, k: int, at: int) -> np.ndarray:
-    """Runs of cells outside band k, with their owners, as `joined`; at : state of cell 0."""
+    """Ranges of states of the cells outside band k : int64[r, 3], as `merged_runs` returns them.
+
+    cells : numbers of cells of a basin; nx : cells in a row; rows : first row of each band; at : state of cell 0
+    """
     cells = np.unique(cells)
     return merged_runs(cells, np.searchsorted(rows, cells // nx, "right") - 1, k, at)
 
 
 def merged_runs(places: np.ndarray, owner: np.ndarray, k: int, at: int) -> np.ndarray:
-    """Runs of adjacent places of the same owner, except owner k : int64[r, 3] (owner, first, one beyond the last)."""
+    """Ranges of adjacent indices in `places` with the same owner, without owner k : int64[r, 3].
+
+    owner : number of the band that computes each entry of `places`; at : offset added to the indices
+    Each row: owner, first index, last index + 1.
+    """
     places, owner = places[owner != k], owner[owner != k]
     if not places.size:
         return np.zeros((0, 3), dtype=np.int64)
@@ -154,7 +168,11 @@ def undivided_basins(model: Model) -> str:
 
 
 def divisible_rows(model: Model) -> dict:
-    """Divisible rows of basins, undivided basins with reasons, greatest number of threads; for `check`."""
+    """Data of the command `check` on threads, as a dict.
+
+    rows : rows of each divisible basin; whole : reason for each undivided basin; most : greatest number of threads
+    why : reason why only one thread is possible, or ""
+    """
     reason = single_thread_reason(model)
     rows = {} if reason else {basin.name: int(basin.row["ny"]) for basin in model.basins if not basin.undivided_reason}
     undivided = {basin.name: basin.undivided_reason for basin in model.basins if basin.undivided_reason}
@@ -162,7 +180,10 @@ def divisible_rows(model: Model) -> dict:
 
 
 def threads_of(model: Model, threads: int) -> tuple[int, list[Notice]]:
-    """(number of threads that step a model, notices); raises FvsolveError for more threads than rows."""
+    """Number of threads that can step a model, at most `threads`, and notices on threads.
+
+    Raises FvsolveError if a divisible basin has fewer rows than threads.
+    """
     if threads == 1:
         return 1, []
     divisible = divisible_rows(model)
@@ -171,7 +192,8 @@ def threads_of(model: Model, threads: int) -> tuple[int, list[Notice]]:
     few = [f"{name} has {rows} rows" for name, rows in divisible["rows"].items() if rows < threads]
     if few:
         raise FvsolveError(
-            f"threads = {threads}: {listing(few)}, and each thread needs a row. Expected {divisible['most']} at most"
+            f"threads = {threads}: {listing(few)}, and each thread needs a row of cells. Expected "
+            f"{divisible['most']} at most"
         )
     text = f"each thread computes the whole of {undivided_basins(model)}"
     return threads, [Notice("threads", "numerics", text, "threads")] if divisible["whole"] else []

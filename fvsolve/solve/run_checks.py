@@ -1,4 +1,4 @@
-"""Checks of a run: steps beyond their limit, growth of states, ledgers that do not close."""
+"""Checks of a run: steps beyond their limit, growth of states, mass balances that do not close."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ LEDGER_TOLERANCE = 1e-8  # greatest remainder of a ledger, relative to its large
 class RunChecks:
     """Checks during a run: wave rates of basins, size of the states, height of sloshing modes.
 
-    largest : float64[n]  largest allowed states: MOST times the largest of the range of initial values, the range of
-    the schedules, and the Joukowsky jump of stopping the initial flows
+    largest : float64[n]  allowed size of each state: 1e6 times the largest of the range of initial values, the range
+    of the schedules, and the Joukowsky jump if the initial flows stop
     sound : time of the last checked state without growth [s]
     """
 
@@ -38,16 +38,16 @@ class RunChecks:
 
     @property
     def needs_frequent_checks(self) -> bool:
-        """True if `look` must be called every few steps: for more than growth, which the time loop checks itself."""
+        """True if `check` must be called every few steps, for checks that the time loop does not make itself."""
         return bool(self.sloshing.tanks or (self.predicted and self.moving))
 
     @property
     def largest_if_needed(self) -> np.ndarray:
-        """`largest` for the time loop if a step limit is exceeded; else an empty array."""
+        """Array `largest` if the step exceeds a predicted limit, so that the time loop checks growth; else empty."""
         return np.array(np.broadcast_to(self.largest, self.model.y_size)) if self.predicted else np.zeros(0)
 
     def check(self, t: float, y: np.ndarray) -> str:
-        """Check a state and update the wave rates of basins; returns the reason to stop the run, or ""."""
+        """Check state y at time t [s], and update the wave rates of basins; returns the reason to stop, or ""."""
         for basin in self.moving:
             self.rates[basin.name] = max(self.rates.get(basin.name, 0.0), basin.max_rate(y)[0])
         if stops := self.sloshing.check(t, y):
@@ -82,7 +82,10 @@ class RunChecks:
 
 
 def split_step_notices(numerics, counts: dict[str, int]) -> list[Notice]:
-    """Notice if steps of the given length were taken in parts."""
+    """Notice if steps of given length were taken in parts; an empty list if not.
+
+    counts : counts of the run, with the number of such steps under "parted"
+    """
     if not counts.get("parted"):
         return []
     key = "step" if numerics.step is not None else "courant"
@@ -93,7 +96,7 @@ def split_step_notices(numerics, counts: dict[str, int]) -> list[Notice]:
 
 
 def ledger_notices(name: str, ledger: dict) -> list[Notice]:
-    """Notice if the remainder of a ledger is larger than rounding."""
+    """Notice if the remainder of the balance `name` is larger than rounding; an empty list if not."""
     relative = ledger.get("relative", 0.0)
     if relative <= LEDGER_TOLERANCE:  # False for NaN: such a ledger does not close
         return []

@@ -1,4 +1,4 @@
-"""Time loop of a run of a model: its functions, its ledgers, its step settings, its events."""
+"""Loop over the time steps of a run: its arrays, its step settings, and the handling of events."""
 
 from __future__ import annotations
 
@@ -32,10 +32,12 @@ MOST_EVENTS_IN_SPAN, SPAN = (
 
 
 class RunLoop:
-    """Arrays of a run of a model; `run` steps until an output, an event or the end needs attention.
+    """Arrays of a run of a model; its method `run` steps until an output is due, a fault occurs or the segment ends.
 
-    structure() : structure of the Jacobian, default that of the model
-    threads : number of threads; comm : MPI communicator of all ranks, in place of threads
+    structure : function without arguments that returns the sparsity structure of the Jacobian; default: that structure
+    of the model
+    threads : number of threads
+    comm : MPI communicator of all ranks, in place of threads
     """
 
     def __init__(self, model: Model, structure: Callable[[], Structure] | None = None, threads=1, comm=None) -> None:
@@ -131,19 +133,22 @@ class RunLoop:
         return float(self.loop_state[loop_indices.T])
 
     def begin(self, end: float, stop_at: float) -> None:
-        """Start a segment that ends at `end` [s]; the step history before the kink is discarded."""
+        """Start a segment of the run that ends at `end` [s], and discard the data of steps before its start.
+
+        stop_at : time [s] from which on the loop writes no output rows
+        """
         self.stepper.discard_history()
         self.resume(end, stop_at)
 
     def resume(self, end: float, stop_at: float) -> None:
-        """Continue a segment that ends at `end` [s]; rows due from `stop_at` on are not written by the loop."""
+        """Continue a segment of the run up to the time `end` [s]; the loop writes no output rows from `stop_at` on."""
         self.controls[loop_indices.END], self.controls[loop_indices.STOP_AT] = end, stop_at
         self.progress[loop_indices.PHASE], self.progress[loop_indices.HAS_LAST_STEP] = loop_indices.FRESH, 0
         self.apply_events()
         self.run_data.clock["limit"] = end
 
     def run(self, budget: float) -> int:
-        """Take at most `budget` steps; returns a code of `steppers.slots`, from DONE to CHATTERS."""
+        """Take at most `budget` steps; returns a code of `steppers.loop_indices`, from DONE to CHATTERING."""
         while (capacity := self.run_data.history_capacity()) < budget:
             code = self.steps(capacity)
             left, budget = self.controls[loop_indices.BUDGET], budget - capacity
@@ -152,7 +157,7 @@ class RunLoop:
         return self.steps(budget)
 
     def steps(self, budget: float) -> int:
-        """`run` for as many steps as the history of delay lines has space for."""
+        """Take at most `budget` steps, for which the wave history of delay lines has space; returns a code as `run`."""
         self.controls[loop_indices.BUDGET] = budget
         code = loop_indices.SWITCHED
         while code == loop_indices.SWITCHED:
@@ -169,7 +174,7 @@ class RunLoop:
 
     @property
     def functions(self) -> tuple:
-        """(functions that the time loop calls, offset of the ledger rates in `out`)."""
+        """Tuple of the compiled functions that the time loop calls, and index of the first ledger rate in `out`."""
         return (self.fused_step, self.observe, self.record, self.events, self.rhs), int(self.model.layout["supply"])
 
     def close(self) -> None:
@@ -179,11 +184,11 @@ class RunLoop:
 
     @property
     def armed(self) -> np.ndarray:
-        """Flags of the events that have occurred and still hold (a view)."""
+        """Flags of events, 1 while the condition of an event holds (a view)."""
         return self.run_data.armed
 
     def record_events(self, before: np.ndarray) -> None:
-        """Record the events since the flags were `before`, and apply their immediate effects."""
+        """Record the events since the event flags were `before`, and apply their immediate effects."""
         first, count = tank_limits.EVENTS * self.tanks.size, len(self.model.events)
         now = self.armed[first : first + count] > before[first : first + count]
         self.switched += [(self.t, int(k)) for k in np.flatnonzero(now) if self.model.events[k][1]]
@@ -200,7 +205,7 @@ class RunLoop:
             device.apply_event(self.run_data, row, self.t, self.now, self.stepper.scale)
 
     def handle_events(self, before: np.ndarray) -> bool:
-        """Record the last events; returns False where they chatter: too many at the same time or in a short span."""
+        """Record the last events; returns False if there are too many at the same time or in a short span of time."""
         self.record_events(before)
         self.at_once = self.at_once + 1 if self.t == self.last_switch else 1
         self.last_switch = self.t
@@ -214,16 +219,20 @@ class RunLoop:
         return self.at_once <= MOST_EVENTS_AT_ONCE + 4 * self.armed.size and not crowded
 
     def evaluate(self, limit: float) -> np.ndarray:
-        """Evaluate `out` now, with left limits of schedules from `limit` on; records events that a jump has caused."""
+        """Compute the output array `out` at the present state, and record the events that a jump has caused.
+
+        limit : time [s] at which schedules with a jump take the value before the jump
+        """
         before = self.armed.copy()
         out = self.run_data.evaluate(self.t, self.now, limit)[1]
         self.record_events(before)
         return out
 
     def stop_columns(self, limit: float) -> list[tuple[int, float]]:
-        """Set the flows of rigid columns that stop, or collide at a node without other flow.
+        """Set the flows of rigid columns that stop, or that collide at a node without other flow.
 
-        Returns (number of the column, lost flow [kg/s]) of the columns whose flow changes.
+        limit : time [s] at which schedules with a jump take the value before the jump
+        Returns a pair (number of the column, lost mass flow [kg/s]) for each column whose flow has changed.
         """
         if not len(self.model.tables.columns) and not self.armed.size:  # no columns and no events to record
             return []
@@ -245,13 +254,13 @@ class RunLoop:
         return stopped
 
     def take_rows(self) -> np.ndarray:
-        """Copy of the rows written since the last call."""
+        """Copy of the output rows (time and probe values) written since the last call."""
         count = int(self.progress[loop_indices.ROWS])
         self.progress[loop_indices.ROWS] = 0
         return self.stepper.rows[:count].copy()
 
     def step_back(self) -> None:
-        """Return to the state before the last step, unless the ledgers include it: then its end state was valid."""
+        """Return to the state before the last step, unless the ledgers include that step already (a valid step)."""
         if self.progress[loop_indices.HAS_LAST_STEP] == 1 and self.loop_state[loop_indices.UNBOOKED] > 0.0:
             self.before  # noqa: B018  (copies that state from the other threads or ranks)
             self.loop_state[loop_indices.T] -= self.loop_state[loop_indices.LAST]
@@ -264,15 +273,16 @@ class RunLoop:
 
 
 def longest_step(model: Model) -> float:
-    """Greatest step for which delay lines are divided [s]; infinity without delay lines."""
+    """Longest step that suits the delay lines [s]: the inverse of their greatest wave rate; infinity without them."""
     delay_lines = model.tables.pipes["delay"] >= 0
     return float(1.0 / model.wave_rates[delay_lines].max()) if delay_lines.any() else np.inf
 
 
 def fused_step_allowed(model: Model, method: Method) -> bool:
-    """True if fused steps are possible: upwind and Euler, only pipes, no events, no friction or a constant factor.
+    """True if a single function can compute both rates and step (a fused step).
 
-    Pipes on moving bodies are excluded: the body accelerates their cells in addition to the waves.
+    Required are the linear density law, the upwind scheme, a one-stage explicit method without error control, no state
+    except cells of pipes, no events, no pipe on a moving body, and no friction or a constant friction factor.
     """
     settings, numerics = model.tables.settings[0], model.case.numerics
     laws = model.tables.pipes["friction"]

@@ -1,4 +1,4 @@
-"""Summary of a run: reason of its end, marks, ledgers, extremes, envelopes, counts."""
+"""Summary of a run: reason of its end, first times outside validity, balances, extremes, envelopes, counts."""
 
 from __future__ import annotations
 
@@ -47,7 +47,12 @@ class Event:
 
 @dataclass
 class Summary:
-    """Results of a run except rows and frames; SI, absolute pressures."""
+    """Results of a run without output rows and field frames, in SI units with absolute pressures.
+
+    reason : reason of the end; ok : True if the results are valid; t : time of the end [s]; seconds : elapsed time of
+    the steps, seconds_setup : of the preparation [s]; dicts of extremes and envelopes are as `find_extremes` and
+    `find_envelope` return them
+    """
 
     reason: str
     ok: bool
@@ -87,9 +92,10 @@ class Summary:
 
 
 def find_marks(run_data: RunData) -> list[Mark]:
-    """First time and place of each condition outside the model's validity.
+    """First time of each condition outside the model's validity, at each place.
 
-    Cavities are not marked under a law that models them; nor is overflow of tanks, which is in the ledger.
+    Pressures below vapour pressure are left out under a density law that models cavities, and overflow of tanks always,
+    as the mass ledger contains it.
     """
     model, marks = run_data.model, run_data.marks
     if np.isnan(marks).all():
@@ -107,15 +113,15 @@ def find_marks(run_data: RunData) -> list[Mark]:
             "use a pipe"
         ),
         "outside its curve": (
-            "the pump works in reverse or beyond the last flow of its curve; give rated_speed to extend the curve by "
-            "the Suter table of its specific speed, or suter = { rated_flow, rated_head, table } in place of the curve"
+            "the pump works in reverse or beyond the last flow of its curve; give the key `rated_speed` to extend the "
+            "curve by the Suter table of its specific speed, or `suter = { rated_flow, rated_head, table }` instead"
         ),
         "beyond its stroke": "the piston is beyond an end of its stroke; an end-stop would stop it",
         "below vapor pressure": (
             "pressure falls below vapour pressure; the liquid column would separate; to model this, set "
             f"{model.case.law.cavitation_keys}cavitation = true in [fluid]"
         ),
-        "dry": "no water is left for the outflow; the missing water is added and booked as made_up",
+        "dry": "no water is left for the outflow; the missing water is added, `made_up` in the mass balance",
     }
     return [
         Mark(kind, place, float(time), f"{place.split('.', 1)[1]}: {texts[kind]}")
@@ -138,7 +144,7 @@ def spill_notices(run_data: RunData) -> list[Notice]:
 
 
 def device_notices(run_data: RunData) -> list[Notice]:
-    """Notices of devices outside their laws that are not marks: pumps that ran down, or with an extended curve."""
+    """Notices on devices that ran outside the given data, but within the model, such as pumps that ran down."""
     model, marks = run_data.model, run_data.marks
     first = len(model.pipes) + 3 * len(model.node_names) + len(model.column_names) + len(model.piston_names)
     times = marks[first + len(model.devices) :]
@@ -150,7 +156,7 @@ def device_notices(run_data: RunData) -> list[Notice]:
 
 
 def drift_notices(model: Model, y: np.ndarray) -> list[Notice]:
-    """Notices for bodies whose Euler parameters no longer have length 1, which measures the error of the steps."""
+    """Notices for bodies whose Euler parameters no longer have length 1; the difference measures the time error."""
     notices = []
     for name, row in zip(model.body_names, model.tables.bodies, strict=True):
         if row["joint"] not in (rec.BALL, rec.FREE):
@@ -160,13 +166,13 @@ def drift_notices(model: Model, y: np.ndarray) -> list[Notice]:
         length = float(np.linalg.norm(row["start"][first : first + 4] + y[at : at + 4]))
         if abs(length - 1.0) > DRIFT:
             text = (f"{name}: its Euler parameters have drifted from length 1 to {length:.9g} and are divided by it; "
-                    "the error of its attitude is about as large; gauss-4 conserves the length")  # fmt: skip
+                    'the error of its attitude is about as large; method = "gauss-4" conserves the length')  # fmt: skip
             notices.append(Notice("drift", f"nodes.{name}", text, None, length - 1.0, DRIFT))
     return notices
 
 
 def find_cavities(run_data: RunData) -> list[Cavity]:
-    """Cavity of every pipe whose pressure fell below twice the vapour pressure: more vapour than gas in the bubbles."""
+    """First cavity of every pipe whose pressure fell below twice the vapour pressure (more vapour than gas)."""
     model, marks, cavities = run_data.model, run_data.marks, []
     for k, pipe in enumerate(model.pipes if model.cavitates else ()):
         share, volume, t_volume = (float(x) for x in marks[marks.size - 3 * (len(model.pipes) - k) :][:3])
@@ -181,19 +187,22 @@ def find_cavities(run_data: RunData) -> list[Cavity]:
 
 
 def find_extremes(run_data: RunData) -> dict[str, tuple[float, float, float, float]]:
-    """Extremes of the probes over all accepted steps and rows: probe -> (least, its time, greatest, its time)."""
+    """Extremes over all accepted steps and rows: probe -> (least value, its time [s], greatest value, its time [s])."""
     table = run_data.extremes
     return {probe.text: tuple(map(float, table[:, k])) for k, probe in enumerate(run_data.model.probes)}
 
 
 def find_watched(run_data: RunData) -> dict[str, tuple[float, float, float, float]]:
-    """Extremes, as `find_extremes`, of the watched quantities that are not probes."""
+    """Extremes, as `find_extremes`, of the quantities that studies and limits need but that are not probes."""
     table, probe_count = run_data.extremes, len(run_data.model.probes)
     return {probe.text: tuple(map(float, table[:, probe_count + k])) for k, probe in enumerate(run_data.model.watched)}
 
 
 def find_point_envelopes(run_data: RunData) -> dict[str, dict[str, np.ndarray]]:
-    """Envelopes, as `find_envelope`, and initial pressure at watched points of pipes: ends and points of profiles."""
+    """Envelopes, as `find_envelope`, at the ends of pipes and the points of their elevation profiles.
+
+    Each envelope has in addition the initial pressure, `initial_pressure` [Pa].
+    """
     model, probe_count, points = run_data.model, len(run_data.model.probes), {}
     rows: dict[str, list[int]] = {}
     for k in np.flatnonzero(np.isfinite(model.watched_start)):
@@ -209,7 +218,7 @@ def find_point_envelopes(run_data: RunData) -> dict[str, dict[str, np.ndarray]]:
 
 
 def find_envelope(run_data: RunData) -> dict[str, dict[str, np.ndarray]]:
-    """Envelopes: pipe -> distance, elevation [m], least and greatest pressure [Pa] and head [m] with times [s]."""
+    """Envelope of each pipe over its cells: name of the pipe -> dict of `pressure_envelope`."""
     model, envelope, result = run_data.model, run_data.envelope, {}
     for k, pipe in enumerate(model.pipes):
         cells = model.tables.pipes[k]["cell"] + np.arange(pipe.cells)
@@ -220,7 +229,11 @@ def find_envelope(run_data: RunData) -> dict[str, dict[str, np.ndarray]]:
 
 
 def pressure_envelope(model: Model, pipe, distance, elevation, extremes) -> dict[str, np.ndarray]:
-    """Envelope of a pipe from (least, times, greatest, times) of its pressures."""
+    """Envelope of a pipe as a dict of float64[points]: least and greatest pressure [Pa] and head [m], and their times.
+
+    distance, elevation : chainage and height of the points [m]
+    extremes : least pressures [Pa], their times [s], greatest pressures [Pa], their times [s]
+    """
     least, t_min, greatest, t_max = extremes
     return {
         "distance": distance, "elevation": elevation, "min_pressure": least, "t_min": t_min,
@@ -230,14 +243,15 @@ def pressure_envelope(model: Model, pipe, distance, elevation, extremes) -> dict
 
 
 def relative(remainder: float, largest: float) -> float:
-    """Remainder over the largest term of a ledger; 0 if both are 0."""
+    """Remainder of a balance as a fraction of its largest term; 0 if both are 0."""
     return abs(remainder) / largest if largest > 0.0 else float(remainder != 0.0)
 
 
 def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, Any]:
-    """Mass ledger: stored mass, inflow, outflow, remainder [kg]; `relative` is the remainder over the largest term.
+    """Mass balance of a run as a dict: stored mass at start and end, inflow, outflow, remainder [kg].
 
-    ledger : float64[2, nodes]  inflow at each node, and outflow as negative numbers
+    ledger : float64[2, nodes]  inflow at each node [kg], and outflow as negative numbers
+    The entry `relative` is the remainder as a fraction of the largest term.
     """
     kinds = model.tables.nodes["kind"]
     initial, change = model.contents(y)

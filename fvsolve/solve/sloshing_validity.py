@@ -20,10 +20,10 @@ RISE, LOSS = slice(0, 2), slice(2, 4)
 class SloshingCheck:
     """Record of the wave height of sloshing modes and of the change of the water's weight by moving bodies.
 
-    Modes oscillate under gravity, cells under gravity and the motion of driven joints; the acceleration of a free body
-    is not in the waves.
-    kept : float64[tanks, 4]  greatest rise as a fraction of the depth and its time [s], greatest change of weight as a
-    fraction and its time [s]
+    Sloshing modes are computed under gravity, sloshing in cells under gravity and the motion of driven joints. Neither
+    includes the acceleration of a body that moves freely.
+    restart_data : float64[tanks, 4]  greatest rise as a fraction of the depth and its time [s], greatest change of
+    weight as a fraction of the weight and its time [s]
     """
 
     def __init__(self, model) -> None:
@@ -40,7 +40,7 @@ class SloshingCheck:
         self.restart_data = np.zeros((len(self.tanks), 4))
 
     def check(self, t: float, y: np.ndarray) -> str:
-        """Check a state; returns the reason to stop the run, or ""."""
+        """Check state y at time t [s], and update the record; returns the reason to stop the run, or ""."""
         if not self.tanks:
             return ""
         out = self.model.evaluate(t, y)[1]
@@ -56,7 +56,11 @@ class SloshingCheck:
     def weight(
         self, out: np.ndarray, i: int, place: np.ndarray, normal: np.ndarray, modal: bool
     ) -> tuple[float, float]:
-        """(effective gravity along the normal of the bed, gravity that the waves use) [m/s2]."""
+        """Effective gravity along the normal of a basin's bed, and gravity that its waves use [m/s2].
+
+        out : output array of the right-hand side; i : number of the body; place, normal : centre of the basin [m] and
+        unit normal of its bed in the axes of the body; modal : True for sloshing modes
+        """
         from fvsolve.kernels.dtypes import BODY_OUT
         from fvsolve.kernels.mechanism import body_layout
 
@@ -88,7 +92,7 @@ class SloshingCheck:
 
 
 def rises(model, name: str) -> tuple:
-    """(states of the sloshing modes, initial values, rise of each in units of the depth, True for a round tank)."""
+    """Arguments `at`, `start`, `lifts` and `is_round` of the function `rise` for the basin `name`."""
     case = model.case
     basin, mesh = case.nodes[name], case.lumped[name]
     modes = sloshing.modes_of(basin, mesh, case.properties.density, case.gravity)
@@ -100,12 +104,18 @@ def rises(model, name: str) -> tuple:
 
 
 def rise(y: np.ndarray, at: np.ndarray, start: np.ndarray, lifts: np.ndarray, is_round: bool) -> float:
-    """Greatest rise of the water, as a fraction of its depth."""
+    """Greatest rise of the water at the wall of a basin, as a fraction of its depth.
+
+    at : int64[modes]  indices of the amplitudes of the sloshing modes in the state y
+    start : float64[modes]  initial amplitudes
+    lifts : float64[2, modes]  rise per amplitude over the depth, of modes along and across the basin
+    is_round : True for a round basin, where the rises in both directions add up as a vector
+    """
     along, across = np.abs(lifts @ (start + y[at]))
     return float(np.hypot(along, across)) if is_round else float(along + across)
 
 
 def keep_greatest(record: np.ndarray, value: float, t: float) -> None:
-    """Store a value and its time if the value is greater than before."""
+    """Store `value` and its time t [s] in `record` if it is greater than the value there."""
     if value > record[0]:
         record[:] = value, t

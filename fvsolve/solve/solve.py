@@ -1,4 +1,4 @@
-"""Run of a case from its start to its end, segment by segment between jumps and kinks of schedules."""
+"""Run of a model from its start to its end, in segments between jumps and kinks of schedules."""
 
 from __future__ import annotations
 
@@ -43,22 +43,24 @@ PERSISTENT = ("extremes", "envelope", "marks", "armed")
 
 
 class MemoryMismatch(RunError):
-    """The memory of a state does not match the run."""
+    """Error: the restart data in `State.memory` do not match the run."""
 
 
 def initial_state(model: Model) -> State:
-    """Initial state of a model: no deviation from its profile, except for a dam break."""
+    """Initial state of a model: zero, as states are deviations from the steady start, except for a dam break."""
     if not isinstance(model, Model):
         raise FvsolveError(f"initial_state takes a Model, not {type(model).__name__}. Expected the result of build()")
     return State(model.case.numerics.start, model.start.copy())
 
 
 def solve(model: Model, state: State, sink, progress=None, threads: int = 1, comm=None) -> Summary:
-    """Run a model from `state` to the end of its case, with rows, fields and checkpoints written to `sink`.
+    """Run a model from `state` to the end time of its case; returns the summary of the run.
 
-    progress(t, seconds, steps) : called about ten times a second
-    threads : number of threads; comm : MPI communicator, whose other ranks follow this rank, in place of threads
-    A state with memory is resumed to the bit, with any number of threads.
+    sink : object that receives the output rows, field frames and checkpoints
+    progress : function of (simulated time [s], elapsed time [s], steps), called about ten times a second
+    threads : number of threads
+    comm : MPI communicator, whose other ranks follow this rank, in place of threads
+    A state with restart data in `memory` continues an interrupted run with identical bits, with any number of threads.
     """
     if not isinstance(model, Model) or not isinstance(state, State):
         raise FvsolveError(f"solve takes a Model and a State, not {type(model).__name__} and {type(state).__name__}")
@@ -129,15 +131,15 @@ class Run:
                 if comm is None:
                     self.loop.close()
                 raise MemoryMismatch(
-                    f"the checkpoint does not match this run (a memory of {state.memory.size} numbers); "
-                    "start again with --force, or with a State without memory"
+                    f"the checkpoint does not match this run ({state.memory.size} numbers of restart data); "
+                    "start again with --force, or with a State with an empty `memory`"
                 ) from None
         self.setup = time.perf_counter() - self.began
 
     # memory -------------------------------------------------------------------------------------------------
 
     def memory(self) -> np.ndarray:
-        """All data that a resumed run needs in addition to t and y, flat."""
+        """All data that a resumed run needs in addition to t and y, as one flat array."""
         arrays = [getattr(self.run_data, name).ravel() for name in PERSISTENT]
         changes = [x for change in self.changes for x in change]
         switched = [x for event in self.loop.switched for x in event]
@@ -194,7 +196,10 @@ class Run:
     # rows and frames ----------------------------------------------------------------------------------------
 
     def row(self, t: float, limit: float) -> np.ndarray:
-        """Write the row of the present state at t, with left limits of schedules from `limit` on; returns `out`."""
+        """Write the output row of the present state at time t [s]; returns the output array `out`.
+
+        limit : time [s] at which schedules with a jump take the value before the jump
+        """
         out = self.loop.evaluate(limit)
         self.loop.record(t, self.loop.now, out, self.run_data.handle, self.loop.stepper.values)
         self.sink.rows(np.array([t]), self.loop.stepper.values[None, : len(self.model.probes)].copy())
@@ -207,7 +212,10 @@ class Run:
             self.update_extremes(rows)
 
     def update_extremes(self, rows: np.ndarray) -> None:
-        """Update the extremes by rows between steps, which are as accurate as steps; so no row exceeds the extremes."""
+        """Update the extremes of the probes by output rows between steps, so that no row exceeds the extremes.
+
+        rows : float64[rows, 1 + probes]  time [s] and values of the probes
+        """
         least, t_min, greatest, t_max = self.run_data.extremes
         t, values = rows[:, 0], rows[:, 1:]
         at, each = values.argmin(axis=0), np.arange(values.shape[1])
@@ -220,7 +228,7 @@ class Run:
             greatest[higher], t_max[higher] = extreme[higher], t[at][higher]
 
     def check_basins(self, t: float, y: np.ndarray) -> None:
-        """Pass a state to the checks of basins."""
+        """Pass state y at time t [s] to the checks of basins."""
         for watch in self.watches:
             watch.check(t, y)
 
@@ -230,7 +238,10 @@ class Run:
             self.sink.field(t, self.run_data.fields(t, y, out))
 
     def pass_outputs(self, t: float, out: np.ndarray) -> None:
-        """Count the rows and frames due at a jump or at the end, which are written separately."""
+        """Count the rows due up to time t [s], a jump or the end, and write the field frame if one is due.
+
+        out : output array of the right-hand side at t
+        """
         memory, orders = self.loop.loop_state, self.loop.controls
         near = 1e-12 * max(abs(t), abs(self.end))
         if orders[loop_indices.EVERY] > 0:
@@ -270,7 +281,7 @@ class Run:
         self.begin_segment(self.starts_with_jump)
 
     def stop_columns(self) -> None:
-        """Stop rigid columns that can no longer flow; set a mark if their flow was more than 1e-3 of its scale."""
+        """Stop rigid columns that can no longer flow; record the time if the lost flow was above 1e-3 of its scale."""
         model, t = self.model, self.loop.t
         for k, flow in self.loop.stop_columns(self.bounds[self.segment][0]):
             at, scale = (
@@ -309,7 +320,7 @@ class Run:
             self.begin_segment(jump)
 
     def steps(self) -> str:
-        """Step to the end of the segment; returns "", or the reason where the run cannot continue."""
+        """Step to the end of the segment; returns "", or the reason why the run cannot continue."""
         while True:
             before, steps, busy = time.perf_counter(), self.loop.loop_state[loop_indices.STEPS], self.busy
             code = self.loop.run(min(self.left, self.checks.step_doubling.steps_left(steps)))
@@ -342,7 +353,7 @@ class Run:
         return time.thread_time() + (0.0 if self.loop.team is None else self.loop.team.seconds)
 
     def pause(self) -> None:
-        """Between chunks: report progress, save a checkpoint, set the next chunk to about a tenth of a second."""
+        """Report progress, save a checkpoint if due, and set the number of steps until the next pause (about 0.1 s)."""
         spent = time.perf_counter() - self.paused
         factor = CHUNK_SECONDS / spent if spent > 0 else 4.0
         most = FREQUENT_CHECK_STEPS if self.checks.needs_frequent_checks else 1e9
@@ -357,12 +368,15 @@ class Run:
         self.saved = time.perf_counter()
 
     def failure(self, code: int) -> str:
-        """Reason for the stop of a run: failure, place, time and remedy, with the advice of the density law."""
+        """Reason why a run stopped: failure, place, time and remedy, with the advice of the density law.
+
+        code : code of `steppers.loop_indices` that the time loop returned
+        """
         numbers = code in (loop_indices.BAD_VALUE, loop_indices.NEWTON_STUCK, loop_indices.TINY_STEP)
         return self.failure_text(code) + (self.model.case.law.advice if numbers else "")
 
     def failure_text(self, code: int) -> str:
-        """Failure, place, time and remedy for a code of the time loop."""
+        """Text with failure, place, time and remedy for a code of `steppers.loop_indices`."""
         model, loop = self.model, self.loop
         place = ""
         if code == loop_indices.BAD_VALUE:
@@ -379,11 +393,11 @@ class Run:
                 device.remedy: None for name, _, device in model.devices if name.removesuffix(".inside") in names
             }
             parts_text = listing(names) if names else "a leak, or a demand that follows the pressure,"
-            remedy = ", or ".join(remedies) or "put a chamber at its place"
+            remedy = ", or ".join(remedies) or "put a chamber at its node"
             return f"stopped: {parts_text} opens and shuts without end at {when}; {remedy}"
         if code == loop_indices.STOPPED:
             event = "a cavity opened" if model.cavitates else "pressure below vapour pressure"
-            return f"stopped: {event} at {when}, as below_vapor requires"
+            return f"stopped: {event} at {when}, as the key `below_vapor` requires"
         if code in (loop_indices.BAD_VALUE, loop_indices.BAD_STATUS):
             loop.step_back()
         if code == loop_indices.NEWTON_STUCK:

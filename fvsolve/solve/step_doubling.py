@@ -1,9 +1,10 @@
 """Step doubling: occasional repetition of a given step as two half steps, to estimate the error of the run.
 
 A step that is too long need not be unstable: the nonlinear law of a valve bounds the growth, so that vessels oscillate
-between two wrong pressures, and implicit methods are stable at any step. The end of such a step differs from that of
-two half steps by e. The sum of the errors of n steps depends on the fraction r of an error that a step leaves,
-e (1 - r^n) / (1 - r). For a draining vessel r is near 1 and all errors remain; with a small r only the last remain.
+between two wrong pressures, and implicit methods are stable at any step. Let e be the difference between the state
+after a step and the state after two half steps, and r the fraction of an error that remains after one more step. The
+errors of n steps add up to e (1 - r^n) / (1 - r). For a draining vessel r is near 1 and all errors remain; with a small
+r only the last errors remain.
 """
 
 from __future__ import annotations
@@ -27,13 +28,14 @@ ROUNDING = 1e-10  # relative to ranges: a smaller error is too small to measure 
 
 
 class StepDoubling:
-    """Error check of a run of given steps: of all states for implicit methods, of states outside cells for explicit.
+    """Estimate of the error of a run with steps of given length.
 
-    It is switched off without such states or without a given step. For cells the Courant limit bounds explicit steps.
+    It checks all states under an implicit method, and states outside cells under an explicit method, where the Courant
+    limit bounds the errors of cells. Without such states or without a given step there is no check.
 
-    kept : float64[4 + 5 k]  data of a resumed run: number of checks, step count of the next check, step count of the
-    last check, r; for each state the error of the last checked step, the accumulated error, the sum of that over the
-    checks, its least and its greatest value
+    restart_data : float64[4 + 5 k]  number of checks, step count of the next check, step count of the last check,
+    fraction r of an error that a step leaves; then five arrays over the k checked states: error of the last checked
+    step, accumulated error, sum of the accumulated errors over the checks, least value, greatest value
     """
 
     def __init__(self, run_data) -> None:
@@ -55,16 +57,19 @@ class StepDoubling:
             self.restart_data[1], self.small = self.interval, state_ranges(model, LEAST_RANGE)[self.states]
 
     def begin(self, steps: float) -> None:
-        """Check the first step of a segment under implicit methods, which stay stable even if a store fills in it."""
+        """Order a check of the first step of a segment under implicit methods, which stay stable at any change there.
+
+        steps : number of steps at the start of the segment
+        """
         if self.states.size and self.implicit:
             self.restart_data[1] = steps + 1.0
 
     def steps_left(self, steps: float) -> float:
-        """Number of steps that may be taken before the next check."""
+        """Number of steps until the next check; steps : number of steps taken so far."""
         return max(1.0, self.restart_data[1] - steps) if self.states.size else np.inf
 
     def check(self, loop) -> None:
-        """Repeat the last step as two half steps if a check is due; called at an accepted state."""
+        """Repeat the last step as two half steps if a check is due; `loop` is a `RunLoop` at an accepted state."""
         memory = loop.loop_state
         steps, h = memory[loop_indices.STEPS], memory[loop_indices.LAST]
         if not self.states.size or steps < self.restart_data[1]:
@@ -88,7 +93,11 @@ class StepDoubling:
         self.restart_data[:3] = self.restart_data[0] + 1.0, steps + self.interval, steps
 
     def accumulate(self, loop, h: float, steps: float, error: np.ndarray) -> None:
-        """Add the errors of `steps` steps: `error` for the last; for the others at most that of the previous check."""
+        """Add the errors of the steps since the last check to the accumulated errors.
+
+        h : length of the last step [s]; steps : number of steps since the last check
+        error : float64[n]  error of the last step; the other steps count with the smaller error of both checks
+        """
         widths, own = self.widths(), np.abs(error[self.states])
         size = float(np.linalg.norm(own / widths))
         if size > ROUNDING:
@@ -105,9 +114,9 @@ class StepDoubling:
         self.sums += self.accumulated_error
 
     def single_step(self, loop, t: float, y: np.ndarray, h: float, first=False) -> np.ndarray:
-        """State after a single step of the run's method, with the present device states.
+        """State after one step of length h [s] from state y at time t [s], with the method of the run.
 
-        first : discard the stored Jacobian, for the first step from a new state
+        first : True to discard the stored Jacobian, for the first step from a new state
         """
         if self.stepper is None:
             model = self.model
@@ -126,11 +135,11 @@ class StepDoubling:
         return self.stepper.single_step(loop.rhs, loop.run_data.handle, int(self.model.layout["supply"]), t, h, y)
 
     def widths(self) -> np.ndarray:
-        """Ranges of the states so far, at least the small range of each state."""
+        """Greatest minus least value so far of each checked state, at least the small range of that state."""
         return np.maximum(self.greatest - self.least, self.small)
 
     def worst(self) -> tuple[str, float]:
-        """(place, mean error as a fraction of the range) of the state with the greatest error."""
+        """Name of the part with the greatest error, and its mean error as a fraction of the range of the state."""
         if not self.restart_data[0]:
             return "", 0.0
         share = self.sums / self.restart_data[0] / self.widths()
@@ -153,6 +162,9 @@ class StepDoubling:
 
 
 def corrected_store(loop) -> bool:
-    """True if a delay line corrected a store for a jump within the last step; half steps have no such correction."""
+    """True if a delay line corrected the mass of a storing node for a jump within the last step of the loop.
+
+    Half steps have no such correction, so such a step is not checked.
+    """
     past = loop.run_data.past
     return past.size > 0 and past[CORRECTED_TIME] == loop.t

@@ -1,8 +1,8 @@
 """Threads that step bands of a state in parallel, all by the same compiled loop.
 
 Every worker has its own arrays, of full size, and uses only the parts that its band reads. Python works on the arrays
-of the loop, which are those of the first worker. Before the workers continue, they copy from there what Python may have
-changed; afterwards each copies its rows back.
+of the run loop, which are also the arrays of the first worker. Before each call the other workers copy the data that
+Python may have changed from these arrays; afterwards each worker copies its rows back.
 """
 
 from __future__ import annotations
@@ -52,9 +52,10 @@ def yield_address() -> int:
 
 
 class BandWorker:
-    """BandWorker of a band: its arrays, and the handle through which compiled code reads them.
+    """Worker of a band: its arrays, and the handle through which compiled code reads them.
 
-    team : a `ThreadTeam` or `MpiRanks`, with the addresses and arrays for the exchange in `kernels.joint`
+    team : a `ThreadTeam` or `MpiRanks`, with the addresses and arrays for the exchange in `kernels.band_exchange`
+    k : number of the band
     """
 
     def __init__(self, team, k: int, run_data: RunData, stepper: Integrator) -> None:
@@ -92,18 +93,18 @@ class BandWorker:
         self.bounds = np.ascontiguousarray(at.reshape(-1, 3)[owned]).ravel(), bounds[owned]
 
     def open(self) -> None:
-        """Collect the written arrays and make their handle; repeated when the history of delay lines has grown."""
+        """Make the handle of the arrays that the run writes; again when the wave history of delay lines has grown."""
         self.written = self.run_data.written._replace(**self.own_arrays)
         self.handle = self.run_data.linked_handle(self.written, self.call_tables)
 
     def store(self, name: str, values: np.ndarray) -> None:
-        """Copy values into an array of `WRITTEN`."""
+        """Copy values into the run's array `name`, which is in the list `WRITTEN`."""
         if name == "past" and values.size != self.run_data.past.size:
             self.run_data.past = values.copy()
         getattr(self.run_data.written, name)[...] = values
 
     def copy_from_loop(self, states: list[slice]) -> None:
-        """Copy from the loop the arrays that Python may have changed, and these states."""
+        """Copy the arrays that Python may have changed, and the given ranges of states, from the run loop."""
         if self.number == 0:
             return
         for name in COPIED:
@@ -116,7 +117,7 @@ class BandWorker:
             self.stepper.y[now, rows] = self.loop.stepper.y[now, rows]
 
     def run_steps(self, functions: tuple, where: int) -> int:
-        """Run the time loop on this band; returns its code."""
+        """Run the time loop on this band; returns a code of `steppers.loop_indices`; arguments as `ThreadTeam.call`."""
         stepper = self.stepper
         if self.run_data.past is not self.written.past:
             self.open()
@@ -126,7 +127,7 @@ class BandWorker:
         return code
 
     def copy_to_loop(self, name: str, at) -> None:
-        """Copy the rows of this band to the arrays of the loop."""
+        """Copy the rows of this band, in row `at` of the integrator's array `name`, to the run loop."""
         if self.number > 0:
             source, target = getattr(self.stepper, name)[at], getattr(self.loop.stepper, name)[at]
             for rows in self.own:
@@ -134,7 +135,7 @@ class BandWorker:
 
 
 def copy_integrator(stepper: Integrator) -> Integrator:
-    """Copy of an integrator, with its own arrays except those that steps only read."""
+    """Copy of an integrator; it shares only the arrays that steps do not change."""
     copy = Integrator(
         stepper.method,
         stepper.scale.size,
@@ -150,13 +151,13 @@ def copy_integrator(stepper: Integrator) -> Integrator:
 
 
 def band_functions(cut: Partition) -> tuple:
-    """(functions of a model with exchange between bands, compiled function that combines partial sums)."""
+    """Compiled functions of a model with exchange between bands, and compiled function that adds up partial sums."""
     features = replace(cut.model.functions.cast, bands=True, boundary_exchange=cut.exchanges_flows)
     return functions(features), compiled_as(band_exchange.gather_sums, JOIN)
 
 
 class ThreadTeam:
-    """Workers of a loop, each in its own thread; the calling thread waits for them."""
+    """Threads that step the bands of a run, one worker in each; the calling thread waits for them."""
 
     def __init__(self, loop, cut: Partition) -> None:
         self.loop, self.cut, self.yield_address, self.callback, self.seconds = loop, cut, yield_address(), 0, 0.0
@@ -176,7 +177,7 @@ class ThreadTeam:
             thread.start()
 
     def serve(self, member: BandWorker, requests: SimpleQueue) -> None:
-        """Serve the requests of a thread: run the time loop for each, until the request is None."""
+        """Run the time loop on the band of `member` for each entry of the queue `requests`, until an entry is None."""
         while (task := requests.get()) is not None:
             start = time.thread_time()
             try:
@@ -189,7 +190,10 @@ class ThreadTeam:
             self.answers.put((answer, time.thread_time() - start))
 
     def call(self, functions: tuple, where: int) -> int:
-        """Run the time loop on all bands; returns a code of `steppers.slots`."""
+        """Run the time loop on all bands; returns a code of `steppers.loop_indices`.
+
+        functions, where : compiled functions, and index of the first ledger rate, from `RunLoop.functions`
+        """
         for member in self.members:
             alike = [slice(*block) for block in self.cut.common_states()]
             member.copy_from_loop(alike + (member.own if self.stale else []))
@@ -205,7 +209,7 @@ class ThreadTeam:
         return answers[0][0]
 
     def gather_states(self, at: int) -> None:
-        """Copy row `at` of the states of all workers to the loop."""
+        """Copy the bands of all workers of the stored state number `at` to the run loop."""
         for member in self.members:
             member.copy_to_loop("y", at)
 

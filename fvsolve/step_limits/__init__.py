@@ -1,1 +1,1 @@
-"""Step limits of schemes and methods, computed before a run."""
+"""Greatest stable time steps of schemes and methods, computed before a run."""

@@ -1,10 +1,10 @@
 """Exact Courant limit of linear advection on a uniform periodic grid (von Neumann).
 
-A wave of phase theta per cell is multiplied by R(nu z(theta)) in a step, with the stability function R of the method,
-the symbol z of the scheme and the Courant number nu. With R = N / D and t = sin^2(theta / 2), E(nu, t) = |D|^2 - |N|^2
-is a polynomial with rational coefficients; a Courant number is stable if E >= 0 for all t. Factors nu^a and t^p are
-divided out, so that slowly growing waves of any length are decided as well; the quotient at t = 0 decides the longest
-waves.
+A wave of phase theta per cell is multiplied by R(nu z(theta)) in a step, with the stability function R of the time
+method, the symbol z of the scheme and the Courant number nu. With R = N / D and t = sin^2(theta / 2),
+E(nu, t) = |D|^2 - |N|^2 is a polynomial with rational coefficients; a Courant number is stable if E >= 0 for all t.
+Common powers of nu and t are divided out, so that the sign is found for slowly growing waves of any length as well; the
+quotient at t = 0 applies to the longest waves.
 """
 
 from __future__ import annotations
@@ -42,7 +42,10 @@ EVERY, LONGEST, SHORTEST, BETWEEN, GROWS = "all", "longest", "shortest", "betwee
 
 @dataclass(frozen=True)
 class RangeEnd:
-    """End of a stable range: Courant number, and wave that determines it, as t = sin^2(theta / 2) and in words."""
+    """End of a range of stable Courant numbers, and the wave of phase theta per cell that determines it.
+
+    t : sin^2(theta / 2); wave : the wave in words
+    """
 
     courant: float
     t: Fraction = Fraction(0)
@@ -50,7 +53,7 @@ class RangeEnd:
 
     @property
     def theta(self) -> float:
-        """Phase per cell [rad]."""
+        """Phase of the wave per cell [rad]."""
         return 2 * math.asin(math.sqrt(self.t))
 
 
@@ -61,13 +64,14 @@ ALL_STABLE = [(RangeEnd(0.0), RangeEnd(math.inf))]
 class AdvectionLimit:
     """Stable Courant numbers of a scheme and a method on a uniform periodic grid.
 
-    limit : greatest Courant number below which all are stable; 0 if there is none, inf without an upper end
+    limit : Courant number up to which every smaller one is stable; 0 if there is none, inf without an upper end
     theta, wave : phase [rad per cell] and name of the waves that determine the limit, None for an infinite limit
-    stable : ranges (low, high) of stable Courant numbers; more than one range if stability returns
+    stable : ranges (low, high) of stable Courant numbers; more than one range if higher numbers are stable again
     proved : True if each range is proved in exact numbers to 1 part in 10^9
-    digits : significant digits of a published tableau, None where its numbers are exact
-    courant : given Courant number, else 1 % above the limit (0.5 if the limit is 0)
-    growth : greatest |R| - 1 at `courant`, 0 where it is stable; steps : number of steps to growth by a factor of 1000
+    digits : significant digits of the method's published coefficients, None for exact coefficients
+    courant : Courant number of `growth`: as given, otherwise 1 % above the limit (0.5 if the limit is 0)
+    growth : growth factor per step, minus 1, of the fastest growing wave at `courant`; 0 where it is stable
+    steps : number of steps in which that wave grows 1000 times
     """
 
     scheme: str
@@ -92,7 +96,7 @@ class AdvectionLimit:
 
 @validated(scheme=NAME, method=NAME, courant=POSITIVE)
 def advection_limit(scheme: str, method: str, courant: float | None = None) -> AdvectionLimit:
-    """Exact Courant limit of a linear scheme and a method, and the growth at `courant`.
+    """Exact Courant limit of a linear scheme and a time method, and the growth of waves at the number `courant`.
 
     Raises FvsolveError for unknown names, and for schemes that are not linear.
     """
@@ -103,7 +107,11 @@ def advection_limit(scheme: str, method: str, courant: float | None = None) -> A
 def advection_limits(
     schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None, courant: float | None = None
 ) -> list[AdvectionLimit]:
-    """Courant limits of all pairs, method by method; None for all schemes or all methods."""
+    """Courant limits of all pairs of the given schemes and methods, method by method.
+
+    schemes, methods : names, or None for all linear schemes or all methods
+    courant : Courant number at which growth is computed, see `AdvectionLimit`
+    """
     schemes, methods = ([x] if isinstance(x, str) else x for x in (schemes, methods))
     schemes = list(dict.fromkeys(schemes or WEIGHTS))
     for name in schemes:
@@ -120,7 +128,11 @@ FACE_WEIGHTS = Kind(
 
 @validated(weights=FACE_WEIGHTS, scheme=TEXT, method=NAME, courant=POSITIVE)
 def limit_of(weights: Sequence[Fraction], scheme: str, method: str, courant: float | None = None) -> AdvectionLimit:
-    """Exact Courant limit for any face weights of cells u-2 .. u+2 with sum 1, and the growth at `courant`."""
+    """Exact Courant limit of the linear scheme with the given face weights, and the growth at the number `courant`.
+
+    weights : five weights, with sum 1, of the cells from two upstream to two downstream in the value at a face
+    scheme : name of the scheme in the result
+    """
     tableau = method_named(method)
     gaps, proved = _stable_ranges(tuple(weights), *_rational(method), _is_a_stable(tableau))
     edge = gaps[0][1] if gaps and gaps[0][0].courant == 0 else None
@@ -140,7 +152,10 @@ def limit_of(weights: Sequence[Fraction], scheme: str, method: str, courant: flo
 
 
 def growth_of(weights: Sequence[Fraction], method: str, courant: float) -> tuple[float, float]:
-    """(greatest |R(nu z(theta))| - 1, its theta) at a Courant number nu; in fractions if too small for floats."""
+    """Growth factor per step, minus 1, of the fastest growing wave at a Courant number, and phase of that wave [rad].
+
+    weights : face weights as in `limit_of`. Growth too small for floating point is computed in fractions.
+    """
     r = _function(method)
     theta = np.linspace(0.0, np.pi, 4001)
     for _ in range(6):
@@ -152,7 +167,10 @@ def growth_of(weights: Sequence[Fraction], method: str, courant: float) -> tuple
 
 
 def _slow_growth(weights: Sequence[Fraction], method: str, courant: Fraction) -> tuple[float, float]:
-    """`growth_of` in fractions, |R| - 1 = (|N|^2 - |D|^2) / (|D|^2 (1 + |R|)), on few waves, by repeated refinement."""
+    """Result of `growth_of`, computed in fractions on few waves, whose phases are refined repeatedly.
+
+    With R = N / D, |R| - 1 = (|N|^2 - |D|^2) / (|D|^2 (1 + |R|)).
+    """
     (r, _), a, q = _rational(method), real_part(weights), square(weights)
     theta = [k * math.pi / SLOW_WAVES for k in range(SLOW_WAVES + 1)]
     for _ in range(SLOW_ZOOMS):
@@ -169,7 +187,10 @@ def _slow_growth(weights: Sequence[Fraction], method: str, courant: Fraction) ->
 
 
 def _modulus(p: Polynomial, real: Fraction, size: Fraction) -> Fraction:
-    """|p(s)|^2 for s with this real part and |s|^2 = `size`: sum_jk p_j p_k |s|^2k Re(s^(j-k))."""
+    """|p(s)|^2 of the polynomial p at a complex s, from its real part and size = |s|^2.
+
+    It is the sum over j, k of p_j p_k |s|^2k Re(s^(j-k)).
+    """
     cosines = [Fraction(1), real]
     while len(cosines) <= p.degree:
         cosines.append(2 * real * cosines[-1] - size * cosines[-2])
@@ -199,7 +220,7 @@ def _is_a_stable(method: Method) -> bool:
 
 
 def _rational(method: str) -> tuple[StabilityFunction, Fraction]:
-    """(R with rational coefficients, relative size below which a coefficient of E is rounding)."""
+    """Stability function R with rational coefficients, and relative size below which a coefficient of E is rounding."""
     tableau, r = method_named(method), _function(method)
     parts = (*r.numerator.coefficients, *r.denominator.coefficients)
     exact = all(isinstance(x, Fraction) for x in parts)
@@ -219,10 +240,12 @@ def _fraction(x) -> Fraction:
 
 
 def _e_polynomial(weights: Sequence[Fraction], r: StabilityFunction, tolerance: Fraction) -> list[list[int]]:
-    """Integer coefficients of nu^m t^i of a positive multiple of E, without the common factors of its terms.
+    """Integer coefficients g[m][i] of nu^m t^i of a positive multiple of E, without the common factors of its terms.
 
+    n and d are the coefficients of numerator and denominator of r, z is the symbol of the scheme:
     E = sum_jk (d_j d_k - n_j n_k) nu^(j+k) Re(z^j conj(z)^k);
     Re(z^j conj(z)^k) = |z|^2k c_j-k, c_0 = 1, c_1 = Re z, c_m+1 = 2 Re z c_m - |z|^2 c_m-1.
+    tolerance : relative size below which a coefficient is rounding
     """
     size = max(r.numerator.degree, r.denominator.degree)
     pairs = (r.denominator, 1), (r.numerator, -1)
@@ -254,10 +277,11 @@ def _without_rounding(p: Polynomial, doubt: Polynomial, tolerance: Fraction) -> 
 
 
 def _reduced(rows: list[Polynomial]) -> list[list[int]]:
-    """Integer coefficients without nu^a and the common factor in t; empty for the zero polynomial.
+    """Integer coefficients g[m][i] of nu^m t^i, without common powers of nu and the common factor in t.
 
-    The common factor is zero where z is zero: at t = 0, and at t = 1 for central differences. If it changes its sign
-    in between, E is negative somewhere at every nu, and [[-1]] is returned.
+    rows : polynomials in t, one for each power of nu. The result is empty for the zero polynomial.
+    The common factor is zero where the symbol of the scheme is zero: at t = 0, and at t = 1 for central differences.
+    If it changes its sign in between, E is negative somewhere at every nu, and [[-1]] is returned.
     """
     while rows and rows[0].degree < 0:
         rows = rows[1:]
@@ -278,7 +302,7 @@ def _reduced(rows: list[Polynomial]) -> list[list[int]]:
 
 
 def _signs(p: Polynomial) -> set[int]:
-    """Signs of p on 0 < t < 1, without its zeros, in exact arithmetic."""
+    """Signs (-1, 1) that the polynomial p has on 0 < t < 1, in exact arithmetic."""
     changes = odd_part(p) if p.degree > 0 else p
     for end in (0, 1):
         while changes.degree > 0 and changes(Fraction(end)) == 0:
@@ -292,7 +316,10 @@ def _signs(p: Polynomial) -> set[int]:
 
 
 def _stable_ranges(weights: tuple, r: StabilityFunction, tolerance: Fraction, left_half_plane: bool):
-    """(stable ranges as pairs of edges, whether they are proved)."""
+    """Stable ranges of Courant numbers as pairs of `RangeEnd`, and True if they are proved.
+
+    r, tolerance : result of `_rational`; left_half_plane : True for an A-stable method
+    """
     if left_half_plane and 1 not in _signs(real_part(weights)):
         return ALL_STABLE, True
     return _cached_stable_ranges(weights, r.numerator.coefficients, r.denominator.coefficients, tolerance)
@@ -317,7 +344,10 @@ def _cached_stable_ranges(weights: tuple, numerator: tuple, denominator: tuple, 
 
 
 def _counterexample(g, low: float, high: float):
-    """Result of `negative_point` for the range, reduced by a margin at its finite ends."""
+    """Result of `negative_point` for Courant numbers from low to high, with a margin inside the finite ends.
+
+    g : integer coefficients from `_e_polynomial`
+    """
     start = Fraction(low) * (1 + MARGIN)
     if math.isfinite(high):
         return negative_point(g, start, Fraction(high) * (1 - MARGIN))
@@ -328,7 +358,11 @@ def _counterexample(g, low: float, high: float):
 
 
 def _fails_outside(g, gaps, rays) -> bool:
-    """True if a wave grows just outside each end, and at all small nu if no range starts at 0, in exact arithmetic."""
+    """True if a wave grows just outside each end of the stable ranges `gaps`, in exact arithmetic.
+
+    If no range starts at 0, a wave must also grow at all small Courant numbers.
+    g : integer coefficients from `_e_polynomial`; rays : tested values of t = sin^2(theta / 2)
+    """
     if (not gaps or gaps[0][0].courant > 0) and not any(_negative_at_small_nu(g, t) for t in rays):
         return False
     ends = [(low, 1 - MARGIN) for low, _ in gaps if low.courant > 0]
@@ -337,12 +371,15 @@ def _fails_outside(g, gaps, rays) -> bool:
 
 
 def _negative_at_small_nu(g, t: Fraction) -> bool:
-    """True if the polynomial at t is negative for all small nu > 0."""
+    """True if E(nu, t) with the coefficients g is negative for all small nu > 0."""
     return next((x < 0 for x in _coefficients_at(g, t) if x), False)
 
 
 def _candidates(g, rays: list[Fraction]):
-    """Stable ranges on the rays, with ends refined between the rays."""
+    """Ranges of Courant numbers that are stable for all tested t, with ends refined between the tested values.
+
+    g : integer coefficients from `_e_polynomial`; rays : tested values of t = sin^2(theta / 2), sorted
+    """
     unstable = sorted(range_ for t in rays for range_ in _negative(_coefficients_at(g, t)))
     gaps, at = [], 0.0
     for low, high in [*unstable, (math.inf, math.inf)]:
@@ -353,7 +390,7 @@ def _candidates(g, rays: list[Fraction]):
 
 
 def _sharpened(g, rays, low: float, high: float):
-    """Range with refined ends; None if it becomes empty."""
+    """Stable range from low to high with ends refined between the tested t in `rays`; None if it becomes empty."""
     inside = (low + high) / 2 if math.isfinite(high) else 2 * low + 1
     start = _edge(g, rays, inside, -1) if low > 0 else RangeEnd(0.0)
     end = _edge(g, rays, inside, 1) if math.isfinite(high) else RangeEnd(math.inf)
@@ -361,7 +398,11 @@ def _sharpened(g, rays, low: float, high: float):
 
 
 def _edge(g, rays: list[Fraction], inside: float, side: int) -> RangeEnd:
-    """End of the stable range around `inside`: the nearest change of sign over all t, by successive refinement."""
+    """End of the stable range that contains the Courant number `inside`.
+
+    It is the nearest change of sign of E over all t, found by successive refinement between the values `rays`.
+    side : 1 for the upper end, -1 for the lower end
+    """
 
     def reach(t: Fraction) -> float:
         ranges = _negative(_coefficients_at(g, t))
@@ -396,7 +437,10 @@ def _dyadic(x, bits: int) -> Fraction:
 
 
 def _coefficients_at(g, t: Fraction) -> np.ndarray:
-    """Coefficients in nu at t, each the nearest float to the exact one, up to a positive factor."""
+    """Coefficients of the powers of nu in E(nu, t) at t, as floats up to a common positive factor.
+
+    g : integer coefficients from `_e_polynomial`
+    """
     powers = [1]  # of the denominator of t, so that all numbers are integers
     for _ in range(len(g[0]) - 1):
         powers.append(powers[-1] * t.denominator)
@@ -411,7 +455,7 @@ def _coefficients_at(g, t: Fraction) -> np.ndarray:
 
 
 def _negative(p: np.ndarray) -> list[tuple[float, float]]:
-    """Ranges of nu > 0 where the polynomial is negative."""
+    """Ranges (low, high) of nu > 0 where the polynomial with coefficients p, lowest power first, is negative."""
     if not p.any():
         return []
     roots = np.roots(p[::-1])

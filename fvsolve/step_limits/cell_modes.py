@@ -1,7 +1,8 @@
 """Eigenvalues of cells at the start: friction, unsteady friction, wall creep, decay and diffusion of scalars.
 
-Friction of slope g = d drag / d M couples the two waves of a pipe: with the symbol q z of a wave that crosses q cells a
-second, s = q Re z - g / 2 +- sqrt(g^2 / 4 - (q Im z)^2).
+Friction couples the two waves of a pipe. With the slope g [1/s] of the friction force over the mass flow, the rate q of
+cells that a wave crosses [1/s], and the symbol z of the scheme, the eigenvalues are
+s = q Re z - g / 2 +- sqrt(g^2 / 4 - (q Im z)^2).
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ Modes = list[tuple[str, np.ndarray]]  # places and eigenvalues there [1/s]
 
 
 def cell_modes(model) -> Modes:
-    """All modes of cells."""
+    """All modes of cells: pairs of the name of the part and the eigenvalues there [1/s]."""
     return [*friction_modes(model), *memory_modes(model), *pipe_scalar_modes(model), *basin_scalar_modes(model)]
 
 
@@ -43,14 +44,21 @@ def friction_modes(model) -> Modes:
 
 @functools.lru_cache(maxsize=256)
 def pipe_symbol(weights: tuple, n: int) -> np.ndarray:
-    """Symbol of waves between the ends of n cells."""
+    """Symbol of a scheme (complex rate of a wave, in cells per time) for waves between the ends of a pipe of n cells.
+
+    weights : weights of cells in the value at a face
+    """
     values = symbol(weights, PHASES * (1.0 - 0.5 / n))
     values.flags.writeable = False
     return values
 
 
 def memory_modes(model) -> Modes:
-    """Modes of unsteady friction and creeping walls: fastest term, with the gain of all terms and the friction."""
+    """Modes of unsteady friction and creeping walls: one estimate of the fastest decay for each pipe.
+
+    It is the rate of the fastest memory term plus the gains of all terms, and for unsteady friction plus the slope of
+    the steady friction.
+    """
     modes, floats = [], model.tables.floats
     for mesh, row in zip(model.pipes, model.tables.pipes, strict=True):
         if row["terms"] > 0:
@@ -63,7 +71,7 @@ def memory_modes(model) -> Modes:
 
 
 def friction_slope(row) -> float:
-    """Slope d drag / d M of a pipe at the initial flow [1/s]."""
+    """Slope of the friction force per length over the mass flow [1/s], at the initial flow; row : data of the pipe."""
     return float(drag_slope(*(row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds", "flow"))))
 
 
@@ -79,7 +87,7 @@ def pipe_scalar_modes(model) -> Modes:
 
 
 def basin_scalar_modes(model) -> Modes:
-    """Modes of scalars in basins, with diffusion at its shortest wave."""
+    """Modes of scalars in basins: decay, and diffusion of the shortest wave of the mesh."""
     return [
         (f"{basin.name}.{name}", np.array([-scalar.decay - scalar.diffusivity * greatest_diffusion_rate(basin.mesh)]))
         for name, scalar in model.case.scalars.items()

@@ -1,10 +1,11 @@
-"""Growth of waves between a store and the far end of a delay line: reflection factor of a method.
+"""Growth of waves between a storing node and the far end of a delay line: reflection factor of a time method.
 
-A store whose pressure follows its inflow, p' = k (2 w - Y p) with an arriving wave w, reflects Y p - w. Under a method
-with R(z), b, A, c and a = h k Y this is S w, S = 2 a b (I + a A)^-1 exp(i theta c) / (exp(i theta) - R(-a)) - 1, for a
-wave with phase theta per step, where exp(i theta c) is the line read at the stages. |S| <= 1 under the trapezoidal rule
-at any step, but not under Euler, nor under the implicit midpoint rule, which has no stage at the end of the step: such
-waves grow, unless interpolation of the line between steps or friction damps them as much.
+The pressure p of a storing node with stiffness k [Pa/kg] follows dp/dt = k (2 w - Y p), with an arriving wave w [kg/s]
+and the admittance Y of the line; the node reflects the wave Y p - w. Let a = h k Y with the step h, let A, b, c be the
+coefficients of the Runge-Kutta method and R its stability function. A wave with the phase theta per step is then
+reflected with the factor S = 2 a b (I + a A)^-1 exp(i theta c) / (exp(i theta) - R(-a)) - 1. |S| <= 1 under the
+trapezoidal rule at any step, but not under Euler, nor under the implicit midpoint rule, which has no stage at the end
+of the step: there waves grow, unless friction or the interpolation between steps damps them as much.
 """
 
 from __future__ import annotations
@@ -24,9 +25,11 @@ ANGLES = np.pi * (np.arange(720) + 1.0) / 720.0  # phases theta per step
 
 
 def wave_growth(model, method: Method, h: float, span: float) -> tuple[float, str, float]:
-    """(growth factor of waves of a line in a run, store with the greatest growth, h k Y).
+    """Growth factor in a run of waves between a storing node and a delay line, name of the node, h k Y there.
 
-    Far ends reflect fully. The factor is 0 without such stores, and for Rosenbrock methods, where it is not computed.
+    h : step [s]; k : stiffness of the node [Pa/kg]; Y : admittance of its lines; span : duration of the run [s]
+    The node is the one with the greatest growth; far ends of lines reflect fully. The factor is 0 without storing
+    nodes at delay lines, and for Rosenbrock methods, where it is not computed.
     """
     candidates = []
     if method.kind == "linear":  # Rosenbrock: stages use the time slope of arriving waves
@@ -46,7 +49,10 @@ def wave_growth(model, method: Method, h: float, span: float) -> tuple[float, st
 
 
 def line_growth_notices(model, method: Method, h: float, span: float) -> list[Notice]:
-    """Notice for the store where waves of a delay line grow most, if they grow."""
+    """Notice for the storing node where waves of a delay line grow most; an empty list if they do not grow.
+
+    h : step [s]; span : duration of the run [s]
+    """
     grows, name, a = wave_growth(model, method, h, span)
     if grows < LEAST_GROWTH:
         return []
@@ -59,7 +65,10 @@ def line_growth_notices(model, method: Method, h: float, span: float) -> list[No
 
 
 def storing_nodes(model, h: float):
-    """(name, number, h k Y) of storing nodes connected to delay lines."""
+    """Name, number and h k Y of each storing node that is connected to delay lines.
+
+    h : step [s]; k : stiffness of the node [Pa/kg]; Y : admittance of its lines [kg/s per Pa]
+    """
     nodes, out = model.tables.nodes, None
     for i, (name, node) in enumerate(zip(model.case.places, nodes, strict=True)):
         if node["line_count"] == 0 or node["kind"] in (rec.FIXED, rec.JUNCTION, rec.PATCH):
@@ -78,14 +87,17 @@ def lines_at(model, i: int):
 
 
 def reflection_factor(method: Method, a: float, steps: float) -> np.ndarray:
-    """Reflection factor S of waves with phases ANGLES per step, read `steps` steps after they were sent."""
+    """Complex reflection factor of a storing node for waves with the phases ANGLES per step : complex[720].
+
+    a : h k Y of the node, see `storing_nodes`; steps : delay of the line in steps
+    """
     solved = np.linalg.solve((np.eye(method.stages) + a * method.a).T, method.b)
     seen = np.array([interpolation_factor(steps - c) for c in method.c])
     return 2.0 * a * (solved @ seen) / (np.exp(1j * ANGLES) - (1.0 - a * solved.sum())) - interpolation_factor(steps)
 
 
 def interpolation_factor(steps: float) -> np.ndarray:
-    """Interpolated value of waves with phases ANGLES per step, read `steps` steps after they were sent."""
+    """Complex factor of waves with the phases ANGLES per step, interpolated `steps` steps after they were sent."""
     steps_up = int(np.ceil(steps - 1e-9))
     x = max(0.0, steps_up - steps)
     weights = lagrange_six(x) if steps_up >= 3 else lagrange_four(x) if steps_up >= 2 else lagrange_three(x)

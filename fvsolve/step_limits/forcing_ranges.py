@@ -9,7 +9,10 @@ FORCING_KEYS = {"pressure": "pressure", "head": "head", "demand": "flow", "flow"
 
 
 def forcing_sizes(model) -> np.ndarray:
-    """Largest size that the forcing gives to states of pipes and basins; FAR scale for other states : float64[n]."""
+    """Largest size that schedules and initial values can give to each state : float64[n].
+
+    It is computed for cells of pipes and basins; for delay lines and other states it is 1000 times their scale or more.
+    """
     largest, linear = OTHER_STATES * model.scale, model.case.properties
     pressure, flow = pressure_and_flow_range(model)
     pipes = model.tables.pipes
@@ -57,7 +60,10 @@ def states_outside_cells(model) -> np.ndarray:
 
 
 def state_ranges(model, share: float = 1.0) -> np.ndarray:
-    """Ranges of states: contents of vessels over the range of pressures; for others `share` of scale : float64[n]."""
+    """Range of each state : float64[n].
+
+    It is the change of mass of a storing node over the range of pressures, and `share` times the scale of other states.
+    """
     ranges, spread = share * model.scale, pressure_and_flow_range(model)[0]
     for row in model.tables.nodes:
         if row["y"] >= 0 and row["stiffness"] > 0.0 and spread > 0.0:

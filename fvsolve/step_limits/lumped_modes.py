@@ -1,9 +1,10 @@
 """Greatest fixed step for modes other than plain waves: vessels, columns, bodies, devices, friction, scalars.
 
-It is estimated at the start, from the eigenvalues of the rates of all states outside cells, with the cells held
-constant, and the modes of cells (`limits.cells`). The method multiplies a deviation by |R(h s)| in a step, the exact
-solution by |exp(h s)|; the quotient is the growth by the method. Slopes are differences over a hundredth of the forcing
-range: the slope of a valve at zero pressure drop is infinite, and smaller oscillations about it are not relevant.
+It is estimated at the start, from the eigenvalues s of the rates of all states outside cells, with the cells held
+constant, and from the modes of cells (`step_limits.cell_modes`). In a step h the method multiplies a deviation by
+|R(h s)|, with its stability function R, and the exact solution by |exp(h s)|; the quotient is the growth by the method.
+Slopes are differences over a hundredth of the forcing range: the slope of a valve at zero pressure drop is infinite,
+and smaller oscillations about it are not relevant.
 """
 
 from __future__ import annotations
@@ -28,12 +29,11 @@ RESOLVED = 1.0  # |h s| up to which a mode is resolved by the steps, and grows a
 
 
 class Mode(NamedTuple):
-    """Mode with the greatest growth in the run: its place, its growth factor, and its greatest stable step [s].
+    """Mode with the greatest growth in the run.
 
-    own : True for states outside cells, which may leave the initial state before they have grown, or be bounded by
-    nonlinear laws
-    followed : True if the steps resolve the mode
-    frequency : of its oscillation [Hz]
+    place : name of the part or state; growth : growth factor in the run; limit : greatest stable step [s]
+    outside_cells : True for states outside cells, whose growth may end because the state changes or a law bounds it
+    resolved : True if the steps resolve the mode; frequency : frequency of its oscillation [Hz]
     """
 
     place: str
@@ -45,7 +45,7 @@ class Mode(NamedTuple):
 
 
 def lumped_modes(model, method: str, step: float) -> list[Mode]:
-    """Fastest growing modes under a fixed step [s]: of states outside cells, and of cells.
+    """Fastest growing mode of the states outside cells, and of the cells, with a step `step` [s]; only growing modes.
 
     Raises FvsolveError for a method without a stability function.
     """
@@ -58,7 +58,10 @@ def lumped_modes(model, method: str, step: float) -> list[Mode]:
 
 
 def fastest_growing(r, modes: Modes, step: float, span: float, own: bool, enough: float = LEAST_GROWTH) -> Mode | None:
-    """Mode with the greatest growth, if it grows by the factor `enough` within the span [s]; else None."""
+    """Mode with the greatest growth, if it grows by the factor `enough` in a run of `span` [s]; otherwise None.
+
+    r : stability function of the method; step : time step [s]; own : True if the modes are of states outside cells
+    """
     if not modes:
         return None
     s = np.concatenate([values for _, values in modes])
@@ -81,19 +84,22 @@ def fastest_growing(r, modes: Modes, step: float, span: float, own: bool, enough
 
 
 def excess_growth(r, s: np.ndarray, h: float) -> np.ndarray:
-    """Growth factor of each mode in a step, over its exact growth factor (at least 1), less 1."""
+    """Growth factor of each mode in a step, divided by the exact growth factor (at least 1), minus 1.
+
+    r : stability function of the method; s : eigenvalues of the modes [1/s]; h : time step [s]
+    """
     with np.errstate(over="ignore", invalid="ignore"):
         ratio = np.abs(r(h * s)) / np.exp(np.maximum(h * s.real, 0.0))
         return (ratio if np.isfinite(ratio).all() else np.nan_to_num(ratio, nan=np.inf)) - 1.0
 
 
 def growth_factor(excess: float, steps: float) -> float:
-    """(1 + excess)^steps, limited to exp(700); 1 for a negative excess."""
+    """Growth factor (1 + excess)^steps over a number of steps, at most exp(700); 1 for a negative excess."""
     return math.exp(min(700.0, steps * math.log1p(max(excess, 0.0))))
 
 
 def modes_outside_cells(model) -> Modes:
-    """Eigenvalues of the states outside cells at the start, each with the state of its greatest component."""
+    """Eigenvalues [1/s] of the states outside cells at the start, each with the name of the state that moves most."""
     states = states_outside_cells(model)
     if not 0 < states.size <= MOST:
         return []

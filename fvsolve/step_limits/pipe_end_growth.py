@@ -1,9 +1,10 @@
 """Courant limit of a pipe of few cells, whose ends reduce the limit.
 
-A wave through n cells follows dr/dt = A r + b in, out = v r, in units of cells a second: `in` is the value at the
-upstream end, `out` that of the polynomial at the downstream end. The outgoing wave returns as the other wave. So a pipe
-whose ends reflect p and q of a pressure has the eigenvalues of A + s b v, s^2 = p q: 1 between two open or two shut
-ends, -1 between an open and a shut end, 0 without reflection.
+A wave with the values r in n cells follows dr/dt = A r + b r_in, r_out = v r, in units of cells a second. Here r_in is
+the wave that enters at the upstream end, and r_out the wave that leaves at the downstream end, by extrapolation. The
+leaving wave returns as the opposite wave. So a pipe with the pressure reflection factors p and q at its ends has the
+eigenvalues of A + s b v with s^2 = p q: 1 between two open or two shut ends, -1 between an open and a shut end, 0
+without reflection.
 """
 
 from __future__ import annotations
@@ -26,9 +27,9 @@ LOWEST, HIGHEST, RISE, HALVINGS = 1.0 / 64.0, 64.0, 1.02, 40  # range of trial C
 
 @functools.lru_cache(maxsize=1024)
 def pipe_limit(scheme: str, method: str, cells: int, returned: tuple[float, ...] = WORST) -> float:
-    """Greatest Courant number up to which no mode of a pipe of so many cells grows; 0 if modes always grow.
+    """Greatest Courant number up to which no mode of a pipe of `cells` cells grows; 0 if modes always grow.
 
-    returned : products p q of the reflections; the limit holds for all of them
+    returned : products of the pressure reflection factors at both ends; the limit holds for all of these products
     """
 
     def holds(courant: float) -> bool:
@@ -45,21 +46,30 @@ def pipe_limit(scheme: str, method: str, cells: int, returned: tuple[float, ...]
 
 @functools.lru_cache(maxsize=4096)
 def pipe_growth(scheme: str, method: str, cells: int, courant: float, returned: tuple[float, ...] = WORST) -> float:
-    """Greatest growth factor of a mode in a step, less 1; negative if all modes decay."""
+    """Greatest growth factor of a mode of a pipe in a step, minus 1; negative if all modes decay.
+
+    returned : products of the pressure reflection factors at both ends
+    """
     r = stability_function(method_named(method))
     return float(np.abs(r(courant * pipe_modes(scheme, cells, returned))).max()) - 1.0
 
 
 @functools.lru_cache(maxsize=1024)
 def pipe_modes(scheme: str, cells: int, returned: tuple[float, ...] = WORST) -> np.ndarray:
-    """Eigenvalues of a pipe in units of the cell rate, for given products of the end reflections : complex[m]."""
+    """Eigenvalues of the waves in a pipe, divided by the cells that a wave crosses per second : complex[m].
+
+    returned : products of the pressure reflection factors at both ends
+    """
     a, b, v = wave_matrices((SCHEMES[scheme].shorter or scheme) if cells < LEAST_CELLS else scheme, cells)
     roots = [sign * np.sqrt(complex(product)) for product in returned for sign in (1.0, -1.0)]
     return np.concatenate([np.linalg.eigvals(a + s * np.outer(b, v)) for s in roots])
 
 
 def wave_matrices(scheme: str, cells: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(A, b, v) of a wave through a pipe, with the end closures of `kernels.pipes` and `kernels.ends`."""
+    """Matrices A, b, v of dr/dt = A r + b r_in, r_out = v r for a wave r through a pipe of `cells` cells.
+
+    r_in is the wave that enters, r_out the wave that leaves, extrapolated as in `kernels.ghost_cells`.
+    """
     degree, weights = SCHEMES[scheme].degree, [float(w) for w in weights_of(scheme)]
     known = np.eye(cells + 1)  # rows: the datum, then the cells
     near, far = known, known[:0:-1]  # from the upstream end, from the downstream end

@@ -1,14 +1,17 @@
 """Courant limit of waves and of advection on a uniform grid in the plane (von Neumann).
 
-Waves p, u, v of speed c, with each direction split into its characteristics: with the symbol z(theta) = a + i b and
-shares w_x + w_y = 1 of the rate c / dx + c / dy, a wave of phases (theta_x, theta_y) follows du/dt = rate M u,
+Waves of pressure p and velocities u, v have the speed c; each direction is split into its characteristics. The symbol
+of the scheme at the phase theta per cell is z(theta) = a + i b. The wave rate is c / dx + c / dy; its fractions in x
+and y are w_x and w_y. For a wave with the phases (theta_x, theta_y) per cell, the rate of change of (p, u, v) is the
+wave rate times M (p, u, v), with
 
     M = [ w_x a_x + w_y a_y   i w_x b_x   i w_y b_y ]
         [ i w_x b_x           w_x a_x     0         ]
         [ i w_y b_y           0           w_y a_y   ]
 
-and an advected quantity w_x z(theta_x) + w_y z(theta_y). Growth of a single wave proves that a Courant number is
-unstable: so growth above the computed limit is proved; below it, only phases between the tested phases are not covered.
+An advected quantity has the single eigenvalue w_x z(theta_x) + w_y z(theta_y) in place of M. Growth of a single wave
+proves that a Courant number is unstable, so growth above the computed limit is proved. Below the limit, phases between
+the tested phases are not covered.
 """
 
 from __future__ import annotations
@@ -32,7 +35,8 @@ MARGIN = 1.01  # margin of the Courant number: a step stable with it needs no fu
 def plane_limit(scheme: str, method: str, share: float, waves: bool = True) -> float:
     """Greatest Courant number, rate times step, up to which no wave grows; 0 if waves always grow.
 
-    share : share of the rate in x; waves : True for waves p, u, v, False for advection
+    share : fraction of the wave rate c / dx + c / dy in x
+    waves : True for waves of pressure and velocity, False for advection
     Raises FvsolveError for a nonlinear scheme.
     """
     z = plane_eigenvalues(scheme, share, waves)
@@ -53,7 +57,10 @@ def plane_limit(scheme: str, method: str, share: float, waves: bool = True) -> f
 
 @functools.lru_cache(maxsize=1024)
 def is_stable_with_margin(scheme: str, method: str, courant: float, share: float = 1.0, waves: bool = False) -> bool:
-    """True if no tested wave grows at a Courant number, nor at a Courant number 1 % greater."""
+    """True if no tested wave grows at a Courant number, nor at a Courant number 1 % greater.
+
+    Arguments are as for `plane_limit`; with share = 1 and no waves it is advection along a line.
+    """
     if share == 1.0 and not waves:
         z = symbol(weights_of(scheme), np.linspace(0.0, np.pi, FINE))
     else:
@@ -62,12 +69,12 @@ def is_stable_with_margin(scheme: str, method: str, courant: float, share: float
 
 
 def is_unstable(z: np.ndarray, method: str, courant: float) -> bool:
-    """True if |R| exceeds 1 for an eigenvalue z, given for a rate of 1."""
+    """True if a wave grows in a step at a Courant number; z : eigenvalues for a wave rate of 1."""
     return bool(np.abs(stability_function(method_named(method))(courant * z)).max() > 1.0 + GROWTH)
 
 
 def plane_eigenvalues(scheme: str, share: float, waves: bool) -> np.ndarray:
-    """Eigenvalues of M over all pairs of phases, for a rate of 1."""
+    """Eigenvalues of the waves (or of advection) for all tested pairs of phases in x and y, for a wave rate of 1."""
     weights = weights_of(scheme)
     x, y = np.meshgrid(np.linspace(0.0, np.pi, PHASES), np.linspace(-np.pi, np.pi, 2 * PHASES - 1))
     zx, zy = share * symbol(weights, x), (1.0 - share) * symbol(weights, y)

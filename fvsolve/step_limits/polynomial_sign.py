@@ -1,9 +1,9 @@
 """Sign of a polynomial in two variables on a box, proved in integers.
 
-In Bernstein's basis a polynomial lies between its least and its greatest coefficient. Coefficients at the corners are
-values of the polynomial; bisection of the box moves the coefficients towards the values (Lane and Riesenfeld 1981).
-Coefficients are integer multiples of 2^-BITS of the largest coefficient, rounded down, so that a proof of their sign
-holds for the polynomial.
+A polynomial lies between its least and its greatest coefficient in Bernstein's basis. Coefficients at the corners of
+the box are values of the polynomial there. Bisection of the box moves all coefficients towards values of the polynomial
+(Lane and Riesenfeld 1981). Coefficients are rounded down to integer multiples of 2^-400 of the largest coefficient, so
+that a proof that they are not negative holds for the polynomial.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Matrix = Sequence[Sequence[int]]  # g[m][i] of x^m y^i
 
 
 def polynomial_value(g: Matrix, x: Fraction, y: Fraction) -> Fraction:
-    """sum g[m][i] x^m y^i."""
+    """Value of the polynomial sum g[m][i] x^m y^i at (x, y)."""
     total = Fraction(0)
     for row in reversed(g):
         inner = Fraction(0)
@@ -32,7 +32,11 @@ def polynomial_value(g: Matrix, x: Fraction, y: Fraction) -> Fraction:
 
 
 def negative_point(g: Matrix, low: Fraction, high: Fraction) -> tuple[Fraction, Fraction] | str | None:
-    """None where g >= 0 for all low <= x <= high, 0 <= y <= 1; else a point where g < 0, or "open" if undecided."""
+    """Point (x, y) with low <= x <= high, 0 <= y <= 1 where the polynomial g is negative.
+
+    g : coefficients g[m][i] of x^m y^i
+    Returns None if g >= 0 in the whole box, and "open" if the search ends undecided.
+    """
     boxes, seen = [(_bernstein(g, low, high), low, high, Fraction(0), Fraction(1))], 0
     while boxes:
         b, x0, x1, y0, y1 = boxes.pop()
@@ -56,7 +60,7 @@ def negative_point(g: Matrix, low: Fraction, high: Fraction) -> tuple[Fraction, 
 
 
 def _bernstein(g: Matrix, low: Fraction, high: Fraction) -> np.ndarray:
-    """Bernstein coefficients on low..high x 0..1, up to a positive factor, rounded down."""
+    """Bernstein coefficients of the polynomial g on low <= x <= high, 0 <= y <= 1, scaled to integers, rounded down."""
     a = np.array([[Fraction(entry) for entry in row] for row in g], dtype=object)
     for k in range(a.shape[0] - 1):  # x = low + s, by repeated Horner schemes
         for m in range(a.shape[0] - 2, k - 1, -1):
@@ -73,13 +77,16 @@ def _bernstein(g: Matrix, low: Fraction, high: Fraction) -> np.ndarray:
 
 
 def _to_bernstein(a: np.ndarray) -> np.ndarray:
-    """Convert from powers to Bernstein's basis along the first axis: b_j = sum_i C(j, i) / C(n, i) a_i."""
+    """Convert coefficients a of powers to Bernstein's basis along the first axis.
+
+    b_j = sum_i C(j, i) / C(n, i) a_i, with binomial coefficients C and the degree n.
+    """
     n = a.shape[0] - 1
     return np.array([sum(Fraction(comb(j, i), comb(n, i)) * a[i] for i in range(j + 1)) for j in range(n + 1)])
 
 
 def _bisect(b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficients on both halves of the first axis (de Casteljau), rounded down."""
+    """Bernstein coefficients on both halves of a box along the first axis (de Casteljau), rounded down."""
     left, right, now = [b[0]], [b[-1]], b
     for _ in range(b.shape[0] - 1):
         now = (now[:-1] + now[1:]) >> 1
@@ -89,7 +96,7 @@ def _bisect(b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _curvature(b: np.ndarray) -> int:
-    """Deviation of the coefficients from a straight line along the first axis, times the square of the degree."""
+    """Greatest second difference of the coefficients along the first axis, times the square of the degree."""
     if b.shape[0] < 3:
         return 0
     return max(abs(difference) for difference in (b[:-2] - 2 * b[1:-1] + b[2:]).flat) * (b.shape[0] - 1) ** 2

@@ -1,9 +1,9 @@
 """Notices for the pipes, basins and modes of a model whose step exceeds the limit of scheme and method.
 
-For linear schemes and waves that do not depend on the state the limit is proved: von Neumann's limit. Limited schemes
-count as their linear scheme in smooth flow, and waves that depend on the state by the fastest wave: these limits are
-estimates. So is the limit of a pipe of few cells, which its ends reduce; there the growth in the run decides, computed
-with the reflections of its own ends.
+For linear schemes with a constant wave speed the limit is proved: von Neumann's limit. Other limits are estimates: a
+limited scheme is treated as its linear scheme in smooth flow, and a variable wave speed as the fastest wave. The limit
+of a pipe of few cells, which its ends reduce, is an estimate too; there the notice depends on the growth in the run,
+computed with the reflection factors of the pipe's ends.
 """
 
 from __future__ import annotations
@@ -40,7 +40,10 @@ LIMITED_EXCESS = (
 
 
 class CourantCheck(NamedTuple):
-    """Courant number of a pipe or a basin and its limit, both defined as `numerics.courant`."""
+    """Comparison of the Courant number of a pipe or a basin with its limit, both defined as in `numerics.courant`.
+
+    place : key path of the part; proved : True if the limit is proved; location : kind of grid, for the text
+    """
 
     place: str
     courant: float
@@ -57,9 +60,10 @@ def step_limits(
 ) -> list[Notice]:
     """Notices for the worst pipe, for basins, and for modes other than waves, whose step exceeds its limit.
 
-    rates : greatest wave rate of each basin in the run so far, by name [1/s]; default the initial rates
-    step_error : greatest mean error of a state in the run, relative to its range (`solve.halves`); None before a run
-    run_data : data of a run to evaluate with, reset afterwards
+    rates : greatest wave rate of each basin in the run so far, by name [1/s]; default: the initial rates
+    step_error : greatest mean error of a state in the run, relative to its range (`solve.step_doubling`); None before
+    a run
+    run_data : data of a run, used to compute the initial rates and reset afterwards
     Returns no notices under error control.
     """
     numerics = model.case.numerics
@@ -89,7 +93,7 @@ def step_limits(
 
 
 def first_step(model, run_data: RunData | None = None) -> float:
-    """Step of a run, under a Courant number its first step; 0 where it is unknown [s]."""
+    """Given step of a run, or its first step under a given Courant number [s]; 0 if the step is unknown."""
     numerics = model.case.numerics
     if numerics.step is not None:
         return numerics.step
@@ -102,13 +106,17 @@ def first_step(model, run_data: RunData | None = None) -> float:
 
 
 def given_step(model) -> float:
-    """Step used for delay lines [s]."""
+    """Given step of a run [s], or the step that follows from the Courant number and the initial wave rate."""
     numerics = model.case.numerics
     return numerics.step if numerics.step is not None else numerics.courant / model.wave_rate
 
 
 def mode_notice(case, h: float, mode: Mode, method: str, step_error: float | None, jumps: bool) -> Notice:
-    """Notice for a growing mode; after a run, with the measured error of its steps."""
+    """Notice for a mode that grows with steps of h [s].
+
+    step_error : measured mean error of a state after a run, relative to its range; None before a run
+    jumps : True if a schedule has a jump
+    """
     numerics = case.numerics
     seen = (
         step_error is None or not mode.outside_cells or step_error >= WRONG or (mode.resolved and step_error > NO_ERROR)
@@ -132,7 +140,7 @@ def mode_notice(case, h: float, mode: Mode, method: str, step_error: float | Non
 
 
 def pipe_checks(model, method: str) -> list[CourantCheck]:
-    """Check of the pipe that is farthest beyond its limit; empty without such a pipe."""
+    """Check of the pipe that is farthest beyond its limit, as a list; empty if no pipe is beyond its limit."""
     own = model.tables.pipes["delay"] < 0  # pipes divided into cells
     if not own.any():
         return []
@@ -155,7 +163,7 @@ def pipe_checks(model, method: str) -> list[CourantCheck]:
 
 
 def long_pipe(model, method: str, k: int, courant: float) -> list[CourantCheck]:
-    """Check of pipe k as a grid without ends, if a wave grows on it."""
+    """Check of pipe number k as a grid without ends, as a list; empty if no wave grows at the Courant number."""
     scheme = smooth_scheme(model.case.numerics.scheme)[0]
     if is_stable_with_margin(scheme, method, courant):
         return []
@@ -174,7 +182,7 @@ def proved(model) -> bool:
 
 
 def short_pipe(model, method: str, k: int, courant: float) -> CourantCheck | None:
-    """Check of pipe k of few cells, if its waves grow within the run with reflections at its ends."""
+    """Check of pipe number k, of few cells; None if waves with reflections at its ends do not grow in the run."""
     cells, own_scheme = model.pipes[k].cells, SCHEMES[model.case.numerics.scheme]
     scheme, limited = smooth_scheme(
         own_scheme.shorter if own_scheme.limited and own_scheme.shorter else own_scheme.name
@@ -191,9 +199,9 @@ def short_pipe(model, method: str, k: int, courant: float) -> CourantCheck | Non
 
 
 def reflection_products(model, k: int) -> tuple[float, ...]:
-    """Products of the pressure reflection factors of both ends of pipe k.
+    """Possible products of the pressure reflection factors of both ends of pipe number k.
 
-    An end with other parts than pipes has two possible factors.
+    An end joined to other parts than pipes has two possible factors: that of the pipes alone and -1 (open end).
     """
     row, nodes, valves = model.tables.pipes[k], model.tables.nodes, model.tables.valves
     ends = []
@@ -206,7 +214,11 @@ def reflection_products(model, k: int) -> tuple[float, ...]:
 
 
 def basin_checks(model, method: str, rates: dict[str, float]) -> list[CourantCheck]:
-    """Checks of all basins whose waves grow; Courant numbers are those of the parts of a cell that its steps use."""
+    """Checks of all basins whose waves grow.
+
+    rates : greatest wave rate of each basin in the run so far, by name [1/s]. Courant numbers count the parts of a cell
+    if the basin's time step uses parts of cells.
+    """
     numerics, checks = model.case.numerics, []
     for basin, row in zip(model.basins, model.tables.basins, strict=True):
         rate, share = basin.max_rate(model.start)
@@ -238,7 +250,7 @@ def span(model) -> float:
 
 
 def smooth_scheme(scheme: str) -> tuple[str, bool]:
-    """(linear scheme equal to a scheme in smooth flow, True if the scheme is limited)."""
+    """Name of the linear scheme that a scheme equals in smooth flow, and True if the scheme has a limiter."""
     return SCHEMES[scheme].smooth.name, SCHEMES[scheme].limited
 
 
@@ -271,7 +283,7 @@ def courant_notice(model, check: CourantCheck, method: str) -> Notice:
 
 
 def growth(scheme: str, method: str, courant: float, crossed: float) -> float:
-    """Growth factor of the fastest growing wave of a uniform grid while waves cross `crossed` cells."""
+    """Growth factor of the fastest growing wave on a uniform grid in the time in which waves cross `crossed` cells."""
     return growth_factor(growth_of(weights_of(scheme), method, courant)[0], crossed / courant)
 
 

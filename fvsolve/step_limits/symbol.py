@@ -1,8 +1,9 @@
 """Symbol of a linear scheme: rate of a wave on a uniform periodic grid, in exact arithmetic.
 
-u_t + a u_x = 0 in cells of width dx: du_j/dt = -(a / dx) (F_j - F_j-1), F_j = sum_k w_k u_j+k-2. A wave
-u_j = exp(i j theta) grows by du/dt = (a / dx) z(theta) u. With t = sin^2(theta / 2) both Re z and |z|^2 are
-polynomials in t, 0 (longest waves) <= t <= 1 (two cells a wave).
+Advection u_t + a u_x = 0 of a quantity u at speed a, in cells of width dx, is computed as
+du_j/dt = -(a / dx) (F_j - F_j-1), with the face values F_j = sum_k w_k u_j+k-2 and the weights w_0 .. w_4 of the scheme.
+A wave u_j = exp(i j theta) changes by du/dt = (a / dx) z(theta) u; z is the symbol. Both Re z and |z|^2 are polynomials
+in t = sin^2(theta / 2), from t = 0 (longest waves) to t = 1 (two cells a wave).
 """
 
 from __future__ import annotations
@@ -20,7 +21,10 @@ WEIGHTS: dict[str, Weights] = {name: scheme.weights for name, scheme in LINEAR.i
 
 
 def weights_of(scheme: str) -> Weights:
-    """Weights of cells u-2 .. u+2 in the value at the face after u; raises FvsolveError for a nonlinear scheme."""
+    """Five weights of a linear scheme: of the cells from two upstream to two downstream of a cell, at its outflow face.
+
+    Raises FvsolveError for a nonlinear scheme.
+    """
     if scheme in WEIGHTS:
         return WEIGHTS[scheme]
     linear = ", ".join(WEIGHTS)
@@ -32,18 +36,21 @@ def weights_of(scheme: str) -> Weights:
 
 
 def symbol(weights: Sequence, theta) -> np.ndarray:
-    """z(theta) in floating point; theta : phase per cell [rad], a number or an array."""
+    """Symbol z(theta) of a scheme in floating point : complex array like theta.
+
+    weights : weights of five cells in a face value; theta : phase of the wave per cell [rad], a number or an array
+    """
     theta = np.asarray(theta, dtype=float)
     return sum(float(a) * np.exp(1j * m * theta) for m, a in _waves(weights).items())
 
 
 def real_part(weights: Sequence) -> Polynomial:
-    """Re z as a polynomial in t."""
+    """Real part of the symbol z of a scheme, as a polynomial in t = sin^2(theta / 2)."""
     return _cosines(_waves(weights))
 
 
 def square(weights: Sequence) -> Polynomial:
-    """|z|^2 as a polynomial in t."""
+    """|z|^2 of the symbol z of a scheme, as a polynomial in t = sin^2(theta / 2)."""
     waves, product = _waves(weights), {}
     for m, x in waves.items():
         for n, y in waves.items():
@@ -52,7 +59,7 @@ def square(weights: Sequence) -> Polynomial:
 
 
 def _waves(weights: Sequence) -> dict[int, Fraction]:
-    """z = sum_m a_m exp(i m theta)."""
+    """Amplitudes a_m of the symbol z = sum_m a_m exp(i m theta) of a scheme, by m."""
     amplitudes: dict[int, Fraction] = {}
     for k, w in enumerate(weights, start=-2):
         amplitudes[k] = amplitudes.get(k, Fraction(0)) - w
@@ -61,7 +68,10 @@ def _waves(weights: Sequence) -> dict[int, Fraction]:
 
 
 def _cosines(waves: dict[int, Fraction]) -> Polynomial:
-    """sum_m a_m cos(m theta), cos theta = 1 - 2 t, by T_m+1 = 2 (1 - 2 t) T_m - T_m-1."""
+    """Polynomial in t = sin^2(theta / 2) equal to sum_m a_m cos(m theta), with the amplitudes a_m in `waves`.
+
+    The cosines follow from cos theta = 1 - 2 t by the recurrence T_m+1 = 2 (1 - 2 t) T_m - T_m-1.
+    """
     cosine = Polynomial([1, -2])
     before, now, total = cosine, Polynomial([1]), Polynomial([])
     for m in range(max(abs(m) for m in waves) + 1):

@@ -1,8 +1,8 @@
-"""Growth of undamped oscillations under a Courant number, by methods unstable on the whole imaginary axis.
+"""Growth of undamped oscillations under methods that are unstable on the whole imaginary axis, at a Courant number.
 
-A Courant number bounds modes that decay, and waves, where the scheme damps the growth of such methods. A body on a
-spring has no such damping: it grows by |R(i w h)| in every step, however short, for ssp-rk2 sqrt(1 + (w h)^4 / 4). The
-growth is estimated at the start.
+A given Courant number limits modes that decay; in waves the scheme damps the growth. A body on a spring has no such
+damping: at an angular frequency w [rad/s] and a step h [s] its oscillation grows by |R(i w h)| in every step, however
+short, with the stability function R; for ssp-rk2 by sqrt(1 + (w h)^4 / 4). The growth is estimated at the start.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def covers_axis(method: Method) -> bool:
 
 
 def undamped_modes(model) -> list:
-    """Oscillating modes of states outside cells with little damping."""
+    """Oscillating modes with little damping of states outside cells: pairs (name of the state, eigenvalue [1/s])."""
     return [
         (place, s)
         for place, s in modes_outside_cells(model)
