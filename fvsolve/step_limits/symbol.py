@@ -1,8 +1,8 @@
 """Symbol of a linear scheme: rate of a wave on a uniform periodic grid, in exact arithmetic.
 
 Advection u_t + a u_x = 0 of a quantity u at speed a, in cells of width dx, is computed as
-du_j/dt = -(a / dx) (F_j - F_j-1), with the face values F_j = sum_k w_k u_j+k-2 and the weights w_0 .. w_4 of the scheme.
-A wave u_j = exp(i j theta) changes by du/dt = (a / dx) z(theta) u; z is the symbol. Both Re z and |z|^2 are polynomials
+du_j/dt = -(a / dx) (F_j - F_j-1). Face values are F_j = sum_k w_k u_j+k-2 with the weights w_0 .. w_4 of the scheme. A
+wave u_j = exp(i j theta) changes by du/dt = (a / dx) z(theta) u; z is the symbol. Both Re z and |z|^2 are polynomials
 in t = sin^2(theta / 2), from t = 0 (longest waves) to t = 1 (two cells a wave).
 """
 

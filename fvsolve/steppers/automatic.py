@@ -28,14 +28,14 @@ def implicit_method(rtol: float) -> str:
 
 
 def step_cost_ratio(structure: Structure) -> float:
-    """Cost of an implicit step in explicit steps: Jacobian, stages, factorisation and solves, counted in rhs calls."""
+    """Cost of an implicit step as a multiple of an explicit step, both counted in calls of the right-hand side."""
     implicit, explicit = method_named(IMPLICIT), method_named(EXPLICIT)
     algebra = DENSE_COST * structure.n**2 if structure.kind == "dense" else SPARSE_COST
     return (structure.color_count + implicit.stages + 1 + algebra) / (explicit.stages - 1)
 
 
 def watch(stepper: Integrator, structure: Structure) -> None:
-    """Switch on the stiffness test of the time loop."""
+    """Switch on the stiffness test of the time loop, with which the method `auto` chooses between its methods."""
     stepper.controls[loop_indices.WATCH], stepper.controls[loop_indices.PRICE] = 1.0, step_cost_ratio(structure)
 
 
@@ -59,7 +59,10 @@ def change(stepper: Integrator) -> tuple[float, float, float]:
 
 
 def method_history(start: float, changes: list[tuple[float, float, float]], price: float, rtol: float) -> list[dict]:
-    """List the methods used: start time, method, reason."""
+    """List the methods used in a run with the method `auto`: dicts with start time, method and reason.
+
+    changes : results of `change`; price : cost of an implicit step in explicit steps; rtol : tolerance of the run
+    """
     entries = [{"time": start, "method": EXPLICIT, "why": "until stability limits the explicit steps"}]
     for k, (t, radius, h) in enumerate(changes):
         if k % 2 == 0:

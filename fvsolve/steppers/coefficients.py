@@ -1,8 +1,8 @@
 """Butcher array of a method as one flat array that the compiled steps read.
 
-[A (s x s), b, c, error] and, for implicit methods, the data of their Newton iterations (`newton.py`, `irk.py`).
-An implicit method whose first stage is not f at the start of the step gets that derivative as an extra first stage of
-weight zero.
+The array holds A (s x s), b, c and the weights of the error estimate, for s stages, then for implicit methods the data
+of their Newton iterations (`newton_transform.py`). An implicit method whose first stage is not the rate f at the start
+of the step gets this rate as an extra first stage with weight zero.
 """
 
 from __future__ import annotations
@@ -19,10 +19,11 @@ from fvsolve.steppers.tableau import Method
 
 @functools.cache
 def coefficients(method: Method, damped: bool = False) -> tuple[np.ndarray, np.ndarray, int]:
-    """(flat coefficients, dense output : float64[s, d], number of stages s), including the start as an explicit stage.
+    """Flat coefficients of a method, coefficients of its dense output : float64[s, d], and number of stages s.
 
-    damped : for `semi_implicit`, which stores the rates at the start in addition to those of its first stage
-    Raises FvsolveError where A, without an explicit first stage, is singular or has no basis of eigenvectors.
+    The stages include the start of the step as an explicit stage where the method is implicit.
+    damped : True for `semi_implicit`, which stores the rates at the start in addition to the rates of its first stage
+    Raises FvsolveError if A, without an explicit first stage, is singular or has no basis of eigenvectors.
     """
     if method.kind == "linear":
         return method.coefficients
@@ -47,10 +48,12 @@ def coefficients(method: Method, damped: bool = False) -> tuple[np.ndarray, np.n
 
 
 def start_slope_correction(method: Method) -> np.ndarray:
-    """[weights of stages in p'(0), psi] of a collocation polynomial p whose last node is the step's end; else empty.
+    """Correction of the dense output of a collocation method whose last stage is the end of the step.
 
-    p + h psi(theta) (f - p'(0)), psi = int prod (x - c_i) / prod (-c_i), has the slope f at the start, which p does not
-    match. Slopes at the stages are unchanged, and as psi(1) = 0 from two stages on, so is the end: one order more.
+    The collocation polynomial p(theta) does not have the slope f of the solution at the start. The polynomial
+    p + h psi(theta) (f - p'(0)), psi = int prod (x - c_i) / prod (-c_i) with the nodes c_i, has this slope, the same
+    slopes at the stages and, from two stages on, the same end, as psi(1) = 0: its order is one higher.
+    Returns the weights of the stages in p'(0), then the coefficients of psi; an empty array for other methods.
     """
     c, dense = method.c, method.dense
     if method.kind != "full" or not dense.size or not method.stiffly_accurate or c[0] == 0.0:
@@ -68,19 +71,19 @@ def start_slope_of(coefficients, s):
 
 @njit(inline="always")
 def row_of(coefficients, s, i):
-    """Row i of A."""
+    """Row i of the matrix A of a method with s stages, in its flat coefficients."""
     return coefficients[i * s : (i + 1) * s]
 
 
 @njit(inline="always")
 def weights_of(coefficients, s):
-    """Weights b."""
+    """Weights b of the stages of a method, in its flat coefficients."""
     return coefficients[s * s : s * s + s]
 
 
 @njit(inline="always")
 def nodes_of(coefficients, s):
-    """Nodes c."""
+    """Nodes c (times of the stages, in steps) of a method, in its flat coefficients."""
     return coefficients[s * s + s : s * s + 2 * s]
 
 

@@ -9,7 +9,7 @@ from fvsolve.steppers.numbers.polynomial import Polynomial
 
 
 def lagrange(c: Sequence) -> list[Polynomial]:
-    """Lagrange polynomials l_i with l_i(c_j) = 1 if i = j, else 0; the nodes must differ."""
+    """Lagrange polynomials l_i on the nodes c, with l_i(c_j) = 1 if i = j, otherwise 0; the nodes must differ."""
     polynomials = []
     for i, x in enumerate(c):
         product = Polynomial([1])
@@ -20,16 +20,18 @@ def lagrange(c: Sequence) -> list[Polynomial]:
 
 
 def integrals(c: Sequence) -> list[Polynomial]:
-    """Integrals int_0^theta l_i of the Lagrange polynomials."""
+    """Integrals int_0^theta l_i of the Lagrange polynomials l_i on the nodes c, as polynomials in theta."""
     return [
         Polynomial([0, *(x / (k + 1) for k, x in enumerate(polynomial.coefficients))]) for polynomial in lagrange(c)
     ]
 
 
 def collocation(a: Sequence, b: Sequence, c: Sequence, rounding: Fraction = Fraction(0)) -> tuple[tuple, ...]:
-    """Coefficients dense_ij of y(theta) = y + h sum_i k_i sum_j dense_ij theta^(j+1); empty unless collocation.
+    """Coefficients dense_ij of the dense output y(theta) = y + h sum_i k_i sum_j dense_ij theta^(j+1).
 
-    A collocation method has a_ij = int_0^c_i l_j and b_j = int_0^1 l_j (Hairer, Norsett and Wanner 1993, II.7).
+    The result is empty if a, b, c is not a collocation method, which has a_ij = int_0^c_i l_j and b_j = int_0^1 l_j
+    with the Lagrange polynomials l_j (Hairer, Norsett and Wanner 1993, II.7).
+    rounding : relative error of a coefficient
     """
     if len(set(c)) < len(c) or (len(c) > 1 and not any(x != 0 for i, row in enumerate(a) for x in row[i:])):
         return ()
@@ -47,9 +49,10 @@ def collocation(a: Sequence, b: Sequence, c: Sequence, rounding: Fraction = Frac
 
 
 def extrapolated(c: Sequence, start) -> tuple:
-    """Weights that, with weight `start` at 0, integrate polynomials of degree below the number of stages over 0 to 1.
+    """Weights of the stages in the embedded solution of Radau IIA methods (Hairer and Wanner 1996, IV.8).
 
-    Embedded solution of Radau IIA (Hairer and Wanner 1996, IV.8).
+    Together with the weight `start` at time 0 they integrate polynomials of degree below the number of stages over 0
+    to 1. c : times of the stages
     """
     return tuple(
         integral(Fraction(1)) - start * basis(Fraction(0))

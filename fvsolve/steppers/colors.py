@@ -10,10 +10,10 @@ PYTHON_ENTRIES = 200  # number of entries below which plain Python is quicker th
 
 
 def colors(pattern) -> np.ndarray:
-    """int64[n]: greedy colours of the columns of a sparse pattern (by columns), columns of many neighbours first.
+    """Colours of the columns of a sparse pattern : int64[n], by the greedy rule, columns with many neighbours first.
 
-    Columns j and k need different colours where they have a row in common (Curtis, Powell and Reid 1974; order of Welsh
-    and Powell 1967).
+    pattern : sparse array stored by columns. Columns with a row in common get different colours (Curtis, Powell and
+    Reid 1974; order of Welsh and Powell 1967).
     """
     rows, n = pattern.shape
     result = np.full(n, -1, dtype=np.int64)
@@ -32,7 +32,11 @@ def colors(pattern) -> np.ndarray:
 
 @njit
 def greedy(starts, rows, row_starts, columns, order, seen, result):
-    """Give each column in `order` the lowest colour unused by columns with a common row; seen : int64[n + 1]."""
+    """Give each column in `order` the lowest colour that no column with a common row has.
+
+    starts, rows : pattern by columns; row_starts, columns : pattern by rows
+    seen : int64[n + 1]  work array, initially -1; result : int64[n]  colours, initially -1
+    """
     for at in range(order.size):
         j = order[at]
         for p in range(starts[j], starts[j + 1]):

@@ -10,13 +10,14 @@ LEAST = 2.0**-34
 
 @njit(forceinline=True)
 def differences(rhs, handle, structure, ledger_offset, t, y, f, rates0, scale, y_work, f_work, out, jacobian):
-    """jacobian <- d(f, ledger rates)/dy by one-sided differences; returns the number of rhs calls.
+    """Compute the Jacobian of the rates f and the ledger rates by one-sided differences; returns the calls of rhs.
 
-    f, rates0 : float64[n], float64[m]  f(t, y) and out[ledger_offset : ledger_offset + m] at y, freshly evaluated, not
-    a stage derivative
-    scale : float64[n]  magnitude of a small deviation; the increment is 2^-26 max(|y|, scale), with 2^-34 |y| for
-    states marked fine in the structure
-    jacobian : float64[nnz]  in the order of the pattern, column by column
+    f, rates0 : float64[n], float64[m]  f(t, y) and the ledger rates out[ledger_offset : ledger_offset + m] at y,
+    evaluated there and not taken from a stage
+    scale : float64[n]  size of a small deviation; the increment is 2^-26 max(|y|, scale), with 2^-34 |y| in place of
+    2^-26 |y| for states marked fine in the structure, and 2^-26 |scale| for a negative scale
+    y_work, f_work : float64[n]  work arrays
+    jacobian : float64[nnz]  result, in the order of the pattern, column by column
     """
     n = structure[SIZE]
     starts, rows = structure[structure[STARTS] :], structure[structure[ROWS] :]
@@ -45,7 +46,7 @@ def differences(rhs, handle, structure, ledger_offset, t, y, f, rates0, scale, y
 
 @njit
 def multiply(structure, jacobian, x, product):
-    """product <- J x : float64[n + m], rows of states, then ledger rows."""
+    """product <- J x with the Jacobian J : float64[n + m], first n states, then m ledger rates."""
     n = structure[SIZE]
     starts, rows = structure[structure[STARTS] :], structure[structure[ROWS] :]
     for i in range(n + structure[LEDGERS]):

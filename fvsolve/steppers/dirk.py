@@ -48,10 +48,11 @@ from fvsolve.steppers.structure import STARTS
 
 @inline
 def predict(b, c, x, first, vectors, k):
-    """k <- predicted slope at x last steps beyond the end of the last step.
+    """Predict the slope k of a stage at the time x h_last after the last step, whose length is h_last.
 
-    The prediction is a parabola through both ends of the last step with the slope at its end. That slope is the slope
-    of the last stage if c_s = 1, else f: re-evaluating a stiff f would amplify the Newton residual.
+    The prediction is the slope of a parabola through both ends of the last step, with the slope at its end. The slope
+    at the end is the slope of the last stage if c_s = 1, because a new evaluation of a stiff f would amplify the Newton
+    residual; otherwise it is `first`, the rate f.
     """
     s, n = b.size, k.size
     slopes = vectors[s - 1] if c[s - 1] == 1.0 else first
@@ -69,9 +70,11 @@ def solve_stage(
     rhs, solve, handle, structure, t, h_gamma, i, k, y_stage, ledger_rates, ledger_offset, out, controls, loop_state,
     nnz, work, vectors, factors
 ):  # fmt: skip
-    """Solve k[i] = f(t, base + h gamma k[i]) by Newton; returns CONVERGED or FAILED.
+    """Solve stage i, k[i] = f(t, base + h_gamma k[i]), by Newton iterations; returns CONVERGED or FAILED.
 
-    The stored stage is f + J d with the last increment d, to the bit: quantities that f and J conserve are conserved.
+    h_gamma : step times the diagonal coefficient of the method
+    The stored stage is exactly f + J d with the last increment d, so it conserves the quantities that f and the
+    Jacobian J conserve.
     """
     s, n = k.shape
     base, d, f, weights = vectors[s + BASE], vectors[s + INCREMENT], vectors[s + RATE], vectors[s + WEIGHTS]
@@ -100,7 +103,10 @@ def try_stages(
     rhs, factor, solve, handle, coefficients, structure, t, h, y, y_stage, k, ledger_rates, ledger_offset, out, scale,
     controls, loop_state, nnz, work, vectors, factors,
 ):  # fmt: skip
-    """Solve all stages with the current Jacobian, with damping where it is fresh; returns CONVERGED or FAILED."""
+    """Solve all stages with the current Jacobian; returns CONVERGED or FAILED.
+
+    A stage that fails is solved again by damped Newton if the Jacobian is of this step.
+    """
     s, fresh = k.shape[0], work[JACOBIAN_STEP] == loop_state[STEPS]
     c, b, base = nodes_of(coefficients, s), weights_of(coefficients, s), vectors[s + BASE]
     for i in range(1, s):
@@ -148,7 +154,7 @@ def attempt(
 ):  # fmt: skip
     """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
-    Uses the real part of the linear algebra. Returns NEWTON_FAILED where a fresh Jacobian does not help.
+    It uses the functions for real matrices only. Returns NEWTON_FAILED if Newton fails with a fresh Jacobian too.
     """
     s = k.shape[0]
     nnz = structure[structure[STARTS] + structure[STATES]]

@@ -1,4 +1,4 @@
-"""One explicit Runge-Kutta step (14)."""
+"""One explicit Runge-Kutta step, equation (14) of docs/course.md."""
 
 from math import sqrt
 
@@ -11,7 +11,10 @@ from fvsolve.steppers.step_operations import BEGIN, STOP, combine, error_of_band
 
 @njit
 def quotient(f_new, f, y_new, y, scale):
-    """|f_new - f| / |y_new - y| of two stages at the end of the step: about the spectral radius (H. and W. IV.2)."""
+    """Estimate of the spectral radius of the Jacobian from two stages at the end of a step (Hairer and Wanner IV.2).
+
+    It is |f_new - f| / |y_new - y| with weighted norms of states and rates.
+    """
     above, below = 0.0, 0.0
     for i in range(y.size):
         w = 1.0 / (scale[i] + abs(y[i]))
@@ -28,8 +31,8 @@ def attempt(
     """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
     ledger_rates[i] receives the ledger rates of stage i.
-    structure : stage sums that rhs forms in blocks, see `kernels.sums`; empty where it forms none
-    The other arguments of implicit steps are not used.
+    structure : description of stage sums that rhs forms in blocks, see `kernels.stage_sums`; empty if rhs forms none
+    Arguments for linear algebra and Newton iterations are not used.
     """
     s, b = k.shape[0], weights_of(coefficients, k.shape[0])
     c, last_is_new, blocked = nodes_of(coefficients, s), controls[FSAL] == 1.0, structure.size > 0

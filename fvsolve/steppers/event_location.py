@@ -1,4 +1,4 @@
-"""Event functions that fall through zero, and the search for the step that ends at an event."""
+"""Event functions, which are zero at an event, and the search for the length of the step that ends at an event."""
 
 from fvsolve.jit import njit
 from fvsolve.steppers.loop_indices import CONTROL, KIND, NEWTON_FAILED, NEWTON_SOLVED, STEP, TOLERANCE, T
@@ -9,9 +9,11 @@ JUMP = 1e-6  # fraction of an event function, and of a given step; smaller chang
 
 @njit(forceinline=True)
 def set_flags(g, armed):
-    """Set the flag of every event function at or below zero, where the rhs is in its switched state.
+    """Set the flag of every event function to 1 if the function is zero or negative, otherwise to 0.
 
-    Only accepted states set flags, so the rhs does not switch within a step, not even in stages beyond an event.
+    The flags select the equations in the rhs. They are set for accepted states only, so the equations do not change
+    within a step.
+    g : float64[events]  values of the event functions; armed : float64[events]  flags
     """
     for i in range(g.size):
         armed[i] = 1.0 if g[i] <= 0.0 else 0.0
@@ -37,7 +39,7 @@ def crossed(g, g_new):
 
 @njit(forceinline=True)
 def event_ratio(g, g_new):
-    """Least ratio of new to old value of the event functions: 1 at the start of the step, 0 at an event."""
+    """Least ratio of new to old value of the positive event functions: 1 at the start of the step, 0 at an event."""
     share = 1.0
     for i in range(g.size):
         if g[i] > 0.0:
@@ -51,11 +53,11 @@ def locate(
     row_blocks, sums, h, y, now, new, k, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, vectors,
     factors, complex_factors, g, g_new, e,
 ):  # fmt: skip
-    """(length, error) of the step that ends just past the first event, by the Illinois rule; y[new] is its end.
+    """Shorten a step so that it ends just past the first event, by the Illinois rule; returns its length and error.
 
-    h, e : length and error of the step that passes the event
-    The error is NEWTON_FAILED where a stage could not be solved, or where a given step jumps across the event: then its
-    stages have several solutions, those of a shorter step only one.
+    h, e : length and error of the full step; y[new] receives the end of the shortened step
+    The error is NEWTON_FAILED if a stage could not be solved, or if an event function jumps over zero in a step of
+    given length: then the stages of the step have several solutions, but the stages of a shorter step only one.
     """
     t, low, high, at_low, past = loop_state[T], 0.0, h, 1.0, event_ratio(g, g_new)
     guess, at_high, side = h, past, 0

@@ -20,8 +20,10 @@ from fvsolve.steppers.time_loop import compiled, compiled_attempt
 class Integrator:
     """Arrays of one run and the compiled functions of its method.
 
-    structure() : structure of the Jacobian, called for implicit methods only
-    scale : float64[n]  reference size of small deviations; ledgers : number of ledger rates in addition to dydt
+    n : number of states
+    ledgers : number of rates (such as inflows of nodes) that are integrated in addition to the states
+    structure : function without arguments that returns the structure of the Jacobian, used for implicit methods only
+    scale : float64[n]  reference size of small deviations of each state
     damped : True for semi-implicit stages, see `semi_implicit`
     """
 
@@ -94,17 +96,17 @@ class Integrator:
 
     @property
     def dense_order(self) -> int:
-        """Order of the dense output: of the polynomial of the method, else of the cubic through both ends."""
+        """Order of the dense output: of the method's own polynomial, or of the cubic through both ends of a step."""
         extra = self.method.kind == "full" and start_slope_correction(self.method).size > 0
         return min(self.dense.shape[1] + extra, self.method.order) if self.dense.size else 3
 
     @property
     def separate_rows(self) -> int:
-        """Source of rows within given steps: a value of `SEPARATE_ROWS`.
+        """Source of output rows within steps of given length, a code of `loop_indices`: dense output or separate steps.
 
-        The polynomial is not used if its order is too low, or if it contains f(t, y) of a stiff problem: that f
-        amplifies the distance of y from the slow solution. Slopes of the last stage do not amplify it, but at a start
-        only f is known.
+        The dense output is not used if its order is too low, or if it contains the rate f(t, y) of a stiff problem,
+        which amplifies the distance of y from the slow solution. Slopes of the last stage do not amplify this distance,
+        but at the start of a run only f is available.
         """
         method = self.method
         if self.dense.shape[1] == 1:  # a straight line
@@ -134,7 +136,7 @@ class Integrator:
         return views
 
     def restore(self, loop_state: np.ndarray) -> np.ndarray:
-        """Restore `restart_arrays` from the beginning of a flat array; returns the rest of it."""
+        """Restore `restart_arrays` from the beginning of the flat array `loop_state`; returns the remaining entries."""
         for view in self.restart_arrays():
             view[...] = loop_state[: view.size].reshape(view.shape)
             loop_state = loop_state[view.size :]
@@ -148,9 +150,10 @@ class Integrator:
         return {name: int(self.loop_state[index]) for name, index in loop_indices.COUNTS.items()}
 
     def single_step(self, rhs, handle, ledger_offset: int, t: float, h: float, y: np.ndarray) -> np.ndarray:
-        """State after a single step of h from y at t, independent of earlier steps; NaN if its stages are not solvable.
+        """State after a single step of length h from state y at time t; NaN if its stages cannot be solved.
 
-        Of the stored data a Newton step uses only the Jacobian, a linearly implicit step nothing.
+        The step does not depend on earlier steps, except that Newton iterations use the stored Jacobian.
+        rhs, handle : compiled right-hand side and its argument; ledger_offset : index of the first ledger rate in `out`
         """
         self.y[0] = y
         self.loop_state[loop_indices.STEPS] += 1.0
@@ -183,7 +186,11 @@ class Integrator:
         return self.y[1].copy() if error != loop_indices.NEWTON_FAILED else np.full(y.size, np.nan)
 
     def call(self, fused_step, observe, record, events, rhs, handle, ledger_offset: int, armed: np.ndarray) -> int:
-        """Continue the time loop; returns a code of `steppers.slots`, from DONE to CHATTERS."""
+        """Continue the time loop; returns a code of `loop_indices`, from DONE to SWITCHED.
+
+        fused_step, observe, record, events, rhs : compiled functions of `time_loop.run_steps`; handle : their argument
+        ledger_offset : index of the first ledger rate in `out`; armed : flags of the events
+        """
         if (
             self.controls[loop_indices.SEPARATE_ROWS]
             and self.controls[loop_indices.CONTROL] != loop_indices.TOLERANCE
@@ -243,9 +250,11 @@ KINDS = {
 
 @compile_once
 def attempt_of(kind: str, algebra: str = ""):
-    """Compiled step of a kind of methods, compiled on first use.
+    """Function that takes one step of a kind of methods, compiled on first use.
 
-    A second process compiles the linear algebra at the same time: for real shifts, and complex shifts of full methods.
+    kind : key of `KINDS`; algebra : kind of linear algebra ("dense", "banded", "sparse"), "" for explicit methods
+    A second process compiles the linear algebra at the same time: with real shifts, and with complex shifts too for
+    fully implicit methods.
     """
     module = f"fvsolve.steppers.{KINDS[kind][0]}"
     if not algebra:

@@ -1,9 +1,10 @@
 """One fully implicit Runge-Kutta step; simplified Newton solves all stages together.
 
-Z are the increments of the q stages and K = (h A)^-1 (Z - h a_0 k_0) their slopes, with a_0 the weights of an explicit
-first stage. A^-1 = T L T^-1, L block diagonal with a real shift for every real eigenvalue and a complex one for every
-pair (Butcher 1976; Hairer and Wanner 1996, IV.8). With W = T^-1 Z Newton solves
-(L / h x I - I x J) dW = T^-1 (F - K), block by block.
+Z are the increments of the q implicit stages over the start of the step, and K = (h A)^-1 (Z - h a_0 k_0) their slopes;
+a_0 are the weights of an explicit first stage with slope k_0, h is the step and J the Jacobian. A^-1 = T L T^-1 with L
+block diagonal: a real shift for every real eigenvalue, a complex shift for every complex pair (Butcher 1976; Hairer and
+Wanner 1996, IV.8). With W = T^-1 Z and the rates F of the stages, Newton solves
+(L / h x I - I x J) dW = T^-1 (F - K), block by block (x is the Kronecker product).
 Where a single Jacobian is not sufficient for all stages, `stage_sweeps.py` solves the stages one after another.
 """
 
@@ -79,13 +80,13 @@ def pairs_of(method: Method) -> int:
 
 @njit(inline="always")
 def matrix(coefficients, s, index):
-    """Read a matrix of `newton_transform`, flat, with everything stored behind it."""
+    """Flat coefficients from matrix number `index` of `newton_transform` on: its q x q entries by rows, then others."""
     return coefficients[s * s + 3 * s + index * (s - 1) * (s - 1) :]
 
 
 @njit
 def blend(base_weight, base, m, at, q, first, vectors, target):
-    """target = base_weight base + sum of m[at + j] vectors[first + j] over j < q, three terms a pass."""
+    """target <- base_weight base + sum of m[at + j] vectors[first + j] over j < q, three terms in each pass."""
     n = target.size
     for j in range(0, q, 3):
         v0, v1, v2 = vectors[first + j], vectors[first + min(j + 1, q - 1)], vectors[first + min(j + 2, q - 1)]
@@ -100,7 +101,10 @@ def blend(base_weight, base, m, at, q, first, vectors, target):
 
 @inline
 def predict(coefficients, h, h_last, s, buffer, vectors):
-    """W <- T^-1 of the stage increments extrapolated from the slopes of the last step; buffer : float64[q q]."""
+    """Predict the transformed stage increments W = T^-1 Z by extrapolation of the slopes of the last step.
+
+    h, h_last : this step and the last step; buffer : float64[q q]  work array; W is stored in `vectors`
+    """
     q, c = s - 1, nodes_of(coefficients, s)
     back, ahead = matrix(coefficients, s, T_INVERSE), matrix(coefficients, s, EXTRAPOLATION)
     for e in range(q * q):
@@ -119,7 +123,10 @@ def predict(coefficients, h, h_last, s, buffer, vectors):
 
 @inline
 def factor_blocks(factor, factor_complex, structure, coefficients, s, h, work, factors, complex_factors, n):
-    """Factor every block of L / h and store the factors one after another; returns their number, 0 if a pivot fails."""
+    """Factor shift I - J for every block (shift) of L / h, and store the factors one after another.
+
+    Returns the number of factors, or 0 if a pivot is zero.
+    """
     q, blocks, b, real, pair, count = s - 1, matrix(coefficients, s, BLOCKS), 0, 0, n, 0
     jacobian, size = work[HEADER:], int(work[FACTOR_SIZE])
     while b < q:
@@ -141,7 +148,7 @@ def factor_blocks(factor, factor_complex, structure, coefficients, s, h, work, f
 
 @inline
 def solve_blocks(solve, solve_complex, structure, coefficients, s, size, factors, complex_factors, vectors):
-    """Solve (L / h x I - I x J) dW = R in place of R."""
+    """Solve (L / h x I - I x J) dW = R with the factors of the blocks; dW replaces R in `vectors`."""
     q, blocks, b, real, n = s - 1, matrix(coefficients, s, BLOCKS), 0, 0, vectors.shape[1]
     first, pair, both = s + STAGES + R * q, n, complex_factors[:n]
     while b < q:
@@ -163,7 +170,10 @@ def iterate(
     rhs, solve, solve_complex, handle, coefficients, structure, t, h, y, y_stage, k0, ledger_rates, ledger_offset, out,
     controls, loop_state, work, vectors, factors, complex_factors,
 ):  # fmt: skip
-    """Newton iterations for W; returns CONVERGED or FAILED."""
+    """Compute the transformed stage increments W by Newton iterations; returns CONVERGED or FAILED.
+
+    k0 : float64[n]  rates at the start of the step
+    """
     s, n = ledger_rates.shape[0], y.size
     q, c, weights = s - 1, nodes_of(coefficients, s), vectors[s + WEIGHTS]
     t_matrix, back, blocks = (
@@ -221,7 +231,7 @@ def iterate(
 
 @inline
 def finish(coefficients, structure, nnz, h, k, ledger_rates, work, vectors):
-    """Compute the slopes k of the stages from W, and add the last Newton increment to their ledger rates."""
+    """Compute the slopes k of the stages from the increments W, and correct the ledger rates by the last increment."""
     s = k.shape[0]
     q, d = s - 1, vectors[s + INCREMENT]
     slopes, start, buffer = matrix(coefficients, s, SLOPES), matrix(coefficients, s, START), work[work.size - q * q :]
@@ -255,10 +265,11 @@ def filtered_error(
     factors,
     retry,
 ):
-    """Norm of the embedded error estimate, smoothed by the first factor; repeated from the filtered state if retry.
+    """Norm of the embedded error estimate, smoothed by the first Newton factor, in units of the tolerance.
 
-    e = (I - h g J)^-1 h (e_0 f(t, y) + sum of e_i k_i), 1 / g the real eigenvalue of A^-1 (Hairer and Wanner IV.8).
-    retry : the step is a repetition or the first after a kink; then an error of 1 or more is estimated once more with
+    The error is e = (I - h g J)^-1 h (e_0 f(t, y) + sum of e_i k_i) with the weights e_i of the error estimate and the
+    real eigenvalue 1 / g of A^-1 (Hairer and Wanner 1996, IV.8).
+    retry : True for a repeated step or the first after a kink; then an error of 1 or more is estimated once more with
     f(t, y + e)
     """
     s, n = k.shape
@@ -307,8 +318,9 @@ def defect_before_end(
 ):
     """Greatest defect of the collocation polynomial p just before the end of a step, in units of the tolerance.
 
-    Where an opening closes at the end, a stiff state becomes free between the stages: e = h g (p' - f(p + d)), with
-    d = (I - h g J)^-1 h g (p' - f(p)). e is as small as d where J is valid there, else it is the full defect.
+    Stages do not show a stiff state that becomes free just before the end, where an opening closes. The defect is
+    e = h g (p' - f(p + d)) with d = (I - h g J)^-1 h g (p' - f(p)), where 1 / g is the first real eigenvalue of A^-1.
+    It is as small as d if the Jacobian J is valid there; otherwise it is the full defect.
     """
     s, n = k.shape
     q, ahead, buffer = s - 1, matrix(coefficients, s, EXTRAPOLATION), work[work.size - (s - 1) * (s - 1) :]
@@ -348,7 +360,7 @@ def attempt(
 ):  # fmt: skip
     """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
-    Returns NEWTON_FAILED where a fresh Jacobian does not help.
+    Returns NEWTON_FAILED if Newton fails with a fresh Jacobian too.
     """
     s, n = k.shape
     nnz = structure[structure[STARTS] + structure[STATES]]

@@ -1,9 +1,9 @@
 """Time integrals of inflows and outflows (ledger), accumulated separately with the weights of the method.
 
-ledger : float64[5 m]  of m rates: sums of positive [0:m] and negative parts [m:2m], their rounding carries [2m:4m],
-and the rates at the last stage of the last step [4m:5m]
-A step in which a rate changes sign adds to both sums: it is divided where the dense output of the amount turns, as
-the state's own dense output gives it.
+ledger : float64[5 m]  for m rates: sums of positive parts [0:m], sums of negative parts [m:2m], rounding errors of both
+sums [2m:4m], rates at the last stage of the last step [4m:5m]
+A step in which a rate changes its sign adds to both sums. It is divided at the extremum of the dense output of the
+amount, computed with the coefficients of the dense output of the state.
 """
 
 from fvsolve.jit import njit
@@ -24,7 +24,10 @@ LEAST = 1e-3  # amount added to the reference amount, so that it is never zero [
 
 @njit(forceinline=True)
 def weight(theta, dense, j):
-    """(weight of stage j, its slope) in the dense output at theta: sum of dense[j, m] theta^(m + 1)."""
+    """Weight of stage j in the dense output at the fraction theta of a step, and its slope over theta.
+
+    The weight is the sum of dense[j, m] theta^(m + 1).
+    """
     w, slope = 0.0, 0.0
     for m in range(dense.shape[1] - 1, -1, -1):
         w, slope = (w + dense[j, m]) * theta, slope * theta + (m + 1) * dense[j, m]
@@ -33,9 +36,10 @@ def weight(theta, dense, j):
 
 @njit
 def amount_and_rate(theta, total, r0, r1, m, ledger_rates, dense):
-    """(amount of rate m up to theta, rate at theta) over h: the method's polynomial, else the cubic through both ends.
+    """Amount of rate number m from the start to the fraction theta of a step, divided by the step, and rate there.
 
-    total : amount of the step over h; r0, r1 : rates at its ends
+    They follow from the dense output of the method, or from the cubic through both ends of the step.
+    total : amount of the whole step, divided by the step; r0, r1 : rates at its start and its end
     """
     if dense.shape[0] == 0:
         s, r = theta, 1.0 - theta
@@ -51,7 +55,10 @@ def amount_and_rate(theta, total, r0, r1, m, ledger_rates, dense):
 
 @njit
 def smaller_side(total, r0, r1, m, ledger_rates, dense):
-    """Size, over h, of the smaller of the positive and negative parts of a step; its rate m changes sign, r0 to r1."""
+    """Size of the smaller of the inflow and outflow in a step in which rate number m changes its sign.
+
+    The size is divided by the step; arguments are as for `amount_and_rate`.
+    """
     low, high = 0.0, 1.0
     at_low, at_high = (
         amount_and_rate(0.0, total, r0, r1, m, ledger_rates, dense)[1],
@@ -75,11 +82,11 @@ def smaller_side(total, r0, r1, m, ledger_rates, dense):
 
 @njit
 def book_error(h, error, k, stored, ledger_rates, tolerance, ledger):
-    """Greatest error of the amounts of a step, over the tolerance of all amounts so far.
+    """Greatest error of the ledger amounts of a step, relative to the tolerance for the sum of all amounts so far.
 
-    Amounts that enter stored states have the errors of those states, which the state error covers already. Amounts that
-    bypass stored states, or enter at fixed values, are not covered.
-    stored : int64[q]  columns of those states in k : float64[s, n]
+    The part of the error that equals the errors of stored masses is left out, because the error of the states contains
+    it already.
+    h : step; error : weights of the error estimate; stored : int64[q]  numbers of the states that are stored masses
     """
     s, count = ledger_rates.shape
     worst, reference, covered = 0.0, LEAST, 0.0
@@ -96,7 +103,7 @@ def book_error(h, error, k, stored, ledger_rates, tolerance, ledger):
 
 @njit(forceinline=True)
 def combined(weights, rates, m):
-    """Sum of weights[i] rates[i, m]."""
+    """Sum over the stages i of weights[i] rates[i, m]."""
     total = 0.0
     for i in range(weights.size):
         total += weights[i] * rates[i, m]
@@ -105,7 +112,7 @@ def combined(weights, rates, m):
 
 @njit(forceinline=True)
 def add(ledger, m, at, part):
-    """Add `part` to sum `at` (0 positive, 1 negative) of rate m with compensated rounding."""
+    """Add `part` to the positive (at = 0) or negative (at = 1) sum of rate number m, with compensated rounding."""
     count = ledger.size // LEDGER_ROWS
     ledger[at * count + m], ledger[(2 + at) * count + m] = add_up(ledger[at * count + m], part,
                                                                   ledger[(2 + at) * count + m])  # fmt: skip
@@ -113,11 +120,11 @@ def add(ledger, m, at, part):
 
 @njit
 def book(h, b, ledger_rates, dense, use_stage_rates, known, end, ledger):
-    """Add an accepted step of length h to the ledger, after its end state is known to be valid.
+    """Add an accepted step of length h, whose end state is valid, to the ledger.
 
-    end : rates at the end of the step
-    use_stage_rates : use the rates of the last stage at the end, and at the start too if `known`, because f amplifies
-    the Newton residual
+    b : weights of the stages; ledger_rates : float64[s, m]  rates at the stages; end : float64[m]  rates at the end
+    use_stage_rates : True to use the rates of the last stage at the end of the step, because f amplifies the Newton
+    residual; known : True to do so at the start of the step too, where the last step is available
     """
     s, count = ledger_rates.shape
     for m in range(count):

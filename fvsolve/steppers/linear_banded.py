@@ -20,7 +20,11 @@ DIAGONAL_PIVOT = 0.1
 
 
 def prepare(pattern) -> tuple[np.ndarray, int]:
-    """(bandwidths, order of the states, place of every Jacobian entry in the factors; length of the factors)."""
+    """Data that the compiled functions of this solver read : int64[n], and length of the array `factors`.
+
+    pattern : sparse pattern of the Jacobian, by columns. The data are bandwidths and row length, the order of the
+    states, and for every Jacobian entry its index in `factors`.
+    """
     n = pattern.shape[1]
     order, below, above = band(pattern)
     width = below + 1 + CHUNK * -(-(below + above) // CHUNK)
@@ -35,7 +39,7 @@ def prepare(pattern) -> tuple[np.ndarray, int]:
 
 
 def band(pattern) -> tuple[np.ndarray, int, int]:
-    """(order of the states, bandwidth below and above the diagonal), reverse Cuthill and McKee 1969."""
+    """Order of the states by the reverse Cuthill-McKee rule (1969), and bandwidth below and above the diagonal."""
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 
@@ -49,13 +53,13 @@ def band(pattern) -> tuple[np.ndarray, int, int]:
 
 
 def entries(pattern) -> tuple[np.ndarray, np.ndarray]:
-    """(row, column) of every entry of a pattern stored by columns, in its order."""
+    """Rows and columns of all entries of a sparse pattern, in the order in which they are stored, by columns."""
     return pattern.indices, np.repeat(np.arange(pattern.shape[1]), np.diff(pattern.indptr))
 
 
 @njit(forceinline=True)
 def subtract(factor, x, y, chunks):
-    """y <- y - factor x, in chunks of four."""
+    """y <- y - factor x for the first 4 `chunks` entries, four at a time."""
     for c in range(chunks):
         a = y[4 * c] - factor * x[4 * c]
         b = y[4 * c + 1] - factor * x[4 * c + 1]

@@ -10,7 +10,7 @@ from fvsolve.steppers.structure import ROWS, SIZE, STARTS
 
 
 def prepare(pattern) -> tuple[np.ndarray, int]:
-    """(no data beyond the pattern, length of the factors)."""
+    """Data of this solver (none, an empty array), and length of the array `factors`."""
     n = pattern.shape[1]
     return np.zeros(0, dtype=np.int64), n * n + n
 

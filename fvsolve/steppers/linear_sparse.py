@@ -22,7 +22,11 @@ LEAST_DETERMINANT = (
 
 
 def prepare(pattern) -> tuple[np.ndarray, int]:
-    """(order of the states, patterns of L, U and J by rows, all behind their offsets; length of the factors)."""
+    """Data that the compiled functions of this solver read : int64[n], and length of the array `factors`.
+
+    pattern : sparse pattern of the Jacobian J, by columns. The data are offsets, then the order of the states and the
+    patterns of L, U and J by rows.
+    """
     members, rows, columns, places = blocks(pattern)
     count = len(members)
     order = minimum_degree(pattern_of(rows, columns, count))
@@ -40,7 +44,10 @@ def prepare(pattern) -> tuple[np.ndarray, int]:
 
 
 def blocks(pattern) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """(pairs of states; row and column of each state entry as 2 pair + member, its place in the Jacobian)."""
+    """Pairs of states, and for each Jacobian entry between states its row, its column and its index in the Jacobian.
+
+    Row and column are 2 pair + member, with the number of the pair and 0 or 1 for the member of the pair.
+    """
     n = pattern.shape[1]
     members = pairs(pattern[:n])
     member = np.empty(n, dtype=np.int64)
@@ -52,7 +59,7 @@ def blocks(pattern) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
 
 
 def pattern_of(rows, columns, count: int):
-    """Pattern of the blocks with an entry, count x count, sparse by columns."""
+    """Sparse pattern, count x count by columns, of the 2 x 2 blocks that contain an entry at (rows, columns)."""
     from scipy.sparse import coo_array, csc_array
 
     pattern = csc_array(coo_array((np.ones(rows.size, dtype=bool), (rows // 2, columns // 2)), shape=(count, count)))
@@ -61,10 +68,10 @@ def pattern_of(rows, columns, count: int):
 
 
 def minimum_degree(pattern) -> np.ndarray:
-    """int64[n]: rows ordered by few neighbours first, multiple minimum degree on A + A^T (Liu 1985).
+    """Order of the rows that keeps the factors sparse : int64[n], by multiple minimum degree on A + A^T (Liu 1985).
 
-    SuperLU computes the order while it factors a diagonally dominant matrix of this pattern, whose pivots stay in
-    place.
+    SuperLU computes the order while it factors a diagonally dominant matrix A with this pattern, which needs no row
+    exchanges.
     """
     from scipy.sparse import csc_array, diags_array
     from scipy.sparse.linalg import splu
@@ -77,7 +84,10 @@ def minimum_degree(pattern) -> np.ndarray:
 
 
 def fill(n: int, starts, columns) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """(starts and columns of L, starts and columns of U) by rows, for pivots on the diagonal."""
+    """Patterns of L and U by rows for pivots on the diagonal: starts and columns of L, starts and columns of U.
+
+    n : number of rows; starts, columns : pattern of the matrix by rows
+    """
     starts, columns = np.asarray(starts, dtype=np.int64), np.asarray(columns, dtype=np.int64)
     capacity = 4 * columns.size + 16
     while True:
@@ -90,10 +100,11 @@ def fill(n: int, starts, columns) -> tuple[np.ndarray, np.ndarray, np.ndarray, n
 
 @njit
 def eliminate(starts, columns, l_starts, l_columns, u_starts, u_columns, chain):
-    """Compute the patterns of L and U; returns False where the arrays are too short.
+    """Compute the patterns of L and U by rows; returns False if the arrays are too short.
 
-    A row of U contains the entries of its row of J and of the rows of U that its row of L refers to.
-    chain : int64[n + 1]  linked list of the columns of the row; chain[n] holds the first, n ends it
+    starts, columns : pattern of the matrix by rows. A row of U contains the entries of the matrix row, and of the rows
+    of U whose numbers are the columns of the row of L.
+    chain : int64[n + 1]  linked list of the columns of a row; chain[n] holds the first column, n ends the list
     """
     n = chain.size - 1
     for i in range(n):
@@ -129,7 +140,7 @@ def eliminate(starts, columns, l_starts, l_columns, u_starts, u_columns, chain):
 
 @njit(forceinline=True)
 def place(structure, index):
-    """Offset of a list of this solver in the structure."""
+    """Offset of list number `index` of this solver in the structure array."""
     return structure[SOLVER_DATA] + structure[structure[SOLVER_DATA] + index]
 
 
@@ -142,8 +153,8 @@ def clear(block):
 def factor(structure, jacobian, shift, factors):
     """factors <- L, U and inverse diagonal blocks of shift I - J; returns 0, or 1 + a state without a good pivot.
 
-    The pivot of a diagonal block is good if its determinant is at least 1e-13 of its value before elimination and of
-    its two terms: a measure that does not depend on the units of states.
+    The pivot of a diagonal block is good if its determinant is above 1e-13 times its two products, now and before
+    elimination. This measure does not depend on the units of states.
     """
     count, order = structure[structure[SOLVER_DATA]], structure[place(structure, ORDER) :]
     l_starts, l_columns = structure[place(structure, L_STARTS) :], structure[place(structure, L_COLUMNS) :]

@@ -4,9 +4,9 @@ Simplified Newton with the Jacobian at the start of the step is used as long as 
 changes by orders of magnitude within a step, as the slope of a valve does near zero pressure drop, the iterates
 oscillate. Then Newton is damped, with a new Jacobian for every iterate.
 
-These data are kept between steps: `work` with a header and the Jacobian; in `vectors` f at the start of the last step;
-the stages of the last step. A restart stores them (`Integrator.restart_arrays`) and factors again: the Jacobian and
-the shift determine the factors to the bit.
+Three data are kept between steps and stored for a restart (`Integrator.restart_arrays`): the array `work` with a header
+and the Jacobian, the rate f at the start of the last step, and the stages of the last step. A resumed run factors
+again; Jacobian and shift determine the factors to the bit.
 """
 
 from __future__ import annotations
@@ -86,7 +86,10 @@ def begin(k, y, scale, controls, loop_state, work, vectors):
 
 @inline
 def renew(rhs, handle, structure, ledger_offset, t, y, f, ledger_rates, scale, out, loop_state, work, moved, rate):
-    """Compute the Jacobian at y from f and ledger rates evaluated there; moved, rate : work rows for a state and f."""
+    """Compute the Jacobian at (t, y) and store it in `work`.
+
+    f, ledger_rates : rates evaluated at (t, y); moved, rate : float64[n]  work arrays for a state and its rates
+    """
     calls = differences(
         rhs, handle, structure, ledger_offset, t, y, f, ledger_rates, scale, moved, rate, out, work[HEADER:]
     )
@@ -97,7 +100,7 @@ def renew(rhs, handle, structure, ledger_offset, t, y, f, ledger_rates, scale, o
 
 @inline
 def spectral_radius(structure, work, nnz, scale, v):
-    """Approximate largest |eigenvalue| of the Jacobian, by five iterations of the power method."""
+    """Approximate largest |eigenvalue| of the Jacobian, by five iterations of the power method; v : work array."""
     n, product, before, now = v.size, work[HEADER + nnz :], 0.0, 0.0
     for e in range(n):
         v[e] = scale[e] if e % 2 == 0 else -scale[e]
@@ -114,7 +117,7 @@ def spectral_radius(structure, work, nnz, scale, v):
 
 @inline
 def size_of(d, weights):
-    """Sum of squares of an increment in units of the tolerance."""
+    """Sum of squares of an increment d, with weights that express it in units of the tolerance."""
     total = 0.0
     for i in range(weights.size):
         total += (d[i] * weights[i]) * (d[i] * weights[i])
@@ -123,7 +126,10 @@ def size_of(d, weights):
 
 @inline
 def next_increment(d, other, weights):
-    """(<d, other> / <d, d>, |other|^2 / |d|^2): component along d and squared length of the next increment."""
+    """Component of the next increment `other` along the increment d, and its squared length, both relative to d.
+
+    The results are <d, other> / <d, d> and |other|^2 / |d|^2, with the given weights of the states.
+    """
     square = dot = size = 0.0
     for i in range(weights.size):
         w = weights[i] * weights[i]
@@ -135,11 +141,11 @@ def next_increment(d, other, weights):
 
 @inline
 def damping_factor(part, ahead, size):
-    """Damping factor of an increment after a trial with `part`; `part` itself if the trial is accepted.
+    """Damping factor of an increment after a trial with the factor `part`; it equals `part` if the trial is accepted.
 
-    ahead, size : component along the increment and squared length of the next increment with the same factors, relative
-    The trial is accepted if the next increment is shorter or 0 <= ahead <= 1. A reversed increment is reduced by the
-    secant rule (natural monotonicity: Deuflhard 2004, 3.3).
+    ahead, size : results of `next_increment` for the next increment, computed with the same Jacobian factors
+    The trial is accepted if the next increment is shorter or 0 <= ahead <= 1. If the next increment is reversed, the
+    factor follows from the secant rule (natural monotonicity: Deuflhard 2004, 3.3).
     """
     if not size < np.inf:
         return 0.25 * part
@@ -152,7 +158,7 @@ def damping_factor(part, ahead, size):
 
 @inline
 def stop_limits(controls):
-    """(increment at which Newton may stop, increment that counts as rounding), in units of the tolerance."""
+    """Size of the increment at which Newton may stop, and size that counts as rounding, in units of the tolerance."""
     if controls[CONTROL] == TOLERANCE:
         enough = max(1e-15 / controls[SIZE], STOP_FRACTION)
         return enough, enough
@@ -161,9 +167,10 @@ def stop_limits(controls):
 
 @inline
 def damped_limits(controls):
-    """(increment to stop at, increment that counts as rounding, greatest increment accepted) of damped Newton.
+    """Limits of damped Newton: increment to stop at, increment that counts as rounding, greatest increment accepted.
 
-    In units of the tolerance. The accuracy is that of given steps, because f amplifies the Newton residual.
+    All are in units of the tolerance. Newton is as accurate as for steps of given length, because f amplifies the
+    Newton residual.
     """
     unit = controls[SIZE] if controls[CONTROL] == TOLERANCE else FIXED
     floor = stop_limits(controls)[1] if controls[CONTROL] == TOLERANCE else FLOOR / unit
@@ -172,7 +179,7 @@ def damped_limits(controls):
 
 @inline
 def find_worst(d, f, weights, loop_state):
-    """Store in loop_state[WORST] a component whose rate is not finite, else that of the greatest weighted increment."""
+    """Store in loop_state[WORST] a state whose rate f is not finite, or the state with the greatest increment d."""
     worst = -1.0
     for i in range(weights.size):
         e = abs(d[i] * weights[i]) if abs(f[i]) < np.inf else np.inf
@@ -182,7 +189,10 @@ def find_worst(d, f, weights, loop_state):
 
 @inline
 def convergence(turn, size, before, controls, work):
-    """(True to stop, CONVERGED or FAILED) after iteration `turn`; size, before : norms of this and last increment."""
+    """Stopping test after Newton iteration `turn`: True to stop, and CONVERGED or FAILED.
+
+    size, before : norms of this and of the previous increment, in units of the tolerance
+    """
     enough, rounded = stop_limits(controls)
     if not size < np.inf:
         return True, FAILED
@@ -205,7 +215,7 @@ def convergence(turn, size, before, controls, work):
 
 @inline
 def book_increment(structure, nnz, d, ledger_rates, i, work):
-    """Add to the ledger rates of stage i their change J d by the last increment d of its state."""
+    """Correct the ledger rates of stage i by their change J d, with the last increment d of the state of the stage."""
     n, product = d.size, work[HEADER + nnz :]
     multiply(structure, work[HEADER : HEADER + nnz], d, product)
     for m in range(ledger_rates.shape[1]):
@@ -214,7 +224,7 @@ def book_increment(structure, nnz, d, ledger_rates, i, work):
 
 @inline
 def evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, loop_state, residual):
-    """Compute f at the stage with slope ki, and the residual f - ki."""
+    """Compute the rates f at the state base + h_gamma ki of a stage with slope ki, and the residual f - ki."""
     for j in range(ki.size):
         y_stage[j] = base[j] + h_gamma * ki[j]
     rhs(t, y_stage, f, out, handle)
@@ -229,8 +239,9 @@ def damped_newton(
     rhs, factor, solve, handle, structure, t, h_gamma, i, k, y_stage, ledger_rates, ledger_offset, out, scale, controls,
     loop_state, nnz, work, vectors, factors,
 ):  # fmt: skip
-    """Solve k[i] = f(t, base + h gamma k[i]) by damped Newton, with a Jacobian for every iterate.
+    """Solve stage i, k[i] = f(t, base + h_gamma k[i]), by damped Newton, with a new Jacobian for every iterate.
 
+    h_gamma : step times the diagonal coefficient of the method
     Returns CONVERGED or FAILED.
     """
     s, n = k.shape
@@ -298,10 +309,10 @@ def solve_stage_from_start(
     rhs, factor, solve, handle, structure, t, h_gamma, i, k, y, y_stage, ledger_rates, ledger_offset, out, scale,
     controls, loop_state, nnz, work, vectors, factors,
 ):  # fmt: skip
-    """Solve a stage by `damped_newton`; for a given step with further starting values. Returns CONVERGED or FAILED.
+    """Solve a stage by `damped_newton`, if necessary from other starting values; returns CONVERGED or FAILED.
 
-    Where the first try of a given step fails, the iteration starts from the state y, and then by continuation in
-    h gamma from a step of zero length. Under error control a shorter step is cheaper.
+    If the first try fails in a step of given length, the iteration starts again from the state y, and then follows the
+    solution from a step of zero length. Under error control a shorter step is cheaper, so there is only one try.
     """
     base, reached, ki = vectors[k.shape[0] + BASE], vectors[k.shape[0] + FALLBACK], k[i]
     done, part, turn, worst = 0.0, 1.0, 0, loop_state[WORST]  # WORST keeps the result of simplified Newton
@@ -337,10 +348,11 @@ def smoothed_error(
     rhs, factor, solve, handle, structure, ledger_offset, t, h, y, y_new, k, ledger_rates, error, shift, scale, out,
     controls, loop_state, work, vectors, factors,
 ):  # fmt: skip
-    """Error of a damped step, (I - J / shift)^-1 h sum e_j k_j with J from its start, in units of the tolerance.
+    """Error of a step that damped Newton has solved, in units of the tolerance.
 
-    The filter reduces the error of stiff components (Hosea and Shampine 1996). Where a jump in J reverses the error,
-    the unfiltered error is used. Returns NEWTON_FAILED where the matrix is singular.
+    It is the norm of (I - J / shift)^-1 h sum e_j k_j with the Jacobian J at the start of the step and the weights e_j
+    in `error`. The matrix reduces the error of stiff components (Hosea and Shampine 1996). If it reverses the error,
+    because J jumps, the unfiltered error is used. Returns NEWTON_FAILED if the matrix is singular.
     """
     s, n = k.shape
     d, f, plain, dot, smooth = vectors[s + INCREMENT], vectors[s + RATE], 0.0, 0.0, 0.0

@@ -6,11 +6,13 @@ import numpy as np
 
 
 def transformed(a: np.ndarray, c: np.ndarray, a0: np.ndarray) -> np.ndarray:
-    """[T, T^-1, L, T L, P, C, T^-1 A^-1 a0, A^-1 a0], flat, for the implicit stages: A : float64[q, q].
+    """Matrices T, T^-1, L, T L, P, C, T^-1 A^-1 a0, A^-1 a0 by rows in one flat array, for `irk` and `stage_sweeps`.
 
+    a : float64[q, q]  coefficients A of the implicit stages; c : their times
+    a0 : float64[q]  weights of the explicit first stage in these stages
     A^-1 = T L T^-1; a complex pair of eigenvalues is a block [[a, -b], [b, a]] of L with b > 0. C : see `lower`.
-    P : sum of P[j, d] x^(d+1) is the integral from 1 to 1 + x of the j-th Lagrange polynomial on c, which extrapolates
-    the slopes of the last step to this step; zero where c has equal nodes
+    P extrapolates the slopes of the last step to this step: the sum of P[j, d] x^(d+1) is the integral from 1 to 1 + x
+    of the j-th Lagrange polynomial on c; zero if c has equal entries.
     Raises LinAlgError for a singular A, ValueError for an A without a basis of eigenvectors.
     """
     q = len(c)
@@ -38,7 +40,10 @@ def transformed(a: np.ndarray, c: np.ndarray, a0: np.ndarray) -> np.ndarray:
 
 
 def lower(a: np.ndarray) -> np.ndarray:
-    """C of A = C U (Crout): float64[q, q]; usable only if its diagonal has no zero."""
+    """Lower triangular factor C of the matrix A = C U, with unit diagonal of U (Crout) : float64[q, q].
+
+    It can be used only if its diagonal has no zero.
+    """
     rest, c = a.copy(), np.zeros_like(a)
     for j in range(len(a)):
         c[j:, j] = rest[j:, j]

@@ -33,13 +33,14 @@ def integrate(
 
     f : f(t, y) -> float64[n], or f(t, y, dydt), which fills its last argument; compiled if numba can compile it
     method : a name, a tableau, or "auto": explicit while stability allows it, implicit where that is cheaper
-    rtol : relative tolerance of methods with an error estimate (default 1e-6)
-    atol : absolute tolerance, a number or float64[n], default rtol
-    step : fixed step [s], for every method
-    counts : dict that receives the numbers of steps, rejections, rhs, jacobians, factorisations, newton, ...
-    Values at t come from dense output; else from steps that end there (`rtol`) or separate steps to them (`step`).
-    Raises FvsolveError for two step settings, a method without an error estimate and without a step, times out of
-    order, a solution that does not stay finite, and failure of Newton.
+    rtol : relative tolerance for methods with an error estimate; default 1e-6
+    atol : absolute tolerance, a number or float64[n]; default: equal to rtol
+    step : fixed step [s], possible with every method
+    counts : dict that receives the numbers of steps, rejections, rhs calls, Jacobians, factorisations and so on
+    Values at the times t come from dense output if it is accurate enough. Otherwise steps end there under `rtol`, and
+    separate steps lead there under `step`.
+    Raises FvsolveError for two step settings, a method without an error estimate and without a step, times that do not
+    rise, a solution that does not stay finite, and Newton iterations that do not converge.
     """
     automatic_choice = isinstance(method, str) and method == AUTO
     if automatic_choice and step is not None:
@@ -76,7 +77,10 @@ def integrate(
 
 
 def _solve_steps(stepper: Integrator, functions: tuple, key: int, t, y0) -> np.ndarray:
-    """States at t : float64[len(t), n]."""
+    """Take all steps, and return the states at the times t : float64[len(t), n].
+
+    functions : result of `_functions`; key : number of the call, with which compiled code finds the Python function
+    """
     controls, loop_state, progress = stepper.controls, stepper.loop_state, stepper.progress
     stepper.times, stepper.rows = np.ascontiguousarray(t[1:]), np.zeros((t.size, y0.size + 1))
     states = np.empty((t.size, y0.size))
@@ -96,9 +100,9 @@ def _solve_steps(stepper: Integrator, functions: tuple, key: int, t, y0) -> np.n
 
 
 def _prepare(f, t0, y0) -> tuple:
-    """(functions of the time loop for f, f(t, y, dydt) as Python function), cached if f is a compiled function.
+    """Functions of the time loop for f, and f as a Python function of (t, y, dydt); cached if f is a compiled function.
 
-    A plain function is not cached: its global variables may change between two calls, unseen by compiled code.
+    A plain Python function is not cached, because compiled code does not notice changes of its global variables.
     """
     if f not in _COMPILED:
         _check_rates(f, t0, y0)
@@ -134,7 +138,7 @@ def _numbers(name, given) -> np.ndarray:
 
 
 def _scale(atol, rtol: float, n: int) -> np.ndarray:
-    """Reference size of the deviations of each state, added to the size of the state."""
+    """Size that is added to the size of each state in its error tolerance, atol / rtol : float64[n]."""
     atol = _numbers("atol", atol)
     if atol.shape not in ((), (n,)) or not np.all(np.isfinite(atol) & (atol > 0)):
         raise FvsolveError(f"atol is not valid. Expected a positive number, or {n} of them, one for each state")
@@ -215,7 +219,7 @@ def in_place(f) -> bool:
 
 
 def _functions(f, t0, y0):
-    """(fused step, observe, record, events, rhs) for f, compiled if numba can compile f."""
+    """Functions of the time loop for f: fused step, observe, record, events, rhs; compiled if numba can compile f."""
     if not COMPILING:
 
         def plain(t, y, dydt, out, handle):
@@ -228,7 +232,7 @@ def _functions(f, t0, y0):
 
 
 def _compile(function, letters: str) -> DeclaredFunction:
-    """Compile a numba function for arguments of these types, in the form that the loop calls."""
+    """Compile a numba function for the time loop, with arguments of the types `letters`, see `signatures`."""
     kinds = argument_types(letters)
     function.compile(kinds)
     return DeclaredFunction(function, letters, code_of(function.overloads[kinds]))
@@ -236,13 +240,16 @@ def _compile(function, letters: str) -> DeclaredFunction:
 
 @compile_once
 def observers() -> tuple:
-    """(fused step, observe, record, events) of a system without events, whose rows are its states."""
+    """Functions fused step, observe, record and events of a system without events, whose output rows are its states."""
     functions = (_no_fused_step, FUSED_STEP), (_row, OBSERVE), (_nothing, OBSERVE), (_no_events, EVENTS)
     return tuple(_compile(numba.njit(function), letters) for function, letters in functions)
 
 
 def _rhs(f, t0, y0):
-    """Rhs function of the time loop for f, NaN where f raises; called as Python if numba cannot compile f."""
+    """Function for the rates in the time loop, made from f; it sets NaN where f raises an exception.
+
+    f is called as a Python function if numba cannot compile it. t0, y0 : arguments of a trial call
+    """
     from numba.core.errors import NumbaError, UnsupportedBytecodeError
 
     fills = in_place(f)

@@ -1,4 +1,4 @@
-"""Output rows and fields: time of the next one, and their values from dense output or separate steps."""
+"""Output rows and field frames: times at which they are due, and values from dense output or separate steps."""
 
 from fvsolve.jit import njit
 from fvsolve.steppers.loop_indices import (
@@ -39,7 +39,10 @@ NEGLIGIBLE = 1e-9  # reference amount below which shares of it are not computed
 
 @njit(forceinline=True)
 def output_due(controls, loop_state, count_at, every, limit):
-    """Time of the next row or field: START + count * every, or infinity."""
+    """Time [s] of the next output row or field: start of the run + count * every, or 1e308 after the last.
+
+    count_at : index of the count in `loop_state`; limit : greatest count
+    """
     if every <= 0.0 or loop_state[count_at] > limit:
         return 1e308
     return controls[START] + loop_state[count_at] * every
@@ -63,7 +66,11 @@ def next_due(controls, loop_state, times):
 
 @njit(forceinline=True)
 def reference_amount(states, bounds, y):
-    """Amount of which a state is a share: base + gain (y[j] + y[k]), without the terms whose index is negative."""
+    """Reference amount of a bounded state, such as the water in a cell for the mass of a scalar there.
+
+    It is base + gain (y[j] + y[k]), without the terms whose index is negative.
+    states : number of the state, j, k; bounds : base and gain in the first two entries
+    """
     amount = bounds[BASE]
     if states[1] >= 0:
         amount += bounds[GAIN] * (y[states[1]] + (y[states[2]] if states[2] >= 0 else 0.0))
@@ -74,8 +81,11 @@ def reference_amount(states, bounds, y):
 def limit_to_bounds(states, bounds, y_old, y, out):
     """Limit interpolated states to their bounds, because a polynomial between two valid states may leave them.
 
-    states : int64[3 q]  a state, and up to two states that give the amount it is a share of, else -1
-    bounds : float64[q, 4]  BASE, GAIN (see `reference_amount`), LEAST and MOST share; shares at the ends widen them
+    states : int64[3 q]  for each bounded state its number and the numbers of up to two states for its reference amount,
+    -1 for none, see `reference_amount`
+    bounds : float64[q, 4]  base and gain of the reference amount, least and greatest ratio of the state to this amount;
+    greater ratios at the start or end of the step widen these limits
+    y_old, y : states at the start and the end of the step; out : interpolated state, which is changed
     """
     for r in range(bounds.shape[0]):
         row_states, low, high = states[3 * r : 3 * r + 3], bounds[r, LEAST], bounds[r, MOST]
@@ -91,7 +101,7 @@ def limit_to_bounds(states, bounds, y_old, y, out):
 
 @njit(forceinline=True)
 def needs_separate_step(controls, work):
-    """True if rows within the last step come from separate steps, see `SEPARATE_ROWS`."""
+    """True if output rows within the last step come from separate steps, see `Integrator.separate_rows`."""
     if controls[CONTROL] == TOLERANCE or controls[SEPARATE_ROWS] == NEVER_SEPARATE:
         return False
     return controls[SEPARATE_ROWS] == ALWAYS_SEPARATE or work[KNOWN_STEPS] < 2.0
@@ -103,10 +113,10 @@ def separate_step(
     t, h, y, old, new, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, spare, spare_flat,
     spare_complex,
 ):  # fmt: skip
-    """Compute y[new] at t + h by a step from y[old], as from a start; returns True if its stages could be solved.
+    """Compute y[new] at t + h by a separate step from y[old] for an output row; returns True if it could be solved.
 
-    It uses separate arrays, so that neither the steps of a run nor the stages that `energy` reads depend on the rows.
-    Its cost is counted.
+    The step uses separate arrays and no data of earlier steps, so that neither the steps of a run nor the stages that
+    energy studies read depend on the output rows. Its calls of rhs are counted.
     ledger_rates : float64[s, ledgers]; spare : float64[s + vectors, n]; spare_flat : float64[work + factors]
     """
     s, worst, radius = ledger_rates.shape[0], loop_state[WORST], loop_state[RADIUS]
@@ -139,7 +149,10 @@ def emit(
     start_slope, scale, out, y_out, rows, bounded_states, bounds, work, spare, spare_ledger_rates, spare_flat,
     spare_complex,
 ):  # fmt: skip
-    """Write the rows due up to the present time; returns early at a due field, held in y_out, or with full rows."""
+    """Write the output rows due up to the present time; returns a code of `loop_indices`.
+
+    DONE : all rows are written; FIELD : a field frame is due, its state is in y_out; ROWS_FULL : `rows` has no space
+    """
     t, h, separate = loop_state[T], loop_state[T] - t_old, needs_separate_step(controls, work)
     while True:
         row = row_due(controls, loop_state, times)

@@ -20,7 +20,10 @@ def reciprocal(x):
 
 @njit
 def bad_row(structure, jacobian):
-    """1 + the state of the first entry that is not finite or is 1e150 or more; 0 if all state entries are valid."""
+    """Number + 1 of the state in whose row the first invalid Jacobian entry is; 0 if all entries are valid.
+
+    An entry is invalid if it is not finite or its size is 1e150 or more. Ledger rows are not tested.
+    """
     n = structure[SIZE]
     last, rows, good = structure[structure[STARTS] + n], structure[structure[ROWS] :], True
     for p in range(last):

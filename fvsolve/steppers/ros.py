@@ -1,7 +1,8 @@
 """One step of a Rosenbrock method: every stage is a linear solve with the Jacobian at the start of the step.
 
 (I / (h g) - J) u_i = f(t + c_i h, y + sum a_ij u_j) + sum C_ij u_j / h + d_i h f_t, y+ = y + sum m_i u_i
-(Hairer and Wanner 1996, (IV.7.25)). Stages are stored as k_i = u_i / h.
+with the step h, the Jacobian J, the time slope f_t = df/dt and the coefficients g, a, c, C, d, m of the method (Hairer
+and Wanner 1996, (IV.7.25)). Stages are stored as k_i = u_i / h.
 """
 
 from __future__ import annotations
@@ -37,7 +38,10 @@ SLOPE = BASE  # row of `vectors`, after the stages, for df/dt: Rosenbrock stages
 
 @inline
 def slope_in_time(rhs, handle, t, h, y, k, ledger_rates, ledger_offset, out, loop_state, work, vectors):
-    """Compute df/dt and, at the end of `work`, the time slopes of the ledger rates, by a difference within the step."""
+    """Compute the time slopes of f and of the ledger rates at constant y, by a difference within the step.
+
+    The slope of f is stored in a row of `vectors`, the slopes of the ledger rates at the end of `work`.
+    """
     s, n = k.shape
     slope, ledgers = vectors[s + SLOPE], ledger_rates.shape[1]
     step = min((2.2e-16 * max(1e-5, abs(t))) ** 0.5, 1e-3 * h)
@@ -53,9 +57,10 @@ def slope_in_time(rhs, handle, t, h, y, k, ledger_rates, ledger_offset, out, loo
 
 @inline
 def book_stage(structure, nnz, i, gamma, time_weight, row, d, ledger_rates, ledger_offset, out, work):
-    """Ledger rates of stage i: gamma (rates + J d + time_weight slope + sum of C_ij ledger_rates_j), d = u_i.
+    """Compute the ledger rates of stage i: gamma (rates + J d + time_weight slope + sum of C_ij ledger_rates_j).
 
-    row : float64[s]  C_i; `out` holds the rates computed with f, the end of `work` their time slopes
+    d : float64[n]  solution u_i of the stage; row : float64[s]  row C_i of the coefficients
+    `out` holds the rates computed with f, the end of `work` their time slopes
     """
     n, ledgers, product = d.size, ledger_rates.shape[1], work[HEADER + nnz :]
     multiply(structure, work[HEADER : HEADER + nnz], d, product)
@@ -73,7 +78,7 @@ def attempt(
 ):  # fmt: skip
     """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
-    Uses the real part of the linear algebra. Returns NEWTON_FAILED where the matrix is singular.
+    It uses the functions for real matrices only. Returns NEWTON_FAILED if the matrix I / (h g) - J is singular.
     """
     s, n = k.shape
     ledgers, nnz = ledger_rates.shape[1], structure[structure[STARTS] + structure[STATES]]

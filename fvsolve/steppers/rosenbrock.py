@@ -1,7 +1,8 @@
-"""Rosenbrock methods as printed in their codes, and their properties.
+"""Rosenbrock methods with the coefficients printed in their published codes, and their properties.
 
-k_i h = h f(y + sum alpha_ij h k_j) + h J sum gamma_ij h k_j; the codes avoid the product with J by u = Gamma h k:
-A = alpha Gamma^-1, C = diag(1 / gamma) - Gamma^-1, m = b Gamma^-1 (Hairer and Wanner 1996, IV.7).
+The stages k_i follow from h k_i = h f(y + sum alpha_ij h k_j) + h J sum gamma_ij h k_j, with the step h, the Jacobian J
+and the weights b. Codes avoid the product with J by u = Gamma h k, with the coefficients A = alpha Gamma^-1,
+C = diag(1 / gamma) - Gamma^-1, m = b Gamma^-1 (Hairer and Wanner 1996, IV.7).
 """
 
 from __future__ import annotations
@@ -20,17 +21,20 @@ DIGITS = 14  # accurate digits of the printed numbers after the inversion of Gam
 
 @dataclass(frozen=True, eq=False)
 class Rosenbrock(Method):
-    """Stiffly accurate Rosenbrock method with a linear solve for each stage: y+ = y_s + u_s, u_s estimates the error.
+    """Stiffly accurate Rosenbrock method with a linear solve for each stage.
 
-    text : rows `c_i d_i | a_i1 a_i2 ...`, c and d the sums of rows of alpha and Gamma; ruled lines before C and before
-    the polynomials of its dense output, y(theta) = y + theta (y+ - y) + theta (1 - theta) sum_k theta^k (H u)_k
+    The new state is y+ = y_s + u_s with the last stage y_s, and u_s estimates the error.
+    text : rows `c_i d_i | a_i1 a_i2 ...` with the sums c and d of the rows of alpha and Gamma, a ruled line, the rows
+    of C, a ruled line, the rows of H for the dense output
+    y(theta) = y + theta (y+ - y) + theta (1 - theta) sum_k theta^k (H u)_k
+    gamma : diagonal coefficient of Gamma
     """
 
     gamma: str = field(default="", repr=False)
 
     @functools.cached_property
     def printed(self) -> tuple:
-        """(c, d, A, C, H) as fractions; A and C square."""
+        """Printed coefficients c, d, A, C, H as fractions; A and C are square, with zeros on and above the diagonal."""
         blocks: list[list[list[Fraction]]] = [[], [], []]
         at, sums = 0, []
         for line in self.text.strip().splitlines():
@@ -48,7 +52,7 @@ class Rosenbrock(Method):
 
     @functools.cached_property
     def forms(self) -> tuple:
-        """(alpha, Gamma, b, b of the embedded solution) in fractions."""
+        """Coefficients alpha, Gamma, weights b and weights of the embedded solution, as fractions."""
         _, _, a, c, _ = self.printed
         s = len(a)
         inverse = [
@@ -63,7 +67,7 @@ class Rosenbrock(Method):
 
     @functools.cached_property
     def exact(self) -> Array:
-        """Array with beta = alpha + Gamma as A: on y' = lambda y the method equals that diagonally implicit method."""
+        """Butcher array with A = alpha + Gamma of the diagonally implicit method that it equals on y' = lambda y."""
         alpha, gamma, b, embedded = self.forms
         beta = tuple(tuple(x + y for x, y in zip(*rows, strict=True)) for rows in zip(alpha, gamma, strict=True))
         return Array(beta, tuple(b), tuple(sum(row) for row in beta), tuple(embedded), Fraction(0), ())
@@ -88,7 +92,10 @@ class Rosenbrock(Method):
 
     @functools.cached_property
     def coefficients(self) -> tuple[np.ndarray, np.ndarray, int]:
-        """(flat coefficients [A, m, c, e, C, d, gamma], dense output, stages), with f at the start as a first stage."""
+        """Flat coefficients A, m, c, e, C, d, gamma, coefficients of the dense output, and number of stages.
+
+        e are the weights of the error estimate. The rate f at the start of the step is added as a first stage.
+        """
         c, d, a, big_c, h = self.printed
         s = len(c)
 

@@ -1,9 +1,8 @@
-"""One step of a semi-implicit SSP method for f + G y, with a fast decay G = -r of each state.
+"""One step of a semi-implicit SSP method for y' = f + G y, with a fast decay G = -r of each state (bed friction).
 
-Chertock, Cui, Kurganov and Wu 2015 (SIAM J. Numer. Anal. 53): each stage is a mean of Euler steps of the full length
-h, y + h (f + G y) / (1 + h R). A correction at the end of the step makes it second order. Where f + G y is zero the
-state does not change, so steady states are those of f + G y for any h. R >= r may differ from r, see
-`free_surface.friction`.
+Each stage is a mean of Euler steps of the full length h, y + h (f + G y) / (1 + h R) (Chertock, Cui, Kurganov and Wu
+2015, SIAM J. Numer. Anal. 53). A correction at the end of the step makes it second order. Where f + G y is zero the
+state does not change, so steady states do not depend on h. The rate R [1/s] may be greater than the decay rate r.
 """
 
 from fvsolve.jit import njit
@@ -15,11 +14,11 @@ from fvsolve.steppers.step_operations import BEGIN, STOP, combine, copy
 
 @njit
 def second_order_correction(begin, end, b, damping, k):
-    """Correct k of the last stage so that y + h sum b_j k_j, for states [begin:end], is second order in h.
+    """Correct k of the last stage so that y + h sum b_j k_j is second order in h, for states from `begin` to `end` - 1.
 
-    The correction is an Euler step of length h (h R) from there, implicit in G, with f + G y of the stage at the end,
-    k[2] (1 + h R).
-    damping : float64[n]  h R
+    The correction is an Euler step of length h (h R) from the end of the step, implicit in the decay. Its rate f + G y
+    is that of the stage at the end of the step, k[2] (1 + h R).
+    b : weights of the stages; damping : float64[n]  h R with the rate R of each state
     """
     last = b.size - 1
     for i in range(begin, end):
@@ -36,9 +35,9 @@ def attempt(
 ):  # fmt: skip
     """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]), a stage of weight zero; returns 0.
 
-    k[1] is k[0] divided by 1 + h R. ledger_rates[i] receives the ledger rates of stage i.
+    k[1] is k[0] divided by 1 + h R, see the module. ledger_rates[i] receives the ledger rates of stage i.
     factors : float64[2 n]  h R of the first two stages, then of the later stages; zero for states without fast decay
-    The other arguments of implicit steps are not used.
+    Arguments for linear algebra and Newton iterations are not used.
     """
     s, b, c, n = k.shape[0], weights_of(coefficients, k.shape[0]), nodes_of(coefficients, k.shape[0]), scale.size
     for m in range(row_blocks.shape[0]):

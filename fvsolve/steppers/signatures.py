@@ -1,8 +1,8 @@
 """Declared types of the functions that the time loop calls, and functions compiled for exactly these types.
 
-With declared types the loop is compiled once, cached, and used for every method and every model. Letters are those of
-`jit.plain_kinds`: t, i numbers, c a complex number, v, w rows and tables of floats, h, s of integers, z of complex
-numbers.
+With declared types the loop is compiled once, cached, and used for every method and every model. A letter stands for
+the type of an argument, as in `jit.plain_kinds`: t float64, i int64, c complex128; arrays with one and two dimensions
+v and w of float64, h and s of int64; z array of complex128.
 """
 
 import functools
@@ -18,7 +18,7 @@ FUSED_STEP, OBSERVE, EVENTS, RHS, JOIN = "ttvvvhv", "tvvhv", "tvhv", "tvvvh", "v
 
 @functools.cache
 def function_types():
-    """Numba types of (attempt, fused step, observe, record, events, rhs, real and complex linear algebra, join)."""
+    """Numba types of the functions attempt, fused step, observe, record, events, rhs, linear algebra and join."""
     from numba import types
 
     def of(letters, returned=types.void):
@@ -33,7 +33,7 @@ def function_types():
 
 
 def argument_types(letters: str) -> tuple:
-    """Numba types of the arguments; F stands for the functions that a step takes."""
+    """Numba types of arguments given as letters, see the module; F stands for all functions that a step takes."""
     kinds = plain_kinds()
     return tuple(kind for letter in letters for kind in (function_types()[5:] if letter == "F" else (kinds[letter],)))
 
@@ -41,7 +41,7 @@ def argument_types(letters: str) -> tuple:
 if COMPILING:
 
     def function_from_address(index: int):
-        """Intrinsic that turns an address into a callable of type `index` in `function_types`."""
+        """Intrinsic that turns an address into a callable function of type number `index` in `function_types`."""
 
         @Intrinsic
         def function_at(typingctx, address):
@@ -79,7 +79,7 @@ def no_solve(structure, factors, x):
 
 @functools.cache
 def no_algebra():
-    """(factor, solve, factor_complex, solve_complex) for steps that solve no equations."""
+    """Functions factor, solve, factor_complex and solve_complex that do nothing, for explicit steps."""
     letters = (FACTOR, SOLVE, FACTOR_COMPLEX, SOLVE_COMPLEX)
     return tuple(compiled_as(njit(f), kinds) for f, kinds in zip((no_factor, no_solve) * 2, letters, strict=True))
 
@@ -90,15 +90,15 @@ def single_band(sums, row_blocks, handle):
 
 @functools.cache
 def no_exchange():
-    """Compiled exchange for a single band."""
+    """Compiled function that exchanges nothing, for a model that is not divided into bands."""
     return compiled_as(njit(single_band), JOIN)
 
 
 def compiled_as(function, letters: str):
-    """Compile a function for arguments of these types only, in the form that the loop calls."""
+    """Compile a function for arguments of the types `letters` only, in the form that the time loop calls."""
     return declare_function(function, letters, argument_types)
 
 
 def compiled_step(attempt):
-    """Compile a step for the signature that the loop calls."""
+    """Compile the step of a method for the argument types that the time loop uses."""
     return compiled_as(attempt, "F" + ATTEMPT)

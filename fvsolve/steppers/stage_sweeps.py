@@ -1,10 +1,11 @@
 """Stages of a fully implicit step solved one by one in sweeps, for slopes of f that differ by orders between stages.
 
-With A = C U, C lower triangular and U with unit diagonal, K <- F(y + h (a_0 k_0 + C K + (A - C) K_before)) is a
-diagonally implicit step, which `newton.damped_newton` solves. Stiff components converge in q sweeps, as I - U is
-nilpotent; the error of other components falls by a factor of 4 or more in each (van der Houwen and de Swart 1997).
-Limiters and the weights of weno can reduce that factor or make sweeps oscillate: then K is extrapolated to where the
-last two changes cancel (Anderson 1965, depth one).
+Let A = C U be the coefficients of the q implicit stages, C lower triangular and U upper triangular with unit diagonal,
+and K the slopes of the stages. The sweep K <- F(y + h (a_0 k_0 + C K + (A - C) K_before)) is a diagonally implicit
+step, whose stages `newton.damped_newton` solves; a_0 are the weights of the slope k_0 at the start. Stiff components
+converge in q sweeps, as I - U is nilpotent; the error of other components falls by a factor of 4 or more in each sweep
+(van der Houwen and de Swart 1997). Limiters and weno weights can reduce this factor or make sweeps oscillate: then K is
+extrapolated to the point where the last two changes cancel (Anderson 1965, depth one).
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ def sweep(
 ):  # fmt: skip
     """Compute the slopes k of the stages and their ledger rates; returns CONVERGED or FAILED.
 
-    low : float64[q q]  C, flat
-    first_row : first of 3 q rows of `vectors`, for slopes at the start of a sweep, their changes, and the results
+    low : float64[q q]  lower triangular matrix C by rows
+    first_row : first of 3 q rows of `vectors`, for the slopes before a sweep, their changes, and the slopes after it
     """
     s, n = k.shape
     q, c, base, weights = s - 1, nodes_of(coefficients, s), vectors[s + BASE], vectors[s + WEIGHTS]
@@ -85,9 +86,11 @@ def sweep(
 
 @inline
 def extrapolate(q, k, first_row, weights, vectors, weight):
-    """K <- K - weight g (K - K_before), g = <d, d - d_before> / |d - d_before|^2 with the changes d.
+    """Extrapolate the slopes K after a sweep, and store the change d and the result of this sweep.
 
-    Stores the change and the result of this sweep. weight : 0 to store them only, else 1
+    K <- K - weight g (K - K_before), g = <d, d - d_before> / |d - d_before|^2 with the changes d, d_before of this and
+    of the last sweep.
+    weight : 1 to extrapolate, 0 to store only
     """
     dot, square = 0.0, 0.0
     for i in range(q):

@@ -6,11 +6,11 @@ import numpy as np
 
 
 def pairs(pattern) -> np.ndarray:
-    """int64[blocks, 2]: every state once, with its partner; a state without a partner is paired with itself.
+    """Pairs of states : int64[blocks, 2]; a state without a partner is paired with itself.
 
-    The weight of a coupling is the number of walks of three steps that it closes. It is greatest between the two waves
-    of a cell, so these are paired. Couplings are taken greedily, strongest first (heavy edge matching; Karypis and
-    Kumar 1998).
+    pattern : sparse pattern of the Jacobian. The weight of a coupling of two states is the number of walks of three
+    edges between them. It is greatest between the two waves of a cell, which become a pair. Couplings are taken
+    greedily, strongest first (heavy edge matching; Karypis and Kumar 1998).
     """
     from scipy.sparse import coo_array, csr_array
 

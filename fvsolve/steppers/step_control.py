@@ -48,7 +48,7 @@ DEAD_BAND = 1.2  # an implicit step that may grow by a smaller factor keeps its 
 
 @njit(forceinline=True)
 def shortest(controls, loop_state):
-    """Least step that rates may demand [s]: a column behind a closing valve has an unbounded rate."""
+    """Least step [s] to which stability may reduce a step: a water column at a closing valve has an unbounded rate."""
     return 1e-13 * max(abs(loop_state[T]), abs(controls[END]))
 
 
@@ -60,7 +60,7 @@ def too_short(controls, loop_state, h):
 
 @njit(forceinline=True)
 def first_step(k, scale, controls, loop_state):
-    """Cautious first step from the size of the rates, which may be about to change [s]."""
+    """Cautious first step [s], from the size of the rates k[0] relative to the scale of the states."""
     total, tolerance, span = 0.0, controls[SIZE], controls[END] - loop_state[T]
     limit = min(span, max(1e-3 * span, shortest(controls, loop_state)))
     for i in range(scale.size):
@@ -71,7 +71,7 @@ def first_step(k, scale, controls, loop_state):
 
 @njit(forceinline=True)
 def next_step(controls, loop_state, out_rate, k, scale):
-    """Length of the step to try, before the end of the segment is considered [s]."""
+    """Length of the step to try [s], without regard to the end of the segment; out_rate : greatest wave rate [1/s]."""
     if controls[CONTROL] == TOLERANCE:
         if too_short(controls, loop_state, loop_state[STEP]):  # no step is stored, or it does not change the time
             loop_state[STEP] = first_step(k, scale, controls, loop_state)
@@ -90,9 +90,9 @@ def next_step(controls, loop_state, out_rate, k, scale):
 
 @njit(forceinline=True)
 def approaches(controls, loop_state, rest):
-    """True if a step by error control should end at APPROACH of the rest of its segment; a short step follows.
+    """True if a step under error control should end after 95 % of the rest of its segment, followed by a short step.
 
-    Where a valve closes at a break, its flow is laminar just before. All stages of a long step lie before that moment.
+    A valve that closes at the end of the segment has laminar flow just before, where a long step has no stage.
     rest : remaining time of the segment [s]
     """
     if controls[CONTROL] != TOLERANCE or rest <= 2.0 * (1.0 - APPROACH) * loop_state[STEP]:
@@ -102,7 +102,10 @@ def approaches(controls, loop_state, rest):
 
 @njit(forceinline=True)
 def row_step_end(controls, loop_state, due, h):
-    """End time of a step by error control that is shortened to end at a due row; infinity if none is due [s]."""
+    """Time [s] of an output row at which a step of length h under error control has to end; 1e308 if no row is due.
+
+    due : time of the next row [s]
+    """
     if controls[END_AT_ROWS] == 0.0 or controls[CONTROL] != TOLERANCE:  # given steps do not depend on output rows
         return HUGE
     if due >= loop_state[T] + h * (1.0 - 1e-9) or too_short(controls, loop_state, due - loop_state[T]):
@@ -112,9 +115,10 @@ def row_step_end(controls, loop_state, due, h):
 
 @njit(forceinline=True)
 def end_of(controls, loop_state, h, last, due):
-    """End time of a step of h [s].
+    """End time [s] of a step of length h.
 
-    Full given steps end at a multiple of the step, so that rounding does not accumulate.
+    last : True for the last step of a segment; due : time from `row_step_end`. Full steps of given length end at a
+    multiple of the step, so that rounding does not accumulate.
     """
     if last:
         return controls[END]
@@ -130,7 +134,10 @@ def end_of(controls, loop_state, h, last, due):
 
 @njit(forceinline=True)
 def closing_step(loop_state, closing, h, least):
-    """A given step h, or a part of it while an opening x closes at an unbounded rate, -x'/x = closing [1/s]."""
+    """Length of the next step [s]: the given step h, or a part of it if an opening closes fast within it.
+
+    closing : relative rate -x'/x of the closing opening x [1/s]; least : least length of a part [s]
+    """
     if h * closing <= CLOSING_FRACTION or h <= 2.0 * least:
         return h
     if loop_state[SPLIT_REMAINDER] == 0.0:  # the parts end together where the given step would have ended
@@ -141,7 +148,7 @@ def closing_step(loop_state, closing, h, least):
 
 @njit(forceinline=True)
 def arriving_step(controls, loop_state, arrives, h):
-    """A step h, or its part up to the time `arrives` [s] at which a jump reaches a part that responds at once."""
+    """Length of the next step [s]: h, or its part up to the time `arrives` [s] of a jump of a wave at its end."""
     rest = arrives - loop_state[T]
     if not 0.0 < rest < h * (1.0 - 1e-9):
         return h
@@ -152,15 +159,15 @@ def arriving_step(controls, loop_state, arrives, h):
 
 @njit(forceinline=True)
 def reduced(controls, e):
-    """Factor on the length of a step whose error e was too large."""
+    """Factor on the length of a step whose error e, in units of the tolerance, was too large."""
     return max(0.1, 0.9 * e ** (-1.0 / controls[ORDER])) if e == e else 0.1
 
 
 @njit(forceinline=True)
 def grown(controls, loop_state, h, e):
-    """Factor on the length after an accepted step of error e: PI control (Gustafsson 1991).
+    """Factor on the step length h after an accepted step with the error e, in units of the tolerance.
 
-    Implicit methods use predictive control (Gustafsson 1994).
+    Explicit methods use PI control (Gustafsson 1991), implicit methods predictive control (Gustafsson 1994).
     """
     e, old, order = max(e, 1e-10), max(loop_state[ERROR_OLD], 1e-4), controls[ORDER]
     if controls[KIND] == EXPLICIT:
@@ -173,10 +180,12 @@ def grown(controls, loop_state, h, e):
 
 @njit(forceinline=True)
 def watch(controls, loop_state, h, e, out_rate):
-    """Count the steps for which the other kind of method would have been cheaper; True if there are enough to switch.
+    """Count the steps for which the other kind of method (explicit or implicit) would have been cheaper.
 
-    Explicit steps: limited by stability (Hairer and Wanner 1996, IV.2) by more than the cost ratio of an implicit step.
-    Implicit steps: explicit steps within their stability boundary would have cost less than half.
+    Returns True if there are enough such steps to change the method. An implicit method would be cheaper if stability
+    limits the explicit step (Hairer and Wanner 1996, IV.2) by more than the cost ratio of an implicit step. An explicit
+    method would be cheaper if its steps within the stability boundary cost less than half.
+    h, e : length and error of the step; out_rate : greatest wave rate [1/s]
     """
     if controls[KIND] == EXPLICIT:
         growth = 0.9 * max(e, 1e-30) ** (-1.0 / controls[ORDER])
@@ -194,5 +203,8 @@ def watch(controls, loop_state, h, e, out_rate):
 
 @njit(forceinline=True)
 def retains_length(controls, grow):
-    """True if an implicit step keeps its length because it may only grow by a small factor."""
+    """True if an implicit step keeps its length, and so its factorisation, as it could grow by a factor up to 1.2 only.
+
+    grow : factor by which the error would allow the step to grow
+    """
     return controls[KIND] == NEWTON_SOLVED and 1.0 <= grow <= DEAD_BAND

@@ -15,13 +15,17 @@ BEGIN, STOP, FIRST, SUMS = range(4)
 
 @njit(forceinline=True)
 def error_scale(scale, y):
-    """Reference size of the error of a state: scale + |y|, or -scale for a negative scale."""
+    """Reference size of the error of a state with value y: scale + |y|, or -scale for a negative scale."""
     return scale + abs(y) if scale >= 0.0 else -scale
 
 
 @njit
 def squares(begin, end, h, error, k, y, y_new, scale, tolerance):
-    """Sum over [begin:end] of squares of h sum e_j k_j / (tolerance `error_scale`), at the greater of |y|, |y_new|."""
+    """Sum of the squared errors of the states from `begin` to `end` - 1, in units of the tolerance.
+
+    The error of a state is h sum e_j k_j with the weights e_j in `error`; its unit is `tolerance` times `error_scale`
+    at the greater of |y| and |y_new|.
+    """
     first, last = 0, error.size
     while last > 0 and error[last - 1] == 0.0:
         last -= 1
@@ -39,13 +43,13 @@ def squares(begin, end, h, error, k, y, y_new, scale, tolerance):
 
 @njit
 def error_norm(h, error, k, y, y_new, scale, tolerance):
-    """Root mean square of h sum e_j k_j / (tolerance `error_scale`), at the greater of |y| and |y_new|."""
+    """Root mean square of the errors of all states in units of the tolerance, see `squares`."""
     return sqrt(squares(0, y.size, h, error, k, y, y_new, scale, tolerance) / max(y.size, 1))
 
 
 @njit
 def error_of_bands(join, handle, row_blocks, sums, h, error, k, y, y_new, scale, tolerance):
-    """`error_norm` over all bands, from partial sums by rows that bands exchange; sums : array for these."""
+    """Result of `error_norm` over the states of all bands, which exchange the partial sums of their rows in `sums`."""
     for m in range(row_blocks.shape[0]):
         begin, count = row_blocks[m, BEGIN], row_blocks[m, SUMS]
         length = (row_blocks[m, STOP] - begin) // count
@@ -61,7 +65,7 @@ def error_of_bands(join, handle, row_blocks, sums, h, error, k, y, y_new, scale,
 
 @njit(forceinline=True)
 def weight(theta, dense, j):
-    """Weight of stage j in the dense output at theta: sum of dense[j, m] theta^(m + 1)."""
+    """Weight of stage j in the dense output at the fraction theta of a step: sum of dense[j, m] theta^(m + 1)."""
     w = 0.0
     for m in range(dense.shape[1] - 1, -1, -1):
         w = (w + dense[j, m]) * theta
@@ -70,10 +74,11 @@ def weight(theta, dense, j):
 
 @njit
 def start_slope_defect(begin, end, start_slope, k, slope, known, out):
-    """out <- slope at the start of a step, less the slope of its collocation polynomial there.
+    """out <- slope of the solution at the start of a step minus the slope of its collocation polynomial there.
 
-    known : `slope`, the last stage of the previous step, is known; else the slope is f, and out is 0 where it differs
-    by more than the first and last stages do, because f is stiff there
+    begin, end : range of states; start_slope : result of `start_slope_correction`
+    known : True if `slope`, the slope of the last stage of the previous step, is available. Otherwise the slope is the
+    rate f, and `out` is 0 for states where the difference exceeds that between the first and last stages (a stiff f)
     """
     s = k.shape[0]
     for i in range(begin, end):
@@ -85,9 +90,10 @@ def start_slope_defect(begin, end, start_slope, k, slope, known, out):
 
 @njit
 def interpolate(begin, end, theta, h, y, f, y_new, f_new, k, dense, start_slope, out):
-    """Dense output at t + theta h, for [begin:end]: polynomial of the method, else Hermite cubic through both ends.
+    """out <- state at t + theta h within a step, for the states from `begin` to `end` - 1 (dense output).
 
-    start_slope : see `start_slope_correction`; if it is not empty, f is the result of `start_slope_defect`
+    It is the method's own polynomial, or the Hermite cubic with values y, y_new and slopes f, f_new at both ends.
+    start_slope : result of `start_slope_correction`; if it is not empty, f is the result of `start_slope_defect`
     """
     if dense.shape[0] > 0:
         w = h * weight(theta, dense, 0)
@@ -119,10 +125,11 @@ def interpolate(begin, end, theta, h, y, f, y_new, f_new, k, dense, start_slope,
 
 @njit
 def all_finite(join, handle, row_blocks, sums, y, stage_sums, checked):
-    """True if all values of all bands are finite and have finite squares; sums : array that bands exchange.
+    """True if the states y of all bands are finite and below 1e100.
 
-    A single partial sum means a single band.
-    stage_sums : see `kernels.sums`; checked : the rhs has already counted the bad values of the stages that it formed
+    sums : partial sums that bands exchange; a single entry means a single band
+    stage_sums : array `sums` of `kernels.stage_sums`
+    checked : True if the rhs has already counted the invalid values of the stages that it formed
     """
     bad = 0
     if checked:
@@ -139,7 +146,7 @@ def all_finite(join, handle, row_blocks, sums, y, stage_sums, checked):
 
 @njit(forceinline=True)
 def sum_of_bands(own, join, handle, row_blocks, sums):
-    """Sum of a number over all bands; sums : array that bands exchange."""
+    """Sum of the number `own` of this band and the numbers of the other bands; sums : array that bands exchange."""
     if sums.size == 1:
         return float(own)
     for m in range(row_blocks.shape[0]):
@@ -155,7 +162,7 @@ def sum_of_bands(own, join, handle, row_blocks, sums):
 
 @njit
 def exceeded(join, handle, row_blocks, sums, y, largest):
-    """True if a state of any band exceeds its largest value or is not a number."""
+    """True if the size of a state of any band exceeds the value in `largest` or is not a number."""
     beyond = 0
     for m in range(row_blocks.shape[0]):
         for i in range(row_blocks[m, BEGIN], row_blocks[m, STOP]):
@@ -165,7 +172,7 @@ def exceeded(join, handle, row_blocks, sums, y, largest):
 
 @njit(forceinline=True)
 def add_up(total, part, carry):
-    """(total + part, new rounding error), with the previous rounding error `carry` added back (Kahan 1965)."""
+    """Sum total + part with the previous rounding error `carry` added back, and new rounding error (Kahan 1965)."""
     corrected = part + carry
     new = total + corrected
     return new, corrected - (new - total)
@@ -173,9 +180,9 @@ def add_up(total, part, carry):
 
 @njit(forceinline=True)
 def add_stored(h, b, k, y, y_new, stored, carry):
-    """Recompute stored masses with compensated sums, so that rounding does not accumulate over steps.
+    """Recompute the states `stored` (masses) with compensated sums, so that rounding does not accumulate over steps.
 
-    Returns True if this changed a bit of y_new.
+    carry : rounding errors of the previous sums. Returns True if this changed a bit of y_new.
     """
     changed = False
     for q in range(stored.size):

@@ -32,9 +32,9 @@ DENSE_SHARE = 0.2  # fraction of non-zero entries from which factors fill up, so
 class Structure:
     """Pattern of a Jacobian and the linear algebra chosen for it.
 
-    pattern : bool[n + m, n]  sparse by columns: n states, then m ledger rows that are not part of the factorisation
-    kind : "dense", "banded" or "sparse"; None: chosen by n and the pattern
-    fine : numbers of the states with fine increments in differences
+    pattern : bool[n + m, n]  sparse by columns: rows of n states, then of m ledger rates, which are not factored
+    kind : "dense", "banded" or "sparse"; default: chosen by the size and the density of the pattern
+    fine : numbers of the states whose increments in finite differences are smaller than usual
     Raises FvsolveError for another kind and for a pattern with fewer rows than columns.
     """
 
@@ -81,7 +81,7 @@ class Structure:
 
     @cached_property
     def colors(self) -> np.ndarray:
-        """int64[n]: colours; columns of equal colour have no row in common, ledger rows included."""
+        """Colour of each column : int64[n]; columns of equal colour have no row in common, ledger rows included."""
         from fvsolve.steppers.colors import colors
 
         return colors(self.pattern)
@@ -93,12 +93,12 @@ class Structure:
 
     @cached_property
     def _own(self) -> tuple[np.ndarray, int]:
-        """(data for the compiled functions of this kind, length of a factor)."""
+        """Data for the compiled functions of this kind : int64[:], and length of the array for the factors."""
         return kind_module(self.kind).prepare(self.pattern)
 
     @cached_property
     def shape(self) -> np.ndarray:
-        """Flat array that every compiled function reads : int64[:]."""
+        """Structure as one flat array for compiled functions : int64[:], see the module."""
         counts = np.bincount(self.colors, minlength=self.color_count)
         color_starts = np.concatenate(([0], np.cumsum(counts)))
         parts = [self.pattern.indptr, self.pattern.indices, color_starts, np.argsort(self.colors, kind="stable")]
@@ -109,11 +109,11 @@ class Structure:
 
     @property
     def store_size(self) -> int:
-        """Length of the array for a factor."""
+        """Length of the array for the factors."""
         return self._own[1]
 
     def functions(self, complex: bool = False) -> tuple:
-        """(factor, solve) of this kind, compiled on first use, for real or for complex shifts.
+        """Functions `factor` and `solve` of this kind, compiled on first use, for real or for complex shifts.
 
         factor(structure, jacobian, shift, factors) -> 0, or 1 + the state at which shift I - J has no good pivot
         solve(structure, factors, x) -> None, in place
@@ -133,13 +133,13 @@ def choose(pattern) -> str:
 
 
 def kind_module(kind: str):
-    """Module with the functions of a kind."""
+    """Module with the linear algebra of a kind of structure."""
     return importlib.import_module(f"fvsolve.steppers.linear_{kind}")
 
 
 @compile_once
 def functions(kind: str, complex: bool) -> tuple:
-    """(factor, solve) of a kind, compiled for real or complex shifts."""
+    """Functions `factor` and `solve` of a kind of structure, compiled for real or complex shifts."""
     module = kind_module(kind)
     letters = (FACTOR_COMPLEX, SOLVE_COMPLEX) if complex else (FACTOR, SOLVE)
     return tuple(compiled_as(njit(f), kinds) for f, kinds in zip((module.factor, module.solve), letters, strict=True))

@@ -27,7 +27,10 @@ EXACT_DECIMALS = 6  # decimals with at most this many digits are exact
 
 @dataclass(frozen=True)
 class Array:
-    """Exact numbers of a tableau: fractions, or algebraic numbers with a common root."""
+    """Exact coefficients of a tableau: fractions, or algebraic numbers with a common root.
+
+    a, b, c : Butcher array; dense : coefficients of the dense output, see `Method`
+    """
 
     a: tuple[tuple, ...]
     b: tuple
@@ -39,13 +42,14 @@ class Array:
 
 @dataclass(frozen=True, eq=False)
 class Method:
-    """A Runge-Kutta method: k_i = f(y + h sum_j a_ij k_j, t + c_i h), y+ = y + h sum_i b_i k_i (14), (23).
+    """A Runge-Kutta method with step h and s stages k_i: equations (14) and (23) of docs/course.md.
 
+    k_i = f(y + h sum_j a_ij k_j, t + c_i h), y+ = y + h sum_i b_i k_i.
     All properties except name, source and text are derived on first use:
-    a : float64[s, s]; b, c : float64[s]
-    error : float64[s] or empty  weights of y+ less the embedded solution
-    start_error : weight of f(t, y) at the start in that difference
-    dense : float64[s, d] or empty  y(theta) = y + h sum_i k_i sum_j dense_ij theta^(j+1)
+    a, b, c : float64[s, s], float64[s], float64[s]  Butcher array
+    error : float64[s] or empty  weights of the stages in the difference of y+ and the embedded solution
+    start_error : weight of f(t, y) at the start of the step in this difference
+    dense : float64[s, d] or empty  dense output y(theta) = y + h sum_i k_i sum_j dense_ij theta^(j+1), 0 <= theta <= 1
     """
 
     name: str
@@ -63,7 +67,7 @@ class Method:
 
     @functools.cached_property
     def digits(self) -> int | None:
-        """Significant digits of the source, None where its numbers are exact."""
+        """Number of significant digits in the published coefficients; None if they are exact."""
         count = self.given_digits or digits(self.text)
         return count if count > EXACT_DECIMALS else None
 
@@ -122,7 +126,7 @@ class Method:
 
     @property
     def control_order(self) -> int:
-        """Power of h of the error estimate; without an error estimate the power of h of the global error."""
+        """Power of the step h in the error estimate; without an error estimate the order of the method."""
         return min(self.order, self.error_order) + 1 if self.adaptive else self.order
 
     @functools.cached_property
@@ -131,7 +135,7 @@ class Method:
 
     @property
     def times(self) -> tuple[float, ...]:
-        """Times of the stages, in steps."""
+        """Times of the stages after the start of a step, in units of the step."""
         return tuple(map(float, self.exact.c))
 
     @functools.cached_property
@@ -146,7 +150,7 @@ class Method:
 
     @property
     def kind(self) -> str:
-        """Kind by the equations of a step: none (explicit), single stages (diagonal), all stages together (full)."""
+        """Kind of the equations of a step: "explicit" (none), "diagonal" (stage by stage), "full" (all together)."""
         return "explicit" if self.explicit else "diagonal" if self.diagonally_implicit else "full"
 
     @functools.cached_property
@@ -172,13 +176,16 @@ def tableau(
 ) -> Method:  # fmt: skip
     """Define a method by its Butcher array, as text or as A, b, c; afterwards it can be used by its name.
 
-    text : rows `c | a1 a2 ...`, a ruled line, `| b1 b2 ...` and, with an embedded solution, a second such row. Entries
-    have no blanks: `1/3`, `0.161`, `(88-7sqrt(6))/360`, or expressions in `numbers`. Or A : [s, s], with
-    b : [s], or two rows, the second embedded; c : [s], default the sums of rows of A. Integers and fractions are exact,
-    floating-point numbers are rounded in their last digit
-    dense : coefficients of the dense output, see `Method`
-    start_weight : weight of f(t, y) in an embedded solution of quadrature type
-    numbers : for example `{"g": ("x^3-3x^2+3x/2-1/6", 0.4358665215)}`: root of that polynomial nearest to that number
+    text : rows `c | a1 a2 ...`, a ruled line, `| b1 b2 ...` and, for an embedded solution, a second row of weights.
+    Entries have no blanks: `1/3`, `0.161`, `(88-7sqrt(6))/360`, or expressions with the names in `numbers`.
+    In place of the text: the matrix A, s x s, with b and c as numbers
+    b : s weights, or two rows of weights, the second for the embedded solution
+    c : s times of the stages; default: the sums of the rows of A. Integers and fractions are exact; floating-point
+    numbers count as rounded in their last digit
+    source : origin of the coefficients; dense : coefficients of the dense output, see `Method`
+    start_weight : weight of f(t, y) at the start of the step in an embedded solution that integrates polynomials
+    numbers : names for irrational numbers, such as `{"g": ("x^3-3x^2+3x/2-1/6", 0.4358665215)}`: the root of the
+    polynomial that is nearest to the given value
     digits : significant digits of the entries; default: decimals of more than six digits are rounded, others exact
     Raises FvsolveError with all faults: rows of wrong length, rows that do not add up to c, invalid entries.
     """
@@ -217,7 +224,7 @@ def method_of_file(path: Path) -> Method:
 
 
 def printed(a: Sequence, b: Sequence, c: Sequence | None = None) -> str:
-    """Text of a Butcher array given as numbers; raises FvsolveError for wrong shapes."""
+    """Text of a tableau from the Butcher array as numbers, see `tableau`; raises FvsolveError for wrong shapes."""
     a, b = np.atleast_2d(np.asarray(a, dtype=object)), np.atleast_2d(np.asarray(b, dtype=object))
     s = a.shape[0]
     if a.shape != (s, s) or b.ndim != 2 or b.shape[0] > 2 or b.shape[1] != s:
@@ -246,7 +253,10 @@ def declare(
     name: str, text: str, source: str, dense: Sequence = (), start_weight: str | None = None,
     numbers: Mapping[str, tuple[str, float]] | None = None, digits: int | None = None, also: str | None = None,
 ) -> Method:  # fmt: skip
-    """Declare a built-in method, whose text is read on first use; `also` is its second name, within a family."""
+    """Declare a built-in method, with arguments as for `tableau`; its text is read on first use.
+
+    also : second name of the method, within a family of methods
+    """
     method = METHODS[name] = Method(name, source, text, numbers or {}, dense, start_weight, digits)
     BUILT_IN.add(name)
     if also:
@@ -256,7 +266,7 @@ def declare(
 
 
 def method_named(name: str | Method) -> Method:
-    """Method of a name, or the given method; raises FvsolveError with the nearest name for an unknown name."""
+    """Method with the given name, or the given `Method`; raises FvsolveError with the nearest name if it is unknown."""
     if isinstance(name, Method):
         return name
     if not isinstance(name, str):
@@ -297,7 +307,10 @@ def _exact(method: Method) -> Array:
 
 
 def _rows(text: str, numbers: Mapping, faults: list[str]) -> tuple[list, list]:
-    """Rows [c, a1, ...] above the ruled line and rows [b1, ...] below it."""
+    """Exact rows [c, a1, ...] above the ruled line of a tableau and rows [b1, ...] below it.
+
+    numbers : names of irrational numbers and their values; faults are added to the list `faults`
+    """
     head, weights, below = [], [], False
     for line in text.strip().splitlines():
         line = line.strip()
@@ -327,7 +340,10 @@ def _mixed_roots(rows: list) -> list[str]:
 
 
 def _faults(head: list, weights: list, rounding: Fraction) -> list[str]:
-    """Faults of a tableau: rows of wrong length or wrong sum."""
+    """Faults of a tableau: rows of wrong length or wrong sum.
+
+    head, weights : results of `_rows`; rounding : relative error of a coefficient
+    """
     s, faults = len(head), []
 
     def differs(row, expected) -> bool:

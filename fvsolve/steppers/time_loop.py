@@ -1,7 +1,7 @@
 """Time loop: steps of any method with dense output, step control and event location.
 
-A single compiled loop is used for every method (a step is a function of declared type, Butcher arrays are data) and
-every model (functions of declared type).
+A single compiled loop is used for every method and every model: the functions for a step and for the rates have
+declared types, and the coefficients of a method are data.
 """
 
 from math import isfinite
@@ -117,7 +117,7 @@ if COMPILING:
 
 @njit(forceinline=True)
 def can_use_fused_step(controls, loop_state, times, h):
-    """True if fused steps are allowed and a step of h ends before the segment and before the next row or field."""
+    """True if fused steps are allowed and a step of length h ends before the segment and the next row or field."""
     if (
         controls[ALLOW_FUSED] == 0.0
         or too_short(controls, loop_state, h)
@@ -151,21 +151,24 @@ def run_steps(
     ledger_offset, ledger, scale, out, out_row, values, g, g_new, armed, stored, carry, y_out, rows, bounded_states,
     bounds, work, vectors, factors, complex_factors, spare, spare_ledger_rates, spare_flat, spare_complex, largest,
 ):  # fmt: skip
-    """Step from loop_state[T] to controls[END]; returns the reason, to be called again with the same arrays.
+    """Step from loop_state[T] to controls[END]; returns the reason for the return, a code of `loop_indices`.
 
-    rhs(t, y, dydt, out, handle) : with an empty dydt it computes only `out`, which is enough for a row
-    fused_step(t, h, y, y_new, out, handle, values) : where controls[ALLOW_FUSED] allows it, a full step to t of a
-    one-stage method, with `out` and the record of its end; used where no row is due
-    join(sums, row_blocks, handle) : adds the values of the other bands, which are stepped in parallel
-    row_blocks, sums : states of this band, and an array with a number for each row of all bands, see `step_operations`
+    The caller handles the reason and calls the function again with the same arrays.
+    attempt : step of the method; rhs(t, y, dydt, out, handle) : rates dydt and other results `out` of the model; with
+    an empty dydt it computes only `out`, which is enough for an output row
+    fused_step(t, h, y, y_new, out, handle, values) : complete step of a one-stage method that ends at t, with `out` and
+    the record of its end; used if controls[ALLOW_FUSED] allows it and no output row is due
+    join(sums, row_blocks, handle) : exchange of partial sums between bands that are stepped in parallel
+    row_blocks, sums : states of this band, and an array of partial sums of all bands, see `step_operations`
+    dense : coefficients of the dense output; ledger : float64[5 m]  integrals of out[ledger_offset:], see `ledger`
     y : float64[4, n]  present, last and next state, and a stage; k : float64[s, n]  stages
-    ledger : float64[5 m]  integrals of out[ledger_offset:] (`ledger.py`)
-    stored : int64[q]  states with compensated sums
-    rows : float64[cap, 1 + probes]; times : times of rows, if given as a list
+    g, g_new, armed : values of the event functions at the start and the end of a step, and event flags
+    stored, carry : int64[q], float64[q]  states with compensated sums, and the rounding errors of these sums
+    rows : float64[capacity, 1 + probes]  output rows; times : times of the rows if given as a list
     bounded_states, bounds : limits of interpolated rows, see `limit_to_bounds`
     work, vectors, factors, complex_factors : data that implicit steps keep
     spare, spare_ledger_rates, spare_flat, spare_complex : arrays for `separate_step`
-    largest : float64[n]  largest allowed states, checked every GROWTH_CHECK_STEPS steps, or empty
+    largest : float64[n]  largest allowed states, checked every 16 steps, or empty
     """
     # event_known: g_new belongs to the end of the last step
     s, reuse, event_known, t_new = k.shape[0], False, False, 0.0
@@ -383,7 +386,7 @@ def run_steps_at(
     bounded_states, bounds, work, vectors, factors, complex_factors, spare, spare_ledger_rates, spare_flat,
     spare_complex, largest,
 ):  # fmt: skip
-    """`run_steps` with the functions at these addresses, in the order of its arguments."""
+    """Call `run_steps` with the functions whose addresses are in `calls`, in the order of its arguments."""
     return run_steps(
         attempt_at(calls[0]), fused_step_at(calls[1]), observe_at(calls[2]), record_at(calls[3]), events_at(calls[4]),
         rhs_at(calls[5]), factor_at(calls[6]), solve_at(calls[7]), factor_complex_at(calls[8]),
@@ -399,7 +402,10 @@ def attempt_with(
     calls, handle, coefficients, structure, row_blocks, sums, t, h, y, now, new, k, ledger_rates, ledger_offset, out,
     scale, controls, loop_state, work, vectors, factors, complex_factors,
 ):  # fmt: skip
-    """One step with the functions at these addresses: step of the method, rhs, linear algebra, exchange."""
+    """Take one step with the functions whose addresses are in `calls`: step of the method, rhs, linear algebra, join.
+
+    The other arguments and the result are as for `erk.attempt`, `irk.attempt` and the steps of other methods.
+    """
     attempt = attempt_at(calls[0])
     return attempt(
         rhs_at(calls[1]), factor_at(calls[2]), solve_at(calls[3]), factor_complex_at(calls[4]),

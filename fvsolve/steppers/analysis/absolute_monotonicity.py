@@ -13,10 +13,10 @@ LONGEST = Fraction(1 << 64)  # a larger radius counts as infinite
 
 
 def ssp_radius(method: Method) -> float:
-    """Greatest r with (I + r K)^-1 1 >= 0 and r K (I + r K)^-1 >= 0, K = [[A, 0], [b^T, 0]]; 0 if none exists.
+    """SSP radius r of a method: if Euler steps up to h do not increase a norm, steps of the method up to r h do not.
 
-    A norm that Euler steps up to h do not increase is not increased by steps of the method up to r h.
-    Returns inf where this holds for every step.
+    It is the greatest r with (I + r K)^-1 1 >= 0 and r K (I + r K)^-1 >= 0 for K = [[A, 0], [b^T, 0]]; 0 if there is
+    none, inf if every r is possible.
     """
     k = _used(method)
     if any(x < 0 for row in k for x in row) or not _fills_in(k):
@@ -38,14 +38,17 @@ def ssp_radius(method: Method) -> float:
 
 @functools.cache
 def in_euler_steps(method: Method) -> bool:
-    """True if every stage is a convex combination of Euler steps of length h, the second stage at the step's end."""
+    """True if a method is explicit, has SSP radius 1 and no error estimate, and its second stage is at the step's end.
+
+    Then every stage is a convex combination of Euler steps of the full length.
+    """
     if not method.explicit or method.adaptive or method.kind == "linear":
         return False
     return (method.stages == 1 or method.c[1] == 1.0) and ssp_radius(method) == 1.0
 
 
 def _used(method: Method) -> list[list]:
-    """K restricted to the stages that the new state depends on."""
+    """Matrix K = [[A, 0], [b^T, 0]] of a method, restricted to the stages that the new state depends on."""
     a, b = method.exact.a, method.exact.b
     used, new = set(), {j for j, x in enumerate(b) if x != 0}
     while new - used:
@@ -56,7 +59,7 @@ def _used(method: Method) -> list[list]:
 
 
 def _fills_in(k: list[list]) -> bool:
-    """True if K^2 is zero wherever K is zero; otherwise the radius is 0."""
+    """True if K^2 is zero wherever K is zero; otherwise the SSP radius is 0."""
     n = len(k)
     return all(
         k[i][j] != 0 or not any(k[i][m] != 0 and k[m][j] != 0 for m in range(n)) for i in range(n) for j in range(n)
@@ -64,7 +67,7 @@ def _fills_in(k: list[list]) -> bool:
 
 
 def _monotone(k: list[list], r: Fraction) -> bool:
-    """True if both conditions hold at r: X = (I + r K)^-1 [1, r K] has no negative entry, in exact arithmetic."""
+    """True if both conditions of `ssp_radius` hold at r: (I + r K)^-1 [1, r K] has no negative entry; exact."""
     n = len(k)
     rows = [[(i == j) + r * k[i][j] for j in range(n)] + [Fraction(1)] + [r * x for x in k[i]] for i in range(n)]
     for i in range(n):

@@ -16,12 +16,14 @@ from fvsolve.steppers.tableau import Method, method_named
 class Facts:
     """Properties of a method: order, cost, stability.
 
-    error_order : order of the embedded solution, 0 without one
-    digits : significant digits of the source, None where its numbers are exact
-    kind : explicit, diagonal, full or linear (Rosenbrock)
-    angle : alpha of A(alpha) stability [degrees], None where no ray is stable
-    real_interval, imaginary_interval, ssp_radius : inf where they are unbounded
-    pade : degrees (k, m) where R is that entry of the Pade table of e^s, else None
+    error_order : order of the embedded solution, 0 without an embedded solution
+    digits : number of significant digits in the published coefficients, None if they are exact
+    kind : explicit, diagonal (stages solved one by one), full (stages solved together) or linear (Rosenbrock)
+    angle : alpha of A(alpha) stability [degrees], None if no ray is stable
+    real_interval, imaginary_interval : lengths of the stable intervals of h lambda on the negative real and on the
+    positive imaginary axis, inf if unbounded
+    ssp_radius : greatest step in Euler steps in which a norm cannot grow, inf if unbounded
+    pade : degrees (k, m) if the stability function R(s) is a Pade approximation of e^s, otherwise None
     error_constant : coefficient of the lowest power of s in R(s) - e^s
     """
 
@@ -60,7 +62,7 @@ class Facts:
 
 
 def analyse(method: str | Method) -> Facts:
-    """Compute the properties of a method in exact arithmetic from its tableau, from the numbers as published.
+    """Compute the properties of a method in exact arithmetic from its published coefficients.
 
     Raises FvsolveError for an unknown method name.
     """

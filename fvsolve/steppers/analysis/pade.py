@@ -1,4 +1,4 @@
-"""Pade table of e^s in exact rationals (course summary 5.9)."""
+"""Pade table of e^s in exact fractions (docs/course.md, 5.9)."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from fvsolve.validation import COUNT_FROM_ZERO, validated
 
 @validated(k=COUNT_FROM_ZERO, m=COUNT_FROM_ZERO)
 def pade(k: int, m: int) -> tuple[Polynomial, Polynomial]:
-    """Return numerator and denominator of P^k_m, the Pade approximation of e^s with degrees k over m.
+    """Numerator N(s) and denominator D(s) of the Pade approximation of e^s, with the degrees k and m.
 
-    It agrees with e^s in k + m + 1 powers.
-    N(s) = sum_j (k+m-j)! k! / ((k+m)! j! (k-j)!) s^j; D likewise with m and -s (Hairer and Wanner 1996, IV.3).
+    Its power series agrees with that of e^s in the first k + m + 1 terms.
+    N(s) = sum_j (k+m-j)! k! / ((k+m)! j! (k-j)!) s^j; D is the same sum with m in place of k and -s in place of s
+    (Hairer and Wanner 1996, IV.3).
     """
 
     def part(degree: int, sign: int) -> Polynomial:

@@ -1,4 +1,4 @@
-"""Stability function R(s) of a method: y+ = R(s) y for y' = lambda y, s = h lambda (12), in exact arithmetic."""
+"""Stability function R(s) of a method in exact arithmetic: a step h of y' = lambda y gives R(s) y with s = h lambda."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PLANE = Kind(lambda given: is_array(given, "fiuc", 0, 9, finite=False), "complex
 class StabilityFunction:
     """Rational function numerator / denominator in lowest terms, with denominator(0) = 1.
 
-    doubts : uncertainty of each coefficient of both polynomials where the source rounds, else zero
+    doubts : uncertainties of the coefficients of both polynomials, due to rounded coefficients of the method
     """
 
     numerator: Polynomial
@@ -45,14 +45,14 @@ class StabilityFunction:
 
     @functools.cached_property
     def pade(self) -> tuple[int, int] | None:
-        """Degrees (k, m) if R is the Pade approximation P^k_m of e^s, else None; decided by comparison."""
+        """Degrees (k, m) of numerator and denominator if R is a Pade approximation of e^s, otherwise None."""
         k, m = self.numerator.degree, self.denominator.degree
         pairs = zip((self.numerator, self.denominator), pade(k, m), self.doubts, strict=True)
         return (k, m) if all(chopped(x - y, uncertainty).degree < 0 for x, y, uncertainty in pairs) else None
 
     @functools.cached_property
     def error_constant(self) -> tuple[int, object]:
-        """(q, C) of R(s) - e^s = C s^(q+1) + ...: order q on the test equation, exact."""
+        """Order q and error constant C on y' = lambda y, exact: R(s) - e^s = C s^(q+1) + higher powers."""
         last = self.numerator.degree + self.denominator.degree + 1
         series = [Fraction(1)]  # power series of e^s
         for j in range(1, last + 1):
@@ -63,7 +63,10 @@ class StabilityFunction:
 
 
 def stability_function(method: str | Method) -> StabilityFunction:
-    """R of a method in lowest terms, by the determinants of (26); (16) is the case of an explicit method."""
+    """Stability function R of a method in lowest terms, as a quotient of determinants.
+
+    It is equation (26) of docs/course.md; for an explicit method (16).
+    """
     return _lowest(method_named(method))
 
 
@@ -82,12 +85,12 @@ def _lowest(method: Method) -> StabilityFunction:
 
 
 def by_determinants(a: Sequence[Sequence], b: Sequence) -> tuple[Polynomial, Polynomial]:
-    """Return det(I - s (A - 1 b^T)) and det(I - s A) of (16) and (26)."""
+    """Numerator det(I - s (A - 1 b^T)) and denominator det(I - s A) of R(s), equations (16), (26) of docs/course.md."""
     return determinant([[x - y for x, y in zip(row, b, strict=True)] for row in a]), determinant(a)
 
 
 def by_resolvent(a: Sequence[Sequence], b: Sequence) -> tuple[Polynomial, Polynomial]:
-    """Return numerator and denominator of 1 + s b^T (I - s A)^-1 1, (25)."""
+    """Numerator and denominator of R(s) = 1 + s b^T (I - s A)^-1 1, equation (25) of docs/course.md."""
     down, adjugate = _leverrier(a)
     up = [sum((x * sum(row, Fraction(0)) for x, row in zip(b, m, strict=True)), Fraction(0)) for m in adjugate]
     return Polynomial(down) + Polynomial([0, *up]), Polynomial(down)
@@ -99,7 +102,7 @@ def determinant(m: Sequence[Sequence]) -> Polynomial:
 
 
 def chopped(p: Polynomial, uncertainty: Polynomial) -> Polynomial:
-    """p without the coefficients that do not exceed their uncertainty."""
+    """Polynomial p without the coefficients that do not exceed their uncertainty."""
     bounds = [*uncertainty.coefficients, *[Fraction(0)] * len(p.coefficients)]
     return Polynomial(x if abs(x) > bound else Fraction(0) for x, bound in zip(p.coefficients, bounds, strict=False))
 
@@ -107,8 +110,8 @@ def chopped(p: Polynomial, uncertainty: Polynomial) -> Polynomial:
 def _doubts(method: Method) -> tuple[Polynomial, Polynomial]:
     """First-order bounds of the errors in numerator and denominator caused by rounded coefficients.
 
-    Computed from the same sums with all terms positive: 1 / det(I - s |A|) for the denominator, and that times
-    1 + s |b| ... for the numerator.
+    They follow from the same sums with all terms positive: 1 / det(I - s |A|) for the denominator, and the product of
+    it with 1 + s |b|^T (I - s |A|)^-1 1 for the numerator.
     """
     a, b, s = np.abs(method.a), np.abs(method.b), method.stages
     traces, moments, power = [], [1.0], np.ones(s)

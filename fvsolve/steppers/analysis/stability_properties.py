@@ -1,4 +1,4 @@
-"""Stability region |R(s)| <= 1 of a method, decided in exact arithmetic (13)."""
+"""Stability region |R(s)| <= 1 of a method, in exact arithmetic; numbers in brackets refer to docs/course.md."""
 
 from __future__ import annotations
 
@@ -15,13 +15,16 @@ ANGLE_BITS = 36  # precision of the cosine of alpha in A(alpha)
 
 
 def e_polynomial(r: StabilityFunction) -> Polynomial:
-    """E(x) = |D(iy)|^2 - |N(iy)|^2 with x = y^2 (Norsett 1975): |R(iy)| <= 1 where E >= 0."""
+    """Polynomial E(x) = |D(iy)|^2 - |N(iy)|^2 with x = y^2, for R = N / D (Norsett 1975).
+
+    |R(iy)| <= 1 where E >= 0.
+    """
     uncertainty = Polynomial(_square_doubt(r).coefficients[0::2])
     return chopped(_modulus(r.denominator) - _modulus(r.numerator), uncertainty)
 
 
 def i_stable(r: StabilityFunction) -> bool:
-    """True if |R(iy)| <= 1 for all y."""
+    """True if |R(iy)| <= 1 for all real y."""
     return nowhere_negative(e_polynomial(r))
 
 
@@ -36,7 +39,7 @@ def l_stable(r: StabilityFunction) -> bool:
 
 
 def real_interval(r: StabilityFunction) -> float:
-    """Greatest x with |R| <= 1 on [-x, 0]; inf if unbounded, 0 if no interval is stable."""
+    """Greatest x with |R(s)| <= 1 for all real s from -x to 0; inf if unbounded, 0 if no interval is stable."""
     down, up = (
         Polynomial(-x if k % 2 else x for k, x in enumerate(p.coefficients)) for p in (r.denominator, r.numerator)
     )
@@ -47,7 +50,7 @@ def real_interval(r: StabilityFunction) -> float:
 
 
 def imaginary_interval(r: StabilityFunction) -> float:
-    """Greatest y with |R| <= 1 on [-iy, iy]; inf if unbounded, 0 if |R(iy)| > 1 for all small y > 0."""
+    """Greatest y with |R| <= 1 on the imaginary axis up to iy; inf if unbounded, 0 if |R(iy)| > 1 for all small y."""
     e = e_polynomial(r)
     if _negative_near_zero(e):
         return 0.0
@@ -56,9 +59,10 @@ def imaginary_interval(r: StabilityFunction) -> float:
 
 
 def angle(r: StabilityFunction) -> float | None:
-    """Greatest alpha [degrees] with |R(s)| <= 1 for all |arg(-s)| <= alpha; None if no ray is stable.
+    """Angle alpha of A(alpha) stability [degrees]; None if not even the negative real axis is stable.
 
-    Found by bisection over rays of rational cosine; the sector must contain no pole.
+    It is the greatest alpha with |R(s)| <= 1 for all |arg(-s)| <= alpha and no pole in this sector, found by bisection
+    over rays with rational cosine.
     """
     if a_stable(r):
         return 90.0
@@ -75,7 +79,10 @@ def angle(r: StabilityFunction) -> float | None:
 
 
 def _stable_ray(r: StabilityFunction, cosine: Fraction) -> bool:
-    """True if |R| <= 1 along s = -x exp(i phi), x >= 0, with no pole between this ray and the negative axis."""
+    """True if |R| <= 1 along the ray s = -x exp(i phi), x >= 0, and no pole is between this ray and the negative axis.
+
+    cosine : cos(phi)
+    """
     if nowhere_negative(chopped(_along(r.denominator, cosine) - _along(r.numerator, cosine), _square_doubt(r))):
         poles = np.roots([float(x) for x in r.denominator.coefficients][::-1])
         return not np.any(-poles.real > float(cosine) * np.abs(poles) * (1 + 1e-9))
@@ -83,7 +90,7 @@ def _stable_ray(r: StabilityFunction, cosine: Fraction) -> bool:
 
 
 def _along(p: Polynomial, cosine: Fraction) -> Polynomial:
-    """|p(-x exp(i phi))|^2 as a polynomial in x: sum_jk p_j p_k (-x)^(j+k) cos((j - k) phi)."""
+    """|p(-x exp(i phi))|^2 as a polynomial in x: sum_jk p_j p_k (-x)^(j+k) cos((j - k) phi); cosine : cos(phi)."""
     cosines = [Fraction(1), cosine]
     while len(cosines) <= p.degree:
         cosines.append(2 * cosine * cosines[-1] - cosines[-2])
@@ -95,7 +102,7 @@ def _along(p: Polynomial, cosine: Fraction) -> Polynomial:
 
 
 def _square_doubt(r: StabilityFunction) -> Polynomial:
-    """Uncertainty of the sums over j + k = n of N_j N_k and D_j D_k."""
+    """Uncertainty of the coefficients of N^2 - D^2, as a polynomial, for the rounded coefficients of R = N / D."""
     pairs = zip((r.numerator, r.denominator), r.doubts, strict=True)
     return sum((2 * Polynomial(map(abs, p.coefficients)) * uncertainty for p, uncertainty in pairs), Polynomial([]))
 

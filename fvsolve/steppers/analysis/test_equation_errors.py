@@ -1,4 +1,7 @@
-"""Errors of a method on the test equation y' = lambda y (11): local and global error, aliasing."""
+"""Errors of a method on the test equation y' = lambda y: local and global error, aliasing.
+
+Numbers in brackets are equations and sections of docs/course.md.
+"""
 
 from __future__ import annotations
 
@@ -11,16 +14,20 @@ from fvsolve.validation import COUNT_FROM_ZERO, NAME, NUMBER, POINT, POSITIVE, v
 
 @validated(method=NAME, lam=POINT, h=NUMBER, y=POINT)
 def local_error(method: str | Method, lam: complex, h: float, y: complex = 1.0) -> complex:
-    """Error e = R(h lambda) y - exp(h lambda) y of one step from y (5), (28), (29), of order h^(p+1)."""
+    """Error R(h lambda) y - exp(h lambda) y of one step from y (5), (28), (29), of order h^(p+1).
+
+    R : stability function; p : order of the method; lam : lambda [1/s]; h : step [s]
+    """
     r = analyse(method).stability_function
     return complex((r(h * lam) - np.exp(h * lam)) * y)
 
 
 @validated(method=NAME, lam=POINT, h=NUMBER, steps=COUNT_FROM_ZERO, y=POINT)
 def global_error(method: str | Method, lam: complex, h: float, steps: int, y: complex = 1.0) -> complex:
-    """Error E = R(h lambda)^n y - exp(n h lambda) y after n steps from y (6), of order h^p at a fixed n h.
+    """Error R(h lambda)^n y - exp(n h lambda) y after n steps from y (6), of order h^p at a fixed time n h.
 
-    It is the sum of the propagated local errors: sum_k R^(n-1-k) e_k+1.
+    It is the sum of the propagated local errors e_k: sum_k R^(n-1-k) e_k+1.
+    R : stability function; p : order of the method; lam : lambda [1/s]; h : step [s]
     """
     r = analyse(method).stability_function
     return complex((r(h * lam) ** steps - np.exp(steps * h * lam)) * y)
@@ -28,9 +35,10 @@ def global_error(method: str | Method, lam: complex, h: float, steps: int, y: co
 
 @validated(method=NAME, omega=NUMBER, h=POSITIVE)
 def seen_frequency(method: str | Method, omega: float, h: float) -> float:
-    """Frequency [rad/s] of the numerical solution for an oscillation of omega [rad/s]: |arg R(i omega h)| / h, h in s.
+    """Frequency of the numerical solution [rad/s] for an oscillation with the frequency `omega` [rad/s].
 
-    It never exceeds pi / h: an A-stable method aliases faster oscillations to slower ones (5.8).
+    It is |arg R(i omega h)| / h with the stability function R and the step h [s]. It never exceeds pi / h: an A-stable
+    method aliases faster oscillations to slower oscillations (5.8).
     """
     r = analyse(method).stability_function
     return float(abs(np.angle(r(1j * omega * h))) / h)

@@ -15,7 +15,7 @@ BITS = 256  # precision of rounded coefficients in intermediate results
 
 @functools.cache
 def trees(nodes: int) -> tuple[tuple[Tree, ...], ...]:
-    """Rooted trees with `nodes` nodes, each as the tuple of its branches; tree (n, i) is trees(n)[i].
+    """Rooted trees with `nodes` nodes, each as the tuple of its branches; a branch (n, i) is the tree trees(n)[i].
 
     There are 1, 1, 2, 4, 9, 20, 48, 115, 286, 719 trees of 1 to 10 nodes.
     """
@@ -35,17 +35,18 @@ def trees(nodes: int) -> tuple[tuple[Tree, ...], ...]:
 
 @functools.cache
 def density(tree: Tree) -> int:
-    """gamma of a tree: its number of nodes times the densities of its branches."""
+    """Density gamma of a tree: its number of nodes times the densities of its branches."""
     nodes, index = tree
     return nodes * math.prod(map(density, trees(nodes)[index]))
 
 
 class Conditions:
-    """Order conditions sum_i b_i phi_i(tree) = 1 / gamma(tree) of an array A, for any weights b.
+    """Order conditions of a Butcher matrix A: sum_i b_i phi_i(tree) = 1 / gamma(tree), for any weights b.
 
-    rounding : relative error of each coefficient, 0 where they are exact
-    single : array in place of A at a node with a single branch; for Rosenbrock methods alpha + Gamma in place of alpha
-    (Hairer and Wanner 1996, theorem IV.7.3)
+    phi are the elementary weights and gamma the density of a tree.
+    rounding : relative error of each coefficient, 0 for exact coefficients
+    single : matrix that replaces A at tree nodes with a single branch: alpha + Gamma for Rosenbrock methods, with alpha
+    as A (Hairer and Wanner 1996, theorem IV.7.3)
     """
 
     def __init__(self, a: Sequence[Sequence], rounding: Fraction = Fraction(0), single: Sequence[Sequence] = ()):
@@ -55,9 +56,9 @@ class Conditions:
         self.known: dict[tuple[Tree, bool], list] = {}
 
     def residual(self, tree: Tree, b: Sequence):
-        """Residual of a condition as an exact number; 0 where it holds to the precision of the coefficients.
+        """Residual of the condition of a tree for the weights b; 0 if it holds to the precision of the coefficients.
 
-        Where that precision cannot separate 1 / gamma from 0, the condition counts as not satisfied.
+        If this precision is not sufficient to separate 1 / gamma from 0, the condition counts as not satisfied.
         """
         left = sum((x * y for x, y in zip(b, self._phi(tree, False), strict=True) if x != 0), Fraction(0))
         residual = left - Fraction(1, density(tree))
@@ -73,7 +74,10 @@ class Conditions:
         return all(self.residual((nodes, i), b) == 0 for i in range(len(trees(nodes))))
 
     def order(self, b: Sequence) -> int:
-        """Greatest p such that all conditions up to p nodes hold; at most twice the number of stages (Butcher 1964)."""
+        """Order with the weights b: greatest p such that all conditions up to p nodes hold, at most 12.
+
+        The order is at most twice the number of stages (Butcher 1964).
+        """
         p, limit = 0, min(2 * len(self.a), ORDER_MOST)
         while p < limit and self.holds(p + 1, b):
             p += 1
@@ -83,7 +87,10 @@ class Conditions:
         return [[(j, short(x) if self.rounding else x) for j, x in enumerate(row) if x != 0] for row in a]
 
     def _phi(self, tree: Tree, absolute: bool) -> list:
-        """Elementary weights: products over the branches of A phi(branch); with absolute values to bound their size."""
+        """Elementary weights phi of a tree: product of A phi(branch) over its branches.
+
+        absolute : True for the weights with absolute values of A, which bound their size
+        """
         if (tree, absolute) not in self.known:
             product = [Fraction(1)] * len(self.a)
             branches = trees(tree[0])[tree[1]]
@@ -101,14 +108,18 @@ class Conditions:
 
 
 def short(x) -> Fraction:
-    """Fraction within 2^-257 of x, far closer than any published coefficient."""
+    """Fraction within 2^-257 of the exact number x, which is more accurate than any published coefficient."""
     if not isinstance(x, Fraction):
         x = sum(x.bracket()) / 2
     return Fraction(round(x * (1 << BITS)), 1 << BITS)
 
 
 def stage_order(a: Sequence[Sequence], b: Sequence, c: Sequence, rounding: Fraction = Fraction(0)) -> int:
-    """Greatest q with sum_j a_ij c_j^(k-1) = c_i^k / k and sum_j b_j c_j^(k-1) = 1 / k for all k <= q."""
+    """Stage order of a Butcher array: order to which the stages and the new state integrate polynomials in time.
+
+    It is the greatest q with sum_j a_ij c_j^(k-1) = c_i^k / k and sum_j b_j c_j^(k-1) = 1 / k for all k <= q.
+    rounding : relative error of a coefficient
+    """
 
     def equal(row, k: int, expected) -> bool:
         terms = [x * y ** (k - 1) for x, y in zip(row, c, strict=True)]

@@ -1,1 +1,1 @@
-"""Exact numbers: fractions, algebraic numbers, polynomials with such coefficients, and their parser."""
+"""Exact numbers: fractions, algebraic numbers, polynomials with exact coefficients, and a parser of exact numbers."""

@@ -1,4 +1,4 @@
-"""Exact numbers a + b theta + c theta^2 + ..., theta a real algebraic number."""
+"""Exact numbers a + b theta + c theta^2 + ... with fractions a, b, c and a real algebraic number theta."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ BITS = 160  # precision of the first bracket of a root: enough for most signs an
 
 
 class Field:
-    """Rational numbers extended by one root theta of a polynomial; double roots of the polynomial are divided out."""
+    """Rational numbers extended by one root theta of a polynomial; multiple roots of the polynomial are made single.
+
+    name : name of theta in texts; near : value near theta
+    """
 
     def __init__(self, name: str, polynomial: Polynomial, near: float):
         self.name = name
@@ -42,7 +45,7 @@ class Field:
 
 
 class SquareRoot(Field):
-    """Rational numbers extended by sqrt(d)."""
+    """Rational numbers extended by the square root of the integer d."""
 
     def __init__(self, d: int):
         self.name = f"sqrt({d})"
@@ -204,7 +207,7 @@ class Algebraic:
 
 
 def number(field: Field, parts):
-    """Number with these coefficients of powers of theta; a fraction where it is rational."""
+    """Number with the coefficients `parts` of powers of theta, lowest first; a fraction if it is rational."""
     parts = list(parts)
     while len(parts) > 1 and not parts[-1]:
         parts.pop()
@@ -238,7 +241,7 @@ def _term(value: Fraction, symbol: str, sign: str) -> str:
 
 
 def _isolated(p: Polynomial, near: Fraction, name: str) -> tuple[Fraction, Fraction]:
-    """Bracket of the root nearest to `near`; the polynomial has no other root there and changes sign."""
+    """Interval around `near` that contains exactly one root of the polynomial p, where p changes its sign."""
     width = Fraction(1, 1 << 40)
     while width <= 1 << 20:
         low, high = near - width, near + width

@@ -16,7 +16,8 @@ POWER_MOST, ROOT_MOST = 64, 10**9
 def value_of(text: str, names: Mapping | None = None):
     """Evaluate the expression `text` exactly; raises ValueError with a message that states the fault.
 
-    Syntax: + - * / ^, brackets, `sqrt(n)` of an integer, `names`; `7sqrt(6)` and `3(g-1)` are products.
+    Syntax: + - * / ^, brackets, `sqrt(n)` of an integer, the names in the dict `names`; `7sqrt(6)` and `3(g-1)` are
+    products.
     """
     tokens = TOKEN.findall(text)
     if "".join(tokens) != re.sub(r"\s", "", text):
@@ -29,7 +30,10 @@ def value_of(text: str, names: Mapping | None = None):
 
 
 def root(name: str, polynomial: str, near: float):
-    """Root of a polynomial in x nearest to `near`, as the number called `name`."""
+    """Root of a polynomial in x that is nearest to `near`, as an exact number that is printed as `name`.
+
+    polynomial : text such as "x^3-3x^2+3x/2-1/6"
+    """
     p = value_of(polynomial, {"x": Polynomial([0, 1])})
     if not isinstance(p, Polynomial) or p.degree < 2 or not all(isinstance(x, Fraction) for x in p.coefficients):
         raise ValueError(f'"{polynomial}" is not a polynomial in x of degree 2 or more with rational coefficients')
@@ -43,7 +47,7 @@ def digits(text: str) -> int:
 
 
 class _Parser:
-    """Recursive-descent parser: sum, product, power, atom."""
+    """Recursive-descent parser of sums, products, powers, and numbers, names or brackets."""
 
     def __init__(self, text: str, tokens: list[str], names: Mapping):
         self.text, self.rest, self.names = text, tokens[::-1], names

@@ -7,7 +7,10 @@ from fractions import Fraction
 
 
 class Polynomial:
-    """sum_k coefficients[k] x^k; the highest coefficient is not zero, so the zero polynomial has no coefficients."""
+    """Polynomial sum_k coefficients[k] x^k with exact coefficients.
+
+    The last coefficient is not zero, so the zero polynomial has no coefficients.
+    """
 
     __slots__ = ("coefficients",)
 

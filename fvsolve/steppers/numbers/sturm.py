@@ -10,7 +10,7 @@ DIGITS = Fraction(1, 1 << 64)  # relative width of the bracket of a root
 
 
 def chain(p: Polynomial) -> list[Polynomial]:
-    """Sturm's chain p, p', -rem, ...; each polynomial scaled by a positive number."""
+    """Sturm's chain of p: p, p', then the negative remainders of successive divisions, scaled by positive numbers."""
     polynomials = [p, p.derivative()]
     while polynomials[-1].degree > 0:
         remainder = -(polynomials[-2] % polynomials[-1])
@@ -22,7 +22,7 @@ def chain(p: Polynomial) -> list[Polynomial]:
 
 
 def count_roots(p: Polynomial, low=None, high=None) -> int:
-    """Number of distinct real roots in (low, high]; None is infinity. `p` must not be zero."""
+    """Number of distinct real roots of p in low < x <= high; None stands for infinity. `p` must not be zero."""
     if p.degree < 1:
         return 0
     polynomials = chain(p)
@@ -30,7 +30,7 @@ def count_roots(p: Polynomial, low=None, high=None) -> int:
 
 
 def odd_part(p: Polynomial) -> Polynomial:
-    """Product of the factors of odd multiplicity: it has single roots where p changes sign (Yun 1976)."""
+    """Polynomial with a single root wherever p changes sign: product of the factors of odd multiplicity (Yun 1976)."""
     product, k = Polynomial([1]), 1
     common = p.gcd(p.derivative())
     w, y = p // common, p.derivative() // common
@@ -84,7 +84,7 @@ def nowhere_negative(p: Polynomial) -> bool:
 
 
 def roots_right(p: Polynomial) -> bool:
-    """True if all roots lie in the open right half plane, by Routh's array of p(-x)."""
+    """True if all roots of p lie in the open right half plane, by Routh's array of p(-x)."""
     up = [x if k % 2 == 0 else -x for k, x in enumerate(p.coefficients)][::-1]
     upper, lower = up[0::2], up[1::2]
     first = sign(upper[0])
