@@ -49,7 +49,7 @@ def test_of_20000_states_the_slowest_poles_and_the_outputs_are_found_soon():
     values = poles_of(found.a, energy_form(found.at.model))
     exact = (2 * np.arange(1, 10) - 1) * 0.5
     assert [p["frequency"] for p in values.poles()[:9]] == pytest.approx(exact, rel=1e-6)
-    assert not values.complete and "of 20000: those nearest 0" in values.description
+    assert not values.complete and "of 20000: eigenvalues nearest 0" in values.description
 
 
 def test_outputs_found_by_halves_are_those_of_every_state_tried_alone(monkeypatch):

@@ -16,7 +16,11 @@ STEP_MARGIN = 4.0  # ratio of the limits of these steps to those of the map, up 
 
 
 class WaveGrowthLimit:
-    """Limits of a case with changed keys, for any method; each step has a model of its own, used by all methods."""
+    """Step limits of a case with delay lines, by growth of waves, for any method.
+
+    set : changed keys of the case; steps : steps of the failure map [s], around which the limit is searched
+    The case has a separate model for each step, which all methods use.
+    """
 
     def __init__(self, case, set: dict, steps: list[float]) -> None:
         self.case, self.set = case, set
@@ -24,20 +28,20 @@ class WaveGrowthLimit:
         self.models: dict[float, object] = {}
 
     def model(self, h: float):
-        """Model with delay lines divided for a step [s]."""
+        """Model with delay lines divided into segments for steps of h [s]."""
         if h not in self.models:
             self.models[h] = study_model(self.case, {**self.set, "numerics.step": h, "numerics.method": "euler"})
         return self.models[h]
 
     def grows(self, method: str, h: float) -> bool:
-        """True if waves grow by VISIBLE_GROWTH in a run with this step [s]."""
+        """True if waves grow 1000 times or more in a run with steps of h [s]."""
         numerics = self.case.numerics
         return wave_growth(self.model(h), method_named(method), h, numerics.end - numerics.start)[0] >= VISIBLE_GROWTH
 
     def __call__(self, method: str) -> float | None:
-        """Greatest step [s] below the first at which waves grow; inf if they never grow, 0 if they grow at all steps.
+        """Greatest step [s] up to which waves do not grow with a method; inf if they never grow, 0 if they always do.
 
-        None if it is not known, for Rosenbrock methods with delay lines at storing nodes.
+        The result is None for Rosenbrock methods if delay lines end at storing nodes, as their growth is not known.
         """
         if method_named(method).kind == "linear" and any(storing_nodes(self.model(self.steps[0]), 1.0)):
             return None

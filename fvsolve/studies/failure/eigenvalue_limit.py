@@ -1,4 +1,4 @@
-"""Greatest step at which no eigenvalue grows, equation (13)."""
+"""Greatest step at which no eigenvalue mode grows, equation (13) of docs/course.md."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ MAX_STATES = 1200  # greatest number for a dense spectrum
 
 
 def eigenvalues_of(case, set: dict) -> np.ndarray | None:
-    """Eigenvalues [1/s] of the rates at the initial profile, for schedules at the start and at the end, in one array.
+    """Eigenvalues of the linearised rates about the initial steady state, in one array [1/s].
 
-    A limited scheme counts with its weights in smooth flow, and waves that arrive from delay lines are constant. None
-    for more than MAX_STATES states.
+    They are computed twice, with the schedules at their values at the start and at the end of the run. A limited scheme
+    has its weights in smooth flow, and waves that arrive from delay lines are constant. Returns None for more than 1200
+    states. set : changed keys of the case
     """
     from fvsolve.studies.outcome import study_model
 
@@ -31,15 +32,15 @@ def eigenvalues_of(case, set: dict) -> np.ndarray | None:
 
 
 def linear_scheme_for(case, scheme: str) -> str:
-    """Linear scheme in place of a limited one: its weights in smooth flow or, if not supported, at steep fronts."""
+    """Linear scheme that replaces a limited scheme: equal in smooth flow or, if the case excludes it, `upwind`."""
     return SCHEMES[scheme].twin if SCHEMES[scheme].twin in case.schemes else "upwind"
 
 
 def greatest_step(method: str, eigenvalues: np.ndarray, span: float) -> float:
-    """First step [s] at which R(h lambda) grows within `span` [s] by VISIBLE_GROWTH more than the exact solution.
+    """Greatest step [s] up to which no mode grows 1000 times more than the exact solution in a run of `span` [s].
 
-    eigenvalues : complex128[n] [1/s]. Returns inf if there is no such step up to 1000 / |lambda| of the fastest
-    eigenvalue, and 0 if there is growth at 0.01 / |lambda| already.
+    eigenvalues : complex128[n]  eigenvalues of the modes [1/s]. The search goes from 0.01 to 1000 over the modulus of
+    the fastest eigenvalue. Returns inf if no mode grows there, and 0 if a mode grows at the shortest step already.
     """
     from fvsolve.steppers import method_named, stability_function
 

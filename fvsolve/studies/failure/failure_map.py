@@ -32,9 +32,10 @@ OUTPUT_ROWS = 1000  # rows of the history of each run
 
 @dataclass(frozen=True)
 class Square:
-    """One run of the map, with its verdict.
+    """Run of a failure map, with its verdict.
 
-    step, courant : None unless the step is fixed; halved_error : error with half the step, None if it was not run
+    column : number of its column; step, courant : step [s] and Courant number, None unless the step is given
+    halved_error : error with half the step, None if it was not run
     limit : predicted greatest stable step [s], None if it is not known
     """
 
@@ -54,10 +55,11 @@ class FailureMap:
     """Verdicts on runs of a case over schemes, methods and columns.
 
     key : "step" [s] or the key of the case that changes along the columns; values : its values
-    squares : schemes x methods x columns, in that order; tolerance : greatest mean error, over the range of a probe
-    reference : the reference in words; doubt : uncertainty of its errors, over ranges
+    squares : runs of all schemes, methods and columns, in this order of loops
+    tolerance : greatest allowed mean error, relative to the range of a probe
+    reference : description of the reference; doubt : uncertainty of its values, relative to the range of a probe
     wave_rate : cells that a wave crosses per second [1/s], None without cells
-    limited : schemes whose limits are those of their weights in smooth flow; lines : True with delay lines
+    limited : limited schemes, whose limits are computed with the weights in smooth flow; lines : True with delay lines
     """
 
     case: str
@@ -78,7 +80,7 @@ class FailureMap:
         return [square for square in self.squares if (square.scheme, square.method) == (scheme, method)]
 
     def plain(self) -> dict:
-        """Return the map as plain data, SI; None for unknown or infinite limits."""
+        """Return the map as plain data in SI units; None for unknown or infinite limits."""
         data = {entry.name: getattr(self, entry.name) for entry in fields(self) if entry.name != "squares"}
         return data | {"squares": [_square_data(entry) for entry in self.squares]}
 
@@ -112,12 +114,13 @@ def failure_map(
 ) -> FailureMap:  # fmt: skip
     """Run a case with every scheme and method at every step (or value of a key), and give a verdict on each run.
 
-    case, set : as in `run`; schemes, methods : default `default_schemes` and METHODS
-    courants or steps [s] : the columns; with key = (NAME, values) the values are the columns, and a single step or
-    Courant number, or else the case's own step control, holds for all
-    tolerance : greatest mean error, over the range of a probe
-    out : folder in which finished squares are stored and found again; progress : progress(done, total, next)
-    jobs, dask : processes that make the runs, as in `sweep`
+    case, set : as in `run`; schemes, methods : names; default: `default_schemes` and seven usual methods
+    courants or steps : Courant numbers or steps [s] of the columns
+    key : (NAME, values), a varied key whose values are the columns; then a single step or Courant number, or the step
+    control of the case, applies to all columns
+    tolerance : greatest allowed mean error, relative to the range of a probe
+    out : folder in which finished runs are stored and found again
+    progress : function of (runs done, runs in total, next run); jobs, dask : processes for the runs, as in `sweep`
     Raises FvsolveError for unknown names, for numbers out of range, and if the reference is not accurate enough.
     """
     case = load(case, dict(set or {}))
@@ -149,9 +152,10 @@ def failure_map(
 
 
 class MapRuns:
-    """Runs of one map, with their references, predicted limits and verdicts.
+    """Runs of one failure map, with their references, predicted limits and verdicts.
 
-    base : keys of all runs; looking : True while missing runs are collected, so that none is made
+    base : keys of all runs; column_set : columns of the map; points : cache of finished runs
+    collecting : True while missing runs are collected, so that no run is made
     """
 
     def __init__(
@@ -167,11 +171,14 @@ class MapRuns:
 
     @property
     def uncertainty(self) -> float:
-        """Greatest uncertainty of all references, over ranges."""
+        """Greatest uncertainty of all references, relative to the range of a probe."""
         return max(reference.uncertainty.trajectory for reference in self._references.values())
 
     def reference(self, k: int) -> Reference:
-        """Reference of column k, or of all columns of steps. Raises FvsolveError if it is not accurate enough."""
+        """Reference for column k; columns that differ in the step only have the same reference.
+
+        Raises FvsolveError if the reference is not accurate enough for the tolerance.
+        """
         at = k if self.columns.keys(k) else 0
         if at not in self._references:
             finest, stiff = {**self.base, **self.columns.keys(k)}, self.columns.stiff(k)
@@ -189,9 +196,9 @@ class MapRuns:
         return self._references[at]
 
     def limit(self, scheme: str, method: str, k: int) -> float | None:
-        """Predicted greatest step [s], by eigenvalues and by waves between storing nodes and delay lines.
+        """Predicted greatest stable step [s] in column k: the lesser limit of eigenvalues and of waves in delay lines.
 
-        None if either is not known.
+        None if one of these limits is not known.
         """
         at = scheme, k if self.columns.keys(k) else 0
         if at not in self._spectra:
@@ -208,9 +215,9 @@ class MapRuns:
         return self._limits[method, *at]
 
     def lines_limit(self, method: str, scheme: str, k: int) -> float | None:
-        """Predicted greatest step [s] by waves between storing nodes and delay lines.
+        """Predicted greatest step [s] up to which waves between storing nodes and delay lines do not grow.
 
-        inf without delay lines, or without fixed steps.
+        It is inf without delay lines, or without fixed steps.
         """
         set = {**self.base, **self.columns.keys(k), "numerics.scheme": scheme}
         steps = [keys["numerics.step"] for keys in self.columns.sets if "numerics.step" in keys]
@@ -221,7 +228,7 @@ class MapRuns:
         return self._delay_line_limits[k](method)
 
     def square(self, scheme: str, method: str, k: int) -> Square:
-        """Square of a run, with runs at shorter steps if its error is too great."""
+        """Run of a scheme and a method in column k with its verdict; runs with shorter steps follow a great error."""
         trial = {**self.base, **self.columns.sets[k], "numerics.scheme": scheme, "numerics.method": method}
         step, waves = trial.get("numerics.step"), self.columns.wave_rate
         limit, errors = self.limit(scheme, method, k), []
@@ -240,9 +247,9 @@ class MapRuns:
         return Square(scheme, method, k, step, courant, word, run, errors[0] if errors else None, limit)
 
     def run_ahead(self, places: Sequence[tuple[str, str, int]], report: Progress) -> None:
-        """Make all runs in other processes: first the runs of all squares, then those with shorter steps.
+        """Make all runs in other processes: first with the steps of the columns, then the runs with shorter steps.
 
-        places : scheme, method and column of each square
+        places : scheme, method and column of each square of the map
         """
         while missing := self.missing_runs(places):
             missing.sort(key=lambda run: -run.trial.get("numerics.step", 0.0))  # the most expensive last
@@ -252,7 +259,7 @@ class MapRuns:
                 report(count, len(missing), f"{len(places)} squares")
 
     def missing_runs(self, places: Sequence[tuple[str, str, int]]) -> list[MissingRun]:
-        """New runs that squares need next, each once."""
+        """Runs that the squares of the map need next and that are not in the cache, each once."""
         missing, self.collecting = {}, True
         for place in places:
             try:
@@ -263,7 +270,10 @@ class MapRuns:
         return [*missing.values()]
 
     def measure(self, trial: dict, k: int) -> Measures:
-        """Measures of a run, or those in the cache. Raises MissingRun for a new run while runs are collected."""
+        """Measures of a run with the keys `trial` against the reference of column k, taken from the cache if possible.
+
+        Raises MissingRun for a new run while runs are collected.
+        """
         every = max(trial["output.every"], trial.get("numerics.step", 0.0))  # no rows between two steps
         reference, run = self.reference(k), {**trial, "output.every": every}
         extra = {"study": "map", "set": trial, "reference": reference.words}
@@ -278,9 +288,9 @@ class MapRuns:
 
 
 class MissingRun(Exception):
-    """Raised for a trial without a run in the cache.
+    """Signal that a run is not in the cache.
 
-    keys : keys of the run; column : column of its reference
+    trial : keys of the run as stored; keys : keys of the run with its output interval; column : column of its reference
     """
 
     def __init__(self, trial: dict, keys: dict, column: int) -> None:
@@ -289,7 +299,10 @@ class MissingRun(Exception):
 
 
 def _shorter_steps(case, trial: dict, ratio: int) -> dict:
-    """Keys for steps shorter by a factor; a tolerance is divided by its square."""
+    """Key and value for steps that are shorter by the factor `ratio`; a tolerance is divided by its square.
+
+    trial : keys of the run with the original step
+    """
     numerics = case.numerics
     for name, factor in (("step", ratio), ("courant", ratio), ("rtol", ratio**2)):
         if f"numerics.{name}" in trial:
@@ -319,7 +332,7 @@ def _check_names(*given: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...
 
 
 def _square_data(square: Square) -> dict:
-    """Square as plain data, with its measures; None for an infinite limit."""
+    """Run of a failure map as plain data, with its measures; None for an infinite limit."""
     data = asdict(square)
     data |= data.pop("measures")
     limit = square.limit

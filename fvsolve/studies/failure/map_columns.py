@@ -23,10 +23,11 @@ MAP_KEYS = tuple(f"numerics.{name}" for name in ("scheme", "method", "courant", 
 
 @dataclass(frozen=True)
 class Columns:
-    """Columns: their key and values, and the keys that they set.
+    """Columns of a failure map: values of the step or of another key.
 
-    name : "step" or the varied key; sets : all keys of each column; span : time span of the run [s]
-    rates : fastest rate and wave rate [1/s] of each column, or of all columns; delay lines count as cells
+    name : "step" or the varied key; values : its value in each column; sets : keys that each column sets
+    span : duration of the run [s]
+    rates : fastest rate and wave rate [1/s] of each column, or one pair for all columns; delay lines count as cells
     wave_rate : cells that a wave crosses per second in the first column [1/s]; None without cells
     """
 
@@ -38,11 +39,11 @@ class Columns:
     wave_rate: float | None
 
     def keys(self, k: int) -> dict:
-        """Keys of column k that change the case itself, not the step."""
+        """Keys and values of column k that change the case itself, not the step."""
         return {} if self.name == "step" else {self.name: self.values[k]}
 
     def stiff(self, k: int) -> bool:
-        """True if column k is stiff: its fastest rate is far above that of waves or, without pipes, of the run."""
+        """True if column k is stiff: its fastest rate exceeds 8 wave rates or, without pipes, 1e5 over the duration."""
         fastest, waves = self.rates[min(k, len(self.rates) - 1)]
         return fastest > STIFFNESS_RATIO * waves if waves else fastest * self.span > STIFF_STEPS
 
@@ -53,7 +54,11 @@ class Columns:
 
 
 def map_columns(case, base: dict, courants, steps, key) -> Columns:
-    """Requested columns, or steps around the predicted limits. Raises FvsolveError for impossible columns."""
+    """Columns of a failure map: the given Courant numbers or steps [s], values of a key, or default steps.
+
+    base : keys of all runs; key : (name, values) of a varied key, or None
+    Raises FvsolveError for options that exclude each other and for values out of range.
+    """
     _check_options(courants, steps, key)
     span = case.numerics.end - case.numerics.start
     if key is not None:
@@ -71,14 +76,17 @@ def map_columns(case, base: dict, courants, steps, key) -> Columns:
 
 
 def _step_control(courants, steps) -> dict:
-    """Step control of all columns with values of a key; empty for that of the case."""
+    """Key and value of the step control for all columns of a varied key; empty for the step control of the case."""
     if courants is not None:
         return {"numerics.courant": courants[0]}
     return {} if steps is None else {"numerics.step": steps[0]}
 
 
 def _fastest_and_wave_rate(case, set: dict) -> tuple[float, float | None]:
-    """(fastest rate, wave rate) [1/s] of a case; with too many states the fastest is the wave rate."""
+    """Fastest rate (modulus of an eigenvalue) and wave rate of a case [1/s]; None for a wave rate without cells.
+
+    With too many states for eigenvalues, the fastest rate is the wave rate.
+    """
     set = set | cells_for_delay_lines(case, set)
     model = study_model(case, set)
     waves = float(model.wave_rates.max()) if model.cells else None
@@ -94,7 +102,7 @@ def _wave_rate(case, set: dict) -> float | None:
 
 
 def cells_for_delay_lines(case, set: dict) -> dict:
-    """Keys that replace delay lines by cells, with the default number of cells in the slowest line."""
+    """Keys and values that replace delay lines by cells, with the default number of cells in the slowest line."""
     case = load(case, set)
     travel = _slowest_travel_time(case)
     return cells_for_lines(case, travel / DEFAULT_CELLS) if travel else {}
@@ -106,10 +114,12 @@ def _slowest_travel_time(case) -> float:
 
 
 def _default_steps(case, rates, waves: float | None) -> list[float]:
-    """Default steps [s]: around Courant number 1 if waves are the fastest, else from below 2 / |lambda| upwards.
+    """Default steps of a failure map [s]: around Courant number 1 if waves have the fastest rate.
 
-    The longest step is a tenth of the run or Courant number 1.5. For delay lines alone the steps go from a hundredth
-    of the slowest travel time, or 0.3 / |lambda| of storing parts if that is less, to this travel time.
+    Otherwise they go from 1.5 over the fastest rate (0.3 without pipes) to a tenth of the run or Courant number 1.5.
+    For delay lines alone they go from a hundredth of the slowest travel time, or 0.3 over the fastest rate of storing
+    parts if that is less, to this travel time.
+    rates : fastest rate and wave rate with delay lines as cells [1/s]; waves : wave rate of the cells, or None
     """
     fastest, span, travel = rates[0], case.numerics.end - case.numerics.start, _slowest_travel_time(case)
     if not waves and travel:
@@ -124,7 +134,7 @@ def _default_steps(case, rates, waves: float | None) -> list[float]:
 
 
 def default_schemes(case, columns: Columns) -> list[str]:
-    """Scheme of the case; if waves are the fastest also `upwind`, to compare the error of the scheme."""
+    """Default schemes of a failure map: the scheme of the case, and `upwind` if waves have the fastest rate."""
     own = case.numerics.scheme
     return [own] if columns.wave_rate is None or columns.stiff(0) else ["upwind", own]
 
@@ -139,7 +149,7 @@ def _check_options(courants, steps, key) -> None:
             raise FvsolveError(f"{option} is empty. Expected at least one number")
     if key is not None and len(courants or steps or [0]) > 1:
         raise FvsolveError(
-            "with --key its values are the columns. Expected at most one --step or one --courant, for all columns"
+            "with --key, the values of the key are the columns. Expected at most one number in --step or --courant"
         )
     if key is not None and not key[1]:
         raise FvsolveError("--key has no values. Expected KEY=a,b,c with at least one value")

@@ -37,11 +37,12 @@ ERROR_RATIO = 0.75  # a shorter step helps if at most this fraction of the error
 
 @dataclass(frozen=True)
 class Measures:
-    """Measures of a run against the reference, of the worst probe, in ranges of the probe; nan if it did not finish.
+    """Measures of a run against the reference, each for the worst probe, relative to the range of the probe.
 
-    error : mean distance over the rows; farthest : greatest distance of steps outside the values of the reference
-    ringing, variation : see `ringing_amplitude` and `excess_variation`; reason : reason for the end of the run
-    refused : True if the run did not begin; seconds : time of the steps [s]
+    reason : reason for the end of the run; refused : True if the run did not begin
+    error : mean distance from the reference over time; nan if the run did not finish
+    farthest : greatest distance of a step outside the values of the reference; nan if the run did not finish
+    ringing, variation : see `ringing_amplitude` and `excess_variation`; seconds : elapsed time of the steps [s]
     """
 
     reason: str
@@ -56,9 +57,10 @@ class Measures:
 
 
 def verdict(run: Measures, shorter: Callable[[], Measures], tolerance: float) -> str:
-    """Verdict on a run; `shorter()` gives the run with half the step, then with a quarter.
+    """Verdict on a run, a key of `VERDICT_TEXTS`.
 
-    It is called only if the error is above the tolerance.
+    shorter : function that returns the measures of the run with half the step, and at the second call with a quarter;
+    it is called only if the error is above the tolerance
     """
     if run.reason.startswith(GIVEN_UP):
         return NOT_RUN
@@ -81,10 +83,10 @@ def verdict(run: Measures, shorter: Callable[[], Measures], tolerance: float) ->
 
 
 def ringing_amplitude(windows: Sequence[np.ndarray], ranges: np.ndarray) -> float:
-    """Greatest amplitude of an oscillation from step to step over MIN_SWINGS steps, in ranges of the probe.
+    """Greatest amplitude of an oscillation from step to step, relative to the range of the probe.
 
-    windows : float64[steps, probes] each; ranges : float64[probes]. A swing is half a change u[n+1] - u[n]. MIN_SWINGS
-    successive changes must alternate in sign, and the least of them counts.
+    windows : float64[steps, probes] each  values after successive steps; ranges : float64[probes]
+    Eight successive changes must alternate in sign; the amplitude is half of the least of these changes.
     """
     worst = 0.0
     for window in windows:
@@ -100,12 +102,12 @@ def ringing_amplitude(windows: Sequence[np.ndarray], ranges: np.ndarray) -> floa
 
 
 def excess_variation(rows: np.ndarray, reference: np.ndarray, ranges: np.ndarray) -> float:
-    """Excess of the variation of a probe over the reference, (TV - TV_ref) / max(TV_ref, range), of the worst probe.
+    """Excess of the total variation TV of the worst probe over the reference, (TV - TV_ref) / max(TV_ref, range).
 
-    It counts only if swings follow in less than PACE_RATIO of the time of those of the reference: a swing that a
-    method amplifies or does not damp is no ringing. TV is the sum of |changes| from row to row. Before, each row is
-    replaced by the median of itself and its neighbours, since a single outlier in the step after a jump is no swing.
-    rows, reference : float64[k, probes]; ranges : float64[probes]
+    TV is the sum of |changes| from row to row. A probe counts only if its swings follow each other in less than half
+    the time of the swings of the reference: a swing that a method amplifies or does not damp is no ringing. Each row is
+    first replaced by the median of itself and its neighbours, as a single outlier after a jump is no swing.
+    rows, reference : float64[k, probes]  values of the run and the reference; ranges : float64[probes]
     """
     smooth, smooth_reference = (_medians(values) / ranges for values in (rows, reference))
     variation, reference_variation = (
@@ -120,7 +122,7 @@ def excess_variation(rows: np.ndarray, reference: np.ndarray, ranges: np.ndarray
 
 
 def turn_interval(values: np.ndarray, height: float) -> float:
-    """Median number of rows between turning points of swings of at least `height`; inf for fewer than two of them."""
+    """Median number of rows between turning points of swings of at least `height`; inf for fewer than two points."""
     turns, low, high, direction = [], 0, 0, 0
     for i, value in enumerate(values):
         low, high = (i if value < values[low] else low), (i if value > values[high] else high)
@@ -138,12 +140,15 @@ def _medians(rows: np.ndarray) -> np.ndarray:
 
 
 def probe_ranges(reference: np.ndarray) -> np.ndarray:
-    """Range of each probe in the reference, inf for constant probes : float64[probes]."""
+    """Greatest minus least value of each probe in the reference, inf for constant probes : float64[probes]."""
     return np.nan_to_num(column_ranges(reference), nan=np.inf)
 
 
 def measure_run(outcome, windows: Sequence[np.ndarray], reference) -> Measures:
-    """Measures of a run against the rows of a reference, interpolated to the times of the run."""
+    """Measures of a run against a reference, whose rows are interpolated to the times of the run.
+
+    outcome : result of the run; windows : float64[steps, probes] each  values of the probes after successive steps
+    """
     if not outcome.ok:
         return Measures(outcome.reason, False, outcome.refused, steps=outcome.counts.get("steps", 0))
     t, rows, reference_rows = outcome.rows[:, 0], outcome.rows[:, 1:], reference.rows(reference.run)

@@ -1,4 +1,4 @@
-"""Run that records its probes after every step of some windows."""
+"""Run that records the values of its probes after every step, in windows of successive steps."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ WINDOW_COUNT = 30  # in long runs the distance of windows is this fraction of th
 
 
 class RecordedRun(CappedRun):
-    """Run that pauses after every step of a window and records its probes; its steps are those of a usual run.
+    """Run that records its probes after every step of a window; it takes the same steps as a usual run.
 
-    windows : lists of float64[probes] [SI], the probes after successive steps
+    windows : lists of float64[probes]  values of the probes after successive steps, in SI units
     """
 
     def __init__(self, *arguments) -> None:
@@ -39,7 +39,7 @@ class RecordedRun(CappedRun):
 
 
 def run_recorded(case, set: Mapping | None = None) -> tuple[Outcome, list[np.ndarray]]:
-    """(outcome of a run with changed keys, its windows : float64[steps, probes] [SI] each)."""
+    """Outcome of a run with the changed keys `set`, and its recorded windows : float64[steps, probes] each, SI."""
     runs: list[RecordedRun] = []
 
     def run(*arguments) -> RecordedRun:

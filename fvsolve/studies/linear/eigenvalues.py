@@ -29,14 +29,20 @@ ZERO_TOLERANCE = 1e-10  # of the greatest modulus: smaller eigenvalues and real 
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """Eigenvalues [1/s], by rising modulus; complete : True if these are all; description : of the selection."""
+    """Eigenvalues `values` of a case [1/s], by rising modulus.
+
+    complete : True if these are all eigenvalues; description : text on which eigenvalues these are
+    """
 
     values: np.ndarray
     complete: bool
     description: str
 
     def poles(self) -> list[dict]:
-        """Row for each real pole and each pair: s, |s| / 2 pi [Hz], damping -Re s / |s|, 1 / |Re s| [s]."""
+        """Dict for each real pole s and each complex pair: parts of s, frequency, damping ratio and time constant.
+
+        The frequency is |s| / 2 pi [Hz], the damping ratio -Re s / |s|, the time constant 1 / |Re s| [s].
+        """
         rows = []
         for s in self.values[self.values.imag >= 0.0]:
             size = abs(s)
@@ -49,7 +55,10 @@ class Spectrum:
 
 
 def poles_of(a: Any, form: EnergyForm) -> Spectrum:
-    """Eigenvalues of A in the energy norm, with those of motions that store no energy."""
+    """Eigenvalues of the matrix A of a linearised case, computed in coordinates of the energy norm `form`.
+
+    Motions that store no energy, such as free translation, have eigenvalues too, which are included.
+    """
     form = form.suited_to(a)
     moving = find_eigenvalues(form.seen(a))
     if form.idle.shape[1] == 0:
@@ -65,9 +74,9 @@ def poles_of(a: Any, form: EnergyForm) -> Spectrum:
 
 
 def find_eigenvalues(e: Any) -> Spectrum:
-    """Eigenvalues of a matrix : float64[n, n] or sparse; all for up to 1500 states, else some by ARPACK in 10 s.
+    """Eigenvalues of a matrix e : float64[n, n] or sparse; all for up to 1500 states, otherwise some by ARPACK in 10 s.
 
-    Raises FvsolveError if ARPACK finds none.
+    Raises FvsolveError if ARPACK finds no eigenvalue.
     """
     n = e.shape[0]
     if n <= MAX_DENSE:
@@ -82,20 +91,20 @@ def find_eigenvalues(e: Any) -> Spectrum:
     values = np.concatenate(by_place)
     if not values.size:
         raise FvsolveError(
-            f"ARPACK found no eigenvalue of {n} states in time; up to {MAX_DENSE} states all are computed: use fewer "
-            "cells, --set links.NAME.cells=100"
+            f"ARPACK found no eigenvalue of {n} states in time; all eigenvalues are computed for up to {MAX_DENSE} "
+            "states: use fewer cells, --set links.NAME.cells=100"
         )
     digits = 9 - int(np.log10(np.abs(values).max()))
     distinct = sort_eigenvalues(np.unique(np.round(np.concatenate([values, values.conj()]), digits)))
     on_rim = sum(part.size > 0 for part in by_place[1:])
-    zero = "those nearest 0" if by_place[0].size else "none near 0 converged"
+    zero = "eigenvalues nearest 0" if by_place[0].size else "none near 0 converged"
     on_circle = f"nearest {on_rim} of {RIM_PLACES} places" if on_rim else f"none of {RIM_PLACES} places converged"
     where = f"{zero}; on the circle |s| = {rim_radius:.4g} 1/s {on_circle}"
     return Spectrum(distinct, False, f"{distinct.size} of {n}: {where}; by ARPACK")
 
 
 def spectral_radius(e: Any) -> float:
-    """Estimate of the spectral radius [1/s]: mean growth of a vector in a power iteration."""
+    """Estimate of the spectral radius of a matrix e [1/s]: mean growth of a vector in a power iteration."""
     v, sizes = np.random.default_rng(1).standard_normal(e.shape[0]), []
     for _ in range(200):
         v = e @ (v / np.linalg.norm(v))
@@ -104,7 +113,11 @@ def spectral_radius(e: Any) -> float:
 
 
 def eigenvalues_near(e: Any, place: complex, latest: float = np.inf) -> np.ndarray:
-    """Eigenvalues of a sparse matrix nearest a place; none if ARPACK does not converge, or not before `latest`."""
+    """Eigenvalues of a sparse matrix that are nearest to the complex number `place`, by ARPACK : complex[k].
+
+    The result is empty or incomplete if ARPACK does not converge, and empty at the time limit `latest`, a time of the
+    monotonic clock [s].
+    """
     from scipy.sparse import eye_array
     from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, splu
 
@@ -130,7 +143,7 @@ def eigenvalues_near(e: Any, place: complex, latest: float = np.inf) -> np.ndarr
 
 
 def sort_eigenvalues(values: np.ndarray) -> np.ndarray:
-    """Sort eigenvalues by modulus; set values, real and imaginary parts to zero that are round-off of the greatest."""
+    """Sort eigenvalues by modulus; real and imaginary parts below 1e-10 of the greatest modulus are set to zero."""
     values = np.asarray(values, dtype=complex)
     floor = ZERO_TOLERANCE * np.max(np.abs(values), initial=0.0)
     real, imaginary = (np.where(np.abs(part) <= floor, 0.0, part) for part in (values.real, values.imag))

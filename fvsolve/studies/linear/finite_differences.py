@@ -29,7 +29,10 @@ Function = Callable[[np.ndarray], np.ndarray]
 def two_sided_differences(
     f: Function, x: np.ndarray, direction: np.ndarray, base: np.ndarray, steps: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(forward, backward difference of f along `direction`) : float64[steps, m] each."""
+    """Forward and backward difference quotients of f at x along `direction` : float64[steps, m] each.
+
+    base : float64[m]  f(x); steps : factors on `direction`
+    """
     forward = [(f(x + h * direction) - base) / h for h in steps]
     return np.array(forward), np.array([(base - f(x - h * direction)) / h for h in steps])
 
@@ -37,7 +40,12 @@ def two_sided_differences(
 def central_differences(
     f: Function, x: np.ndarray, direction: np.ndarray, base: np.ndarray, steps: np.ndarray = STEPS
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(derivative of f along `direction`, forward less backward difference) : float64[steps, m] each."""
+    """Central difference quotient of f at x along `direction`, and forward minus backward quotient.
+
+    Both are float64[steps, m].
+
+    base : float64[m]  f(x); steps : factors on `direction`
+    """
     forward, backward = two_sided_differences(f, x, direction, base, steps)
     return 0.5 * (forward + backward), forward - backward
 
@@ -45,7 +53,11 @@ def central_differences(
 def single_sided_differences(
     f: Function, x: np.ndarray, direction: np.ndarray, base: np.ndarray, steps: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """One-sided difference along `direction` in place of both: (-3 f(x) + 4 f(x + h) - f(x + 2 h)) / 2 h, twice."""
+    """One-sided difference quotient of f at x along `direction`, in place of forward and backward ones: twice the same.
+
+    It is (-3 f(x) + 4 f(x + h) - f(x + 2 h)) / 2 h, second order in the step h : float64[steps, m].
+    base : float64[m]  f(x); steps : factors on `direction`
+    """
     slopes = [(4.0 * (f(x + h * direction) - base) - (f(x + 2.0 * h * direction) - base)) / (2.0 * h) for h in steps]
     return np.array(slopes), np.array(slopes)
 
@@ -53,11 +65,12 @@ def single_sided_differences(
 def longest_step_slopes(
     forward: np.ndarray, backward: np.ndarray, size: np.ndarray, steps: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(derivative [m], error, kink) of each entry, from the longest steps at which both sides have equal slopes.
+    """Derivative, error and kink of each entry : float64[m] each, from the longest steps at which both sides agree.
 
-    forward, backward : float64[steps, m]  differences; size : float64[m]  of rows, for their round-off
-    Error and kink are relative to the entry. A slope that falls with the step is zero. It is a kink if both sides are
-    constant at different values over longer steps: the law smooths this kink over a range below those steps.
+    forward, backward : float64[steps, m]  difference quotients; size : float64[m]  size of each row, for its round-off
+    Error and kink are relative to the greatest quotient of the entry. A slope that falls with the step counts as zero.
+    The kink is the difference of both sides if each side is constant over longer steps; laws smooth such a kink over a
+    range below these steps.
     """
     slopes, magnitude = 0.5 * (forward + backward), np.maximum(np.abs(forward), np.abs(backward))
     clear = magnitude[1:] > ROUNDING_SHARE * size / steps[1:, None]
@@ -79,15 +92,16 @@ def longest_step_slopes(
 
 
 def above_zero(x: np.ndarray) -> np.ndarray:
-    """x, with 1 in place of values that are not positive."""
+    """Array x with 1 in place of values that are not positive."""
     return np.where(x > 0.0, x, 1.0)
 
 
 def best_slopes(slopes: np.ndarray, size: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(derivative [p], error of each column relative to `size`), from the two steps that agree best for a column.
+    """Derivative of each matrix entry : float64[p], and error of each column : float64[columns], relative to `size`.
 
-    slopes : float64[steps, p]  entries, column after column; size : float64[p]  of each entry's row
-    starts : int64[columns]  where each column begins
+    They come from the two consecutive steps that agree best for the column.
+    slopes : float64[steps, p]  difference quotients of the entries, column after column
+    size : float64[p]  size of the row of each entry; starts : int64[columns]  first entry of each column
     """
     if slopes.shape[1] == 0:
         return slopes[0], np.zeros(0)
@@ -100,7 +114,10 @@ def best_slopes(slopes: np.ndarray, size: np.ndarray, starts: np.ndarray) -> tup
 
 
 def side_differences(sides: np.ndarray, size: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    """Least difference of both sides over all steps, for each column, relative to `size`."""
+    """Least difference of forward and backward quotients over all steps, for each column : float64[columns].
+
+    It is relative to `size`; sides : float64[steps, p]  differences; size, starts : as in `best_slopes`
+    """
     if sides.shape[1] == 0:
         return np.zeros(0)
     return np.min(np.maximum.reduceat(np.abs(sides) / size, starts, axis=1), axis=0)
@@ -109,11 +126,12 @@ def side_differences(sides: np.ndarray, size: np.ndarray, starts: np.ndarray) ->
 def hidden_kinks(
     sides: np.ndarray, size: np.ndarray, rounding: np.ndarray, starts: np.ndarray, steps: np.ndarray
 ) -> np.ndarray:
-    """True for columns with an entry whose sides differ equally over three steps, above `HIDDEN_KINK` of its row.
+    """True for each column with a kink: an entry whose sides differ equally over three steps, by over 1e-4 of its row.
 
-    The difference of a smooth function falls with the step. size : float64[p]  of each entry's row over the longest
-    step, which does not resolve the steep laminar range of a valve at a drop of zero
-    rounding : float64[p]  size of rows for their round-off
+    The difference of both sides of a smooth function falls with the step.
+    sides : float64[steps, p]  forward minus backward quotients; starts : int64[columns]  first entry of each column
+    size : float64[p]  size of the row of each entry over the longest step, which does not resolve the steep laminar
+    range of a valve at zero pressure drop; rounding : float64[p]  size of the row for its round-off
     """
     if sides.shape[1] == 0:
         return np.zeros(0, dtype=bool)

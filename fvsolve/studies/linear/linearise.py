@@ -1,4 +1,4 @@
-"""State-space form of a case about a state: A, B, C, D (9), (10) with names and SI units."""
+"""State-space form of a case about a state: matrices A, B, C, D with names and SI units."""
 
 from __future__ import annotations
 
@@ -51,12 +51,13 @@ STATE_UNITS = {
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """dx/dt = A x + B u, y = C x + D u for deviations x, u, y from a state (9), (10); SI.
+    """Linear system dx/dt = A x + B u, y = C x + D u for deviations of states x, inputs u, outputs y from a state; SI.
 
-    a : float64[n, n], or scipy csc if n > 1000; b : float64[n, inputs]; c : float64[outputs, n];
-    d : float64[outputs, inputs]; at : operating point
-    error : for each of A, B, C, D the greatest difference of an entry between two steps of the differences, relative
-    to the sum of |entry| times small deviation of its column over the row
+    These are equations (9) and (10) of docs/course.md. at : operating point
+    a : float64[n, n]  A, or a sparse scipy array if n > 1000; b : float64[n, inputs]  B; c : float64[outputs, n]  C
+    d : float64[outputs, inputs]  D; input_values, output_values : values at the operating point
+    error : greatest errors "A", "C" and "BD" (of B and D) of an entry, the difference of two steps of the difference
+    quotients, relative to the sum of |entry| times small deviation over its row
     """
 
     at: OperatingPoint
@@ -74,12 +75,12 @@ class Linear:
 
     @property
     def states(self) -> list[str]:
-        """Names of x: deviations from the profile."""
+        """Names of the states x."""
         return list(self.at.model.state_names)
 
     @property
     def state_units(self) -> list[str]:
-        """Units of x."""
+        """SI units of the states x."""
         names, basins = set(self.states), {basin.name: basin.part.physics_type.states for basin in self.at.model.basins}
         return [
             basins[part].get(quantity.split("[")[0], "-") if part in basins
@@ -110,7 +111,10 @@ class Linear:
 
 
 def state_unit(name: str, opens: bool) -> str:
-    """SI unit of a state; for a part with an opening (`opens`), `speed` is the rate of its opening [1/s]."""
+    """SI unit of the state `name`.
+
+    opens : True for a part with a state `opening`, whose state `speed` is the rate of the opening [1/s]
+    """
     quantity = name.rsplit(".", 1)[1].rstrip("0123456789[]")
     amount = "kg/m" if name.endswith("]") else "kg"  # of a scalar, times its own unit
     return "1/s" if quantity == "speed" and opens else STATE_UNITS.get(quantity, amount)
@@ -122,8 +126,9 @@ def linearise(
 ) -> Linear:  # fmt: skip
     """Linearise a case by central differences at its start, or at the time `at` [s], with held schedules.
 
-    inputs : names such as "valve.opening", "lake.pressure"; outputs : probes, those of the case if None
-    before : at a kink or jump of a schedule hold its left limit; scheme : linear scheme in place of that of the case
+    inputs : names such as "valve.opening", "lake.pressure"; outputs : probes; default: the probes of the case
+    before : True to hold schedules at the values just before a kink or jump at this time
+    scheme : linear scheme that replaces the scheme of the case; set : changed keys of the case
     For an input at the end of its range differences are one-sided. Raises CaseError, and FvsolveError for an unknown
     name, a state without a derivative (a limited scheme, a valve at a drop of zero, a kink), a case without states.
     """
@@ -133,7 +138,7 @@ def linearise(
 
 
 def linearise_at(at: OperatingPoint, inputs=(), outputs: int = 0) -> Linear:
-    """Linearise about an operating point, with the first `outputs` of its probes as outputs."""
+    """Linearise about an operating point, with named inputs; outputs are the first `outputs` of its probes."""
     model, inputs = at.model, tuple(dict.fromkeys(inputs))
     available = inputs_of(model)
     for name in inputs:
@@ -173,7 +178,7 @@ def refuse_limiter(model) -> None:
 
 
 def input_value(at: OperatingPoint, name: str, input_: Input) -> float:
-    """Value of an input at the state [SI]."""
+    """Value of an input at the operating point, in SI units."""
     model = at.model
     if input_.node >= 0:
         pressure = float(model.tables.nodes[input_.node]["pressure"]
@@ -187,13 +192,17 @@ def input_value(at: OperatingPoint, name: str, input_: Input) -> float:
 
 
 def input_width(at: OperatingPoint, input_: Input, value: float) -> float:
-    """Small change of an input for differences [SI]."""
+    """Small change of an input for difference quotients, in SI units; value : value of the input there."""
     usual = input_.sort.small / (input_.scale or 1e4) if input_.node >= 0 else input_.sort.small
     return usual if input_.sort.bounded or input_.sort is PRESSURE else max(usual, abs(value))
 
 
 def input_column(at, name, input_, value, size, outputs, steps) -> tuple[np.ndarray, float]:
-    """(column of B over that of D, error) of an input; one-sided differences at the end of its range."""
+    """Column of B, followed by the column of D, of an input : float64[n + outputs], and its error.
+
+    value : value of the input; size : float64[n]  size of each row of A; steps : factors on the small change
+    Differences are one-sided if the value is at an end of the range of the input.
+    """
     model = at.model
     width = np.array([input_width(at, input_, value)])
     low, high = input_.sort.least, input_.sort.greatest

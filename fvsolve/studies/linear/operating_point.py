@@ -20,11 +20,11 @@ DELAY_ERROR = 0.01  # relative error of a wave in cells that replace a delay lin
 
 @dataclass(frozen=True, eq=False)
 class OperatingPoint:
-    """Model with held schedules, and a state of it.
+    """State of a case about which it is linearised, and model with schedules held at their values.
 
-    t : time at which schedules are held [s]; y : float64[n]  state, deviations from the profile
-    when : description of that time, with the side of a kink or jump of a schedule
-    armed : flags of devices at that time, see `model.run_data.RunData`; 0 at the start
+    t : time at which schedules are held [s]; y : float64[n]  state, as deviations from the initial steady state
+    when : description of this time, with the side of a kink or jump of a schedule
+    armed : flags of events at this time, see `model.run_data.RunData`; 0 at the start
     """
 
     model: object
@@ -35,18 +35,19 @@ class OperatingPoint:
 
     @property
     def rate(self) -> np.ndarray:
-        """dy/dt : float64[n]; zero at a steady state."""
+        """Rate of change dy/dt of the state : float64[n]; zero at a steady state."""
         return self.model.rhs(self.t, self.y)
 
 
 def operating_point(case, set=None, at: float | None = None, before: bool = False, probes=()) -> OperatingPoint:
     """Operating point of a case at its start, or at the time `at` [s], to which the case is run.
 
-    before : at a kink or jump of a schedule, hold its left limit; else its right limit
-    probes : names to be observed besides those of the case, first in the order
-    Delay lines are replaced by cells. In a case without a scheme the linear scheme that a limited default equals in
-    smooth solutions replaces it, with basins `upwind`. Raises CaseError for a case or probe that cannot be read,
-    FvsolveError for a case without states and for a run that does not reach `at`.
+    set : changed keys of the case; before : True to hold schedules at the values just before a kink or jump at this
+    time, otherwise just after it
+    probes : names of probes that are added before the probes of the case
+    Delay lines are replaced by cells. If the case gives no scheme and the default scheme is limited, the linear scheme
+    that it equals in smooth solutions replaces it; with basins `upwind`. Raises CaseError for a case or probe that
+    cannot be read, and FvsolveError for a case without states and for a run that does not reach `at`.
     """
     from fvsolve.case import load
 
@@ -76,7 +77,10 @@ def operating_point(case, set=None, at: float | None = None, before: bool = Fals
 
 
 def frequency_limit_note(model, lines: list[str]) -> str:
-    """Note with the frequency up to which cells replace delay lines: error of exp(-s tau) at most `DELAY_ERROR`."""
+    """Note with the frequency up to which cells in place of the delay lines `lines` are accurate.
+
+    Up to it the error of a wave at the end of a line, relative to an exact delay, is at most 0.01.
+    """
     theta = np.linspace(0.0, np.pi, 20001)[1:]
     error = np.abs(symbol(SCHEMES[model.case.numerics.scheme].weights, theta) + 1j * theta)
     rates = []
@@ -88,7 +92,7 @@ def frequency_limit_note(model, lines: list[str]) -> str:
 
 
 def _state_at(model, at: float | None) -> tuple[float, np.ndarray, np.ndarray | float]:
-    """Time, state and flags of a run at `at`; those of the start if it is None."""
+    """Time [s], state and event flags of a run at the time `at` [s]; at the start if `at` is None."""
     start = model.case.numerics.start
     if at is None or at == start:
         return start, model.start.copy(), 0.0
@@ -102,9 +106,10 @@ def _state_at(model, at: float | None) -> tuple[float, np.ndarray, np.ndarray | 
 
 
 def with_held_schedules(model, t: float, before: bool = False):
-    """Model with all schedules and all periodic velocities of basins held at t [s], left or right limit.
+    """Model with all schedules and all periodic velocities of basins held at their values at t [s].
 
-    Schedules that drive joints and walls continue at their rate at that time.
+    before : True for the values just before a kink or jump at t, otherwise just after it
+    Schedules that drive joints and walls continue with their rate of change at this time.
     """
     tables = model.tables
     schedules, limit = tables.schedules.copy(), t if before else np.inf
@@ -124,9 +129,9 @@ def with_held_schedules(model, t: float, before: bool = False):
 
 
 def without_slope_limits(tables: rec.Tables) -> rec.Tables:
-    """Tables in which pipes transport scalars without slopes, and mixed values are not bounded.
+    """Tables of a model in which pipes transport scalars without slopes in cells, and mixed values are not bounded.
 
-    Both would be kinks of the right-hand side.
+    Limited slopes and bounds are kinks of the right-hand side, which has no derivative there.
     """
     settings, scalars = tables.settings.copy(), tables.scalars.copy()
     settings["limiter"] = rec.FLAT
@@ -135,7 +140,7 @@ def without_slope_limits(tables: rec.Tables) -> rec.Tables:
 
 
 def with_held_velocities(model, tables: rec.Tables, t: float) -> rec.Tables:
-    """Tables in which given velocities of basins that reverse with a period are held at their values at t."""
+    """Tables of a model in which given velocities of basins that reverse periodically are held at their values at t."""
     if not any(row["period"] > 0.0 for row in tables.basins):
         return tables
     tables = tables._replace(basins=tables.basins.copy(), plane=tables.plane.copy())
@@ -150,9 +155,10 @@ def with_held_velocities(model, tables: rec.Tables, t: float) -> rec.Tables:
 
 
 def with_weights(at: OperatingPoint, weights: tuple[float, ...], degree: int) -> OperatingPoint:
-    """Operating point with a linear scheme: weights of cells u-2 .. u+2, polynomials of `degree` at pipe ends.
+    """Operating point with another linear scheme.
 
-    Its stencil must not be wider than that of the scheme of `at`, whose Jacobian pattern is reused.
+    weights : weights of the cells around a face in its value; degree : degree of the polynomials at pipe ends
+    The stencil must not be wider than that of the scheme of `at`, whose Jacobian pattern is reused.
     """
     tables = at.model.tables._replace(settings=at.model.tables.settings.copy())
     settings = tables.settings[0]
@@ -166,7 +172,7 @@ def with_weights(at: OperatingPoint, weights: tuple[float, ...], degree: int) ->
 
 
 def has_limiter(model) -> bool:
-    """True if a limited scheme is used: in basins all but `upwind`, and but `upwind5` on a grid."""
+    """True if a model uses a limited scheme, in pipes with cells or in basins, see `basin_has_limiter`."""
     scheme = model.case.numerics.scheme
     if any(basin_has_limiter(basin, scheme) for basin in model.basins):
         return True
@@ -174,5 +180,5 @@ def has_limiter(model) -> bool:
 
 
 def basin_has_limiter(basin, scheme: str) -> bool:
-    """True if a basin limits its slopes under a scheme."""
+    """True if a basin limits its slopes under a scheme: all except `upwind`, and except `upwind5` on a grid."""
     return scheme != "upwind" and not (scheme == "upwind5" and basin.is_grid)

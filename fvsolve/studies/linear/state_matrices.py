@@ -1,4 +1,4 @@
-"""Matrices A and C at an operating point, by differences that are checked."""
+"""Matrices A and C of a linearised case at an operating point, by finite differences that are checked."""
 
 from __future__ import annotations
 
@@ -29,7 +29,10 @@ TRIAL_DIRECTIONS = 3  # random directions along which A is checked
 
 
 def responses(at: OperatingPoint, y: np.ndarray, outputs: int) -> np.ndarray:
-    """dy/dt and the first probes at the state y : float64[n + outputs]."""
+    """Rates dy/dt and the values of the first `outputs` probes at the state y : float64[n + outputs].
+
+    Raises FvsolveError if the rates cannot be computed.
+    """
     model, t = at.model, float(at.t)
     with model.run_data(at.armed) as data:
         dydt, out = data.evaluate(t, y, np.inf)
@@ -48,9 +51,10 @@ def small_deviations(at: OperatingPoint) -> np.ndarray:
 
 
 def state_matrix(at: OperatingPoint) -> tuple[Any, np.ndarray, float, np.ndarray]:
-    """(A, size of each rate, error, steps of the differences), by colours of the Jacobian pattern of the model.
+    """Matrix A, size of each of its rows : float64[n], error, and steps of the differences.
 
-    size : float64[n]  sum of |A_ij| times the small deviation of state j
+    The size of row i is the sum over j of |A_ij| times the small deviation of state j. States whose columns have no row
+    in common (equal colours) are changed together. Raises FvsolveError for a state without a derivative.
     """
     from scipy.sparse import csc_array
 
@@ -79,7 +83,10 @@ def state_matrix(at: OperatingPoint) -> tuple[Any, np.ndarray, float, np.ndarray
 
 
 def matrix_entries(at: OperatingPoint, width, rows, columns, steps) -> tuple[np.ndarray, np.ndarray]:
-    """(slopes, sides) of the entries at `rows` and `columns` : float64[steps, entries], per small deviation."""
+    """Central difference quotients of matrix entries, and forward minus backward ones : float64[steps, entries] each.
+
+    They are changes of a rate per small deviation `width` of a state; rows, columns : int64[entries]  entries of A
+    """
     structure, slopes, sides = at.model.structure, [], []
     base = responses(at, at.y, 0)
     for color in range(structure.color_count):
@@ -92,7 +99,7 @@ def matrix_entries(at: OperatingPoint, width, rows, columns, steps) -> tuple[np.
 
 
 def basin_states(model) -> np.ndarray:
-    """True for states of basins : bool[n]; upwind fluxes of water at rest have kinks of some 1e-4 of their row."""
+    """True for each state of a basin : bool[n]; upwind fluxes of water at rest have kinks of about 1e-4 of a row."""
     names = tuple(f"{basin.name}." for basin in model.basins)
     return np.array([name.startswith(names) for name in model.state_names]) if names else np.zeros(model.y_size, bool)
 
@@ -106,8 +113,8 @@ def refuse_state(model, j: int, cause: str) -> None:
         )
         raise FvsolveError(f"the state cannot be linearised along {model.state_names[j]}: {text}; choose another state")
     reason = {
-        "slope": "its slope does not converge there, as that of a valve at a drop of zero: give the valve "
-                 "laminar_reynolds, or linearise while it flows (--at)",
+        "slope": "its slope does not converge there, like the slope of a valve at a drop of zero: give the valve the "
+                 "key `laminar_reynolds`, or linearise at a time with flow (--at)",
         "kink": "its slope differs from side to side there (a tank dry or full, an end stop or seat just touched): "
                 "choose another time with --at",
     }[cause]  # fmt: skip
@@ -115,7 +122,7 @@ def refuse_state(model, j: int, cause: str) -> None:
 
 
 def check_directions(at: OperatingPoint, a, width: np.ndarray, size: np.ndarray, steps: np.ndarray) -> None:
-    """Check A along random directions of all states; raises FvsolveError if f is homogeneous but not linear."""
+    """Check A along random directions of all states; raises FvsolveError if rates are not linear along them."""
     model, rng = at.model, np.random.default_rng(1)
     base = responses(at, at.y, 0)
     for _ in range(TRIAL_DIRECTIONS):
@@ -130,7 +137,10 @@ def check_directions(at: OperatingPoint, a, width: np.ndarray, size: np.ndarray,
 
 
 def output_matrix(at: OperatingPoint, outputs: int, steps: np.ndarray) -> tuple[np.ndarray, float]:
-    """(C, error), by differences along each state that an output depends on."""
+    """Matrix C : float64[outputs, n], and its error, by differences along each state on which an output depends.
+
+    Raises FvsolveError for an output without a derivative, and if C is too large or takes too long.
+    """
     n, width = at.model.y_size, small_deviations(at)
     if outputs == 0:
         return np.zeros((0, n)), 0.0
@@ -168,7 +178,10 @@ def too_large(n: int, outputs: int) -> FvsolveError:
 
 
 def visible_states(at: OperatingPoint, outputs: int, base: np.ndarray, width: np.ndarray) -> Iterator[int]:
-    """States that change some output, by bisection: a range that changes no output by one bit is left out."""
+    """Numbers of the states that change an output; bisection leaves out ranges of states that change no output.
+
+    base : float64[outputs]  outputs at the state; width : float64[n]  small deviations
+    """
     rng, n = np.random.default_rng(2), width.size
     direction = rng.uniform(0.5, 1.0, n) * rng.choice([-1.0, 1.0], n) * width * STEPS[0]
     ranges = [(0, n)]

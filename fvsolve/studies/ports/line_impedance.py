@@ -19,10 +19,13 @@ ROUNDING = 1e-12  # rounding error of a sample, relative to |H|
 
 @dataclass(frozen=True)
 class LineImpedance:
-    """Input impedance of a lossless line with a reflection at its end: Z0 (1 + g e) / (1 - g e), e = exp(-2 s T).
+    """Input impedance of a lossless line with a reflection at its end.
 
-    z0 : characteristic impedance rho a / A [Pa s/m3]; time : travel time T = L / a [s]; reflection : reflection factor
-    g of pressure at the far end, 1 closed (Z0 coth s T), -1 open (Z0 tanh s T), (R - Z0) / (R + Z0) at a resistance R
+    H(s) = Z0 (1 + g e) / (1 - g e) with e = exp(-2 s T).
+    z0 : characteristic impedance Z0 = rho a / A [Pa s/m3]; time : travel time T = L / a [s], for a line with length L,
+    area A, wave speed a and density rho
+    reflection : reflection factor g of pressure at the far end: 1 closed (Z0 coth s T), -1 open (Z0 tanh s T),
+    (R - Z0) / (R + Z0) at a resistance R
     """
 
     z0: float
@@ -38,17 +41,20 @@ class LineImpedance:
 
     @validated(s=COMPLEX)
     def __call__(self, s):
-        """H at complex numbers s [1/s], Re s >= 0."""
+        """Impedance H [Pa s/m3] at complex numbers s [1/s] with Re s >= 0."""
         back = self.reflection * np.exp(-2.0 * self.time * np.asarray(s))
         return self.z0 * (1.0 + back) / (1.0 - back)
 
     @property
     def period(self) -> float:
-        """H(s + j period) = H(s) [rad/s]."""
+        """Period of the impedance along the imaginary axis [rad/s], pi / T."""
         return math.pi / self.time
 
     def slope(self, shift: float, low, high):
-        """Bound of |dH/ds| on Re s = shift from low to high [rad/s]: greatest 4 Z0 T u / |1 - g e|^2, u = |g e|."""
+        """Bound of |dH/ds| on the line Re s = shift [1/s], between the frequencies low and high [rad/s].
+
+        It is the greatest 4 Z0 T u / |1 - g e|^2 there, with u = |g e| and e = exp(-2 s T).
+        """
         u = abs(self.reflection) * math.exp(-2.0 * self.time * shift)
         phase = 2.0 * self.time * np.asarray([low, high]) + (math.pi if self.reflection < 0.0 else 0.0)
         # angle between g e and the positive real axis
@@ -60,16 +66,17 @@ class LineImpedance:
 
     @property
     def rightmost(self) -> float:
-        """Re s of the poles: ln|g| / (2 T) [1/s], -inf without reflection."""
+        """Real part of all poles [1/s]: ln|g| / (2 T), -inf without reflection."""
         return math.log(abs(self.reflection)) / (2.0 * self.time) if self.reflection else -math.inf
 
 
 @dataclass(frozen=True)
 class SweepVerdict(PlainData):
-    """Result of a sweep: Re H >= `floor` on Re s = shift, 0 <= w <= high [rad/s].
+    """Result of a sweep of H(s) along the line Re s = shift [1/s], over frequencies w from 0 to `high` [rad/s].
 
     positive_real : False if Re H < 0 at a sample, True if the bound proves Re H >= 0, otherwise None
-    least : least sample of Re H, at `worst` [rad/s]; floor : proven lower bound; samples : number of samples
+    reason : result in words; samples : number of samples
+    least : least sample of Re H, at the frequency `worst` [rad/s]; floor : proven lower bound of Re H
     """
 
     positive_real: bool | None
@@ -96,15 +103,16 @@ POLE_ABSCISSA = Kind(lambda given: is_number(given) or str(given) == "-inf", "a 
 def sweep_positive_real(
     h: Callable, slope, high: float, shift: float = 0.0, tolerance: float = 1e-6, rightmost: float = -math.inf
 ) -> SweepVerdict:
-    """Test Re H >= 0 on the line Re s = shift up to w = high, with a lower bound between the samples.
+    """Test if Re H >= 0 on the line Re s = shift from w = 0 to w = high, with a lower bound between the samples.
 
-    h : function of complex arrays, real for real s; slope : bound of |dH/ds| on that line, a number or a function of
-    arrays (low, high) [rad/s]; high : [rad/s], the period of a periodic H, so that the whole line is covered
-    tolerance : relative to |H|, gap of the proof below which an interval is not halved; rightmost : Re s of the
-    rightmost poles, if known [1/s]
+    h : function of a complex array s [1/s], real for real s; shift : real part of s on the line [1/s]
+    slope : bound of |dH/ds| on this line, a number or a function of arrays (low, high) of frequencies [rad/s]
+    high : greatest frequency w [rad/s]; the period of a periodic H covers the whole line
+    tolerance : difference of samples and lower bound, relative to |H|, below which an interval is not halved
+    rightmost : real part of the rightmost poles [1/s], if known
     If H is analytic and bounded right of the line, Re H >= 0 on the line implies Re H >= 0 everywhere right of it.
-    Between two samples Re H >= (sum - slope * distance) / 2. Raises FvsolveError for an invalid range or bound, and if
-    H is not finite on the line.
+    Between two samples Re H is at least half of their sum minus slope times distance. Raises FvsolveError for an
+    invalid range or bound, and if H is not finite on the line.
     """
     if rightmost > shift:
         return SweepVerdict(False, f"a pole with Re s = {rightmost:.6g} 1/s, right of the line", math.nan, math.nan,
@@ -130,7 +138,10 @@ def sweep_positive_real(
 
 
 def _value_per_point(name: str, given, shape: tuple, kind: type) -> np.ndarray:
-    """Convert the result of a function to an array with a number for each point. Raises FvsolveError."""
+    """Convert the result `given` of the function `name` to an array with a number of type `kind` for each point.
+
+    Raises FvsolveError if this is not possible.
+    """
     try:
         return np.broadcast_to(np.asarray(given, kind), shape)
     except (TypeError, ValueError):
@@ -149,9 +160,11 @@ def _slopes(slope, w: np.ndarray, shift: float) -> np.ndarray:
 
 @validated(line=instance_of(LineImpedance), shift=NOT_NEGATIVE, tolerance=POSITIVE)
 def line_positive_real(line: LineImpedance, shift: float | None = None, tolerance: float = 1e-6) -> SweepVerdict:
-    """Test if the impedance of a line is positive real on Re s = shift (default 1e-3 / T), over a whole period.
+    """Test if the impedance H of a line is positive real on the line Re s = shift [1/s], over a whole period.
 
-    Without losses at the end, Re H = 0 on the imaginary axis, with poles on it, and Re H > 0 right of it.
+    shift : default: 1e-3 / T with the travel time T. Without losses at the end of the line, Re H = 0 on the imaginary
+    axis, with poles on it, and Re H > 0 right of it.
+    tolerance : as for `sweep_positive_real`
     """
     shift = 1e-3 / line.time if shift is None else shift
     return sweep_positive_real(

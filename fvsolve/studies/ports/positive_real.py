@@ -31,7 +31,7 @@ HIDDEN_POLES = {  # location of a cancelled pole -> text
 
 @dataclass(frozen=True)
 class RootPlace:
-    """Root for a text; near : estimate in floats [1/s]; side : right, axis or left, exact."""
+    """Root of a polynomial in a text: estimate `near` in floats [1/s], and exact side, "right", "axis" or "left"."""
 
     near: complex
     side: str
@@ -39,7 +39,10 @@ class RootPlace:
 
 @dataclass(frozen=True)
 class AxisPole:
-    """Pole at s = j frequency [rad/s] (inf: at infinity); residue : of a simple pole; fault : text, None if allowed."""
+    """Pole on the imaginary axis, at s = j frequency [rad/s] (inf: at infinity).
+
+    residue : residue of a simple pole, otherwise None; fault : text if the pole is not allowed, otherwise None
+    """
 
     frequency: float
     order: int
@@ -49,7 +52,11 @@ class AxisPole:
 
 @dataclass(frozen=True)
 class Band:
-    """Interval low < w < high [rad/s] with Re H(jw) < 0; least : its infimum; worst : frequency of it [rad/s]."""
+    """Interval of frequencies low < w < high [rad/s] with Re H(jw) < 0.
+
+    width : (high - low) / (high + low), inf for an infinite `high`; least : infimum of Re H(jw)
+    worst : frequency of the infimum [rad/s]
+    """
 
     low: float
     high: float
@@ -60,17 +67,17 @@ class Band:
 
 @dataclass(frozen=True)
 class Verdict(PlainData):
-    """Result of `positive_real` with reasons.
+    """Result of `positive_real` for a transfer function H(s), with reasons.
 
-    positive_real : definition (4.1) of the course, with the pole at infinity
-    strictly : H(s - e) is positive real for some e > 0 (Khalil, Nonlinear Systems, definition 6.4)
-    lossless : positive real with Re H(jw) = 0 at every w
-    reason, reasons : texts, all faults or the proof
+    positive_real : True if H is positive real by definition (4.1) of docs/course.md, with the pole at infinity
+    strictly : True if H(s - e) is positive real for some e > 0 (Khalil, Nonlinear Systems, definition 6.4)
+    lossless : True if H is positive real with Re H(jw) = 0 at every w
+    reason, reasons : texts with all faults, or with the proof
     poles : poles of the reduced function; axis_poles : poles on the imaginary axis and at infinity, w >= 0
     bands : intervals with Re H(jw) < 0, w >= 0; zeros : frequencies with Re H(jw) = 0 [rad/s], empty if it is zero
     everywhere
-    hidden : poles cancelled by the numerator; H does not show them, but a system may have them
-    numerator, denominator : reduced, highest power first
+    hidden : poles that the numerator cancels; H does not show them, but a system may have them
+    numerator, denominator : coefficients of the reduced function, highest power first
     """
 
     positive_real: bool
@@ -102,12 +109,13 @@ class Verdict(PlainData):
 
 
 def positive_real(numerator, denominator) -> Verdict:
-    """Test if H(s) = numerator / denominator is positive real; coefficients HIGHEST power FIRST, as in numpy and SciPy.
+    """Test if H(s) = numerator / denominator is positive real, from coefficients, HIGHEST power FIRST as in numpy.
 
     Exact conditions, after common factors are removed: no pole with Re s > 0 (Cauchy index), simple poles with positive
-    real residue on the axis and at infinity, and E(w^2) = Re N(jw) D(-jw) >= 0 for all w (Sturm). Coefficients are
-    whole numbers, fractions, text such as "0.1" or floats. A float is taken as its binary fraction, so that 0.1 is not
-    1/10. Raises FvsolveError for invalid coefficients and for a zero denominator.
+    real residue on the imaginary axis and at infinity, and Re N(jw) D(-jw) >= 0 for all w, with numerator N and
+    denominator D (Sturm). Coefficients are whole numbers, fractions, text such as "0.1" or floats. A float is taken as
+    its binary fraction, so that 0.1 is not 1/10. Raises FvsolveError for invalid coefficients and for a zero
+    denominator.
     """
     n, d = coefficients(numerator, "numerator"), coefficients(denominator, "denominator")
     if d.degree < 0:
@@ -169,7 +177,10 @@ def _origin(n: Polynomial, d: Polynomial, locations: RootLocations) -> list[Axis
 
 
 def _pair(n: Polynomial, d: Polynomial, x: Root, order: int) -> AxisPole:
-    """Pole at s = j sqrt(x): with D = C(s^2) R(s), its residue is N / (2 s C' R)."""
+    """Pole of N / D at s = j sqrt(x), of the given order.
+
+    With D = C(s^2) R(s), where C has the roots on the imaginary axis, the residue of a simple pole is N / (2 s C' R).
+    """
     name = f"the pole at w = {x.frequency:.12g} rad/s"
     if order > 1:
         return AxisPole(x.frequency, order, None, f"{name} has order {order}; expected a simple pole")
@@ -195,13 +206,16 @@ def _pair(n: Polynomial, d: Polynomial, x: Root, order: int) -> AxisPole:
 
 
 def _real_part(n: Polynomial, d: Polynomial) -> tuple[Polynomial, Polynomial]:
-    """(E, P) with Re H(jw) = E / P, polynomials in x = w^2; P = |D|^2."""
+    """Polynomials E and P in x = w^2 with Re H(jw) = E / P, for H = n / d; P = |d(jw)|^2."""
     (ne, no), (de, do), x = even_odd_parts(n), even_odd_parts(d), Polynomial([0, 1])
     return ne * de + x * no * do, de * de + x * do * do
 
 
 def _bands(even: Polynomial, below: Polynomial) -> list[Band]:
-    """Open intervals of x > 0 with E < 0, between the roots at which E changes sign."""
+    """Bands of frequencies with Re H = E / P < 0, between the roots x = w^2 > 0 at which E changes sign.
+
+    even, below : polynomials E and P from `_real_part`
+    """
     if even.degree < 0:
         return []
     edges = positive_roots(odd_part(even)) if even.degree > 0 else []
@@ -226,7 +240,10 @@ def _band(even: Polynomial, below: Polynomial, low: Root | None, high: Root | No
 
 
 def _least(even: Polynomial, below: Polynomial, left: Fraction, right: Fraction | None) -> tuple[float, float]:
-    """(frequency, infimum) of E / P between left and right."""
+    """Frequency [rad/s] and value of the infimum of E / P between x = left and x = right, x the squared frequency.
+
+    even, below : polynomials E and P from `_real_part`; right : None for infinity
+    """
     common = even.gcd(below)
     top, below = even // common, below // common
     candidates = [left, *(() if right is None else (right,))]
@@ -257,7 +274,10 @@ def _zeros(even: Polynomial, below: Polynomial) -> list[float]:
 
 
 def _strictly(n: Polynomial, d: Polynomial, locations: RootLocations, even: Polynomial, zeros: list[float]) -> bool:
-    """True if all poles are left of the axis, Re H(jw) > 0 at every finite w, and w^2 Re H does not tend to zero."""
+    """True if all poles are left of the imaginary axis, Re H(jw) > 0 at every finite w, and Re H decays slowly enough.
+
+    At infinity w^2 Re H must not tend to zero if H does, and otherwise Re H must not tend to zero.
+    """
     bounded_decay = even.degree == (d.degree - 1 if n.degree < d.degree else d.degree)
     return locations.axis == 0 and not zeros and even.degree >= 0 and bounded_decay
 
@@ -312,7 +332,7 @@ def _roots_text(roots: list[complex]) -> str:
 
 
 def _float(x: Fraction) -> float:
-    """Nearest float; infinite outside of their range."""
+    """Float nearest to the fraction x; infinity outside the range of floats."""
     try:
         return float(x)
     except OverflowError:

@@ -19,10 +19,11 @@ BITS = 200  # relative precision of a bracketed root in bits, before values are 
 
 
 def coefficients(given, name: str) -> Polynomial:
-    """Exact polynomial from coefficients, highest power FIRST. Raises FvsolveError that names an invalid coefficient.
+    """Exact polynomial from its coefficients `given`, highest power FIRST; a single number is a constant.
 
     Whole numbers, fractions, decimals and text ("0.1", "1/3", "2e-7") are taken exactly. A float is taken as its binary
-    fraction: 0.1 is 3602879701896397 / 2^55. A bare number is a constant.
+    fraction: 0.1 is 3602879701896397 / 2^55. Raises FvsolveError for an invalid coefficient; name : name of the
+    polynomial in the error message
     """
     if isinstance(given, (str, Real, Decimal, complex)) or np.ndim(given) == 0 and isinstance(given, np.ndarray):
         given = [given[()] if isinstance(given, np.ndarray) else given]
@@ -49,7 +50,7 @@ def _exact(x, name: str) -> Fraction:
 
 
 def even_odd_parts(p: Polynomial) -> tuple[Polynomial, Polynomial]:
-    """(e, o) with p(jw) = e(w^2) + j w o(w^2)."""
+    """Polynomials e and o of the even and odd powers of p: p(jw) = e(w^2) + j w o(w^2)."""
     signed = [x if k % 4 < 2 else -x for k, x in enumerate(p.coefficients)]
     return Polynomial(signed[0::2]), Polynomial(signed[1::2])
 
@@ -58,8 +59,9 @@ def even_odd_parts(p: Polynomial) -> tuple[Polynomial, Polynomial]:
 class RootLocations:
     """Location of the roots of a real polynomial, counted with multiplicity.
 
-    right, axis, left : numbers of roots with Re s > 0, = 0, < 0; zero : number of roots s = 0 (also counted in `axis`)
-    pairs : ((x, order), ...) of the roots s = +-j sqrt(x), x > 0, increasing
+    right, axis, left : numbers of roots s with Re s > 0, Re s = 0, Re s < 0
+    zero : number of roots s = 0, which are also counted in `axis`
+    pairs : x > 0 and multiplicity of each pair of roots s = +-j sqrt(x), with increasing x
     """
 
     right: int
@@ -72,8 +74,8 @@ class RootLocations:
 def locate_roots(p: Polynomial) -> RootLocations:
     """Locate the roots of p exactly: Cauchy index for the half planes, Sturm chain for the axis.
 
-    left - right = change of arg p(jw) / pi (Hermite 1856, Routh 1877), by a chain of remainders without degenerate
-    rows. Roots on the axis are the common roots of the even and odd part of p(jw).
+    The number of left roots minus right roots is the change of arg p(jw) / pi (Hermite 1856, Routh 1877), computed from
+    a chain of polynomial remainders. Roots on the axis are the common roots of the even and odd part of p(jw).
     """
     zero = next((k for k, x in enumerate(p.coefficients) if x != 0), 0)
     pairs = tuple(_pairs(p))
@@ -84,7 +86,7 @@ def locate_roots(p: Polynomial) -> RootLocations:
 
 
 def _pairs(p: Polynomial):
-    """Yield (x, order) of every pair of roots +-j sqrt(x), x > 0."""
+    """Yield x > 0 and multiplicity for every pair of roots +-j sqrt(x) of p."""
     common = axis_factor(p)
     for x in positive_roots(common):
         order, q = 1, common.derivative()
@@ -94,13 +96,16 @@ def _pairs(p: Polynomial):
 
 
 def axis_factor(p: Polynomial) -> Polynomial:
-    """Greatest common divisor c(x) of the even and odd part of p(jw), x = w^2."""
+    """Polynomial c(x) whose roots x = w^2 > 0 are those of the roots jw of p on the imaginary axis.
+
+    It is the greatest common divisor of the even and odd part of p(jw).
+    """
     even, odd = even_odd_parts(p)
     return even.gcd(odd)
 
 
 def _left_minus_right(p: Polynomial) -> int:
-    """Number of roots with Re s < 0 less number of roots with Re s > 0."""
+    """Number of roots of p with Re s < 0 minus number of roots with Re s > 0."""
     signed = [x if k % 4 < 2 else -x for k, x in enumerate(p.coefficients)]
     u = Polynomial(x if k % 2 == 0 else 0 for k, x in enumerate(signed))
     v = Polynomial(x if k % 2 else 0 for k, x in enumerate(signed))
@@ -108,7 +113,10 @@ def _left_minus_right(p: Polynomial) -> int:
 
 
 def cauchy_index(top: Polynomial, below: Polynomial) -> int:
-    """Cauchy index of top / below on the real line: number of jumps from -infinity to infinity less those back."""
+    """Cauchy index of the rational function top / below on the real line.
+
+    It is the number of jumps from -infinity to infinity minus the number of jumps from infinity to -infinity.
+    """
     remainders = [below, top] if top.degree >= 0 else [below]
     while len(remainders) > 1 and (remainder := -(remainders[-2] % remainders[-1])).degree >= 0:
         remainders.append(remainder / abs(remainder.coefficients[-1]))
@@ -118,7 +126,7 @@ def cauchy_index(top: Polynomial, below: Polynomial) -> int:
 
 
 class Root:
-    """Real root x > 0 of a polynomial without multiple roots, the only root in (low, high]."""
+    """Real root x > 0 of a polynomial p without multiple roots; it is the only root of p with low < x <= high."""
 
     def __init__(self, p: Polynomial, low: Fraction, high: Fraction):
         self.p, self.low, self.high = p, low, high
@@ -126,7 +134,7 @@ class Root:
         self.rising = sign(p(high)) > 0
 
     def bisect(self) -> None:
-        """Halve the bracket."""
+        """Halve the interval from low to high that contains the root."""
         middle = (self.low + self.high) / 2
         if self.exact:
             self.low = middle
@@ -140,13 +148,13 @@ class Root:
             self.low = middle
 
     def refine(self, bits: int = BITS) -> Fraction:
-        """Upper end of a bracket of relative width 2^-bits, or the root itself if the bisection met it."""
+        """Upper bound of the root with a relative error of at most 2^-bits, or the root itself if it was found."""
         while not self.exact and (self.high - self.low) * (1 << bits) > self.high:
             self.bisect()
         return self.high
 
     def sign_of(self, q: Polynomial) -> int:
-        """Exact sign of q at the root."""
+        """Exact sign of the polynomial q at the root: -1, 0 or 1."""
         if self.exact or q.degree < 1:
             return sign(q(self.high))
         common = chain(self.p.gcd(q))
@@ -161,18 +169,18 @@ class Root:
 
     @property
     def frequency(self) -> float:
-        """sqrt(x) as a float, correct to one unit in the last place."""
+        """Frequency sqrt(x) [rad/s] of the root x as a float, correct to one unit in the last place."""
         return float_root(self.refine())
 
 
 def float_root(x: Fraction) -> float:
-    """sqrt(x) of a fraction x >= 0 as a float, to the last bit, also if x is outside the range of floats."""
+    """Square root of a fraction x >= 0 as a float, correct to the last bit, also if x is out of the range of floats."""
     shift = max(0, 130 - x.numerator.bit_length() + x.denominator.bit_length()) // 2
     return float(Fraction(math.isqrt((x.numerator << (2 * shift)) // x.denominator), 1 << shift))
 
 
 def positive_roots(p: Polynomial) -> list[Root]:
-    """Distinct roots x > 0 of p, increasing, each bracketed (Sturm 1829); empty for the zero polynomial."""
+    """Distinct roots x > 0 of p in increasing order, each in its own interval (Sturm 1829); empty for p = 0."""
     while p.degree > 0 and p.coefficients[0] == 0:
         p = Polynomial(p.coefficients[1:])
     if p.degree < 1:
@@ -196,12 +204,12 @@ def positive_roots(p: Polynomial) -> list[Root]:
 
 
 def count_roots(sequence: list[Polynomial], low: Fraction, high: Fraction) -> int:
-    """Number of distinct roots in (low, high] of the polynomial with this Sturm chain."""
+    """Number of distinct roots with low < x <= high of the polynomial whose Sturm chain is `sequence`."""
     return _sign_changes(sign(q(low)) for q in sequence) - _sign_changes(sign(q(high)) for q in sequence)
 
 
 def estimates(p: Polynomial) -> list[complex]:
-    """All roots in floats, rightmost first; used only in texts, never for decisions."""
+    """Estimates of all roots of p in floating point, rightmost first; used only in texts, never for decisions."""
     if p.degree < 1:
         return []
     top = max(abs(x) for x in p.coefficients)
@@ -215,6 +223,6 @@ def _sign_changes(signs) -> int:
 
 
 def _sign_at_infinity(p: Polynomial, side: int) -> int:
-    """Sign of p at side * infinity."""
+    """Sign of p(x) as x tends to infinity (side = 1) or -infinity (side = -1)."""
     top = sign(p.coefficients[-1]) if p.degree >= 0 else 0
     return top if side > 0 or p.degree % 2 == 0 else -top

@@ -18,12 +18,15 @@ POINTS_PER_DECADE = 200  # frequencies per decade in the table
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """State space dx/dt = A x + B u, y = C x + D u at a port, its frequency response and verdict; deviations in SI.
+    """Linearised case at a port, dx/dt = A x + B u, y = C x + D u, with its frequency response; SI deviations.
 
     kind : "admittance" of a reservoir (u pressure [Pa], y flow into the network [m3/s]) or "impedance" (u inflow
-    [m3/s], y pressure [Pa]); a : float64[n, n]; b, c : float64[n]; d : float; w : float64[k] [rad/s]; h : complex128[k]
-    moving : greatest rate of change of the state, over its scale [1/s]; 0 for a steady state
-    error : relative error of A, B, C, D, from two difference steps
+    [m3/s], y pressure [Pa]); when : state about which the case is linearised
+    states, state_units : names and units of x
+    a : float64[n, n]  A; b, c : float64[n]  B and C; d : D; error : relative error of A, B, C, D
+    transfer : transfer function H(s); verdict : result of the test for positive realness
+    w : float64[k]  frequencies [rad/s]; h : complex128[k]  H(j w)
+    moving : greatest rate of change of a state relative to its scale [1/s]; 0 for a steady state
     """
 
     case: str
@@ -46,11 +49,11 @@ class Response:
 
     @property
     def units(self) -> tuple[str, str]:
-        """Units of u and y."""
+        """Units of the input u and of the output y."""
         return ("Pa", "m3/s") if self.kind == "admittance" else ("m3/s", "Pa")
 
     def __call__(self, s):
-        """H at complex numbers s [1/s]; returns a number for a number, an array for an array."""
+        """Transfer function H at complex numbers s [1/s]; a number for a number, an array for an array."""
         values = self.transfer(s)
         return complex(values[0]) if np.ndim(s) == 0 else values
 
@@ -76,9 +79,10 @@ def response(
 ) -> Response:  # fmt: skip
     """Compute the transfer function between pressure and flow at a node of a case, linearised by `linearise`.
 
-    port : a reservoir (admittance), or a junction, inflow, chamber or tank (impedance); at, before, scheme : see
-    `linearise`; frequencies : float64[k]  frequencies of the table [rad/s]. Raises FvsolveError for an invalid port, a
-    case that cannot be linearised, and more than 800 states.
+    port : name of a reservoir (for an admittance), or of a junction, inflow, chamber or tank (for an impedance)
+    at, before, scheme : time, side of a jump, and linear scheme as in `linearise`; set : changed keys of the case
+    frequencies : float64[k]  frequencies of the response [rad/s]; default: 200 in each decade around the poles
+    Raises FvsolveError for an invalid port, a case that cannot be linearised, and more than 800 states.
     """
     from fvsolve.case import load
 
@@ -105,7 +109,7 @@ def response(
 
 
 def _linear_system(case, port: str, at, before, scheme):
-    """((A, b, c, d), `Linear` system with the inputs and outputs of the port)."""
+    """State space (A, b, c, d) with the input and the output of a port, and `Linear` system from which it is made."""
     from fvsolve.studies.linear.linearise import linearise
 
     driven = case.places[port].driven
@@ -128,7 +132,7 @@ def _linear_system(case, port: str, at, before, scheme):
 
 
 def port_flows(case, port: str) -> dict[str, float]:
-    """Probe -> sign; the signed sum of these probes is the flow from a node into its links [m3/s]."""
+    """Signs of the probes whose sum is the flow from a node into its links [m3/s]: name of the probe -> 1 or -1."""
     signs: dict[str, float] = {}
     for name, link in case.links.items():
         for end, node in link.ports.items():
@@ -144,7 +148,7 @@ def port_flows(case, port: str) -> dict[str, float]:
 
 
 def _density(system, row) -> float:
-    """Density of the inflow at a storing node [kg/m3]."""
+    """Density of the fluid at the storing node of the port, at its pressure [kg/m3]."""
     return float(system.at.model.case.law.density(system.output_values[0]))
 
 
@@ -158,7 +162,10 @@ def _dense(a) -> np.ndarray:
 
 
 def _transfer(at, a, b, c, d, error: float) -> Transfer:
-    """Transfer function from a state space in coordinates whose squared norm is the energy."""
+    """Transfer function of the state space A, b, c, d, with A, b, c converted to coordinates of the energy norm.
+
+    at : operating point; error : relative error of A, b, c, d
+    """
     from fvsolve.model.energy_norm import energy_form
 
     form = energy_form(at.model, at.y).full_norm()
@@ -166,7 +173,7 @@ def _transfer(at, a, b, c, d, error: float) -> Transfer:
 
 
 def _frequency_table(verdict: StateVerdict, h: Transfer) -> np.ndarray:
-    """Frequencies of the table: logarithmic grid, poles that are not on the axis, and worst frequencies of dips."""
+    """Frequencies of the response [rad/s]: logarithmic grid, poles off the imaginary axis, and worst points of dips."""
     low, high = verdict.low, verdict.high
     grid = np.geomspace(low, high, int(POINTS_PER_DECADE * np.log10(high / low)) + 1)
     poles = np.abs(h.poles.imag[~np.isin(h.poles, verdict.axis)])

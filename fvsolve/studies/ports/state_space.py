@@ -1,4 +1,4 @@
-"""Test of a state space in floats for positive realness, up to a tolerance."""
+"""Test of a state-space system for positive realness, in floating point up to a tolerance."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ DEFECT = 1e-7  # greatest error of a pole relative to the norm of A, also for de
 class Transfer:
     """Transfer function H(s) = D + C (s - A)^-1 B with a single input and output, by a Schur form of the balanced A.
 
-    a : float64[n, n]; b, c : float64[n]; d : float; error : relative error of A
-    poles : complex128[n] [1/s]; residues : complex128[n]; doubt : float64[n]  error of poles by rounding and `error`
-    [1/s]; seen : bool[n]  True if the pole has a residue in H
+    a, b, c, d : float64[n, n], float64[n], float64[n], float  matrices A, B, C, D; error : relative error of A
+    poles : complex128[n]  poles [1/s]; residues : complex128[n]  their residues
+    pole_error : float64[n]  errors of the poles due to rounding and `error` [1/s]
+    visible : bool[n]  True if the residue of the pole is not zero, so that H shows it
     """
 
     @validated(a=MATRIX, b=SERIES, c=SERIES, d=NUMBER, error=NUMBER)
@@ -62,12 +63,15 @@ class Transfer:
         return poles, residues, np.minimum(moved, DEFECT * norm), np.abs(residues) > HIDDEN_RESIDUE * most
 
     def __call__(self, s: np.ndarray) -> np.ndarray:
-        """H at complex numbers s : complex128[k]; infinite at a pole."""
+        """Transfer function H at complex numbers s [1/s] : complex128[k]; infinity at a pole."""
         return self.evaluate(s)[0]
 
     @validated(s=COMPLEX)
     def evaluate(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(H, its error by rounding and the error of A) : complex128[k], float64[k]."""
+        """Transfer function H at complex numbers s [1/s] : complex128[k], and its error : float64[k].
+
+        The error contains rounding and the error of A.
+        """
         s = np.atleast_1d(np.asarray(s, complex))
         n = len(self.poles)
         x, diagonal = np.zeros((n, s.size), complex), np.diag(self.t)
@@ -81,7 +85,10 @@ class Transfer:
 
     @validated(s=COMPLEX)
     def angle(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(Re H / |H|, the cosine of the phase; its error) : float64[k] each; 1 and 0 at a pole and where H = 0."""
+        """Cosine of the phase of H, Re H / |H|, at complex numbers s [1/s] : float64[k], and its error : float64[k].
+
+        The results are 1 and 0 at a pole and where H = 0.
+        """
         value, doubt = self.evaluate(s)
         size = np.abs(value)
         finite = np.isfinite(size) & (size > 0.0)
@@ -91,7 +98,10 @@ class Transfer:
 
 @dataclass(frozen=True)
 class Dip:
-    """Interval low < w < high [rad/s] with Re H < 0; real : Re H at `worst` [rad/s]; angle : Re H / |H| there."""
+    """Interval of frequencies low < w < high [rad/s] with Re H < 0.
+
+    worst : frequency of the least Re H / |H| [rad/s]; real, angle : Re H and Re H / |H| there
+    """
 
     low: float
     high: float
@@ -102,13 +112,14 @@ class Dip:
 
 @dataclass(frozen=True)
 class StateVerdict(PlainData):
-    """Result of the test; positive_real : True, False, or None if undecided within rounding.
+    """Result of `state_positive_real` for a transfer function H(s).
 
-    margin : least Re H / |H|, the cosine of the phase, at `worst` [rad/s]; with poles on the axis it is extrapolated
-    from Re s = `shift` [1/s] to the axis
+    positive_real : True, False, or None if undecided within the tolerance; reasons : texts
+    margin : least Re H / |H|, the cosine of the phase, at the frequency `worst` [rad/s]; with poles on the imaginary
+    axis it is extrapolated to the axis from the line Re s = `shift` [1/s]
     tolerance : values of Re H / |H| closer to zero are undecided; low, high : range of frequencies searched [rad/s]
-    unstable : poles right of the axis [1/s]; axis : poles on the axis within their errors [1/s]; hidden : poles right
-    of the axis without a residue in H [1/s]
+    dips : intervals of frequencies with Re H < 0; unstable : poles right of the imaginary axis [1/s]
+    axis : poles on the axis within their errors [1/s]; hidden : poles right of the axis that H does not show [1/s]
     """
 
     positive_real: bool | None
@@ -139,11 +150,12 @@ class StateVerdict(PlainData):
 
 @validated(h=instance_of(Transfer), tolerance=POSITIVE)
 def state_positive_real(h: Transfer, tolerance: float = TOLERANCE) -> StateVerdict:
-    """Test if H is positive real, from the sign of Re H between all frequencies at which it can change.
+    """Test if a transfer function H is positive real, from the sign of Re H between all points where it can change.
 
     Re H(jw) = 0 only if jw is an eigenvalue of the Hamiltonian matrix of A, B, C, D (Boyd, Balakrishnan, Kabamba 1989),
-    so that no interval between samples is missed. With poles on the axis, Re H is evaluated at a small distance `shift`
-    right of it, where a pole of higher order, or with a residue that is not positive, makes it negative.
+    so that no interval between samples is missed. With poles on the imaginary axis, Re H is evaluated on a line
+    slightly right of it, where a pole of higher order, or with a residue that is not positive, makes Re H negative.
+    tolerance : values of Re H / |H| closer to zero are undecided
     """
     size = np.abs(h.poles)
     reach = h.pole_error + 1e-12 * size
@@ -175,7 +187,12 @@ def state_positive_real(h: Transfer, tolerance: float = TOLERANCE) -> StateVerdi
 
 
 def _margin(h, near, shift, w, raw, doubt, within) -> tuple[float, float]:
-    """(least certain Re H / |H|, its frequency), extrapolated from the shift to the axis; poles on it are excluded."""
+    """Least Re H / |H|, reduced by its error, and its frequency [rad/s], away from poles on the imaginary axis.
+
+    near : True for poles on the imaginary axis; shift : real part of the line of the samples [1/s], from which the
+    value is extrapolated to the axis; w : frequencies; raw, doubt : result of `Transfer.angle` there
+    within : True for frequencies in the searched range
+    """
     angle = _certain_part(raw, doubt)
     if shift:
         within = within & (np.min(np.abs(w[:, None] - np.abs(h.poles.imag[near])), axis=1) > POLE_DISTANCE * shift)
@@ -189,7 +206,10 @@ def _certain_part(angle: np.ndarray, doubt: np.ndarray) -> np.ndarray:
 
 
 def _rate_range(h: Transfer, size: np.ndarray) -> tuple[float, float]:
-    """Slowest and fastest rate of H [1/s]; if all poles are 0, the corner frequency between residue and D."""
+    """Slowest and fastest rate of the transfer function h [1/s], from the sizes of its poles that are not 0.
+
+    If all poles are 0, both are the corner frequency |C B / D|, or 1 without it.
+    """
     if len(size):
         return float(size.min()), float(size.max())
     corner = abs(h.c @ h.b / h.d) if h.d else 0.0
@@ -197,9 +217,11 @@ def _rate_range(h: Transfer, size: np.ndarray) -> tuple[float, float]:
 
 
 def frequencies(h: Transfer, near: np.ndarray, shift: float, slow: float, quick: float):
-    """(frequencies : float64[k] increasing, low, high) [rad/s], dense enough that no interval of Re H < 0 is missed.
+    """Frequencies to be tested, in increasing order : float64[k], and the range low, high that they cover [rad/s].
 
-    near : poles on the axis; frequencies near them are added, also below `low`
+    They include all frequencies at which Re H can change sign, so that no interval with Re H < 0 is missed.
+    near : poles on the imaginary axis, around which frequencies are added, also below `low`; shift : see `_margin`
+    slow, quick : slowest and fastest rate of H [1/s]
     """
     zeros = crossings(h.a - shift * np.eye(len(h.poles)), h.b, h.c, float(h.d))
     real = np.abs(zeros.imag[np.abs(zeros.real) <= 1e-6 * np.abs(zeros)])  # imaginary eigenvalues: changes of sign
@@ -215,10 +237,10 @@ def frequencies(h: Transfer, near: np.ndarray, shift: float, slow: float, quick:
 
 
 def crossings(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: float) -> np.ndarray:
-    """Numbers that include all jw with Re H(jw) = 0 : complex128[k], not sorted.
+    """Complex numbers that include all jw with Re H(jw) = 0 : complex128[k], not sorted; a, b, c, d : state space.
 
-    They are eigenvalues of the Hamiltonian matrix. Without a direct term, 1 / H less its pole at infinity s / CB is
-    used, because Re 1/H has the sign of Re H.
+    They are eigenvalues of the Hamiltonian matrix. If D is zero, 1 / H without its part s / (C B), which grows to
+    infinity, is used in place of H, because Re 1/H has the sign of Re H.
     """
     n = len(a)
     if n == 0:
@@ -239,7 +261,7 @@ def crossings(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: float) -> np.ndarr
 
 
 def _dips(h, shift, w, angle, tolerance) -> list[Dip]:
-    """Intervals of frequencies with the angle below -tolerance, with refined ends."""
+    """Intervals of the frequencies w in which Re H / |H| (`angle`) is below -tolerance, with refined ends."""
     negative = angle < -tolerance
     edges = np.flatnonzero(np.diff(np.concatenate([[False], negative, [False]]).astype(int)))
     dips = []
@@ -252,7 +274,7 @@ def _dips(h, shift, w, angle, tolerance) -> list[Dip]:
 
 
 def _edge(h, shift, good: float, bad: float) -> float:
-    """Frequency between two others at which Re H changes sign, by bisection."""
+    """Frequency [rad/s] at which Re H changes sign, by bisection between `good` (Re H >= 0) and `bad` (Re H < 0)."""
     for _ in range(60):
         middle = 0.5 * (good + bad)
         if middle in (good, bad):

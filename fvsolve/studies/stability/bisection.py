@@ -12,7 +12,7 @@ STEP_RATIO = 1.3  # ratio of consecutive steps of the search upwards
 
 
 class StepLimit(NamedTuple):
-    """Greatest step [s] below which none fails (inf: no failure found), and the failing end of the bracket [s]."""
+    """Greatest step [s] below which no step fails (inf: no failure found), and least step [s] found to fail."""
 
     step: float
     fails: float
@@ -21,9 +21,11 @@ class StepLimit(NamedTuple):
 def bisect_limit(
     fails: Callable[[float], bool], first: float, far: float, rise: float = STEP_RATIO, fine: float = BRACKET_WIDTH
 ) -> StepLimit:
-    """Search upwards for the least h at which `fails` is true, by factors `rise` from `first`; then bisect to `fine`.
+    """Find the least step h [s] at which fails(h) is true, by a search upwards and bisection.
 
-    If `first` fails, it is halved down to 1e-9 of its value; if all these fail, the limit is 0. Above `far` it is inf.
+    The search starts at `first` and multiplies by `rise`. Bisection ends at the relative width `fine`. If `first`
+    fails, it is halved down to 1e-9 of its value; if all these steps fail, the limit is 0. If no step up to `far`
+    fails, it is inf.
     """
     low, high = 0.0, first
     if fails(high):
@@ -44,7 +46,7 @@ def bisect_limit(
 
 
 def bisect(fails: Callable[[float], bool], low: float, high: float, fine: float = BRACKET_WIDTH) -> StepLimit:
-    """Bisect a bracket (`low` safe, `high` failing) to the relative width `fine`."""
+    """Bisect between a safe step `low` [s] and a failing step `high` [s], to the relative width `fine`."""
     while high - low > fine * high:
         middle = 0.5 * (low + high)
         if fails(middle):

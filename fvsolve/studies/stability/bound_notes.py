@@ -1,4 +1,4 @@
-"""Notes on a row of a stability study: where a bound misleads, and the reason."""
+"""Notes on a row of a stability study: bounds that differ from the actual limit, and the reasons."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ GROWTH_FLOOR = 1e-9  # of the greatest wave rate or eigenvalue: real parts below
 
 
 def bound_notes(row, side, system) -> list[str]:
-    """Notes for the reader of a row."""
+    """Notes on a row of a stability study, as texts.
+
+    row : `StabilityRow`; side : `LinearSystem` of its scheme; system : object that computes growth, or None
+    """
     texts = [*case_notes(row, side)]
     if row.limited:
         return texts + limiter_notes(row, side.at.model)
@@ -50,21 +53,22 @@ def nonlinear_failure_notes(row) -> list[str]:
 
 
 def case_notes(row, side) -> list[str]:
-    """Notes on the state itself."""
+    """Notes on the operating point and the case, which do not depend on the method."""
     texts = []
     growing = row.greatest_real > 0.0
     if growing and row.greatest_real > GROWTH_FLOOR * max(row.rate, np.abs(side.spectrum.values).max(initial=0.0)):
         texts.append(f"the case itself grows, at {row.greatest_real:.3g} 1/s: this is not caused by long steps")
     if side.full_form is not side.form:
-        texts.append(f"{listing(side.idle)}: no stored energy, but states with energy depend on it: it counts, "
-                     "with the least weight of all")  # fmt: skip
+        texts.append(f"{listing(side.idle)}: free motion stores no energy, but states with energy depend on it: it is "
+                     "included, with the least weight of all states")  # fmt: skip
     elif side.idle:
-        texts.append(f"{listing(side.idle)}: no stored energy where it moves freely; this motion is left out")
+        texts.append(f"{listing(side.idle)}: free motion stores no energy and is left out")
     model = side.at.model
     if model.cells and model.case.scalars and model.case.numerics.scheme != "upwind" and not has_limiter(model):
-        texts.append("scalars in pipes are computed without slopes, whose limiter has no derivative")
+        texts.append("scalars in pipes are computed without slopes in cells, because their limiter has no derivative")
     if state_moves(side):
-        texts.append("the state moves: runs are compared with a run from the same state, schedules held")
+        texts.append("the state is not steady: deviations are measured from a run that starts at this state, with "
+                     "schedules held")  # fmt: skip
     return texts
 
 
@@ -74,21 +78,21 @@ def state_moves(side) -> bool:
 
 
 def eigenvalue_notes(row, system) -> list[str]:
-    """Notes on the bound by eigenvalues, compared with powers."""
+    """Notes on the bound by eigenvalues, compared with the predicted limit."""
     if np.isinf(row.eigenvalues) or row.eigenvalues > (1.0 + AGREEMENT) * row.predicted:
         if np.isinf(row.eigenvalues):
-            return ["by eigenvalues no step fails, by powers some do: J is not normal"]
+            return ["eigenvalues allow every step, but deviations grow at some steps: the Jacobian J is not normal"]
         try:
             after = system.failing_after(0.99 * row.eigenvalues)
         except TooLarge:
             after = 0
         if after:
-            return [f"eigenvalues mislead: J is not normal, 1 % below their limit growth exceeds {row.threshold:g} "
-                    f"after {after} steps"]  # fmt: skip
-        return ["eigenvalues allow longer steps than powers do: J is not normal"]
+            return [f"eigenvalues mislead: the Jacobian J is not normal, and 1 % below their limit growth exceeds "
+                    f"{row.threshold:g} after {after} steps"]  # fmt: skip
+        return ["eigenvalues allow longer steps than the growth of deviations does: the Jacobian J is not normal"]
     if row.eigenvalues < (1.0 - AGREEMENT) * row.predicted:
-        return [f"above the limit of eigenvalues a mode grows, but not by {row.threshold:g} in {row.steps} steps: "
-                "longer runs fail at smaller steps"]  # fmt: skip
+        return [f"above the limit of the eigenvalues a mode grows, but not {row.threshold:g} times in {row.steps} "
+                "steps: longer runs fail at smaller steps"]  # fmt: skip
     return []
 
 
@@ -99,11 +103,10 @@ def field_of_values_notes(row, side) -> list[str]:
     if row.field_of_values == 0.0:
         reach = float(side.field.real.max())
         if reach > GROWTH_FLOOR * np.abs(side.field).max():
-            return [f"the field of values gives 0: it reaches {reach:.3g} 1/s into the right half plane; energy can "
-                    "grow at first (ends of a scheme above first order, a gain in the case): no failure"]  # fmt: skip
-        return [
-            "the field of values gives 0: it touches the imaginary axis, which lies outside the region of the method"
-        ]
+            return [f"the field of values allows no step: it reaches {reach:.3g} 1/s into the right half plane; energy "
+                    "can grow at first (ends of a scheme above first order, a gain in the case), which is no failure"
+                    ]  # fmt: skip
+        return ["the field of values allows no step: it touches the imaginary axis, outside the stability region"]
     return ["the bound by the field of values is on the safe side here"]
 
 
@@ -122,13 +125,13 @@ def von_neumann_notes(row) -> list[str]:
 
 
 def limiter_notes(row, model) -> list[str]:
-    """Notes on a limited scheme with frozen weights."""
+    """Notes on a limited scheme, whose weights are held constant in predictions."""
     frozen = "its weights give the limits in this row"
     if model.cavitates:
         frozen = "its weights in pipes with cavities are only upwind"
     elif model.basins:
         frozen = "its weights in basins are only upwind"
-    texts = [f"{row.scheme} has no derivative at a constant state: its limit is measured; if frozen, {frozen}"]
+    texts = [f"{row.scheme} has no derivative at a constant state: its limit is measured; held constant, {frozen}"]
     if np.isfinite(row.longer):
         texts.append(f"Euler with a limiter has no sharp limit: {row.courant(row.measured):.3g} in {row.steps} steps, "
                      f"{row.courant(row.longer):.3g} in {10 * row.steps}")  # fmt: skip

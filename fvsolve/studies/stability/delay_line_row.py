@@ -28,7 +28,11 @@ NO_LIMIT_NOTE = "no step up to twice the slowest line's travel time fails"
 
 
 class DelayLineLimits:
-    """Limit of the step of one case and method, by models divided for each step and their linear systems."""
+    """Limit of the step of one case and method with delay lines, from the linear system for each step.
+
+    The delay lines are divided into segments for each step. steps : number of steps over which growth counts
+    threshold : growth above which a step fails
+    """
 
     def __init__(self, case, scheme: str, method, steps: int, threshold: float) -> None:
         self.case, self.method, self.steps, self.threshold = case, method, steps, threshold
@@ -46,19 +50,22 @@ class DelayLineLimits:
             self.first = min(self.first, float(np.sqrt(2.0 * travel / (REFLECTION_BOUND * rate * steps))))
 
     def model(self, h: float | None):
-        """Model at the start with held schedules, lines divided for steps of h [s]; for None for those of the case."""
+        """Model with schedules held at the start, and delay lines divided for steps of h [s]; None: step of the case.
+
+        Raises FvsolveError for a limited scheme in pipes with cells, and for more than 400 states.
+        """
         step = {} if h is None else {"numerics.step": h}
         model = study_model(self.case, self.set | step)
         if model.case.numerics.scheme in LIMITED and (model.tables.pipes["delay"] < 0).any():
-            raise FvsolveError(f"with delay lines stability needs a linear scheme; {model.case.numerics.scheme} "
-                               "limits slopes: use for example scheme = \"upwind5\"")  # fmt: skip
+            raise FvsolveError(f"numerics.scheme: {model.case.numerics.scheme} limits slopes. Expected a linear scheme "
+                               "for stability with delay lines, such as scheme = \"upwind5\"")  # fmt: skip
         if model.y_size > MAX_STATES:
-            raise FvsolveError(f"{model.y_size} states, one for each delay line; with lines stability is computed for "
-                               f"at most {MAX_STATES}: use fewer cells, or a part of the network")  # fmt: skip
+            raise FvsolveError(f"the case has {model.y_size} states, with one for each delay line. Expected at most "
+                               f"{MAX_STATES} with delay lines: use fewer cells, or a part of the network")  # fmt: skip
         return with_held_schedules(model, model.case.numerics.start)
 
     def system(self, h: float) -> DelayLineSystem:
-        """Linear system of steps of h [s]."""
+        """Linear system that describes the model with steps of h [s]."""
         return DelayLineSystem(self.model(h), self.method, h)
 
     def fails(self, h: float) -> bool:
@@ -70,7 +77,7 @@ class DelayLineLimits:
             return True
 
     def predicted(self) -> StepLimit:
-        """Greatest step [s] below which none fails; nan for a method whose steps are not modelled."""
+        """Greatest step below which no step fails, with its failing neighbour; nan for Rosenbrock methods."""
         if self.method.kind == "linear":
             return StepLimit(np.nan, np.nan)
         rough = bisect_limit(self.fails, self.first, self.far, RISE, FINE)
@@ -80,13 +87,19 @@ class DelayLineLimits:
         return least
 
     def delays_at_stores(self, rough: StepLimit) -> list[float]:
-        """Longest delays of lines at stores [s]; waves grow most with steps that divide such a delay."""
+        """Longest delays of the lines at storing nodes [s]; waves grow most with steps that divide one of these delays.
+
+        rough : first estimate of the limit
+        """
         at_stores = [line for _, i, _ in storing_nodes(self.base_model, 1.0) for line in lines_at(self.base_model, i)]
         delays = {float(line["tau"] * line["stretches"]) for line in at_stores} if 0.0 < rough.step < np.inf else set()
         return sorted(delays, reverse=True)[:LINE_COUNT]
 
     def limit_at_parts(self, delay: float, fails: float) -> StepLimit:
-        """Least step that fails near integer parts of a delay, where interpolation does not damp waves."""
+        """Least failing step among integer parts of the delay `delay` [s] of a line, where interpolation damps nothing.
+
+        fails : a failing step [s], below which the search starts
+        """
         low = int(np.ceil(delay / fails))
         if low < 1 or not self.fails(delay / low):
             return StepLimit(np.inf, np.inf)
@@ -101,7 +114,11 @@ class DelayLineLimits:
 
 
 def delayed_row(case, scheme: str, method, steps: int, threshold: float) -> StabilityRow:
-    """Limits of a scheme and method about the start: predicted by the linear system of steps, and measured."""
+    """Stability row of a scheme and method for a case with delay lines, about its start.
+
+    It contains the limit from the linear system of a step and the limit of real runs.
+    steps : number of steps over which growth counts; threshold : growth above which a step fails
+    """
     limits, left_out, notes = DelayLineLimits(case, scheme, method, steps, threshold), {}, []
     predicted, model = limits.predicted(), limits.base_model
     rate = float(max(model.wave_rates[model.tables.pipes["delay"] < 0], default=0.0))
@@ -127,7 +144,10 @@ def delayed_row(case, scheme: str, method, steps: int, threshold: float) -> Stab
 
 
 def measured_entries(runs: DelayLineRuns, guess: float, left_out: dict[str, str]) -> dict:
-    """Columns of a row with the limit of real runs; if it is not found in time, `left_out` gets the reason."""
+    """Columns of a row with the limit of real runs near the predicted limit `guess` [s].
+
+    If the limit is not found in time, the dict is empty and `left_out` receives the reason.
+    """
     try:
         measured = runs.limit(guess)
     except TimeoutError:

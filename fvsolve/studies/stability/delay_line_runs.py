@@ -25,7 +25,8 @@ SMALL_WAVE = 1e-5  # deviation at the start, in units of a wave of 1 bar over on
 class DelayLineRuns(RealRuns):
     """Real runs at fixed steps, each from the deviation with the greatest growth in the linear system of the step.
 
-    limits : see `delay_line_row.DelayLineLimits`; failing_step : a step that is predicted to fail [s], nan for none
+    limits : a `delay_line_row.DelayLineLimits`; steps : number of steps of a run; threshold : growth at which it fails
+    end : a step that is predicted to fail [s], nan for none
     """
 
     def __init__(self, limits, steps: int, threshold: float, end: float) -> None:
@@ -37,7 +38,7 @@ class DelayLineRuns(RealRuns):
         self.latest = time.monotonic() + TIME_LIMIT
 
     def start_run(self, system: DelayLineSystem, x: np.ndarray, history: np.ndarray) -> RunLoop:
-        """Run from the start plus x, with entries `history` in its lines."""
+        """Run from the initial state plus the deviation x, with the past waves `history` in its delay lines."""
         model, t = system.model, float(system.model.case.numerics.start)
         changes = {"method": system.method.name, "step": system.h, "courant": None, "rtol": None}
         numerics = model.case.numerics.model_copy(update=changes)
@@ -50,9 +51,9 @@ class DelayLineRuns(RealRuns):
         return loop
 
     def limit(self, guess: float) -> StepLimit:
-        """Measured limit, searched close to the prediction: steps beside integer parts of delays may be safe again.
+        """Limit of real runs, searched close to the predicted limit `guess` [s]; without a prediction over all steps.
 
-        Without a prediction all steps are searched.
+        The search stays close because steps that do not divide the delay of a line may be safe above the limit.
         """
         if not np.isfinite(guess):
             return bisect_limit(self.fails, self.first, self.far, STEP_RATIO if np.isnan(guess) else STEP_RATIO_UP)
@@ -65,7 +66,7 @@ class DelayLineRuns(RealRuns):
         )
 
     def growth(self, h: float) -> tuple[float, int]:
-        """(greatest growth, its number of steps); infinite for a run that stops."""
+        """Greatest growth of a deviation with steps of h [s], and number of steps; infinity if a run stops."""
         system = self.system(h)
         predicted = system.growth(self.steps, self.threshold)
         small = SMALL_WAVE * float(system.weight.max()) * greatest_wave(system)
@@ -86,13 +87,16 @@ class DelayLineRuns(RealRuns):
 
 
 def greatest_wave(system: DelayLineSystem) -> float:
-    """Wave of 1 bar in the line with the greatest admittance [kg/s]."""
+    """Mass flow [kg/s] of a wave of 1 bar in the delay line with the greatest admittance."""
     tables = system.model.tables
     return BAR_PRESSURE * float(tables.pipes["admittance"][tables.delays["pipe"]].max())
 
 
 def write_history(past: np.ndarray, delays: np.ndarray, t: float, h: float, history: np.ndarray) -> None:
-    """Write entries of lines : float64[count, 2, stretches] at t - count h, ..., t - h."""
+    """Write past waves into the wave history `past` of delay lines, at the times t - count h, ..., t - h.
+
+    history : float64[count, 2, segments]  deviations of both waves in each segment of a line, oldest first [kg/s]
+    """
     count, places = history.shape[0], at.offsets_of(past)
     numbers = at.PROFILE_ENTRIES + np.arange(count)
     past[at.COUNT] = at.PROFILE_ENTRIES + count
@@ -103,7 +107,7 @@ def write_history(past: np.ndarray, delays: np.ndarray, t: float, h: float, hist
 
 
 def read_history(past: np.ndarray, system: DelayLineSystem) -> np.ndarray:
-    """Entries of all stretches before the last entry : float64[history_steps, 2, stretches]."""
+    """Past waves of all segments of delay lines, without the last entry : float64[history_steps, 2, segments]."""
     values = np.zeros((system.history_steps, 2, system.delays.size))
     numbers = int(past[at.COUNT]) - 1 - system.history_steps + np.arange(system.history_steps)
     for where, s, wave in ring_offsets(at.offsets_of(past), system.model.tables.delays, numbers):
@@ -112,7 +116,10 @@ def read_history(past: np.ndarray, system: DelayLineSystem) -> np.ndarray:
 
 
 def ring_offsets(places, delays: np.ndarray, numbers: np.ndarray):
-    """(offsets of entries with given numbers, stretch, wave) for all stretches and waves."""
+    """Offsets in the wave history, number of the segment and number of the wave, for each segment and wave.
+
+    places : offsets of the parts of the history; delays : delay lines in the tables; numbers : entries to find
+    """
     for row in delays:
         for q in range(row["stretches"]):
             ring, mask = at.ring_of(places, row, q)

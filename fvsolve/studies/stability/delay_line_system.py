@@ -1,9 +1,9 @@
-"""Fixed steps of a model with delay lines as a linear system: states, nodes and waves in lines.
+"""Fixed steps of a model with delay lines as a linear system of states and of waves in the lines.
 
-x' = A x + B w, s = C x + D w about a state at rest: w waves that arrive at the ends of lines, s waves that nodes send
-into lines. An arriving wave was sent one delay earlier and is interpolated between steps by the polynomials of the
-lines; friction in the middle of a stretch reflects a share of it. A step computes x by the tableau of the method, with
-w at its stages, and stores s.
+Deviations from a state at rest follow x' = A x + B w, s = C x + D w: x are the states outside the lines, w the waves
+that arrive at the ends of lines, s the waves that nodes send into lines. An arriving wave was sent one delay earlier
+and is interpolated between steps by the polynomials of the lines; friction in the middle of each segment of a line
+reflects a part of it. A step computes x by the tableau of the method, with w at its stages, and stores s.
 """
 
 from __future__ import annotations
@@ -30,7 +30,11 @@ VANISHED = 1e-100  # size of a deviation that has left the model
 
 
 class DelayedGrowth(NamedTuple):
-    """Greatest growth, its number of steps; x and entries of waves at its start and at its end."""
+    """Greatest growth `size` of a deviation, after `steps` steps.
+
+    x, end : float64[n]  states at the start and the end
+    history, end_history : float64[history_steps, 2, segments]  past waves in the lines at the start and the end
+    """
 
     size: float
     steps: int
@@ -41,11 +45,12 @@ class DelayedGrowth(NamedTuple):
 
 
 class DelayLineSystem:
-    """Operating point with delay lines divided for steps of h [s], with one method.
+    """Linear system of a model at its start, with delay lines divided for steps of h [s], for one method.
 
-    states : indices of states that are not those of lines; delays : of all stretches, in steps
-    reflection : share of a wave that friction reflects; first, last : stretches at the ends of lines
-    history_steps : number of past steps that are read
+    states : indices of the states outside the delay lines; a, b, c, d : matrices A, B, C, D
+    delays : delay of each segment of a line, in steps; first, last : first and last segment of each line
+    reflection : part of a wave that friction in a segment reflects
+    history_steps : number of past steps whose waves are read
     """
 
     def __init__(self, model, method: Method, h: float) -> None:
@@ -73,7 +78,7 @@ class DelayLineSystem:
 
     @cached_property
     def stages(self) -> tuple[np.ndarray, list[np.ndarray]]:
-        """(matrix of a step for x, matrices for the waves that arrive at each stage)."""
+        """Matrix of a step for the states x, and for each stage the matrix of the waves that arrive then."""
         method, n, s = self.method, self.states.size, self.method.stages
         inverse = np.linalg.inv(np.eye(s * n) - self.h * np.kron(method.a, self.a)) if n else np.zeros((0, 0))
         weights = self.h * np.kron(method.b, np.eye(n)) @ inverse
@@ -81,7 +86,10 @@ class DelayLineSystem:
         return step, [weights[:, i * n : (i + 1) * n] @ self.b for i in range(s)]
 
     def reading_weights(self, c: float) -> tuple[np.ndarray, np.ndarray]:
-        """(entries, weights) : [6, stretches] of the interpolation at t_n + c h; entries are relative to n."""
+        """Interpolation of past waves at the time c h after the start t_n of a step: six entries and weights.
+
+        Returns int64[6, segments], numbers of the entries relative to step n, and float64[6, segments], their weights.
+        """
         newest = -1 if c <= 0.0 else 0
         position = c - self.delays
         low = np.floor(position + 1e-9)
@@ -98,7 +106,11 @@ class DelayLineSystem:
         return low.astype(int) + np.arange(-2, 4)[:, None], weights
 
     def arrivals(self, past: np.ndarray, n: int, reading: tuple[np.ndarray, np.ndarray]) -> tuple:
-        """Waves (backward, forward) at the ends of all stretches; n : entry of t_n, reading : see `reading_weights`."""
+        """Backward and forward waves that arrive at the ends of all segments : float64[segments, m] each.
+
+        past : float64[entries, 2, segments, m]  past waves; n : entry of the start of the step
+        reading : result of `reading_weights`
+        """
         entries, weights = reading
         near = past[np.clip(n + entries, 0, past.shape[0] - 1), :, np.arange(self.delays.size)]
         r, l = np.einsum("js,jswm->wsm", weights, near)  # noqa: E741
@@ -108,24 +120,34 @@ class DelayLineSystem:
         return factor * (backward - self.now * forward), factor * (forward - self.now * backward)
 
     def node_arrivals(self, waves: tuple) -> np.ndarray:
-        """Waves that arrive at nodes, at `from` and `to` of each line in turn."""
+        """Waves that arrive at nodes, at the ends `from` and `to` of each line in turn : float64[2 lines, m].
+
+        waves : result of `arrivals`
+        """
         backward, forward = waves
         return np.stack([backward[self.first], forward[self.last]], axis=1).reshape(2 * self.first.size, -1)
 
     def store_entry(self, past: np.ndarray, n: int, x: np.ndarray, waves: tuple) -> None:
-        """Write the waves sent at t_n as entry n of past."""
+        """Write the waves that nodes and segments send, with states x and arriving `waves`, as entry n of `past`."""
         backward, forward = waves
         sent = (self.c @ x + self.d @ self.node_arrivals(waves)).reshape(self.first.size, 2, -1)
         past[n, 0, 1:], past[n, 1, :-1] = forward[:-1], backward[1:]  # joints
         past[n, 0, self.first], past[n, 1, self.last] = sent[:, 0], sent[:, 1]
 
     def size(self, x: np.ndarray, history: np.ndarray) -> np.ndarray:
-        """Root of the energy of deviations : float64[m]; history : the `history_steps` entries before t_n."""
+        """Root of the energy of m deviations : float64[m].
+
+        x : float64[n, m]  states; history : float64[history_steps, 2, segments, m]  past waves
+        """
         waves = self.weight[:, None, :, None] * history
         return np.sqrt(np.sum((self.energy_rows @ x) ** 2, axis=0) + np.sum(waves**2, axis=(0, 1, 2)))
 
     def propagate(self, x: np.ndarray, history: np.ndarray, steps: int, threshold: float) -> tuple:
-        """(greatest growth of each deviation, steps, x, history) after `steps`, or once it exceeds the threshold."""
+        """Take up to `steps` steps with m deviations; ends when the growth of a deviation exceeds the threshold.
+
+        Returns the greatest growth of each deviation : float64[m], the number of steps of the last increase, and states
+        and past waves at the end. x, history : states and past waves at the start, as in `size`
+        """
         K, m = self.history_steps, x.shape[1]
         past = np.zeros((K + steps + 2, *history.shape[1:]))
         past[:K] = history
@@ -146,7 +168,10 @@ class DelayLineSystem:
         return size, after, x, past[n + 1 : n + 1 + K]
 
     def starts(self) -> tuple[np.ndarray, np.ndarray]:
-        """Random deviations, independent of the direction of lines: equal waves, opposite waves, no waves."""
+        """Three random deviations: states and past waves, with equal waves, with opposite waves, and without waves.
+
+        They do not depend on the direction in which a line is drawn.
+        """
         rng, rows = np.random.default_rng(7), self.model.tables.delays
         stored = rng.standard_normal((self.states.size, 1)) * self.model.scale[self.states][:, None]
         sent = rng.standard_normal((self.history_steps, self.delays.size)) * BAR_PRESSURE
@@ -157,9 +182,9 @@ class DelayLineSystem:
         return x, np.stack([equal, opposite, np.zeros_like(equal)], axis=-1)
 
     def growth(self, steps: int, threshold: float) -> DelayedGrowth:
-        """Greatest growth found within `steps`, a lower bound; nan for Rosenbrock methods, whose steps are unknown.
+        """Greatest growth found within `steps` steps, a lower bound; nan for Rosenbrock methods (not modelled).
 
-        Starts are random deviations, and then their ends, which are close to the deviation that grows most.
+        The first starts are random deviations; the next starts are their ends, close to the deviation that grows most.
         """
         start = self.starts()
         for _ in range(GROWTH_ROUNDS):
@@ -176,7 +201,7 @@ class DelayLineSystem:
         return growth
 
     def dominant_part(self, grown: DelayedGrowth) -> tuple[str, float]:
-        """(part with the most energy of the grown deviation, its share of the energy)."""
+        """Part with the greatest share of the energy of a grown deviation, and this share."""
         waves = np.sum((self.weight[:, None] * grown.end_history) ** 2, axis=(0, 1))
         shares = dict.fromkeys(self.parts, 0.0)
         for part, root in zip(self.parts, self.energy_rows @ grown.end, strict=True):
@@ -189,7 +214,10 @@ class DelayLineSystem:
 
 
 def reflected_share(pipe, tau: float) -> float:
-    """Share of a wave that friction in the middle of a stretch reflects, at the flow of the start."""
+    """Part of a wave that friction in the middle of a segment of a delay line reflects, at the initial flow.
+
+    tau : travel time of the segment [s]
+    """
     flow, width = float(pipe["flow"]), DERIVATIVE_STEP * float(pipe["admittance"]) * BAR_PRESSURE
     slope = (drag_and_slope(pipe, flow + width)[0] - drag_and_slope(pipe, flow - width)[0]) / (2.0 * width)
     k = 0.5 * tau * float(slope)
@@ -197,7 +225,7 @@ def reflected_share(pipe, tau: float) -> float:
 
 
 def local_matrices(model, states: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """A, B, C, D at the start, by central differences; states : indices of x."""
+    """Matrices A, B, C, D of the module, at the start, by central differences; states : indices of the states x."""
     t, y, rows = float(model.case.numerics.start), model.start, model.tables.delays
     ends = int(model.layout["ends"]) + 4 * rows["pipe"][:, None] + np.array([0, 3])
     first = np.cumsum(rows["stretches"]) - rows["stretches"]

@@ -1,4 +1,4 @@
-"""Choice of the method for powers of a step by the number of states, and the predicted limit."""
+"""Choice between matrix powers and vectors, by the number of states, for the growth of deviations over many steps."""
 
 from __future__ import annotations
 
@@ -14,7 +14,11 @@ from fvsolve.studies.stability.power_growth import DENSE, STEPS, THRESHOLD, Dens
 def growth_method(
     method: Method, e: Any, steps: int = STEPS, threshold: float = THRESHOLD, latest: float | None = None
 ) -> Any:
-    """Growth of steps by full matrices, or by vectors above `DENSE` states; latest : end on the monotonic clock [s]."""
+    """Object that computes the growth of deviations: `DenseGrowth` for up to 500 states, `VectorGrowth` for more.
+
+    e : Jacobian in coordinates of the energy norm [1/s]; steps : number of steps over which growth counts
+    threshold : growth above which a step fails; latest : end of the computation on the monotonic clock [s]
+    """
     if e.shape[0] <= DENSE:
         return DenseGrowth(method, e if isinstance(e, np.ndarray) else e.toarray(), steps, threshold)
     from scipy.sparse import csr_array
@@ -25,7 +29,10 @@ def growth_method(
 
 
 def predicted_limit(growth: Any) -> StepLimit:
-    """Limit of the step of a linear system, below which no step fails; searched from 0.1 to 1e4 over ||J||."""
+    """Limit of the step of a linear system, below which no step fails.
+
+    growth : result of `growth_method`. The search goes from 0.1 / ||J|| to 1e4 / ||J|| with the norm of the Jacobian J.
+    """
     if growth.size == 0.0:
         return StepLimit(np.inf, np.inf)
     return growth.limit()

@@ -1,10 +1,10 @@
 """Courant limits of limited schemes on a periodic grid: frozen weights, bounds and real runs.
 
 A limited scheme has no derivative at a constant state, since its weights depend on the solution, and no exact limit.
-Known are: the exact limits of the linear schemes that result from fixed weights; for slope limiters the Courant number
-up to which total variation cannot grow, r / (1 + phi / 2) with phi the greatest slope in differences (1 for minmod, 2
-for the others) and r the SSP radius of the method (Harten 1983); limits of real runs from three starts for increasing
-numbers of steps.
+Three kinds of limits are computed. The linear schemes that result from constant weights have exact limits. For slope
+limiters total variation cannot grow up to the Courant number r / (1 + phi / 2), with the greatest slope phi over the
+difference of neighbours (1 for minmod, 2 for other limiters) and the SSP radius r of the method (Harten 1983). Real
+runs from three starts give measured limits for increasing numbers of steps.
 """
 
 from __future__ import annotations
@@ -39,10 +39,12 @@ SEED = 1
 class LimitedLimit(PlainData):
     """Courant limits of a limited scheme with a method.
 
-    frozen : limits of the linear schemes by name; monotone : Courant number up to which total variation cannot grow,
-    None if unknown; measured : for each start, the least Courant number found to fail in steps[i] steps (None: none up
-    to 20); least : least value over the starts; sharp : False if it falls by more than 5 % from the fewest to the most
-    steps (more than exponential growth explains), None if no run failed.
+    frozen : exact limits with constant weights, by name of the resulting linear scheme
+    monotone : Courant number up to which total variation cannot grow; None if unknown
+    measured : for each start, the least Courant number found to fail in steps[i] steps; None if none fails up to 20
+    least : least measured limit over the starts, for each number of steps
+    sharp : False if `least` falls by more than 5 % from the fewest to the most steps (exponential growth alone would
+    change it less), None if no run failed
     """
 
     scheme: str
@@ -68,7 +70,7 @@ class LimitedLimit(PlainData):
         return None if first is None or last is None else last >= (1 - SHARPNESS) * first
 
     def flat(self) -> dict:
-        """Row of a table."""
+        """Values as a single row of a table, without the exact limits: name of the column -> value."""
         cells = {"scheme": self.scheme, "limiter": self.limiter, "method": self.method, "monotone": self.monotone}
         cells |= {"cells": self.cells, "sharp": self.sharp}
         for start, row in self.measured.items():
@@ -81,8 +83,10 @@ def limited_limits(
     schemes: Sequence[str] = tuple(LIMITED), methods: Sequence[str] | None = None, cells: int = CELLS,
     steps: int = STEPS, progress: Progress | None = None,
 ) -> list[LimitedLimit]:  # fmt: skip
-    """Limits of limited schemes (muscl with each limiter) and explicit methods, for 1, 10 and 100 times `steps`.
+    """Courant limits of limited schemes (muscl with each limiter) with explicit methods on a periodic grid.
 
+    cells : cells of the grid; steps : real runs have 1, 10 and 100 times this number of steps
+    progress : function of (limits done, limits in total, next pair)
     Raises FvsolveError for unknown names, implicit methods, and for too few cells or steps.
     """
     check_size(cells, steps)
@@ -93,7 +97,7 @@ def limited_limits(
     )
     implicit = [tableau.name for tableau in chosen if not tableau.explicit]
     if implicit:
-        raise FvsolveError(f"{implicit[0]} is implicit: limited schemes are measured with explicit methods")
+        raise FvsolveError(f"{implicit[0]} is implicit. Expected explicit methods for runs with limited schemes")
     for name in schemes:
         if name not in LIMITED:
             hint = did_you_mean(name, LIMITED) or f"; limited schemes are {', '.join(LIMITED)}"
@@ -110,7 +114,7 @@ def limited_limits(
 def limited_limit(
     scheme: str, limiter: str | None, method: str, cells: int = CELLS, steps: int = STEPS
 ) -> LimitedLimit:
-    """Courant limits of a limited scheme with a method."""
+    """Courant limits of a limited scheme (and the limiter of muscl) with a method, on a grid of `cells` cells."""
     name = limiter or scheme
     counts = tuple(n * steps for n in STEP_FACTORS)
     return LimitedLimit(
@@ -150,7 +154,7 @@ def measured_courant(scheme: str, limiter: str | None, method: str, start: np.nd
 
 
 def _growth(circle: PeriodicPipe, start: np.ndarray, courant: float, steps: int) -> float:
-    """log10 of the greatest norm in a run over that of its start; inf above the threshold."""
+    """log10 of the growth in a run, the greatest norm divided by the norm of its start; inf above 1000."""
     u, greatest, done = start, 0.0, 0
     for k in range(1, NORM_CHECKS + 1):
         count, done = steps * k // NORM_CHECKS - done, steps * k // NORM_CHECKS

@@ -1,8 +1,10 @@
 """Courant limits of linear schemes on a periodic pipe: predicted for each wave, and measured by real runs.
 
-Failure: the L2 norm of some start grows by more than `THRESHOLD` within n steps. On a periodic grid the matrix of a
-step is normal, so the greatest growth over all starts is exactly max_k |R(nu z(theta_k))|^n, theta_k = 2 pi k / cells.
-This growth is measured from one impulse, all of whose waves have equal size: max_k |u_k(n)| / |u_k(0)|.
+A Courant number nu fails if the L2 norm of some start grows more than 1000 times within n steps. On a periodic grid the
+matrix of a step is normal, so the greatest growth over all starts is exactly the greatest |R(nu z(theta_k))|^n over the
+waves k, with the phases theta_k = 2 pi k / cells, the stability function R of the method and the symbol z of the
+scheme. A run measures this growth from one impulse, all of whose waves have equal size, as the greatest
+|u_k(n)| / |u_k(0)| of the Fourier coefficients u_k.
 """
 
 from __future__ import annotations
@@ -55,7 +57,7 @@ class MeasuredLimit(PlainData):
 
     @property
     def ratio(self) -> float | None:
-        """Predicted over measured."""
+        """Predicted limit divided by measured limit; None if a limit is missing."""
         return self.predicted / self.measured if self.predicted and self.measured else None
 
 
@@ -68,7 +70,7 @@ class PeriodicPipe:
         self.handle, self.functions = make_handle(self.tables), (*observers(), _rhs())
 
     def run(self, start: np.ndarray, courant: float, steps: int) -> np.ndarray | None:
-        """Cell values after `steps` at a Courant number; None if they do not remain finite."""
+        """Cell values after `steps` steps at a Courant number, from the values `start`; None if not finite."""
         stepper = self.stepper
         stepper.loop_state[:], stepper.controls[loop_indices.CONTROL] = 0.0, loop_indices.FIXED_STEP
         stepper.controls[[loop_indices.SIZE, loop_indices.STEP_MAX, loop_indices.STOP_AT]] = courant, FAR_TIME, FAR_TIME
@@ -86,8 +88,11 @@ def measured_limits(
     schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None, cells: int = CELLS, steps: int = STEPS,
     progress: Progress | None = None,
 ) -> list[MeasuredLimit]:  # fmt: skip
-    """Predicted and measured limits of linear schemes and explicit methods, by default of all.
+    """Predicted and measured Courant limits of linear schemes with explicit methods on a periodic grid.
 
+    schemes, methods : names; default: all linear schemes, all explicit methods
+    cells : cells of the grid; steps : number of steps of a run
+    progress : function of (limits done, limits in total, next pair)
     Raises FvsolveError for unknown names, and for too few cells or steps.
     """
     check_size(cells, steps)
@@ -113,7 +118,7 @@ def measured_limit(scheme: str, method: str, cells: int = CELLS, steps: int = ST
 
 
 def predicted_growth(scheme: str, method: str, cells: int, steps: int, courant: float) -> float:
-    """log10 of the greatest |R(nu z(theta_k))|^n over the waves of the periodic grid."""
+    """log10 of the greatest growth of a wave of the periodic grid within `steps` steps, from the stability function."""
     theta = 2 * np.pi * np.arange(cells // 2 + 1) / cells
     r = analyse(method).stability_function
     return steps * math.log10(np.abs(r(courant * symbol(weights_of(scheme), theta))).max())
@@ -133,7 +138,11 @@ def first_failure(
     smallest: float = SMALLEST_COURANT,
     ratio: float = COURANT_RATIO,
 ) -> float | None:
-    """Least Courant number whose growth (log10) exceeds the threshold: search upwards, then bisection to `width`."""
+    """Least Courant number whose growth exceeds 1000; None if there is none up to 20.
+
+    growth : function of the Courant number, log10 of the growth
+    The search goes upwards from `smallest` by factors `ratio`; bisection ends at the relative width `width`.
+    """
     low, high = 0.0, smallest
     while growth(high) <= math.log10(THRESHOLD):
         low, high = high, high * ratio
@@ -157,7 +166,7 @@ def check_size(cells: int, steps: int) -> None:
 
 
 def _tables(scheme: str, limiter: str, cells: int) -> tuple:
-    """Tables of a handle: settings of the scheme, small number of the pipe and work space; all else empty."""
+    """Tables that the kernel of the periodic grid reads: settings of the scheme, small number of WENO, work space."""
     tables = {name: np.zeros(1, rec.RECORDS.get(name, float)) for name in (*rec.Tables._fields, *rec.RunArrays._fields)}
     tables["scratch"] = np.zeros(2 * cells + 7)
     scheme_settings(tables["settings"][0], scheme, limiter)

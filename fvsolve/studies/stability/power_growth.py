@@ -1,6 +1,7 @@
 """Growth of powers of the matrix of a step, and the greatest step without growth above the threshold.
 
-growth = max over n <= N of ||R(h J)^n|| in the energy norm; a step fails if it exceeds 1e3.
+The growth is the greatest norm of R(h J)^n over n <= N steps, in the energy norm, with the step h, the Jacobian J and
+the stability function R of the method. A step fails if the growth exceeds 1000.
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ CHECKED_STEPS = 11  # steps whose powers are all checked if a few powers show no
 
 
 class Growth(NamedTuple):
-    """Greatest norm found (inf: not finite), its number of steps, the start with this growth, and its end.
+    """Greatest growth found, `size` (inf: not finite), after `steps` steps.
 
-    start, end : float64[n], unit vectors
+    start, end : float64[n]  deviation with this growth at its start and at its end, scaled to norm 1
     """
 
     size: float
@@ -34,7 +35,11 @@ class Growth(NamedTuple):
 
 
 def step_matrix(method: Method, e: np.ndarray) -> np.ndarray:
-    """R(E) : float64[n, n] for E = h J, by Horner's rule for explicit methods, else by the linear system of stages."""
+    """Matrix of a step of a linear system : float64[n, n], R(E) with the stability function R and E = h J.
+
+    e : float64[n, n]  step times Jacobian. It is computed by Horner's rule for explicit methods, and from the linear
+    system of the stages for implicit methods.
+    """
     n = e.shape[0]
     if method.explicit:
         coefficients = [float(x) for x in stability_function(method).numerator.coefficients]
@@ -56,7 +61,7 @@ def step_matrix(method: Method, e: np.ndarray) -> np.ndarray:
 
 
 def norm_exceeds(m: np.ndarray, threshold: float) -> bool:
-    """True if ||M||_2 > threshold; cheap bounds are checked first."""
+    """True if the 2-norm of the matrix m exceeds the threshold or is not finite; cheap bounds are checked first."""
     if not np.all(np.isfinite(m)):
         return True
     squares = np.einsum("ij,ij->j", m, m)
@@ -70,9 +75,10 @@ ALL_POWERS_STATES = 64  # greatest number of states for which every power is che
 
 
 def checked_powers(steps: int, few: bool = False) -> list[int]:
-    """Increasing numbers of steps at which growth is checked: 1 .. 64, 16 .. 31 times powers of two, the last 64.
+    """Increasing numbers n of steps, up to `steps`, at which growth is checked.
 
-    few : powers of two and `steps` only
+    They are 1 to 64, 16 to 31 times powers of two, powers of two, and the last 64 numbers.
+    few : True for powers of two and `steps` only
     """
     numbers = {1 << k for k in range(64)} | {steps}
     if not few:
@@ -82,9 +88,10 @@ def checked_powers(steps: int, few: bool = False) -> list[int]:
 
 
 def matrix_powers(m: np.ndarray, steps: int, few: bool = False) -> Iterator[tuple[int, np.ndarray]]:
-    """(n, M^n) for the n of `checked_powers`, for a small M all n; ends with the first power that is not finite.
+    """Pairs (n, m^n) of powers of a matrix, for the numbers n of `checked_powers`; up to 64 states for all n.
 
-    A power is the product of M and the power before, or of two lower powers.
+    A power is the product of m and the power before, or of two lower powers. The first power that is not finite is the
+    last pair.
     """
     known, last, power = {1: m}, 1, m
     yield 1, m
@@ -106,7 +113,7 @@ def matrix_powers(m: np.ndarray, steps: int, few: bool = False) -> Iterator[tupl
 
 
 def assembled_power(known: dict[int, np.ndarray], n: int) -> np.ndarray:
-    """M^n as a product of known powers M^(2^k)."""
+    """Power m^n of a matrix as a product of the powers m^(2^k) in `known`."""
     product = None
     for k in range(n.bit_length()):
         if n >> k & 1:
@@ -115,7 +122,7 @@ def assembled_power(known: dict[int, np.ndarray], n: int) -> np.ndarray:
 
 
 def power_growth(m: np.ndarray, steps: int = STEPS) -> Growth:
-    """Greatest ||M^n||_2 over the n <= steps of `matrix_powers`, and the unit vector with this growth."""
+    """Greatest 2-norm of the powers m^n over the n <= steps of `matrix_powers`, and the deviation with this growth."""
     size, after, greatest = 1.0, 0, np.eye(m.shape[0])
     for n, power in matrix_powers(m, steps):
         if not np.all(np.isfinite(power)):
@@ -130,20 +137,26 @@ def power_growth(m: np.ndarray, steps: int = STEPS) -> Growth:
 
 
 class DenseGrowth:
-    """Growth of steps of one method on a small system; e : J in the energy norm."""
+    """Growth over the steps of one method on a small system, from powers of the step matrix.
+
+    e : float64[n, n]  Jacobian in coordinates of the energy norm [1/s]; size : its 2-norm
+    """
 
     def __init__(self, method: Method, e: np.ndarray, steps: int, threshold: float = THRESHOLD) -> None:
         self.method, self.e, self.steps, self.threshold = method, e, steps, threshold
         self.size = float(np.linalg.norm(e, 2))
 
     def fails(self, h: float, few: bool = False) -> bool:
-        """True if a power n <= steps of R(h J) exceeds the threshold; few : check only powers of two and `steps`."""
+        """True if a power of the matrix of a step of h [s] exceeds the threshold within the number of steps.
+
+        few : True to check only powers of two and the last power
+        """
         m = self.matrix(h)
         with np.errstate(over="ignore", invalid="ignore"):
             return any(norm_exceeds(power, self.threshold) for _, power in matrix_powers(m, self.steps, few))
 
     def limit(self) -> StepLimit:
-        """Limit of the step: first by few powers, which give an upper bound, then by all."""
+        """Limit of the step: first from few powers, which give an upper bound, then from all checked powers."""
         rough = bisect_limit(lambda h: self.fails(h, few=True), 0.1 / self.size, MAX_HJ / self.size)
         if rough.step == 0.0:
             return rough
@@ -158,7 +171,7 @@ class DenseGrowth:
         return bisect(self.fails, low, high)
 
     def failing_after(self, h: float) -> int:
-        """Number of steps after which growth first exceeds the threshold; 0 if it does not."""
+        """Number of steps of h [s] after which growth first exceeds the threshold; 0 if it does not."""
         with np.errstate(over="ignore", invalid="ignore"):
             failing = (
                 n for n, power in matrix_powers(self.matrix(h), self.steps) if norm_exceeds(power, self.threshold)
@@ -171,6 +184,6 @@ class DenseGrowth:
             return power_growth(self.matrix(h), self.steps)
 
     def matrix(self, h: float) -> np.ndarray:
-        """R(h J)."""
+        """Matrix of a step of h [s] : float64[n, n]."""
         with np.errstate(over="ignore", invalid="ignore"):
             return step_matrix(self.method, h * self.e)

@@ -36,11 +36,13 @@ MAX_WIDENINGS, MAX_REDUCTIONS = (
 
 
 class RealRuns:
-    """Real runs about an operating point by one method with fixed steps; growth of the difference of two runs.
+    """Pairs of real runs about an operating point with fixed steps, to measure how the difference of the runs grows.
 
-    form : energy norm; worst : float64[r]  a start in its coordinates, used besides two random starts
-    small : greatest deviation at the start, in units of the small deviation of states; if None, the size for which
-    rates are most nearly `a` (their derivative) times the deviation, at the start and after growth to the threshold
+    at : operating point; steps : number of steps of a run; threshold : growth above which a step fails
+    form : energy norm; worst : float64[r]  start deviation in coordinates of the norm, in addition to two random starts
+    small : greatest deviation at the start, in units of the small deviation of states; default: the size at which the
+    rates are closest to linear, both at the start and after growth to the threshold
+    a : float64[n, n]  Jacobian of the rates, for this default
     """
 
     def __init__(self, at: OperatingPoint, method: str, form: EnergyForm, worst=None, steps: int = STEPS,
@@ -59,14 +61,18 @@ class RealRuns:
         self.latest = time.monotonic() + TIME_LIMIT
 
     def as_deviation(self, start: np.ndarray) -> np.ndarray:
-        """Start in coordinates of the energy norm as a deviation of states; the greatest equals its small deviation."""
+        """Deviation of all states for a start in coordinates of the energy norm : float64[n].
+
+        It is scaled so that its greatest entry equals the small deviation of that state.
+        """
         y = self.form.back @ start
         return y / np.max(np.abs(y) / self.at.model.scale)
 
     def linear_width(self, y: np.ndarray, a) -> float:
-        """Size of the start deviation for which growth remains linear up to the threshold and is above round-off.
+        """Factor on the start deviation y for which growth remains linear up to the threshold and is above round-off.
 
-        After growth the deviation may have any shape, with all its energy in one state; stages of a step exceed it.
+        a : float64[n, n]  Jacobian. A grown deviation may have all its energy in one state, and the stages of a step
+        may exceed it; the factor allows for both.
         """
         base, rng = self.at.rate, np.random.default_rng(11)
         grown = self.at.model.scale * rng.choice([-1.0, 1.0], y.size)
@@ -93,11 +99,11 @@ class RealRuns:
         return loop
 
     def growth(self, h: float) -> tuple[float, int]:
-        """(greatest growth over all starts, its number of steps); infinite for a run that stops.
+        """Greatest growth of a deviation with steps of h [s], and number of steps; infinity if a run stops.
 
-        If growth exceeds the threshold, a larger start is run. If its growth agrees, the start has grown, and not
-        round-off or Newton residuals, whose size does not depend on the start. Otherwise the larger start counts, and
-        the check is repeated.
+        If growth exceeds the threshold, a run with a larger start follows. If its growth agrees, the start has grown;
+        if not, round-off or Newton residuals have grown, whose size does not depend on the start. Then the larger start
+        is used, and the check is repeated.
         """
         size, after, base_at = 1.0, 0, self.base_states(h)
         for start, width in self.starts:
@@ -114,7 +120,10 @@ class RealRuns:
         return size, after
 
     def base_states(self, h: float) -> Callable[[int], np.ndarray | None]:
-        """Function k -> state relative to which deviations are measured at check k; None if a run from it stops."""
+        """Function of k that returns the state from which deviations are measured at check number k.
+
+        It is the state of a run from the operating point with steps of h [s], or None if this run has stopped.
+        """
         run, states = None if self.at_rest else self.loop(self.at.y, h), []
 
         def state(k: int) -> np.ndarray | None:
@@ -127,7 +136,10 @@ class RealRuns:
         return state
 
     def growth_of_start(self, start: np.ndarray, h: float, base_at: Callable) -> tuple[float, int]:
-        """(greatest growth of one start, its number of steps); stops above the threshold."""
+        """Greatest growth of the deviation `start` with steps of h [s], and number of steps; ends above the threshold.
+
+        base_at : result of `base_states`
+        """
         size, after, run = 1.0, 0, self.loop(self.at.y + start, h)
         first = np.linalg.norm(self.form.forward @ start)
         for k, n in enumerate(self.check_steps):
@@ -144,24 +156,24 @@ class RealRuns:
         return size, after
 
     def state_end_time(self, h: float) -> float:
-        """Time [s] after which a run from the state itself stops, equal for this step and for half of it; else inf.
+        """Time [s] after which a run from the operating point itself stops, if it is equal for the steps h and h / 2.
 
-        Then the model ends there (a piston at the end of its cylinder), and no step has failed.
+        Then the model ends there (such as a piston at the end of its cylinder), and no step has failed. Otherwise inf.
         """
         ends = [self.break_time(self.loop(self.at.y, step), self.steps * h / step) for step in (h, 0.5 * h)]
         return min(ends) if abs(ends[0] - ends[1]) <= END_TOLERANCE * h else np.inf
 
     def break_time(self, run: RunLoop, steps: float) -> float:
-        """Time [s] after which a run stops within a number of steps; inf if it does not."""
+        """Time [s] from the operating point at which a run stops within a number of steps; inf if it does not stop."""
         return np.inf if run.run(steps) in (loop_indices.BUDGET_SPENT, loop_indices.DONE) else run.t - self.at.t
 
     def fails(self, h: float) -> bool:
-        """True if the growth of a run exceeds the threshold."""
+        """True if the growth of a deviation with steps of h [s] exceeds the threshold."""
         self.longest_tried = max(self.longest_tried, h)
         return self.growth(h)[0] > self.threshold
 
     def limit(self, guess: float) -> StepLimit:
-        """Greatest safe step by bisection around a guess, after a check that smaller steps are safe."""
+        """Greatest safe step by bisection around the step `guess` [s], after a check that smaller steps are safe."""
         for part in SAFE_PARTS:
             if self.fails(part * guess):
                 return self.limit_below(part * guess)
@@ -177,11 +189,11 @@ class RealRuns:
         return StepLimit(np.inf, np.inf)
 
     def safe(self, h: float) -> bool:
-        """True if no run fails."""
+        """True if the growth of deviations with steps of h [s] does not exceed the threshold."""
         return not self.fails(h)
 
     def limit_below(self, high: float) -> StepLimit:
-        """Limit below a step that fails; nan if none is found."""
+        """Limit of the step below a step `high` [s] that fails; nan if no safe step is found."""
         for _ in range(MAX_REDUCTIONS):
             if self.safe(high / STEP_RATIO):
                 return bisect(self.fails, high / STEP_RATIO, high)
@@ -192,7 +204,10 @@ class RealRuns:
 def measure_limit(
     runs: RealRuns, guess: float, size: float, left_out: dict[str, str], quantity: str = "measured"
 ) -> dict:
-    """Measured limit around a guess; if it is not found in time, `left_out` gets the reason."""
+    """Columns of a stability row with the limit of real runs, see `measured_limit_of`.
+
+    quantity : name under which `left_out` receives the reason if the limit is not found in time
+    """
     try:
         return measured_limit_of(runs, guess, size)
     except TimeoutError:
@@ -206,7 +221,11 @@ def too_long(runs: RealRuns) -> str:
 
 
 def measured_limit_of(runs: RealRuns, guess: float, size: float) -> dict:
-    """Measured limit around a guess; if no step is predicted to fail, two long steps are run."""
+    """Limit of real runs `measured` and longest tested step `measured_up_to` [s], as a dict.
+
+    guess : predicted limit [s]; if it is infinite, runs with two long steps are made
+    size : norm of the Jacobian [1/s]
+    """
     if np.isfinite(guess) and guess > 0.0:
         limit = runs.limit(guess)
         return {

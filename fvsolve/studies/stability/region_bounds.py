@@ -1,4 +1,4 @@
-"""Bounds on the greatest step (13) by eigenvalues and by the field of values."""
+"""Bounds on the greatest stable step, from eigenvalues and from the field of values of the Jacobian."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ MAX_HS = 1e5  # greatest h |s| of the search
 
 
 def region_limit(method: Method, points: np.ndarray) -> float:
-    """Greatest h [s] with |R(h' s)| <= 1 for all points s [1/s] and all h' <= h; 0 for none, inf for all steps.
+    """Greatest step h [s] for which all points s [1/s] times any shorter step are in the stability region.
 
-    Points within 1e-10 of the imaginary axis (round-off) are moved onto it. Points to its right allow no step.
+    The result is 0 if there is no such step, inf if all steps are possible. Points within 1e-10 of the imaginary axis
+    (round-off, relative to the greatest |s|) are moved onto it. Points to its right allow no step.
     """
     size = np.max(np.abs(points), initial=0.0)
     points = points[np.abs(points) > ZERO_TOLERANCE * size]
@@ -42,10 +43,11 @@ def region_limit(method: Method, points: np.ndarray) -> float:
 
 
 def field_of_values(e: np.ndarray) -> np.ndarray:
-    """Points of the boundary of {x* E x : |x| = 1} : complex[m], on the sides of an inscribed polygon.
+    """Points on a polygon inscribed in the field of values of the real matrix E : complex[m].
 
-    The tangent at an angle touches at x* E x, where x is the eigenvector of the greatest eigenvalue of the Hermitian
-    part of exp(-i angle) E (Johnson 1978). E is real, so the lower half mirrors the upper half.
+    The field of values is the set of all x* E x with |x| = 1. Its tangent at an angle touches it at x* E x, where x is
+    the eigenvector of the greatest eigenvalue of the Hermitian part of exp(-i angle) E (Johnson 1978). The lower half
+    mirrors the upper half.
     """
     from scipy.linalg import eigh
 
@@ -62,7 +64,7 @@ def field_of_values(e: np.ndarray) -> np.ndarray:
 
 
 def numerical_abscissa(e: np.ndarray) -> float:
-    """Greatest Re x* E x, the initial growth rate of the norm [1/s]."""
+    """Greatest initial growth rate [1/s] of the norm of x under x' = E x: the greatest Re x* E x with |x| = 1."""
     from scipy.linalg import eigh
 
     n = e.shape[0]

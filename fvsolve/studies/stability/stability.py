@@ -1,6 +1,7 @@
-"""Greatest safe step of a case: predicted by powers of a step, measured by real runs, and bounds.
+"""Greatest safe step of a case: predicted from the linearised case, measured by real runs, and bounds.
 
-Failure: max over n <= N of ||R(h J)^n|| > 1e3 in the energy norm.
+A step h fails if a deviation grows more than 1000 times in the energy norm within n <= N steps. For the linearised case
+this growth is the greatest norm of the powers R(h J)^n, with the Jacobian J and the stability function R of the method.
 """
 
 from __future__ import annotations
@@ -48,7 +49,10 @@ LONGER_FACTOR = 10  # factor of the number of steps in longer runs of Euler with
 
 @dataclass(frozen=True)
 class Stability:
-    """Rows of a study with notes; systems : scheme -> function that makes its linear system on first use."""
+    """Result of a stability study: a row for each scheme and method, and notes.
+
+    systems : for each scheme a function of the scheme that makes its linear system on first use
+    """
 
     case: str
     rows: tuple[StabilityRow, ...]
@@ -65,7 +69,10 @@ class Stability:
 
 
 class LinearSystem:
-    """Case with one linear scheme about a state: J in the energy norm, and data that do not depend on the method."""
+    """Case linearised with one linear scheme about a state, and data that do not depend on the time method.
+
+    linear : state-space form; form : energy norm in use; e : Jacobian in the coordinates of this norm [1/s]
+    """
 
     def __init__(self, at: OperatingPoint) -> None:
         self.at = at
@@ -81,12 +88,12 @@ class LinearSystem:
 
     @cached_property
     def spectrum(self) -> Spectrum:
-        """Eigenvalues of J."""
+        """Eigenvalues of the Jacobian [1/s]."""
         return find_eigenvalues(self.e)
 
     @cached_property
     def field(self) -> np.ndarray:
-        """Boundary of the field of values of J."""
+        """Boundary of the field of values (numerical range) of the Jacobian : complex[m] [1/s]."""
         return field_of_values(self.e)
 
     @property
@@ -113,10 +120,16 @@ def stability(
     before: bool = False, steps: int = STEPS, threshold: float = THRESHOLD, set=None, out: str | Path | None = None,
     progress: Progress | None = None, jobs: int = 1, dask: str | None = None,
 ) -> Stability:  # fmt: skip
-    """Compute a row for each scheme and method (those of the case if None) about the start or the state at `at` [s].
+    """Compute the greatest stable steps of a case for each scheme and time method: a row for each pair.
 
-    Finished rows are stored in `out` and reused; jobs, dask : processes, as in `sweep`. Raises CaseError, and
-    FvsolveError for a state that cannot be linearised, and for too few steps or too small a threshold.
+    schemes, methods : names; default: scheme and method of the case
+    at : time of the state about which deviations grow [s]; default: the start
+    before : True to take schedules just before a jump or kink at this time
+    steps : number of steps over which growth counts; threshold : growth above which a step fails
+    set : changed keys of the case; out : folder in which finished rows are stored and found again
+    progress : function of (rows done, rows in total, next row); jobs, dask : processes, as in `sweep`
+    Raises CaseError, and FvsolveError for a state that cannot be linearised, and for too few steps or too small a
+    threshold.
     """
     if steps < 10 or not threshold > 1.0:
         raise FvsolveError(
@@ -141,7 +154,10 @@ def stability(
 
 
 def cached_rows(points: ResultCache, case, options: dict, pairs: list, pool: TaskPool, report: Progress) -> list[dict]:
-    """Rows of pairs (scheme, method); missing rows are computed by `pool` and stored as they are finished."""
+    """Rows of all pairs (scheme, method); rows that are not in the cache are computed by `pool` and stored.
+
+    options : settings of the study that are part of the key of a row
+    """
     keys = [{"study": "stability", "scheme": scheme, "method": method, **options} for scheme, method in pairs]
     rows = [points.find(case, extra) for extra in keys]
     new = [k for k, row in enumerate(rows) if row is None]
@@ -185,7 +201,7 @@ class RowTask:
 
 
 class SchemeRows:
-    """Rows of one scheme; shared data are computed once, on first use."""
+    """Computation of the rows of one scheme; data that methods share are computed once, on first use."""
 
     def __init__(self, case, scheme: str, at: float | None, before: bool, steps: int, threshold: float) -> None:
         self.case, self.scheme, self.time, self.before = case, scheme, at, before
@@ -206,7 +222,7 @@ class SchemeRows:
         return self.systems[scheme]
 
     def frozen_systems(self) -> Iterator[tuple[str, LinearSystem]]:
-        """Linear systems with fixed weights of the limited scheme, for equal cells and state."""
+        """Names and linear systems for the limited scheme with its weights held constant, at the same state."""
         at = self.at(self.scheme)
         if at.model.cavitates or at.model.basins:  # their only linear scheme is upwind
             yield "upwind", LinearSystem(replace(self.at("upwind"), y=at.y))
@@ -242,7 +258,7 @@ class SchemeRows:
         return StabilityRow(**row | {"notes": tuple(bound_notes(result, side, growth))})
 
     def bound_columns(self, side: LinearSystem, method) -> dict:
-        """Columns of a row that need no powers: names, sizes, bounds."""
+        """Columns of a row that do not need powers of the step matrix: names, sizes, bounds of the step."""
         model, left_out = side.at.model, {}
         values = side.spectrum
         row = {
@@ -264,7 +280,7 @@ class SchemeRows:
         return row | {"left_out": left_out}
 
     def limited_row(self, method) -> StabilityRow:
-        """Row of a limited scheme: limits with frozen weights, and the measured limit."""
+        """Row of a limited scheme: predicted limits with its weights held constant, and the limit of real runs."""
         at = self.at(self.scheme)
         limits, starts, left_out, latest = {}, {}, {}, time.monotonic() + TIME_LIMIT
         try:
@@ -304,14 +320,17 @@ class SchemeRows:
 
 
 def von_neumann_limit(scheme: str, method) -> float:
-    """Von Neumann's limit of the Courant number."""
+    """Von Neumann's limit of the Courant number, for a linear scheme on a uniform grid."""
     from fvsolve.step_limits.advection_limit import advection_limit
 
     return advection_limit(scheme, method.name).limit
 
 
 def dominant_part(form: EnergyForm, end: np.ndarray) -> tuple[str, float]:
-    """(part with the most energy of a unit vector, its share)."""
+    """Part with the greatest share of the energy of a deviation, and this share.
+
+    end : float64[r]  deviation in coordinates of the energy norm, with norm 1
+    """
     shares: dict[str, float] = {}
     for part, root in zip(form.parts, form.rows @ (form.back @ end), strict=True):
         shares[part] = shares.get(part, 0.0) + float(root**2)

@@ -9,16 +9,21 @@ import numpy as np
 
 @dataclass(frozen=True)
 class StabilityRow:
-    """Limits of a scheme with a method. Steps in s; inf: no failing step found, nan: unknown (reason in `left_out`).
+    """Limits of the step [s] for a scheme with a method; inf: no failing step found, nan: unknown, see `left_out`.
 
-    predicted : greatest step with growth <= threshold in `steps` steps; growth, after : greatest growth with a slightly
-    greater step, and its number of steps; where, share : part with the most energy of the grown deviation, its share
-    measured : limit of real runs, measured_up_to : longest step that was run
-    eigenvalues, field_of_values, von_neumann : greatest step that keeps these in the region of the method
-    rate : greatest wave rate [1/s], the Courant number is step times rate; 0 without cells
-    frozen : for a limited scheme, predictions with its weights fixed at their extremes
+    when : state about which deviations grow; states : number of states; steps : number of steps over which they grow
+    predicted : greatest step with which the linearised case grows by `threshold` at most
+    growth, after : greatest growth with a slightly longer step, and its number of steps
+    where, share : part with the most energy of the grown deviation, and its share of the energy
+    measured : limit of real runs; measured_up_to : longest step of a real run
+    eigenvalues, field_of_values, von_neumann : bounds, the greatest steps with which the eigenvalues, the field of
+    values, or the waves of a uniform grid are in the stability region; greatest_real : greatest real part of an
+    eigenvalue [1/s]
+    rate : greatest wave rate [1/s]; the Courant number is the step times this rate; 0 without cells
+    frozen : for a limited scheme, predicted limits with its weights held at their extremes
     lines : True for a case with delay lines, for which there are no bounds
     longer : for a limited scheme with Euler, the measured limit for ten times as many steps
+    left_out : reason for each missing column
     """
 
     scheme: str
@@ -52,12 +57,12 @@ class StabilityRow:
 
     @property
     def difference(self) -> float:
-        """measured / predicted - 1; nan if either is missing."""
+        """Relative difference of the limits, measured / predicted - 1; nan if either limit is missing."""
         known = np.isfinite(self.measured) and np.isfinite(self.predicted) and self.predicted > 0.0
         return self.measured / self.predicted - 1.0 if known else np.nan
 
     def courant(self, step: float) -> float:
-        """A step [s] as a Courant number; nan without cells."""
+        """Courant number of a step [s]; nan without cells."""
         return step * self.rate if self.rate > 0.0 else np.nan
 
     def plain(self) -> dict:
@@ -76,7 +81,7 @@ def json_number(x: float):
 
 
 def row_from_json(data: dict) -> StabilityRow:
-    """Row from the data of `StabilityRow.plain`."""
+    """Row of a stability study from the data that `StabilityRow.plain` returned."""
     values = {"none": np.inf, None: np.nan}
     fields = {name: data[name] for name in StabilityRow.__dataclass_fields__}
     for name, value in fields.items():

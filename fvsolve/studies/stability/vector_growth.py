@@ -21,9 +21,11 @@ NORM_MARGIN = 2.0
 
 
 class VectorGrowth:
-    """Growth on a large system: a block of vectors is multiplied by powers of R and of its transpose in turn.
+    """Growth over many steps on a large system: a block of vectors is multiplied by the step matrix again and again.
 
-    Start vectors are random with a fixed seed. The result is a lower bound of the norm, close to it after four passes.
+    The matrix and its transpose are used in turn, as in a power iteration for the 2-norm. Start vectors are random with
+    a fixed seed. The result is a lower bound of the greatest growth, close to it after four passes.
+    e : sparse Jacobian in coordinates of the energy norm [1/s]; latest : end on the monotonic clock [s]
     """
 
     def __init__(
@@ -36,22 +38,22 @@ class VectorGrowth:
         self.start_block = np.random.default_rng(1).standard_normal((e.shape[0], VECTORS))
 
     def two_norm(self) -> float:
-        """||J||_2 [1/s] by power iteration."""
+        """2-norm of the Jacobian [1/s], by power iteration."""
         v = np.random.default_rng(2).standard_normal(self.e.shape[0])
         for _ in range(50):
             v = self.transpose @ (self.e @ (v / np.linalg.norm(v)))
         return float(np.sqrt(np.linalg.norm(v)))
 
     def limit(self) -> StepLimit:
-        """Limit of the step: no smaller step is found to fail."""
+        """Limit of the step [s], below which no step is found to fail."""
         return bisect_limit(self.fails, 0.1 / self.size, MAX_HJ / self.size)
 
     def fails(self, h: float) -> bool:
-        """True if growth above the threshold is found."""
+        """True if growth above the threshold is found with steps of h [s]."""
         return self.failing_after(h) > 0
 
     def failing_after(self, h: float) -> int:
-        """Number of steps after which growth first exceeds the threshold; 0 if it does not."""
+        """Number of steps of h [s] after which growth first exceeds the threshold; 0 if it does not."""
         growth = self.growth(h, self.threshold)
         return growth.steps if growth.size > self.threshold else 0
 
@@ -76,7 +78,10 @@ class VectorGrowth:
         return best
 
     def propagate(self, step: Callable, v: np.ndarray, enough: float) -> tuple[float, int, np.ndarray]:
-        """(greatest norm of the propagated block, its number of steps, the block there); stops above `enough`."""
+        """Greatest norm of a block v of vectors over the steps, number of steps there, and block there.
+
+        step : function that multiplies a block by the step matrix; enough : norm above which it ends
+        """
         size, steps, block, done = 1.0, 0, v, 0
         with np.errstate(over="ignore", invalid="ignore"):
             for n in checked_powers(self.steps):
@@ -100,7 +105,7 @@ class TooLarge(FvsolveError):
 
 
 def too_large(states: int, steps: int) -> str:
-    """Text of that error."""
+    """Text of the error `TooLarge`: number of states and steps, and remedies."""
     return (
         f"{states} states and {steps} steps take longer than {TIME_LIMIT:g} s to predict: give pipes or basins fewer "
         "cells, --set links.NAME.cells=100 or nodes.NAME.cells=[20,20] (or a greater numerics.cell_time for pipes "
@@ -109,7 +114,7 @@ def too_large(states: int, steps: int) -> str:
 
 
 def step_function(method: Method, h: float, e: Any) -> Callable[[np.ndarray], np.ndarray]:
-    """Function v -> R(h J) v for blocks of vectors : float64[n, k]; e : J."""
+    """Function that multiplies a block of vectors : float64[n, k] by the matrix of a step of h [s]; e : Jacobian."""
     if method.explicit:
         coefficients = [float(x) for x in stability_function(method).numerator.coefficients]
         scaled = h * e
