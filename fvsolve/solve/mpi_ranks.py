@@ -36,7 +36,7 @@ class Exchange:
         self.buffers = {k: np.zeros(at.size) for k, at in self.received.items()}
 
     def __call__(self, values: np.ndarray) -> None:
-        """Exchange the entries; received entries are written into `values`."""
+        """Exchange entries of the array `values` between all ranks; received entries are written into it."""
         from mpi4py import MPI
 
         requests = [self.comm.Irecv(self.buffers[k], k) for k, at in self.received.items() if at.size]

@@ -108,12 +108,12 @@ class Partition:
 
 
 def quantities(model: Model, b: int) -> int:
-    """Number of states of a cell of a basin."""
+    """Number of states in each cell of basin number b, transported scalars included."""
     return len(model.basins[b].quantities) + len(model.basins[b].scalars)
 
 
 def common_cells(model: Model, b: int):
-    """Cells of a basin that all bands read: behind its patches, and at probes."""
+    """Numbers of the cells of basin b that all bands read: cells at its patches and at probes, as several arrays."""
     integers = model.tables.integers
     for patch in model.tables.patches[model.tables.patches["basin"] == b]:
         yield integers[patch["first"] : patch["first"] + patch["count"]]

@@ -68,7 +68,7 @@ class RunChecks:
         return f"stopped: {text}"
 
     def warnings(self, ledgers: dict) -> list[Notice]:
-        """All notices of a finished run."""
+        """Notices of all checks of a finished run; ledgers : balances of mass and scalars by name."""
         notices = list(self.predicted)
         # repeat the prediction with the wave rates and step errors of the run
         if self.model.case.numerics.step is not None and (notices or self.moving):

@@ -195,7 +195,7 @@ class RunLoop:
         self.apply_events()
 
     def apply_events(self) -> None:
-        """Apply the immediate effects of events on tanks and devices."""
+        """Apply the immediate effects of events: tank levels are limited, discs stop at seats and end stops."""
         for i in self.tanks:
             node, sums = self.model.tables.nodes[i], self.stepper.ledger.reshape(LEDGER_ROWS, -1)
             part = tank_limits.overshoot_correction(node, self.armed, float(node["mass"] + self.now[node["y"]]))

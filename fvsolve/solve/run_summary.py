@@ -16,7 +16,10 @@ DRIFT = 1e-6  # deviation of the length of Euler parameters from 1 above which a
 
 @dataclass(frozen=True)
 class Mark:
-    """First occurrence [s] of a condition outside the model's validity; later results are not to be trusted."""
+    """First occurrence of a condition outside the validity of the model, after which results are not reliable.
+
+    what : kind of condition; place : key path of the part; time : [s]; text : description with a remedy
+    """
 
     what: str
     place: str

@@ -423,7 +423,7 @@ class Run:
         return f"stopped: a value is not finite{place} at {when}; the step is beyond the limit of the method: halve it"
 
     def methods(self) -> list[dict]:
-        """Methods of the run with start time and reason."""
+        """Time methods used in the run: dicts with start time [s], name and reason."""
         name = self.model.case.numerics.method
         if name != automatic.AUTO:
             return [{"time": self.start, "method": name, "why": "given by numerics.method"}]

@@ -29,7 +29,7 @@ def cell_modes(model) -> Modes:
 
 
 def friction_modes(model) -> Modes:
-    """Modes of waves in pipes with friction, at the initial flow."""
+    """Modes of waves in pipes with friction, at the initial flow: pairs of pipe name and eigenvalues [1/s]."""
     scheme, modes = model.case.numerics.scheme, []
     weights = SCHEMES[scheme].smooth.weights
     symbols = {n: pipe_symbol(tuple(weights), n) for n in {mesh.cells for mesh in model.pipes}}
@@ -76,7 +76,7 @@ def friction_slope(row) -> float:
 
 
 def pipe_scalar_modes(model) -> Modes:
-    """Modes of scalars in pipes, at the initial flow."""
+    """Modes of transported scalars in pipes, at the initial flow: pairs of "pipe.scalar" and eigenvalues [1/s]."""
     modes, rho = [], model.case.properties.density
     for name, scalar in model.case.scalars.items():
         for mesh, row in zip(model.pipes, model.tables.pipes, strict=True):

@@ -80,7 +80,7 @@ def storing_nodes(model, h: float):
 
 
 def lines_at(model, i: int):
-    """Rows of the delay lines connected to node i."""
+    """Delay lines connected to node number i, as rows of the table of delay lines."""
     node = model.tables.nodes[i]
     ends = model.tables.integers[node["lines"] : node["lines"] + node["line_count"]]
     return [model.tables.delays[end // 2] for end in ends]

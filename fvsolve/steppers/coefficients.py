@@ -89,5 +89,5 @@ def nodes_of(coefficients, s):
 
 @njit(inline="always")
 def error_of(coefficients, s):
-    """Weights of the error estimate; zeros for a method without one."""
+    """Weights of the stages in the error estimate of a method, in its flat coefficients; zeros without an estimate."""
     return coefficients[s * s + 2 * s : s * s + 3 * s]

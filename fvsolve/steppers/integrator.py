@@ -46,7 +46,7 @@ class Integrator:
         self.use(method)
 
     def use(self, method: Method) -> None:
-        """Use this method for the following steps."""
+        """Use `method` for the following steps: allocate its arrays and select its compiled functions."""
         n, ledgers = self.scale.size, self.ledger.size // LEDGER_ROWS
         self.method = method
         self.coefficients, self.dense, s = coefficients(method, self.damped)
@@ -73,7 +73,10 @@ class Integrator:
         self.progress[loop_indices.PHASE], self.progress[loop_indices.HAS_LAST_STEP] = loop_indices.FRESH, 0
 
     def prepare_newton(self, structure: Structure, s: int, n: int, ledgers: int) -> None:
-        """Allocate arrays and select functions for the linear algebra of Newton iterations."""
+        """Allocate arrays and select functions for the linear algebra of Newton iterations.
+
+        s : number of stages; n : number of states; ledgers : number of ledger rates
+        """
         from fvsolve.steppers import newton
 
         q = pairs = 0
@@ -119,7 +122,7 @@ class Integrator:
         return loop_indices.SEPARATE_AT_START if solved else loop_indices.ALWAYS_SEPARATE
 
     def discard_history(self) -> None:
-        """Discard at a kink the step size, the last error, the stiffness count and the Jacobian; keep other counts."""
+        """Discard the step size, the last error, the stiffness count and the Jacobian, for a start after a kink."""
         self.loop_state[
             [loop_indices.STEP, loop_indices.ERROR_OLD, loop_indices.SWITCH_COUNT, loop_indices.SPLIT_REMAINDER]
         ] = 0.0

@@ -1,4 +1,4 @@
-"""Size of pivots and check of Jacobian entries, for real and complex numbers."""
+"""Size and reciprocal of pivots, real or complex, and check of Jacobian entries."""
 
 from fvsolve.jit import njit
 from fvsolve.steppers.structure import ROWS, SIZE, STARTS

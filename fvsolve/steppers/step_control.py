@@ -54,7 +54,7 @@ def shortest(controls, loop_state):
 
 @njit(forceinline=True)
 def too_short(controls, loop_state, h):
-    """True if a step of h does not change the time in floating point."""
+    """True if a step of length h [s] is too short to change the time in floating point."""
     return not h > LEAST_STEP * max(abs(loop_state[T]), abs(controls[END]))
 
 

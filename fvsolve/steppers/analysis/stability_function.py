@@ -32,7 +32,7 @@ class StabilityFunction:
 
     @validated(s=PLANE)
     def __call__(self, s):
-        """R(s) in floating point; s : complex number or array."""
+        """Value R(s) of the stability function in floating point; s : complex number or array."""
         s = np.asarray(s, dtype=np.complex128)
         up, down = self.floats
         return np.polyval(up, s) / np.polyval(down, s)
@@ -97,7 +97,7 @@ def by_resolvent(a: Sequence[Sequence], b: Sequence) -> tuple[Polynomial, Polyno
 
 
 def determinant(m: Sequence[Sequence]) -> Polynomial:
-    """det(I - s M) as a polynomial in s."""
+    """Determinant det(I - s m) of a square matrix m of exact numbers, as a polynomial in s."""
     return Polynomial(_leverrier(m)[0])
 
 
@@ -130,7 +130,7 @@ def _doubts(method: Method) -> tuple[Polynomial, Polynomial]:
 
 
 def _leverrier(a: Sequence[Sequence]) -> tuple[list, list]:
-    """Coefficients of det(I - s A) and of adj(I - s A), lowest power first (Faddeev and Leverrier)."""
+    """Coefficients of the determinant and of the adjugate of I - s A, lowest power first (Faddeev and Leverrier)."""
     s = len(a)
     rows = [[(j, x) for j, x in enumerate(row) if x != 0] for row in a]
     characteristic, m = [Fraction(1)], [[Fraction(i == j) for j in range(s)] for i in range(s)]

@@ -32,7 +32,7 @@ class Field:
         return Algebraic(self, [Fraction(0), Fraction(1)])
 
     def refine(self, bits: int) -> None:
-        """Bisect the bracket of theta until it is no longer than 2^-bits."""
+        """Refine the bounds of theta by bisection until they differ by 2^-bits at most."""
         low, high, p = self.low, self.high, self.polynomial
         rising = p(low) < 0
         while high - low > Fraction(1, 1 << bits):
@@ -60,7 +60,7 @@ class SquareRoot(Field):
 
 
 class Algebraic:
-    """Irrational element of a field; operations return a fraction where the result is rational."""
+    """Irrational number of a `Field`, as coefficients of powers of theta; operations return fractions if rational."""
 
     __slots__ = ("field", "parts")
 
@@ -128,7 +128,7 @@ class Algebraic:
         return result
 
     def inverse(self):
-        """1 / self by the extended Euclidean algorithm."""
+        """Inverse of the number, by the extended Euclidean algorithm; raises ZeroDivisionError for zero."""
         if self.sign() == 0:
             raise ZeroDivisionError("division by zero")
         modulus, polynomial = self.field.polynomial, Polynomial(self.parts)
@@ -140,7 +140,7 @@ class Algebraic:
         return number(self.field, (s1 / r1.coefficients[0]).coefficients)
 
     def bracket(self) -> tuple[Fraction, Fraction]:
-        """Lower and upper bound, by interval arithmetic on the bracket of theta."""
+        """Lower and upper bound of the number, by interval arithmetic with the bounds of theta."""
         low = high = Fraction(0)
         for value in reversed(self.parts):
             ends = [low * self.field.low, low * self.field.high, high * self.field.low, high * self.field.high]
@@ -186,7 +186,7 @@ class Algebraic:
         return hash((id(self.field), self.parts))
 
     def __float__(self) -> float:
-        """The nearest float."""
+        """Nearest float."""
         low, high = self.bracket()
         bits = BITS
         while float(low) != float(high):

@@ -76,7 +76,7 @@ class FailureMap:
     lines: bool = False
 
     def row(self, scheme: str, method: str) -> list[Square]:
-        """Squares of a scheme and a method, by column."""
+        """Runs of a scheme and a method in the order of the columns."""
         return [square for square in self.squares if (square.scheme, square.method) == (scheme, method)]
 
     def plain(self) -> dict:

@@ -163,7 +163,7 @@ def linearise_at(at: OperatingPoint, inputs=(), outputs: int = 0) -> Linear:
 
 
 def refuse_limiter(model) -> None:
-    """Raise FvsolveError if a limited scheme is used."""
+    """Raise FvsolveError if the model uses a limited scheme, which has no derivative where the state is constant."""
     scheme, schemes = model.case.numerics.scheme, model.case.schemes
     if has_limiter(model):
         linear = "upwind"

@@ -46,7 +46,7 @@ def responses(at: OperatingPoint, y: np.ndarray, outputs: int) -> np.ndarray:
 
 
 def small_deviations(at: OperatingPoint) -> np.ndarray:
-    """Small deviation of each state for differences : float64[n]."""
+    """Small deviation of each state for finite differences, the greater of its scale and its size : float64[n]."""
     return np.maximum(at.model.scale, np.abs(at.y))
 
 
@@ -105,7 +105,10 @@ def basin_states(model) -> np.ndarray:
 
 
 def refuse_state(model, j: int, cause: str) -> None:
-    """Raise FvsolveError for state j, along which there is no derivative; cause : "slope" or "kink"."""
+    """Raise FvsolveError, as the rates have no derivative along state number j.
+
+    cause : "slope" if difference quotients do not converge, "kink" if they differ from side to side
+    """
     basin = next((part for part in model.basins if model.state_names[j].startswith(f"{part.name}.")), None)
     if basin is not None:
         text = (

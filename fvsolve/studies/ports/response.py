@@ -153,7 +153,7 @@ def _density(system, row) -> float:
 
 
 def _dense(a) -> np.ndarray:
-    """Convert A to a full array. Raises FvsolveError if it has too many states."""
+    """Matrix A as a full array; raises FvsolveError for more than 800 states."""
     if a.shape[0] > MAX_STATES:
         percent = math.floor(100 * MAX_STATES / a.shape[0])
         raise FvsolveError(f"the case has {a.shape[0]} states. Expected {MAX_STATES} or fewer. Reduce the cells of its "

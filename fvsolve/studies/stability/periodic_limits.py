@@ -110,7 +110,7 @@ def measured_limits(
 
 
 def measured_limit(scheme: str, method: str, cells: int = CELLS, steps: int = STEPS) -> MeasuredLimit:
-    """Least Courant number at which growth exceeds the threshold, predicted and measured."""
+    """Least Courant number at which growth exceeds 1000 within `steps` steps, predicted and measured."""
     predicted = first_failure(lambda courant: predicted_growth(scheme, method, cells, steps, courant))
     circle = PeriodicPipe(scheme, method, cells)
     measured = first_failure(lambda courant: measured_growth(circle, cells, steps, courant))

@@ -179,7 +179,10 @@ class DenseGrowth:
             return next(failing, 0)
 
     def growth(self, h: float) -> Growth:
-        """Greatest growth with steps of h [s]; far above the threshold repeated squaring is dominated by round-off."""
+        """Greatest growth with steps of h [s], and the deviation with this growth.
+
+        Growth far above the threshold is inaccurate, because repeated squaring amplifies round-off.
+        """
         with np.errstate(over="ignore", invalid="ignore"):
             return power_growth(self.matrix(h), self.steps)
 

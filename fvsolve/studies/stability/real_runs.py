@@ -88,7 +88,7 @@ class RealRuns:
         )
 
     def loop(self, y: np.ndarray, h: float) -> RunLoop:
-        """Run from the state y with fixed steps of h [s]."""
+        """Run loop that starts from the state y with fixed steps of h [s]."""
         model = self.at.model
         changes = {"method": self.method, "step": h, "courant": None, "rtol": None}
         numerics = model.case.numerics.model_copy(update=changes)

@@ -175,7 +175,7 @@ def cached_rows(points: ResultCache, case, options: dict, pairs: list, pool: Tas
 
 
 class RowTask:
-    """Task that computes rows of a case about one state, in any process."""
+    """Task that computes rows of a stability study of a case, in this or another process."""
 
     def __init__(self, case, **options) -> None:
         self.pickled_case, self.options = PickledCase(case), options
@@ -186,7 +186,7 @@ class RowTask:
         return self.maker(scheme).row(method).plain()
 
     def maker(self, scheme: str) -> SchemeRows:
-        """Object that computes the rows of a scheme."""
+        """Object that computes the rows of a scheme for all methods."""
         if scheme not in self.makers:
             self.makers[scheme] = SchemeRows(load(self.pickled_case.source), scheme, **self.options)
         return self.makers[scheme]
@@ -210,13 +210,13 @@ class SchemeRows:
         self.systems: dict[str, LinearSystem] = {}
 
     def at(self, scheme: str) -> OperatingPoint:
-        """Operating point with a scheme."""
+        """Operating point of the case with a scheme, computed on first use."""
         if scheme not in self.states:
             self.states[scheme] = operating_point(self.case, {"numerics.scheme": scheme}, self.time, self.before)
         return self.states[scheme]
 
     def system(self, scheme: str) -> LinearSystem:
-        """Linear system with a scheme."""
+        """Linear system of the case with a linear scheme, computed on first use."""
         if scheme not in self.systems:
             self.systems[scheme] = LinearSystem(self.at(scheme))
         return self.systems[scheme]
@@ -237,7 +237,7 @@ class SchemeRows:
             yield name, self.systems[name]
 
     def row(self, name: str) -> StabilityRow:
-        """Row of a method."""
+        """Row of the stability study for the scheme and a method; name : name of the method."""
         method = method_named(name)
         if delay_lines(self.case):
             return delayed_row(self.case, self.scheme, method, self.steps, self.threshold)

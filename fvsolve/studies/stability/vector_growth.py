@@ -58,7 +58,7 @@ class VectorGrowth:
         return growth.steps if growth.size > self.threshold else 0
 
     def growth(self, h: float, enough: float = np.inf) -> Growth:
-        """Greatest growth found with steps of h [s]; stops if it exceeds `enough`."""
+        """Greatest growth found with steps of h [s], and the deviation with this growth; ends above `enough`."""
         forth, back = step_function(self.method, h, self.e), step_function(self.method, h, self.transpose)
         v, unit = self.start_block, self.start_block[:, 0] / np.linalg.norm(self.start_block[:, 0])
         best = Growth(1.0, 0, unit, unit)
