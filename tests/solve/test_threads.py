@@ -290,7 +290,9 @@ def test_a_number_of_threads_that_is_none_is_named(threads):
 
 
 def test_more_threads_than_rows_are_named():
-    with pytest.raises(FvsolveError, match="pool has 12 rows, and each thread needs a row. Expected 12 at most"):
+    with pytest.raises(
+        FvsolveError, match="pool has 12 rows, and each thread needs a row of cells. Expected 12 at most"
+    ):
         fvsolve.run(water(), threads=13)
 
 
