@@ -1,4 +1,4 @@
-"""Formulas of x and y, parsed into steps on arrays of floats."""
+"""Formulas of x and y, parsed into a list of steps that act on arrays of floats."""
 
 from __future__ import annotations
 
@@ -38,7 +38,10 @@ ERRORS = ("divides by zero", "is the logarithm of zero", "is not a number", "ove
 
 
 class Step(NamedTuple):
-    """Step of a formula: a name or number (count 0), or a function of the last `count` values; part : its text."""
+    """Step of the evaluation of a formula with a stack of values.
+
+    rule : a number or name to push (count 0), or a function of the last `count` values; part : its text in the formula
+    """
 
     rule: Callable | str | float
     count: int
@@ -48,11 +51,11 @@ class Step(NamedTuple):
 class Arithmetic:
     """Formula of x and y. Raises ValueError for an invalid text, and where a value is not finite.
 
-    All values are floats; comparisons give 1 or 0. Values that `where` does not choose may be invalid.
+    All values are floats; comparisons give 1 or 0. Values that `where` does not select may be invalid.
     """
 
     def __init__(self, text: str, otherwise: str = "") -> None:
-        """otherwise : error message for a text that is not a formula at all."""
+        """Parse a formula; otherwise : error message for a text that is not a formula at all."""
         self.text, self.source = text, text.replace("^", "**").strip()
         about = f"{show(text)} is not a formula of x and y"
         if len(text) > MAX_LENGTH:
@@ -75,7 +78,7 @@ class Arithmetic:
             raise ValueError(f"{about}: {error}") from None
 
     def read(self, node: ast.expr) -> Iterator[Step]:
-        """Steps of a node of the syntax tree; the last step gives its value."""
+        """Yield the steps that compute a node of the syntax tree; the last step gives its value."""
         part = self.source_of(node)
         if isinstance(node, ast.Constant):
             yield Step(decimal_number(part), 0, part)
@@ -111,7 +114,7 @@ class Arithmetic:
             operator_function(getattr(node, "op", node))
 
     def call(self, node: ast.Call, part: str) -> Iterator[Step]:
-        """Steps of a call."""
+        """Yield the steps that compute a function call."""
         name = node.func.id if isinstance(node.func, ast.Name) else ""
         if name not in FUNCTIONS:
             text = self.source_of(node.func)
@@ -131,7 +134,7 @@ class Arithmetic:
         return text.replace("**", "^") if "^" in self.text else text
 
     def __call__(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Values at points : float64[n]. Raises ValueError with the first invalid part and its point."""
+        """Values of the formula at points x, y [m] : float64[n]. Raises ValueError at the first invalid value."""
         known, stack = {"x": np.asarray(x, float), "y": np.asarray(y, float), "pi": np.pi}, []
         with np.errstate(all="ignore"):
             for at, step in enumerate(self.steps):
@@ -153,9 +156,10 @@ class Arithmetic:
 
 
 def apply_step(at: int, rule: Callable, values: tuple, wrongs: tuple) -> tuple[np.ndarray, np.ndarray]:
-    """Apply a function to values; also return the error codes.
+    """Result of a function of arrays, and its error codes : float64[n], int64[n].
 
-    An error code is -1 for a valid value, else len(WRONG) * step + index in `WRONG`.
+    at : index of the step; rule : function; values : its arguments; wrongs : error codes of the arguments
+    An error code is -1 for a valid value, else len(ERRORS) * index of the step + index in `ERRORS`.
     """
     if rule is np.where:
         condition, a, b = wrongs
@@ -170,7 +174,7 @@ def apply_step(at: int, rule: Callable, values: tuple, wrongs: tuple) -> tuple[n
 
 
 def operator_function(node: ast.AST) -> Callable:
-    """NumPy function of an operator. Raises ValueError for an operator that formulas do not have."""
+    """NumPy function of an operator of the syntax tree. Raises ValueError for an operator that formulas do not have."""
     if type(node) in OPERATORS:
         return OPERATORS[type(node)]
     sign, instead = UNKNOWN_OPERATORS.get(type(node), ("", ""))
@@ -180,7 +184,7 @@ def operator_function(node: ast.AST) -> Callable:
 
 
 def decimal_number(text: str) -> float:
-    """Value of a decimal number. Raises ValueError for any other form, and for a number too large for a float."""
+    """Value of a decimal number. Raises ValueError for any other text, and for a number too large for a float."""
     if NUMBER.fullmatch(text) is None:
         raise ValueError(f"{text} is not a decimal number; expected for example 16, 0.5 or 1e-3")
     if not np.isfinite(float(text)):
@@ -189,7 +193,7 @@ def decimal_number(text: str) -> float:
 
 
 def bracket_fault(text: str) -> str:
-    """Fault of the brackets of a text; "" if there is none."""
+    """Text of the fault of the brackets in a formula; "" if there is none."""
     depth = 0
     for sign in text:
         depth += (sign == "(") - (sign == ")")

@@ -1,4 +1,4 @@
-"""Attitude of a body: keys of its representations, checked against each other."""
+"""Attitude of a body: the keys of its representations, checked against each other."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ def Angle(about: str) -> Quantity:
 
 
 class Attitude(Table):
-    """Rotation R^a_b of axes b in axes a: angles (40), (41), axis and angle (43), Euler parameters (45) or a matrix.
+    """Rotation matrix from the rotated axes of a body or joint to its reference axes, in one of five forms.
 
-    If several forms are given, they must agree; the first form in this order is used.
+    The forms are roll, pitch and yaw; zyz Euler angles; axis and angle; Euler parameters; a matrix. If several forms
+    are given, they must agree; the first in this order is used.
     """
 
     roll: Annotated[
@@ -59,7 +60,8 @@ class Attitude(Table):
         tuple[float, ...] | None, Rows("number", length=4, about="Euler parameters [eta, e1, e2, e3]")
     ] = None
     matrix: Annotated[
-        tuple | None, Matrix("number", about="rotation matrix; its columns are the rotated axes in the reference axes")
+        tuple | None,
+        Matrix("number", about="rotation matrix R; its columns are the rotated axes in the reference axes"),
     ] = None
 
     synonyms: ClassVar[dict[str, str]] = {
@@ -76,12 +78,12 @@ class Attitude(Table):
 
     @property
     def rotation(self) -> np.ndarray:
-        """R^a_b : float64[3, 3]; the identity if no form is given."""
+        """Rotation matrix : float64[3, 3], columns are the rotated axes in the reference axes; identity by default."""
         return next(iter(self._rotations().values()), np.eye(3))
 
     @property
     def parameters(self) -> np.ndarray:
-        """Euler parameters (eta, eps), eta not negative : float64[4]."""
+        """Euler parameters (eta, e1, e2, e3) of the rotation, eta not negative : float64[4]."""
         return attitude.euler_parameters(self.rotation)
 
     @classmethod
@@ -115,14 +117,14 @@ class Attitude(Table):
                 ("matrix",),
                 off,
                 ROUNDING,
-                f"R'R differs from the identity by {off:.2g}; the nearest rotation is used",
+                f"R'R differs from the identity by {off:.2g}, R the matrix; the nearest rotation is used",
             )
         for key, text, apart in self._deviations():
             if apart > ROUNDING:
                 yield (key,), apart, ROUNDING, f"{text}; the latter is used"
 
     def _rotations(self) -> dict[str, np.ndarray]:
-        """Rotation of each given form, by its first key."""
+        """Rotation matrix of each given form : first key of the form -> float64[3, 3]."""
         result = {}
         for keys, form in self.forms.items():
             values = [getattr(self, key) for key in keys]
@@ -133,7 +135,7 @@ class Attitude(Table):
         return result
 
     def _deviations(self) -> Iterator[tuple[str, str, float]]:
-        """(key, text, deviation [rad]) of every form except the first."""
+        """(key, text, angle [rad]) of the deviation of every form but the first from the first form."""
         (first, rotation), *others = self._rotations().items() or [("", None)]
         for key, other in others:
             angle = attitude.axis_angle(attitude.deviation(other, rotation))[1]
@@ -146,7 +148,7 @@ class Attitude(Table):
 
 
 def valid_values(table: type[Table], given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
-    """Values of the valid keys; the table itself reports faults of the other keys."""
+    """Read the values of the keys that are valid; leave out other keys, whose faults the table itself reports."""
     result = {}
     for key, value in table.values().items():
         try:
@@ -158,14 +160,14 @@ def valid_values(table: type[Table], given: dict[str, Any], setting: ReadContext
 
 
 def length_notices(key: str, given: tuple[float, ...] | None) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
-    """Notice of a direction or Euler parameters of a length other than 1; they are divided by it."""
+    """Notice of a direction or Euler parameters with a length other than 1; they are divided by their length."""
     length = math.hypot(*given) if given else 1.0
     if abs(length - 1.0) > ROUNDING:
         yield (key,), length, 1.0, f"its length is {length:.6g}, not 1; it is divided by it"
 
 
 def is_zero_vector(given: tuple[float, ...] | None) -> bool:
-    """True if a vector is given with zero length, or too short to be squared."""
+    """True if a vector is given and its length is zero, or too small to be squared."""
     return given is not None and math.hypot(*given) < SHORTEST
 
 

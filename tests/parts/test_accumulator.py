@@ -207,7 +207,7 @@ def test_a_precharge_above_the_line_is_kept_until_the_line_exceeds_it(law):
     [
         ({"gas_volume": None}, "no gas; expected one of precharge, gas_volume"),
         ({"precharge": 1e5}, "precharge and gas_volume are given; keep one"),
-        ({"gas_volume": 0.2}, "0.2 m3 is greater than volume, 0.1 m3"),
+        ({"gas_volume": 0.2}, "0.2 m3 is greater than `volume`, 0.1 m3"),
         ({"gas_volume": 0.0}, "out of range"),
         ({"exponent": 0.9}, "out of range; expected a value of at least 1"),
         ({"initial_pressure": 1000.0}, "vapour pressure"),

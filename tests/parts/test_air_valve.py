@@ -336,12 +336,12 @@ def test_staged_and_resumed_it_is_the_unbroken_run(tmp_path, end):
 
 @pytest.mark.parametrize(
     "more, said",
-    [({"throttled_outlet": None}, "switch: has no effect without throttled_outlet"),
-     ({"switch": None}, "throttled_outlet: has no effect without switch or switch_velocity"),
+    [({"throttled_outlet": None}, "switch: has no effect without `throttled_outlet`"),
+     ({"switch": None}, "throttled_outlet: has no effect without `switch` or `switch_velocity`"),
      ({"switch_velocity": 0.5}, "switch and switch_velocity are given; keep one"),
      ({"switch": None, "switch_velocity": -1.0}, "out of range"),
      ({"switch": None, "switch_velocity": 0.5, "throttled_outlet": None}, "switch_velocity: has no effect without"),
-     ({"throttled_outlet": 0.03}, "does not throttle; expected less than outlet")],
+     ({"throttled_outlet": 0.03}, "does not throttle; expected less than `outlet`")],
 )  # fmt: skip
 def test_what_is_wrong_with_its_stages_is_said(more, said):
     case = staged(**more)

@@ -96,7 +96,9 @@ def test_a_length_that_is_not_one_is_divided_by_and_said():
 def test_typed_digits_are_no_fault_but_said():
     typed = [[0.8660, -0.5, 0], [0.5, 0.8660, 0], [0, 0, 1]]
     one = read(matrix=typed)
-    assert notes(one) == [("matrix", "R'R differs from the identity by 4.4e-05; the nearest rotation is used")]
+    assert notes(one) == [
+        ("matrix", "R'R differs from the identity by 4.4e-05, R the matrix; the nearest rotation is used")
+    ]
     assert_allclose(one.rotation, Rotation.from_euler("z", np.arctan2(0.5, 0.866)).as_matrix(), rtol=0, atol=1e-15)
     one = read(matrix=typed, yaw="30.01 deg")  # of atan(0.5 / 0.866) = 30.00073 deg
     assert notes(one)[1] == (

@@ -280,21 +280,27 @@ def test_limits_and_claims_look_at_its_level():
 @pytest.mark.parametrize(
     "wrong, said",
     [
-        ({"diameter": None, "slope": None}, "level: has no effect on a vessel without a shape; give diameter or area"),
+        (
+            {"diameter": None, "slope": None},
+            "level: has no effect on a vessel without a shape; give the key `diameter` or `area`",
+        ),
         ({"gas_volume": 0.05}, "gas_volume and level are given; keep one"),
         ({"level": None}, "no gas; expected one of precharge, gas_volume, level"),
         ({"area": 0.1}, "diameter and area are given; keep one"),
-        ({"diameter": None, "area": 0.1}, "slope: applies only with diameter"),
-        ({"level": None, "precharge": 4e5}, "is not valid with precharge (a bladder)"),
+        ({"diameter": None, "area": 0.1}, "slope: applies only with `diameter`"),
+        ({"level": None, "precharge": 4e5}, "is not valid with `precharge` (a bladder)"),
         ({"slope": 45.0}, '2578.31 deg is steeper than upright; expected 0 to 90 deg, did you mean "45 deg"'),
         ({"slope": -0.1}, "out of range"),
         ({"level": 5.0}, "5 m leaves no volume for gas; the vessel is full at 0.827"),
-        ({"compressor": {"start": 0.2, "stop": 0.3, "flow": 1e-3}}, "compressor.stop: 0.3 m is not below start"),
+        (
+            {"compressor": {"start": 0.2, "stop": 0.3, "flow": 1e-3}},
+            "compressor.stop: 0.3 m is not below the level `start`",
+        ),
         ({"compressor": {"start": 2.0, "stop": 0.3, "flow": 1e-3}}, "2 m is never reached; the vessel is full at"),
         ({"compressor": {"start": 0.2}}, "stop is missing"),
         (
             {"bottom": 70.0},
-            "no steady state: the pressure at its place, 600000 Pa, is below that of the fluid column, 70.4 m",
+            "no steady state: the pressure at the node, 600000 Pa, is below that of the fluid column, 70.4 m",
         ),
         ({"inclination": 0.2}, "slope"),
     ],

@@ -1,9 +1,11 @@
-"""Gas and fluid in an accumulator, p V^n constant in the gas.
+"""Gas and fluid in an accumulator, with p V^n constant in the gas.
 
-The state of the node is y, the mass that has flowed in since the start [kg]. Under the law `linear` V = V0 - y / rho
-and p - p0 = p0 ((V / V0)^-n - 1). Under `log` and `table` rho(p) (total - V) = mass, solved by Newton for ln(V / V0).
-A bladder expands until it fills the vessel. Below that, only the fluid in the neck takes up pressure; it is as stiff
-as a small chamber.
+p and V are pressure and volume of the gas, p0 and V0 their values at the start, n the polytropic exponent. The state
+of the node is y, the mass of fluid that has flowed in since the start [kg]. Under the density law `linear`, with the
+density rho, V = V0 - y / rho and p - p0 = p0 ((V / V0)^-n - 1). Under the laws `log` and `table`, Newton's method
+solves rho(p) (total volume - V) = mass of the fluid for ln(V / V0).
+A bladder expands until it fills the vessel. Below that pressure, only the fluid in the neck takes up pressure; it is as
+stiff as a small chamber.
 """
 
 from math import exp, expm1, log, log1p
@@ -23,14 +25,18 @@ EXPONENT, GAS_VOLUME, TOTAL_VOLUME, NECK_STIFFNESS, EMPTY_MASS, EMPTY_PRESSURE =
     5,
 )  # indices into the numbers of an accumulator
 NUMBER_COUNT = 6
-"""Exponent n; gas volume in the profile [m3]; volume of gas, fluid and neck [m3]; stiffness of the neck [Pa/kg], 0
+"""Exponent n; gas volume at the start [m3]; volume of gas, fluid and neck [m3]; stiffness dp/dm of the neck [Pa/kg], 0
 without a neck; inflow since the start at which the gas just fills the vessel [kg], negative if fluid must flow out;
-pressure in that state minus that of the profile [Pa]."""
+pressure at that inflow minus the pressure at the start [Pa]."""
 
 
 @njit
 def gas_state(st, floats, node, at, y):
-    """(ln(V / V0) of the gas, p - p0 [Pa], dp/dm [Pa/kg]) after an inflow y [kg]."""
+    """Gas volume, pressure and stiffness of an accumulator after an inflow y since the start [kg].
+
+    Returns ln(V / V0), V the gas volume and V0 its value at the start; the pressure of the node minus that at the start
+    [Pa]; and the stiffness dp/dm, pressure rise per mass of fluid [Pa/kg]. floats[at:] : numbers of the accumulator
+    """
     n, neck, above_empty = floats[at + EXPONENT], floats[at + NECK_STIFFNESS], y - floats[at + EMPTY_MASS]
     if st["law"] != LAW_LINEAR:
         return gas_state_dense(st, floats, node, at, y)
@@ -49,7 +55,7 @@ def gas_state(st, floats, node, at, y):
 
 @njit
 def full_bladder_gas(floats, node, at):
-    """ln(V / V0) of a bladder that fills its vessel, by p V^n from the profile; 0 if it is full in the profile."""
+    """ln(V / V0) of the gas when its bladder fills the vessel; 0 if the bladder fills it at the start."""
     if floats[at + EMPTY_MASS] > 0.0:
         return 0.0
     return -log1p(floats[at + EMPTY_PRESSURE] / node["pressure"]) / floats[at + EXPONENT]
@@ -57,7 +63,7 @@ def full_bladder_gas(floats, node, at):
 
 @njit
 def gas_state_dense(st, floats, node, at, y):
-    """Values of `gas_state` under the laws log and table."""
+    """`gas_state` under the density laws `log` and `table`."""
     n, gas, total, neck = (
         floats[at + EXPONENT],
         floats[at + GAS_VOLUME],
@@ -90,7 +96,7 @@ def gas_state_dense(st, floats, node, at, y):
 
 @njit
 def set(t, y, out, tables, device):
-    """Write the pressure and stiffness of its node."""
+    """Write the pressure of the node minus that at the start [Pa], and its stiffness dp/dm [Pa/kg], into `out`."""
     i, layout = device["node"], tables.layout[0]
     node = tables.nodes[i]
     st, floats = tables.settings[0], tables.floats
@@ -101,7 +107,7 @@ def set(t, y, out, tables, device):
 
 @njit
 def events(t, y, out, tables, device, g):
-    """g: fluid left until the bladder or vessel is empty [kg], and its negative."""
+    """Write the event functions g: mass of fluid left until the bladder or vessel is empty [kg], then its negative."""
     left = y[tables.nodes[device["node"]]["y"]] - tables.floats[device["data"] + EMPTY_MASS]
     g[device["event"]], g[device["event"] + 1] = left, -left
 
@@ -122,14 +128,18 @@ def value(t, y, out, tables, device, quantity):
 
 @njit
 def gas_energy(p, gas, n, ambient, u):
-    """Minus the integral of (p - ambient) dV from volume `gas` at pressure p to exp(u) gas, p V^n constant [J]."""
+    """Energy that a gas takes up as its volume changes from `gas` to exp(u) `gas` with p V^n constant [J].
+
+    It is minus the integral of (pressure - ambient) dV. p : pressure at volume `gas` [Pa]
+    ambient : ambient pressure [Pa]
+    """
     work = -p * gas * u if n == 1.0 else p * gas * expm1((1.0 - n) * u) / (n - 1.0)
     return work + ambient * gas * expm1(u)
 
 
 @njit
 def accumulator_energy(st, floats, node, at, y):
-    """Stored energy after an inflow y [kg], minus that of the profile [J]."""
+    """Stored energy of an accumulator after an inflow y since the start [kg], minus that at the start [J]."""
     n, gas, empty, p0 = floats[at + EXPONENT], floats[at + GAS_VOLUME], floats[at + EMPTY_MASS], node["pressure"]
     neck = floats[at + NECK_STIFFNESS] if st["law"] == LAW_LINEAR else 0.0
     first = p0 + floats[at + EMPTY_PRESSURE] if floats[at + NECK_STIFFNESS] > 0.0 and empty > 0.0 else p0
@@ -149,12 +159,12 @@ def accumulator_energy(st, floats, node, at, y):
 
 @njit
 def stored(y, tables, device):
-    """Stored energy, change since the profile [J]."""
+    """Stored energy of the accumulator, minus that at the start [J]."""
     node = tables.nodes[device["node"]]
     return accumulator_energy(tables.settings[0], tables.floats, node, device["data"], y[node["y"]])
 
 
 @njit
 def power(t, y, dydt, out, tables, device):
-    """(0, rate of the stored energy, 0) [W]."""
+    """Power supplied from outside (0), rate of the stored energy, and power dissipated (0) [W]."""
     return 0.0, vessel_power(dydt, out, tables, device), 0.0

@@ -1,9 +1,9 @@
 """Volume, free surface and first moment of a vessel below a level: prisms, cylinders at any slope, tables of areas.
 
-For a cylinder with flat ends, radius R and length L, whose axis has the angle `slope` to the horizontal, a level z is
-the depth d = z / (R cos) at the lower end and d' = d - (L / R) tan at the upper end, both in radii. S(d) is the wetted
-segment of the unit circle, T and U are its first and second integral over d. Then V = R^3 cot (T(d) - T(d')) and
-dV/dz = R^2 (S(d) - S(d')) / sin.
+For a cylinder with flat ends, radius R and length L, whose axis has the angle `slope` to the horizontal, the water
+level z above the lowest point is the depth d = z / (R cos(slope)) at the lower end and d' = d - (L / R) tan(slope) at
+the upper end, both in radii. S(d) is the area of the unit circle below depth d; T and U are its first and second
+integral over d. Then the volume is V = R^3 cot(slope) (T(d) - T(d')), and dV/dz = R^2 (S(d) - S(d')) / sin(slope).
 """
 
 from math import acos, cos, pi, sin, sqrt
@@ -22,7 +22,7 @@ LEAST_SURFACE = 1e-6  # of the mean surface: least slope dV/dz in the search for
 
 @njit
 def segment(d):
-    """S(d): wetted area of the unit circle up to depth d, 0 to pi."""
+    """Area S(d) of the unit circle below depth d, from 0 to pi."""
     if d <= 0.0:
         return 0.0
     if d >= 2.0:
@@ -33,7 +33,7 @@ def segment(d):
 
 @njit
 def segment_integral(d):
-    """T(d): integral of S from 0 to d."""
+    """T(d), the integral of the wetted area S of the unit circle over its depth from 0 to d."""
     if d <= 0.0:
         return 0.0
     if d >= 2.0:
@@ -44,7 +44,7 @@ def segment_integral(d):
 
 @njit
 def segment_double_integral(d):
-    """U(d): integral of T from 0 to d."""
+    """U(d), the integral of T (see `segment_integral`) from 0 to d."""
     if d <= 0.0:
         return 0.0
     if d >= 2.0:
@@ -55,7 +55,7 @@ def segment_double_integral(d):
 
 @njit
 def cylinder_depths(floats, at, z):
-    """(d at the lower end, d at the upper end, tangent of the slope) of an inclined cylinder."""
+    """Depths at the lower and upper end of an inclined cylinder at level z, in radii, and the tangent of its slope."""
     radius, length, slope = floats[at + FIRST_SIZE], floats[at + SECOND_SIZE], floats[at + THIRD_SIZE]
     tangent = sin(slope) / cos(slope)
     d = z / (radius * cos(slope))
@@ -64,7 +64,7 @@ def cylinder_depths(floats, at, z):
 
 @njit
 def volume_below(floats, at, z):
-    """Volume below level z [m3]; z must lie within the vessel."""
+    """Volume of a vessel below level z above its bottom [m3]; z must lie within the vessel."""
     kind, first = int(floats[at + KIND]), floats[at + FIRST_SIZE]
     if kind == PRISM:
         return first * z
@@ -85,7 +85,7 @@ def volume_below(floats, at, z):
 
 @njit
 def surface_at(floats, at, z):
-    """Area of the free surface at level z [m2]."""
+    """Area of the free surface of a vessel at level z above its bottom [m2]."""
     kind, first = int(floats[at + KIND]), floats[at + FIRST_SIZE]
     if kind == PRISM:
         return first
@@ -105,7 +105,7 @@ def surface_at(floats, at, z):
 
 @njit
 def moment_below(floats, at, z):
-    """Integral of z dV from the bottom to level z [m4]."""
+    """Integral of z dV in a vessel from its bottom to level z [m4]."""
     kind, first = int(floats[at + KIND]), floats[at + FIRST_SIZE]
     if kind == PRISM:
         return 0.5 * first * z * z
@@ -122,7 +122,7 @@ def moment_below(floats, at, z):
 
 @njit
 def level_at(floats, at, volume):
-    """Level below which the vessel contains a volume [m], 0 for no volume; bounded Newton for a cylinder."""
+    """Level [m] above the bottom below which a vessel contains a volume [m3]; bounded Newton for cylinders."""
     kind = int(floats[at + KIND])
     if volume <= 0.0:
         return 0.0

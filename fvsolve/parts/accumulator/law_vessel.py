@@ -1,10 +1,11 @@
 """Gas and fluid in a vessel with a shape, in which the fluid has a level.
 
-The numbers are those of `law`, followed from `SHAPED` on by those below. The gas follows
-p V^n = p0 V0^n (1 + a)^n, where a is the gas that a compressor has added, relative to the gas at the start. Under the
-law `linear` the pressure of the node is that of the gas plus rho g (bottom + level). Otherwise the fluid inside has
-one density rho(q), at the pressure q = p + rho g (level - z) of its centroid z, and h(q) + g (bottom + z) equals the
-enthalpy of the node. All quantities then follow from one energy.
+The numbers of the vessel are those of `law`, followed from index `SHAPED` on by those below. The gas follows
+p V^n = p0 V0^n (1 + a)^n, with its pressure p and volume V, their values p0 and V0 at the start, the exponent n, and
+the gas `a` that a compressor has added, relative to the gas at the start. Under the density law `linear` the pressure
+of the node is that of the gas plus rho g (bottom + level). Under the other laws the fluid inside has one density
+rho(q), with q = p + rho g (level - z) the pressure at its centroid, z above the bottom; h(q) + g (bottom + z) equals
+the enthalpy of the node, h the specific enthalpy. All these values then follow from one energy of gas and fluid.
 """
 
 from math import exp, expm1, log, log1p
@@ -20,20 +21,24 @@ from fvsolve.parts.accumulator.law import NUMBER_COUNT as SHAPED
 from fvsolve.parts.accumulator.law_shape import FULL_LEVEL, level_at, moment_below, surface_at
 
 GAS_PRESSURE, LEVEL, BOTTOM, COMPRESSOR_RATE, START_LEVEL, STOP_LEVEL, SHAPE = range(SHAPED, SHAPED + 7)
-"""Gas pressure [Pa] and level [m] in the profile; height of the bottom above the node [m]; of the compressor, da/dt
+"""Gas pressure [Pa] and level [m] at the start; height of the bottom above the node [m]; of the compressor, da/dt
 [1/s] and the levels at which it starts and stops [m]; the first number of the shape."""
 LEAST_SURFACE = 1e-3  # of the mean surface: lower bound in the stiffness, for a little fluid in a corner
 
 
 @njit
 def compressor_gas(y, device):
-    """a: gas added by the compressor, relative to the gas at the start."""
+    """Gas `a` that the compressor has added, relative to the gas at the start [-]."""
     return y[device["y"]] if device["states"] > 0 else 0.0
 
 
 @njit
 def vessel_state(st, floats, node, at, y, a):
-    """(ln(V / V0) of the gas, its pressure minus that of the profile [Pa], volume [m3] and level [m] of the fluid)."""
+    """Gas and fluid of a vessel after an inflow y since the start [kg] and added gas `a` [-].
+
+    Returns ln(V / V0) of the gas, V its volume and V0 its volume at the start; the gas pressure minus that at the start
+    [Pa]; the volume [m3] and the level [m] of the fluid.
+    """
     gas, total, n, first = (
         floats[at + GAS_VOLUME],
         floats[at + TOTAL_VOLUME],
@@ -51,7 +56,10 @@ def vessel_state(st, floats, node, at, y, a):
 
 @njit
 def vessel_state_dense(st, floats, node, at, y, a):
-    """(ln(V / V0) of the gas, volume of the fluid [m3]) with rho(q) V equal to the mass of the fluid, by Newton."""
+    """ln(V / V0) of the gas and volume of the fluid [m3] under the density laws `log` and `table`.
+
+    Newton's method solves rho(q) times fluid volume = mass of the fluid; q is the pressure at the centroid.
+    """
     gas, total, n, first = (
         floats[at + GAS_VOLUME],
         floats[at + TOTAL_VOLUME],
@@ -78,7 +86,10 @@ def vessel_state_dense(st, floats, node, at, y, a):
 
 @njit
 def centroid_pressure_rise(st, floats, at, mass, volume):
-    """(rho g (level - z) of a mass in a volume, z its centroid [Pa]; its derivative by the volume [Pa/m3])."""
+    """Pressure at the centroid of a fluid minus that at its surface [Pa], and its derivative by the volume [Pa/m3].
+
+    The rise is rho g times the depth of the centroid, with rho = mass [kg] / volume [m3].
+    """
     if volume <= 0.0 or mass <= 0.0:
         return 0.0, 0.0
     level = level_at(floats, at + SHAPE, volume)
@@ -89,7 +100,7 @@ def centroid_pressure_rise(st, floats, at, mass, volume):
 
 @njit
 def surface_area(floats, at, level):
-    """Area of the free surface at a level [m2], at least `LEAST_SURFACE` of the mean area."""
+    """Area of the free surface at a level [m2], at least the fraction `LEAST_SURFACE` of the mean area."""
     return max(
         surface_at(floats, at + SHAPE, level),
         LEAST_SURFACE * floats[at + TOTAL_VOLUME] / floats[at + SHAPE + FULL_LEVEL],
@@ -98,7 +109,10 @@ def surface_area(floats, at, level):
 
 @njit
 def pressure_and_stiffness(st, floats, node, at, y, a):
-    """(pressure of the node minus that of the profile [Pa], dp/dm [Pa/kg])."""
+    """Pressure of the node minus that at the start [Pa], and stiffness dp/dm [Pa/kg].
+
+    y : inflow since the start [kg]; a : added gas relative to the gas at the start [-]
+    """
     n, gas = floats[at + EXPONENT], floats[at + GAS_VOLUME]
     u, change, volume, level = vessel_state(st, floats, node, at, y, a)
     p, gas_stiffness = floats[at + GAS_PRESSURE] + change, n / (gas * exp(u))
@@ -117,20 +131,26 @@ def pressure_and_stiffness(st, floats, node, at, y, a):
 
 @njit
 def centroid_state(st, floats, node, at, y, p, volume, level):
-    """(pressure of the fluid at its centroid [Pa], height of the centroid above the bottom [m])."""
+    """Pressure of the fluid at its centroid [Pa], and height of the centroid above the bottom [m].
+
+    p : gas pressure [Pa]; volume, level : those of the fluid [m3], [m]
+    """
     z = moment_below(floats, at + SHAPE, level) / volume if volume > 0.0 else 0.0
     return p + centroid_pressure_rise(st, floats, at, node["mass"] + y, volume)[0], z
 
 
 @njit
 def node_pressure(st, floats, at, q, z):
-    """Pressure of the node [Pa] for fluid of pressure q at its centroid z, laws log and table."""
+    """Pressure of the node [Pa] under the density laws `log` and `table`.
+
+    q : pressure of the fluid at its centroid [Pa]; z : height of the centroid above the bottom [m]
+    """
     return pressure_of_enthalpy(st, floats, enthalpy(st, floats, q) + st["gravity"] * (floats[at + BOTTOM] + z))
 
 
 @njit
 def set(t, y, out, tables, device):
-    """Write the pressure and stiffness of its node."""
+    """Write the pressure of the node minus that at the start [Pa], and its stiffness dp/dm [Pa/kg], into `out`."""
     i, layout, at = device["node"], tables.layout[0], device["data"]
     node, st = tables.nodes[i], tables.settings[0]
     a = compressor_gas(y, device)
@@ -141,21 +161,24 @@ def set(t, y, out, tables, device):
 
 @njit
 def compressor_rate(tables, device):
-    """da/dt while the compressor runs, otherwise 0 [1/s]."""
+    """Rate at which the running compressor adds gas, relative to the gas at the start [1/s]; 0 while it is off."""
     runs = device["states"] > 0 and tables.armed[device["event"] + 2] > 0.0
     return tables.floats[device["data"] + COMPRESSOR_RATE] if runs else 0.0
 
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    """d/dt of the gas added by the compressor."""
+    """Write the rate of the gas added by the compressor into `dydt`."""
     if dydt.size > 0 and device["states"] > 0:
         dydt[device["y"]] = compressor_rate(tables, device)
 
 
 @njit
 def events(t, y, out, tables, device, g):
-    """g: fluid left until the vessel is empty [kg], and its negative; level left until the compressor switches [m]."""
+    """Write the event functions g: mass of fluid left until the vessel is empty [kg], then its negative.
+
+    With a compressor, the level left until it starts or stops [m] and its negative follow.
+    """
     node, st, floats, at = tables.nodes[device["node"]], tables.settings[0], tables.floats, device["data"]
     left, flag = y[node["y"]] - floats[at + EMPTY_MASS], device["event"]
     g[flag], g[flag + 1] = left, -left
@@ -182,7 +205,11 @@ def value(t, y, out, tables, device, quantity):
 
 @njit
 def compressed_gas_energy(p, gas, n, ambient, a):
-    """Energy above ambient that a times the gas adds at constant volume, from pressure p and volume `gas` [J]."""
+    """Energy above ambient that added gas brings at constant volume [J].
+
+    p, gas : pressure [Pa] and volume [m3] before; a : added gas relative to the gas present; n : polytropic exponent;
+    ambient : ambient pressure [Pa]
+    """
     r = 1.0 + a
     if n == 1.0:
         return p * gas * (r * log1p(a) + a * (log(p / ambient) - 1.0))
@@ -192,7 +219,10 @@ def compressed_gas_energy(p, gas, n, ambient, a):
 
 @njit
 def compression_energy_rate(p, gas, n, ambient, a):
-    """d/da of that energy, p at a: work of compression from ambient along p V^n constant [J]."""
+    """Derivative of the energy of the added gas by its relative amount `a` [J]; p : pressure [Pa] with `a` added.
+
+    It is the work of compression from ambient pressure with p V^n constant.
+    """
     if n == 1.0:
         return p * gas * log(p / ambient) / (1.0 + a)
     return n / (n - 1.0) * (p * gas - ambient * gas * (p / ambient) ** (1.0 / n)) / (1.0 + a)
@@ -200,7 +230,7 @@ def compression_energy_rate(p, gas, n, ambient, a):
 
 @njit
 def stored_energy_change(st, floats, node, at, y, a):
-    """Stored energy after an inflow y [kg] and added gas a, minus that of the profile [J]."""
+    """Stored energy after an inflow y [kg] and added gas `a` [-], minus that at the start [J]."""
     n, gas, total, first = (
         floats[at + EXPONENT],
         floats[at + GAS_VOLUME],
@@ -227,7 +257,7 @@ def stored_energy_change(st, floats, node, at, y, a):
 
 @njit
 def stored(y, tables, device):
-    """Stored energy, change since the profile [J]."""
+    """Stored energy of the vessel, minus that at the start [J]."""
     node = tables.nodes[device["node"]]
     return stored_energy_change(
         tables.settings[0], tables.floats, node, device["data"], y[node["y"]], compressor_gas(y, device)
@@ -236,7 +266,7 @@ def stored(y, tables, device):
 
 @njit
 def power(t, y, dydt, out, tables, device):
-    """(power of the compressor, rate of the stored energy, 0) [W]."""
+    """Power supplied by the compressor, rate of the stored energy, and power dissipated (0) [W]."""
     supplied, rate = 0.0, compressor_rate(tables, device)
     if rate > 0.0:
         st, floats, at = tables.settings[0], tables.floats, device["data"]

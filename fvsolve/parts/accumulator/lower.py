@@ -1,4 +1,4 @@
-"""Accumulators in the tables of a model."""
+"""Rows and initial states of accumulators and air vessels in the tables of a model."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ NECK_SHARE = 0.01  # volume of the neck of a bladder accumulator over its volume
 
 
 class AccumulatorRows(Device, kind="accumulator"):
-    """A vessel whose pressure is that of its gas."""
+    """Rows of accumulators: vessels whose node has the pressure of the gas."""
 
     law = law
     vessel = True
@@ -73,17 +73,20 @@ class AccumulatorRows(Device, kind="accumulator"):
         return []
 
     def change(self, model, row, y: float) -> float:
-        """Pressure minus that of the profile [Pa] after an inflow y [kg]."""
+        """Pressure of the node minus that at the start [Pa] after an inflow y [kg]."""
         st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
         return law.gas_state(st, floats, node, int(row["data"]), y)[1]
 
     def energy(self, model, row, y: float) -> float:
-        """Stored energy after an inflow y [kg], minus that of the profile [J]."""
+        """Stored energy after an inflow y since the start [kg], minus that at the start [J]."""
         st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
         return law.accumulator_energy(st, floats, node, int(row["data"]), y)
 
     def above(self, model, part, row) -> float:
-        """Stored energy minus that of the state that can release no more: energy head 0, or no fluid left [J]."""
+        """Stored energy at the start minus that of the state that can release no more [J].
+
+        In that state the energy head is 0, or no fluid is left.
+        """
         from fvsolve.kernels.barotropic_energy import energy_head
 
         st, floats = model.tables.settings[0], model.tables.floats
@@ -104,7 +107,7 @@ class AccumulatorRows(Device, kind="accumulator"):
 
 
 class ShapedRows(AccumulatorRows, kind=""):
-    """An air vessel with a shape, whose fluid has weight."""
+    """Rows of air vessels with a shape; the weight of the fluid acts on the node."""
 
     quantities = (*AccumulatorRows.quantities, "level")
 
@@ -136,8 +139,8 @@ class ShapedRows(AccumulatorRows, kind=""):
                 draft.case.amount(node["pressure"], "pressure", 6),
                 draft.case.amount(height, "head", span=True),
             )
-            text = (f"no steady state: the pressure at its place, {pressure}, is below that of the fluid column, "
-                    f"{head} high, so the gas would have no pressure; set bottom or level lower")  # fmt: skip
+            text = (f"no steady state: the pressure at the node, {pressure}, is below that of the fluid column, {head} "
+                    "high, so the gas would have no pressure; set the key `bottom` or `level` lower")  # fmt: skip
             draft.fault(f"nodes.{name}.{'level' if part.gas_volume is None else 'gas_volume'}", text)
             return []
         floats = draft.tables.floats
@@ -163,7 +166,7 @@ class ShapedRows(AccumulatorRows, kind=""):
 
 
 class CompressorRows(ShapedRows, kind=""):
-    """An air vessel whose compressor limits the level."""
+    """Rows of air vessels with a compressor, which limits the level."""
 
     states = ("gas",)
     events = (*ShapedRows.events, "compressor starts", "compressor stops")
@@ -172,7 +175,11 @@ class CompressorRows(ShapedRows, kind=""):
         return [0.1]
 
     def energy_rows(self, model, part, row, y, out):
-        """n p V / 2 (da / (1 + a) + dy / (rho V))^2 of the gas, g / (2 rho surface) dy^2 of the weight of the fluid."""
+        """Rows of a matrix L, as state index -> factor: |L dy|^2 is the energy [J] of a small deviation dy.
+
+        With added gas a, inflow y, density rho, gas pressure p and volume V, exponent n and free surface S, the energy
+        is n p V / 2 (da / (1 + a) + dy / (rho V))^2 of the gas and g / (2 rho S) dy^2 of the weight of the fluid.
+        """
         st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
         at, mass, a, rho = int(row["data"]), int(node["y"]), float(y[row["y"]]), model.case.properties.density
         u, change, _, _ = self.law.vessel_state(st, floats, node, at, float(y[mass]), a)

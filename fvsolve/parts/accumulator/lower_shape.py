@@ -15,8 +15,9 @@ SLOPE_TOLERANCE = 1e-6  # axis rise over radius below which a cylinder counts as
 class VesselStart:
     """Gas and fluid of a vessel with a shape at the start.
 
-    gas : gas volume [m3]; held : fluid volume [m3]; level : level of the fluid above the bottom [m]
+    gas, fluid_volume : volumes of gas and fluid [m3]; level : level of the fluid above the bottom [m]
     centroid : height of the centroid of the fluid above the bottom [m]
+    bottom : height of the bottom above the node [m]
     """
 
     def __init__(self, start, part) -> None:
@@ -31,7 +32,7 @@ class VesselStart:
         self.centroid = below / self.fluid_volume if self.fluid_volume > 0.0 else 0.0
 
     def gas_pressure(self, p: float) -> tuple[float, float]:
-        """(pressure of the gas [Pa], mass of the fluid [kg]) for pressure p of the node."""
+        """Pressure of the gas [Pa] and mass of the fluid [kg] at a pressure p of the node [Pa]."""
         if self.law.linear:
             rho = self.law.rho
             return p - rho * self.gravity * (self.bottom + self.level), rho * self.fluid_volume
@@ -41,7 +42,7 @@ class VesselStart:
         return q - rho * self.gravity * (self.level - self.centroid), rho * self.fluid_volume
 
     def node_pressure(self, gas: float) -> float:
-        """Pressure of the node [Pa] for a pressure of the gas."""
+        """Pressure of the node [Pa] at a pressure `gas` of the gas [Pa]."""
         if self.law.linear:
             return gas + self.law.rho * self.gravity * (self.bottom + self.level)
         q = gas
@@ -51,7 +52,7 @@ class VesselStart:
 
 
 def shape_numbers(part) -> list[float]:
-    """Numbers of the shape of a vessel, in the order of `law_shape`."""
+    """Numbers of the shape of a vessel in the order of `law_shape`: kind, level when full, three sizes or a table."""
     top = height_of(part)
     if part.diameter is None:
         if not hasattr(part.area, "level") or len(part.area.level) == 1:

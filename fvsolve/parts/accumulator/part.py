@@ -23,11 +23,12 @@ GAS_KEYS = ("precharge", "gas_volume", "level")  # keys that determine the amoun
 
 
 class Accumulator(Node, kind="accumulator"):
-    """A bladder accumulator (`precharge`) or an air vessel (`gas_volume`, `level`): p V^n constant in its gas.
+    """A bladder accumulator (`precharge`) or an air vessel (`gas_volume`, `level`), with p V^n constant in its gas.
 
     Ports: any number, at one pressure: that of the gas, plus the weight of the fluid column above the node if a shape
-    (`diameter` or `area`) is given. Stored energy, p from ambient: of the gas, p0 V0 ((V0 / V)^(n-1) - 1) / (n - 1)
-    minus the work of ambient, and of the height of the fluid [J]. Dissipated energy: that of its connection.
+    (`diameter` or `area`) is given. Stored energy [J]: p0 V0 ((V0 / V)^(n-1) - 1) / (n - 1) of the gas, minus the work
+    of ambient pressure, plus the potential energy of the fluid; p is pressure, V gas volume, p0 and V0 at the start,
+    n `exponent`. Dissipated energy: that of its connection.
 
     A bladder fills `volume` at `precharge`. Below that pressure only the fluid in the neck, 1 % of `volume`, is
     compressed. An air vessel that runs empty lets its air into the node.
@@ -47,7 +48,8 @@ class Accumulator(Node, kind="accumulator"):
         float | None,
         Quantity(
             "pressure",
-            about="gas pressure at which the bladder fills volume [Pa]; gas_volume or level is needed if left out",
+            about="gas pressure at which the bladder fills `volume` [Pa]; "
+            "`gas_volume` or `level` is needed if left out",
             usual=GAS_PRESSURES,
         ),
     ] = None
@@ -56,7 +58,7 @@ class Accumulator(Node, kind="accumulator"):
         Quantity(
             "volume",
             positive,
-            "gas volume of an air vessel at the start [m3]; precharge or level is needed if left out",
+            "gas volume of an air vessel at the start [m3]; `precharge` or `level` is needed if left out",
             VOLUMES,
         ),
     ] = None
@@ -65,13 +67,13 @@ class Accumulator(Node, kind="accumulator"):
         Quantity(
             "level",
             nonnegative,
-            "level of the fluid above the bottom at the start [m]; precharge or gas_volume is needed if left out",
+            "fluid level above the bottom at the start [m]; `precharge` or `gas_volume` is needed if left out",
             LEVELS,
         ),
     ] = None
     diameter: Annotated[
         float | None,
-        Quantity("length", positive, "diameter of a cylinder with flat ends, whose length follows from volume [m]",
+        Quantity("length", positive, "diameter of a cylinder with flat ends, whose length follows from `volume` [m]",
                  UsualRange(0.01, 10.0, "pilot vessels to field-built ones")),
     ] = None  # fmt: skip
     slope: Annotated[
@@ -92,7 +94,7 @@ class Accumulator(Node, kind="accumulator"):
         float, Number(Range(1.0), "polytropic exponent n in p V^n: 1 isothermal, 1.4 adiabatic air", EXPONENTS)
     ] = 1.2
     initial_pressure: Annotated[
-        float | None, Quantity("pressure", about="gas pressure at the start [Pa]; in equilibrium if left out")
+        float | None, Quantity("pressure", about="gas pressure at the start [Pa]; that of the steady state if left out")
     ] = None
     connection: Annotated[Connection | None, ConnectionTable()] = None
 
@@ -111,15 +113,15 @@ class Accumulator(Node, kind="accumulator"):
         faults += [(keys, f"no gas; {message}") for keys, message in missing_key_faults(given, GAS_KEYS)]
         shapes = [key for key in SHAPE_KEYS if key in given]
         if not shapes:
-            text = "has no effect on a vessel without a shape; give diameter or area, or remove it"
+            text = "has no effect on a vessel without a shape; give the key `diameter` or `area`, or remove this key"
             faults += [((key,), text) for key in KEYS_WITH_SHAPE if key in given]
         elif "precharge" in given:
-            text = (
-                "is not valid with precharge (a bladder); give gas_volume or level in place of precharge, or remove it"
-            )
+            text = "is not valid with `precharge` (a bladder); give `gas_volume` or `level` instead, or remove this key"
             faults += [((key,), text) for key in shapes]
         if "slope" in given and shapes == ["area"]:
-            faults.append((("slope",), "applies only with diameter; area gives the surface at all levels"))
+            faults.append(
+                (("slope",), "applies only with `diameter`; `area` gives the surface at all levels; remove it")
+            )
         return faults
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -127,7 +129,7 @@ class Accumulator(Node, kind="accumulator"):
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         if (self.gas_volume or 0.0) > self.volume:
-            yield ("gas_volume",), f"{self.gas_volume:g} m3 is greater than volume, {self.volume:g} m3"
+            yield ("gas_volume",), f"{self.gas_volume:g} m3 is greater than `volume`, {self.volume:g} m3; expected less"
         if self.initial_pressure is not None:
             yield from around.boiling_faults("nodes", name, "initial_pressure", [self.initial_pressure])
         if not self.has_shape:
@@ -142,12 +144,12 @@ class Accumulator(Node, kind="accumulator"):
         if self.compressor is not None:
             start, stop = self.compressor.start, self.compressor.stop
             if stop >= start:
-                yield ("compressor", "stop"), f"{stop:g} m is not below start, {start:g} m; set it lower"
+                yield ("compressor", "stop"), f"{stop:g} m is not below the level `start`, {start:g} m; set it lower"
             if start >= top:
                 yield ("compressor", "start"), f"{start:g} m is never reached; the vessel is full at {top:.6g} m"
 
 
 class Vessel(Accumulator):
-    """A vessel with a shape; its level can be probed."""
+    """An accumulator with a shape, so that its level can be probed."""
 
     quantities: ClassVar[dict[str, str]] = {**Accumulator.quantities, "level": "level"}

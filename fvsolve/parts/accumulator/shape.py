@@ -17,7 +17,7 @@ class Compressor(Table):
 
     start: Annotated[float, Quantity("level", nonnegative, "fluid level at which the compressor starts [m]", LEVELS)]
     stop: Annotated[
-        float, Quantity("level", nonnegative, "fluid level, below start, at which the compressor stops [m]", LEVELS)
+        float, Quantity("level", nonnegative, "fluid level, below `start`, at which the compressor stops [m]", LEVELS)
     ]
     flow: Annotated[
         float,
@@ -29,12 +29,12 @@ class Compressor(Table):
 
 
 def length_of(vessel: Any) -> float:
-    """Length of a cylindrical vessel [m]."""
+    """Length of a cylindrical vessel [m], from its volume and diameter."""
     return vessel.volume / (math.pi * (0.5 * vessel.diameter) ** 2)
 
 
 def height_of(vessel: Any) -> float:
-    """Level at which a vessel with a shape is full [m]."""
+    """Level above the bottom at which a vessel with a shape is full [m]."""
     if vessel.diameter is not None:
         slope = UPRIGHT if vessel.slope is None else vessel.slope
         across = vessel.diameter * math.cos(slope) if slope < UPRIGHT else 0.0

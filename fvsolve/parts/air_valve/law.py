@@ -1,9 +1,11 @@
 """Air that a valve admits to and releases from a chamber above the fluid.
 
-p V = m R T, V = V0 - y / rho, where y [kg] is the fluid that has flowed in. The flow of air is isentropic through an
-orifice in each direction, choked below r = 0.528 (Wylie and Streeter 1993, 7-4). Open (armed[event]), the valve lets
-fluid pass; shut, it does not, and the node is a junction. The valve opens when the pressure at the node falls below
-ambient. It shuts when the air volume is V0 again and fluid still flows in.
+p V = m R T, with p, V, m and T pressure, volume, mass and temperature of the air, and V = V0 - y / rho; V0 is the
+volume of the empty chamber, y the mass of fluid that has flowed in [kg] and rho its density. The flow of air is
+isentropic through an orifice in each direction, choked below the pressure ratio 0.528 (Wylie and Streeter 1993, 7-4).
+While open (flag armed[event]), the valve lets fluid into the chamber; while shut, the node is a junction. The valve
+opens when the pressure at the node falls below ambient. It shuts when the air volume is V0 again and fluid still flows
+in.
 
 A throttling valve releases air through its wide bore until the air pressure is `SWITCH_PRESSURE` above ambient, or
 until the air is above ambient and fluid flows in at `SWITCH_FLOW`. From then on (armed[event + 2]) it releases air
@@ -21,9 +23,9 @@ from fvsolve.kernels.restrictions import restriction_slope
 from fvsolve.kernels.valves import flow_at_drop
 
 VOLUME, AIR_MASS, RT, INLET_AREA, OUTLET_AREA, SWITCH_PRESSURE, THROTTLED_AREA, SWITCH_FLOW = 0, 1, 2, 3, 4, 5, 6, 7
-"""Numbers: V0 [m3], mass of V0 of air at ambient pressure [kg], R T [J/kg], Cd A in and out [m2]; pressure
-above ambient from which the valve throttles [Pa], 0 for none; Cd A out while it throttles [m2]; flow of fluid from
-which it throttles [kg/s], 0 for none."""
+"""Numbers of an air valve: chamber volume V0 [m3], mass of air in V0 at ambient pressure [kg], R T [J/kg], Cd A of the
+inlet and of the outlet [m2]; pressure above ambient from which the valve throttles [Pa], 0 for none; Cd A of the outlet
+while it throttles [m2]; flow of fluid from which it throttles [kg/s], 0 for none."""
 KAPPA = 1.4
 CRITICAL_RATIO = (2.0 / (KAPPA + 1.0)) ** (KAPPA / (KAPPA - 1.0))
 SMALL_DROP = 1e-3  # pressure drop over upstream pressure below which a polynomial replaces the square root
@@ -35,7 +37,10 @@ EQUALISATION_TIME = 0.02  # shortest time constant in which the air left after s
 
 @njit
 def orifice_flow(r):
-    """Mass flow from p0 to r p0 over Cd A p0 / sqrt(R T) [-], isentropic, choked below CRITICAL_RATIO."""
+    """Dimensionless mass flow of air from pressure p0 to r p0, over Cd A p0 / sqrt(R T).
+
+    Isentropic flow through an orifice, choked below CRITICAL_RATIO. r : pressure ratio, at most 1
+    """
     x, power = 1.0 - max(r, CRITICAL_RATIO), (KAPPA - 1.0) / KAPPA
     factor = -expm1(power * log1p(-x)) / x if x > 0.0 else power
     root = flow_at_drop(1.0, sqrt(SMALL_DROP), x)
@@ -44,7 +49,10 @@ def orifice_flow(r):
 
 @njit
 def air_state(st, floats, node, at, y_fluid, y_air):
-    """(pressure of the air above ambient [Pa], its volume [m3], its mass [kg])."""
+    """Pressure of the air above ambient [Pa], its volume [m3] and its mass [kg].
+
+    y_fluid, y_air : mass of fluid and of air that have entered the chamber since the start [kg]
+    """
     volume, start_mass = floats[at + VOLUME], floats[at + AIR_MASS]
     filled = y_fluid / (node["density"] * volume)
     left = max(1e-3, 1.0 - filled)
@@ -53,13 +61,13 @@ def air_state(st, floats, node, at, y_fluid, y_air):
 
 @njit
 def has_throttled_outlet(floats, at):
-    """True if the valve has a small bore for air out."""
+    """True if the valve has a small bore for throttled air outflow."""
     return floats[at + SWITCH_PRESSURE] > 0.0 or floats[at + SWITCH_FLOW] > 0.0
 
 
 @njit
 def outlet_area(tables, device):
-    """Present Cd A for air out [m2]."""
+    """Cd A for air outflow in the present mode of the valve [m2]."""
     floats, at = tables.floats, device["data"]
     if has_throttled_outlet(floats, at) and tables.armed[device["event"] + 2] > 0.0:
         return floats[at + THROTTLED_AREA]
@@ -68,9 +76,9 @@ def outlet_area(tables, device):
 
 @njit
 def air_inflow(st, floats, at, gauge, outlet):
-    """(mass flow of air into the chamber [kg/s], its greatest slope over relative pressure [kg/s]).
+    """Mass flow of air into the chamber [kg/s], and the greatest slope of this flow over relative pressure [kg/s].
 
-    outlet : Cd A for air out [m2]
+    gauge : pressure of the air above ambient [Pa]; outlet : Cd A for air outflow [m2]
     """
     p, root = st["ambient"] + gauge, sqrt(floats[at + RT])
     if gauge < 0.0:
@@ -87,7 +95,10 @@ def air_inflow(st, floats, at, gauge, outlet):
 
 @njit
 def set(t, y, out, tables, device):
-    """Write pressure and stiffness of the chamber and the conductance of the connection, 0 while shut."""
+    """Write pressure and stiffness of the chamber and the conductance of the connection into `out`.
+
+    Pressure minus ambient [Pa]; stiffness dp/dm [Pa/kg]; conductance [kg2/s2/Pa], 0 while the valve is shut.
+    """
     st, floats, layout, i = tables.settings[0], tables.floats, tables.layout[0], device["node"]
     node, k = tables.nodes[i], device["valve"]
     gauge, volume, _ = air_state(st, floats, node, device["data"], y[node["y"]], y[device["y"]])
@@ -103,7 +114,7 @@ def set(t, y, out, tables, device):
 
 @njit
 def air_rate(y, tables, device):
-    """(d/dt of the air mass in the chamber [kg/s], its rate limit [1/s], R T ln(p / p_ambient) [J/kg])."""
+    """Rate of the air mass in the chamber [kg/s], its rate limit [1/s], and R T ln(p / p_ambient) of the air [J/kg]."""
     st, floats, at = tables.settings[0], tables.floats, device["data"]
     node = tables.nodes[device["node"]]
     gauge, volume, mass = air_state(st, floats, node, at, y[node["y"]], y[device["y"]])
@@ -117,7 +128,7 @@ def air_rate(y, tables, device):
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    """d/dt of the air mass in the chamber, and its rate limit."""
+    """Write the rate of the air mass in the chamber into `dydt`, and raise out[RATE] to its rate limit."""
     flow, rate, _ = air_rate(y, tables, device)
     out[RATE] = max(out[RATE], rate, fluid_rate_limit(out, tables, device))
     if dydt.size > 0:
@@ -126,7 +137,7 @@ def move(t, y, dydt, out, tables, device):
 
 @njit
 def fluid_rate_limit(out, tables, device):
-    """Rate of the fluid in the open chamber [1/s]: stiffness times the flow slopes of all that join the node."""
+    """Rate of the fluid in the open chamber [1/s]: stiffness times the flow slopes of all parts that join the node."""
     layout, nodes, valves, own = tables.layout[0], tables.nodes, tables.valves, device["valve"]
     place = valves[own]["from_node"]
     if tables.armed[device["event"]] <= 0.0:
@@ -142,7 +153,11 @@ def fluid_rate_limit(out, tables, device):
 
 @njit
 def events(t, y, out, tables, device, g):
-    """g: margins until it opens [Pa] or shuts, negative [kg], and until throttling changes; each with its negative."""
+    """Write the event functions g, each followed by its negative.
+
+    If shut, the pressure left until the valve opens [Pa]; if open, minus the mass of fluid left until it shuts [kg].
+    With a throttled outlet, the margin until throttling begins or ends follows.
+    """
     st, floats, at = tables.settings[0], tables.floats, device["event"]
     node, place = tables.nodes[device["node"]], tables.valves[device["valve"]]["from_node"]
     fluid = y[node["y"]]
@@ -164,9 +179,10 @@ def events(t, y, out, tables, device, g):
 
 @njit
 def throttling_margin(out, tables, device, gauge):
-    """Margin until throttling begins: pressure [Pa], or fluid flow [kg/s] and air pressure above PRESSURE_MARGIN.
+    """Margin until throttling begins: pressure [Pa], or with SWITCH_FLOW the greater of two margins.
 
-    At ambient pressure itself the wide bore is in use again, so a margin of zero there would switch both ways.
+    These are of the fluid flow [kg/s] and of the air pressure above PRESSURE_MARGIN [Pa]. At ambient pressure itself
+    the wide bore is in use again, so a margin of zero there would switch both ways.
     """
     floats, at = tables.floats, device["data"]
     if floats[at + SWITCH_PRESSURE] > 0.0:
@@ -185,7 +201,10 @@ def value(t, y, out, tables, device, quantity):
 
 @njit
 def air_energy(st, floats, node, at, y_fluid, y_air):
-    """m R T (ln(p / p_ambient) - 1) + p_ambient V of air, and height of fluid; 0 in the profile [J]."""
+    """Stored energy of the air and of the height of the fluid in the chamber, 0 at the start [J].
+
+    The energy of the air is m R T (ln(p / p_ambient) - 1) + p_ambient V; m, p and V are its mass, pressure and volume.
+    """
     gauge, volume, mass = air_state(st, floats, node, at, y_fluid, y_air)
     energy = mass * floats[at + RT] * log1p(gauge / st["ambient"]) - gauge * volume
     return energy + st["gravity"] * (node["elevation"] - st["datum"]) * y_fluid
@@ -193,13 +212,13 @@ def air_energy(st, floats, node, at, y_fluid, y_air):
 
 @njit
 def stored(y, tables, device):
-    """Stored energy, change since the profile [J]."""
+    """Stored energy of the chamber, minus that at the start [J]."""
     node = tables.nodes[device["node"]]
     return air_energy(tables.settings[0], tables.floats, node, device["data"], y[node["y"]], y[device["y"]])
 
 
 @njit
 def power(t, y, dydt, out, tables, device):
-    """(0, rate of the stored energy, dissipation of the air in the orifice) [W]."""
+    """Power supplied (0), rate of the stored energy, and power that the air dissipates in the orifice [W]."""
     potential = air_rate(y, tables, device)[2] * dydt[device["y"]]
     return 0.0, vessel_power(dydt, out, tables, device) + potential, -potential

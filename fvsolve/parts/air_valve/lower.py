@@ -1,4 +1,4 @@
-"""Air valves in the tables of a model."""
+"""Rows and initial states of air valves in the tables of a model."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ GAS_CONSTANT = 287.05  # of air [J/kg/K]
 
 
 class AirValveRows(Device, kind="air-valve"):
-    """The chamber of an air valve, which is shut at the start."""
+    """Rows of the chambers of air valves, which are shut at the start."""
 
     law = law
     vessel = events_only = True
@@ -68,7 +68,11 @@ class AirValveRows(Device, kind="air-valve"):
         return [f"air valve {name}: {below} below ambient, so it opens"]
 
     def energy_rows(self, model, part, row, y, out):
-        """R T / (2 m) (dm + m / (V rho) dy)^2 : pressure energy of air and fluid in the chamber."""
+        """Row of a matrix L, as state index -> factor: |L dy|^2 is the energy [J] of a small deviation dy.
+
+        The energy is R T / (2 m) (dm + m / (V rho) dy)^2 of air and fluid in the chamber, with air mass m, air volume
+        V, fluid density rho, and deviations dm and dy of air and fluid mass.
+        """
         st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes
         node, at = node[row["node"]], int(row["data"])
         _, volume, mass = law.air_state(st, floats, node, at, float(y[node["y"]]), float(y[row["y"]]))
@@ -77,7 +81,7 @@ class AirValveRows(Device, kind="air-valve"):
 
 
 class ThrottledAirValveRows(AirValveRows, kind=""):
-    """An air valve that releases air through a small bore from `switch` or `switch_velocity` on."""
+    """Rows of air valves that release air through a small bore from `switch` or `switch_velocity` on."""
 
     events = (*AirValveRows.events, "throttles", "stops throttling")
 

@@ -23,9 +23,10 @@ class AirValve(Node, kind="air-valve"):
     """A junction that admits air when its pressure falls below ambient, and releases it above ambient.
 
     Air flows isentropically through a bore for each direction, choked beyond the critical pressure ratio, and keeps
-    `temperature`: p V = m R T. The chamber of the float, `volume`, is full of air at the start. When the fluid has
-    filled the rest, the valve shuts, with a pressure surge. Ports: any number. Stored energy:
-    m R T (ln(p / p_ambient) - 1) + p_ambient V [J]. Dissipated power: R T ln(p_ambient / p) times the flow of air [W].
+    `temperature`: p V = m R T. The chamber of the float, `volume`, is full of air at the start. The valve shuts, with a
+    pressure surge, when fluid has replaced all air in excess of `volume`. Ports: any number. Stored energy:
+    m R T (ln(p / p_ambient) - 1) + p_ambient V [J] of air with pressure p, volume V and mass m. Dissipated power:
+    R T ln(p_ambient / p) times the mass flow of air [W].
     With `switch` or `switch_velocity` it throttles the outflow until the air inside is at ambient pressure again.
     """
 
@@ -42,7 +43,7 @@ class AirValve(Node, kind="air-valve"):
         Quantity(
             "pressure_drop",
             positive,
-            "gauge pressure of the air above which it leaves through throttled_outlet instead of outlet",
+            "gauge pressure above which air leaves through `throttled_outlet` instead of `outlet` [Pa]",
             UsualRange(100.0, 1e5, "anti-slam discs"),
         ),
     ] = None
@@ -51,7 +52,7 @@ class AirValve(Node, kind="air-valve"):
         Quantity(
             "velocity",
             positive,
-            "fluid velocity towards the valve above which air leaves through throttled_outlet, instead of switch [m/s]",
+            "fluid velocity towards the valve above which air leaves through `throttled_outlet`, not with `switch` [m/s]",
             UsualRange(0.01, 20.0, "anti-slam discs"),
         ),
     ] = None
@@ -89,15 +90,17 @@ class AirValve(Node, kind="air-valve"):
         faults = super().key_faults(given)
         switches = [key for key in SWITCH_KEYS if key in given]
         if switches and "throttled_outlet" not in given:
-            faults.append(((switches[0],), "has no effect without throttled_outlet; give both, or remove it"))
+            faults.append(
+                ((switches[0],), "has no effect without `throttled_outlet`; give both keys, or remove this key")
+            )
         elif "throttled_outlet" in given and not switches:
-            text = "has no effect without switch or switch_velocity; give one, or remove it"
+            text = "has no effect without `switch` or `switch_velocity`; give one of them, or remove this key"
             faults.append((("throttled_outlet",), text))
         return faults
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         if self.throttled_outlet is not None and not self.throttled_outlet < self.outlet:
-            text = f"{self.throttled_outlet:g} m does not throttle; expected less than outlet, {self.outlet:g} m"
+            text = f"{self.throttled_outlet:g} m does not throttle; expected less than `outlet`, {self.outlet:g} m"
             yield ("throttled_outlet",), text
         lines = [
             link
@@ -107,7 +110,7 @@ class AirValve(Node, kind="air-valve"):
         if self.switch_velocity is not None and not lines:
             yield (
                 ("switch_velocity",),
-                "no pipe or rigid column joins this node, so it has no velocity; give switch",
+                "no pipe or rigid column joins this node, so it has no velocity; give the key `switch` instead",
             )
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""Basins, their patches and the declaration of their physics: keys and faults."""
+"""Basins, their patches, and the base class for the equations of basins (`Physics`): keys and faults."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ VELOCITY_FIELDS = {"u": "velocity", "v": "velocity", "speed": "velocity"}  # fie
 
 
 class Patch(Table):
-    """A section of the outline: a node `BASIN.PATCH` that links may join, or a boundary other than a fixed wall."""
+    """A section of the boundary of a basin: a node `BASIN.PATCH` for links, or other than a fixed wall."""
 
     side: Annotated[
         str | None,
@@ -63,12 +63,12 @@ class Patch(Table):
     impedance: Annotated[
         float | None,
         Quantity(
-            "impedance", nonnegative, "ratio of pressure to velocity of waves in a liquid, instead of boundary [Pa s/m]"
+            "impedance", nonnegative, "ratio of pressure to velocity of waves in a liquid, not with `boundary` [Pa s/m]"
         ),
     ] = None
     body: Annotated[str | None, Text("mass, or body on a prismatic joint, that moves this wall along x or y")] = None
     travel: Annotated[
-        Schedule | None, Scheduled("position", about="displacement of this wall along x or y, instead of body [m]")
+        Schedule | None, Scheduled("position", about="displacement of this wall along x or y, not with `body` [m]")
     ] = None
     zone: Annotated[
         float | None,
@@ -84,14 +84,14 @@ class Patch(Table):
 
     @property
     def moves(self) -> bool:
-        """True if it is a moving wall."""
+        """True if the patch is a moving wall."""
         return self.body is not None or self.travel is not None
 
 
 class Cells(Value):
-    """Numbers of cells along both sides of a rectangle."""
+    """Numbers of cells along x and y of a rectangle."""
 
-    about = "numbers of cells along x and y; a mesh is needed if left out"
+    about = "numbers of cells along x and y; the key `mesh` is needed if left out"
     takes = "[whole number, whole number]"
 
     def read(self, given: Any, setting: ReadContext) -> tuple[int, int]:
@@ -114,7 +114,7 @@ class Holes(Value):
 
 
 class File(Value):
-    """A file, named by its copy beside the resolved case."""
+    """A file of the case, read as the name of its copy beside the resolved case."""
 
     def __init__(self, about: str) -> None:
         self.about = about
@@ -134,18 +134,18 @@ class MeshFile(Table):
 
 
 class VelocityStart(Table):
-    """Initial velocities of a physics that has them."""
+    """Initial velocities of a basin whose equations have velocities."""
 
     u: Annotated[SpatialField, SpatialFieldKey("velocity", "velocity along x [m/s]")] = uniform(0.0)
     v: Annotated[SpatialField, SpatialFieldKey("velocity", "velocity along y [m/s]")] = uniform(0.0)
 
 
 class BasinStart(Table):
-    """Initial fields of a basin that is not at rest; the keys are those of its physics."""
+    """Initial values of a basin that is not at rest; the valid keys depend on its `physics`."""
 
 
 class PatchNode(PlaceOnBody):
-    """A patch as a node: pressure of the cells behind it, flow into them."""
+    """A patch as a node: it has the pressure of the cells behind it and carries flow into them."""
 
     fixes_pressure: ClassVar[bool] = True
     kind: ClassVar[str] = "patch"
@@ -158,25 +158,25 @@ class PatchNode(PlaceOnBody):
 
 
 class MovingWall(PatchNode):
-    """A patch that is a moving wall: force on the water (inward), power into the water, travel."""
+    """A patch that is a moving wall; probes: force on the water (inward), power into the water, travel."""
 
     wall_quantities: ClassVar[dict[str, str]] = {"force": "force", "power": "power", "travel": "position"}
     quantities: ClassVar[dict[str, str]] = PatchNode.quantities | wall_quantities
 
 
 class Physics(Table):
-    """Equations of the cells of basins: name in the file, own keys, capabilities.
+    """Base of the declarations of equations of basins: name in the file, keys, capabilities.
 
-    A key without a default must be given. A key that several physics have must be declared equally in all. The module
-    `lower.py` beside the declaration fills the rows of tables.
+    A key without a default must be given. A key that several declarations have must be declared equally in all. The
+    module `lower.py` beside the declaration fills the rows of tables.
     states : quantities of cells -> their units, the first is the stored quantity; fields : quantities that can be
-    probed at a point -> dimension; starts : keys of `start`
-    laws : density laws that it supports, all if empty; described : text for the limit to these laws
-    joined : True if links may join its patches; not so for a given velocity
-    moves : True if its walls may move; rides : True if the basin may be on a body; sloshes : True if it has sloshing
-    models other than cells; docks : True if links may join its patches while it is on a body
-    carries : True if it carries scalars; echoes : True if its boundary may have an impedance
-    steep : True if waves steepen into lasting shocks, and smooth flow in the plane has at most second order
+    probed at a point -> dimension; starts : table with the keys of `start`
+    laws : supported density laws, all if empty; description : text for messages about unsupported laws
+    joined : True if links may join its patches (False where the velocity is given); moves : True if walls may move
+    on_bodies : True if the basin may be on a body; links_on_bodies : True if links may then join its patches
+    has_modes : True if `sloshing` may be other than "cells"; carries : True if the basin carries scalars
+    allows_impedance : True if a boundary may have an impedance
+    has_shocks : True if waves steepen into lasting shocks, and smooth flow in the plane has at most second order
     """
 
     kinds: ClassVar[dict[str, type[Physics]]] = {}
@@ -219,30 +219,31 @@ class Physics(Table):
 
     @classmethod
     def has_friction(cls, basin: Basin) -> bool:
-        """True if friction of the bed or walls acts on the flow."""
+        """True if friction of the bed or of walls acts on the flow of a basin."""
         return False
 
     @classmethod
     def rest(
         cls, basin: Basin, mean: Callable[[Any], np.ndarray], cells: np.ndarray, area: np.ndarray
     ) -> dict[str, Any]:
-        """Elevation [m] of a patch at rest, and depth of water [m] or pressure [Pa] in the cells behind it.
+        """State of a patch at rest, by name: "elevation" [m], "depth" of water [m], "pressure" [Pa].
 
-        mean : function from a formula to its means over all cells; cells : numbers of the cells behind the patch
-        area : areas of all cells [m2]
+        Depth and pressure are means over the cells behind the patch; None if not defined. mean : function from a
+        formula to its means over all cells; cells : numbers of the cells behind the patch; area : areas of all cells
+        [m2]
         """
         return {"elevation": basin.elevation, "depth": None, "pressure": None}
 
     @classmethod
     def formulas(cls, basin: Basin, mesh: Any) -> Iterator[tuple[tuple[str, ...], Any, np.ndarray | None]]:
-        """Formulas of its own keys: (keys, formula, points of evaluation, None for the means over all cells)."""
+        """Formulas in the keys of these equations: (keys, formula, points of evaluation or None for cell means)."""
         for key in cls.model_fields:
             if isinstance(shape := getattr(basin, key), SpatialField):
                 yield (key,), shape, None
 
     @classmethod
     def own_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
-        """Faults of keys of physics that a basin of this physics has or lacks."""
+        """Faults of keys that belong to other equations, and of keys that these equations need."""
         faults = cls.key_faults(given)
         for key in given:
             owners = [name for name, kind in Physics.kinds.items() if key in kind.model_fields]
@@ -253,12 +254,12 @@ class Physics(Table):
 
     @classmethod
     def accepts_law(cls, law: str) -> bool:
-        """True if it supports a density law."""
+        """True if these equations support a density law."""
         return law in (cls.laws or (law,))
 
 
 class Basin(PlaceOnBody, kind="basin"):
-    """Fields in the plane between walls, joined to the network by patches."""
+    """Water or liquid in a plane region between walls, joined to the network by patches."""
 
     fixes_pressure: ClassVar[bool] = True
     quantities: ClassVar[dict[str, str]] = {}
@@ -267,7 +268,7 @@ class Basin(PlaceOnBody, kind="basin"):
     size: Annotated[
         tuple[float, float] | None,
         Rows(
-            "length", positive, length=2, about="lengths along x and y [m]; a mesh is needed if left out", changes=SHAPE
+            "length", positive, length=2, about="lengths along x and y [m]; `mesh` is needed if left out", changes=SHAPE
         ),
     ] = None
     cells: Annotated[Any, Cells()] = None
@@ -304,7 +305,7 @@ class Basin(PlaceOnBody, kind="basin"):
 
     @property
     def physics_type(self) -> type[Physics]:
-        """Declaration of its physics."""
+        """Declaration of the equations that `physics` names."""
         return Physics.kinds[self.physics]
 
     @classmethod
@@ -314,14 +315,16 @@ class Basin(PlaceOnBody, kind="basin"):
         faults = Physics.kinds[physics].own_faults(given) if known else []
         if "mesh" in given:
             faults += [
-                ((key,), "belongs to rectangles; this basin has a mesh") for key in RECTANGLE_KEYS if key in given
+                ((key,), "is a key of rectangles, but this basin has a `mesh`; remove one")
+                for key in RECTANGLE_KEYS
+                if key in given
             ]
         else:
             faults += [((), f"{key} is missing") for key in RECTANGLE_KEYS[:2] if key not in given]
         for name, patch in given["patches"].items() if isinstance(given.get("patches"), dict) else ():
             side = isinstance(patch, dict) and "side" in patch
             if side and "mesh" in given:
-                faults.append((("patches", name), "takes its faces from the mesh; remove side and span"))
+                faults.append((("patches", name), "takes its faces from the mesh; remove the keys `side` and `span`"))
             elif isinstance(patch, dict) and not side and "mesh" not in given:
                 faults.append((("patches", name), "side is missing"))
         return faults
@@ -333,12 +336,12 @@ class Basin(PlaceOnBody, kind="basin"):
 
     @property
     def rotation(self) -> np.ndarray:
-        """Rotation matrix from its axes to those of its body : float64[3, 3]."""
+        """Rotation matrix from the axes of the basin to those of its body : float64[3, 3]."""
         return np.eye(3) if self.attitude is None else self.attitude.rotation
 
     @property
     def lumped(self) -> bool:
-        """True if its water is represented by masses on its body, without cells."""
+        """True if masses on the body represent the water of the basin, without cells."""
         return self.on is not None and self.sloshing != "cells"
 
     def inner(self, name: str) -> tuple[dict[str, Node], dict[str, Any]]:
@@ -356,7 +359,7 @@ BASIN_DOC = Basin.__doc__  # docstring of Basin before every physics adds a line
 
 
 def optional_keys(table: type[Table]) -> dict[str, FieldInfo]:
-    """Keys of a table, each made optional."""
+    """Declarations of the keys of a table, each made optional."""
     keys = {key: copy(info) for key, info in table.model_fields.items()}
     for info in keys.values():
         info.default = None if info.is_required() else info.default
