@@ -27,8 +27,8 @@ def Angle(about: str) -> Quantity:
 class Attitude(Table):
     """Rotation matrix from the rotated axes of a body or joint to its reference axes, in one of five forms.
 
-    The forms are roll, pitch and yaw; zyz Euler angles; axis and angle; Euler parameters; a matrix. If several forms
-    are given, they must agree; the first in this order is used.
+    The forms are roll, pitch and yaw (docs/course.md, 40); zyz Euler angles (41); axis and angle (43); Euler parameters
+    (45); a matrix. If several forms are given, they must agree; the first in this order is used.
     """
 
     roll: Annotated[

@@ -12,7 +12,10 @@ from fvsolve.units import show
 
 
 class Scalar(Table):
-    """Quantity c per mass, transported by the fluid: (m c)_t + (M c - D m c_x)_x = -decay m (c - ambient)."""
+    """Quantity c per mass, transported by the fluid: (m c)_t + (M c - D m c_x)_x = -decay m (c - ambient).
+
+    m is the mass of fluid per length, M the mass flow, D the `diffusivity`; indices t and x are derivatives.
+    """
 
     unit: Annotated[str, Text("unit, a label in headers", VALUE)] = "-"
     initial: Annotated[float, Number(about="initial value, unless a part states another")] = 0.0
@@ -25,7 +28,7 @@ class Scalar(Table):
 
 @dataclass(frozen=True)
 class ScalarValues(Value):
-    """Values of scalars by name: numbers or schedules."""
+    """Values of transported scalars, name -> number or schedule."""
 
     about: str = "value of each scalar, by its name"
     value: Value = Scheduled("number")

@@ -60,7 +60,7 @@ class Fittings(Value):
 
 
 class Conduit(TwoPort):
-    """Pipe or rigid column; `nominal` and `fittings` are read as `diameter`, `thickness` and `minor_loss`."""
+    """Base of pipe and rigid column; `nominal` and `fittings` are read as `diameter`, `thickness` and `minor_loss`."""
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("diameter", "nominal"), ("diameter", "schedule"))
 
@@ -77,7 +77,7 @@ class Conduit(TwoPort):
     length: Annotated[float, LENGTH]
     diameter: Annotated[float, DIAMETER] = None  # nominal replaces it
     nominal: Annotated[
-        str | None, Text('nominal size, instead of diameter: "DN100", "NPS 4" or "NPS 1-1/2"', BY_CELLS)
+        str | None, Text('nominal size, not with `diameter`: "DN100", "NPS 4" or "NPS 1-1/2"', BY_CELLS)
     ] = None
     schedule: Annotated[
         str | None, Text('schedule of the nominal size: "40", "80", "STD", "10S"; "40" if left out', BY_CELLS)
@@ -105,7 +105,10 @@ class Conduit(TwoPort):
 
     @classmethod
     def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
-        """Replace names by `diameter`, wall `thickness` and `minor_loss`. Raises ValueFault for unknown names."""
+        """Table with catalogue names replaced by `diameter`, wall `thickness` and `minor_loss`.
+
+        Raises ValueFault for unknown names.
+        """
         result, faults = {**given}, []
         if isinstance(given.get("nominal"), str) and "diameter" not in given:
             try:
@@ -129,7 +132,7 @@ class Conduit(TwoPort):
 
 
 def pipe_size(nominal: str, schedule: Any) -> tuple[float, float]:
-    """(inner diameter, wall thickness) [m] of a nominal size and schedule. Raises ValueFault with the faulty key."""
+    """Inner diameter and wall thickness of a nominal size and schedule [m]. Raises ValueFault with the faulty key."""
     try:
         return pipe_bore(nominal, str(schedule))
     except ValueError as error:

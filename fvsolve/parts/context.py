@@ -13,11 +13,10 @@ Faults = Iterator[tuple[tuple[Any, ...], str]]  # (keys below the part, text of 
 class CaseContext:
     """Parts and properties of a case after its parts are read.
 
-    ambient : ambient pressure [Pa]
-    gravity : [m/s2]; None if faulty
-    fluid : properties of the fluid; None if faulty
-    vacuum : (group, name, key, pressures [Pa]) of a part -> faults of pressures at which the fluid boils
-    between : (place, place) -> distance from the first to the second at the start [m]; None if unknown
+    nodes, links : parts by name; ambient : ambient pressure [Pa]
+    gravity : [m/s2], None if faulty; fluid : properties of the fluid, None if faulty
+    boiling_faults : function of (group, name, key, pressures [Pa]) of a part; yields a fault if the fluid boils there
+    place_distance : function of two places; distance from the first to the second at the start [m], None if unknown
     """
 
     nodes: dict[str, Any]
@@ -35,9 +34,9 @@ class CaseContext:
         return getattr(node, "domain", "") == "spatial" or bool(point) and point in getattr(node, "points", {})
 
     def separation(self, link: Any, first: str, second: str) -> float | None:
-        """Distance from the place at port `first` to that at port `second` at the start [m]; None if unknown.
+        """Distance from the place at port `first` of a link to the place at port `second` at the start [m].
 
-        It is a difference of positions (signed) for masses on the axis, and a distance for points in space.
+        A signed difference of positions for masses on the axis, a distance for points in space; None if unknown.
         """
         ends = [link.ports.get(port) for port in (first, second)]
         return None if None in ends else self.place_distance(*ends)

@@ -24,7 +24,7 @@ NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?")
 
 
 class CsvError(ValueError):
-    """Fault of a file, with its line."""
+    """Fault of a CSV file, with its line number if known."""
 
     def __init__(self, file: str, message: str, line: int | None = None) -> None:
         self.message, self.line = message, line
@@ -35,7 +35,8 @@ class CsvError(ValueError):
 class CsvRows:
     """Rows of a CSV file.
 
-    header : names with their units; lines : line number of each row; cells : texts of each row, as many as the header
+    file : name of the file; header : column names with their units; lines : line number of each row
+    cells : texts of each row, as many as the header has names
     """
 
     file: str
@@ -45,14 +46,17 @@ class CsvRows:
 
     @property
     def names(self) -> list[str]:
-        """Names of the columns without units."""
+        """Names of the columns, without units."""
         return [split_header(name)[0] for name in self.header]
 
     def column(self, name: str | None, default: int) -> int:
-        """Index of a column by its name, with or without unit; `default` if the name is None. Raises ValueError."""
+        """Index of a column by its name, with or without unit; `default` if the name is None.
+
+        Raises ValueError if there is no such column, or if several columns have the name.
+        """
         if name is None:
             if len(self.header) <= default:
-                raise ValueError(f"{self.file} has one column; expected a time and a value")
+                raise ValueError(f"{self.file} has one column; expected a column of times and a column of values")
             return default
         for known in (self.header, self.names):
             if known.count(name) > 1:
@@ -65,7 +69,10 @@ class CsvRows:
         raise ValueError(f"{self.file} has no column {show(name)}{shown}")
 
     def numbers(self, column: int, dimension: str, ambient: float = 101325.0) -> np.ndarray:
-        """Values of a column in SI by the unit in its header, pressures absolute : float64[n]."""
+        """Values of a column in SI by the unit in its header, pressures absolute : float64[n].
+
+        dimension : expected kind of unit; ambient : ambient pressure, added to gauge pressures [Pa]
+        """
         unit = split_header(self.header[column])[1]
         try:
             known = units.find(unit, dimension) if unit else None
@@ -77,7 +84,7 @@ class CsvRows:
         return known.si(values) + (ambient if known.gauge and dimension == "pressure" else 0.0)
 
     def plain(self, column: int) -> list[float]:
-        """Numbers of a column without conversion of units. Raises Misread."""
+        """Numbers of a column without conversion of units. Raises CsvError."""
         values, points = [], False
         for k, (line, row) in enumerate(zip(self.lines, self.cells, strict=True)):
             text = row[column]
@@ -101,14 +108,14 @@ def split_header(header: str) -> tuple[str, str]:
 
 
 def number(text: str) -> float | None:
-    """Number of a cell, with a decimal point or comma; None if it is not a finite number."""
+    """Value of the text of a cell, with a decimal point or comma; None if it is not a finite number."""
     text = text.replace("\N{MINUS SIGN}", "-")
     value = float(text.replace(",", ".")) if NUMBER.fullmatch(text) else np.inf
     return value if np.isfinite(value) else None
 
 
 def read_rows(path: Path) -> CsvRows:
-    """Header and rows of a file. Raises ValueError for rows that do not match the header."""
+    """Read header and rows of a CSV file. Raises ValueError for rows that do not match the header."""
     lines = [(n, line) for n, line in enumerate(read_text(path).splitlines(), 1) if line.strip() and line[0] != "#"]
     if len(lines) < 2:
         raise ValueError(f"{path.name} is empty; expected a header and rows of numbers")
@@ -138,7 +145,7 @@ def is_uniform(rows: list[list[str]]) -> bool:
 
 
 def split_lines(path: Path, lines: list[tuple[int, str]], mark: str = ",") -> list[list[str]]:
-    """Cells of each line."""
+    """Texts of the cells of each line; `mark` is the separator."""
     try:
         return [[cell.strip() for cell in next(csv.reader([line], delimiter=mark))] for _, line in lines]
     except csv.Error as error:

@@ -1,4 +1,4 @@
-"""Values over the plane: a number, a formula of x and y, or samples of a file."""
+"""Values over a plane: a number, a formula of x and y, or interpolated points of a file."""
 
 from __future__ import annotations
 
@@ -19,13 +19,16 @@ BLOCK = 2**16  # points per evaluation: limits the memory of intermediate values
 
 @dataclass(frozen=True)
 class SpatialField:
-    """Value at every point in SI: the text of the file, and a function of coordinates [m]."""
+    """Value at every point of a plane, in SI.
+
+    given : the value as in the case file; rule : function of arrays x and y [m]
+    """
 
     given: Any
     rule: Any
 
     def at(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Values at points : float64[n]. Raises ValueError if a value is not finite."""
+        """Values at points x, y [m] : float64[n]. Raises ValueError if a value is not finite."""
         values = np.empty(np.shape(x))
         for first in range(0, values.size, BLOCK):
             part = slice(first, first + BLOCK)
@@ -47,13 +50,13 @@ class SpatialField:
 
 
 def uniform(value: float) -> SpatialField:
-    """Formula of a uniform value."""
+    """Field with the same value at every point."""
     return SpatialField(value, lambda x, y: value)
 
 
 @dataclass(frozen=True)
 class SpatialFieldKey(Value):
-    """Field over the plane: a quantity, a formula of x and y in SI, or { file } with columns x, y and the value."""
+    """Field over a plane in a case file: a quantity, a formula of x and y in SI, or { file } with x, y and the value."""
 
     dimension: str
     about: str = ""
@@ -106,7 +109,10 @@ def read_points(path: Path, dimension: str) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Linear interpolation between scattered points, outside them the nearest value; columns : float64[n, 3]."""
+    """Linear interpolation between scattered points, and the value of the nearest point outside them.
+
+    columns : float64[n, 3]  x [m], y [m] and value of the points
+    """
 
     columns: np.ndarray
 

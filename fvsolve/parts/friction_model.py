@@ -38,9 +38,10 @@ class Friction(Table):
     """Friction model of a pipe.
 
     steady : Darcy factor of the initial flow; quasi-steady : Darcy factor of the present flow
-    unsteady : quasi-steady, plus the history of the flow by a weighting function, a sum of exponentials; each term is
-    a state of every cell and stores energy
-    Dissipated power: pressure drop times flow [W].
+    unsteady : quasi-steady, plus the effect of past flow changes by a weighting function, a sum of exponentials; each
+    term of the sum is a state of every cell and stores energy
+    hazen-williams, chezy-manning : empirical formulas with a `coefficient`. Dissipated power: pressure drop times flow
+    [W].
     """
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("roughness", "factor"),)
@@ -48,11 +49,11 @@ class Friction(Table):
     model: Annotated[str, Choice("friction model", MODELS, "model of the wall friction", SYNONYMS)]
     roughness: Annotated[
         float | None,
-        Quantity("length", nonnegative, "roughness of the wall [m], models steady, quasi-steady and unsteady"),
+        Quantity("length", nonnegative, "roughness of the wall for the models steady, quasi-steady and unsteady [m]"),
     ] = None
     factor: Annotated[
         float | None,
-        Number(nonnegative, "Darcy friction factor, four times Fanning's, instead of roughness [-]", FACTORS),
+        Number(nonnegative, "Darcy friction factor, four times Fanning's, not with `roughness` [-]", FACTORS),
     ] = None
     coefficient: Annotated[
         float | None, Number(positive, "coefficient C of hazen-williams [-], or n of chezy-manning [s/m^(1/3)]")
@@ -63,7 +64,7 @@ class Friction(Table):
         Choice(
             "weighting function",
             WEIGHTINGS,
-            "weighting function of the flow history, model unsteady; by the initial Reynolds number if left out",
+            "weighting function of past flow changes, model unsteady; by the initial Reynolds number if left out",
         ),
     ] = None
     accuracy: Annotated[
@@ -83,7 +84,7 @@ class Friction(Table):
         if allowed is None:
             return faults
         stray = [key for key in given if key in cls.model_fields and key not in ("model", *allowed)]
-        faults += [((key,), f'friction model "{model}" has no {key}') for key in stray]
+        faults += [((key,), f'friction model "{model}" has no key {key}') for key in stray]
         return faults + (missing_key_faults(given, allowed[:2]) if allowed else [])
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:

@@ -1,4 +1,4 @@
-"""Links: base of all parts that join nodes and carry flow."""
+"""Links: base classes of all parts that join places and carry flow, force or torque."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Link(Table):
     owns: ClassVar[dict[str, str]] = {}  # own place, `LINK.PLACE` for other parts -> domain
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Link]]:
-        """(places, links) of the solved network for this part, by name: itself, and its own places `NAME.PLACE`."""
+        """Places and links of the solved network for this link, by name: itself, and its own places `NAME.PLACE`."""
         return {}, {name: self}
 
     def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
@@ -45,7 +45,7 @@ class Link(Table):
 
 
 class TwoPort(Link):
-    """Link with the ports `from` and `to`; its flow [m3/s] is that at `from`."""
+    """Link with the ports `from` and `to`; its flow [m3/s] is the flow at `from`."""
 
     joins: ClassVar[dict[str, str]] = {"from": "hydraulic", "to": "hydraulic"}
 
@@ -59,7 +59,7 @@ class TwoPort(Link):
 
 
 class Coupling(TwoPort):
-    """Link between masses on an axis, or between points in space.
+    """Link between two masses on an axis, or between two points in space.
 
     Its force [N] acts on `to` in the positive direction and on `from` in the negative direction. Between points,
     x_to - x_from is their distance, and a positive force pushes them apart.
@@ -71,7 +71,7 @@ class Coupling(TwoPort):
 
 @dataclass(frozen=True)
 class Ports(Value):
-    """Table `ports` of a link with ports other than `from` and `to`: port name -> place."""
+    """The key `ports` of a link whose ports are not `from` and `to`: port name -> place."""
 
     names: tuple[str, ...]
     about: str = "place of each port"

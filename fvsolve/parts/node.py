@@ -1,4 +1,4 @@
-"""Nodes: base of all places with a single potential."""
+"""Nodes: base classes of all places with a single potential."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ USUAL_ELEVATIONS = UsualRange(-12e3, 9e3, "boreholes to mountains")
 class Node(Table):
     """Place with a single potential: pressure at its elevation (hydraulic), or velocity (translational).
 
-    Ports: those of the links that name it. Stored and dissipated energy: none, unless its type states it.
+    Ports: those of the links that name it. Stored and dissipated energy: none, unless its type states otherwise.
     """
 
     kind: ClassVar[str] = ""
@@ -36,7 +36,7 @@ class Node(Table):
         float | None,
         Quantity(
             "length",
-            about="elevation above datum [m]; 0 for all nodes (reservoir with head: that of the far end) if left out",
+            about="elevation above datum [m]; 0 (reservoir with `head`: elevation of the far end) if left out",
             usual=USUAL_ELEVATIONS,
         ),
     ] = None
@@ -49,21 +49,21 @@ class Node(Table):
 
     @classmethod
     def variant(cls, given: dict[str, Any]) -> type[Node]:
-        """Class for given keys: itself, or a subclass with more quantities."""
+        """Class of a node with the given keys: this class, or a subclass with more quantities."""
         return cls
 
     @classmethod
     def own_places(cls, given: dict[str, Any]) -> tuple[str, ...] | None:
-        """Names in the file of the places that replace it; None if it is a place itself."""
+        """Names in the file of the places that replace the node; None if the node itself is a place."""
         return None
 
     @classmethod
     def bodies(cls, given: dict[str, Any]) -> tuple[str, ...]:
-        """Names in the file of the bodies that carry it."""
+        """Names of the bodies that carry the node, as given in the file."""
         return ()
 
     def inner(self, name: str) -> tuple[dict[str, Node], dict[str, Any]]:
-        """(places, links) of the solved network for this node, by name: itself, and its own places `NAME.PLACE`."""
+        """Places and links of the solved network for this node, by name: itself, and its own places `NAME.PLACE`."""
         return {name: self}, {}
 
     def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
@@ -76,7 +76,7 @@ class Node(Table):
 
 
 class PlaceOnBody(Node):
-    """Place that may be on a body."""
+    """Node that a body may carry."""
 
     on: Annotated[str | None, Text("body that carries the node; fixed in the world if left out")] = None
     at: Annotated[
@@ -84,7 +84,7 @@ class PlaceOnBody(Node):
         Rows(
             "position",
             length=3,
-            about="position (of a basin: of its origin) in axes of the body, instead of elevation [m]; 0 if left out",
+            about="position (of a basin: of its origin) in axes of the body, not with `elevation` [m]; 0 if left out",
         ),
     ] = None
 
@@ -94,10 +94,10 @@ class PlaceOnBody(Node):
 
     @property
     def position_keys(self) -> dict[str, Any]:
-        """Keys of its position."""
+        """Keys of the position of the node, with their values."""
         return {"elevation": self.elevation, "on": self.on, "at": self.at}
 
     @property
     def place(self) -> tuple[float, ...]:
-        """Position in axes of its body [m]."""
+        """Position of the node in the axes of its body [m]."""
         return self.at or (0.0, 0.0, 0.0)

@@ -468,7 +468,7 @@ BAD = {
     ),
     "schedule file, one column": (
         opening('{ file = "one.csv" }'),
-        "one.csv has one column; expected a time and a value",
+        "one.csv has one column; expected a column of times and a column of values",
     ),
     "schedule file, no such column": (
         opening('{ file = "good.csv", value = "opening" }'),

@@ -414,7 +414,7 @@ def test_shut_or_open_it_gives_nothing_out():
     [
         ({"cracking_pressure": -1.0}, "at least 0"),
         ({"time_constant": 0.1}, "overpressure is missing"),
-        ({"overpressure": 1e4}, "needs a time_constant"),
+        ({"overpressure": 1e4}, "needs the key `time_constant`"),
         ({"time_constant": 0.0, "overpressure": 1e4}, "above 0"),
     ],
 )

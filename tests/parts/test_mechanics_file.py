@@ -161,7 +161,7 @@ BAD = {
     ),
     "an area and a rod": (
         swap('piston_diameter = "40 mm"', "area_A = 1"),
-        "links.cyl.rod_diameter: needs piston_diameter; with area_A give area_B instead",
+        "links.cyl.rod_diameter: needs the key `piston_diameter`; with `area_A` give `area_B` instead",
     ),
     "a rod too thick": (
         swap('"25 mm"', '"40 mm"'),

@@ -98,7 +98,7 @@ def test_resumed_it_is_the_unbroken_run_to_the_bit(tmp_path, end):
      ({"deceleration": {"rate": [2.0, 1.0], "reverse_velocity": [0.1, 0.2]}}, "rates"),
      ({"deceleration": {"rate": [1.0]}}, "reverse_velocity is missing"),
      ({"deceleration": 3.0}, "is not a table"),
-     ({"diameter": None, "loss_coefficient": None, "Kv": 100.0}, "its velocities need a bore")],
+     ({"diameter": None, "loss_coefficient": None, "Kv": 100.0}, "its velocities refer to a bore")],
 )  # fmt: skip
 def test_what_is_wrong_with_its_curve_is_said(wrong, said):
     case = column(3.0, TIGHT)

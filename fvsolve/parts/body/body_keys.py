@@ -1,4 +1,4 @@
-"""Points of a body and its inertia, as values of a case file."""
+"""Values of a case file for the points of a body and for its inertia."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MOMENT_TOLERANCE = 1e-6  # share of the largest moment: tolerance of the triangl
 
 
 class NamedPoints(Value):
-    """A table of points by name."""
+    """A table of points, name -> [x, y, z]."""
 
     takes = "`{ NAME = [x, y, z] }`"
 
@@ -46,7 +46,7 @@ class NamedPoints(Value):
 
 
 class Inertia(Value):
-    """Three moments about the axes through the centre of mass, or the whole symmetric matrix."""
+    """Inertia of a body: three moments about axes through its centre of mass, or the whole symmetric matrix."""
 
     about = "inertia about the centre of mass in the axes of the body: moments about x, y, z, or 3 x 3 [kg m2]"
     takes = "[kg m2, kg m2, kg m2], or three such rows"
@@ -55,7 +55,7 @@ class Inertia(Value):
     def read(self, given: Any, setting: ReadContext) -> tuple:
         if not isinstance(given, (list, tuple)) or len(given) != 3:
             raise ValueError(
-                f"{show(given)} is not an inertia; expected moments about x, y and z, or three rows of three"
+                f"{show(given)} is not an inertia; expected moments about x, y and z, or three rows of three numbers"
             )
         if any(isinstance(row, (list, tuple)) for row in given):
             inertia = Matrix("inertia").read(given, setting)
@@ -76,11 +76,16 @@ class Inertia(Value):
 
 
 def principal_moments(rows: tuple) -> np.ndarray:
-    """Principal moments, ascending; ValueError if the matrix is not symmetric or a moment is negative."""
+    """Principal moments of an inertia matrix [kg m2], ascending.
+
+    Raises ValueError if the matrix is not symmetric or a moment is negative.
+    """
     matrix = np.array(rows)
     if np.abs(matrix - matrix.T).max() > MOMENT_TOLERANCE * np.abs(matrix).max():
-        raise ValueError(f"{show(rows)} is not symmetric; expected the moments, and minus the products of inertia")
+        raise ValueError(
+            f"{show(rows)} is not symmetric; expected moments on the diagonal, and minus the products of inertia"
+        )
     moments = np.linalg.eigvalsh(matrix)
     if moments[0] < -MOMENT_TOLERANCE * moments[2]:
-        raise ValueError(f"has a principal moment of {moments[0]:.4g} kg m2; expected all at least 0")
+        raise ValueError(f"has a principal moment of {moments[0]:.4g} kg m2; expected principal moments of at least 0")
     return moments

@@ -45,7 +45,7 @@ POSE_QUANTITIES = {"x": "position", "y": "position", "z": "position", "roll": "a
 
 
 def vector_quantities(name: str, dimension: str) -> dict[str, str]:
-    """Quantities of the x, y and z components of a vector."""
+    """Names of the x, y and z components of a vector, each with its dimension; `name` precedes the axis."""
     return {f"{name}{axis}": dimension for axis in "xyz"}
 
 
@@ -83,9 +83,11 @@ class Joint(Table):
     on: Annotated[str | None, Text("carrier: BODY, BODY.POINT or FRAME.POINT; the world if left out")] = None
     at: Annotated[
         tuple[float, ...] | None,
-        Rows("position", length=3, about="position of the joint in the axes of `on` [m]; 0 if left out"),
+        Rows("position", length=3, about="position of the joint in the axes of its carrier `on` [m]; 0 if left out"),
     ] = None
-    attitude: Annotated[Attitude, Nested(Attitude, "attitude of the joint axes relative to those of `on`")] = Attitude()
+    attitude: Annotated[Attitude, Nested(Attitude, "attitude of the joint axes in the axes of its carrier `on`")] = (
+        Attitude()
+    )
     axis: Annotated[tuple[float, ...] | None, Rows("number", length=3, about="axis of motion in the joint axes")] = None
     angle: Annotated[
         Schedule | None,
@@ -138,13 +140,13 @@ class Joint(Table):
                 faults.append((("axis",), "is all zeros; expected a direction, for example [0, 1, 0]"))
         if "at" in given and isinstance(given.get("on"), str) and "." in given["on"]:
             faults.append(
-                (("at",), f"{given['on']} gives the position already; remove at, or name only the body in on")
+                (("at",), f"{given['on']} gives the position already; remove `at`, or name only the body in `on`")
             )
         return faults
 
     @classmethod
     def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
-        """The table with rate, damping and stiffness read in the units of its kind of joint."""
+        """Table with the keys `rate`, `damping` and `stiffness` read in the units of the kind of joint."""
         kind, result, faults = given.get("kind", "free"), dict(given), []
         rate, damping, stiffness = LINEAR_DIMENSIONS if kind == "prismatic" else ANGULAR_DIMENSIONS
         triple = kind in ("ball", "free")
@@ -171,38 +173,39 @@ class Joint(Table):
 
     @property
     def drive_schedule(self) -> Schedule | None:
-        """Schedule that drives the joint, None without one."""
+        """Schedule that drives the joint; None if the joint moves freely."""
         given = self.coordinate
         return given if given is not None and not given.constant else None
 
     @property
     def coordinate(self) -> Schedule | None:
-        """Angle or travel of the joint."""
+        """Angle [rad] or travel [m] of the joint, as a schedule; None if not given."""
         return self.travel if self.kind == "prismatic" else self.angle
 
     @property
     def unit_axis(self) -> np.ndarray:
-        """Unit vector along the axis : float64[3]."""
+        """Unit vector along the axis of the joint : float64[3]."""
         axis = np.array(self.axis or (0.0, 0.0, 0.0))
         return axis / (np.linalg.norm(axis) or 1.0)
 
     @property
     def angular_velocity(self) -> np.ndarray:
-        """Angular velocity of a ball joint or a free body at the start, in the axes of the body : float64[3]."""
+        """Angular velocity [rad/s] of a ball joint or a free body at the start, in axes of the body : float64[3]."""
         return np.array(self.rate or (0.0, 0.0, 0.0))
 
     @property
     def centre_velocity(self) -> np.ndarray:
-        """Velocity of the centre of mass of a free body at the start : float64[3]."""
+        """Velocity of the centre of mass of a free body at the start [m/s] : float64[3]."""
         return np.array(self.velocity or (0.0, 0.0, 0.0))
 
 
 class Body(Node, kind="body"):
-    """A rigid body, F = m a_c and T = J alpha + w x J w about its centre of mass (68), moved by its joint.
+    """A rigid body: force = mass times acceleration of its centre, torque = J alpha + w x J w; moved by its joint.
 
-    Ports: its origin, and its points, `NAME.POINT`; velocity and force. Stored energy: m v_c^2 / 2 + w J w / 2 +
-    m g z_c + k s^2 / 2 of its joint [J]. Dissipated power: damping times rate^2 of its joint [W]. A driven joint
-    supplies its torque times rate.
+    J is the inertia about the centre of mass, w the angular velocity, alpha its rate (docs/course.md, 68). Ports: its
+    origin, and its points, `NAME.POINT`; velocity and force. Stored energy [J]: mass v^2 / 2 + w J w / 2 + mass g z +
+    k s^2 / 2, with velocity v and height z of the centre, and stiffness k and coordinate s of its joint. Dissipated
+    power: damping times rate^2 of its joint [W]. A driven joint supplies its torque times rate.
     """
 
     domain: ClassVar[str] = "spatial"
@@ -233,7 +236,7 @@ class Body(Node, kind="body"):
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
         faults = super().key_faults(given)
-        where = "has no effect: joint.at, angle or travel set the position of a body; remove it"
+        where = "has no effect: `joint.at`, `angle` or `travel` sets the position of a body; remove it"
         return faults + [((key,), where) for key in ("elevation", "position") if key in given]
 
     def inertia_matrix(self) -> np.ndarray:
@@ -246,7 +249,7 @@ ACCELERATION_TERMS = ("relative", "coriolis", "transversal", "centripetal")
 
 
 class BodyPoint(Node, kind=""):
-    """A point of a body or of the world, to which a link may apply a force. Not a part of its own."""
+    """A point of a body or of the world, to which a link may apply a force; not a part of a case file."""
 
     kind: ClassVar[str] = "point"
     domain: ClassVar[str] = "spatial"

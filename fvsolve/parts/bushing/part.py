@@ -10,11 +10,13 @@ from fvsolve.parts.value import VALUE, Quantity, nonnegative
 
 
 class Bushing(TwoPort, kind="bushing"):
-    """Pulls point `to` to point `from` and turns its body back to the initial relative attitude, by the deviation (56).
+    """Spring and damper in all directions between two points, which also turn the second body to its initial attitude.
 
-    force = -stiffness gap - damping d(gap)/dt, torque = -2 rotational_stiffness eta eps - rotational_damping w~ (57),
-    in the axes of `from`, on both bodies at point `to`. Ports: from, to; velocity and force. Stored energy: stiffness
-    gap^2 / 2 + 2 rotational_stiffness eps.eps [J]. Dissipated power: damping (d(gap)/dt)^2 + rotational_damping w~^2.
+    gap : vector from point `from` to point `to`; w : relative angular velocity; (eta, eps) : Euler parameters of the
+    deviation from the initial relative attitude (docs/course.md, 56). In the axes of `from`, the force
+    -stiffness gap - damping d(gap)/dt and the torque -2 rotational_stiffness eta eps - rotational_damping w (57) act on
+    both bodies at point `to`. Ports: from, to; velocity and force. Stored energy: stiffness gap^2 / 2 +
+    2 rotational_stiffness eps^2 [J]. Dissipated power: damping (d(gap)/dt)^2 + rotational_damping w^2 [W].
     """
 
     joins: ClassVar[dict[str, str]] = {"from": "spatial", "to": "spatial"}
@@ -24,7 +26,7 @@ class Bushing(TwoPort, kind="bushing"):
         if not any((self.stiffness, self.damping, self.rotational_stiffness, self.rotational_damping)):
             yield (
                 ("stiffness",),
-                "is 0, like damping and both rotational coefficients; expected at least one above 0",
+                "is 0, like `damping`, `rotational_stiffness` and `rotational_damping`; expected at least one above 0",
             )
 
     stiffness: Annotated[

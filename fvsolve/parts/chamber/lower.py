@@ -1,4 +1,4 @@
-"""Closed volumes in the tables of a model: chambers, and the chambers of cylinders."""
+"""Rows of closed volumes in the tables of a model: chambers, and the chambers of cylinders."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from fvsolve.model.lowering import Lowering
 
 
 def joins_masses(case, cylinder) -> bool:
-    """True if a cylinder joins masses on one axis, not points of bodies."""
+    """True if both ends of a cylinder are masses or frames on one axis, not points of bodies."""
     ends = [cylinder.ports[port] for port in ("case", "rod")]
     return all(getattr(case.nodes.get(end), "domain", "") == "translational" for end in ends)
 
 
 class ChamberRows(Lowering, kind="chamber"):
-    """A node whose pressure follows from the mass of the fluid in it."""
+    """Rows of nodes whose pressure follows from the mass of the fluid in them."""
 
     def place(self, draft, name, node, row) -> None:
         moving, air = name in draft.owned, draft.fluid.air

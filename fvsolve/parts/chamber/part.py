@@ -10,10 +10,10 @@ from fvsolve.parts.value import VALUE, Quantity, UsualRange, positive
 
 
 class Chamber(PlaceOnBody, kind="chamber"):
-    """A rigid vessel full of fluid, (V / beta) dp/dt = net flow into it (80).
+    """A rigid vessel full of fluid, (V / beta) dp/dt = net flow into it; V `volume`, p pressure, beta bulk modulus.
 
-    Ports: any number. Stored energy, p from ambient: V p^2 / (2 beta) [J] under the linear law,
-    V (beta (exp(p/beta) - 1) - p) under the log law. Dissipated energy: none.
+    Ports: any number (docs/course.md, 80). Stored energy, p above ambient: V p^2 / (2 beta) [J] under the density law
+    `linear`, V (beta (exp(p / beta) - 1) - p) under the law `log`. Dissipated energy: none.
     """
 
     own_scalars: ClassVar[str] = "start"
@@ -24,7 +24,7 @@ class Chamber(PlaceOnBody, kind="chamber"):
         Quantity("volume", positive, "volume of fluid [m3]", UsualRange(1e-10, 1e5, "cylinders to caverns"), VALUE),
     ]
     initial_pressure: Annotated[
-        float | None, Quantity("pressure", about="pressure at the start [Pa]; in equilibrium if left out")
+        float | None, Quantity("pressure", about="pressure at the start [Pa]; that of the steady state if left out")
     ] = None
 
     def faults(self, name: str, around: CaseContext) -> Faults:

@@ -1,7 +1,8 @@
 """A check valve that shuts when its flow reverses.
 
-Open, it is a restriction in both directions, and its event function is the flow. Shut, nothing passes; it opens when
-the drop exceeds its cracking pressure. armed[event] marks it as shut and changes on accepted states only.
+While open, it is a restriction in both directions, and its event function is the flow. While shut, no fluid passes; it
+opens when the pressure drop exceeds its cracking pressure. The flag armed[event] is above 0 while it is shut; it
+changes on accepted states only.
 """
 
 from fvsolve.jit import njit
@@ -14,21 +15,24 @@ PRESSURE_MARGIN = 1.0  # excess over the cracking pressure at which it opens, so
 
 @njit
 def set(t, y, out, tables, device):
-    """Write its conductance, 0 while shut."""
+    """Write the conductance of the valve [kg2/s2/Pa] into `out`, 0 while it is shut."""
     k, shut = device["valve"], tables.armed[device["event"]] > 0.0
     out[tables.layout[0]["conductance"] + k] = 0.0 if shut else tables.valves[k]["conductance"]
 
 
 @njit
 def joins_junction(tables, device):
-    """True if a junction lies at one of its ends: other parts may then stop the flow while the valve is open."""
+    """True if a junction lies at one end of the valve: other parts may then stop the flow while the valve is open."""
     valve, nodes = tables.valves[device["valve"]], tables.nodes
     return nodes[valve["from_node"]]["kind"] == JUNCTION or nodes[valve["to_node"]]["kind"] == JUNCTION
 
 
 @njit
 def events(t, y, out, tables, device, g):
-    """g: flow while open [kg/s], or drop beyond the opening pressure while shut [Pa]; and its negative."""
+    """Write the event function g and its negative.
+
+    g is the flow while the valve is open [kg/s], and the drop minus the opening pressure while it is shut [Pa].
+    """
     k, at = device["valve"], device["event"]
     margin = out[tables.layout[0]["valve"] + k]
     if margin == 0.0 and tables.armed[at] == 0.0 and joins_junction(tables, device):
@@ -40,5 +44,5 @@ def events(t, y, out, tables, device, g):
 
 @njit
 def value(t, y, out, tables, device, quantity):
-    """1 if open, 0 if shut."""
+    """Opening of the valve: 1 if open, 0 if shut."""
     return 1.0 if out[tables.layout[0]["conductance"] + device["valve"]] > 0.0 else 0.0

@@ -1,8 +1,8 @@
 """A check valve that shuts at a reverse velocity given by its manufacturer's curve.
 
-It is OPEN, or REVERSED (the flow has reversed and the valve is still open), or SHUT. armed[event] to armed[event + 2]
-mark the mode and change on accepted states only. Two states store, from the reversal on, the reverse velocity at which
-it shuts and the deceleration from which that was read.
+It is OPEN, or REVERSED (the flow has reversed and the valve is still open), or SHUT. The flags armed[event] to
+armed[event + 2] mark the mode and change on accepted states only. From the reversal on, two states store the reverse
+velocity at which the valve shuts [m/s] and the deceleration of the flow at the reversal [m/s2].
 """
 
 from fvsolve.jit import njit
@@ -22,7 +22,10 @@ SMALLEST = 1e-300
 
 @njit
 def valve_mode(y, tables, device):
-    """REVERSED, SHUT or OPEN by its flags; without a flag, REVERSED if a slam velocity is stored, otherwise UNKNOWN."""
+    """Mode of the valve by its flags: REVERSED, SHUT or OPEN.
+
+    Without a set flag it is REVERSED if a slam velocity is stored, otherwise UNKNOWN.
+    """
     for mode in range(BEYOND_CURVE):
         if tables.armed[device["event"] + mode] > 0.0:
             return mode
@@ -31,21 +34,24 @@ def valve_mode(y, tables, device):
 
 @njit
 def set(t, y, out, tables, device):
-    """Write its conductance, 0 while shut."""
+    """Write the conductance of the valve [kg2/s2/Pa] into `out`, 0 while it is shut."""
     k, shut = device["valve"], tables.armed[device["event"] + SHUT] > 0.0
     out[tables.layout[0]["conductance"] + k] = 0.0 if shut else tables.valves[k]["conductance"]
 
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    """Zero: its states change by events only."""
+    """Write zero rates into `dydt`: the states of the valve change by events only."""
     if dydt.size > 0:
         dydt[device["y"]] = dydt[device["y"] + 1] = 0.0
 
 
 @njit
 def events(t, y, out, tables, device, g):
-    """g: velocity margin until the flow reverses or the valve shuts [m/s], drop margin until it opens [Pa]."""
+    """Write the event functions g of the modes REVERSED, SHUT and OPEN, and of a deceleration beyond the curve [m/s2].
+
+    Margins are velocities until the flow reverses or the valve shuts [m/s], and a drop until the valve opens [Pa].
+    """
     k, at, data, o, present = (
         device["valve"],
         device["event"],
@@ -75,12 +81,12 @@ def events(t, y, out, tables, device, g):
 
 @njit
 def set_mode_events(g, at, mode, later, margin):
-    """Write the events of a mode that holds while `margin` is positive and is then followed by `later`."""
+    """Write the event functions of a mode that lasts while `margin` is positive, and of its next mode `later`."""
     margin = -SMALLEST if margin == 0.0 else margin
     g[at + mode], g[at + later] = -margin, margin
 
 
 @njit
 def value(t, y, out, tables, device, quantity):
-    """1 if open, 0 if shut."""
+    """Opening of the valve: 1 if open, 0 if shut."""
     return 1.0 if out[tables.layout[0]["conductance"] + device["valve"]] > 0.0 else 0.0

@@ -1,4 +1,4 @@
-"""Check valves in the tables of a model."""
+"""Rows and initial states of check valves in the tables of a model."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SMALL_FLOW = 1e-9  # share of the flow scale below which a reversed flow is roun
 
 
 class CheckDisc(LiftedValve, kind=""):
-    """A check valve whose disc moves with a delay."""
+    """Rows of check valves whose disc moves with a delay."""
 
     mode = CHECK
 
@@ -37,7 +37,7 @@ class CheckDisc(LiftedValve, kind=""):
         return newton
 
     def add_start_notices(self, start, name, x):
-        """Warn that a disc that shares a rigid column with other valves does not control the column."""
+        """Add a notice if the disc and other valves join a rigid column: it then does not control the column."""
         valve, nodes = start.valves[start.draft.valve_names.index(name)], start.nodes
         if any(
             nodes["gates"][valve[end]] >= 0 and nodes["gate_count"][valve[end]] > 1 for end in ("from_node", "to_node")
@@ -51,19 +51,22 @@ class CheckDisc(LiftedValve, kind=""):
 
 
 class InertialCheckDisc(CheckDisc, kind=""):
-    """A check valve whose disc has inertia."""
+    """Rows of check valves whose disc has inertia."""
 
     states = ("opening", "speed")
 
 
 class LaggedCheckDisc(CheckDisc, kind=""):
-    """A check valve whose disc has no inertia."""
+    """Rows of check valves whose disc has a first-order lag without inertia."""
 
     states = ("opening",)
 
 
 class CheckValveRows(Device, kind="check-valve"):
-    """An open or shut valve. In the steady state no open valve has reverse flow, and no shut valve is pushed open."""
+    """Rows of check valves that are open or shut.
+
+    In the steady state no open valve has reverse flow, and no shut valve has a drop that opens it.
+    """
 
     law, events_only = law, True
     quantities = ("opening",)
@@ -96,7 +99,7 @@ class CheckValveRows(Device, kind="check-valve"):
 
 
 class SlamCurveRows(CheckValveRows, kind=""):
-    """A check valve that shuts at the reverse velocity of its manufacturer's curve."""
+    """Rows of check valves that shut at the reverse velocity of their manufacturer's curve."""
 
     law = law_slam
     states = ("slam_velocity", "deceleration")
@@ -121,7 +124,7 @@ class SlamCurveRows(CheckValveRows, kind=""):
         return run_data.model.valve_names[row["valve"]]
 
     def deceleration(self, run_data, row, t: float, y) -> float:
-        """Deceleration of the flow at the state, by a backward difference along the solution [m/s2]."""
+        """Deceleration of the flow at a state, by a backward difference along the solution [m/s2]."""
         model, k = run_data.model, int(run_data.model.layout["valve"] + row["valve"])
         dydt, now, before = np.zeros(y.size), model.new_out(), model.new_out()
         model.functions.rhs(t, y, dydt, now, run_data.handle)

@@ -25,7 +25,7 @@ from fvsolve.parts.valve.part import Sized
 
 @dataclass(frozen=True)
 class SlamCurve:
-    """Reverse velocity at which a valve shuts over the deceleration of the flow, linear between entries.
+    """Reverse velocity at which a valve shuts, over the deceleration of the flow; linear between entries.
 
     rate : deceleration, ascending [m/s2]; reverse_velocity : velocity in the bore [m/s]
     """
@@ -34,14 +34,14 @@ class SlamCurve:
     reverse_velocity: tuple[float, ...]
 
     def table(self) -> dict[str, list[float]]:
-        """The table as in a case file."""
+        """Table as in a case file, key -> list."""
         return {"rate": [*self.rate], "reverse_velocity": [*self.reverse_velocity]}
 
 
 class SlamCurveTable(Value):
     """A manufacturer's curve of slam velocities in a case file."""
 
-    about = "curve of the manufacturer: reverse velocity at which the valve shuts, over deceleration of the flow"
+    about = "manufacturer's curve of the reverse velocity at which the valve shuts, over the deceleration of the flow"
     takes = "`{ rate = [...], reverse_velocity = [...] }`, m/s2 and m/s"
     keys = {
         "rate": (Rows("acceleration", nonnegative), NEEDED),
@@ -72,13 +72,13 @@ class SlamCurveTable(Value):
 
 
 class CheckValve(Disc, Sized, TwoPort, kind="check-valve"):
-    """Open, a turbulent restriction q = Cd A sqrt(2 dp / rho) (79); it shuts when the flow reverses, and then q = 0.
+    """Check valve: a turbulent restriction q = Cd A sqrt(2 dp / rho) while open, shut when the flow reverses.
 
-    It opens again when the drop from `from` to `to` exceeds `cracking_pressure`. With a time_constant or a
-    natural_frequency its disc moves with a delay: q = x Cd A sqrt(2 |dp| / rho) sign(dp), and the disc tends to
-    x = (dp - cracking_pressure) / overpressure, so the flow reverses before it shuts. With `deceleration` it shuts at
-    the reverse velocity of that curve. Ports: from, to. Stored energy: none, that of the disc is neglected. Dissipated
-    power: dp q [W].
+    It opens again when the drop dp from `from` to `to` exceeds `cracking_pressure`. With `time_constant` or
+    `natural_frequency` its disc moves with a delay: q = x Cd A sqrt(2 |dp| / rho) sign(dp), and the lift x of the disc
+    tends to (dp - cracking_pressure) / overpressure, so the flow reverses before the valve shuts. With `deceleration`
+    it shuts at the reverse velocity of that curve. Ports: from, to (docs/course.md, 79). Stored energy: none, that of
+    the disc is neglected. Dissipated power: dp q [W].
     """
 
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "opening": "number"}
@@ -91,7 +91,7 @@ class CheckValve(Disc, Sized, TwoPort, kind="check-valve"):
         Quantity(
             "pressure_drop",
             positive,
-            "drop above cracking_pressure that opens the valve fully, with a time_constant or natural_frequency [Pa]",
+            "drop above `cracking_pressure` that opens the valve fully, with time_constant or natural_frequency [Pa]",
             DROPS,
         ),
     ] = None
@@ -99,7 +99,7 @@ class CheckValve(Disc, Sized, TwoPort, kind="check-valve"):
 
     @property
     def bore_area(self) -> float:
-        """Area to which the velocities of `deceleration` refer [m2]."""
+        """Area to which the velocities of the key `deceleration` refer [m2]."""
         return self.area if self.area is not None else math.pi / 4.0 * self.diameter**2
 
     @classmethod
@@ -107,13 +107,19 @@ class CheckValve(Disc, Sized, TwoPort, kind="check-valve"):
         faults = super().key_faults(given)
         moves = "time_constant" in given or "natural_frequency" in given
         if moves and "overpressure" not in given:
-            faults.append(((), "overpressure is missing: the drop above cracking_pressure that holds it fully open"))
+            faults.append(
+                ((), "overpressure is missing: the drop above `cracking_pressure` that holds the valve fully open")
+            )
         if "overpressure" in given and not moves:
-            faults.append((("overpressure",), "needs a time_constant or a natural_frequency"))
+            faults.append((("overpressure",), "needs the key `time_constant` or `natural_frequency`"))
         if "deceleration" in given and moves:
-            text = "is not valid with time_constant or natural_frequency, which also define how it shuts; remove one"
+            text = (
+                "is not valid with `time_constant` or `natural_frequency`, which also define how it shuts; remove one"
+            )
             faults.append((("deceleration",), text))
         if "deceleration" in given and not {"area", "diameter"} & set(given):
-            text = "its velocities need a bore; expected diameter or area, with loss_coefficient instead of Kv or Cv"
+            text = (
+                "its velocities refer to a bore; give `diameter` or `area`, with `loss_coefficient` instead of Kv or Cv"
+            )
             faults.append((("deceleration",), text))
         return faults

@@ -1,4 +1,4 @@
-"""Connections of vessels in the tables of a model."""
+"""Rows of the connections of vessels in the tables of a model."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from fvsolve.parts.schedule import constant
 
 
 class ConnectionRows(Restriction, kind="connection"):
-    """A throat with a loss coefficient for each direction."""
+    """Rows of throats with a loss coefficient for each flow direction."""
 
     def restriction(self, draft, name, link, row) -> None:
         row["schedule"], row["back"] = draft.schedules.add(constant(1.0)), link.outflow_ratio

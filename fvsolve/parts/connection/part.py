@@ -12,7 +12,10 @@ from fvsolve.units import show
 
 
 class Connection(Table):
-    """The throat between a vessel and its node: dp = loss rho v |v| / 2, v in its area, a loss for each direction."""
+    """Throat between a vessel and its node, with a loss coefficient K for each direction: dp = K rho v |v| / 2.
+
+    v is the velocity in the area of the throat.
+    """
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("area", "diameter"),)
     needs: ClassVar[tuple[tuple[str, ...], ...]] = (("area", "diameter"),)
@@ -38,7 +41,7 @@ class Connection(Table):
 class ConnectionTable(Value):
     """The table of a connection in a case file."""
 
-    about = "throat with a loss for each flow direction; joined without loss if left out"
+    about = "throat with a loss coefficient for each flow direction; joined without loss if left out"
     takes = "[connection](#connection)"
 
     def read(self, given: Any, setting: ReadContext) -> Connection:
@@ -56,7 +59,7 @@ class ConnectionTable(Value):
 
 
 class Throat(TwoPort):
-    """A connection as a link from the node of the vessel to the vessel inside."""
+    """A connection as a link from the node of a vessel to the vessel behind the throat."""
 
     kind: ClassVar[str] = "connection"
 
@@ -66,7 +69,7 @@ class Throat(TwoPort):
     laminar_reynolds: float | None = None
 
     def flow_area(self) -> float:
-        """Area over the square root of the loss into the vessel [m2]."""
+        """Throat area over the square root of the coefficient `loss_in` [m2]."""
         return self.throat_area / math.sqrt(self.size.loss_in)
 
     @property
@@ -76,19 +79,22 @@ class Throat(TwoPort):
 
     @property
     def outflow_ratio(self) -> float:
-        """Conductance out of the vessel over the conductance into it [-]."""
+        """Conductance for flow out of the vessel over the conductance for flow into it [-]."""
         return self.size.loss_in / self.size.loss_out
 
 
 def with_connection(name: str, vessel: Any, place: Any) -> tuple[dict[str, Any], dict[str, Throat]]:
-    """(places, links) of a vessel: the vessel alone, or `place` at `name`, the throat and the vessel inside."""
+    """Places and links, by name, that represent a vessel.
+
+    Without a connection the vessel alone; else `place` at `name`, the throat, and the vessel behind it.
+    """
     if vessel.connection is None:
         return {name: vessel}, {}
     return behind_throat(name, vessel.model_copy(update={"connection": None}), place, vessel.connection)
 
 
 def behind_throat(name: str, inside: Any, place: Any, size: Connection) -> tuple[dict[str, Any], dict[str, Throat]]:
-    """(places, links) of a vessel `inside` a throat from `place` at `name`."""
+    """Places and links, by name, of a vessel `inside` behind a throat of `size`, whose node is `place` at `name`."""
     ends = {"from": name, "to": f"{name}.inside"}
     throat = Throat.model_construct(**ends, size=size, diameter=size.diameter, area=size.area)
     return {name: place, f"{name}.inside": inside}, {f"{name}.connection": throat}

@@ -1,4 +1,4 @@
-"""Cylinders in the tables of a model; their chambers are nodes of their own."""
+"""Rows of cylinders in the tables of a model; their chambers are separate nodes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from fvsolve.model.mass_tables import PushLowering, join_ports
 
 
 class CylinderRows(PushLowering, kind="cylinder"):
-    """A piston between two chambers and two masses or points."""
+    """Rows of cylinders: a piston between two chambers, and between two masses or two points."""
 
     table = "piston"
 

@@ -15,10 +15,11 @@ AREAS = UsualRange(1e-7, 30.0, "micro-hydraulics to presses")
 
 
 class Cylinder(Link, kind="cylinder"):
-    """Chambers A and B, V_A = dead_volume_A + area_A x, V_B = dead_volume_B + area_B (stroke - x).
+    """Hydraulic cylinder: a piston between chambers A and B moves a rod relative to a case.
 
-    x = x_rod - x_case - closed_length; between points of bodies, their distance minus closed_length.
-    The piston pushes the rod forward by area_A p_A - area_B p_B - viscous_friction (v_rod - v_case), p from ambient,
+    The volumes are dead_volume_A + area_A x and dead_volume_B + area_B (stroke - x), with the piston position
+    x = x_rod - x_case - closed_length, or between points of bodies, their distance minus closed_length.
+    The piston pushes the rod forward by area_A p_A - area_B p_B - viscous_friction (v_rod - v_case), p above ambient,
     and the case backward by the same force. Ports: rod, case (velocity, force); places A, B (pressure, flow). Stored
     energy: that of its chambers. Dissipated power: leakage (p_A - p_B)^2 + viscous_friction (v_rod - v_case)^2 [W].
     """
@@ -38,18 +39,18 @@ class Cylinder(Link, kind="cylinder"):
     ] = 0.0
     area_A: Annotated[
         float | None,
-        Quantity("area", positive, "area of the piston at A [m2]; piston_diameter is needed if left out", AREAS),
+        Quantity("area", positive, "area of the piston at A [m2]; `piston_diameter` is needed if left out", AREAS),
     ] = None
     area_B: Annotated[
         float | None,
-        Quantity("area", positive, "ring area at B, without the rod [m2]; rod_diameter is needed if left out", AREAS),
+        Quantity("area", positive, "ring area at B, without the rod [m2]; `rod_diameter` is needed if left out", AREAS),
     ] = None
     piston_diameter: Annotated[
-        float | None, Quantity("length", positive, "diameter of the piston, instead of area_A [m]", SIZES)
+        float | None, Quantity("length", positive, "diameter of the piston, not with `area_A` [m]", SIZES)
     ] = None
     rod_diameter: Annotated[
         float | None,
-        Quantity("length", nonnegative, "diameter of the rod, instead of area_B, with piston_diameter [m]", SIZES),
+        Quantity("length", nonnegative, "diameter of the rod, with `piston_diameter`, not with `area_B` [m]", SIZES),
     ] = None
     dead_volume_A: Annotated[
         float, Quantity("volume", positive, "volume of chamber A with the rod in, lines included [m3]", changes=VALUE)
@@ -61,14 +62,14 @@ class Cylinder(Link, kind="cylinder"):
         float | None,
         Quantity(
             "pressure",
-            about="pressure of chamber A at the start [Pa]; by the load (shut chamber) or its links if left out",
+            about="pressure of chamber A at the start [Pa]; by its links, or by the load if it is shut, if left out",
         ),
     ] = None
     initial_pressure_B: Annotated[
         float | None,
         Quantity(
             "pressure",
-            about="pressure of chamber B at the start [Pa]; by the load (shut chamber) or its links if left out",
+            about="pressure of chamber B at the start [Pa]; by its links, or by the load if it is shut, if left out",
         ),
     ] = None
     leakage: Annotated[
@@ -87,7 +88,7 @@ class Cylinder(Link, kind="cylinder"):
         if "area_B" not in given and "rod_diameter" not in given:
             faults.append(((), "area_B or rod_diameter is missing"))
         if "rod_diameter" in given and "area_A" in given and "piston_diameter" not in given:
-            faults.append((("rod_diameter",), "needs piston_diameter; with area_A give area_B instead"))
+            faults.append((("rod_diameter",), "needs the key `piston_diameter`; with `area_A` give `area_B` instead"))
         return faults
 
     def faults(self, name: str, around: CaseContext) -> Faults:
@@ -102,7 +103,7 @@ class Cylinder(Link, kind="cylinder"):
             text = f"the piston starts at {x:g} m ({rod} minus {case}{closed}); expected 0 to {self.stroke:g} m"
             yield ("stroke",), text
         if min(self.areas()) <= 0.0:
-            yield ("rod_diameter",), "leaves no area at B; expected a diameter below piston_diameter"
+            yield ("rod_diameter",), "leaves no area at B; expected a diameter below `piston_diameter`"
 
     def areas(self) -> tuple[float, float]:
         """Areas of the piston at A and at B [m2]."""
@@ -112,7 +113,7 @@ class Cylinder(Link, kind="cylinder"):
         return bore, math.pi / 4.0 * (self.piston_diameter**2 - self.rod_diameter**2)
 
     def chambers(self, x: float) -> dict[str, Chamber]:
-        """Both chambers with the piston at x [m]."""
+        """Chambers A and B, by name, with the piston at position x [m]."""
         a, b = self.areas()
         volumes = {"A": self.dead_volume_A + a * x, "B": self.dead_volume_B + b * (self.stroke - x)}
         given = {"A": self.initial_pressure_A, "B": self.initial_pressure_B}

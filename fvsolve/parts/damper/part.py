@@ -9,7 +9,7 @@ from fvsolve.parts.value import VALUE, Quantity, positive
 
 
 class Damper(Coupling, kind="damper"):
-    """force = -damping (v_to - v_from).
+    """A viscous damper with the force = -damping (v_to - v_from), v the velocity of each port.
 
     Ports: from, to; the force pushes `to` forward. Stored energy: none. Dissipated power: damping
     (v_to - v_from)^2 [W].

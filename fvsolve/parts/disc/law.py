@@ -1,8 +1,10 @@
 """A disc on a spring that opens a restriction, M |M| = G x^2 dP.
 
-T dx/dt = target - x, or x'' = w^2 (target - x) - 2 zeta w x', between the seat at 0 and the stop at 1, where the disc
-comes to rest: armed[event] marks it at its stop, armed[event + 2] on its seat. target = (lifting pressure - opening
-pressure) / span; the lifting pressure is the upstream pressure of a relief valve, or the drop across a check valve.
+M is the mass flow, G the conductance at full opening, dP the drop, x the lift: 0 on the seat, 1 at the stop. The lift
+follows T dx/dt = target - x or x'' = w^2 (target - x) - 2 zeta w x', with time constant T, or angular frequency w and
+damping ratio zeta. target = (lifting pressure - opening pressure) / span; the lifting pressure is the upstream pressure
+of a relief valve, or the drop across a check valve. The disc rests at its stop (flag armed[event]) and on its seat
+(armed[event + 2]).
 
 A disc that alone joins a rigid column controls its flow near the seat (armed[event + 4]): `kernels.valve_seating`.
 """
@@ -27,20 +29,20 @@ SLAM_TIME = 1e-9  # time over T or 1 / w before the seat at which a closing disc
 
 @njit
 def disc_lift(y, tables, device):
-    """Lift x, beyond its stops by rounding at most."""
+    """Lift x of the disc; it may exceed 0 to 1 by rounding."""
     return tables.floats[device["data"] + LIFT] + y[device["y"]]
 
 
 @njit
 def set(t, y, out, tables, device):
-    """Write its conductance G x^2."""
+    """Write the conductance G x^2 of the restriction into `out`, G the conductance at full opening and x the lift."""
     k, x = device["valve"], min(max(disc_lift(y, tables, device), 0.0), 1.0)
     out[tables.layout[0]["conductance"] + k] = tables.valves[k]["conductance"] * x * x
 
 
 @njit
 def disc_drive(y, out, tables, device):
-    """target - x at the present state."""
+    """Target lift minus lift of the disc at the present pressures [-]."""
     k = device["valve"]
     before = out[tables.layout[0]["pressure"] + tables.valves[k]["from_node"]]
     return disc_drive_at(y, tables, device, before, head_drop(tables, out, k)[1])
@@ -48,7 +50,10 @@ def disc_drive(y, out, tables, device):
 
 @njit
 def disc_drive_at(y, tables, device, before, drop):
-    """target - x at an upstream pressure deviation p' and a drop across the disc."""
+    """Target lift minus lift of the disc [-] at given pressures.
+
+    before : upstream pressure minus that at the start [Pa]; drop : pressure drop across the disc [Pa]
+    """
     floats, data = tables.floats, device["data"]
     lifting = before if device["mode"] == RELIEF else drop - floats[data + LIFTING_PRESSURE]
     return (floats[data + TARGET] - floats[data + LIFT]) + lifting / floats[data + SPAN] - y[device["y"]]
@@ -56,7 +61,11 @@ def disc_drive_at(y, tables, device, before, drop):
 
 @njit
 def lead(t, y, tables, device, before, behind, drop, ahead):
-    """dx/dt at pressures p' of its ends and a drop across it, and the derivative of dx/dt by the drop [1/Pa/s]."""
+    """Rate of the lift dx/dt [1/s] at given pressures, and its derivative by the drop [1/Pa/s].
+
+    before, behind : pressures at the ends minus those at the start [Pa]; drop : drop across the valve [Pa]
+    ahead : True if the drop changes by the upstream pressure
+    """
     floats, armed, at, data = tables.floats, tables.armed, device["event"], device["data"]
     if armed[at] > 0.0 or armed[at + 2] > 0.0:
         return 0.0, 0.0
@@ -69,17 +78,17 @@ def lead(t, y, tables, device, before, behind, drop, ahead):
 
 @njit
 def lift_rate_slope(tables, device):
-    """d(dx/dt) / d(lifting pressure) [1/Pa/s]; 0 for a disc with inertia."""
+    """Derivative of the rate of the lift dx/dt by the lifting pressure [1/Pa/s]; 0 for a disc with inertia."""
     floats, data = tables.floats, device["data"]
     return 1.0 / (floats[data + TIME_CONSTANT] * floats[data + SPAN]) if device["states"] == 1 else 0.0
 
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    """Rates of its lift and speed, 0 at a stop, and its rate limit.
+    """Write the rates of lift and speed into `dydt`, 0 at a stop, and raise out[RATE] to the rate limit of the disc.
 
-    While the disc closes on a column, -x'/x goes into out[CLOSING]: a column that flows back slams the disc,
-    x ~ (time left)^(1/3), and a step must not pass that instant.
+    While the disc closes on a column, -x'/x (x the lift) goes into out[CLOSING]: a column that flows back slams the
+    disc, x ~ (time left)^(1/3), and a time step must not pass that instant.
     """
     floats, armed, at, o = tables.floats, tables.armed, device["event"], device["y"]
     drive, stopped = disc_drive(y, out, tables, device), armed[at] > 0.0 or armed[at + 2] > 0.0
@@ -101,7 +110,10 @@ def move(t, y, dydt, out, tables, device):
 
 @njit
 def disc_rate_limit(y, out, tables, device, own):
-    """Rate limit including the nodes at its ends; where a column sets the flow, d dP / dx = -2 dP / x."""
+    """Rate limit of the disc with the nodes at its ends [1/s]; own : rate of the disc alone [1/s].
+
+    Where a column sets the flow, the derivative of the drop dP by the lift x is -2 dP / x.
+    """
     k, speed, nodes = device["valve"], own / tables.floats[device["data"] + SPAN], tables.nodes
     before, behind = tables.valves[k]["from_node"], tables.valves[k]["to_node"]
     if controls_column(tables, k):
@@ -116,7 +128,10 @@ def disc_rate_limit(y, out, tables, device, own):
 
 @njit
 def events(t, y, out, tables, device, g):
-    """g: distance to the stop, to the seat, and to the lift at which it stops controlling a column; each both ways."""
+    """Write the event functions g, each with its negative.
+
+    They are the distances to the stop, to the seat, and to the lift at which the valve stops to control a column.
+    """
     armed, at, o = tables.armed, device["event"], device["y"]
     x, drive = disc_lift(y, tables, device), disc_drive(y, out, tables, device)
     stop, seat = -drive - STOP_MARGIN, drive - STOP_MARGIN
@@ -137,5 +152,5 @@ def events(t, y, out, tables, device, g):
 
 @njit
 def value(t, y, out, tables, device, quantity):
-    """Lift, 0 to 1."""
+    """Lift of the disc, 0 to 1."""
     return min(max(disc_lift(y, tables, device), 0.0), 1.0)

@@ -1,4 +1,4 @@
-"""Valves with a disc lifted by pressure, in the tables of a model and in its steady state."""
+"""Valves with a disc that pressure lifts: rows in the tables of a model, and states in the steady start."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ STOP_EVENTS = ("is fully open", "leaves full opening", "is shut", "leaves its se
 
 
 class LiftedValve(Device, kind=""):
-    """A valve that is shut, fully open, or lifted between; a disc with a delay has its lift as a state."""
+    """Rows of valves that are shut, fully open, or partly lifted; a disc with a delay has its lift as a state."""
 
     law, controlling_event = law, 4
     quantities = ("opening",)
@@ -25,7 +25,7 @@ class LiftedValve(Device, kind=""):
     remedy = "give it a greater overpressure"
 
     def numbers(self, draft, name, part) -> list[float]:
-        """Lift, target and lifting pressure at the start; then the span and the dynamics of the disc."""
+        """Numbers of the disc in the order of `law`: lift, target and lifting pressure at the start, then its keys."""
         frequency = part.natural_frequency or 0.0
         return [0.0, 0.0, 0.0, part.overpressure, part.time_constant or 0.0, 2.0 * math.pi * frequency,
                 part.damping_ratio or 0.0]  # fmt: skip
@@ -45,7 +45,7 @@ class LiftedValve(Device, kind=""):
         return start.draft.devices[start.valves[k]["device"]][1]
 
     def lifting_pressure(self, start, k: int) -> float:
-        """Lifting pressure beyond the opening pressure in the present steady solution [Pa]."""
+        """Lifting pressure of valve k minus its opening pressure in the present steady solution [Pa]."""
         raise NotImplementedError
 
     def edge(self, start, k):
@@ -57,10 +57,10 @@ class LiftedValve(Device, kind=""):
         return Edge(i, j, self.row(start, k), 0.0, sensed_node=i)
 
     def follow(self, start, k) -> None:
-        """Nothing: `begin` sets the drop."""
+        """Do nothing: `begin` sets the drop."""
 
     def flow_at(self, start, k: int, drop: float, lift: float) -> tuple[float, float, float]:
-        """(flow, its derivative by the drop at this lift, its derivative by the lift)."""
+        """Mass flow of valve k [kg/s] and its derivatives by the drop [kg/s/Pa] and by the lift [kg/s]."""
         g = float(start.valves[k]["conductance"]) * start.factor.get(k, 1.0)
         transition = transition_of(start.valves[k], g)
         full, x = flow_at_drop(g, transition, drop), max(lift, 0.0)
@@ -79,7 +79,10 @@ class LiftedValve(Device, kind=""):
         return after != before
 
     def next_mode(self, x: float, back: bool, now: str) -> str:
-        """Mode in the next steady solution."""
+        """Mode of the valve in the next steady solution: "shut", LIFTING or OPEN.
+
+        x : lift by the pressures, not limited; back : True if the flow is reversed; now : present mode
+        """
         if now == "shut":
             return LIFTING if x > SMALL_LIFT else now
         if x < -SMALL_LIFT:
@@ -105,8 +108,8 @@ class LiftedValve(Device, kind=""):
         )
 
     def store_lift(self, start, row, x: float, target: float) -> None:
-        """Store the lift and the target at the start."""
+        """Store the lift x and the target lift at the start in the numbers of the device."""
         start.draft.tables.floats[row["data"] : row["data"] + 2] = x, target
 
     def add_start_notices(self, start, name: str, x: float) -> None:
-        """Add notices about the start."""
+        """Add notices about a valve with the lift x at the start to the draft."""

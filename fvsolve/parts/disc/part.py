@@ -21,7 +21,7 @@ class Disc(Table):
         Quantity(
             "time",
             positive,
-            "time constant of its disc, damping over stiffness [s]; no delay if left out",
+            "time constant of the disc, damping over stiffness [s]; no delay if left out",
             UsualRange(1e-6, 300.0, "poppets to damped flaps"),
             VALUE,
         ),
@@ -31,25 +31,26 @@ class Disc(Table):
         Quantity(
             "frequency",
             positive,
-            "undamped natural frequency of its disc, instead of time_constant [Hz]",
+            "undamped natural frequency of the disc, not with `time_constant` [Hz]",
             UsualRange(1e-2, 2e4, "flaps to poppets"),
             VALUE,
         ),
     ] = None
     damping_ratio: Annotated[
-        float | None, Number(nonnegative, "damping ratio of its disc, 1 is critical", changes=VALUE)
+        float | None,
+        Number(nonnegative, "damping ratio of the disc, with `natural_frequency`; 1 is critical", changes=VALUE),
     ] = None
 
     @property
     def has_dynamics(self) -> bool:
-        """True if its lift is a state."""
+        """True if the lift is a state."""
         return self.time_constant is not None or self.natural_frequency is not None
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
         faults = super().key_faults(given) + exclusive_key_faults(given, ("time_constant", "natural_frequency"))
         if "natural_frequency" in given and "damping_ratio" not in given:
-            faults.append((("natural_frequency",), "needs a damping_ratio, for example 0.3"))
+            faults.append((("natural_frequency",), "needs the key `damping_ratio`, for example 0.3"))
         if "damping_ratio" in given and "natural_frequency" not in given:
-            faults.append((("damping_ratio",), "needs a natural_frequency"))
+            faults.append((("damping_ratio",), "needs the key `natural_frequency`"))
         return faults

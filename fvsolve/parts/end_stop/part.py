@@ -10,10 +10,11 @@ from fvsolve.parts.value import VALUE, Quantity, nonnegative, positive
 
 
 class EndStop(Coupling, kind="end-stop"):
-    """Contact outside minimum <= x_to - x_from <= maximum, at depth d with force max(0, stiffness d + damping dd/dt).
+    """Contact of two bodies where x_to - x_from is below `minimum` or above `maximum`; x is the position of a port.
 
-    Ports: from, to; the force pushes `to` forward, so it is negative at `maximum`; it never pulls. Stored energy:
-    stiffness d^2 / 2 [J]. Dissipated power: (force - stiffness d) dd/dt [W].
+    At the depth d beyond the limit the force is max(0, stiffness d + damping dd/dt). Ports: from, to; the force pushes
+    `to` forward at `minimum` and backward (negative) at `maximum`; it never pulls. Stored energy: stiffness d^2 / 2
+    [J]. Dissipated power: (force - stiffness d) dd/dt [W].
     """
 
     needs: ClassVar[tuple[tuple[str, ...], ...]] = (("minimum", "maximum"),)
@@ -29,4 +30,4 @@ class EndStop(Coupling, kind="end-stop"):
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         if None not in (self.minimum, self.maximum) and self.minimum >= self.maximum:
-            yield ("maximum",), f"{self.maximum:g} m is not above minimum, {self.minimum:g} m"
+            yield ("maximum",), f"{self.maximum:g} m is not above `minimum`, {self.minimum:g} m; set it higher"

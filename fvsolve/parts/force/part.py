@@ -15,10 +15,10 @@ from fvsolve.parts.value import Rows, Text
 
 
 class Force(Coupling, kind="force"):
-    """force(t) on `to`, forward; the opposite force acts on `from`, if given.
+    """External force(t) that acts on `to` in forward direction, and in opposite direction on `from`, if given.
 
-    Ports: from, to. Stored and dissipated energy: none; it supplies force times (v_to - v_from) [W], in space along its
-    direction.
+    Ports: from, to. Stored and dissipated energy: none; it supplies force times (v_to - v_from) [W], v the velocity of
+    a port, in space along `direction`.
     """
 
     may_lack: ClassVar[tuple[str, ...]] = ("from",)

@@ -4,4 +4,4 @@ from fvsolve.model.mass_tables import AxisLowering
 
 
 class FrameRows(AxisLowering, kind="frame"):
-    """A fixed body on the axis."""
+    """Rows of frames: fixed bodies on the axis."""

@@ -10,9 +10,10 @@ from fvsolve.parts.value import Quantity
 
 
 class Frame(Node, kind="frame"):
-    """A fixed position on the axis; its velocity is zero under any force.
+    """A fixed position on the common axis of masses, or points fixed in the world.
 
-    Ports: those of the links that name it, velocity and force. Stored and dissipated energy: none.
+    Its velocity is zero under any force. Ports: those of the links that name it, velocity and force. Stored and
+    dissipated energy: none.
     """
 
     domain: ClassVar[str] = "translational"

@@ -8,7 +8,7 @@ from fvsolve.model.lowering import Lowering
 
 
 class InflowRows(Lowering, kind="inflow"):
-    """A junction with negative demand."""
+    """Rows of inflows: junctions with a negative demand."""
 
     ledger_name = "inflow"
 

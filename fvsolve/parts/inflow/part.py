@@ -9,9 +9,9 @@ from fvsolve.parts.schedule import Schedule, Scheduled
 
 
 class Inflow(PlaceOnBody, kind="inflow"):
-    """A node without volume that supplies `flow(t)` to its links.
+    """A node without volume that supplies a given flow(t) to its links.
 
-    Ports: any number. Stored energy: none. Dissipated energy: none; it supplies p times flow [W].
+    Ports: any number. Stored energy: none. Dissipated energy: none; it supplies p times flow [W], p its pressure.
     """
 
     driven: ClassVar[tuple[str, float]] = "flow", 1.0

@@ -16,11 +16,12 @@ from fvsolve.parts.value import Number, Quantity, between
 class Junction(PlaceOnBody, kind="junction"):
     """A node without volume: the flows into its links and its demand sum to zero.
 
-    Ports: any number. Stored energy: none. Dissipated energy: none; the demand removes p demand [W].
+    Ports: any number. Stored energy: none. Dissipated energy: none; the demand removes p times demand [W], p its
+    pressure.
 
-    With a `required_pressure` the demand depends on pressure: demand ((p - minimum) / (required - minimum))^exponent,
-    0 at `minimum_pressure`, all of it at `required_pressure` and above (Wagner, Shamir and Marks 1988). It flows out
-    to ambient, and (p - ambient) q is dissipated [W].
+    With a `required_pressure` the flow is demand ((p - minimum) / (required - minimum))^demand_exponent: 0 up to
+    `minimum_pressure`, the full demand from `required_pressure` on (Wagner, Shamir and Marks 1988). It flows out to
+    ambient, and (p - ambient) times the flow is dissipated [W].
     """
 
     driven: ClassVar[tuple[str, float]] = "demand", -1.0
@@ -56,7 +57,7 @@ class Junction(PlaceOnBody, kind="junction"):
         least = around.ambient if self.minimum_pressure is None else self.minimum_pressure
         if self.required_pressure is None:
             if self.minimum_pressure is not None:
-                yield ("minimum_pressure",), "has no effect without required_pressure"
+                yield ("minimum_pressure",), "has no effect without `required_pressure`; give both keys, or remove it"
             return
         if self.required_pressure <= least:
             text = f"{self.required_pressure:g} Pa is not above the pressure of no flow, {least:g} Pa"
@@ -64,4 +65,4 @@ class Junction(PlaceOnBody, kind="junction"):
         if least < around.ambient:
             yield ("minimum_pressure",), f"{least:g} Pa is below ambient pressure, where nothing flows out"
         if not (self.demand.value.min() >= 0.0 and self.demand.value.max() > 0.0):
-            yield ("demand",), "with required_pressure, expected a demand that is never negative and not always 0"
+            yield ("demand",), "with `required_pressure`, expected a demand that is never negative and not always 0"

@@ -14,7 +14,7 @@ from fvsolve.parts.value import Number, Text, UsualRange, between, positive
 
 
 class Leak(Link, kind="leak"):
-    """A leak or emitter, q = opening coefficient (p - ambient)^exponent, none where p is below ambient.
+    """A leak or emitter, q = opening coefficient (p - ambient)^exponent; no flow where the pressure p is below ambient.
 
     Port: from; the outflow is at the elevation of its node. Below 10 Pa, a millimetre of head, a cubic joins the power
     law to zero flow. Stored energy: none. Dissipated power: (p - ambient) q [W].
@@ -24,14 +24,17 @@ class Leak(Link, kind="leak"):
 
     from_: Annotated[str, Text("place of the leak"), Field(alias="from")]
     coefficient: Annotated[
-        float, Number(positive, "flow in m3/s at a drop of 1 Pa", UsualRange(1e-15, 0.1, "seeping to a main torn off"))
+        float,
+        Number(
+            positive, "flow in m3/s at a pressure drop of 1 Pa", UsualRange(1e-15, 0.1, "seeping to a main torn off")
+        ),
     ]
     exponent: Annotated[
-        float, Number(between(0, 3, open=True), "exponent of the drop, 0.5 for a hole of fixed size")
+        float, Number(between(0, 3, open=True), "exponent of the pressure drop, 0.5 for a hole of fixed size")
     ] = 0.5
-    opening: Annotated[
-        Schedule, Scheduled("number", between(0, 1), "relative opening, a factor of the coefficient")
-    ] = Field(default_factory=lambda: constant(1.0))
+    opening: Annotated[Schedule, Scheduled("number", between(0, 1), "relative opening, a factor of `coefficient`")] = (
+        Field(default_factory=lambda: constant(1.0))
+    )
 
     @property
     def ports(self) -> dict[str, str]:

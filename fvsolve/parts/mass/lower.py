@@ -4,4 +4,4 @@ from fvsolve.model.mass_tables import AxisLowering
 
 
 class MassRows(AxisLowering, kind="mass"):
-    """A body on an axis, moved by forces."""
+    """Rows of masses: bodies on an axis, moved by forces."""

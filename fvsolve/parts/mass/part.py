@@ -9,7 +9,7 @@ from fvsolve.parts.value import VALUE, Quantity, UsualRange, positive
 
 
 class Mass(Node, kind="mass"):
-    """A rigid body on one axis, mass dv/dt = sum of the forces on it, dx/dt = v; two states.
+    """A rigid body on one axis, mass dv/dt = sum of the forces on it; its states are position and velocity v.
 
     Ports: those of the links that name it, velocity and force. Stored energy: mass v^2 / 2 [J]. Dissipated: none.
     """

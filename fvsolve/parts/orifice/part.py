@@ -4,7 +4,8 @@ from fvsolve.parts.valve.part import Valve
 
 
 class Orifice(Valve, kind="orifice"):
-    """A fixed restriction with the law of a valve, q = f(opening) Cd A sqrt(2 |dp| / rho) sign(dp) (79).
+    """A restriction whose opening is usually fixed: q = f(opening) Cd A sqrt(2 |dp| / rho) sign(dp), as a valve.
 
+    q is the flow, f the characteristic, Cd the discharge coefficient, A the area, dp the drop (docs/course.md, 79).
     Ports: from, to. Stored energy: none. Dissipated power: dp q [W].
     """
