@@ -56,7 +56,7 @@ def uniform(value: float) -> SpatialField:
 
 @dataclass(frozen=True)
 class SpatialFieldKey(Value):
-    """Field over a plane in a case file: a quantity, a formula of x and y in SI, or { file } with x, y and the value."""
+    """Field over a plane in a case file: a quantity, a formula of x and y in SI, or { file } with x, y, value."""
 
     dimension: str
     about: str = ""

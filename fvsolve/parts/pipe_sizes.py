@@ -1,7 +1,7 @@
 """Nominal pipe sizes and fittings by name, from the tables of the package `fluids`.
 
-Fittings are those of Crane TP-410: K = (L / D) f_T, f_T the friction factor of clean commercial steel in fully
-turbulent flow.
+Loss coefficients of fittings are those of Crane TP-410: K = (L / D) f_T, with the equivalent length L over the diameter
+D, and f_T the friction factor of clean commercial steel in fully turbulent flow.
 """
 
 from __future__ import annotations
@@ -61,7 +61,10 @@ def parse_inches(text: str) -> float:
 
 
 def pipe_bore(nominal: str, schedule: str) -> tuple[float, float]:
-    """(inner diameter, wall thickness) [m] of "DN100" or "NPS 4" in a schedule. Raises ValueError for unknown sizes."""
+    """Inner diameter and wall thickness [m] of a size such as "DN100" or "NPS 4" in a schedule.
+
+    Raises ValueError for an unknown size or schedule.
+    """
     from fluids.piping import nearest_pipe, schedule_lookup
 
     match = re.fullmatch(rf"(DN|NPS)\s*({WHOLE}|{MIXED})", nominal.strip(), re.IGNORECASE)
@@ -82,7 +85,7 @@ def pipe_bore(nominal: str, schedule: str) -> tuple[float, float]:
 
 
 def fittings_loss(names: list[str], diameter: float) -> float:
-    """Sum of the loss coefficients of fittings in a pipe; diameter : inner [m]."""
+    """Sum of the loss coefficients of fittings in a pipe of an inner diameter [m]."""
     from fluids import fittings
     from fluids.friction import ft_Crane
 

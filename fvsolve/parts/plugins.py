@@ -1,4 +1,4 @@
-"""Part plugins: parts in a folder, or in an installed package."""
+"""Part plugins: parts declared in a folder, or in an installed package."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ PLUGIN_PACKAGE = "fvsolve_parts"  # package in which registered folders appear
 
 @validated(folder=PATH)
 def register_part(folder: str | os.PathLike) -> None:
-    """Register the part in a folder: `part.py`, and `lower.py` and `law.py` if the part has a law.
+    """Register the part in a folder: `part.py`, and `lower.py` and `law.py` if the part has a compiled law.
 
     Modules of the folder use relative imports. Their sources belong to the key of the compilation cache: an edit
-    recompiles them. Child processes register the part too; the environment variable FVSOLVE_PARTS lists such folders.
+    recompiles them. Child processes register the part too; the environment variable FVSOLVE_PARTS lists the folders.
     Raises FvsolveError if there is no part.py, or if the name of the part exists already.
     """
     path = Path(folder).resolve()
@@ -45,7 +45,7 @@ def register_part(folder: str | os.PathLike) -> None:
 
 
 def registered_folders() -> list[str]:
-    """Folders of parts in the environment variable."""
+    """Folders of registered parts, from the environment variable FVSOLVE_PARTS."""
     return [folder for folder in os.environ.get(VARIABLE, "").split(os.pathsep) if folder]
 
 
@@ -57,7 +57,7 @@ def declare(package: str) -> None:
 
 
 def declare_installed() -> None:
-    """Declare parts of installed packages and of the environment variable; warn of unreadable parts."""
+    """Declare parts of installed packages and of the variable FVSOLVE_PARTS; warn of unreadable parts."""
     offered = [
         (f"{entry.name} of the entry points {GROUP}", declare, entry.value) for entry in entry_points(group=GROUP)
     ]

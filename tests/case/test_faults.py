@@ -262,7 +262,7 @@ BAD = {
     ),
     "friction with a stray number": (
         swap('"steady", r', '"none", r'),
-        'links.main.friction.roughness: friction model "none" has no roughness',
+        'links.main.friction.roughness: friction model "none" has no key roughness',
     ),
     "friction model": (
         swap('"steady"', '"stedy"'),

@@ -227,7 +227,7 @@ def test_a_demand_follows_the_pressure_between_none_and_all():
         ({"required_pressure": 1e5}, "is not above the pressure of no flow"),
         ({"required_pressure": 3e5, "minimum_pressure": 0.9e5}, "is below ambient"),
         ({"required_pressure": 3e5, "demand": -1.0}, "never negative"),
-        ({"minimum_pressure": 2e5}, "has no effect without required_pressure"),
+        ({"minimum_pressure": 2e5}, "has no effect without `required_pressure`"),
     ],
 )
 def test_what_is_wrong_with_such_a_demand_is_said(wrong, said):

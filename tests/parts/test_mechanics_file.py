@@ -191,7 +191,7 @@ BAD = {
         swap('minimum = "1 mm"\nmaximum = "199 mm"', ""),
         "links.stop: expected one of minimum, maximum",
     ),
-    "a stop without room": (swap('"199 mm"', '"1 mm"'), "links.stop.maximum: 0.001 m is not above minimum, 0.001 m"),
+    "a stop without room": (swap('"199 mm"', '"1 mm"'), "links.stop.maximum: 0.001 m is not above `minimum`, 0.001 m"),
     "a force on nothing": (swap('to = "load"\nforce', "force"), "links.push: to is missing"),
     "a loose mass": (
         swap("[nodes.ground]", '[nodes.m]\ntype = "mass"\nmass = 1\n[nodes.ground]'),

@@ -293,7 +293,7 @@ def test_pipes_without_it_have_no_state_of_it():
 
 @pytest.mark.parametrize(
     ("friction", "kind", "words"),
-    [({"model": "steady", "factor": 0.02, "weighting": "zielke"}, "pipe", "has no weighting"),
+    [({"model": "steady", "factor": 0.02, "weighting": "zielke"}, "pipe", "has no key weighting"),
      ({"model": "unsteady"}, "pipe", "roughness"),
      ({"model": "unsteady", "factor": 0.02, "weighting": "zielk"}, "pipe", 'did you mean "zielke"'),
      ({"model": "unsteady", "factor": 0.02, "accuracy": 1e-9}, "pipe", "out of range"),

@@ -1,10 +1,11 @@
-"""Outflow to ambient as a power of the drop, without backflow: leaks, and demands that depend on pressure.
+"""Outflow to ambient as a power of the pressure drop, without backflow: leaks, and demands that depend on pressure.
 
-M = sqrt(G span) min(most, x^n), x = (drop - least) / span. Below LEAST_DROP a cubic joins the power law to zero flow
-with zero slope, so that the slope is bounded and continuous. `floats` has n, least, span and most; `event` of the
-VALVE row is the index of the flags. The flags change on accepted states only, so that no step crosses a kink. Shut,
-the outlet passes nothing. With a part of its demand (PART) the power law holds also above `most`. With all of it
-(FULL) the flow stays at the limit until x is half of its value at full demand.
+M = sqrt(G span) min(most, x^n), x = (drop - least) / span; M is the mass flow, sqrt(G span) the flow at x = 1. Below
+LEAST_DROP a cubic joins the power law to zero flow with zero slope, so that the slope is bounded and continuous.
+`floats` holds n, least, span and most of an outlet; `event` of its row of restrictions is the index of its flags. The
+flags change on accepted states only, so that no time step crosses a kink. Under the rule SHUT no fluid passes. While
+the outlet supplies a part of its demand (PART), the power law also holds above `most`. While it supplies the full
+demand (FULL), the flow stays at its limit until x is half of its value at full demand.
 """
 
 from math import sqrt
@@ -22,7 +23,7 @@ NO_LIMIT = 1e300  # value of `most` without a limit
 
 @njit(forceinline=True)
 def rule_of(tables, k):
-    """Rule of restriction k until its next event."""
+    """Rule of restriction k until its next event: FREE, SHUT, PART or FULL."""
     armed, at = tables.armed, tables.valves[k]["event"]
     if armed[at] > 0.0:
         return SHUT
@@ -31,7 +32,7 @@ def rule_of(tables, k):
 
 @njit(forceinline=True)
 def drop_under_rule(floats, at, drop, rule):
-    """(drop above `least` for the power law, most) under a rule."""
+    """Drop above `least` in the power law [Pa], and the limit `most` of the relative flow, under a rule."""
     above, most = drop - floats[at + 1], floats[at + 3]
     if rule == PART:
         return above, NO_LIMIT
@@ -40,7 +41,10 @@ def drop_under_rule(floats, at, drop, rule):
 
 @njit
 def emitter_flow(floats, at, g, drop, rule):
-    """Mass flow [kg/s] at a drop [Pa]; g : conductance now, (flow at x = 1)^2 / span [kg2/s2/Pa]."""
+    """Mass flow of an outlet at a drop [kg/s]; 0 below the drop at which flow begins.
+
+    g : conductance now, (flow at x = 1)^2 / span [kg2/s2/Pa]; drop [Pa]; rule : FREE, SHUT, PART or FULL
+    """
     n, span = floats[at], floats[at + 2]
     above, most = drop_under_rule(floats, at, drop, rule)
     if above <= 0.0 or g <= 0.0:
@@ -54,7 +58,7 @@ def emitter_flow(floats, at, g, drop, rule):
 
 @njit
 def emitter_slope(floats, at, g, drop, rule):
-    """d flow / d drop [kg/s/Pa]."""
+    """Derivative of the mass flow of an outlet by its drop [kg/s/Pa]."""
     n, span = floats[at], floats[at + 2]
     above, most = drop_under_rule(floats, at, drop, rule)
     if above <= 0.0 or g <= 0.0:
@@ -71,7 +75,7 @@ def emitter_slope(floats, at, g, drop, rule):
 
 @njit
 def cubic_root(n, share):
-    """s in [0, 1] with s^2 ((3 - n) + (n - 2) s) = share, by bounded Newton."""
+    """Root s in [0, 1] of s^2 ((3 - n) + (n - 2) s) = share, by bounded Newton."""
     low, high, s = 0.0, 1.0, sqrt(share)
     for _ in range(60):
         residual = s * s * ((3.0 - n) + (n - 2.0) * s) - share
@@ -90,7 +94,7 @@ def cubic_root(n, share):
 
 @njit
 def emitter_drop(floats, at, g, flow, rule):
-    """Drop [Pa] at which it carries a flow [kg/s]; for no flow, the drop at which flow begins."""
+    """Drop at which an outlet carries a mass flow [Pa]; for no flow, the drop at which flow begins."""
     n, span = floats[at], floats[at + 2]
     if flow <= 0.0 or g <= 0.0:
         return floats[at + 1]
@@ -102,11 +106,12 @@ def emitter_drop(floats, at, g, flow, rule):
 
 @njit
 def emitter_step(floats, at, g, m, drop, rule):
-    """a, s with dM = a + s d(drop) for the next Newton step of an emitter that carries m [kg/s] at a drop [Pa].
+    """a [kg/s] and s [kg/s/Pa] of the next Newton step of an outlet, dM = a + s d(drop).
 
-    s is the chord between the present flow and the flow at the drop; for n = 1/2 it is Newton's slope in M^2. The flow
-    rises with the drop, and the flow that the network leaves for the outlet falls, so the root lies between both. Every
-    chord lies within the previous one, so Newton cannot cycle at a kink.
+    m : mass flow M before the step [kg/s]; drop : drop across the outlet [Pa]
+    s is the slope of the chord between the present flow and the flow at the drop; for n = 1/2 it is Newton's slope in
+    M^2. The flow rises with the drop, and the flow that the network leaves for the outlet falls, so the root lies
+    between both. Every chord lies within the previous one, so Newton cannot cycle at a kink.
     """
     target, own_drop = emitter_flow(floats, at, g, drop, rule), emitter_drop(floats, at, g, m, rule)
     if rule == SHUT:
@@ -118,7 +123,10 @@ def emitter_step(floats, at, g, m, drop, rule):
 
 @njit
 def bends(tables, k, drop, g):
-    """g: margins until it shuts or opens, and until it supplies all of its demand or less [Pa]."""
+    """Write the event functions g [Pa], each with its negative, at a drop of restriction k.
+
+    They are margins until the outlet shuts or opens, and until it supplies its full demand or less.
+    """
     valve, floats, armed = tables.valves[k], tables.floats, tables.armed
     at, event = valve["data"], valve["event"]
     above, span, most, missing = drop - floats[at + 1], floats[at + 2], floats[at + 3], 1.0
@@ -132,11 +140,14 @@ def bends(tables, k, drop, g):
 
 @njit
 def step(out, tables, k, g, m, drop, denser, wide):
-    """a, s under the present rule; the volume flow follows the drop."""
+    """a, s of the Newton step `emitter_step` of restriction k under its present rule.
+
+    The volume flow follows the drop: g grows with the square of the relative density `denser`.
+    """
     return emitter_step(tables.floats, tables.valves[k]["data"], g * denser * denser, m, drop, rule_of(tables, k))
 
 
 @njit
 def slope(out, tables, k, g, drop):
-    """d flow / d drop [kg/s/Pa]."""
+    """Derivative of the mass flow of restriction k by its drop [kg/s/Pa]."""
     return emitter_slope(tables.floats, tables.valves[k]["data"], g, drop, rule_of(tables, k))

@@ -1,6 +1,7 @@
 """Flow to ambient by the square-root law M = sqrt(G (p - ambient)): an outlet of exponent 1/2, for valves.
 
-No backflow; below 10 Pa a cubic joins the law to zero flow.
+M is the mass flow, G the conductance, p the upstream pressure. There is no backflow; below 10 Pa a cubic joins the law
+to zero flow.
 """
 
 from fvsolve.jit import njit
@@ -11,11 +12,11 @@ __all__ = ["bends", "slope", "step"]
 
 @njit
 def step(out, tables, k, g, m, drop, denser, wide):
-    """a, s of its flow under the present rule."""
+    """a, s of the Newton step `emitter_step` of restriction k under its present rule."""
     return emitter_step(tables.floats, tables.valves[k]["data"], g * denser, m, drop, rule_of(tables, k))
 
 
 @njit
 def slope(out, tables, k, g, drop):
-    """d flow / d drop [kg/s/Pa]."""
+    """Derivative of the mass flow of restriction k by its drop [kg/s/Pa]."""
     return emitter_slope(tables.floats, tables.valves[k]["data"], g, drop, rule_of(tables, k))

@@ -1,4 +1,4 @@
-"""Outlets to ambient in the tables of a model."""
+"""Rows of outlets to ambient, and of valves that open to ambient, in the tables of a model."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SPAN = 1e5  # default drop at which an outlet has its nominal flow [Pa]
 
 
 class OutsideRows(Lowering, kind="outside"):
-    """A node at ambient pressure."""
+    """Rows of nodes at ambient pressure."""
 
     ledger_name = "outside"
 
@@ -28,7 +28,7 @@ class OutsideRows(Lowering, kind="outside"):
 
 
 class OutletRows(Restriction, kind="outlet"):
-    """A link whose flow is a power of the drop."""
+    """Rows of outlets: links whose flow is a power of the drop."""
 
     law = law
     events = ("",) * law.EVENT_COUNT
@@ -45,7 +45,7 @@ class OutletRows(Restriction, kind="outlet"):
         return 0.0 if link.least is None else link.least - draft.case.ambient_pressure
 
     def span(self, draft, link) -> float:
-        """Drop from there to the drop of the nominal flow [Pa]."""
+        """Drop at the nominal flow minus the drop from which flow begins [Pa]."""
         return SPAN if link.upper is None else link.upper - draft.case.ambient_pressure - self.least(draft, link)
 
     def inputs(self, model, name, part):
@@ -53,15 +53,15 @@ class OutletRows(Restriction, kind="outlet"):
 
 
 class RelievingRows(Device, kind=""):
-    """A valve shut at the start that opens to a node (square-root law) or to ambient (outlet of exponent 1/2).
+    """Rows of valves that are shut at the start and open to a node (square-root law) or to ambient (outlet law).
 
-    mode : count of numbers and flags of an outlet that precede its own
+    mode : number of values and flags of an outlet of exponent 1/2 that precede those of the valve
     """
 
     quantities = ("opening",)
 
     def own_numbers(self, draft, name, part) -> list[float]:
-        """Numbers of the valve itself."""
+        """Numbers of the valve without those of an outlet."""
         raise NotImplementedError
 
     def numbers(self, draft, name, part) -> list[float]:
@@ -74,4 +74,4 @@ class RelievingRows(Device, kind=""):
         return new
 
     def follow(self, start, k) -> None:
-        """Nothing: a shut valve carries no flow."""
+        """Do nothing: a shut valve carries no flow."""

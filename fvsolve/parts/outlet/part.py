@@ -14,7 +14,7 @@ from fvsolve.parts.valve.part import Sized
 
 
 class Outside(Node):
-    """Ambient pressure at the elevation of another node."""
+    """Node at ambient pressure, at the elevation of the node `level_of`."""
 
     kind: ClassVar[str] = "outside"
     fixes_pressure: ClassVar[bool] = True
@@ -23,10 +23,11 @@ class Outside(Node):
 
 
 class Outlet(TwoPort):
-    """From a place to ambient, q = opening / full flow min(most, ((p - least) / (upper - least))^exponent).
+    """Link from a place to ambient, q = opening / full flow min(most, ((p - least) / (upper - least))^exponent).
 
-    No backflow. flow : [m3/s] at p = upper and opening = full; least : [Pa], ambient if None; upper : [Pa], 1 bar above
-    least if None
+    q is the volume flow, p the pressure at the place; there is no backflow. flow : flow at p = upper and opening = full
+    [m3/s]; least : pressure from which flow begins [Pa], ambient if None; upper : [Pa], 1 bar above least if None
+    most : limit of the power of pressure [-]
     """
 
     kind: ClassVar[str] = "outlet"
@@ -41,13 +42,13 @@ class Outlet(TwoPort):
 
 
 def outlet_to_ambient(name: str, place: str, **law: Any) -> tuple[dict[str, Node], dict[str, Outlet]]:
-    """(places, links) of an outlet `name` at a place."""
+    """Places and links, by name, of an outlet `name` at a place: a node at ambient pressure and the outlet."""
     outlet = Outlet.model_construct(**{"from": place}, to=f"{name}.outside", **law)
     return {f"{name}.outside": Outside.model_construct(level_of=place)}, {name: outlet}
 
 
 class Relieving(Sized, Link):
-    """A valve shut at the start that opens to another place, or, without `to`, to ambient."""
+    """A valve or disc, shut at the start, that opens to another place, or without the key `to` to ambient."""
 
     joins: ClassVar[dict[str, str]] = {"from": "hydraulic", "to": "hydraulic"}
     may_lack: ClassVar[tuple[str, ...]] = ("to",)
@@ -63,7 +64,7 @@ class Relieving(Sized, Link):
 
     @property
     def outward(self) -> bool:
-        """True if it opens to ambient."""
+        """True if the valve opens to ambient."""
         return self.to is None or self.to.endswith(".outside")
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Link]]:

@@ -16,8 +16,9 @@ from fvsolve.parts.value import VALUE, Quantity, Rows, positive
 class Pin(TwoPort, kind="pin"):
     """Joint that keeps point `to` at point `from`; with `axis`, only in the two directions normal to it (plane loop).
 
-    Ports: from, to. Stored and dissipated energy: none, except the energy by which `pull` closes a gap. The forces are
-    Lagrange multipliers of d2(gap)/dt2 = -2 pull d(gap)/dt - pull^2 gap (Baumgarte, 1972).
+    gap is the distance vector between the points. Ports: from, to. Stored and dissipated energy: none, except the
+    energy by which `stabilisation` closes a gap. The forces are Lagrange multipliers of
+    d2(gap)/dt2 = -2 stabilisation d(gap)/dt - stabilisation^2 gap (Baumgarte, 1972).
     """
 
     joins: ClassVar[dict[str, str]] = {"from": "spatial", "to": "spatial"}
@@ -43,7 +44,7 @@ class Pin(TwoPort, kind="pin"):
         yield from length_notices("axis", self.axis)
 
     def directions(self) -> np.ndarray:
-        """Constrained directions in the axes of `from` : float64[rows, 3]."""
+        """Constrained directions in the axes of `from`, as unit vectors : float64[directions, 3]."""
         if self.axis is None:
             return np.eye(3)
         axis = np.array(self.axis) / np.linalg.norm(self.axis)

@@ -1,6 +1,6 @@
 """Bore, wall, roughness and allowable pressure of a pipe from its material and class.
 
-Values of the case file take precedence; `source` lists the sources of all others.
+Values of the case file take precedence; the key `source` lists the sources of all other values.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ WALL_KEYS = ("youngs_modulus", "poisson_ratio")
 
 
 def from_catalogue(given: dict[str, Any]) -> dict[str, Any]:
-    """Table of a pipe, completed with the values of its material and class; raises Misfit with the faults."""
+    """Table of a pipe, completed with the values of its material and class. Raises ValueFault with the faults."""
     name = given.get("material")
     material = materials().get(name) if isinstance(name, str) else None
     if material is None and "class" not in given and "lining" not in given:
@@ -44,7 +44,7 @@ def from_catalogue(given: dict[str, Any]) -> dict[str, Any]:
 
 
 def with_substitutes(given: dict[str, Any]) -> dict[str, Any]:
-    """Table with placeholder bore, wall and roughness where a wrong name gives none, so that other faults are found."""
+    """Table with placeholder bore, wall and roughness for a wrong name, so that reading finds the other faults."""
     table = {**given}
     if not {"class", "nominal"}.isdisjoint(given):
         table["diameter"] = 1.0
@@ -57,14 +57,14 @@ def with_substitutes(given: dict[str, Any]) -> dict[str, Any]:
 
 
 def _add_class(table: dict[str, Any], sources: list[str], material: str | None) -> None:
-    """Bore, wall and allowable pressure of a class; a class that names a schedule becomes `schedule`."""
+    """Add bore, wall and allowable pressure of a class; a class that names a schedule becomes the key `schedule`."""
     name, nominal = table["class"], table.get("nominal")
     if (schedule := SCHEDULE.fullmatch(name.strip())) is not None:
         del table["class"]
         table["schedule"] = schedule[1]
         return
     if not isinstance(nominal, str):
-        raise ValueFault([(("class",), f'{show(name)} needs a nominal size; give one, for example nominal = "DN300"')])
+        raise ValueFault([(("class",), f'{show(name)} needs a nominal size; give for example nominal = "DN300"')])
     try:
         size = class_size(name, nominal, material)
     except ValueError as error:
@@ -77,9 +77,11 @@ def _add_class(table: dict[str, Any], sources: list[str], material: str | None) 
 
 
 def _add_schedule(table: dict[str, Any], material: Material | None) -> None:
-    """Add bore and wall of a steel pipe from its nominal size."""
+    """Add bore and wall thickness of a steel pipe from its nominal size."""
     if material is not None and material.name not in STEELS:
-        raise ValueFault([(("nominal",), f"is a steel size without class; expected a class for {material.name}")])
+        raise ValueFault(
+            [(("nominal",), f"is a steel size without the key `class`; expected a class for {material.name}")]
+        )
     try:
         bore, thickness = pipe_size(table["nominal"], table.get("schedule", "40"))
     except ValueFault:
@@ -90,7 +92,7 @@ def _add_schedule(table: dict[str, Any], material: Material | None) -> None:
 
 
 def _size(table: dict[str, Any], bore: float, thickness: float) -> None:
-    """Add the bore inside the lining, and the wall thickness where the wave speed follows from the wall."""
+    """Add the bore inside the lining, and the wall thickness if the wave speed follows from the wall."""
     try:
         lining = parse(table["lining"]["thickness"], "length")
     except (KeyError, TypeError, ValueError):  # no lining, or reported where the key is read
@@ -102,7 +104,7 @@ def _size(table: dict[str, Any], bore: float, thickness: float) -> None:
 
 
 def _add_wall(table: dict[str, Any], sources: list[str], material: Material) -> None:
-    """Add modulus and Poisson's ratio to a wall without them."""
+    """Add Young's modulus and Poisson's ratio of the material to a wall without them."""
     wall = table.get("wall", {})
     if "wave_speed" in table or not isinstance(wall, dict):
         return
@@ -118,7 +120,7 @@ def _add_wall(table: dict[str, Any], sources: list[str], material: Material) -> 
 
 
 def _add_roughness(table: dict[str, Any], sources: list[str], material: Material) -> None:
-    """Add the roughness of an unlined wall where the friction model needs one and the file has none."""
+    """Add the roughness of the material to an unlined pipe whose friction model needs a roughness and has none."""
     friction = table.get("friction")
     if not isinstance(friction, dict) or "lining" in table or any(key in friction for key in DARCY):
         return

@@ -1,4 +1,4 @@
-"""Keys of the Kelvin-Voigt elements of a viscoelastic wall."""
+"""Keys of the Kelvin-Voigt elements, which describe the creep of a viscoelastic wall."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from fvsolve.units import parse, show
 class Creep:
     """Kelvin-Voigt elements: each adds a strain J (1 - exp(-t / tau)) per unit of hoop stress to the elastic strain.
 
-    compliance : J of each element [1/Pa]; time : retardation time tau of each [s]
+    compliance : J of each element [1/Pa]; time : retardation time tau of each element [s]; t is the time since loading
     """
 
     compliance: tuple[float, ...]
     time: tuple[float, ...]
 
     def table(self) -> dict[str, list[float]]:
-        """The table as in a case file."""
+        """Table as in a case file."""
         return {"compliance": list(self.compliance), "time": list(self.time)}
 
 
 @dataclass(frozen=True)
 class PositiveList(Value):
-    """A list of numbers above 0, one for each element."""
+    """A list of numbers above 0, a number for each element."""
 
     dimension: str
     changes: str = VALUE
@@ -48,7 +48,7 @@ CREEP_KEYS = {"compliance": (PositiveList("compliance"), NEEDED), "time": (Posit
 
 
 class Elements(Value):
-    """The table of Kelvin-Voigt elements: as many compliances as times, all above 0."""
+    """Table of Kelvin-Voigt elements with equal numbers of compliances and times, all above 0."""
 
     about = "Kelvin-Voigt elements of a viscoelastic wall"
     takes = "`{ compliance, time }`, lists of 1/Pa and s"
@@ -61,7 +61,7 @@ class Elements(Value):
             raise ValueError(f"{show(given)} is not a table; expected {{ compliance = [1e-10], time = [0.05] }}")
         creep = Creep(**read_keys(given, CREEP_KEYS, setting))
         if len(creep.compliance) != len(creep.time):
-            sizes = f"{len(creep.compliance)} of compliance and {len(creep.time)} of time"
+            sizes = f"{len(creep.compliance)} values of `compliance` and {len(creep.time)} of `time`"
             raise ValueError(f"{sizes}; expected one compliance and one time for each element")
         return creep
 

@@ -1,4 +1,4 @@
-"""Elevation profile of a pipe over its chainage."""
+"""Elevation of the axis of a pipe over its chainage."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ AXES = "x, y, z"
 class Profile:
     """Elevation over chainage, linear between points.
 
-    chainage : float64[n]  distance along the axis, ascending [m]; elevation : float64[n]  of the axis above datum [m];
-    said : table of the case file, in SI; plan : float64[n, 2]  x and y [m], or None
+    chainage : float64[n]  distance along the axis, ascending [m]; elevation : float64[n]  of the axis above datum [m]
+    given : table of the case file, in SI; plan : float64[n, 2]  x and y of the points [m], or None
     """
 
     chainage: np.ndarray
@@ -31,24 +31,24 @@ class Profile:
 
     @property
     def length(self) -> float:
-        """Length along the axis [m]."""
+        """Length of the pipe axis [m]."""
         return float(self.chainage[-1] - self.chainage[0])
 
     @property
     def distance(self) -> np.ndarray:
-        """Distances of the points from the start [m] : float64[n]."""
+        """Distances of the points from the first point [m] : float64[n]."""
         return self.chainage - self.chainage[0]
 
     def at(self, distance: Any) -> Any:
-        """Elevation at distances from the start [m]."""
+        """Elevation at distances from the first point [m]."""
         return np.interp(distance, self.distance, self.elevation)
 
     def plan_at(self, distance: np.ndarray) -> np.ndarray:
-        """x and y at distances from the start : float64[m, 2] [m]."""
+        """Plan coordinates x and y at m distances from the first point [m] : float64[m, 2]."""
         return np.column_stack([np.interp(distance, self.distance, axis) for axis in self.plan.T])
 
     def part(self, begin: float, end: float) -> Profile:
-        """Profile between two distances from the start [m], with unchanged chainages."""
+        """Profile between two distances from the first point [m], with unchanged chainages."""
         d = self.distance
         inside = (d > begin) & (d < end)
         cut = np.concatenate([[begin], d[inside], [end]])
@@ -57,7 +57,7 @@ class Profile:
         return Profile(chainage, elevation, table, None if self.plan is None else self.plan_at(cut))
 
     def table(self) -> dict[str, Any]:
-        """The table as in a case file."""
+        """Table as in a case file."""
         return self.given
 
     def __eq__(self, other: object) -> bool:
@@ -67,9 +67,9 @@ class Profile:
 
 
 class ProfileValue(Value):
-    """Points of a pipe's axis: chainage and elevation, or x, y and z, as lists or columns of a CSV file."""
+    """Points of a pipe axis: chainage and elevation, or x, y and z, as lists or columns of a CSV file."""
 
-    about = "elevation along the axis, linear between points; straight from end to end if left out"
+    about = "elevation along the axis, linear between points; straight between its ends if left out"
     takes = "`{ chainage, elevation }` or `{ x, y, z }`, lists of m, or `{ file }` with such columns"
 
     def read(self, given: Any, setting: ReadContext) -> Profile:
@@ -96,7 +96,7 @@ class ProfileValue(Value):
 
 
 def check_slope(profile: Profile) -> None:
-    """Raise ValueError where a section rises more than its length."""
+    """Raise ValueError where the elevation between two points changes by more than the chainage."""
     lengths, rises = np.diff(profile.chainage), np.abs(np.diff(profile.elevation))
     if (rises > lengths * (1.0 + 1e-9)).any():
         k = int(np.argmax(rises - lengths))
@@ -107,7 +107,7 @@ def check_slope(profile: Profile) -> None:
 
 
 def from_lists(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """Columns [m] from lists of equal length, and the table of the case file."""
+    """Columns by key [m], read from lists of equal length, and the table of the case file in SI."""
     keys = columns_among(list(given), "keys")
     columns, faults = {}, [((key,), f"unknown key; expected {' and '.join(keys)}") for key in given if key not in keys]
     for key in keys:
@@ -130,7 +130,7 @@ def from_lists(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, n
 
 
 def from_file(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """Columns [m] of a CSV file by header, and the table of the case file."""
+    """Columns by key [m], read from a CSV file by its header, and the table of the case file."""
     unknown = [((key,), "unknown key; expected only file") for key in given if key != "file"]
     if unknown:
         raise ValueFault(unknown)
@@ -153,7 +153,7 @@ def from_file(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, np
 
 
 def columns_among(names: list[str], source: str) -> tuple[str, ...]:
-    """Names of the columns, chainage and elevation or x, y, z; ValueError where neither set is complete."""
+    """Names of the columns: chainage and elevation, or x, y and z. Raises ValueError if neither set is complete."""
     for keys in COLUMN_SETS:
         if set(keys) <= set(names):
             return keys

@@ -1,7 +1,7 @@
 """Pipe materials: moduli, roughness and density, each with its source.
 
-Figures without a source are left out; the user gives them. Of a range, the greatest modulus is used (fastest wave,
-greatest pressure jump), and the mean of roughness and all other figures.
+Numbers without a source are left out; the user gives them. Of several sources, the greatest modulus is used (fastest
+wave, greatest pressure jump), and the mean of least and greatest value of roughness and all other properties.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ WITHOUT_SOURCE = ("PVC-O", "PEX", "hydraulic-hose")  # pipe materials without a 
 
 @dataclass(frozen=True)
 class Figure:
-    """Number of a material, SI: least and greatest of its sources, and the value used."""
+    """Number of a material in SI: least and greatest value of its sources, and the value used."""
 
     key: str
     least: float
@@ -79,13 +79,13 @@ class Figure:
         return self.greatest if self.key == "youngs_modulus" else 0.5 * (self.least + self.greatest)
 
     def span(self, between: str) -> str:
-        """Least and greatest, in the unit of the table; one number where they are equal."""
+        """Text of the least and greatest value in the unit of the table; one number if they are equal."""
         low, high = (f"{x / SI[self.key]:.4g}" for x in (self.least, self.greatest))
         return low if low == high else f"{low}{between}{high}"
 
     @property
     def description(self) -> str:
-        """Text with the number, its range and its sources."""
+        """Text with the value used, its range and its sources."""
         choice = "the greatest" if self.key == "youngs_modulus" else "the mean"
         span = "" if self.least == self.greatest else f", {choice} of {self.span(' to ')}"
         form = f" ({self.material_form})" if self.material_form else ""
@@ -95,20 +95,20 @@ class Figure:
 
 @dataclass(frozen=True)
 class Material:
-    """Figures of a material by key."""
+    """Material with its numbers: key of a property -> number."""
 
     name: str
     figures: dict[str, Figure] = field(default_factory=dict)
 
     @property
     def missing_keys(self) -> list[str]:
-        """Keys without a source."""
+        """Keys of the properties for which there is no source."""
         return [key for key in KEYS.values() if key not in self.figures]
 
 
 @functools.cache
 def materials() -> dict[str, Material]:
-    """The catalogue by name."""
+    """Catalogue of materials by name."""
     catalogue: dict[str, Material] = {}
     for line in TABLE.strip().splitlines():
         name, short, least, greatest, *rest = line.split(maxsplit=4)

@@ -1,4 +1,4 @@
-"""Pipes: keys, faults, and names of catalogues turned into numbers."""
+"""Pipes: keys, faults, and names of catalogue entries turned into numbers."""
 
 from __future__ import annotations
 
@@ -59,9 +59,9 @@ SOFT_WALLS = (  # (modulus [Pa], least wall over bore of such a pipe, text); the
 class Pipe(Conduit, kind="pipe"):
     """A pipe, straight or along a profile: balances of mass and momentum along the axis, wave speed sqrt(K / rho).
 
-    Ports: from, to; each end has one outgoing characteristic. Stored energy, p from ambient: rho A
-    integral of (v^2 / 2 + p^2 / (2 rho K) + g z) dx [J]. Dissipated power: friction and minor loss, pressure
-    drop times flow [W].
+    K is the effective bulk modulus of fluid and wall. Ports: from, to; each end has one outgoing characteristic. Stored
+    energy: rho A integral of (v^2 / 2 + p^2 / (2 rho K) + g z) dx [J] over the length, with area A, velocity v,
+    pressure p above ambient and elevation z. Dissipated power: friction and minor loss, pressure drop times flow [W].
     """
 
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "force": "force"}
@@ -82,30 +82,30 @@ class Pipe(Conduit, kind="pipe"):
     profile: Annotated[Profile | None, ProfileValue()] = None
     bends: Annotated[
         tuple[float, ...] | None,
-        Rows("length", rising=True, about="chainages of bends, which divide the pipe into legs", changes=SHAPE),
+        Rows("length", rising=True, about="chainages of bends, which divide the pipe into legs [m]", changes=SHAPE),
     ] = None
     wave_speed: Annotated[
-        float | None, Quantity("velocity", positive, "wave speed, instead of wall [m/s]", WAVES, BY_CELLS)
+        float | None, Quantity("velocity", positive, "wave speed, not with `wall` [m/s]", WAVES, BY_CELLS)
     ] = None
     wall: Annotated[Wall | Literal["rigid"] | None, WallOrRigid()] = None
     material: Annotated[str | None, MaterialName()] = None
     class_: Annotated[
         str | None,
         Text(
-            'pressure class or schedule: "K9", "C40", "SDR11", "PN16", "schedule 40"; with nominal it sets bore, '
+            'pressure class or schedule: "K9", "C40", "SDR11", "PN16", "schedule 40"; with `nominal` it sets bore, '
             "wall and allowable pressure",
             BY_CELLS,
         ),
         Field(alias="class"),
     ] = None
     restraint: Annotated[str | float | None, Restraint()] = None
-    lining: Annotated[Lining | None, Nested(Lining, "inner layer of the wall; diameter is the bore inside it")] = None
+    lining: Annotated[Lining | None, Nested(Lining, "inner layer of the wall; `diameter` is the bore inside it")] = None
     allowable_pressure: Annotated[
         float | None,
         Quantity(
             "gauge_pressure",
             positive,
-            "allowable pressure above ambient [Pa]; that of its class if left out",
+            "allowable pressure above ambient [Pa]; that of the key `class` if left out",
             changes=VALUE,
         ),
     ] = None
@@ -114,7 +114,7 @@ class Pipe(Conduit, kind="pipe"):
     ] = None
     cells: Annotated[
         int | None,
-        Whole(between(1, MOST_CELLS), "number of finite volumes; travel time over cell_time if left out"),
+        Whole(between(1, MOST_CELLS), "number of finite volumes; travel time over `cell_time` if left out"),
     ] = None
     pipe_model: Annotated[
         str | None,
@@ -129,7 +129,7 @@ class Pipe(Conduit, kind="pipe"):
 
     @property
     def creep_elements(self) -> tuple[tuple[float, float], ...]:
-        """(final growth of the bore area with pressure [1/Pa], time [s]) of each creep element of the wall."""
+        """(final relative growth of the bore area per pressure [1/Pa], time constant [s]) of each creep element."""
         return creep_elements(self)
 
     @classmethod
@@ -139,7 +139,10 @@ class Pipe(Conduit, kind="pipe"):
 
     @classmethod
     def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
-        """Keys with names of catalogue and sizes replaced by numbers; Misfit for an unknown name."""
+        """Table with names of catalogue entries and sizes replaced by numbers.
+
+        Raises ValueFault for an unknown name.
+        """
         faults, values = [], given
         if not CATALOGUE.isdisjoint(given):
             from fvsolve.parts.pipe.catalogue import from_catalogue, with_substitutes
@@ -163,16 +166,16 @@ class Pipe(Conduit, kind="pipe"):
         yield from self.profile_faults(around)
 
     def profile_faults(self, around: CaseContext) -> Faults:
-        """Faults of the profile with respect to length and nodes."""
+        """Faults of the elevation profile: its length or end elevations differ from those of pipe and nodes."""
         if self.profile is None:
             return
         if abs(self.profile.length - self.length) > LENGTH_TOLERANCE * self.length:
-            text = f"chainage spans {self.profile.length:.10g} m, and length is {self.length:.10g} m; they must agree"
-            yield ("profile",), f"{text}. Leave length out"
+            text = f"chainage spans {self.profile.length:.10g} m, and `length` is {self.length:.10g} m; they must agree"
+            yield ("profile",), f"{text}. Leave `length` out"
         for place, end, z in zip(("from", "to"), (self.from_, self.to), self.profile.elevation[[0, -1]], strict=True):
             node = around.nodes.get(end)
             if getattr(node, "on", None) is not None:
-                yield ("profile",), f"{end} is on body {node.on}, and pipes on bodies are straight; leave profile out"
+                yield ("profile",), f"{end} is on body {node.on}, and pipes on bodies are straight; leave `profile` out"
             stated = getattr(node, "elevation", None)
             if stated is not None and abs(stated - z) > ELEVATION_TOLERANCE:
                 text = (
@@ -195,7 +198,7 @@ class Pipe(Conduit, kind="pipe"):
 
 
 def add_profile_length(given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
-    """Add the length of the profile where none is given; Misfit with the faults of the profile."""
+    """Table with the length of the profile added if none is given. Raises ValueFault with the faults of the profile."""
     if "profile" not in given:
         return given
     try:

@@ -19,7 +19,10 @@ POISSON = "poisson_ratio"
 
 
 class Wall(Table):
-    """An elastic wall: 1/K = 1/beta + c diameter / (youngs_modulus thickness), c the factor of `restraint`."""
+    """An elastic wall: 1/K = 1/beta + c diameter / (youngs_modulus thickness), K the effective bulk modulus.
+
+    beta is the bulk modulus of the fluid, c the factor of the key `restraint`, 1 by default.
+    """
 
     youngs_modulus: Annotated[
         float, Quantity("modulus", positive, "Young's modulus of the wall [Pa]", MODULI, BY_CELLS)
@@ -32,7 +35,10 @@ class Wall(Table):
 
 
 class Lining(Table):
-    """An inner layer of the wall, such as cement mortar, with the same hoop strain: E e + E' e' instead of E e."""
+    """An inner layer of the wall, such as cement mortar, with the same hoop strain as the wall.
+
+    The sum of modulus times thickness of wall and lining replaces that of the wall.
+    """
 
     youngs_modulus: Annotated[
         float, Quantity("modulus", positive, "Young's modulus of the lining [Pa]", MODULI, BY_CELLS)
@@ -43,7 +49,7 @@ class Lining(Table):
 class MaterialName(Value):
     """Name of a material of the catalogue."""
 
-    about = "material of the wall: sets modulus, Poisson's ratio and roughness, where a source is known"
+    about = "material of the wall: sets modulus, Poisson's ratio and roughness, if a source is known"
     changes = BY_CELLS
 
     @property
@@ -74,7 +80,7 @@ class MaterialName(Value):
 
 
 class WallOrRigid(Value):
-    """Text "rigid" or table of an elastic wall."""
+    """Wall of a pipe: the text "rigid", or the table of an elastic wall."""
 
     about = 'wall, elastic or rigid; "rigid" if left out'
     takes = '`"rigid"`, or `{ youngs_modulus, thickness, poisson_ratio, creep }`, Pa and m'
@@ -97,7 +103,7 @@ class WallOrRigid(Value):
 
 
 class Restraint(Value):
-    """Axial restraint of a pipe: a word, or the factor c itself."""
+    """Axial restraint of a pipe: a word, or the factor c of the wall compliance."""
 
     about = "axial restraint; 1 (thin wall between expansion joints) if left out"
     takes = "`joints`, `upstream`, `anchored`, or a number, above 0"
@@ -117,8 +123,9 @@ class Restraint(Value):
 
 
 def restraint_factor(restraint: str | float | None, bore: float, wall: Wall) -> float:
-    """Factor c of the area growth dA / A = c D / (E e) dp; 1 without restraint.
+    """Factor c of the relative growth of the bore area A with pressure, dA / A = c D / (E e) dp; 1 without restraint.
 
+    D : bore, E : Young's modulus, e : thickness, nu : Poisson's ratio of the wall
     Thin walls (D/e >= 25): 1 with expansion joints, 1 - nu/2 anchored upstream only, 1 - nu^2 anchored throughout.
     Thick walls (Lame): that factor times D / (D + e), plus 2 (e/D) (1 + nu); Wylie and Streeter 1993.
     """
@@ -135,12 +142,15 @@ def restraint_factor(restraint: str | float | None, bore: float, wall: Wall) -> 
 
 
 def needs_poisson(restraint: str | float | None, bore: float, wall: Wall) -> bool:
-    """True if the factor depends on Poisson's ratio."""
+    """True if the restraint factor depends on Poisson's ratio of the wall."""
     return restraint in ("upstream", "anchored") or (restraint == "joints" and wall.thickness * THIN_WALL > bore)
 
 
 def creep_elements(pipe: Any) -> tuple[tuple[float, float], ...]:
-    """(final growth of the bore with pressure, dA / (A dp) [1/Pa], time tau [s]) of each creep element of the wall."""
+    """(final relative growth of the bore area per pressure, time constant) of each creep element of a pipe wall.
+
+    The growth is dA / (A dp) [1/Pa] of the bore area A, the time constant is in s.
+    """
     wall = pipe.wall
     if not isinstance(wall, Wall) or wall.creep is None:
         return ()
@@ -151,7 +161,7 @@ def creep_elements(pipe: Any) -> tuple[tuple[float, float], ...]:
 
 
 def elastic_compliance(pipe: Any) -> float:
-    """Elastic growth of the bore of a pipe with pressure, dA / (A dp) [1/Pa]; 0 for a stiff wall."""
+    """Elastic relative growth of the bore area of a pipe per pressure, dA / (A dp) [1/Pa]; 0 for a stiff wall."""
     wall = pipe.wall
     if not isinstance(wall, Wall):
         return 0.0

@@ -2,9 +2,10 @@
 
 Ductile iron, class K: nominal wall e = K (0.5 + 0.001 DN) mm, at least 6 mm; least wall e - (1.3 + 0.001 DN) mm.
 Class C: least walls of EN 545:2010; the nominal wall is 1.3 + 0.001 DN mm more. Allowable pressure of K classes:
-20 e R / (D S) bar, at most 64 bar, with e the least wall, D = DE - e, R = 420 MPa, S = 3. A C class has the pressure
-of its name. Polyethylene by SDR: e = d / SDR, d the outer diameter, allowable pressure 20 MRS / (C (SDR - 1)) bar; by
-PN: the wall with that allowable pressure.
+20 e R / (D S) bar, at most 64 bar, with e the least wall, D = DE - e, DE the outer diameter, R = 420 MPa the tensile
+strength and S = 3 the safety factor. A C class has the pressure of its name. Polyethylene by SDR: e = d / SDR, d the
+outer diameter, allowable pressure 20 MRS / (C (SDR - 1)) bar, MRS the minimum required strength [MPa] and C the design
+coefficient; by PN: the wall with that allowable pressure.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ PRESSURES = (25, 30, 40, 50, 64, 100)
 
 
 class ClassSize(NamedTuple):
-    """Bore and wall [m], allowable pressure [Pa, gauge] where known, and source of a class at a nominal size."""
+    """Data of a class at a nominal size: bore and wall [m], allowable gauge pressure [Pa] if known, source."""
 
     diameter: float
     thickness: float
@@ -59,12 +60,12 @@ class ClassSize(NamedTuple):
 
 
 class UnknownSize(ValueError):
-    """Unknown nominal size of a class."""
+    """Nominal size that a class does not have."""
 
 
 @functools.cache
 def ductile() -> dict[int, tuple[float, dict[int, float]]]:
-    """DN -> (outer diameter, class -> least wall) [mm]."""
+    """Ductile iron pipes: DN -> (outer diameter, class -> least wall) [mm]."""
     sizes = {}
     for line in DUCTILE.strip().splitlines():
         size, outer, *walls = line.split()
@@ -78,7 +79,7 @@ SCHEDULE = re.compile(r"(?:schedule|sch\.?)\s*(\w+)", re.IGNORECASE)
 
 
 def class_size(name: str, nominal: str, material: str | None) -> ClassSize:
-    """Size data of a class at a nominal size; ValueError for an unknown class or a size without data."""
+    """Size data of a class at a nominal size. Raises ValueError for an unknown class or a size without data."""
     text = name.strip().upper().replace(" ", "")
     if match := IRON.fullmatch(text):
         if material != "ductile-iron":
@@ -131,7 +132,7 @@ def _ductile(series: str, number: int, name: str, size: float) -> ClassSize:
 def _plastic(series: str, number: float, name: str, size: float, material: str | None) -> ClassSize:
     strength = MRS.get(material or "")
     if series == "PN" and strength is None:
-        raise ValueError(f"the wall of {name} is known only for {listing(list(MRS))}. Expected such a material, or "
+        raise ValueError(f"the wall of {name} is known only for {listing(list(MRS))}. Expected one of these materials, or "
                          "the SDR and allowable_pressure")  # fmt: skip
     ratio = number if series == "SDR" else 1.0 + 20.0 * strength / (DESIGN_COEFFICIENT * number)
     if not SDR_RANGE[0] <= ratio <= SDR_RANGE[1]:
