@@ -1,4 +1,4 @@
-"""Head, efficiency, power and Suter tables of a pump in a case file."""
+"""Values of a case file for the head curve, efficiency, power and Suter table of a pump."""
 
 from __future__ import annotations
 
@@ -31,9 +31,10 @@ ROUNDING = 1e-6  # allowed difference of first and last value of a Suter table, 
 
 @dataclass(frozen=True)
 class CurvePoints:
-    """Values of a pump over flow [m3/s].
+    """Head, efficiency or power of a pump over its flow.
 
-    flow, value : points; word : key of the values; coefficients : of a polynomial, instead of points
+    flow : flows of the points [m3/s]; value : their values; quantity : key of the values, such as "head"
+    coefficients : coefficients of a polynomial of the flow, in place of points
     """
 
     flow: tuple[float, ...] = ()
@@ -51,7 +52,11 @@ class CurvePoints:
 def points(
     given: dict[str, Any], word: str, dimension: str, setting: ReadContext, range=nonnegative, faults_of=lambda *_: []
 ) -> CurvePoints:
-    """Points of a table { flow, WORD }; Misfit if flows do not rise, lengths differ, or `faults_of` finds faults."""
+    """Read a table { flow, WORD } with points over the flow.
+
+    word : key of the values; dimension, range : those of the values; faults_of : function that yields further faults
+    Raises ValueFault if flows do not rise, lengths differ, or `faults_of` finds faults.
+    """
     lists = read_keys(given, keys_of(word, dimension, range), setting)
     flow, value = lists["flow"], lists[word]
     faults = faults_of(given, flow, value)
@@ -71,7 +76,7 @@ def keys_of(word: str, dimension: str, range=nonnegative) -> dict[str, tuple[Val
 
 
 class HeadCurve(Value):
-    """A head curve: points { flow, head }, or { coefficients } of head [m] over powers of flow [m3/s]."""
+    """Head curve in a case file: points { flow, head }, or { coefficients } of head [m] over powers of flow [m3/s]."""
 
     about = "head [m] over flow [m3/s] at relative speed 1: points, or coefficients of powers of the flow"
     takes = "`{ flow = [...], head = [...] }`, or `{ coefficients = [...] }`"
@@ -91,10 +96,12 @@ class HeadCurve(Value):
         return points(given, "head", "head", setting, nonnegative, self.faults_of)
 
     def faults_of(self, given: dict[str, Any], flow: tuple[float, ...], head: tuple[float, ...]) -> list:
-        """Faults of a single point without positive flow and head, and of heads that do not fall."""
+        """Faults of a single point without positive flow and head, and of heads that do not fall as the flow rises."""
         faults = []
         if len(flow) == 1 and not (flow[0] > 0 and head[0] > 0):
-            faults.append(((), "one point must have a flow and a head above 0, or give two points or more"))
+            faults.append(
+                ((), "a single point must have a flow and a head above 0; correct it, or give two points or more")
+            )
         for k, (before, after) in enumerate(zip(head, head[1:], strict=False)):
             if not after < before:
                 text = f"{show(given['head'][k + 1])} comes after {show(given['head'][k])}"
@@ -102,7 +109,7 @@ class HeadCurve(Value):
         return faults
 
     def check_polynomial(self, coefficients: tuple[float, ...]) -> None:
-        """Misfit if the head never falls to zero, or rises before that flow."""
+        """Raise ValueFault if the head of a polynomial never falls to zero, or rises before it is zero."""
         end = zero_head_flow(coefficients)
         if coefficients[0] <= 0.0 or end is None:
             raise ValueFault([(("coefficients",), "the head must start above 0 and fall to 0 at some flow; for example "
@@ -125,14 +132,14 @@ class HeadCurve(Value):
 
 
 def zero_head_flow(coefficients: tuple[float, ...]) -> float | None:
-    """Least positive root of a polynomial of the flow; None without such a root."""
+    """Least positive root of a polynomial of the flow [m3/s], where the head is 0; None if there is no root."""
     roots = np.polynomial.polynomial.polyroots(np.trim_zeros(coefficients, "b")) if any(coefficients) else []
     real = [float(root.real) for root in roots if abs(root.imag) <= 1e-12 * abs(root) and root.real > 0.0]
     return min(real, default=None)
 
 
 class Efficiency(Value):
-    """Efficiency of a pump: a number, or points { flow, efficiency }."""
+    """Efficiency of a pump in a case file: a number, or points { flow, efficiency }."""
 
     about = "efficiency, hydraulic power over shaft power: at the rated point, or over flow; 0.75 if left out"
     takes = "-, or `{ flow = [...], efficiency = [...] }`"
@@ -154,9 +161,9 @@ class Efficiency(Value):
 
 
 class ShaftPower(Value):
-    """Shaft power of a pump: points { flow, power }."""
+    """Shaft power of a pump in a case file: points { flow, power }."""
 
-    about = "power at the shaft [W] over flow, at relative speed 1, instead of efficiency"
+    about = "power at the shaft [W] over flow, at relative speed 1, not with `efficiency`"
     takes = "`{ flow = [...], power = [...] }`"
     changes = PROFILE
 
@@ -175,10 +182,10 @@ class ShaftPower(Value):
 
 @dataclass(frozen=True)
 class SuterTable:
-    """Four-quadrant characteristic of a pump, H = rated_head (n^2 + v^2) WH(x), T = T_rated (n^2 + v^2) WB(x).
+    """Four-quadrant characteristic of a pump with head H = rated_head (n^2 + v^2) WH(x).
 
-    x = pi + atan2(v, n) at equal intervals from 0 to 2 pi, v = q / rated_flow, n = speed / rated speed.
-    head, torque : values of WH and WB
+    The torque is rated torque (n^2 + v^2) WB(x), with x = pi + atan2(v, n) at equal intervals from 0 to 2 pi,
+    v = flow / rated_flow and n = speed / rated speed. head, torque : values of the functions WH and WB
     """
 
     rated_flow: float
@@ -193,7 +200,7 @@ class SuterTable:
 
 
 class Suter(Value):
-    """A Suter table in a case file."""
+    """Suter table of a pump in a case file: a published table, or its values of WH and WB."""
 
     about = "four-quadrant characteristic: WH and WB at equal intervals of x = pi + atan2(flow / rated, speed / rated)"
     takes = "`{ rated_flow, rated_head, table }`, or `{ rated_flow, rated_head, head = [...], torque = [...] }`"
@@ -213,12 +220,14 @@ class Suter(Value):
         values = read_keys(given, self.keys, setting)
         table = values.pop("table")
         if table is not None and ("head" in given or "torque" in given):
-            raise ValueFault([(("table",), "gives head and torque; remove table, or head and torque")])
+            raise ValueFault([(("table",), "gives head and torque; remove `table`, or remove `head` and `torque`")])
         if table is not None:
             values["head"], values["torque"] = SUTER_TABLES[table]
         head, torque, faults = values["head"], values["torque"], []
         if len(head) != len(torque):
-            faults.append((("torque",), f"{len(torque)} values for {len(head)} of head; expected equal numbers"))
+            faults.append(
+                (("torque",), f"{len(torque)} values for {len(head)} values of `head`; expected equal numbers")
+            )
         if not head and not torque:
             raise ValueFault([((), f"table, or head and torque, is missing; tables are {', '.join(SUTER_TABLES)}")])
         for key, series in (("head", head), ("torque", torque)):

@@ -1,8 +1,9 @@
 """Pump: speed, torque of the fluid on the shaft, and check valve.
 
 While the motor holds the speed, the speed follows a schedule. After a trip, or with given torques from the start,
-J d(omega)/dt = motor torque - torque of the fluid, in relative speed n = omega / rated speed. The torque of the fluid
-is n^2 P(q / n) / rated speed, P the shaft power at rated speed, or that of a Suter table.
+J d(omega)/dt = motor torque - torque of the fluid, with inertia J and relative speed n = omega / rated speed. The
+torque of the fluid is n^2 P(q / n) / rated speed at the flow q, P the shaft power at rated speed, or that of a Suter
+table.
 """
 
 from math import sqrt
@@ -58,13 +59,13 @@ OUTSIDE = 1e-6  # tolerance of the range of the curve, over its flow scale
 
 @njit
 def tripped(t, tables, device):
-    """True if the motor no longer holds the speed; false in a step that ends at the trip."""
+    """True if the motor no longer holds the speed at time t; False at the end of a time step that ends at the trip."""
     return schedule_value(tables, int(tables.floats[device["data"] + TRIP]), t) > 0.0
 
 
 @njit
 def pump_speed(t, y, tables, device):
-    """Relative speed of the shaft."""
+    """Speed of the shaft over its rated speed at time t [-]."""
     floats, at = tables.floats, device["data"]
     mode = floats[at + MODE]
     if mode == HELD_SPEED or (mode == TRIPPING and not tripped(t, tables, device)):
@@ -74,7 +75,7 @@ def pump_speed(t, y, tables, device):
 
 @njit
 def set(t, y, out, tables, device):
-    """Write the speed and the conductance, which is 0 behind a shut check valve."""
+    """Write relative speed and conductance of the pump into `out`; 0 conductance behind a shut check valve."""
     layout, k, floats = tables.layout[0], device["valve"], tables.floats
     shut = floats[device["data"] + CHECK] > 0.0 and tables.armed[device["event"]] > 0.0
     out[layout["drive"] + k] = pump_speed(t, y, tables, device)
@@ -83,7 +84,7 @@ def set(t, y, out, tables, device):
 
 @njit
 def pump_point(out, tables, device):
-    """(relative speed, flow [m3/s], density [kg/m3]) of a pump after the nodes are solved."""
+    """Relative speed [-], flow [m3/s] and fluid density [kg/m3] of a pump, after the nodes are solved."""
     layout, k = tables.layout[0], device["valve"]
     rho, _ = head_drop(tables, out, k)
     return out[layout["drive"] + k], out[layout["valve"] + k] / rho, rho
@@ -91,7 +92,7 @@ def pump_point(out, tables, device):
 
 @njit
 def pump_torque(out, tables, device):
-    """Torque of the fluid on the shaft, against the rotation [N m]."""
+    """Torque of the fluid on the shaft, positive against the rotation [N m]."""
     n, q, rho = pump_point(out, tables, device)
     curve, dense = tables.valves[device["valve"]]["data"], rho / tables.settings[0]["rho"]
     return fluid_torque(tables.floats, device["data"], curve, n, q, dense)
@@ -99,7 +100,11 @@ def pump_torque(out, tables, device):
 
 @njit
 def fluid_torque(floats, at, curve, n, q, dense):
-    """Torque of the fluid [N m] at a relative speed, a flow [m3/s] and a density over that of the case."""
+    """Torque of the fluid [N m], positive against the rotation.
+
+    at, curve : index of the numbers of the pump and of its head curve; n : relative speed; q : flow [m3/s]
+    dense : density of the fluid over that of the case
+    """
     table = at + OWN_NUMBERS + 2 * int(floats[at + TORQUE_COUNT])
     if floats[curve + LAW] == SUTER:
         rated = dense * floats[at + COUNT_OR_TORQUE]
@@ -116,7 +121,7 @@ def fluid_torque(floats, at, curve, n, q, dense):
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    """Write d/dt of the relative speed of a free shaft, and its rate limit."""
+    """Write the rate of the relative speed of a free shaft into `dydt`, and raise out[RATE] to its rate limit."""
     floats, at = tables.floats, device["data"]
     mode = floats[at + MODE]
     if mode == HELD_SPEED:
@@ -137,7 +142,7 @@ def move(t, y, dydt, out, tables, device):
 
 @njit
 def given_torque(t, tables, device, change):
-    """Sum of the given torques on the shaft, or its `change` since the start [N m]."""
+    """Sum of the given torques on the shaft [N m]; if `change` is True, minus their sum at the start."""
     floats, total = tables.floats, 0.0
     for k in range(int(floats[device["data"] + TORQUE_COUNT])):
         own = device["data"] + OWN_NUMBERS + 2 * k
@@ -147,7 +152,7 @@ def given_torque(t, tables, device, change):
 
 @njit
 def shaft_rate(out, tables, device, torque):
-    """Upper bound of the rate at which the fluid brakes a free shaft [1/s]."""
+    """Upper bound of the rate at which the fluid brakes a free shaft [1/s]; torque : torque of the fluid [N m]"""
     floats, at, curve = tables.floats, device["data"], tables.valves[device["valve"]]["data"]
     n, q, _ = pump_point(out, tables, device)
     if floats[curve + LAW] == SUTER or floats[curve + JOIN] > 0.0:
@@ -160,7 +165,7 @@ def shaft_rate(out, tables, device, torque):
 
 @njit
 def power(t, y, dydt, out, tables, device):
-    """Power given to the shaft, rate of its kinetic energy, and power taken from it by the fluid [W]."""
+    """Power supplied to the shaft, rate of its kinetic energy, and power that the fluid takes from it [W]."""
     floats, at = tables.floats, device["data"]
     if floats[at + HAS_SHAFT_POWER] == 0.0:
         return 0.0, 0.0, 0.0
@@ -175,7 +180,7 @@ def power(t, y, dydt, out, tables, device):
 
 @njit
 def stored(y, tables, device):
-    """Change of the kinetic energy of a free shaft since it began to run free [J]."""
+    """Kinetic energy of a free shaft, minus that at the time from which it runs free [J]."""
     floats, at = tables.floats, device["data"]
     if floats[at + MODE] == HELD_SPEED:
         return 0.0
@@ -185,13 +190,20 @@ def stored(y, tables, device):
 
 @njit
 def reversal_margin(valve):
-    """Reverse flow below which the check valve stays open [kg/s]: next to a shut valve it stays open without flow."""
+    """Reverse mass flow below which the check valve stays open [kg/s].
+
+    The margin keeps a check valve without flow, next to a shut valve, open.
+    """
     return FLOW_ROUNDING * sqrt(BAR * valve["conductance"])
 
 
 @njit
 def events(t, y, out, tables, device, g):
-    """g of the check valve: flow above the margin if open [kg/s], opening drop if shut [Pa]; then its negative."""
+    """Write the event function g of the check valve, and its negative.
+
+    g is the flow above the margin of reversal if the check valve is open [kg/s], and the drop that opens it if shut
+    [Pa].
+    """
     layout, k, at = tables.layout[0], device["valve"], device["event"]
     valve, floats = tables.valves[k], tables.floats
     g[at], g[at + 1] = 1.0, 1.0
@@ -207,7 +219,7 @@ def events(t, y, out, tables, device, g):
 
 @njit
 def value(t, y, out, tables, device, quantity):
-    """Head [m], relative speed, torque of the fluid [N m] or power at the shaft [W], by number."""
+    """Value of a quantity: 0 head [m], 1 relative speed, 2 torque of the fluid [N m], 3 power at the shaft [W]."""
     floats = tables.floats
     n, q, _ = pump_point(out, tables, device)
     if quantity == 0:
@@ -220,10 +232,10 @@ def value(t, y, out, tables, device, quantity):
 
 @njit
 def outside(out, tables, device):
-    """1 where the pump works outside its curve, at reverse flow or beyond the last flow; 0 for a Suter table.
+    """1 if the pump works outside its head curve, at reverse flow or beyond the last flow; 0 within the curve.
 
-    PASSING with a joined table, and while the pump runs down with a check valve: slower than at the start, with a
-    forward flow that was within the curve at the initial speed.
+    0 for a pump with only a Suter table. TEMPORARY with a joined table, and while the pump runs down with a check
+    valve: slower than at the start, with a forward flow that was within the curve at the initial speed.
     """
     floats, curve = tables.floats, tables.valves[device["valve"]]["data"]
     if floats[curve + LAW] == SUTER:
@@ -244,14 +256,14 @@ def outside(out, tables, device):
 
 @njit
 def step(out, tables, k, g, m, drop, denser, wide):
-    """a, s of the Newton step, from the drop of heads at the upstream density."""
+    """a [kg/s] and s [kg/s/Pa] of the Newton step `curve_step`, from the drop of heads at the upstream density."""
     rho, fall = head_drop(tables, out, k)
     return pump_step(tables, out, k, rho, g, m, fall)
 
 
 @njit
 def slope(out, tables, k, g, drop):
-    """d flow / d drop [kg/s/Pa]; 0 with a shut check valve."""
+    """Derivative of the mass flow of restriction k by its drop [kg/s/Pa]; 0 with a shut check valve."""
     m = out[tables.layout[0]["valve"] + k]
     return pump_step(tables, out, k, tables.settings[0]["rho"], g, m, drop)[1] if g > 0.0 else 0.0
 

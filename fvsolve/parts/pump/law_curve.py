@@ -1,13 +1,13 @@
 """Head curves of pumps at any speed.
 
-H = n^2 f(q / n), n the relative speed (affinity). Between two flows `first` and `last` [m3/s] at n = 1, f is
-a - b q^c, linear between points, or a polynomial. It continues with equal slope: below `first` as a line, beyond
-`last` as a parabola a' - b' q^2, which also holds for a pump at rest. Reverse flow adds b' q^2. Where `first` is above
-0 (a curve that is flat at no flow), the line ends at the reverse flow -`first`.
+H = n^2 f(q / n), with head H, flow q and relative speed n (affinity). Between two flows `first` and `last` [m3/s] at
+n = 1, f is a - b q^c, linear between points, or a polynomial. It continues with equal slope: below `first` as a line,
+beyond `last` as a parabola a' - b' q^2, which also holds for a pump at rest. Reverse flow adds b' q^2. Where `first` is
+above 0 (a curve that is flat at no flow), the line ends at the reverse flow -`first`.
 With a Suter table, H = (n^2 + v^2) WH(pi + atan2(v, n)) [rated heads], v the flow over the rated flow.
-A Suter table may be joined to a curve instead of line and parabolas. It holds outside of 0 <= q <= n `last`, n > 0.
+A Suter table may be joined to a curve in place of line and parabolas. It holds outside of 0 <= q <= n `last`, n > 0.
 There WH is corrected so that it agrees with both ends of the curve; the corrections fade to zero at standstill,
-x = pi / 2 (already in the values of the table) and x = 3 pi / 2.
+x = pi / 2 (already in the values of the table) and x = 3 pi / 2, with x = pi + atan2(v, n).
 """
 
 from math import atan2, pi, sqrt
@@ -28,7 +28,7 @@ RATED_HEAD, RATED_FLOW, VALUES, EDGE, CORRECTION = 0, 1, 2, 3, 4
 
 @njit
 def piecewise(floats, at, count, x):
-    """(value, slope) of a piecewise linear function : count abscissas, then count values."""
+    """Value at x of a piecewise linear function, and its slope; floats[at:] : `count` abscissas, then `count` values"""
     k = 1
     while k < count - 1 and x > floats[at + k]:
         k += 1
@@ -38,7 +38,7 @@ def piecewise(floats, at, count, x):
 
 @njit
 def base_head(floats, at, x):
-    """(head [m], slope [s/m2]) at rated speed and a flow x between `first` and `last`."""
+    """Head [m] at rated speed and a flow x [m3/s] between `first` and `last`, and its slope over the flow [s/m2]."""
     own, count = at + OWN, int(floats[at + COUNT])
     if floats[at + LAW] == POWER:
         part = floats[own + 1] * x ** floats[own + 2]
@@ -54,7 +54,10 @@ def base_head(floats, at, x):
 
 @njit
 def suter_value(floats, at, count, speed, flow):
-    """(value, d/d flow) of a Suter function times (speed^2 + flow^2), relative to rated; x from 0 to 2 pi."""
+    """Suter function times (speed^2 + flow^2), and its derivative by the flow.
+
+    floats[at:] : `count` values of the function from x = 0 to 2 pi; speed, flow : relative to rated values
+    """
     square, place = speed * speed + flow * flow, (pi + atan2(flow, speed)) / (2.0 * pi) * (count - 1)
     k = min(int(place), count - 2)
     rise = floats[at + k + 1] - floats[at + k]
@@ -64,13 +67,16 @@ def suter_value(floats, at, count, speed, flow):
 
 @njit
 def is_off_curve(floats, at, speed, flow):
-    """True if a pump with a joined table works outside its curve."""
+    """True if a pump with a joined Suter table works outside its head curve."""
     return floats[at + JOIN] > 0.0 and not (speed > 0.0 and 0.0 <= flow <= speed * floats[at + LAST])
 
 
 @njit
 def joined_value(floats, join, correction_at, speed, flow):
-    """`suter_value` of a joined table with its correction; `correction_at` : index of correction, then table."""
+    """`suter_value` of a joined table with its correction.
+
+    join : index of the numbers of the joined table; correction_at : index of a correction, followed by the table
+    """
     value, slope = suter_value(floats, correction_at + 1, int(floats[join + VALUES]), speed, flow)
     angle, edge, fade, steep = atan2(flow, speed), floats[join + EDGE], 0.0, 0.0
     if edge <= angle < 0.5 * pi:
@@ -81,7 +87,7 @@ def joined_value(floats, join, correction_at, speed, flow):
 
 @njit
 def curve_head(floats, at, speed, flow):
-    """(head [m], its slope over flow [s/m2]) of the curve at `at` at a relative speed and a flow [m3/s]."""
+    """Head [m] of the curve at index `at`, and its slope over flow [s/m2], at a relative speed and a flow [m3/s]."""
     if is_off_curve(floats, at, speed, flow):
         join = at + int(floats[at + JOIN])
         head, rated = floats[join + RATED_HEAD], floats[join + RATED_FLOW]
@@ -106,7 +112,7 @@ def curve_head(floats, at, speed, flow):
 
 @njit
 def curve_flow(floats, at, speed, head, flow):
-    """Flow [m3/s] at which the curve has a head [m], by safeguarded Newton from `flow`."""
+    """Flow [m3/s] at which the curve has a head [m], by safeguarded Newton from the start value `flow`."""
     low, high, scale = -1e300, 1e300, floats[at + SCALE]
     for _ in range(200):
         value, slope = curve_head(floats, at, speed, flow)
@@ -129,10 +135,11 @@ def curve_flow(floats, at, speed, head, flow):
 
 @njit
 def curve_step(floats, at, speed, rho, weight, g, m, drop):
-    """a, s with dM = a + s d(drop) for the next Newton step of a pump that carries m [kg/s] at a drop [Pa].
+    """a [kg/s] and s [kg/s/Pa] of the next Newton step of a pump, dM = a + s d(drop), M the mass flow.
 
-    Instead of the slope it takes the chord of the curve between the present flow and the flow at the drop. The chord
-    is at least as steep as that of a restriction of conductance g. rho, weight : density and rho g of the fluid.
+    In place of the slope it takes the chord of the curve between the present flow m [kg/s] and the flow at the drop
+    [Pa]. The chord is at least as steep as that of a restriction of conductance g. rho, weight : density and rho g of
+    the fluid
     """
     head, slope = curve_head(floats, at, speed, m / rho)
     residual = drop + weight * head

@@ -1,4 +1,4 @@
-"""Pumps in the tables of a model, and their steady state at the start."""
+"""Rows of pumps in the tables of a model, and their initial steady state."""
 
 from __future__ import annotations
 
@@ -23,7 +23,10 @@ SMALL_SPECIFIC_SPEED, LARGE_SPECIFIC_SPEED = 20.0, 320.0  # range of specific sp
 
 
 class PumpRows(ShaftLowering, Device, kind="pump"):
-    """A restriction with a head curve; in the steady state no flow passes its check valve backward."""
+    """Rows of pumps: restrictions with a head curve.
+
+    In the steady state no flow passes the check valve of a pump backward.
+    """
 
     law = law
     quantities = ("head", "speed", "torque", "power")
@@ -63,7 +66,7 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
         return 0.5 * inertia(part, weight_of(model)) * (part.rated_speed * speed) ** 2 if row["y"] >= 0 else 0.0
 
     def passing_notice(self, model, name, part, time) -> Notice:
-        """Notice of a pump that left its curve in an allowed way."""
+        """Notice of a pump that left its head curve at a time [s] in a way that its law allows."""
         moment = model.case.amount(time, "time", 6)
         rated = rated_point(part, weight_of(model))
         if (table := joined_table(part, *rated)) is None:
@@ -74,7 +77,7 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
         source = table.words if SMALL_SPECIFIC_SPEED <= speed <= LARGE_SPECIFIC_SPEED else f"{table.words}, the nearest"
         text = (f"{name}: it leaves its curve at {moment}; outside of it head and torque are those of the Suter "
                 f"table {source}, joined to it, by its specific speed of {speed:.4g} (rpm, m3/s, m); "
-                "for a pump of several stages or inlets give suter")  # fmt: skip
+                "for a pump of several stages or inlets give the key `suter`")  # fmt: skip
         return Notice("range", f"links.{name}", text, "curve_extrapolation", speed)
 
     def edge(self, start, k: int):
@@ -102,7 +105,7 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
         """Do nothing: `begin` sets the drop."""
 
     def lift(self, start, row, flow: float) -> float:
-        """Pressure rise of a pump at a mass flow [Pa]."""
+        """Pressure rise of a pump at a mass flow [kg/s] in the steady state [Pa]."""
         floats, rho = start.draft.tables.floats, start.density_at(int(row["from_node"]))
         at, speed = int(row["data"]), float(row["drive"])
         return float(rho * start.case.gravity * curves.curve_head(floats, at, speed, float(flow) / rho)[0])

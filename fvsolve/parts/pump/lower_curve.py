@@ -15,7 +15,7 @@ HIGHEST, LOWEST = 1000.0, 0.1  # range of heads of the curve of a constant-power
 
 
 def curve_numbers(part, weight: float) -> list[float]:
-    """Numbers of the head curve of a pump, in the order of `law_curve`; weight = rho g [N/m3]."""
+    """Numbers of the head curve of a pump, in the order stated in `law_curve`; weight = rho g [N/m3]."""
     if part.suter is not None:
         entry = part.suter
         return [
@@ -43,7 +43,7 @@ def curve_numbers(part, weight: float) -> list[float]:
 
 
 def base_law(part, weight: float) -> tuple[int, int, float, float, list[float]]:
-    """(law, count, first and last flow, own numbers) of a curve that is not a Suter table."""
+    """Law, count of numbers, first and last flow [m3/s], and numbers of a head curve that is not a Suter table."""
     if part.power is not None:
         product = part.power / weight
         return curves.POWER, 3, product / HIGHEST, product / LOWEST, [0.0, -product, -1.0]
@@ -60,9 +60,10 @@ def base_law(part, weight: float) -> tuple[int, int, float, float, list[float]]:
 
 
 def power_law(curve: CurvePoints) -> tuple[float, float, float] | None:
-    """a, b, c of H = a - b q^c through one point (4/3 of its head at no flow, 0 at twice its flow) or three from q = 0.
+    """Coefficients a, b, c of H = a - b q^c, with head H and flow q, by the formula of EPANET (Rossman 2020).
 
-    The formula of EPANET (Rossman 2020). None for other curves, which are straight lines between their points.
+    Through one point (4/3 of its head at no flow, zero head at twice its flow), or through three points from q = 0 on.
+    None for other curves, which are straight lines between their points.
     """
     if len(curve.flow) == 1:
         return 4.0 / 3.0 * curve.value[0], curve.value[0] / 3.0 / curve.flow[0] ** 2, 2.0
@@ -74,7 +75,10 @@ def power_law(curve: CurvePoints) -> tuple[float, float, float] | None:
 
 
 def rated_point(part, weight: float) -> tuple[float, float]:
-    """(flow [m3/s], head [m]) of the rated point: the single point, the middle of three, or the greatest q H."""
+    """Flow [m3/s] and head [m] at the rated point of a pump.
+
+    It is the single point of the curve, the middle of three points, or the point with the greatest flow times head.
+    """
     if part.suter is not None:
         return part.suter.rated_flow, part.suter.rated_head
     if part.power is not None:

@@ -1,4 +1,4 @@
-"""Shafts driven by a motor, generator or given torques, in the tables of a model."""
+"""Shafts that a motor, a generator or given torques drive, in the tables of a model."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ ROUNDING_SHARE = 1e-12  # sum of the torques on a shaft regarded as rounding, ov
 
 
 class ShaftLowering:
-    """Base of restrictions with a shaft; `small` : scale of the speed state."""
+    """Base of the rows of restrictions with a shaft; small : size of a small deviation of the speed state"""
 
     small = 1.0
 
@@ -21,18 +21,21 @@ class ShaftLowering:
         return [self.small for _ in self.states_of(draft, name, part)]
 
     def drive_numbers(self, draft, name, part) -> dict[int, float]:
-        """Numbers of the drive, without inertia and rated speed; also sets the speed schedule of the device row."""
+        """Numbers of the drive by index, without inertia and rated speed; write the speed schedule to its row."""
         torques = torques_on(draft.case, name)
         mode = law.TORQUE_DRIVEN if torques else law.HELD_SPEED if part.trip is None else law.TRIPPING
         draft.device_table["schedule"][draft.device_names.index(name)] = draft.schedules.add(part.speed)
         return {law.MODE: mode, law.TRIP: self.trip(draft, name, part), law.TORQUE_COUNT: len(torques)}
 
     def torque_schedules(self, draft, name) -> list[float]:
-        """Pairs (schedule, value at the start) of the given torques."""
+        """Index of the schedule and value at the start (0, set later) of each given torque, in pairs."""
         return [x for torque in torques_on(draft.case, name) for x in (draft.schedules.add(torque.torque), 0.0)]
 
     def trip(self, draft, name, part) -> int:
-        """Index of a schedule that is 0 before and 1 after the trip; the speed has a kink there, not a jump."""
+        """Index of a schedule that is 0 before and 1 after the trip, -1 without a trip.
+
+        The speed has a kink at the trip, not a jump.
+        """
         if part.trip is None:
             return -1
         kinks, start = dict(draft.schedules.breaks), draft.case.numerics.start
@@ -44,12 +47,12 @@ class ShaftLowering:
         return index
 
     def speed_at(self, start, k: int) -> float:
-        """Speed at the start by the schedule `speed`."""
+        """Speed of restriction k at the start, from its schedule `speed`."""
         row = start.draft.device_table[start.valves[k]["device"]]
         return start.schedule_value(row["schedule"])
 
     def fluid_torque(self, start, row, valve) -> float:
-        """Torque of the fluid on the shaft at the start [N m]."""
+        """Torque of the fluid on the shaft at the start, positive against the rotation [N m]."""
         raise NotImplementedError
 
     def set_free_shaft(self, start, part, row, valve) -> list[str]:
@@ -75,10 +78,10 @@ class ShaftLowering:
 
 
 def torques_on(case, name: str) -> list:
-    """Torque links on the shaft of a pump or turbine."""
+    """Torque links of a case on the shaft of a pump or turbine."""
     return [link for link in case.links.values() if link.kind == "torque" and link.to == f"{name}.shaft"]
 
 
 def numbers_of(by_index: dict[int, float], given: list[float], own: list[float]) -> list[float]:
-    """Numbers of a shaft in the order of `law`."""
+    """Numbers of a shaft in the order of `law`: those by index, the given torques, the numbers of the part."""
     return [float(by_index.get(k, 0.0)) for k in range(law.OWN_NUMBERS)] + given + own

@@ -13,7 +13,10 @@ ROUNDING = 1e-9  # angle regarded as zero [rad]
 
 
 def joined_numbers(part, flow: float, head: float, numbers: list[float]) -> list[float]:
-    """Numbers of the table joined to a head curve with these `numbers`; empty without a table."""
+    """Numbers of the Suter table joined to a head curve, in the order of `law_curve`; empty without a table.
+
+    flow, head : rated point [m3/s], [m]; numbers : those of the head curve
+    """
     if (table := joined_table(part, flow, head)) is None:
         return []
     edge = math.atan2(numbers[curves.LAST], flow)
@@ -24,10 +27,10 @@ def joined_numbers(part, flow: float, head: float, numbers: list[float]) -> list
 
 
 def fit_to_curve(values, shut_off: float, last: float, edge: float) -> tuple[float, np.ndarray]:
-    """Fit a table to a curve: (correction at the last flow, values corrected for no flow).
+    """Fit a Suter table to a curve: correction at the last flow, and values of the table corrected for no flow.
 
-    shut_off, last : values of the curve at no flow and at the last flow, over the rated value. The correction for no
-    flow fades to zero at standstill.
+    shut_off, last : values of the curve at no flow and at the last flow, over the rated value; edge : angle atan2(v, n)
+    of the last flow. The correction for no flow fades to zero at standstill.
     """
     values = np.array(values)
     at = np.linspace(-math.pi, math.pi, len(values))
@@ -37,9 +40,9 @@ def fit_to_curve(values, shut_off: float, last: float, edge: float) -> tuple[flo
 
 
 def monotone_head(values: np.ndarray) -> np.ndarray:
-    """WH raised so that the head never falls as the flow through a turning pump reverses; else two flows have one head.
+    """Values of WH, raised so that the head never falls as the flow through a turning pump reverses.
 
-    Condition on W = WH between two values: d/d(angle) of W / cos^2 is below 0.
+    Otherwise two flows have one head. Condition on W = WH between two values: d/d(angle) of W / cos^2 is below 0.
     """
     values, at = values.copy(), np.linspace(-math.pi, math.pi, len(values))
     width = at[1] - at[0]
@@ -51,12 +54,12 @@ def monotone_head(values: np.ndarray) -> np.ndarray:
 
 
 def joined_table(part, flow: float, head: float) -> Quadrants | None:
-    """Table for the specific speed of a pump with `curve` and `rated_speed`; None without, or with a parabola."""
+    """Suter table for the specific speed of a pump with `curve` and `rated_speed`; None if it has no joined table."""
     if part.curve is None or part.rated_speed is None or part.curve_extrapolation == "parabola":
         return None
     return quadrants(specific_speed(part, flow, head))
 
 
 def specific_speed(part, flow: float, head: float) -> float:
-    """rpm (m3/s)^(1/2) / m^(3/4) at the rated point: flow [m3/s], head [m]."""
+    """Specific speed at the rated point, in rpm (m3/s)^(1/2) / m^(3/4); flow [m3/s], head [m]"""
     return part.rated_speed * 30.0 / math.pi * math.sqrt(flow) / head**0.75

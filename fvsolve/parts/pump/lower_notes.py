@@ -22,7 +22,7 @@ UNITS = (("l/s", 1e-3), ("m3/h", 1.0 / 3600.0), ("l/min", 1e-3 / 60.0))
 
 
 def reversed_pump(start, name: str, part, valve) -> list[Notice]:
-    """Notice about a pump that runs at the start and delivers to a lower head, or to the lowest water level."""
+    """Notice of a pump that runs at the start and delivers to a lower head, or to the lowest water level."""
     i, j = int(valve["from_node"]), int(valve["to_node"])
     heads = start.nodes["pressure"] / start.weight + start.nodes["elevation"]
     fixed = np.isin(start.nodes["kind"], (rec.FIXED, rec.TANK))
@@ -39,17 +39,17 @@ def reversed_pump(start, name: str, part, valve) -> list[Notice]:
 
 
 def estimated_inertia(draft, name: str, part) -> list[Notice]:
-    """Notice about the estimated inertia of a pump that trips without given inertia."""
+    """Notice of the estimated inertia of a pump that trips without given inertia."""
     if part.trip is None or part.inertia is not None:
         return []
     value = inertia(part, draft.fluid.density * draft.case.gravity)
     text = (f"{name}: its inertia is estimated at {value:.4g} kg m2, impeller, water and motor, by power and speed; "
-            "the surge depends on it; give inertia from the manufacturer")  # fmt: skip
+            "the surge depends on it; give the key `inertia` from the manufacturer")  # fmt: skip
     return [Notice("range", f"links.{name}", text, "inertia", value)]
 
 
 def rated_point_notes(draft, name: str, part) -> list[Notice]:
-    """Notices about inertia and shaft power that are inconsistent with the rated point."""
+    """Notices of inertia and shaft power that are inconsistent with the rated point."""
     weight = draft.fluid.density * draft.case.gravity
     if weight == 0.0:
         return []
@@ -68,7 +68,7 @@ def rated_point_notes(draft, name: str, part) -> list[Notice]:
 
 
 def unusual_inertia(case, name: str, given: float, power: float, speed: float) -> list[Notice]:
-    """Notice about an inertia [kg m2] far from the usual value at a power [W] and speed [rad/s]."""
+    """Notice of an inertia [kg m2] far from the usual value at a power [W] and speed [rad/s]."""
     usual = usual_inertia(power, speed)
     if usual / INERTIA_RATIO <= given <= usual * INERTIA_RATIO:
         return []
@@ -79,7 +79,7 @@ def unusual_inertia(case, name: str, given: float, power: float, speed: float) -
 
 
 def unusual_flow(draft, name: str, part) -> list[Notice]:
-    """Notice about a rated flow that is too fast or too slow in every adjacent pipe.
+    """Notice of a rated flow that is too fast or too slow in every adjacent pipe.
 
     Pumping stations have 1 to 4 m/s (Sanks, Pumping Station Design).
     """

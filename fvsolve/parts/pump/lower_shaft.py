@@ -17,9 +17,10 @@ SAMPLE_COUNT = 65  # number of points of a power by a Suter table over the angle
 
 
 def shaft_points(part, weight: float) -> list[float]:
-    """[count, flows, powers at the shaft [W]] at relative speed 1; for a Suter table [rated torque, WB].
+    """Numbers of the shaft power at relative speed 1: count of points, flows [m3/s], powers [W].
 
-    Where a table is joined to the curve its rated torque, what WB lacks at the last flow and WB follow.
+    For a Suter table: rated torque, values of WB. Where a table is joined to the curve, its rated torque, the
+    correction of WB at the last flow and the values of WB follow the points.
     """
     flow, head = rated_point(part, weight)
     rated = weight * flow * head / rated_efficiency(part)
@@ -41,7 +42,11 @@ def shaft_points(part, weight: float) -> list[float]:
 
 
 def table_power(table, numbers, flow: float, head: float, last: float) -> tuple[np.ndarray, np.ndarray]:
-    """(flows, powers over the rated power) of a curve by WB, nowhere below that of the rated efficiency."""
+    """Flows [m3/s] and shaft powers over the rated power of a head curve, by the values WB of a Suter table.
+
+    The power is nowhere below that at the rated efficiency. numbers : those of the curve; flow, head : rated point
+    last : last flow of the curve [m3/s]
+    """
     flows = flow * np.tan(np.linspace(0.0, math.atan2(last, flow), SAMPLE_COUNT)[:-1])
     flows = np.unique([*flows, *np.linspace(0.0, last, SAMPLE_COUNT), *([flow] if last > flow else [])])
     lifts = np.array([curves.curve_head(numbers, 0, 1.0, float(q))[0] for q in flows]) / head
@@ -56,7 +61,10 @@ def rated_efficiency(part) -> float:
 
 
 def shaft_power(part, weight: float, flow: float, rated: float) -> tuple[Sequence[float], Sequence[float]]:
-    """Flows and powers at the shaft [W] at relative speed 1, two or more of each."""
+    """Flows [m3/s] and powers at the shaft [W] at relative speed 1, at least two of each.
+
+    flow, rated : flow [m3/s] and shaft power [W] at the rated point
+    """
     if part.power is not None and part.shaft_power is None:
         return (0.0, flow), (part.power / rated_efficiency(part),) * 2
     if part.shaft_power is not None:
@@ -71,7 +79,10 @@ def shaft_power(part, weight: float, flow: float, rated: float) -> tuple[Sequenc
 
 
 def by_efficiency(part, weight: float) -> tuple[list[float], list[float]]:
-    """Powers at the points of an efficiency over flow, rho g q H / eta; at no flow, the power of the next point."""
+    """Flows [m3/s] and shaft powers rho g q H / eta [W] at the points of an efficiency curve.
+
+    q : flow, H : head, eta : efficiency; at no flow, the power is H times the ratio of power to head at the next point
+    """
     numbers = np.array(curve_numbers(part, weight))
     points = [(q, e) for q, e in zip(part.efficiency.flow, part.efficiency.value, strict=True) if q > 0.0 and e > 0.0]
     flows = [q for q, _ in points]

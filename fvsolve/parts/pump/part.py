@@ -16,11 +16,12 @@ SPEEDS = UsualRange(2.0, 1400.0, "20 rpm of great tidal pumps to 13 000 rpm of s
 
 
 class Pump(TwoPort, kind="pump"):
-    """Pump that raises the head from `from` to `to` by n^2 f(q / n), n relative speed; J d(omega)/dt = sum of torques.
+    """Pump that raises the head from `from` to `to` by n^2 f(q / n), q the flow, n the relative speed, f the curve.
 
-    As in EPANET, f is a - b q^c through one point (4/3 of its head at no flow, zero head at twice its flow) or through
-    three points from no flow on, and linear between any other number of points. Ports: from, to. Place: shaft (angular
-    velocity, torque). Stored energy: J omega^2 / 2 [J] where the shaft runs free. It supplies rho g H q [W].
+    On a free shaft, J d(omega)/dt = sum of torques, with inertia J and angular velocity omega. As in EPANET, f is a - b
+    q^c through one point (4/3 of its head at no flow, zero head at twice its flow) or through three points from no flow
+    on, and linear between any other number of points. Ports: from, to. Place: shaft (angular velocity, torque). Stored
+    energy: J omega^2 / 2 [J] where the shaft runs free. It supplies rho g H q [W], H the head.
     """
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
@@ -43,8 +44,8 @@ class Pump(TwoPort, kind="pump"):
         Choice(
             "law",
             ("suter", "parabola"),
-            "head outside the flows of curve: suter (a table by specific speed, joined to the curve; default with "
-            "rated_speed) or parabola",
+            "head outside the flows of `curve`: suter (a table by specific speed, joined to the curve; default with "
+            "`rated_speed`) or parabola",
         ),
     ] = None
     speed: Annotated[
@@ -64,12 +65,12 @@ class Pump(TwoPort, kind="pump"):
         Quantity(
             "inertia",
             positive,
-            "inertia of all rotating masses and the water in the pump [kg m2], with rated_speed; estimated if left out",
+            "inertia of all rotating masses and the water in the pump, with `rated_speed` [kg m2]; estimated if left out",
             changes=VALUE,
         ),
     ] = None
     trip: Annotated[
-        float | None, Quantity("time", about="time at which the motor is switched off [s], requires rated_speed")
+        float | None, Quantity("time", about="time at which the motor is switched off, requires `rated_speed` [s]")
     ] = None
     efficiency: Annotated[Any, Efficiency()] = None
     shaft_power: Annotated[CurvePoints | None, ShaftPower()] = None
@@ -85,7 +86,9 @@ class Pump(TwoPort, kind="pump"):
         if "inertia" in given and "rated_speed" not in given:
             faults.append((("inertia",), 'needs rated_speed, for example "1480 rpm"'))
         if "curve_extrapolation" in given and "curve" not in given:
-            faults.append((("curve_extrapolation",), "needs a curve; it defines the head outside its flows"))
+            faults.append(
+                (("curve_extrapolation",), "needs the key `curve`; it defines the head outside the flows of the curve")
+            )
         if given.get("curve_extrapolation") == "suter" and "curve" in given and "rated_speed" not in given:
             faults.append(
                 (("curve_extrapolation",), 'needs rated_speed, for example "1480 rpm", for the specific speed')

@@ -121,7 +121,11 @@ TORQUE_260 = """
 
 @dataclass(frozen=True)
 class Quadrants:
-    """WH and WB at equal intervals of x from 0 to 2 pi, and the names of their tables."""
+    """Values of WH and WB at equal intervals of x from 0 to 2 pi, and the names of the published tables used.
+
+    x = pi + atan2(v, n), with flow v and speed n over their rated values; head, torque : values of WH and WB
+    words : names of the tables
+    """
 
     head: tuple[float, ...]
     torque: tuple[float, ...]
@@ -142,7 +146,10 @@ SUTER_TABLES = {
 
 
 def quadrants(speed: float) -> Quadrants:
-    """Table of a specific speed (rpm, m3/s, m): interpolated over its logarithm; the nearest table out of range."""
+    """Suter table for a specific speed (rpm, m3/s, m), interpolated between tables over its logarithm.
+
+    Out of range it is the nearest table.
+    """
     names, logs = list(SPEEDS), [math.log(value) for value in SPEEDS.values()]
     place = min(max(math.log(speed), logs[0]), logs[-1])
     k = max(j for j in range(len(logs) - 1) if logs[j] <= place)
