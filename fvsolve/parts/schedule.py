@@ -40,12 +40,13 @@ AMPLITUDE_DIMENSIONS = {
 
 @dataclass(frozen=True, eq=False)
 class Schedule:
-    """Value over time: constant before the first and after the last entry, right-continuous.
+    """Value over time: constant before the first and after the last entry; at a jump, the value after the jump holds.
 
     kind : constant | linear | step | smooth (monotone cubic) | ramp | harmonic
-    time, value : float64[n]  breakpoints [s] and values there [SI, pressures absolute]; a constant has one; a harmonic
-    schedule has its minimum and maximum, at infinite times
-    exponent : for a ramp, value = v1 + (v0 - v1) (1 - s)^exponent with s from 0 to 1 between its two times
+    time, value : float64[n]  breakpoints [s] and values there [SI, pressures absolute]; a constant has one entry; a
+    harmonic schedule has its minimum and maximum, at infinite times
+    exponent : for a ramp, value = v1 + (v0 - v1) (1 - s)^exponent, with v0 and v1 its first and last value, and s from
+    0 to 1 between its two times
     wave : mean, amplitude, period [s] and phase if harmonic, value = mean + amplitude sin(2 pi t / period + phase)
     origin : table as in a case file, in SI
     """
@@ -74,7 +75,7 @@ class Schedule:
 
     @property
     def first(self) -> float:
-        """Value before the first entry [SI]."""
+        """Value before and at the first entry [SI]."""
         return float(self.value[0])
 
     @property
@@ -94,7 +95,7 @@ def constant(value: float) -> Schedule:
 
 @dataclass(frozen=True)
 class Scheduled(Value):
-    """Schedule of a quantity: a number or text, a table, a file, a ramp, a wave, or a signal."""
+    """Value of a case file that may change with time: number, text, table, file, ramp, wave or signal."""
 
     dimension: str
     range: Range = anything
@@ -119,7 +120,7 @@ class Scheduled(Value):
 
     @cached_property
     def forms(self) -> dict[str, dict[str, tuple[Value, Any]]]:
-        """Forms of a schedule table: value and default of each key."""
+        """Forms of a schedule table, name -> key -> (declaration, default)."""
         item, kind = (self.dimension, self.range), (Choice("kind of schedule", KINDS), "linear")
         return {
             "table": {"time": (Rows("time"), NEEDED), "value": (Rows(*item), NEEDED), "kind": kind},

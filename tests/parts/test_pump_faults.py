@@ -26,7 +26,7 @@ FOUND = [
     ({"curve": {"flow": [0.0, 0.1], "head": [50.0, 55.0]}}, "curve.head[1]: 55.0 comes after 50.0; the head must fall"),
     ({"curve": {"flow": [0.0, 0.1], "head": [50.0, 50.0]}}, "the head must fall as the flow rises"),
     ({"curve": {"flow": [0.0, 0.1, 0.1], "head": [50.0, 40.0, 30.0]}}, "flows out of order: 0.1 comes after 0.1"),
-    ({"curve": {"flow": [0.0], "head": [50.0]}}, "one point must have a flow and a head above 0"),
+    ({"curve": {"flow": [0.0], "head": [50.0]}}, "a single point must have a flow and a head above 0"),
     ({"curve": {"flow": [], "head": []}}, "is not a list; expected a list of values"),
     ({"curve": {"flow": [0.0, 0.1], "head": [50.0]}}, "1 values for 2 flows"),
     ({"curve": {"coefficients": [50.0]}}, "fall to 0 at some flow"),

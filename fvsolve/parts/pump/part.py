@@ -65,7 +65,7 @@ class Pump(TwoPort, kind="pump"):
         Quantity(
             "inertia",
             positive,
-            "inertia of all rotating masses and the water in the pump, with `rated_speed` [kg m2]; estimated if left out",
+            "inertia of all rotating masses and water in the pump, with `rated_speed` [kg m2]; estimated if left out",
             changes=VALUE,
         ),
     ] = None

@@ -1,8 +1,9 @@
-"""Control valve that moves until the sensed quantity has its set value.
+"""Control valve that moves until the sensed pressure or flow has its set value.
 
-dx/dt = error / (band T), 0 <= x <= 1, M |M| = G x^2 dP. armed[event] : shut against reverse flow;
-armed[event + 2] : fully open; armed[event + 4] : on its seat. These flags change on accepted states only. If it is the
-only valve at a rigid column, it controls the flow of the column near its seat (armed[event + 6]).
+dx/dt = error / (band T), 0 <= x <= 1, M |M| = G x^2 dP, with opening x, time constant T, mass flow M, conductance G at
+full opening and drop dP. Flags: armed[event], shut against reverse flow; armed[event + 2], fully open;
+armed[event + 4], on its seat. They change on accepted states only. If the valve is the only one at a rigid column, it
+controls the flow of the column near its seat (armed[event + 6]).
 """
 
 from math import sqrt
@@ -26,13 +27,13 @@ PRESSURE_MARGIN = 1e-3  # drop below which it stays shut against reverse flow [P
 
 @njit
 def regulator_opening(y, tables, device):
-    """Stem position x; it may exceed its stops by rounding."""
+    """Opening x of the valve; it may exceed 0 to 1 by rounding."""
     return tables.floats[device["data"] + OPENING] + y[device["y"]]
 
 
 @njit
 def set(t, y, out, tables, device):
-    """Write the conductance G x^2; 0 while shut against reverse flow."""
+    """Write the conductance G x^2 of the valve into `out`; 0 while it is shut against reverse flow."""
     k, x = device["valve"], min(max(regulator_opening(y, tables, device), 0.0), 1.0)
     back = tables.armed[device["event"]] > 0.0
     out[tables.layout[0]["conductance"] + k] = 0.0 if back else tables.valves[k]["conductance"] * x * x
@@ -40,7 +41,11 @@ def set(t, y, out, tables, device):
 
 @njit
 def lead(t, y, tables, device, before, behind, drop, ahead):
-    """dx/dt of one that a pressure moves, at p' before and behind it; what of it rises with the drop [1/Pa/s]."""
+    """Rate of the opening dx/dt [1/s] of a pressure-controlled valve, and its derivative by the drop [1/Pa/s].
+
+    before, behind : pressures at the ends minus those at the start [Pa]; drop : drop across the valve [Pa]
+    ahead : True if the drop changes by the upstream pressure; the derivative is 0 if the valve senses the other end
+    """
     floats, armed, at, data = tables.floats, tables.armed, device["event"], device["data"]
     if armed[at + 2] > 0.0 or armed[at + 4] > 0.0:
         return 0.0, 0.0
@@ -52,13 +57,16 @@ def lead(t, y, tables, device, before, behind, drop, ahead):
 
 @njit
 def stroke(tables, device):
-    """Band times time constant: dx/dt = error / stroke."""
+    """Product of band and time constant, so that dx/dt = error / stroke."""
     return tables.floats[device["data"] + BAND] * tables.floats[device["data"] + TIME]
 
 
 @njit
 def regulator_error(t, out, tables, device):
-    """Control error over the band, positive to open: set minus sensed value; sensed minus set if it sustains."""
+    """Control error over the band [-], positive if the valve must open.
+
+    It is set value minus sensed value, or sensed minus set value for a pressure-sustaining valve.
+    """
     layout, floats, data = tables.layout[0], tables.floats, device["data"]
     valve = tables.valves[device["valve"]]
     change = schedule_value(tables, device["schedule"], t) - floats[data + SET]
@@ -73,7 +81,7 @@ def regulator_error(t, out, tables, device):
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    """Write dx/dt, 0 at a stop, and the rate limit."""
+    """Write the rate of the opening into `dydt`, 0 at a stop, and raise out[RATE] to the rate limit."""
     out[RATE] = max(out[RATE], regulator_rate(y, out, tables, device))
     if dydt.size == 0:
         return
@@ -84,7 +92,10 @@ def move(t, y, dydt, out, tables, device):
 
 @njit
 def regulator_rate(y, out, tables, device):
-    """Rate of the control loop [1/s]; if a column sets the flow, d dP / dx = -2 dP / x."""
+    """Rate of the control loop [1/s].
+
+    Where a column sets the flow, the derivative of the drop dP by the opening x is -2 dP / x.
+    """
     k, speed = device["valve"], 1.0 / stroke(tables, device)
     drop = abs(head_drop(tables, out, k)[1])
     if device["mode"] == FLOW_CONTROL:
@@ -97,7 +108,11 @@ def regulator_rate(y, out, tables, device):
 
 @njit
 def events(t, y, out, tables, device, g):
-    """g: flow, or drop above the opening margin; distance to full opening; distance to the seat; each both ways."""
+    """Write the event functions g, each with its negative.
+
+    They are the flow [kg/s], or if shut the drop above the opening margin [Pa]; the distance to full opening; the
+    distance to the seat; and the distance to the opening at which control of a column begins or ends.
+    """
     layout, armed = tables.layout[0], tables.armed
     at, x, error = device["event"], regulator_opening(y, tables, device), regulator_error(t, out, tables, device)
     drop, back = head_drop(tables, out, device["valve"])[1], 1.0
@@ -122,5 +137,5 @@ def events(t, y, out, tables, device, g):
 
 @njit
 def value(t, y, out, tables, device, quantity):
-    """Opening, 0 to 1."""
+    """Opening of the valve, 0 to 1."""
     return min(max(regulator_opening(y, tables, device), 0.0), 1.0)

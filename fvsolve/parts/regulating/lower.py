@@ -1,4 +1,4 @@
-"""Control valves in the tables of a model, and their state in the steady solution."""
+"""Rows of control valves in the tables of a model, and their state in the steady solution."""
 
 from __future__ import annotations
 
@@ -18,7 +18,11 @@ OPEN, ACTIVE = "open", "active"  # as EPANET calls them; in `start.shut`, closed
 
 
 class SteadyValve(NamedTuple):
-    """A valve in a steady solution: potentials at its ends and set potential [Pa], flow, loss at full opening [Pa]."""
+    """State of a control valve in a steady solution.
+
+    start : steady problem; k : row of the valve; p_from, p_to : potentials at its ends [Pa]; flow : mass flow [kg/s]
+    target : set potential [Pa], or set flow [kg/s]; loss : drop at full opening at this flow [Pa]
+    """
 
     start: object
     k: int
@@ -34,7 +38,10 @@ class SteadyValve(NamedTuple):
 
 
 class Regulator(Device, kind=""):
-    """Active, it keeps the sensed quantity at its set value; else it is open or shut. Its opening is a state."""
+    """Rows of control valves; their opening is a state.
+
+    In the steady state a valve is active (it keeps the sensed quantity at its set value), open or shut.
+    """
 
     law, controlling_event = law, 6
     states = ("opening",)
@@ -55,7 +62,7 @@ class Regulator(Device, kind=""):
         return [0.0, 0.0, 0.0, band, part.time_constant]
 
     def check_set_pressure(self, draft, name, part) -> None:
-        """Report a fault if no source can supply the set pressure."""
+        """Report a fault if no source of the case can supply the set pressure."""
         nodes, case = draft.case.nodes.values(), draft.case
         if any(node.kind not in ("reservoir", "tank", "junction") for node in nodes) or "pump" in kinds_of(case):
             return  # pressure comes from elsewhere too
@@ -84,7 +91,7 @@ class Regulator(Device, kind=""):
         return start.schedule_value(row["schedule"])
 
     def target(self, start, k: int) -> float:
-        """Set value at the start, a pressure as potential [Pa]."""
+        """Set value of valve k at the start: pressure as potential [Pa], or mass flow [kg/s]."""
         if not self.end:
             return self.set_value(start, k)
         return start.law.potential_of(self.set_value(start, k), float(start.nodes["elevation"][self.sensed(start, k)]))
@@ -125,7 +132,7 @@ class Regulator(Device, kind=""):
         return after != before
 
     def next_mode(self, here: SteadyValve, now: str) -> str:
-        """State of the valve in the next solution, by the rules of EPANET."""
+        """Mode in the next steady solution, "shut", ACTIVE or OPEN, by the rules of EPANET; now : present mode"""
         raise NotImplementedError
 
     def begin(self, start, part, row) -> list[str]:
@@ -145,7 +152,7 @@ class Regulator(Device, kind=""):
         return []
 
     def error(self, start, k: int) -> float:
-        """Control error at the start, positive to open, in the unit of the sensed quantity."""
+        """Control error at the start, positive if the valve must open, in [Pa] or [kg/s]."""
         given = self.set_value(start, k)
         if not self.end:
             return given - float(start.valves[k]["flow"])
@@ -153,14 +160,17 @@ class Regulator(Device, kind=""):
         return given - pressure if self.end == "to" else pressure - given
 
     def refuse(self, start, k: int) -> None:
-        """Report a fault: no opening keeps the sensed quantity at its set value."""
+        """Report a fault: no opening of valve k keeps the sensed quantity at its set value."""
         name = start.draft.valve_names[k]
         start.draft.fault(f"links.{name}.{self.key}", "no steady state: the valve alone supplies a given demand, "
-                          'so it cannot set its quantity; change the demand, or use initial = "rest"')  # fmt: skip
+                          'so it cannot set pressure or flow; change the demand, or use initial = "rest"')  # fmt: skip
 
 
 class PressureReducingRows(Regulator, kind="pressure-reducing"):
-    """Limits the pressure at `to`: open if it is lower even at full opening, shut if other sources keep it higher."""
+    """Rows of pressure-reducing valves, which limit the pressure at `to`.
+
+    Open if this pressure is too low even at full opening; shut if other sources keep it higher.
+    """
 
     mode, end, verb = law.REDUCING, "to", "reduce"
 
@@ -176,7 +186,10 @@ class PressureReducingRows(Regulator, kind="pressure-reducing"):
 
 
 class PressureSustainingRows(Regulator, kind="pressure-sustaining"):
-    """Keeps the pressure at `from` up: open if it is higher even at full opening, shut if it is lower."""
+    """Rows of pressure-sustaining valves, which keep up the pressure at `from`.
+
+    Open if this pressure is too high even at full opening; shut if it is lower than the set value.
+    """
 
     mode, end, verb = law.SUSTAINING, "from", "open"
 
@@ -192,7 +205,7 @@ class PressureSustainingRows(Regulator, kind="pressure-sustaining"):
 
 
 class FlowControlRows(Regulator, kind="flow-control"):
-    """Limits the flow: open if even full opening passes less."""
+    """Rows of flow-control valves, which limit the flow; open if full opening passes less."""
 
     mode, key = law.FLOW_CONTROL, "set_flow"
 
@@ -206,12 +219,12 @@ class FlowControlRows(Regulator, kind="flow-control"):
 
 
 def kinds_of(case) -> set[str]:
-    """Types of the links of a case."""
+    """Types of the links in a case."""
     return {link.kind for link in case.links.values()}
 
 
 def head_of(case, weight: float, name: str) -> tuple[float, str]:
-    """(greatest head [m] that a place can bring, its name)."""
+    """Greatest head that a place can supply [m], and its name."""
     node, z = case.nodes[name], case.elevation(name) or 0.0
     if node.kind == "tank":
         return z + max(node.level, node.height or 0.0), name

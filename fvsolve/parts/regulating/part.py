@@ -1,4 +1,4 @@
-"""Control valves (pressure reducing, pressure sustaining, flow control): keys."""
+"""Control valves (pressure-reducing, pressure-sustaining, flow-control): keys."""
 
 from __future__ import annotations
 
@@ -14,19 +14,20 @@ BANDS = UsualRange(20.0, 1e8, "millimetres of water to servo valves")
 
 
 class Regulating(Sized, TwoPort):
-    """A self-acting control valve: time_constant dx/dt = error / band, 0 <= x <= 1."""
+    """Base of self-acting control valves: time_constant dx/dt = error / band, with the opening x from 0 to 1."""
 
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "opening": "number"}
 
     time_constant: Annotated[
         float,
-        Quantity("time", positive, "time in which an error of one band opens the shut valve [s]", STROKES, VALUE),
+        Quantity("time", positive, "time in which an error of one `band` opens the shut valve [s]", STROKES, VALUE),
     ]
 
 
 class PressureReducing(Regulating, kind="pressure-reducing"):
-    """q = x Cd A sqrt(2 dp / rho), time_constant dx/dt = (set_pressure - p_to) / band, 0 <= x <= 1; never backwards.
+    """Valve that limits the pressure at `to`: q = x Cd A sqrt(2 dp / rho), never backwards.
 
+    q is the flow, dp the drop. The opening x follows time_constant dx/dt = (set_pressure - p_to) / band, 0 <= x <= 1.
     Ports: from, to; p_to is taken at the elevation of `to`. Stored energy: none. Dissipated power: dp q [W].
     """
 
@@ -40,8 +41,9 @@ class PressureReducing(Regulating, kind="pressure-reducing"):
 
 
 class PressureSustaining(Regulating, kind="pressure-sustaining"):
-    """q = x Cd A sqrt(2 dp / rho), time_constant dx/dt = (p_from - set_pressure) / band, 0 <= x <= 1; never backwards.
+    """Valve that keeps up the pressure at `from`: q = x Cd A sqrt(2 dp / rho), never backwards.
 
+    q is the flow, dp the drop. The opening x follows time_constant dx/dt = (p_from - set_pressure) / band, 0 <= x <= 1.
     Ports: from, to; p_from is taken at the elevation of `from`. Stored energy: none. Dissipated power: dp q [W].
     """
 
@@ -55,10 +57,10 @@ class PressureSustaining(Regulating, kind="pressure-sustaining"):
 
 
 class FlowControl(Regulating, kind="flow-control"):
-    """q = x Cd A sqrt(2 |dp| / rho) sign(dp), time_constant dx/dt = (set_flow - q) / set_flow, 0 <= x <= 1.
+    """Valve that limits the flow q from `from` to `to`: q = x Cd A sqrt(2 |dp| / rho) sign(dp).
 
-    It limits the flow from `from` to `to`; for reverse flow it is open. Ports: from, to. Stored energy: none.
-    Dissipated power: dp q [W].
+    dp is the drop. The opening x follows time_constant dx/dt = (set_flow - q) / set_flow, 0 <= x <= 1. For reverse flow
+    the valve is open. Ports: from, to. Stored energy: none. Dissipated power: dp q [W].
     """
 
     set_flow: Annotated[Schedule, Scheduled("flow", positive, "greatest flow, at the reference density [m3/s]")]

@@ -1,7 +1,8 @@
 """Relief valve whose lift follows the upstream pressure at once.
 
-Partly open: M |M| = G x^2 dP with x = (p - set) / span, solved with the nodes. armed[event] : the valve is shut;
-armed[event + 2] : it is fully open. Both flags change on accepted states only, so that each mode has a smooth law.
+Partly open: M |M| = G x^2 dP with x = (p - set pressure) / span, solved with the nodes; M is the mass flow, G the
+conductance at full opening, x the lift, dP the drop, p the upstream pressure. Flags: armed[event], the valve is shut;
+armed[event + 2], it is fully open. Both change on accepted states only, so that each mode has a smooth law.
 """
 
 from math import sqrt
@@ -16,23 +17,24 @@ RELUCTANCE = 1e-10  # margin of lift at events, so that rounding does not open t
 
 @njit
 def set(t, y, out, tables, device):
-    """Write the conductance G at full opening; 0 if shut."""
+    """Write the conductance G at full opening into `out`; 0 if the valve is shut."""
     k, shut = device["valve"], tables.armed[device["event"]] > 0.0
     out[tables.layout[0]["conductance"] + k] = 0.0 if shut else tables.valves[k]["conductance"]
 
 
 @njit
 def value(t, y, out, tables, device, quantity):
-    """Lift, 0 to 1."""
+    """Lift of the valve, 0 to 1."""
     return min(max(pressure_lift(tables, out, device["valve"]), 0.0), 1.0)
 
 
 @njit
 def events(t, y, out, tables, device, g):
-    """g: lift above the seat (or above the opening margin if shut), and lift below full opening; each both ways.
+    """Write the event functions g, each with its negative: lift above the seat, and lift below full opening.
 
-    Between shut and fully open it always becomes partly open first: after a jump, a direct change to the opposite stop
-    might not be consistent with the law of that stop.
+    If the valve is shut, the first is the lift above the opening margin. Between shut and fully open it always becomes
+    partly open first: after a jump, a direct change to the opposite stop might not be consistent with the law of that
+    stop.
     """
     armed, at, x = tables.armed, device["event"], pressure_lift(tables, out, device["valve"])
     left, missing = x, 1.0 - x
@@ -46,7 +48,10 @@ def events(t, y, out, tables, device, g):
 
 @njit
 def step(out, tables, k, g, m, drop, denser, wide):
-    """a, s of the flow x `full`; by the square-root law unless the valve is partly open."""
+    """a [kg/s] and s [kg/s/Pa] of the next Newton step, dM = a + s d(drop), M the mass flow.
+
+    The square-root law holds unless the valve is partly open; then see `lifting_step`.
+    """
     if not is_lifted(tables, k):
         return root_step(tables, k, g, m, drop, denser)
     dense = g * denser
@@ -56,7 +61,7 @@ def step(out, tables, k, g, m, drop, denser, wide):
 
 @njit
 def slope(out, tables, k, g, drop):
-    """d flow / d drop [kg/s/Pa], with the change of lift."""
+    """Derivative of the mass flow by the drop [kg/s/Pa], including the change of lift."""
     if not is_lifted(tables, k):
         return root_slope(tables, k, g, drop)
     transition = transition_of(tables.valves[k], g)
@@ -66,14 +71,14 @@ def slope(out, tables, k, g, drop):
 
 @njit
 def lift(out, tables, k, g, drop, denser, wide):
-    """d flow / d (upstream pressure) through the lift [kg/s/Pa]."""
+    """Derivative of the mass flow by the upstream pressure through the lift [kg/s/Pa]."""
     dense = g * denser
     return lifting_slope(tables, out, k, flow_at_drop(dense, transition_of(tables.valves[k], dense), drop), wide)
 
 
 @njit
 def pressure_lift(tables, out, k):
-    """Lift x, linear in the upstream pressure and not limited to 0 to 1."""
+    """Lift x of valve k, linear in the upstream pressure and not limited to 0 to 1."""
     floats, valve = tables.floats, tables.valves[k]
     change = out[tables.layout[0]["pressure"] + valve["from_node"]]
     return floats[valve["data"]] + change / floats[valve["data"] + 1]
@@ -81,16 +86,16 @@ def pressure_lift(tables, out, k):
 
 @njit
 def lift_rise(tables, k):
-    """d lift / d (upstream pressure) [1/Pa]."""
+    """Derivative of the lift by the upstream pressure [1/Pa]."""
     return 1.0 / tables.floats[tables.valves[k]["data"] + 1]
 
 
 @njit
 def lift_of(tables, out, k, full, wide):
-    """Lift used in the node equations; `full` is the flow at full opening [kg/s].
+    """Lift of valve k in the node equations; full : flow at full opening [kg/s]
 
     Reverse flow raises the pressure that lifts the disc. The lift is then limited to 0 to 1, and two solutions may
-    exist; the greater lift is stable. Newton reaches it from above, starting with all such valves `wide` open.
+    exist; the greater lift is stable. Newton reaches it from above: it starts with all valves of this kind `wide` open.
     """
     x = pressure_lift(tables, out, k)
     if full >= 0.0:
@@ -100,7 +105,10 @@ def lift_of(tables, out, k, full, wide):
 
 @njit
 def lifting_step(tables, out, k, full, g, m, wide):
-    """a, s of the flow x `full` of a partly open valve: chord as in `valve_step`, for reverse flow the slope."""
+    """a [kg/s] and s [kg/s/Pa] of the Newton step of a partly open valve, dM = a + s d(drop), at the flow m [kg/s].
+
+    full : flow at full opening [kg/s]; s is the chord as in `valve_step`, for reverse flow the slope
+    """
     x, transition = lift_of(tables, out, k, full, wide), transition_of(tables.valves[k], g)
     if x <= 0.0:
         return x * full - m, 0.0
@@ -113,7 +121,10 @@ def lifting_step(tables, out, k, full, g, m, wide):
 
 @njit
 def lifting_slope(tables, out, k, full, wide):
-    """d flow / d (upstream pressure) through the lift of a partly open valve [kg/s/Pa]; negative for reverse flow."""
+    """Derivative of the flow of a partly open valve by the upstream pressure through the lift [kg/s/Pa].
+
+    It is negative for reverse flow. full : flow at full opening [kg/s]; wide : True if the valve counts as fully open
+    """
     if full < 0.0 and (wide or not 0.0 < pressure_lift(tables, out, k) < 1.0):
         return 0.0
     return full * lift_rise(tables, k)

@@ -11,10 +11,11 @@ from fvsolve.parts.valve.part import Sized
 
 
 class ReliefValve(Disc, Sized, TwoPort, kind="relief-valve"):
-    """q = x Cd A sqrt(2 |dp| / rho) sign(dp), x = (p_from - set_pressure) / overpressure between 0 and 1.
+    """Relief valve, q = x Cd A sqrt(2 |dp| / rho) sign(dp), with flow q, drop dp and lift x between 0 and 1.
 
-    x follows the pressure at once, or with the dynamics of a disc that has a time_constant or a natural_frequency.
-    Ports: from, to. Stored energy: none, that of the disc is neglected. Dissipated power: dp q [W].
+    x = (p_from - set_pressure) / overpressure. The lift follows the pressure at once, or with the dynamics of a disc
+    that has a time_constant or a natural_frequency. Ports: from, to. Stored energy: none, that of the disc is
+    neglected. Dissipated power: dp q [W].
     """
 
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "opening": "number"}
@@ -27,5 +28,7 @@ class ReliefValve(Disc, Sized, TwoPort, kind="relief-valve"):
     ]
     overpressure: Annotated[
         float,
-        Quantity("pressure_drop", positive, "pressure above set_pressure at which the valve is fully open [Pa]", DROPS),
+        Quantity(
+            "pressure_drop", positive, "pressure above `set_pressure` at which the valve is fully open [Pa]", DROPS
+        ),
     ]

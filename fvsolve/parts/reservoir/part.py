@@ -13,8 +13,8 @@ from fvsolve.parts.schedule import Schedule, Scheduled
 class Reservoir(PlaceOnBody, kind="reservoir"):
     """A place of given pressure, p = pressure(t) or p = ambient + rho g (head(t) - elevation) [Pa].
 
-    Ports: any number, with any flow. Stored energy: none; energy through its ports is work done on the network in the
-    ledger. Dissipated energy: none.
+    Ports: any number, with any flow. Stored energy: none. The energy ledger books energy through its ports as work done
+    on the network. Dissipated energy: none.
     """
 
     driven: ClassVar[tuple[str, float]] = "pressure", 0.0

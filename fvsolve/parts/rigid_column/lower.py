@@ -9,7 +9,7 @@ from fvsolve.model.lowering import Lowering
 
 
 class RigidColumnRows(Lowering, kind="rigid-column"):
-    """Row of a rigid column: one state, its flow."""
+    """Rows of rigid columns, each with its flow as state."""
 
     table = "column"
 

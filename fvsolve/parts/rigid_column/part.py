@@ -10,7 +10,7 @@ from fvsolve.units import show
 
 
 class Way(Value):
-    """A list of points in space."""
+    """Value of a case file: a list of points in space."""
 
     takes = "list of [x, y, z], m"
 
@@ -37,10 +37,10 @@ class Way(Value):
 
 
 class RigidColumn(Conduit, kind="rigid-column"):
-    """An incompressible pipe, (rho length / A) dq/dt = drop of p + rho g z - friction; one state, its flow q.
+    """An incompressible pipe, (rho length / A) dq/dt = drop of p + rho g z minus friction; its flow q is a state.
 
-    Ports: from, to. Stored energy: rho length q^2 / (2 A) [J]. Dissipated power: friction and minor loss,
-    pressure drop times flow [W].
+    A is the area, p the pressure and z the elevation. Ports: from, to. Stored energy: rho length q^2 / (2 A) [J].
+    Dissipated power: friction and minor loss, pressure drop times flow [W].
     """
 
     route: Annotated[

@@ -1,4 +1,4 @@
-"""Rupture disc to ambient: functions of the disc and of the outlet law."""
+"""Rupture disc to ambient: functions of the disc law and of the outlet law."""
 
 from fvsolve.parts.outlet.law_root import bends, slope, step
 from fvsolve.parts.rupture_disc.law import events, set, value

@@ -1,4 +1,4 @@
-"""Rupture discs in the tables of a model, intact at the start."""
+"""Rows of rupture discs in the tables of a model; discs are intact at the start."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fvsolve.parts.rupture_disc import law, law_outside
 
 
 class RuptureDiscRows(RelievingRows, kind="rupture-disc"):
-    """A rupture disc between two nodes."""
+    """Rows of rupture discs between two nodes."""
 
     law, events_only = law, True
     events = ("bursts",)
@@ -31,7 +31,7 @@ class RuptureDiscRows(RelievingRows, kind="rupture-disc"):
 
 
 class DiscToAmbient(RuptureDiscRows, kind=""):
-    """A rupture disc to ambient."""
+    """Rows of rupture discs to ambient."""
 
     law, mode = law_outside, EVENT_COUNT
     events = ("",) * EVENT_COUNT + ("bursts",)

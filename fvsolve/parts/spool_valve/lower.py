@@ -13,7 +13,7 @@ FLOWS = {  # flow into the link at a port: weights of its four edges
 
 
 class SpoolValveRows(Restriction, kind="spool-valve"):
-    """Rows of four valves; the two valves that open on one side of zero share an opening schedule."""
+    """Rows of spool valves, four each; the two edges that open on one side of zero share an opening schedule."""
 
     rows, rank = len(EDGES), 1
 

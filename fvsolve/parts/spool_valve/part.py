@@ -18,10 +18,11 @@ EDGES = (
 
 
 class SpoolValve(Sized, Link, kind="spool-valve"):
-    """Zero-lapped valve: P-A and B-T open by `position` above 0, P-B and A-T by -`position` below 0.
+    """Zero-lapped spool valve: edges P-A and B-T open by `position` above 0, edges P-B and A-T by -`position` below 0.
 
-    Each edge is a valve, q = |position| Cd A sqrt(2 |dp| / rho) sign(dp) (79). Ports: P, T, A, B; at position 0
-    there is no flow. Stored energy: none. Dissipated power: dp q [W] over the edges.
+    Each edge is a valve, q = |position| Cd A sqrt(2 |dp| / rho) sign(dp), with flow q and drop dp (docs/course.md, 79).
+    Ports: P, T, A, B; at position 0 there is no flow. Stored energy: none. Dissipated power: dp q [W], summed over the
+    edges.
     """
 
     joins: ClassVar[dict[str, str]] = dict.fromkeys(("P", "T", "A", "B"), "hydraulic")

@@ -10,9 +10,11 @@ from fvsolve.parts.value import VALUE, Quantity, nonnegative, positive
 
 
 class Spring(Coupling, kind="spring"):
-    """force = -stiffness (x_to - x_from - free_length) (81), or preload - stiffness (length - length at the start).
+    """Linear spring with the force -stiffness (x_to - x_from - free_length), x the position of a port.
 
-    Ports: from, to; the force pushes `to` forward. Stored energy: force^2 / (2 stiffness) [J] (82). Dissipated: none.
+    With `preload` the force is preload - stiffness (length - length at the start), the length x_to - x_from
+    (docs/course.md, 81). Ports: from, to; the force pushes `to` forward. Stored energy: force^2 / (2 stiffness) [J]
+    (82). Dissipated energy: none.
     """
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("free_length", "preload"),)
@@ -21,7 +23,10 @@ class Spring(Coupling, kind="spring"):
     free_length: Annotated[
         float | None,
         Quantity(
-            "length", nonnegative, "length x_to - x_from without load [m]; 0 without preload if left out", changes=VALUE
+            "length",
+            nonnegative,
+            "length x_to - x_from without load [m]; 0 without `preload` if left out",
+            changes=VALUE,
         ),
     ] = None
     preload: Annotated[
@@ -35,4 +40,4 @@ class Spring(Coupling, kind="spring"):
     def faults(self, name: str, around: CaseContext) -> Faults:
         distance = around.separation(self, "from", "to")
         if distance is not None and distance < 0.0 and (self.free_length or self.preload):
-            yield ("to",), f"{self.to} is behind {self.from_} at the start; exchange from and to"
+            yield ("to",), f"{self.to} is behind {self.from_} at the start; exchange the keys `from` and `to`"
