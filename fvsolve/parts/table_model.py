@@ -1,4 +1,4 @@
-"""Tables of a case file: keys, and which keys are compatible."""
+"""Tables of a case file: base class, keys, and faults of incompatible keys."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def read_keys(given: dict[str, Any], keys: dict[str, tuple[Value, Any]], setting
 
 
 def keys_json(keys: dict[str, tuple[Value, Any]]) -> dict[str, Any]:
-    """JSON schema of a table with these keys."""
+    """JSON schema of a table with the given keys."""
     return {
         "type": "object",
         "properties": {key: value.json() for key, (value, _) in keys.items()},
@@ -47,7 +47,7 @@ def _key_hint(name: str, keys: list[str]) -> str:
 
 
 class Table(BaseModel):
-    """Base of all tables of a case file: frozen, no unknown keys, all faults in a single error."""
+    """Base of all tables of a case file: frozen, without unknown keys, all faults in a single error."""
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", populate_by_name=False, arbitrary_types_allowed=True,
@@ -92,27 +92,27 @@ class Table(BaseModel):
 
     @classmethod
     def keys(cls) -> list[str]:
-        """Keys in a case file."""
+        """Names of the keys in a case file."""
         return [info.alias or name for name, info in cls.model_fields.items()]
 
     @classmethod
     def values(cls) -> dict[str, Value]:
-        """Declaration of each key."""
+        """Declaration of each key, by its name in a case file."""
         declared = {info.alias or name: (info.metadata, info.annotation) for name, info in cls.model_fields.items()}
         return {key: next((value for value in metadata if isinstance(value, Value)), Nested(model))
                 for key, (metadata, model) in declared.items()}  # fmt: skip
 
     @classmethod
     def expected(cls, given: Any) -> str:
-        """Text of the expected table, for a value that is not a table."""
+        """Text about the expected table, for a value that is not a table."""
         return f"keys of {listing(cls.keys())}"
 
     def faults(self, name: str, around: CaseContext) -> Faults:
-        """Faults of the part in the context of its case: (keys, text)."""
+        """Faults of the part in the context of its case: (key path, text)."""
         yield from ()
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
-        """Unusual combinations of keys: (keys, value, limit, text)."""
+        """Unusual combinations of keys, which give notices: (key path, value, limit, text)."""
         yield from ()
 
     def table(self) -> dict[str, Any]:
@@ -126,7 +126,7 @@ class Table(BaseModel):
 
 
 class Nested(Value):
-    """Nested table."""
+    """Value of a case file that is a table."""
 
     def __init__(self, model: type[Table], about: str = "") -> None:
         self.model, self.about = model, about
@@ -154,7 +154,7 @@ class Nested(Value):
 
 
 class NamedTables(Value):
-    """Tables of the same type by name."""
+    """Value of a case file with tables of the same type, name -> table."""
 
     def __init__(self, model: type[Table], about: str) -> None:
         self.model, self.about = model, about
@@ -188,7 +188,7 @@ class NamedTables(Value):
 
 
 def plain_value(value: Any) -> Any:
-    """Value of a field as in a case file."""
+    """Value of a key as in a case file: number, text, list or table."""
     if hasattr(value, "table"):
         return value.table()
     if isinstance(value, (list, tuple)):
@@ -216,7 +216,7 @@ def faults_of_error(
     keys: list[str],
     synonyms: dict[str, str] = {},  # noqa: B006
 ) -> list[tuple[tuple[Any, ...], str]]:
-    """Faults of a pydantic error, with their key paths; synonyms : keys of other programs -> equivalent here."""
+    """Faults of a pydantic error, with their key paths; synonyms : keys of other programs -> equivalent here"""
     result = []
     for entry in error.errors(include_url=False):
         place, cause = tuple(entry["loc"]), entry.get("ctx", {}).get("error")

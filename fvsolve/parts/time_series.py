@@ -1,4 +1,4 @@
-"""Time series in CSV files of a case."""
+"""Time series of a case, read from CSV files."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ from fvsolve.units import show
 
 
 def find_file(name: str, setting: ReadContext) -> Path:
-    """Path of a file named relative to the case; it is added to the files of the context. Raises ValueError."""
+    """Path of a file named relative to the case; add it to the files of the context.
+
+    Raises ValueError if it is missing.
+    """
     setting.lookups += 1
     path = Path(name)
     if not path.is_absolute():
@@ -40,7 +43,7 @@ def copy_name(path: Path, setting: ReadContext) -> str:
 def read_columns(
     path: Path, time: str | None, value: str | None, dimension: str, setting: ReadContext
 ) -> tuple[np.ndarray, np.ndarray, str, str]:
-    """Time [s] and value [SI, pressures absolute] : float64[n] and their headers.
+    """Times [s] : float64[n], values [SI, pressures absolute] : float64[n], and the headers of both columns.
 
     time, value : headers of the columns, with or without unit; None for the first and the second column
     Raises ValueError with the faulty line of the file.

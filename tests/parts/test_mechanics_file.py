@@ -185,7 +185,7 @@ BAD = {
     ),
     "a spring backwards": (
         swap('from = "ground"\nto = "load"', 'from = "load"\nto = "ground"'),
-        "links.spring.to: ground is behind load at the start; exchange from and to",
+        "links.spring.to: ground is behind load at the start; exchange the keys `from` and `to`",
     ),
     "a stop without a side": (
         swap('minimum = "1 mm"\nmaximum = "199 mm"', ""),

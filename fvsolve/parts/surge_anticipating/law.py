@@ -4,7 +4,8 @@ Flags, with at = event + mode: armed[at] to armed[at + 3] for the stages SHUT, O
 the states give the stage. armed[at + 4]: opened by high pressure; armed[at + 5]: the pressure has exceeded low_set
 since the valve shut, so that a pressure below low_set opens it; armed[at + 6]: after the trip. Flags change on accepted
 states only. The states are the opening and the time spent fully open; their rates are constant in a stage, so that
-every method integrates them to rounding. To ambient, `mode` numbers and flags of an outlet precede those of the valve.
+every method integrates them to rounding. For a valve to ambient, `mode` is the number of values and flags of an outlet
+that precede those of the valve.
 """
 
 from fvsolve.jit import njit
@@ -31,14 +32,14 @@ def valve_stage(y, tables, device):
 
 @njit
 def set(t, y, out, tables, device):
-    """Write the conductance G x^2."""
+    """Write the conductance G x^2 of the valve into `out`, G the conductance at full opening and x the opening."""
     k, x = device["valve"], min(max(y[device["y"]], 0.0), 1.0)
     out[tables.layout[0]["conductance"] + k] = tables.valves[k]["conductance"] * x * x
 
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    """Write the rates of the opening and of the time spent open."""
+    """Write the rates of the opening and of the time spent fully open into `dydt`."""
     if dydt.size == 0:
         return
     floats, at, o, stage = tables.floats, device["data"] + device["mode"], device["y"], valve_stage(y, tables, device)
@@ -49,7 +50,7 @@ def move(t, y, dydt, out, tables, device):
 
 @njit
 def pilot_margins(t, y, out, tables, device):
-    """Margins to opening by low pressure, by high pressure [Pa] and by trip [s]; and the sensed pressure [Pa]."""
+    """Margins until the valve opens by low pressure [Pa], high pressure [Pa] and trip [s]; sensed pressure [Pa]."""
     floats, armed, layout = tables.floats, tables.armed, tables.layout[0]
     at, flags = device["data"] + device["mode"], device["event"] + device["mode"]
     i = int(floats[at + PLACE])
@@ -63,7 +64,7 @@ def pilot_margins(t, y, out, tables, device):
 
 @njit
 def events(t, y, out, tables, device, g):
-    """g: margins to the next stage, and the flags of high pressure, arming and trip."""
+    """Write the event functions g: margins until the next stage, and of the flags of high pressure, arming and trip."""
     floats, armed, o = tables.floats, tables.armed, device["y"]
     at, flags, stage = device["data"] + device["mode"], device["event"] + device["mode"], valve_stage(y, tables, device)
     low, high, trip, p = pilot_margins(t, y, out, tables, device)
@@ -93,12 +94,12 @@ def events(t, y, out, tables, device, g):
 
 @njit
 def set_stage_event(g, flags, stage, next_stage, margin):
-    """Set g of the present stage, which lasts while the margin is positive, and of the next stage."""
+    """Write g of the present stage, which lasts while the margin is positive, and of the next stage."""
     margin = -LEAST if margin == 0.0 else margin
     g[flags + stage], g[flags + next_stage] = -margin, margin
 
 
 @njit
 def value(t, y, out, tables, device, quantity):
-    """Opening, 0 to 1."""
+    """Opening of the valve, 0 to 1."""
     return min(max(y[device["y"]], 0.0), 1.0)

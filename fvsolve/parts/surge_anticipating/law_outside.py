@@ -1,4 +1,4 @@
-"""Surge-anticipating valve to ambient: functions of the valve and of the outlet law."""
+"""Surge-anticipating valve to ambient: functions of the valve law and of the outlet law."""
 
 from fvsolve.parts.outlet.law_root import bends, slope, step
 from fvsolve.parts.surge_anticipating.law import events, move, set, value

@@ -1,4 +1,4 @@
-"""Surge-anticipating valves in the tables of a model, shut at the start."""
+"""Rows of surge-anticipating valves in the tables of a model; the valves are shut at the start."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fvsolve.parts.surge_anticipating import law, law_outside
 
 
 class SurgeAnticipatingRows(RelievingRows, kind="surge-anticipating"):
-    """A surge-anticipating valve between two nodes."""
+    """Rows of surge-anticipating valves between two nodes."""
 
     law = law
     states = ("opening", "held")
@@ -59,7 +59,7 @@ class SurgeAnticipatingRows(RelievingRows, kind="surge-anticipating"):
 
 
 class AnticipatingToAmbient(SurgeAnticipatingRows, kind=""):
-    """A surge-anticipating valve to ambient."""
+    """Rows of surge-anticipating valves to ambient."""
 
     law, mode = law_outside, EVENT_COUNT
     events = ("",) * EVENT_COUNT + SurgeAnticipatingRows.events

@@ -13,39 +13,40 @@ from fvsolve.units import show
 
 
 class SurgeAnticipating(Relieving, kind="surge-anticipating"):
-    """q = x Cd A sqrt(2 |dp| / rho) sign(dp); p < low_set or `trip` opens it for `hold`, then it shuts.
+    """Valve that a pressure below `low_set`, or `trip`, opens for the time `hold`, and that then shuts.
 
-    A pressure above high_set opens it while it lasts. x moves at the constant rates 1 / opening_time and
-    1 / closing_time. Without `to` it opens to ambient at the elevation of its place, without backflow. Ports: from, to.
-    Stored energy: none. Dissipated power: dp q [W].
+    A pressure above `high_set` opens it while the pressure lasts. q = x Cd A sqrt(2 |dp| / rho) sign(dp), with flow q
+    and drop dp; the opening x moves at the constant rates 1 / opening_time and 1 / closing_time. Without `to` the valve
+    opens to ambient at the elevation of its place, without backflow. Ports: from, to. Stored energy: none. Dissipated
+    power: dp q [W].
     """
 
     low_set: Annotated[
         float | None,
-        Quantity("pressure", about="pressure at `senses` below which the valve opens, gauge or absolute by its unit"),
+        Quantity("pressure", about="pressure at `senses` below which it opens, gauge or absolute by its unit [Pa]"),
     ] = None
     high_set: Annotated[
         float | None,
-        Quantity("pressure", about="pressure at `senses` above which the valve opens, gauge or absolute by its unit"),
+        Quantity("pressure", about="pressure at `senses` above which it opens, gauge or absolute by its unit [Pa]"),
     ] = None
     trip: Annotated[float | None, Quantity("time", about="time at which the valve opens regardless of pressure")] = None
     senses: Annotated[str | None, Text("place whose pressure opens the valve; `from` if left out")] = None
     opening_time: Annotated[float, Quantity("time", positive, "time from shut to fully open", STROKES)]
     hold: Annotated[
-        float, Quantity("time", nonnegative, "time for which it stays fully open after low_set or trip")
+        float, Quantity("time", nonnegative, "time for which the valve stays fully open after `low_set` or `trip` [s]")
     ] = 0.0
     closing_time: Annotated[float, Quantity("time", positive, "time from fully open to shut", STROKES)]
 
     @property
     def sensed(self) -> str:
-        """Place of the pressure that opens it."""
+        """Place whose pressure opens the valve."""
         return self.from_ if self.senses is None else self.senses
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
         faults = super().key_faults(given)
         if not {"low_set", "high_set", "trip"} & set(given):
-            faults.append(((), "nothing opens it; expected low_set, high_set or trip"))
+            faults.append(((), "nothing opens the valve; expected the key `low_set`, `high_set` or `trip`"))
         return faults
 
     def faults(self, name: str, around: CaseContext) -> Faults:

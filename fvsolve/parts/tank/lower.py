@@ -1,4 +1,4 @@
-"""Open tanks in the tables of a model."""
+"""Rows of open tanks in the tables of a model."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fvsolve.model.lowering import Lowering
 
 
 class TankRows(Lowering, kind="tank"):
-    """A node with the hydrostatic pressure under the level of its water."""
+    """Rows of tanks: nodes with the hydrostatic pressure at the bottom of their water."""
 
     ledger_name = "over the rim"
 
@@ -52,7 +52,11 @@ class TankRows(Lowering, kind="tank"):
 
 
 def tank_volume(level, area, volume, z: float) -> float:
-    """Volume below level z [m3] of a tank whose areas are linear between levels and constant above the last."""
+    """Volume below level z above the bottom of a tank [m3].
+
+    level, area, volume : levels [m], areas [m2] and volumes below the levels [m3]; the area is linear between levels
+    and constant above the last level
+    """
     if z >= level[-1]:
         return float(volume[-1] + (z - level[-1]) * area[-1])
     k = int(np.searchsorted(level, z, side="right")) - 1

@@ -33,9 +33,9 @@ LEVELS = UsualRange(0.0, 2000.0, "tanks to lakes and shafts")
 
 @dataclass(frozen=True, eq=False)
 class AreaTable:
-    """Free surface over level, linear between entries and constant outside them.
+    """Area of the free surface over the level, linear between entries and constant outside them.
 
-    level, area : float64[n]  level above the bottom, ascending from 0 [m], and surface at that level [m2]
+    level : float64[n]  level above the bottom, ascending from 0 [m]; area : float64[n]  surface at that level [m2]
     """
 
     level: np.ndarray
@@ -48,12 +48,12 @@ class AreaTable:
         return hash((self.level.tobytes(), self.area.tobytes()))
 
     def table(self) -> dict[str, list[float]]:
-        """The table as in a case file."""
+        """Table as in a case file."""
         return {"level": self.level.tolist(), "area": self.area.tolist()}
 
 
 class Surface(Value):
-    """A free surface: one area, or a table of areas over levels."""
+    """Value of a case file for a free surface: an area, or a table of areas over levels."""
 
     about = "area of the free surface, linear between levels and constant above the last level [m2]"
     takes = "m2, or `{ level = [0, ...], area = [...] }`"
@@ -87,7 +87,7 @@ class Surface(Value):
 
 
 class Tank(PlaceOnBody, kind="tank"):
-    """An open tank, d(level)/dt = net flow / area(level), p = ambient + rho g level at the bottom.
+    """An open tank, d(level)/dt = net flow / area(level); its pressure at the bottom is ambient + rho g level.
 
     Ports: any number, all at the bottom, or outside its `connection` (the throttle of a surge tank). Stored
     energy: rho g times the integral of (elevation + level) area over the level [J]. Dissipated energy: the
@@ -113,4 +113,4 @@ class Tank(PlaceOnBody, kind="tank"):
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         if self.height is not None and self.level > self.height:
-            yield ("level",), f"{self.level:g} m is above its height of {self.height:g} m"
+            yield ("level",), f"{self.level:g} m is above its `height` of {self.height:g} m; set it lower"

@@ -1,4 +1,4 @@
-"""Torques on shafts and bodies in the tables of a model."""
+"""Rows of torques on shafts and bodies in the tables of a model."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fvsolve.parts.pump.lower_drive import torques_on
 
 
 class TorqueRows(Lowering, kind="torque"):
-    """A torque on a shaft; its pump or turbine has the numbers."""
+    """Torques on shafts; they have no rows, because the pump or turbine of the shaft holds their numbers."""
 
     def of(self, part):
         return self if part.axis is None else BODY_TORQUES
@@ -27,7 +27,7 @@ class TorqueRows(Lowering, kind="torque"):
 
 
 class BodyTorqueRows(PushLowering):
-    """A torque by a schedule about an axis of a body."""
+    """Rows of torques about an axis of a body, given by a schedule."""
 
     ledger_name = "supplied"
     table, rank = "brace", 3

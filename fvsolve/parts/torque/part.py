@@ -15,10 +15,10 @@ from fvsolve.parts.value import Rows, Text
 
 
 class Torque(Link, kind="torque"):
-    """torque(t) on the shaft `to`, whose speed follows from it and the fluid; or on a body about `axis`.
+    """External torque(t) on the shaft `to`, whose speed follows from it and the fluid; or on a body about `axis`.
 
-    Ports: to; for bodies also from, which takes the reaction. Stored and dissipated energy: none. It supplies torque
-    times angular velocity [W]; for bodies the velocity of `to` relative to `from` about the axis.
+    Ports: to; for bodies also from, on which the reaction torque acts. Stored and dissipated energy: none. It supplies
+    torque times angular velocity [W]; for bodies, the velocity of `to` relative to `from` about the axis.
     """
 
     joins: ClassVar[dict[str, str]] = {"from": "spatial", "to": "rotational or spatial"}
@@ -31,7 +31,9 @@ class Torque(Link, kind="torque"):
     to: Annotated[str, Text("shaft (PUMP.shaft or TURBINE.shaft) or body")]
     torque: Annotated[
         Schedule,
-        Scheduled("torque", about="torque on `to`, positive as that of a motor on its pump, or about axis [N m]"),
+        Scheduled(
+            "torque", about="torque on `to`, positive as the torque of a motor on its pump, or about `axis` [N m]"
+        ),
     ]
     axis: Annotated[
         tuple[float, ...] | None,
@@ -57,10 +59,12 @@ class Torque(Link, kind="torque"):
         if turned.inertia is None:
             yield (
                 ("to",),
-                f"{self.to} has no inertia, so its speed cannot follow from a torque; give the {turned.kind} inertia",
+                f"{self.to} has no inertia, so its speed cannot follow from a torque; give the {turned.kind} the key `inertia`",
             )
         if turned.trip is not None:
-            text = "is held by its motor until it trips; remove trip, and let the torque fall to 0 at that time"
+            text = (
+                "is held by its motor until it trips; remove the key `trip`, and let the torque fall to 0 at that time"
+            )
             yield ("to",), f"{self.to} {text}"
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:

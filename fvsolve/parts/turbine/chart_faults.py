@@ -1,4 +1,4 @@
-"""Faults of the points of a hill chart, for each opening."""
+"""Faults of the points of a hill chart, opening by opening."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SPEED, FLOW, EFFICIENCY, TORQUE = "unit_speed", "unit_flow", "efficiency", "unit
 
 
 def faults_of_shut(curve) -> list[tuple[str, str]]:
-    """Faults of the curve of opening 0, shut vanes."""
+    """Faults of the curve of opening 0, with shut vanes: (key or "", text)."""
     if not len(curve.speed) == len(curve.flow) == len(curve.value) == 1 or curve.quantity != TORQUE:
         return [("", f"vanes at opening 0 are shut; expected no curve, or a single point with a {TORQUE}")]
     faults = [(FLOW, f"{curve.flow[0]:g} is a flow through shut vanes; expected 0")] * (curve.flow[0] != 0.0)
@@ -23,7 +23,7 @@ def faults_of_shut(curve) -> list[tuple[str, str]]:
 
 
 def faults_of_curve(curve) -> list[tuple[str, str]]:
-    """Faults of the points of an opening above 0."""
+    """Faults of the points of a curve of an opening above 0: (key or "", text)."""
     if not len(curve.speed) == len(curve.flow) == len(curve.value):
         counts = f"{len(curve.speed)} of {SPEED}, {len(curve.flow)} of {FLOW}, {len(curve.value)} of {curve.quantity}"
         return [("", f"{counts}; expected equal numbers")]
@@ -50,7 +50,10 @@ def faults_of_curve(curve) -> list[tuple[str, str]]:
 
 
 def angle_faults(points: list[tuple[float, float]]) -> list[tuple[str, str]]:
-    """Fault of points whose angle about the origin is not monotonic, or that cross reverse flow at rest."""
+    """Fault of points (unit speed, unit flow) whose angle about the origin does not rise or fall throughout.
+
+    Also the fault of points that cross reverse flow at rest.
+    """
     way = 0.0
     for k, ((n, q), (m, r)) in enumerate(pairwise(points)):
         across = n * r - q * m
@@ -80,5 +83,5 @@ def angle_faults(points: list[tuple[float, float]]) -> list[tuple[str, str]]:
 
 
 def point_text(point: tuple[float, float]) -> str:
-    """Text of a point."""
+    """Text of a point (unit speed, unit flow)."""
     return f"({point[0]:g}, {point[1]:g})"

@@ -1,4 +1,4 @@
-"""Hill charts of turbines in a case file or CSV file."""
+"""Hill charts of turbines in a case file or a CSV file."""
 
 from __future__ import annotations
 
@@ -18,9 +18,11 @@ EXAMPLE = "{ opening = 0.5, unit_speed = [60, 75], unit_flow = [0.52, 0.48], eff
 
 
 class OpeningCurve(NamedTuple):
-    """Points of an opening in order: n11 = N D / sqrt(H), Q11 = Q / (D^2 sqrt(H)), and efficiency or T11.
+    """Points of a hill chart at an opening of the vanes, in order along the curve.
 
-    speed [rpm m^(1/2)]; flow [m^(1/2)/s]; value : efficiency [-], or T11 = T / (D^3 H) [N/m3]; word : key of `value`
+    speed : unit speed n11 = N D / sqrt(H) [rpm m^(1/2)]; flow : unit flow Q11 = Q / (D^2 sqrt(H)) [m^(1/2)/s]
+    value : efficiency [-], or unit torque T11 = T / (D^3 H) [N/m3]; quantity : key of `value`
+    N : speed, D : runner diameter, H : head, Q : flow, T : torque
     """
 
     opening: float
@@ -30,7 +32,7 @@ class OpeningCurve(NamedTuple):
     quantity: str
 
     def table(self) -> dict[str, Any]:
-        """The table as in a case file."""
+        """Table as in a case file."""
         return {
             "opening": self.opening,
             SPEED: list(self.speed),
@@ -39,7 +41,7 @@ class OpeningCurve(NamedTuple):
         }
 
     def torques(self, weight: float) -> list[float]:
-        """T11 at its points; weight = rho g [N/m3]."""
+        """Unit torque T11 at the points [N/m3]; weight = rho g [N/m3]."""
         if self.quantity == TORQUE:
             return list(self.value)
         points = zip(self.speed, self.flow, self.value, strict=True)
@@ -47,9 +49,10 @@ class OpeningCurve(NamedTuple):
 
 
 class HillChart(NamedTuple):
-    """Curves by ascending opening above 0; still : (n11, T11) of the braking torque with shut vanes, or None.
+    """Hill chart of a turbine.
 
-    said : the value as given in the case file
+    curves : by ascending opening above 0; shut_point : (n11, T11) of the braking torque with shut vanes, or None
+    given : value as in the case file
     """
 
     curves: tuple[OpeningCurve, ...]
@@ -57,12 +60,12 @@ class HillChart(NamedTuple):
     given: Any
 
     def table(self) -> Any:
-        """The table as in a case file."""
+        """Value as in a case file."""
         return self.given
 
 
 class HillChartValue(Value):
-    """Curves of openings, inline or as columns of a CSV file."""
+    """Value of a case file for a hill chart: curves of openings, inline or as columns of a CSV file."""
 
     about = (
         "for each opening, points of n11 = N D / sqrt(H) [rpm m^(1/2)], Q11 = Q / (D^2 sqrt(H)) [m^(1/2)/s] and "
@@ -96,7 +99,7 @@ class HillChartValue(Value):
         return chart_of(curves, places, faults, [entry.table() for entry in curves.values()])
 
     def curve(self, given: Any, setting: ReadContext) -> OpeningCurve:
-        """Read the curve of an opening."""
+        """Read the curve of an opening from its table."""
         if not isinstance(given, dict):
             raise ValueError(f"{show(given)} is not a table; expected for example {EXAMPLE}")
         keys = read_keys(given, self.keys, setting)
@@ -111,7 +114,7 @@ class HillChartValue(Value):
 
 
 def from_file(given: dict[str, Any], setting: ReadContext) -> HillChart:
-    """Chart from CSV columns opening, unit_speed, unit_flow and efficiency or unit_torque, points in order."""
+    """Hill chart from CSV columns opening, unit_speed, unit_flow and efficiency or unit_torque, points in order."""
     unknown = [((key,), "unknown key; expected only file") for key in given if key != "file"]
     if unknown or not isinstance(given["file"], str):
         raise ValueFault(unknown or [(("file",), f"{show(given['file'])} is not a file name in quotes")])
@@ -137,7 +140,10 @@ def from_file(given: dict[str, Any], setting: ReadContext) -> HillChart:
 
 
 def columns_of(rows) -> tuple[list, str]:
-    """(columns opening, n11, Q11 and efficiency or T11, key of the last column) by header."""
+    """Columns of a hill chart by their headers, and the key of the last column.
+
+    The columns are opening, n11, Q11 and efficiency or T11.
+    """
     words = [word for word in (EFFICIENCY, TORQUE) if word in rows.names]
     if len(words) != 1:
         state = "has both; keep one" if words else "has neither"
@@ -153,7 +159,11 @@ def columns_of(rows) -> tuple[list, str]:
 
 
 def chart_of(curves: dict, places: dict, faults: list, source: Any, file: str = "") -> HillChart:
-    """Build a chart of curves; raise Misfit with all faults. places : keys of each curve for messages."""
+    """Build a hill chart of curves. Raises ValueFault with all faults.
+
+    curves : curve of each index or opening; places : key path of each curve for messages; faults : faults found before
+    source : value as in the case file; file : prefix of messages about a CSV file
+    """
     seen: dict[float, Any] = {}
     for k, curve in curves.items():
         if curve.opening in seen:

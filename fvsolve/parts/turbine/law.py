@@ -1,7 +1,8 @@
 """Turbine: guide vanes, speed and shaft torque.
 
 While the generator holds the speed, the speed follows a schedule. After load rejection, or with given torques from the
-start, J d(omega)/dt = torque of the water + given torques. Its numbers are those of a pump with a rated speed of 1.
+start, J d(omega)/dt = torque of the water + given torques, with inertia J and angular velocity omega. The numbers of a
+turbine are those of a pump with a rated speed of 1.
 """
 
 from math import sqrt
@@ -32,7 +33,7 @@ SHUT_SHARE = 1e-12  # square of an opening regarded as zero
 
 @njit
 def set(t, y, out, tables, device):
-    """Write the speed and the conductance of the vane opening."""
+    """Write the speed and the conductance at the vane opening into `out`."""
     layout, k = tables.layout[0], device["valve"]
     out[layout["drive"] + k] = pump_speed(t, y, tables, device)
     g = valve_conductance(tables, k, t)
@@ -41,13 +42,13 @@ def set(t, y, out, tables, device):
 
 @njit
 def vane_opening(tables, k, g):
-    """Opening of turbine k at its conductance."""
+    """Opening of the vanes of turbine k at its conductance g, 0 to 1."""
     return sqrt(g / tables.valves[k]["conductance"])
 
 
 @njit
 def operating_point(out, tables, device):
-    """(opening, speed [rad/s], flow [m3/s], density over that of the case) of a turbine after the nodes are solved."""
+    """Opening, speed [rad/s], flow [m3/s] and relative density of a turbine, after the nodes are solved."""
     layout, k = tables.layout[0], device["valve"]
     rho, _ = head_drop(tables, out, k)
     opening = vane_opening(tables, k, out[layout["conductance"] + k])
@@ -56,21 +57,21 @@ def operating_point(out, tables, device):
 
 @njit
 def turbine_torque(out, tables, device):
-    """Torque of the water on the shaft [N m]."""
+    """Torque of the water on the shaft, positive in forward rotation [N m]."""
     opening, omega, q, density_ratio = operating_point(out, tables, device)
     return density_ratio * chart_torque(tables.floats, tables.valves[device["valve"]]["data"], opening, omega, q)
 
 
 @njit
 def generator_holds_speed(t, tables, device):
-    """True if the generator holds the speed."""
+    """True if the generator holds the speed at time t."""
     mode = tables.floats[device["data"] + MODE]
     return mode == HELD_SPEED or (mode == TRIPPING and not tripped(t, tables, device))
 
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    """Write d/dt of the speed of a free shaft, and its rate limit."""
+    """Write the rate of the speed of a free shaft into `dydt`, and raise out[RATE] to its rate limit."""
     floats, at = tables.floats, device["data"]
     if floats[at + MODE] == HELD_SPEED:
         return
@@ -100,7 +101,7 @@ def shaft_rate(out, tables, device):
 
 @njit
 def power(t, y, dydt, out, tables, device):
-    """Power given to the shaft, rate of its kinetic energy, and minus the power taken from the water [W]."""
+    """Power supplied to the shaft, rate of its kinetic energy, and minus the power that it takes from the water [W]."""
     floats, at = tables.floats, device["data"]
     omega = out[tables.layout[0]["drive"] + device["valve"]]
     taken = -turbine_torque(out, tables, device) * omega
@@ -112,7 +113,7 @@ def power(t, y, dydt, out, tables, device):
 
 @njit
 def value(t, y, out, tables, device, quantity):
-    """Head [m], speed [rad/s], torque [N m], power at the shaft [W] or opening, by number."""
+    """Value of a quantity: 0 head [m], 1 speed [rad/s], 2 torque [N m], 3 power at the shaft [W], 4 opening."""
     st, k = tables.settings[0], device["valve"]
     opening, omega, q, _ = operating_point(out, tables, device)
     if quantity == 0:
@@ -130,7 +131,7 @@ def value(t, y, out, tables, device, quantity):
 
 @njit
 def outside(out, tables, device):
-    """PASSING if the operating angle is outside the chart, else 0."""
+    """TEMPORARY if the operating point is outside the angles of the hill chart, otherwise 0."""
     opening, omega, q, _ = operating_point(out, tables, device)
     beyond = is_outside(tables.floats, tables.valves[device["valve"]]["data"], opening, omega, q)
     return TEMPORARY if beyond else 0
@@ -138,7 +139,7 @@ def outside(out, tables, device):
 
 @njit
 def stiffness(tables, k):
-    """Decrease of the drop across turbine k per flow, by the adjacent pipes [Pa s/kg]."""
+    """Decrease of the drop across turbine k per mass flow, caused by the adjacent pipes [Pa s/kg]."""
     nodes, total = tables.nodes, 0.0
     for i in (tables.valves[k]["from_node"], tables.valves[k]["to_node"]):
         if nodes[i]["kind"] == JUNCTION and nodes[i]["admittance"] > 0.0:
@@ -148,14 +149,14 @@ def stiffness(tables, k):
 
 @njit
 def step(out, tables, k, g, m, drop, denser, wide):
-    """a, s of the Newton step, from the drop of heads at the upstream density."""
+    """a [kg/s] and s [kg/s/Pa] of the Newton step `chart_step`, from the drop of heads at the upstream density."""
     rho, fall = head_drop(tables, out, k)
     return turbine_step(tables, out, k, rho, g, m, fall)
 
 
 @njit
 def slope(out, tables, k, g, drop):
-    """d flow / d drop [kg/s/Pa]; 0 with shut vanes."""
+    """Derivative of the mass flow of turbine k by its drop [kg/s/Pa]; 0 with shut vanes."""
     m = out[tables.layout[0]["valve"] + k]
     return turbine_step(tables, out, k, tables.settings[0]["rho"], g, m, drop)[1] if g > 0.0 else 0.0
 

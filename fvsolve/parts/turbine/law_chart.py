@@ -1,10 +1,11 @@
 """Hill charts of turbines at any speed, flow and opening.
 
-n = omega / speed, u = flow / capacity. The root of head S(n, u) gives the head H = S |S| [m]. Between two rays S is
-linear in n and u, so that at a head of 1 m a curve is a straight line between its points. The torque is H T, with T
-linear along this line. Between two openings, S and T on a ray and the capacity are linear in the opening. Below the
-least opening the curve in n and u stays the same and its capacity is proportional to the opening; the torque tends to
-the torque behind shut vanes.
+n = omega / speed and u = flow / (flow scale capacity) are speed and flow over their values at a head of 1 m. The chart
+holds values on rays from the origin of the plane (n, u). The root of head S(n, u) gives the head H = S |S| [m]. Between
+two rays S is linear in n and u, so that at a head of 1 m a curve is a straight line between its points. The torque is
+H T, with T linear along this line. Between two openings, S and T on a ray and the capacity are linear in the opening.
+Below the least opening the curve in n and u stays the same and its capacity is proportional to the opening; the torque
+tends to the torque behind shut vanes.
 """
 
 from math import atan2, copysign, pi, sqrt
@@ -23,14 +24,20 @@ CURVES, RAYS, SPEED, FLOW, SHUT_VANES, OWN = 0, 1, 2, 3, 4, 5
 
 @njit
 def torque_between_rays(share_1, share_2, root_1, root_2, torque_1, torque_2):
-    """T at the sum of shares of two ray directions, linear along the line between their points at 1 m."""
+    """T, torque over head, between two rays: linear along the line between their points at a head of 1 m.
+
+    share_1, share_2 : shares of the ray directions in the direction of the point; root, torque : S and T on both rays
+    """
     weight_1, weight_2 = share_1 * max(root_1, LEAST_ROOT), share_2 * max(root_2, LEAST_ROOT)
     return (weight_1 * torque_1 + weight_2 * torque_2) / (weight_1 + weight_2)
 
 
 @njit
 def opening_share(floats, at, opening):
-    """(curve at or below an opening, share of the next curve, opening over the least opening or 1 if it is above)."""
+    """Curve at or below an opening; share of the next curve in the interpolation; and a factor of flow and torque.
+
+    The factor is the opening over the least opening of the chart, 1 if the opening is above the least.
+    """
     count = int(floats[at + CURVES])
     if opening <= floats[at + OWN]:
         return 0, 0.0, opening / floats[at + OWN]
@@ -43,7 +50,7 @@ def opening_share(floats, at, opening):
 
 @njit
 def interpolate_curves(floats, first, stride, k, share):
-    """Value of curve k at `first + k stride`, interpolated to the next curve by `share`."""
+    """Value of curve k at index `first + k stride`, interpolated to the next curve by `share`."""
     value = floats[first + k * stride]
     if share > 0.0:
         value += share * (floats[first + (k + 1) * stride] - value)
@@ -52,14 +59,14 @@ def interpolate_curves(floats, first, stride, k, share):
 
 @njit
 def capacity(floats, at, opening):
-    """Flow at u = 1 and a head of 1 m, over the `flow` of the chart."""
+    """Flow at u = 1 and a head of 1 m, over the flow scale of the chart [-]."""
     k, share, least = opening_share(floats, at, opening)
     return least * interpolate_curves(floats, at + OWN + int(floats[at + CURVES]), 1, k, share)
 
 
 @njit
 def ray_below(floats, first, count, angle):
-    """Index of the last of `count` ascending angles at or below `angle`."""
+    """Index of the last of `count` ascending angles, from index `first` on, that is at or below `angle`."""
     low, high = 0, count - 1
     while high - low > 1:
         middle = (low + high) // 2
@@ -72,14 +79,14 @@ def ray_below(floats, first, count, angle):
 
 @njit
 def operating_angle(n, u):
-    """Angle of (n, u), from -pi / 2 to 3 pi / 2."""
+    """Angle of the point (n, u) about the origin, from -pi / 2 to 3 pi / 2 [rad]."""
     angle = atan2(u, n)
     return angle + 2.0 * pi if angle < -0.5 * pi else angle
 
 
 @njit
 def chart_at(floats, at, opening, omega, flow):
-    """(root of head, its slopes over omega and flow, torque [N m], its slope over omega) at an opening above 0."""
+    """Root of head, its slopes over omega and flow, torque [N m] and its slope over omega, at an opening above 0."""
     curves, rays = int(floats[at + CURVES]), int(floats[at + RAYS])
     k, share, least = opening_share(floats, at, opening)
     flow_scale = floats[at + FLOW] * least * interpolate_curves(floats, at + OWN + curves, 1, k, share)
@@ -116,7 +123,7 @@ def chart_at(floats, at, opening, omega, flow):
 
 @njit
 def chart_torque(floats, at, opening, omega, flow):
-    """Torque on the shaft, positive forward [N m]; with shut vanes, the drag of the water."""
+    """Torque on the shaft, positive in forward rotation [N m]; with shut vanes, the drag of the water."""
     if opening <= 0.0:
         return floats[at + SHUT_VANES] * abs(omega) * omega
     return chart_at(floats, at, opening, omega, flow)[3]
@@ -124,14 +131,14 @@ def chart_torque(floats, at, opening, omega, flow):
 
 @njit
 def chart_head(floats, at, opening, omega, flow):
-    """(head taken [m], its slope over flow [s/m2]) at an opening above 0."""
+    """Head that the turbine takes [m] and its slope over flow [s/m2], at an opening above 0."""
     root, _, by_flow, _, _ = chart_at(floats, at, opening, omega, flow)
     return root * abs(root), 2.0 * abs(root) * by_flow
 
 
 @njit
 def is_outside(floats, at, opening, omega, flow):
-    """True if the operating angle is outside the given points of the chart."""
+    """True if the angle of the operating point is outside the given points of the chart."""
     curves = int(floats[at + CURVES])
     if opening <= 0.0:
         return False
@@ -147,7 +154,7 @@ def is_outside(floats, at, opening, omega, flow):
 
 @njit
 def flow_bound(floats, at, opening, weight, drop):
-    """Flow above all flows at a pressure drop and a usual speed [m3/s]."""
+    """Upper bound of the flow at a pressure drop and a usual speed [m3/s]."""
     return floats[at + FLOW] * capacity(floats, at, opening) * (1.0 + sqrt(abs(drop) / weight))
 
 
@@ -155,7 +162,8 @@ def flow_bound(floats, at, opening, weight, drop):
 def chart_flow(floats, at, opening, omega, weight, stiff, drop, start, flow):
     """Flow [m3/s] at which weight H + stiff (flow - start) = drop [Pa], by safeguarded Newton steps from `flow`.
 
-    weight : rho g [N/m3]; stiff : decrease of the drop per flow, by the adjacent pipes [Pa s/m3]
+    H : head that the turbine takes [m]; weight : rho g [N/m3]; stiff : decrease of the drop per flow, caused by the
+    adjacent pipes [Pa s/m3]; start : flow at the given drop [m3/s]
     """
     low, high, scale = -1e300, 1e300, flow_bound(floats, at, opening, weight, drop)
     for _ in range(200):
@@ -182,8 +190,9 @@ def chart_flow(floats, at, opening, omega, weight, stiff, drop, start, flow):
 
 @njit
 def chart_step(floats, at, opening, omega, rho, weight, stiff, g, m, drop, first):
-    """a, s with dM = a + s d(drop) for the next Newton step of a turbine with mass flow m [kg/s] at a drop [Pa].
+    """a [kg/s] and s [kg/s/Pa] of the next Newton step of a turbine, dM = a + s d(drop), M the mass flow.
 
+    m : mass flow before the step [kg/s]; drop : drop across the turbine [Pa]
     The slope is that of the chord between the present flow and the flow at which turbine and adjacent pipes agree. It
     is negative where the head falls with rising flow.
     g : conductance, which sets the least slope; first : start of the search for the flow of agreement [m3/s]

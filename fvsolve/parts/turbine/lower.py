@@ -1,4 +1,4 @@
-"""Turbines in the tables of a model, and their steady state at the start."""
+"""Rows of turbines in the tables of a model, and their initial steady state."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FLOW_TOLERANCE = 1e-6  # pressure difference regarded as zero, over the pressure
 
 
 class TurbineRows(ShaftLowering, Device, kind="turbine"):
-    """A restriction that follows its hill chart; its initial flow satisfies the chart at the node pressures."""
+    """Rows of turbines: restrictions that follow their hill chart."""
 
     law = law
     quantities = ("head", "speed", "torque", "power", "opening")
@@ -111,7 +111,7 @@ class TurbineRows(ShaftLowering, Device, kind="turbine"):
 
 
 def folded_curve_notice(start, name: str, part, valve) -> list[Notice]:
-    """Notice about a turbine with folded curves between two nodes that are not junctions."""
+    """Notice of a turbine with folded curves between two nodes that are not junctions."""
     ends = (start.nodes["kind"][int(valve[key])] for key in ("from_node", "to_node"))
     if rec.JUNCTION in ends or not any(map(has_fold, part.hill_chart.curves)):
         return []
@@ -122,7 +122,7 @@ def folded_curve_notice(start, name: str, part, valve) -> list[Notice]:
 
 
 def unusual_inertia_notice(start, name: str, part, valve) -> list[Notice]:
-    """Notice about an inertia far from the usual value at the greatest power of the chart at the initial head."""
+    """Notice of an inertia far from the usual value at the greatest power of the chart at the initial head."""
     speed, ends = float(np.max(np.abs(part.speed.value))), [int(valve["from_node"]), int(valve["to_node"])]
     if part.inertia is None or speed == 0.0 or start.weight == 0.0:
         return []
@@ -134,7 +134,7 @@ def unusual_inertia_notice(start, name: str, part, valve) -> list[Notice]:
 
 
 def has_fold(curve) -> bool:
-    """True if unit speed in forward rotation rises with the angle somewhere on a curve."""
+    """True if unit speed in forward rotation rises with the angle of the points somewhere on a curve."""
     points = list(zip(curve.speed, curve.flow, strict=True))
     rising = points[0][0] * points[1][1] > points[0][1] * points[1][0]
     ahead = points if rising else points[::-1]

@@ -1,7 +1,7 @@
-"""Hill charts as numbers for the kernels: values on rays from the origin of the plane of n11 and Q11.
+"""Hill charts as numbers for the kernels: values on rays from the origin of the plane of unit speed and unit flow.
 
-n = omega / speed, u = flow / capacity, both divided by the square root of 1 m; `capacity` is the greatest flow of a
-curve.
+The plane has the coordinates n = omega / speed and u = flow / capacity at a head of 1 m; `capacity` is the greatest
+flow of a curve.
 """
 
 from __future__ import annotations
@@ -42,11 +42,12 @@ def chart_numbers(part, weight: float) -> list[float]:
 
 
 def nodes_of(curve, part, speed: float, flow: float, torque_scale: float, weight: float):
-    """(capacity, angles, directions, roots of head, torques over head, (least, greatest) given angle) of a curve.
+    """Values of a curve on its own rays from the origin.
 
-    The root of head on a ray is 1 over the distance of the curve from the origin. Assumptions outside the given points:
-    at standstill, the flow of the last point forward and the greatest flow of the curve in reverse; no head at backward
-    rotation without flow; zero forward flow at the distance of the first point.
+    Returns the capacity [-], angles [rad], directions (cosine, sine), roots of head, torques over head [N], and the
+    (least, greatest) given angle. The root of head on a ray is 1 over the distance of the curve from the origin.
+    Assumptions outside the given points: at standstill, the flow of the last point forward and the greatest flow of the
+    curve in reverse; no head at backward rotation without flow; zero forward flow at the distance of the first point.
     """
     d = part.diameter
     capacity = max(curve.flow) * d * d / flow
@@ -66,7 +67,11 @@ def nodes_of(curve, part, speed: float, flow: float, torque_scale: float, weight
 
 
 def nodes_before(first, n: float, u: float, torque: float, torque_scale: float) -> list:
-    """Nodes below the first angle of a curve, down to reverse flow at standstill."""
+    """(angle, root of head, torque over head) of rays below the first angle of a curve.
+
+    They reach down to reverse flow at standstill. first : these values on the ray of the first point
+    n, u, torque : speed, flow and torque over head of the first point
+    """
     angle, root, _ = first
     nodes = []
     if angle > 0.0:
@@ -77,7 +82,11 @@ def nodes_before(first, n: float, u: float, torque: float, torque_scale: float) 
 
 
 def nodes_behind(last, n: float, u: float, torque: float, torque_scale: float) -> list:
-    """Nodes above the last angle of a curve, up to reverse flow at standstill."""
+    """(angle, root of head, torque over head) of rays above the last angle of a curve.
+
+    They reach up to reverse flow at standstill. last : these values on the ray of the last point
+    n, u, torque : speed, flow and torque over head of the last point
+    """
     angle, root, _ = last
     nodes = []
     if angle < STANDING:
@@ -88,10 +97,10 @@ def nodes_behind(last, n: float, u: float, torque: float, torque_scale: float) -
 
 
 def pump_nodes(angle: float, root: float, torque: float, torque_scale: float, direction: float) -> list:
-    """Nodes from a ray of a turning runner to reverse flow at standstill, where the root is -1.
+    """(angle, root of head, torque over head) of rays from a turning runner to reverse flow at standstill.
 
-    direction : -1 for forward rotation, 1 for backward. The shaft power is PUMPED times the hydraulic power, plus its
-    excess at the first ray.
+    There the root is -1. direction : -1 for forward rotation, 1 for backward. The shaft power is PUMP_RATIO times the
+    hydraulic power, plus its excess at the first ray.
     """
     first_tilt = -angle if direction < 0.0 else angle
     count = max(2, math.ceil((STANDING - first_tilt) / SPACING))
@@ -110,13 +119,13 @@ def pump_nodes(angle: float, root: float, torque: float, torque_scale: float, di
 
 
 def root_on_line(first_tilt: float, root: float, tilt: float) -> float:
-    """Root at an angle below the speed axis, on the line from `root` at `first_tilt` to -1 at standstill."""
+    """Root of head at an angle below the speed axis, on the line from `root` at `first_tilt` to -1 at standstill."""
     share = math.cos(tilt) / math.cos(first_tilt)
     return share * root - (math.sin(tilt) - share * math.sin(first_tilt))
 
 
 def merge_angles(angles: np.ndarray) -> np.ndarray:
-    """Ascending angles from reverse flow at standstill once around, close angles merged."""
+    """Ascending angles of all rays over a full turn from reverse flow at standstill; close angles are merged [rad]."""
     inner = np.sort(angles[(angles > -STANDING + ANGLE_TOLERANCE) & (angles < 3.0 * STANDING - ANGLE_TOLERANCE)])
     distinct = inner[np.concatenate([[True], np.diff(inner) > ANGLE_TOLERANCE])]
     return np.concatenate([[-STANDING], distinct, [3.0 * STANDING]])
@@ -125,7 +134,7 @@ def merge_angles(angles: np.ndarray) -> np.ndarray:
 def curve_at_rays(
     ray_directions: np.ndarray, rays: np.ndarray, angles, directions, roots, torques
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(roots, torques over head) of a curve on all rays, on the straight lines between its own rays."""
+    """Roots of head and torques over head of a curve on all rays, on straight lines between its own rays."""
     i = np.clip(np.searchsorted(angles, rays) - 1, 0, len(angles) - 2)
     (a, b), (c, d), (x, y) = directions[i].T, directions[i + 1].T, ray_directions.T
     share_1, share_2 = (x * d - y * c) / (a * d - b * c), (a * y - b * x) / (a * d - b * c)

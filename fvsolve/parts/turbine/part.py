@@ -19,10 +19,11 @@ ROUNDING = 1e-9  # tolerance, over the power of the water
 
 
 class Turbine(TwoPort, kind="turbine"):
-    """Takes the head H from `from` to `to` by its hill chart; J d(omega)/dt = torque after load rejection.
+    """Turbine that takes the head H from `from` to `to` by its hill chart.
 
-    Ports: from, to. Place: shaft (angular velocity, torque). Stored energy: J omega^2 / 2 [J] where the shaft runs
-    free. Of rho g H q [W] the shaft takes torque omega, which goes to the generator while it holds the speed.
+    After load rejection J d(omega)/dt = torque, with inertia J and angular velocity omega. Ports: from, to. Place:
+    shaft (angular velocity, torque). Stored energy: J omega^2 / 2 [J] where the shaft runs free. Of the power rho g H q
+    [W] of the flow q the shaft takes torque omega, which goes to the generator while it holds the speed.
     """
 
     owns: ClassVar[dict[str, str]] = {"shaft": "rotational"}
@@ -46,7 +47,7 @@ class Turbine(TwoPort, kind="turbine"):
         Quantity(
             "inertia",
             positive,
-            "inertia of runner, the water in it and generator [kg m2]; required with trip",
+            "inertia of runner, water in it and generator, required with `trip` [kg m2]",
             changes=VALUE,
         ),
     ] = None
@@ -58,7 +59,7 @@ class Turbine(TwoPort, kind="turbine"):
     def key_faults(cls, given) -> list:
         faults = super().key_faults(given)
         if "trip" in given and "inertia" not in given:
-            faults.append((("trip",), "needs inertia, that of all rotating masses"))
+            faults.append((("trip",), "needs the key `inertia`, the inertia of all rotating masses"))
         return faults
 
     def faults(self, name: str, around: CaseContext) -> Faults:
@@ -71,7 +72,7 @@ class Turbine(TwoPort, kind="turbine"):
 
 
 def excess_power_point(curve: OpeningCurve, weight: float) -> str | None:
-    """Text about the first point or line where the shaft power exceeds the hydraulic power; None without such."""
+    """Text about the first point or line where the shaft power exceeds the hydraulic power; None without excess."""
     points = list(zip(curve.speed, curve.flow, (t * pi / 30.0 for t in curve.torques(weight)), strict=True))
     for n, q, t in points:
         if t * n > weight * q + ROUNDING * weight * abs(q):
