@@ -1,4 +1,4 @@
-"""Valid unique names of parts from EPANET's names."""
+"""Valid and unique names of parts, made from EPANET's names."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ import re
 
 
 class FreeNames:
-    """Unique names of a group of parts; invalid characters are replaced."""
+    """Unique names for a group of parts; characters that a case file does not allow are replaced."""
 
     def __init__(self) -> None:
         self.given: dict[str, str] = {}  # EPANET's name -> name in the case
         self.taken: set[str] = set()
 
     def add(self, name: str) -> str:
-        """Add a name of EPANET; return the name in the case."""
+        """Add a name of EPANET; return the name of the part in the case."""
         self.given[name] = self.new(re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_") or "part")
         return self.given[name]
 
     def new(self, base: str) -> str:
-        """Unused name: `base`, or `base` with a number."""
+        """Unused name: `base`, or `base` followed by a number."""
         name, number = base, 2
         while name in self.taken:
             name, number = f"{base}-{number}", number + 1
@@ -26,5 +26,5 @@ class FreeNames:
         return name
 
     def changed(self) -> dict[str, str]:
-        """EPANET's name -> name in the case, for names that differ."""
+        """EPANET's name -> name in the case, for names that are not equal."""
         return {name: ours for name, ours in self.given.items() if name != ours}

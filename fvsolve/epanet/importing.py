@@ -1,4 +1,4 @@
-"""Text of a case file from an EPANET file."""
+"""Conversion of an EPANET file to the text of a case file."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ PROBES = 5  # number of recorded junctions: those with the largest demands
 
 @dataclass(frozen=True)
 class Imported:
-    """Text of a case file imported from EPANET.
+    """Case file imported from EPANET.
 
-    nodes, links : EPANET's name -> name in the case
+    text : text of the case file; nodes, links : EPANET's name -> name in the case
     notes : differences from EPANET as (text, names)
-    short : EPANET's names of pipes shorter than a cell, the shortest first
+    short_pipes : EPANET's names of pipes shorter than a cell, the shortest first
     """
 
     text: str
@@ -36,9 +36,10 @@ class Imported:
 
 
 def import_network(path: str | Path, hour: float = 0.0, wave_speed: float = 1200.0, shortest: float = 0.0) -> Imported:
-    """Import an EPANET file at an hour of EPANET's own run; every pipe gets the same wave speed [m/s].
+    """Import an EPANET file with the state at an hour of EPANET's run; every pipe gets the same wave speed [m/s].
 
-    shortest : smallest length of a pipe [m]; shorter pipes are lengthened, with the loss of their own length
+    hour : time from the start of EPANET's run [h]; shortest : least length of a pipe in the case [m]; a shorter pipe is
+    lengthened, with the friction loss of its original length
     Raises FvsolveError if WNTR is missing, or if EPANET finds faults in the file.
     """
     if not (math.isfinite(hour) and hour >= 0.0):
@@ -55,7 +56,7 @@ def import_network(path: str | Path, hour: float = 0.0, wave_speed: float = 1200
 
 
 def cell_time(lengths: list[float], wave_speed: float) -> float:
-    """Travel time of a cell [s]: 10 ms, or longer to limit all pipes to `MOST_CELLS`, rounded to two digits."""
+    """Travel time of a cell [s]: 10 ms, or longer so that all pipes have at most `MOST_CELLS` cells; two digits."""
     return float(f"{max(CELL_TIME, sum(lengths) / wave_speed / MOST_CELLS):.2g}")
 
 
@@ -96,7 +97,7 @@ def _text(path: Path, network: Any, translation: Translation, hour: float, time:
 
 
 def _short_pipes_comment(translation: Translation, short: list[str]) -> str:
-    """Comment on pipes shorter than a cell."""
+    """Comment for the case file on the pipes that are shorter than a cell."""
     first = translation.link_names.given[short[0]]
     pipes = f"{first} is" if len(short) == 1 else f"{len(short)} pipes are"
     return (
@@ -105,7 +106,7 @@ def _short_pipes_comment(translation: Translation, short: list[str]) -> str:
 
 
 def _probes(translation: Translation) -> list[str]:
-    """Probes: levels of tanks, flows of pumps, and heads of the junctions with the largest demands."""
+    """Names of probes: levels of tanks, flows of pumps, and heads of the junctions with the largest demands."""
     nodes, links = translation.nodes, translation.links
     probes = [f"nodes.{name}.level" for name, part in nodes.items() if part["type"] == "tank"]
     probes += [f"links.{name}.flow" for name, part in links.items() if part["type"] == "pump"]

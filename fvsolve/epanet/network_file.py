@@ -1,4 +1,4 @@
-"""EPANET files read by WNTR, and EPANET's own solution at an hour."""
+"""EPANET files, read by WNTR, and EPANET's solution at an hour of its run."""
 
 from __future__ import annotations
 
@@ -21,10 +21,11 @@ LISTING_TIME = 60.0  # time limit for EPANET to list the faults of a file [s]
 
 @dataclass(frozen=True)
 class HourState:
-    """EPANET's solution at a time of its own run; name -> value, SI.
+    """EPANET's solution at a time of its run; each dictionary is EPANET's name -> value in SI.
 
-    head [m], demand and flow [m3/s]
-    status : EPANET's code, see `SHUT`; setting : of a pump its relative speed; factor : Darcy friction factor
+    seconds : time [s]; head : of nodes [m]; demand : of nodes [m3/s]; flow : of links [m3/s]
+    status : EPANET's code of a link, see `CLOSED`; setting : of a valve or pump, of a pump its relative speed
+    factor : Darcy friction factor of a pipe
     """
 
     seconds: float
@@ -54,7 +55,7 @@ def wntr() -> Any:
 def read_network(path: Path) -> Any:
     """Read an EPANET file as a network of WNTR.
 
-    Raises FvsolveError with the faults that EPANET or WNTR finds, with their lines if reported.
+    Raises FvsolveError with the faults that EPANET or WNTR finds, with their lines in the file if reported.
     """
     package = wntr()
     if not path.is_file():
@@ -122,14 +123,17 @@ def _root_cause(error: BaseException) -> str:
 
 
 def _fault_message(path: Path, faults: list[str], source: str) -> str:
-    """Message that lists every fault once; source : program that reported the faults."""
+    """Message that lists every fault once; source : program that reported the faults"""
     faults = list(dict.fromkeys(faults))
     head = f"{path.name}: {len(faults)} fault{'' if len(faults) == 1 else 's'}, reported by {source}"
     return "\n".join([head, *(f"  {fault}" for fault in faults)])
 
 
 def _listed_faults(package: Any, path: Path) -> list[str]:
-    """Faults that EPANET itself lists; it runs in a second process, since a faulty file can crash its library."""
+    """Faults that EPANET lists for a file.
+
+    EPANET runs in a second process, because a faulty file can crash its library.
+    """
     library = package.epanet.toolkit.ENepanet(version=2.2).ENlib._name
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "net.rpt"
@@ -160,7 +164,7 @@ engine.ENclose()
 
 
 def _report_errors(report: Path) -> list[str]:
-    """Texts such as `undefined curve c9 in [PUMPS] section: q r b HEAD c9` of the errors in EPANET's report."""
+    """Texts of the errors in EPANET's report, such as `undefined curve c9 in [PUMPS] section: q r b HEAD c9`."""
     text = report.read_text(encoding="utf-8", errors="replace") if report.is_file() else ""
     matches = re.findall(r"^ *Error \d+: (.*(?:\n +\S.*)?)", text, re.MULTILINE)
     messages = [re.sub(r"\s+", " ", item).strip() for item in matches]

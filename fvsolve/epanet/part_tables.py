@@ -1,4 +1,4 @@
-"""Tables of a case file for the parts of EPANET."""
+"""Tables of a case file for the types of parts that EPANET has."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ GRAVITY = 9.80665
 
 
 def quantity_text(value: float, unit: str) -> str:
-    """Text of a value [SI] in a unit, with ten digits: `304.8 mm`."""
+    """Text of a value [SI] in a unit, with ten digits, such as `304.8 mm`."""
     factor = {"m": 1.0, "mm": 1e3, "l/s": 1e3, "m/s": 1.0, "m2": 1.0}[unit]
     return f"{value * factor:.10g} {unit}".replace("-0 ", "0 ")
 
@@ -27,7 +27,7 @@ def rounded_number(value: float) -> float | int:
 
 
 def junction(elevation: float, demand: float, position: Any) -> Part:
-    """Junction with a demand [m3/s]."""
+    """Table of a junction with elevation [m] and demand [m3/s]."""
     part = {"type": "junction", "elevation": quantity_text(elevation, "m")}
     if demand:
         part["demand"] = quantity_text(demand, "l/s")
@@ -35,7 +35,10 @@ def junction(elevation: float, demand: float, position: Any) -> Part:
 
 
 def pressure_demand(minimum: float, required: float, exponent: float) -> Part:
-    """Keys of a demand that grows from zero at the `minimum` to full at the `required` pressure, heads of water [m]."""
+    """Keys of a demand that depends on pressure: zero at the `minimum`, full at the `required` pressure.
+
+    Both pressures are heads of water [m]; the demand grows with the power `exponent` of the head.
+    """
     part = {"required_pressure": gauge_pressure(required)}
     if minimum:
         part["minimum_pressure"] = gauge_pressure(minimum)
@@ -43,24 +46,24 @@ def pressure_demand(minimum: float, required: float, exponent: float) -> Part:
 
 
 def gauge_pressure(head: float) -> str:
-    """Text of the gauge pressure of a head of water [m]."""
+    """Text of the gauge pressure under a head of water [m]."""
     return f"{DENSITY * GRAVITY * head * 1e-5:.10g} barg"
 
 
 def reservoir(head: float, position: Any) -> Part:
-    """Reservoir of given head [m]."""
+    """Table of a reservoir of given head [m]."""
     return {"type": "reservoir", "head": quantity_text(head, "m")} | _position(position)
 
 
 def tank(elevation: float, area: float, level: float, height: float, position: Any) -> Part:
-    """Tank with its area [m2], level and largest level above its bottom [m]."""
+    """Table of a tank: elevation of its bottom [m], area [m2], level and greatest level above its bottom [m]."""
     part = {"type": "tank", "elevation": quantity_text(elevation, "m"), "area": quantity_text(area, "m2")}
     part |= {"level": quantity_text(level, "m"), "height": quantity_text(height, "m")}
     return part | _position(position)
 
 
 def pipe(ends: tuple[str, str], length: float, diameter: float, friction: Part, minor: float, speed: float) -> Part:
-    """Pipe with its length [m], diameter [m], minor loss and wave speed [m/s]."""
+    """Table of a pipe: length [m], diameter [m], friction table, minor loss coefficient and wave speed [m/s]."""
     part = _link("pipe", ends) | {"length": quantity_text(length, "m"), "diameter": quantity_text(diameter, "mm")}
     part |= {"friction": friction}
     if minor:
@@ -69,7 +72,10 @@ def pipe(ends: tuple[str, str], length: float, diameter: float, friction: Part, 
 
 
 def friction(formula: str, roughness: float) -> Part:
-    """Friction by EPANET's formula; roughness : C [-], height [m], or n [s/m^(1/3)]."""
+    """Table of friction by EPANET's formula ("H-W", "C-M" or "D-W").
+
+    roughness : coefficient C [-], coefficient n [s/m^(1/3)] or height [m]
+    """
     if formula == "H-W":
         return {"model": "hazen-williams", "coefficient": rounded_number(roughness)}
     if formula == "C-M":
@@ -78,40 +84,47 @@ def friction(formula: str, roughness: float) -> Part:
 
 
 def darcy(factor: float) -> Part:
-    """Friction by the Darcy factor."""
+    """Table of friction by a constant Darcy factor."""
     return {"model": "steady", "factor": rounded_number(factor)}
 
 
 def valve(ends: tuple[str, str], diameter: float, loss: float, opening: float = 1.0) -> Part:
-    """Valve with its loss coefficient on the velocity in its diameter."""
+    """Table of a valve: diameter [m], loss coefficient referred to the velocity in the diameter, and opening."""
     part = _link("valve", ends) | {"diameter": quantity_text(diameter, "mm")}
     part["loss_coefficient"] = rounded_number(loss or NO_LOSS)
     return part if opening == 1.0 else part | {"opening": opening}
 
 
 def pump(ends: tuple[str, str], law: Part, speed: float) -> Part:
-    """Pump with its law at full speed, and a check valve: EPANET's pumps have no reverse flow."""
+    """Table of a pump with its head law at full speed, relative speed, and check valve.
+
+    EPANET's pumps have no reverse flow.
+    """
     return _link("pump", ends) | law | {"speed": rounded_number(speed), "check_valve": True}
 
 
 def curve(points: list[tuple[float, float]]) -> Part:
-    """Pump curve by points of flow [m3/s] and head [m]; case and EPANET interpret the points equally."""
+    """Head law of a pump by points of flow [m3/s] and head [m]; fvsolve and EPANET interpret the points equally."""
     flow, head = zip(*points, strict=True)
     return {"curve": {"flow": [quantity_text(q, "l/s") for q in flow], "head": [quantity_text(h, "m") for h in head]}}
 
 
 def power(watts: float) -> Part:
-    """Pump law of constant power [W]."""
+    """Head law of a pump by constant power [W]."""
     return {"power": f"{watts * 1e-3:.10g} kW"}
 
 
 def check_valve(ends: tuple[str, str], diameter: float) -> Part:
-    """Check valve."""
+    """Table of a check valve; diameter [m]."""
     return _link("check-valve", ends) | {"diameter": quantity_text(diameter, "mm"), "loss_coefficient": NO_LOSS}
 
 
 def regulating(kind: str, ends: tuple[str, str], diameter: float, setting: float, loss: float) -> Part:
-    """Valve that controls a head of water above its end ("PRV", "PSV") [m] or a flow ("FCV") [m3/s]."""
+    """Table of a regulating valve with its diameter [m] and loss coefficient.
+
+    kind : "PRV" or "PSV", whose setting is a head of water above the controlled end [m], or "FCV", whose setting is a
+    flow [m3/s]
+    """
     part = _link(REGULATING[kind], ends)
     if kind == "FCV":
         part["set_flow"] = quantity_text(setting, "l/s")
@@ -122,7 +135,10 @@ def regulating(kind: str, ends: tuple[str, str], diameter: float, setting: float
 
 
 def leak(place: str, coefficient: float, exponent: float) -> Part:
-    """Leak for an emitter: flow [m3/s] = coefficient * (head of water [m])^exponent, converted to pressure in Pa."""
+    """Table of a leak for an emitter, whose flow [m3/s] is coefficient (head of water [m])^exponent.
+
+    The coefficient is converted to a pressure in Pa.
+    """
     per_pascal = coefficient / (DENSITY * GRAVITY) ** exponent
     return {
         "type": "leak",
@@ -133,7 +149,7 @@ def leak(place: str, coefficient: float, exponent: float) -> Part:
 
 
 def loss_coefficient(drop: float, flow: float, diameter: float) -> float:
-    """Loss coefficient on the velocity in a diameter for a head loss [m] at a flow [m3/s]."""
+    """Loss coefficient for a head loss [m] at a flow [m3/s], referred to the velocity in a diameter [m]."""
     velocity = flow / (math.pi / 4.0 * diameter**2)
     return 2.0 * GRAVITY * drop / velocity**2
 

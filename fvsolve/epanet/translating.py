@@ -19,11 +19,11 @@ REGULATING_STATUS = 2  # WNTR's code of a valve that is neither fixed open nor f
 
 
 class Translation:
-    """Nodes and links of a case, and notes on differences from EPANET.
+    """Nodes and links of a case made from an EPANET network, and notes on differences from EPANET.
 
     nodes, links : name -> table of the case file
     lengths : EPANET's name of a pipe -> its length in the case [m]
-    notes : (text, EPANET's names)
+    notes : list of (text, EPANET's names)
     """
 
     def __init__(self, network: Any, hour: HourState, wave_speed: float, shortest: float) -> None:
@@ -98,7 +98,7 @@ class Translation:
         )
 
     def demand_at(self, node: Any) -> float:
-        """Demand of a junction at the hour, from its patterns [m3/s]."""
+        """Demand of a junction at the imported hour, from its patterns [m3/s]."""
         return node.demand_timeseries_list.at(self.clock, multiplier=self.multiplier)
 
     def position(self, node: Any) -> Any:
@@ -167,13 +167,16 @@ class Translation:
         return part_tables.pipe((start, end), length, link.diameter, law, link.minor_loss, self.speed)
 
     def length(self, link: Any) -> float:
-        """Length of a pipe in the case [m]: at least `shortest`, and at least its rise / `STEEPEST`."""
+        """Length of a pipe in the case [m]: at least `shortest`, and at least its rise over `MAX_SLOPE`."""
         low, high = sorted(self.elevation.get(end, 0.0) for end in (link.start_node_name, link.end_node_name))
         inside = {link.start_node_name, link.end_node_name} <= self.elevation.keys()
         return max(link.length, self.shortest, (high - low) / MAX_SLOPE if inside and high - low > link.length else 0.0)
 
     def spread(self, name: str, link: Any, length: float) -> part_tables.Part:
-        """Friction of a lengthened pipe that gives the loss of its original length."""
+        """Table of the friction of a lengthened pipe, so that it has the loss of its original length.
+
+        length : length of the pipe in the case [m]
+        """
         ratio = link.length / length
         if self.formula == "H-W":
             return part_tables.friction("H-W", link.roughness * ratio ** (-1.0 / 1.852))
@@ -218,13 +221,16 @@ class Translation:
         return part_tables.valve(ends, diameter, link.minor_loss)
 
     def bore(self, link: Any, otherwise: float = 0.1) -> float:
-        """Diameter of the widest pipe next to a link [m]."""
+        """Diameter of the widest pipe next to a link [m]; `otherwise` without a pipe."""
         ends = (link.start_node_name, link.end_node_name)
         near = [self.network.get_link(other) for end in ends for other in self.network.get_links_for_node(end)]
         return max((pipe.diameter for pipe in near if pipe.link_type == "Pipe"), default=otherwise)
 
     def size(self, link: Any) -> float:
-        """Diameter of a valve [m]; without a loss that refers to it, at most that of the widest pipe next to it."""
+        """Diameter of a valve in the case [m].
+
+        Without a loss that refers to the diameter, it is at most the diameter of the widest adjacent pipe.
+        """
         widest = self.bore(link, link.diameter)
         if link.minor_loss or link.valve_type in ("TCV", "GPV") or widest >= link.diameter:
             return link.diameter
@@ -232,7 +238,7 @@ class Translation:
         return widest
 
     def set_too_high(self, name: str, link: Any) -> bool:
-        """True if the head set for a PRV or PSV exceeds that of all reservoirs and tanks, and there is no pump."""
+        """True if the head set for a PRV or PSV exceeds the heads of all sources, and the network has no pump."""
         network, controlled = self.network, link.end_node_name if link.valve_type == "PRV" else link.start_node_name
         sources = [*network.reservoir_name_list, *network.tank_name_list]
         greatest = max(self.hour.head[source] for source in sources)
@@ -240,7 +246,10 @@ class Translation:
         return not network.num_pumps and head > greatest
 
     def setting(self, name: str, link: Any) -> float:
-        """Set point of a valve: head of water above its end [m], corrected for a moved elevation, or flow [m3/s]."""
+        """Set point of a valve: head of water above the controlled end [m], or flow [m3/s].
+
+        The head is corrected for a moved elevation of that end.
+        """
         controlled = link.end_node_name if link.valve_type == "PRV" else link.start_node_name
         if link.valve_type == "FCV" or controlled not in self.elevation:
             return self.hour.setting[name]
@@ -248,7 +257,7 @@ class Translation:
         return self.hour.setting[name] + self.gravity * moved
 
     def emitters(self) -> None:
-        """Add emitters as leaks. WNTR converts coefficients from psi to metres with exponent 0.5; corrected here."""
+        """Add emitters as leaks; WNTR converts coefficients from psi to metres with exponent 0.5, corrected here."""
         hydraulic = self.network.options.hydraulic
         exponent = hydraulic.emitter_exponent
         unit = PSI_OF_METRE ** (exponent - 0.5) if hydraulic.inpfile_units in US_UNITS else 1.0
@@ -264,7 +273,7 @@ class Translation:
 
 
 def curve_slope(points: list[tuple[float, float]], at: float) -> float:
-    """Slope of a piecewise linear curve at a place, or of the nearest piece."""
+    """Slope of the section of a piecewise linear curve at an abscissa; beyond the points, of the nearest section."""
     for (x0, y0), (x1, y1) in zip(points[:-1], points[1:], strict=True):
         if at < x1 or (x1, y1) == tuple(points[-1]):
             return (y1 - y0) / (x1 - x0)

@@ -1,4 +1,4 @@
-"""Synonyms: engineering terms for parts that have another name here."""
+"""Engineering terms for parts that have another name in fvsolve, each with the name of the part."""
 
 SYNONYMS = {
     "hose": 'a "pipe" with a low wave_speed, or wall = { youngs_modulus, thickness }',

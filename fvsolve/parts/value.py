@@ -26,7 +26,10 @@ SHAPE = "shape"  # a new model: cells, parts, methods
 
 
 class ValueFault(ValueError):
-    """Faults of a value: (keys below it, message); instead : values to continue with, so that more faults are found."""
+    """Faults of a value: list of (keys below the value, message).
+
+    replacement : values with which reading continues, so that it finds further faults; None for none
+    """
 
     def __init__(self, faults: list[tuple[tuple[Any, ...], str]], instead: dict[str, Any] | None = None):
         self.faults, self.replacement = faults, instead
@@ -46,26 +49,26 @@ class ReadContext:
 
 
 def context_of(info: Any) -> ReadContext:
-    """Context that a pydantic validator was called with."""
+    """Context with which a pydantic validator was called."""
     return info.context if info is not None and info.context is not None else ReadContext()
 
 
 @dataclass(frozen=True)
 class Range:
-    """Range of valid numbers; open : the lower bound is excluded."""
+    """Range of valid numbers, from `least` to `greatest`; open : True if the lower bound is excluded"""
 
     least: float = -math.inf
     greatest: float = math.inf
     open: bool = False
 
     def check(self, value: float, given: Any) -> None:
-        """Raise ValueError if `value` lies outside; given : value as written in the file."""
+        """Raise ValueError if `value` is outside the range; given : value as written in the file"""
         if value < self.least or value > self.greatest or (self.open and value == self.least):
             raise ValueError(f"{show(given)} is out of range; expected a value {self}")
 
     @property
     def bounds(self) -> str:
-        """Text such as ", above 0" to append to a unit; "" if all numbers are valid."""
+        """Text of the range such as ", above 0" to append to a unit; "" if all numbers are valid."""
         return "" if self == Range() else f", {self}".replace("of at least", "at least")
 
     def __str__(self) -> str:
@@ -77,7 +80,10 @@ class Range:
 
 
 class UsualRange(NamedTuple):
-    """Usual range in practice, SI, bounds included; other values are valid, but give a notice. 0 gives no notice."""
+    """Usual range of a value in practice [SI], bounds included.
+
+    Other values are valid but give a notice; 0 never gives a notice.
+    """
 
     least: float
     greatest: float
@@ -95,25 +101,28 @@ def between(least: float, greatest: float, open: bool = False) -> Range:
 
 
 class Value:
-    """Base of the declarations of fields: `read` converts a value of the file to that of the part.
+    """Base of the declarations of keys: `read` converts a value of the case file to a value of the part.
 
     about : description; "...; TEXT if left out" describes the default
-    changes : one of VALUE, PROFILE, COUNTED, SHAPE
+    changes : effect of a changed value on an existing model: VALUE, PROFILE, BY_CELLS or SHAPE
     """
 
     about: str = ""
     changes: str = SHAPE
 
     def read(self, given: Any, setting: ReadContext) -> Any:
-        """Read a value. Raises ValueError (`ValueFault` if the fault is at a key below it)."""
+        """Value of the part for a value of the case file.
+
+        Raises ValueError, or ValueFault if the fault is at a key below the value.
+        """
         raise NotImplementedError(type(self).__name__)
 
     def below(self, key: str) -> Value | None:
-        """Declaration of a key below this value; None if it has no keys. Raises KeyError for unknown keys."""
+        """Declaration of a key below this value; None if the value has no keys. Raises KeyError for unknown keys."""
         return None
 
     def json(self) -> dict[str, Any]:
-        """JSON schema of the value in the file."""
+        """JSON schema of the value in the case file."""
         return {}
 
     @property
@@ -129,7 +138,7 @@ class Value:
 
 
 class Anything(Value):
-    """Any value: its type is unknown, since another key is faulty."""
+    """Any value: its declaration is unknown, because another key is faulty."""
 
     def read(self, given: Any, setting: ReadContext) -> Any:
         return given
@@ -137,7 +146,7 @@ class Anything(Value):
 
 @dataclass(frozen=True)
 class Quantity(Value):
-    """Number in SI, or text with a unit, in a range; pressures become absolute."""
+    """Number in SI, or text with a number and a unit, in a range; pressures become absolute."""
 
     dimension: str
     range: Range = anything
@@ -201,7 +210,7 @@ class Whole(Value):
 
 @dataclass(frozen=True)
 class Choice(Value):
-    """Choice of a word; what : noun for messages."""
+    """Choice of a word from a list; noun : name of the choice for messages; words : valid words"""
 
     noun: str
     words: Collection[str]
@@ -240,7 +249,7 @@ class Flag(Value):
 
     def read(self, given: Any, setting: ReadContext) -> bool:
         if not isinstance(given, bool):
-            raise ValueError(f"{show(given)} is neither true nor false")
+            raise ValueError(f"{show(given)} is neither true nor false; expected true or false, without quotes")
         return given
 
     @property
@@ -260,7 +269,7 @@ class Text(Value):
 
     def read(self, given: Any, setting: ReadContext) -> str:
         if not isinstance(given, str):
-            raise ValueError(f"{show(given)} is not text")
+            raise ValueError(f"{show(given)} is not text; expected text in quotes")
         return given
 
     @property
@@ -273,7 +282,10 @@ class Text(Value):
 
 @dataclass(frozen=True)
 class Rows(Value):
-    """List of quantities; rising : True if the values must increase."""
+    """List of quantities.
+
+    rising : True if the values must increase; length : number of values, None for any
+    """
 
     dimension: str
     range: Range = anything
@@ -344,7 +356,10 @@ class Matrix(Value):
 
 
 def check_increasing(values: Any, given: Any, noun: str = "values") -> None:
-    """Raise ValueError with the first pair that does not increase."""
+    """Raise ValueError with the first pair of values that does not increase.
+
+    given : values as written in the file; noun : plural name of the values for the message
+    """
     for before, after, text_before, text_after in zip(values, values[1:], given, given[1:], strict=False):
         if not after > before:
             raise ValueError(f"{noun} out of order: {show(text_after)} comes after {show(text_before)}")

@@ -238,7 +238,7 @@ BAD = {
     ),
     "Kv with an area": (
         swap("discharge_coefficient = 0.6", "Kv = 1"),
-        "links.valve.area: Kv already gives the size; leave area out",
+        "links.valve.area: Kv already gives the size; leave the key `area` out",
     ),
     "no size": (
         swap('area = "0.001768 m2"\n', ""),
@@ -370,7 +370,7 @@ BAD = {
     "tank without level": (tank("level = 1\n", ""), "nodes.t: level is missing"),
     "level above height": (
         tank("level = 1\n", "level = 3\nheight = 2\n"),
-        "nodes.t.level: 3 m is above its height of 2 m",
+        "nodes.t.level: 3 m is above its `height` of 2 m",
     ),
     "negative level": (
         tank("level = 1", "level = -1"),

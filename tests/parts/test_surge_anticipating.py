@@ -145,7 +145,8 @@ def test_its_energy_closes_and_it_only_dissipates():
 
 @pytest.mark.parametrize(
     "wrong, said",
-    [({"trip": None}, "nothing opens it; expected low_set, high_set or trip"), ({"hold": -1.0}, "out of range"),
+    [({"trip": None}, "nothing opens the valve; expected the key `low_set`, `high_set` or `trip`"),
+     ({"hold": -1.0}, "out of range"),
      ({"trip": -3.0}, "lies before the start"), ({"low_set": 4e5, "high_set": 3e5}, "is not above low_set"),
      ({"senses": "tt"}, 'unknown place of the fluid "tt"'), ({"closing_time": None}, "closing_time is missing")],
 )  # fmt: skip

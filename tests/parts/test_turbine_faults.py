@@ -79,7 +79,12 @@ def test_a_fault_of_a_hill_chart(chart, message):
 
 def test_faults_of_its_keys_come_with_those_of_its_chart():
     said = faults(half(efficiency=[0.7, 0.85]), trip=1.0, diameter=-1.0, opening=1.5)
-    for one in ("trip: needs inertia", "diameter: -1.0 is out of range", "opening: 1.5 is out", "2 of efficiency"):
+    for one in (
+        "trip: needs the key `inertia`",
+        "diameter: -1.0 is out of range",
+        "opening: 1.5 is out",
+        "2 of efficiency",
+    ):
         assert one in said
     assert "-1 s lies before the start" in faults(trip=-1.0, inertia=1e4)
     assert "give the turbine inertia" in torque_on({})

@@ -1,4 +1,4 @@
-"""Valves, and the size keys of all restrictions."""
+"""Valves, and the keys for the size of all restrictions."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ WATER_15, WATER_60F = 1000.0, 999.016  # densities for which Kv and Cv are defin
 class Characteristic:
     """Relative flow area over stem opening, linear between entries.
 
-    opening, flow_area : float64[n]  opening ascending from 0 to 1, flow area from 0 [-]
+    opening : float64[n]  ascending from 0 to 1; flow_area : float64[n]  over the flow area at full opening, from 0
     """
 
     opening: np.ndarray
@@ -50,12 +50,12 @@ class Characteristic:
         return hash((self.opening.tobytes(), self.flow_area.tobytes()))
 
     def table(self) -> dict[str, list[float]]:
-        """The table as in a case file."""
+        """Table as in a case file."""
         return {"opening": self.opening.tolist(), "flow_area": self.flow_area.tolist()}
 
 
 class CharacteristicValue(Value):
-    """Characteristic of a valve: a name or a table."""
+    """Value of a case file for the characteristic of a valve: a name or a table."""
 
     about = "relative flow area over opening"
     takes = '`"linear"`, `"equal-percentage"`, `{ opening = [0, ..., 1], flow_area = [0, ...] }`'
@@ -94,7 +94,7 @@ class CharacteristicValue(Value):
 
 
 class Sized(Table):
-    """Size of a restriction, by Cd, loss coefficient, Kv or Cv."""
+    """Base of restrictions: size by discharge coefficient Cd, loss coefficient K, Kv or Cv."""
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
         ("discharge_coefficient", "loss_coefficient", "Kv", "Cv"),
@@ -105,11 +105,11 @@ class Sized(Table):
         float | None,
         Number(
             between(0, 1, open=True),
-            f"discharge coefficient Cd, with area or diameter; {DISCHARGE_COEFFICIENT} if left out",
+            f"discharge coefficient Cd, with `area` or `diameter`; {DISCHARGE_COEFFICIENT} if left out",
         ),
     ] = None
     loss_coefficient: Annotated[
-        float | None, Number(positive, "loss coefficient K, referred to the velocity in area or diameter")
+        float | None, Number(positive, "loss coefficient K, referred to the velocity in `area` or `diameter`")
     ] = None
     Kv: Annotated[
         float | None, Number(positive, "flow coefficient Kv, m3/h of water of 1000 kg/m3 at 1 bar", COEFFICIENTS)
@@ -123,7 +123,7 @@ class Sized(Table):
         Quantity(
             "area",
             positive,
-            "area of the opening [m2]; needed unless diameter, Kv or Cv is given",
+            "area of the opening [m2]; needed unless `diameter`, `Kv` or `Cv` is given",
             UsualRange(1e-12, 200.0, "leaks to sluices"),
         ),
     ] = None
@@ -145,7 +145,7 @@ class Sized(Table):
         bare = next((key for key in ("Kv", "Cv") if key in given), None)
         if bare:
             stray = [key for key in ("area", "diameter") if key in given]
-            return faults + [((key,), f"{bare} already gives the size; leave {key} out") for key in stray]
+            return faults + [((key,), f"{bare} already gives the size; leave the key `{key}` out") for key in stray]
         if "area" in given or "diameter" in given:
             return faults
         alone = next((key for key in ("discharge_coefficient", "loss_coefficient") if key in given), None)
@@ -153,9 +153,10 @@ class Sized(Table):
         return faults + [((), text)]
 
     def flow_area(self) -> float:
-        """Cd A at full opening, such that q = Cd A sqrt(2 dp / rho) [m2].
+        """Product Cd A of discharge coefficient and area at full opening [m2], such that q = Cd A sqrt(2 dp / rho).
 
-        K gives A / sqrt(K); Kv gives Kv / 3600 / sqrt(2e5 / 1000); Cv likewise in gallons and psi at 60 degF.
+        A loss coefficient K gives A / sqrt(K); Kv gives Kv / 3600 / sqrt(2e5 / 1000); Cv likewise in gallons per minute
+        and psi at 60 degF.
         """
         if self.Kv is not None:
             return self.Kv / 3600.0 / math.sqrt(2.0 * 1e5 / WATER_15)
@@ -171,10 +172,10 @@ CLOSURE = 'opening = { start = "1 s", duration = "2 s", value = [1, 0] }'
 
 
 class Valve(Sized, TwoPort, kind="valve"):
-    """Turbulent restriction, q = f(opening) Cd A sqrt(2 |dp| / rho) sign(dp) (79).
+    """Turbulent restriction, q = f(opening) Cd A sqrt(2 |dp| / rho) sign(dp), equal in both directions.
 
-    Ports: from, to; equal in both directions; no flow at opening 0. Stored energy: none. Dissipated
-    power: dp q [W].
+    q is the flow, f the characteristic, Cd A the size at full opening, dp the drop (docs/course.md, 79). Ports: from,
+    to; no flow at opening 0. Stored energy: none. Dissipated power: dp q [W].
     """
 
     synonyms: ClassVar[dict[str, str]] = dict.fromkeys(
