@@ -77,7 +77,7 @@ class Conduit(TwoPort):
     length: Annotated[float, LENGTH]
     diameter: Annotated[float, DIAMETER] = None  # nominal replaces it
     nominal: Annotated[
-        str | None, Text('nominal size, not with `diameter`: "DN100", "NPS 4" or "NPS 1-1/2"', BY_CELLS)
+        str | None, Text('nominal size, instead of `diameter`: "DN100", "NPS 4" or "NPS 1-1/2"', BY_CELLS)
     ] = None
     schedule: Annotated[
         str | None, Text('schedule of the nominal size: "40", "80", "STD", "10S"; "40" if left out', BY_CELLS)

@@ -53,7 +53,7 @@ class Friction(Table):
     ] = None
     factor: Annotated[
         float | None,
-        Number(nonnegative, "Darcy friction factor, four times Fanning's, not with `roughness` [-]", FACTORS),
+        Number(nonnegative, "Darcy friction factor, four times Fanning's, instead of `roughness` [-]", FACTORS),
     ] = None
     coefficient: Annotated[
         float | None, Number(positive, "coefficient C of hazen-williams [-], or n of chezy-manning [s/m^(1/3)]")

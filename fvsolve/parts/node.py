@@ -36,7 +36,8 @@ class Node(Table):
         float | None,
         Quantity(
             "length",
-            about="elevation above datum [m]; 0 (reservoir with `head`: elevation of the far end) if left out",
+            about="elevation above datum, at all nodes or none [m]; "
+            "0 (reservoir with `head`: that of the far end) if left out",
             usual=USUAL_ELEVATIONS,
         ),
     ] = None
@@ -84,7 +85,7 @@ class PlaceOnBody(Node):
         Rows(
             "position",
             length=3,
-            about="position (of a basin: of its origin) in axes of the body, not with `elevation` [m]; 0 if left out",
+            about="position (of a basin: of its origin) in axes of the body, instead of `elevation` [m]; 0 if left out",
         ),
     ] = None
 

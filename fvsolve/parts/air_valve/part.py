@@ -52,7 +52,7 @@ class AirValve(Node, kind="air-valve"):
         Quantity(
             "velocity",
             positive,
-            "fluid velocity to the valve above which air leaves through `throttled_outlet`, not with `switch` [m/s]",
+            "fluid velocity to the valve above which air leaves through `throttled_outlet`, instead of `switch` [m/s]",
             UsualRange(0.01, 20.0, "anti-slam discs"),
         ),
     ] = None

@@ -63,12 +63,14 @@ class Patch(Table):
     impedance: Annotated[
         float | None,
         Quantity(
-            "impedance", nonnegative, "ratio of pressure to velocity of waves in a liquid, not with `boundary` [Pa s/m]"
+            "impedance",
+            nonnegative,
+            "ratio of pressure to velocity of waves in a liquid, instead of `boundary` [Pa s/m]",
         ),
     ] = None
     body: Annotated[str | None, Text("mass, or body on a prismatic joint, that moves this wall along x or y")] = None
     travel: Annotated[
-        Schedule | None, Scheduled("position", about="displacement of this wall along x or y, not with `body` [m]")
+        Schedule | None, Scheduled("position", about="displacement of this wall along x or y, instead of `body` [m]")
     ] = None
     zone: Annotated[
         float | None,
@@ -91,7 +93,7 @@ class Patch(Table):
 class Cells(Value):
     """Numbers of cells along x and y of a rectangle."""
 
-    about = "numbers of cells along x and y; the key `mesh` is needed if left out"
+    about = "numbers of cells along x and y; `mesh` is needed if left out"
     takes = "[whole number, whole number]"
 
     def read(self, given: Any, setting: ReadContext) -> tuple[int, int]:

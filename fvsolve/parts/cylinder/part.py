@@ -46,11 +46,11 @@ class Cylinder(Link, kind="cylinder"):
         Quantity("area", positive, "ring area at B, without the rod [m2]; `rod_diameter` is needed if left out", AREAS),
     ] = None
     piston_diameter: Annotated[
-        float | None, Quantity("length", positive, "diameter of the piston, not with `area_A` [m]", SIZES)
+        float | None, Quantity("length", positive, "diameter of the piston, instead of `area_A` [m]", SIZES)
     ] = None
     rod_diameter: Annotated[
         float | None,
-        Quantity("length", nonnegative, "diameter of the rod, with `piston_diameter`, not with `area_B` [m]", SIZES),
+        Quantity("length", nonnegative, "diameter of the rod, with `piston_diameter`, instead of `area_B` [m]", SIZES),
     ] = None
     dead_volume_A: Annotated[
         float, Quantity("volume", positive, "volume of chamber A with the rod in, lines included [m3]", changes=VALUE)
@@ -62,14 +62,14 @@ class Cylinder(Link, kind="cylinder"):
         float | None,
         Quantity(
             "pressure",
-            about="pressure of chamber A at the start [Pa]; by its links, or by the load if it is shut, if left out",
+            about="pressure of chamber A at the start [Pa]; by its links, or by the load of a shut chamber if left out",
         ),
     ] = None
     initial_pressure_B: Annotated[
         float | None,
         Quantity(
             "pressure",
-            about="pressure of chamber B at the start [Pa]; by its links, or by the load if it is shut, if left out",
+            about="pressure of chamber B at the start [Pa]; by its links, or by the load of a shut chamber if left out",
         ),
     ] = None
     leakage: Annotated[

@@ -31,7 +31,7 @@ class Disc(Table):
         Quantity(
             "frequency",
             positive,
-            "undamped natural frequency of the disc, not with `time_constant` [Hz]",
+            "undamped natural frequency of the disc, instead of `time_constant` [Hz]",
             UsualRange(1e-2, 2e4, "flaps to poppets"),
             VALUE,
         ),

@@ -85,7 +85,7 @@ class Pipe(Conduit, kind="pipe"):
         Rows("length", rising=True, about="chainages of bends, which divide the pipe into legs [m]", changes=SHAPE),
     ] = None
     wave_speed: Annotated[
-        float | None, Quantity("velocity", positive, "wave speed, not with `wall` [m/s]", WAVES, BY_CELLS)
+        float | None, Quantity("velocity", positive, "wave speed, instead of `wall` [m/s]", WAVES, BY_CELLS)
     ] = None
     wall: Annotated[Wall | Literal["rigid"] | None, WallOrRigid()] = None
     material: Annotated[str | None, MaterialName()] = None

@@ -163,7 +163,7 @@ class Efficiency(Value):
 class ShaftPower(Value):
     """Shaft power of a pump in a case file: points { flow, power }."""
 
-    about = "power at the shaft [W] over flow, at relative speed 1, not with `efficiency`"
+    about = "power at the shaft [W] over flow, at relative speed 1, instead of `efficiency`"
     takes = "`{ flow = [...], power = [...] }`"
     changes = PROFILE
 

@@ -20,7 +20,13 @@ class Regulating(Sized, TwoPort):
 
     time_constant: Annotated[
         float,
-        Quantity("time", positive, "time in which an error of one `band` opens the shut valve [s]", STROKES, VALUE),
+        Quantity(
+            "time",
+            positive,
+            "time in which an error of one `band` (or of `set_flow`) opens the shut valve [s]",
+            STROKES,
+            VALUE,
+        ),
     ]
 
 

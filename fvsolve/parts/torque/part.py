@@ -59,7 +59,7 @@ class Torque(Link, kind="torque"):
         if turned.inertia is None:
             yield (
                 ("to",),
-                f"{self.to} has no inertia, so its speed cannot follow from a torque; give its key `inertia`",
+                f"{self.to} has no inertia, so its speed cannot follow from a torque; give the {turned.kind} `inertia`",
             )
         if turned.trip is not None:
             text = (
