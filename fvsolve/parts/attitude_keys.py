@@ -90,7 +90,7 @@ class Attitude(Table):
     def key_faults(cls, given: dict[str, Any]) -> list:
         pairs = (("axis", "angle"), ("angle", "axis"))
         alone = [(key, other) for key, other in pairs if key in given and other not in given]
-        return super().key_faults(given) + [((key,), f"needs {other} too") for key, other in alone]
+        return super().key_faults(given) + [((key,), f"needs the key `{other}` too") for key, other in alone]
 
     @classmethod
     def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:

@@ -54,7 +54,7 @@ class TwoPort(Link):
 
     @property
     def ports(self) -> dict[str, str]:
-        """Port name -> place."""
+        """Places that the ports join, port name -> place."""
         return {"from": self.from_, "to": self.to}
 
 

@@ -118,8 +118,8 @@ BAD = {
         {"axis": [0, 0, 0], "angle": 1, "euler_parameters": [0, 0, 0, 0]},
         {"axis": "has zero length", "euler_parameters": "has zero length"},
     ),
-    "axis alone": ({"axis": [0, 0, 1]}, {"axis": "needs angle too"}),
-    "angle alone": ({"angle": 1}, {"angle": "needs axis too"}),
+    "axis alone": ({"axis": [0, 0, 1]}, {"axis": "needs the key `angle` too"}),
+    "angle alone": ({"angle": 1}, {"angle": "needs the key `axis` too"}),
     "unit": ({"yaw": "3 m", "zyz": [1, "2 kg", 3]}, {"yaw": '"3 m" is a length', "zyz.1": '"2 kg" is a mass'}),
     "sizes": (
         {"matrix": [[1, 0], [0, 1]], "euler_parameters": [1, 0, 0]},
@@ -162,7 +162,7 @@ def test_a_case_has_its_notes_and_faults_with_their_places():
     with pytest.raises(CaseError) as found:
         load(case)
     assert [(one.place, one.message) for one in found.value.faults] == [
-        ("nodes.arm.joint.attitude.axis", "needs angle too")
+        ("nodes.arm.joint.attitude.axis", "needs the key `angle` too")
     ]
     body["joint"]["attitude"]["angle"] = 30
     assert [

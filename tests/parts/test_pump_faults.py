@@ -47,7 +47,7 @@ FOUND = [
     ({"suter": {"rated_flow": 0.1, "rated_head": 50.0, "head": [1.0] * 9, "torque": [1.0] * 8 + [2.0]}},
      "x = 2 pi is x = 0 again"),
     ({"suter": {"rated_flow": 0.1, "rated_head": 50.0, "table": "radial-35"},
-      "shaft_power": {"flow": [0.1], "power": [1.0]}}, "suter already gives the torque"),
+      "shaft_power": {"flow": [0.1], "power": [1.0]}}, "`suter` already gives the torque"),
 ]  # fmt: skip
 
 

@@ -15,7 +15,7 @@ NECK_SHARE = 0.01  # volume of the neck of a bladder accumulator over its volume
 
 
 class AccumulatorRows(Device, kind="accumulator"):
-    """Rows of accumulators: vessels whose node has the pressure of the gas."""
+    """Model table rows of accumulators: vessels whose node has the pressure of the gas."""
 
     law = law
     vessel = True
@@ -107,7 +107,7 @@ class AccumulatorRows(Device, kind="accumulator"):
 
 
 class ShapedRows(AccumulatorRows, kind=""):
-    """Rows of air vessels with a shape; the weight of the fluid acts on the node."""
+    """Model table rows of air vessels with a shape; the weight of the fluid acts on the node."""
 
     quantities = (*AccumulatorRows.quantities, "level")
 
@@ -166,7 +166,7 @@ class ShapedRows(AccumulatorRows, kind=""):
 
 
 class CompressorRows(ShapedRows, kind=""):
-    """Rows of air vessels with a compressor, which limits the level."""
+    """Model table rows of air vessels with a compressor, which limits the level."""
 
     states = ("gas",)
     events = (*ShapedRows.events, "compressor starts", "compressor stops")

@@ -12,7 +12,7 @@ GAS_CONSTANT = 287.05  # of air [J/kg/K]
 
 
 class AirValveRows(Device, kind="air-valve"):
-    """Rows of the chambers of air valves, which are shut at the start."""
+    """Model table rows of the chambers of air valves, which are shut at the start."""
 
     law = law
     vessel = events_only = True
@@ -81,7 +81,7 @@ class AirValveRows(Device, kind="air-valve"):
 
 
 class ThrottledAirValveRows(AirValveRows, kind=""):
-    """Rows of air valves that release air through a small bore from `switch` or `switch_velocity` on."""
+    """Model table rows of air valves that release air through a small bore from `switch` or `switch_velocity` on."""
 
     events = (*AirValveRows.events, "throttles", "stops throttling")
 

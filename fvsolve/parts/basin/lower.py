@@ -7,7 +7,7 @@ from fvsolve.model.lowering import Lowering
 
 
 class PatchRows(Lowering, kind="patch"):
-    """Rows of nodes whose pressure is that of the basin cells behind a patch."""
+    """Model table rows of nodes whose pressure is that of the basin cells behind a patch."""
 
     ledger_name = "dry patch"
 

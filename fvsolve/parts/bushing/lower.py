@@ -8,7 +8,7 @@ from fvsolve.model.lowering import Lowering
 
 
 class BushingRows(Lowering, kind="bushing"):
-    """Rows of bushings: three forces and three torques between two bodies."""
+    """Model table rows of bushings: three forces and three torques between two bodies."""
 
     table = "bushing"
 

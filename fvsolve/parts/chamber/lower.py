@@ -13,7 +13,7 @@ def joins_masses(case, cylinder) -> bool:
 
 
 class ChamberRows(Lowering, kind="chamber"):
-    """Rows of nodes whose pressure follows from the mass of the fluid in them."""
+    """Model table rows of nodes whose pressure follows from the mass of the fluid in them."""
 
     def place(self, draft, name, node, row) -> None:
         moving, air = name in draft.owned, draft.fluid.air

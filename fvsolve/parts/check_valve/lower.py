@@ -15,7 +15,7 @@ SMALL_FLOW = 1e-9  # share of the flow scale below which a reversed flow is roun
 
 
 class CheckDisc(LiftedValve, kind=""):
-    """Rows of check valves whose disc moves with a delay."""
+    """Model table rows of check valves whose disc moves with a delay."""
 
     mode = CHECK
 
@@ -51,19 +51,19 @@ class CheckDisc(LiftedValve, kind=""):
 
 
 class InertialCheckDisc(CheckDisc, kind=""):
-    """Rows of check valves whose disc has inertia."""
+    """Model table rows of check valves whose disc has inertia."""
 
     states = ("opening", "speed")
 
 
 class LaggedCheckDisc(CheckDisc, kind=""):
-    """Rows of check valves whose disc has a first-order lag without inertia."""
+    """Model table rows of check valves whose disc has a first-order lag without inertia."""
 
     states = ("opening",)
 
 
 class CheckValveRows(Device, kind="check-valve"):
-    """Rows of check valves that are open or shut.
+    """Model table rows of check valves that are open or shut.
 
     In the steady state no open valve has reverse flow, and no shut valve has a drop that opens it.
     """
@@ -99,7 +99,7 @@ class CheckValveRows(Device, kind="check-valve"):
 
 
 class SlamCurveRows(CheckValveRows, kind=""):
-    """Rows of check valves that shut at the reverse velocity of their manufacturer's curve."""
+    """Model table rows of check valves that shut at the reverse velocity of their manufacturer's curve."""
 
     law = law_slam
     states = ("slam_velocity", "deceleration")

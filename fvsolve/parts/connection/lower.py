@@ -8,7 +8,7 @@ from fvsolve.parts.schedule import constant
 
 
 class ConnectionRows(Restriction, kind="connection"):
-    """Rows of throats with a loss coefficient for each flow direction."""
+    """Model table rows of throats with a loss coefficient for each flow direction."""
 
     def restriction(self, draft, name, link, row) -> None:
         row["schedule"], row["back"] = draft.schedules.add(constant(1.0)), link.outflow_ratio

@@ -7,7 +7,7 @@ from fvsolve.model.mass_tables import PushLowering, join_ports
 
 
 class CylinderRows(PushLowering, kind="cylinder"):
-    """Rows of cylinders: a piston between two chambers, and between two masses or two points."""
+    """Model table rows of cylinders: a piston between two chambers, and between two masses or two points."""
 
     table = "piston"
 

@@ -17,7 +17,10 @@ STOP_EVENTS = ("is fully open", "leaves full opening", "is shut", "leaves its se
 
 
 class LiftedValve(Device, kind=""):
-    """Rows of valves that are shut, fully open, or partly lifted; a disc with a delay has its lift as a state."""
+    """Model table rows of valves that are shut, fully open, or partly lifted by pressure.
+
+    A disc with a delay has its lift as a state.
+    """
 
     law, controlling_event = law, 4
     quantities = ("opening",)

@@ -11,7 +11,7 @@ from fvsolve.model.mass_tables import PushLowering, join_ports
 
 
 class ForceRows(PushLowering, kind="force"):
-    """Rows of forces given by a schedule."""
+    """Model table rows of forces given by a schedule."""
 
     ledger_name = "supplied"
     table, rank = "brace", 2

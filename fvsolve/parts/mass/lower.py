@@ -4,4 +4,4 @@ from fvsolve.model.mass_tables import AxisLowering
 
 
 class MassRows(AxisLowering, kind="mass"):
-    """Rows of masses: bodies on an axis, moved by forces."""
+    """Model table rows of masses: bodies on an axis, moved by forces."""

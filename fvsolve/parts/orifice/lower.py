@@ -4,4 +4,4 @@ from fvsolve.parts.valve.lower import ValveRows
 
 
 class OrificeRows(ValveRows, kind="orifice"):
-    """Rows of orifices, which are those of valves."""
+    """Model table rows of orifices, which are those of valves."""

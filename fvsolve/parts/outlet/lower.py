@@ -13,7 +13,7 @@ SPAN = 1e5  # default drop at which an outlet has its nominal flow [Pa]
 
 
 class OutsideRows(Lowering, kind="outside"):
-    """Rows of nodes at ambient pressure."""
+    """Model table rows of nodes at ambient pressure."""
 
     ledger_name = "outside"
 
@@ -28,7 +28,7 @@ class OutsideRows(Lowering, kind="outside"):
 
 
 class OutletRows(Restriction, kind="outlet"):
-    """Rows of outlets: links whose flow is a power of the drop."""
+    """Model table rows of outlets: links whose flow is a power of the drop."""
 
     law = law
     events = ("",) * law.EVENT_COUNT
@@ -53,7 +53,7 @@ class OutletRows(Restriction, kind="outlet"):
 
 
 class RelievingRows(Device, kind=""):
-    """Rows of valves that are shut at the start and open to a node (square-root law) or to ambient (outlet law).
+    """Model table rows of valves that are shut at the start and open to another node or to ambient.
 
     mode : number of values and flags of an outlet of exponent 1/2 that precede those of the valve
     """

@@ -59,7 +59,7 @@ class Relieving(Sized, Link):
 
     @property
     def ports(self) -> dict[str, str]:
-        """Port name -> place."""
+        """Places that the ports join, port name -> place."""
         return {"from": self.from_} | ({} if self.to is None else {"to": self.to})
 
     @property

@@ -8,7 +8,7 @@ from fvsolve.model.lowering import Lowering
 
 
 class PinRows(Lowering, kind="pin"):
-    """Rows of pins: loop constraints between two points."""
+    """Model table rows of pins: loop constraints between two points."""
 
     table = "pin"
 

@@ -16,7 +16,7 @@ from fvsolve.schemes import end_rate_factor
 
 
 class PipeRows(Lowering, kind="pipe"):
-    """Rows of pipes: cells with a forward and a backward wave, or a delay line."""
+    """Model table rows of pipes: cells with a forward and a backward wave, or a delay line."""
 
     table = "pipe"
 

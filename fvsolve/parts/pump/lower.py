@@ -23,7 +23,7 @@ SMALL_SPECIFIC_SPEED, LARGE_SPECIFIC_SPEED = 20.0, 320.0  # range of specific sp
 
 
 class PumpRows(ShaftLowering, Device, kind="pump"):
-    """Rows of pumps: restrictions with a head curve.
+    """Model table rows of pumps: restrictions with a head curve.
 
     In the steady state no flow passes the check valve of a pump backward.
     """

@@ -10,7 +10,7 @@ ROUNDING_SHARE = 1e-12  # sum of the torques on a shaft regarded as rounding, ov
 
 
 class ShaftLowering:
-    """Base of the rows of restrictions with a shaft; small : size of a small deviation of the speed state"""
+    """Base of the table rows of restrictions with a shaft; small : size of a small deviation of the speed state"""
 
     small = 1.0
 

@@ -97,9 +97,9 @@ class Pump(TwoPort, kind="pump"):
             faults.append(
                 (
                     ("efficiency",),
-                    "suter already gives the torque; expected a number, the efficiency at the rated point",
+                    "`suter` already gives the torque; expected a number, the efficiency at the rated point",
                 )
             )
         if "suter" in given and "shaft_power" in given:
-            faults.append((("shaft_power",), "suter already gives the torque; leave shaft_power out"))
+            faults.append((("shaft_power",), "`suter` already gives the torque; leave `shaft_power` out"))
         return faults

@@ -38,7 +38,7 @@ class SteadyValve(NamedTuple):
 
 
 class Regulator(Device, kind=""):
-    """Rows of control valves; their opening is a state.
+    """Model table rows of control valves; their opening is a state.
 
     In the steady state a valve is active (it keeps the sensed quantity at its set value), open or shut.
     """
@@ -167,7 +167,7 @@ class Regulator(Device, kind=""):
 
 
 class PressureReducingRows(Regulator, kind="pressure-reducing"):
-    """Rows of pressure-reducing valves, which limit the pressure at `to`.
+    """Model table rows of pressure-reducing valves, which limit the pressure at `to`.
 
     Open if this pressure is too low even at full opening; shut if other sources keep it higher.
     """
@@ -186,7 +186,7 @@ class PressureReducingRows(Regulator, kind="pressure-reducing"):
 
 
 class PressureSustainingRows(Regulator, kind="pressure-sustaining"):
-    """Rows of pressure-sustaining valves, which keep up the pressure at `from`.
+    """Model table rows of pressure-sustaining valves, which keep up the pressure at `from`.
 
     Open if this pressure is too high even at full opening; shut if it is lower than the set value.
     """
@@ -205,7 +205,7 @@ class PressureSustainingRows(Regulator, kind="pressure-sustaining"):
 
 
 class FlowControlRows(Regulator, kind="flow-control"):
-    """Rows of flow-control valves, which limit the flow; open if full opening passes less."""
+    """Model table rows of flow-control valves, which limit the flow; open if full opening passes less."""
 
     mode, key = law.FLOW_CONTROL, "set_flow"
 

@@ -10,7 +10,7 @@ from fvsolve.parts.relief_valve import law
 
 
 class ReliefDisc(LiftedValve, kind=""):
-    """Rows of relief valves with disc dynamics."""
+    """Model table rows of relief valves with disc dynamics."""
 
     mode = RELIEF
 
@@ -38,19 +38,19 @@ class ReliefDisc(LiftedValve, kind=""):
 
 
 class ReliefSwing(ReliefDisc, kind=""):
-    """Rows of relief valves with an oscillating disc (mass, spring, damper)."""
+    """Model table rows of relief valves with an oscillating disc (mass, spring, damper)."""
 
     states = ("opening", "speed")
 
 
 class ReliefLag(ReliefDisc, kind=""):
-    """Rows of relief valves with a disc of first-order lag."""
+    """Model table rows of relief valves with a disc of first-order lag."""
 
     states = ("opening",)
 
 
 class Relief(ReliefDisc, kind="relief-valve"):
-    """Rows of relief valves whose lift follows the pressure at once."""
+    """Model table rows of relief valves whose lift follows the pressure at once."""
 
     law, controlling_event = law, -1
     events = ("is shut", "opens", "is fully open", "leaves full opening")

@@ -9,7 +9,7 @@ from fvsolve.parts.rupture_disc import law, law_outside
 
 
 class RuptureDiscRows(RelievingRows, kind="rupture-disc"):
-    """Rows of rupture discs between two nodes."""
+    """Model table rows of rupture discs between two nodes."""
 
     law, events_only = law, True
     events = ("bursts",)
@@ -31,7 +31,7 @@ class RuptureDiscRows(RelievingRows, kind="rupture-disc"):
 
 
 class DiscToAmbient(RuptureDiscRows, kind=""):
-    """Rows of rupture discs to ambient."""
+    """Model table rows of rupture discs to ambient."""
 
     law, mode = law_outside, EVENT_COUNT
     events = ("",) * EVENT_COUNT + ("bursts",)

@@ -13,7 +13,10 @@ FLOWS = {  # flow into the link at a port: weights of its four edges
 
 
 class SpoolValveRows(Restriction, kind="spool-valve"):
-    """Rows of spool valves, four each; the two edges that open on one side of zero share an opening schedule."""
+    """Model table rows of spool valves, four rows for each valve.
+
+    The two edges that open on one side of position zero share an opening schedule.
+    """
 
     rows, rank = len(EDGES), 1
 

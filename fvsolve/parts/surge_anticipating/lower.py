@@ -10,7 +10,7 @@ from fvsolve.parts.surge_anticipating import law, law_outside
 
 
 class SurgeAnticipatingRows(RelievingRows, kind="surge-anticipating"):
-    """Rows of surge-anticipating valves between two nodes."""
+    """Model table rows of surge-anticipating valves between two nodes."""
 
     law = law
     states = ("opening", "held")
@@ -59,7 +59,7 @@ class SurgeAnticipatingRows(RelievingRows, kind="surge-anticipating"):
 
 
 class AnticipatingToAmbient(SurgeAnticipatingRows, kind=""):
-    """Rows of surge-anticipating valves to ambient."""
+    """Model table rows of surge-anticipating valves to ambient."""
 
     law, mode = law_outside, EVENT_COUNT
     events = ("",) * EVENT_COUNT + SurgeAnticipatingRows.events

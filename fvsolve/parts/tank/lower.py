@@ -9,7 +9,7 @@ from fvsolve.model.lowering import Lowering
 
 
 class TankRows(Lowering, kind="tank"):
-    """Rows of tanks: nodes with the hydrostatic pressure at the bottom of their water."""
+    """Model table rows of tanks: nodes with the hydrostatic pressure at the bottom of their water."""
 
     ledger_name = "over the rim"
 

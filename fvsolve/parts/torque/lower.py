@@ -27,7 +27,7 @@ class TorqueRows(Lowering, kind="torque"):
 
 
 class BodyTorqueRows(PushLowering):
-    """Rows of torques about an axis of a body, given by a schedule."""
+    """Model table rows of torques about an axis of a body, given by a schedule."""
 
     ledger_name = "supplied"
     table, rank = "brace", 3

@@ -23,7 +23,7 @@ FLOW_TOLERANCE = 1e-6  # pressure difference regarded as zero, over the pressure
 
 
 class TurbineRows(ShaftLowering, Device, kind="turbine"):
-    """Rows of turbines: restrictions that follow their hill chart."""
+    """Model table rows of turbines: restrictions that follow their hill chart."""
 
     law = law
     quantities = ("head", "speed", "torque", "power", "opening")

@@ -8,7 +8,7 @@ from fvsolve.model.lowering import Restriction
 
 
 class ValveRows(Restriction, kind="valve"):
-    """Rows of valves: a square-root law whose conductance follows a schedule of the opening."""
+    """Model table rows of valves: a square-root law whose conductance follows a schedule of the opening."""
 
     def restriction(self, draft, name, link, row) -> None:
         row["schedule"] = draft.schedules.add(link.opening)
