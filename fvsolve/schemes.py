@@ -37,7 +37,7 @@ class Scheme:
     extra_cells : cells read at an end where a wave leaves, in addition to those of the polynomial there
     own_end_factors : factors on the rate (cells crossed per second) of a pipe of 1, 2, 3, ... cells because of its
     ends, at least 1. They are 0.9, or 0.9 times the limit of a long pipe if that is less, over the Courant number above
-    which ssp-rk3 is unstable between an open and a shut end (tests/limits/test_ends.py).
+    which ssp-rk3 is unstable between an open and a shut end (tests/step_limits/test_ends.py).
     """
 
     name: str
