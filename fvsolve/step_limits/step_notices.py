@@ -35,7 +35,7 @@ SMOOTH_GROWTH = (
 # Mean error of a state outside cells, relative to its range: no error, doubtful, wrong.
 NO_ERROR, DOUBTFUL, WRONG = 1e-9, 0.005, 0.05
 LIMITED_EXCESS = (
-    0.3  # SHARE for limiters between few cells, which are stable up to this excess (tests/limits/test_ends.py)
+    0.3  # SHARE for limiters between few cells, which are stable up to this excess (tests/step_limits/test_ends.py)
 )
 
 

@@ -104,7 +104,7 @@ def field_of_values_notes(row, side) -> list[str]:
         reach = float(side.field.real.max())
         if reach > GROWTH_FLOOR * np.abs(side.field).max():
             return [f"the field of values allows no step: it reaches {reach:.3g} 1/s into the right half plane; energy "
-                    "can grow at first (ends of a scheme above first order, a gain in the case), which is no failure"
+                    "can grow at first (ends of a scheme above first order, a gain in the case). This is not a failure"
                     ]  # fmt: skip
         return ["the field of values allows no step: it touches the imaginary axis, outside the stability region"]
     return ["the bound by the field of values is on the safe side here"]
