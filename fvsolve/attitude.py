@@ -50,7 +50,7 @@ def nearest(matrix: Matrix) -> Matrix:
 
 
 def about_x(phi: float) -> Matrix:
-    """Rotation matrix R_x(phi) about the x axis, (37)."""
+    """Rotation matrix R_x(phi) about the x axis by the angle phi [rad] (docs/course.md, 37)."""
     c, s = math.cos(phi), math.sin(phi)
     return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
 
@@ -226,7 +226,7 @@ def deviation(rotation: Matrix, desired: Matrix) -> Matrix:
 
 
 def deviation_velocity(turn: Matrix, w: Vector, desired: Vector) -> np.ndarray:
-    """Angular velocity of the deviation `turn`, (58): w - turn w_d, in axes a.
+    """Angular velocity of the deviation `turn`, w - turn w_d (docs/course.md, 58), in axes a.
 
     w, desired : angular velocities w of the body and w_d of its desired attitude, in axes a. Equation (57) omits the
     factor `turn`, which is valid near the identity.

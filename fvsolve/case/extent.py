@@ -121,7 +121,7 @@ def parts_of(name: str, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) 
         matches = [(ALL[name], part) for part, kind in kinds[ALL[name]].items() if kind is not None and included(kind)]
         if not matches:
             if name == "pipes":
-                raise ValueError(f"{show(name)}: the case has no pipe")
+                raise ValueError(f"{show(name)} means all pipes, but the case has none")
             raise ValueFault([(("quantity",), f"no node has {show(quantity)}")])
         return matches
     known = [*kinds["nodes"], *kinds["links"], *routes, *ALL]

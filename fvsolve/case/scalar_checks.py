@@ -50,7 +50,8 @@ def find_faults(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str,
                     elif part.physics_type.joined and patch_options.boundary != "open":
                         yield (
                             place,
-                            'follows from the joined links; it applies only with a given velocity or boundary = "open"',
+                            "is not valid here, because the joined links give the value. Remove this key, or set "
+                            'boundary = "open"',
                         )
             if scalars and part.no_scalars:
                 article = "an" if part.kind[0] in "aeiou" else "a"

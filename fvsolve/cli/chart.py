@@ -51,7 +51,9 @@ def chart(
             "(default none, with --models 0.01)",
         ),
     ] = None,
-    models: Annotated[bool, typer.Option("--models", help="compare models of the case instead of methods")] = False,
+    models: Annotated[
+        bool, typer.Option("--models", help="compare models, from lumped volumes to cells, instead of methods")
+    ] = False,
     jobs: Jobs = 1,
     dask: Dask = None,
     set: Set = [],  # noqa: B006

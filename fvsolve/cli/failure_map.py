@@ -22,7 +22,10 @@ def failure_map(
         typer.Option(metavar="A,B", help="schemes, one panel for each (default upwind and the scheme of the case)"),
     ] = None,
     method: Annotated[
-        str | None, typer.Option(metavar="A,B", help="methods, one row for each (default seven methods)")
+        str | None,
+        typer.Option(
+            metavar="A,B", help="methods, one row for each (default euler, ssp-rk3, rk4 and four implicit methods)"
+        ),
     ] = None,
     courant: Annotated[
         str | None, typer.Option(metavar="A,B", help="Courant numbers, one column for each (default 0.25 to 3)")

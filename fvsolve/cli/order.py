@@ -39,7 +39,8 @@ def order(
         ),
     ] = None,
     key: Annotated[
-        str | None, typer.Option(metavar="KEY", help="single key to refine instead: links.main.cells")
+        str | None,
+        typer.Option(metavar="KEY", help="single key to refine, instead of --refine, for example links.main.cells"),
     ] = None,
     levels: Annotated[
         int | None, typer.Option(help="number of refinement levels (default 4, with --refine time 6)")

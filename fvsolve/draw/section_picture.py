@@ -94,7 +94,7 @@ def _places(axes, posts, labels) -> None:
 
 
 def _thin_path(x, y) -> tuple:
-    """Reduce a long path (x, y) to the extremes of both coordinates in bins of rows."""
+    """Reduce a long path (x, y) to the extremes of both coordinates in bins of consecutive points."""
     rows = np.arange(len(x), dtype=float)
     indices = np.union1d(thin_series(rows, x)[0], thin_series(rows, y)[0]).astype(int)
     return x[indices], y[indices]

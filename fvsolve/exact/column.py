@@ -43,9 +43,15 @@ def find_faults(case):
             message = f'the exact solution "{name}" needs an opening that is constant or jumps, and is never 0'
             yield ("links", link, "opening"), message
         if part.characteristic != "linear":
-            yield ("links", link, "characteristic"), f'the exact solution "{name}" supports only "linear"'
+            yield (
+                ("links", link, "characteristic"),
+                f'the exact solution "{name}" supports only characteristic = "linear"',
+            )
         if part.laminar_reynolds is not None:
-            yield ("links", link, "laminar_reynolds"), f'the exact solution "{name}" supports only the turbulent law'
+            yield (
+                ("links", link, "laminar_reynolds"),
+                f'the exact solution "{name}" supports no laminar flow. Remove this key',
+            )
 
 
 def columns_and_valves(case) -> tuple[list, list]:

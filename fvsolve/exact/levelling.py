@@ -32,7 +32,10 @@ def _find_faults(case):
         if part.kind == "tank" and hasattr(part.area, "area"):
             yield ("nodes", node, "area"), f'the exact solution "{name}" needs a constant area'
         if getattr(part, "connection", None) is not None:
-            yield ("nodes", node, "connection"), f'the exact solution "{name}" does not support a connection'
+            yield (
+                ("nodes", node, "connection"),
+                f'the exact solution "{name}" does not support `connection`. Remove this key',
+            )
         if part.kind == "chamber" and part.initial_pressure is None:
             yield ("nodes", node), f'the exact solution "{name}" needs the key `initial_pressure`'
         if part.kind == "reservoir" and not constant_from(part.pressure or part.head, start):
@@ -41,9 +44,15 @@ def _find_faults(case):
         if not constant_from(part.opening, start):
             yield ("links", link, "opening"), f'the exact solution "{name}" needs a constant opening'
         if part.characteristic != "linear":
-            yield ("links", link, "characteristic"), f'the exact solution "{name}" supports only "linear"'
+            yield (
+                ("links", link, "characteristic"),
+                f'the exact solution "{name}" supports only characteristic = "linear"',
+            )
         if part.laminar_reynolds is not None:
-            yield ("links", link, "laminar_reynolds"), f'the exact solution "{name}" supports only the turbulent law'
+            yield (
+                ("links", link, "laminar_reynolds"),
+                f'the exact solution "{name}" supports no laminar flow. Remove this key',
+            )
 
 
 def solution(case, start: ExactStart) -> Solution:

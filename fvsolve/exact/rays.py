@@ -36,9 +36,15 @@ def find_faults(case):
                 yield ("links", name, "minor_loss"), 'the exact solution "rays" holds only without losses; expected 0'
         else:
             if link.characteristic != "linear":
-                yield ("links", name, "characteristic"), 'the exact solution "rays" supports only "linear"'
+                yield (
+                    ("links", name, "characteristic"),
+                    'the exact solution "rays" supports only characteristic = "linear"',
+                )
             if link.laminar_reynolds is not None:
-                yield ("links", name, "laminar_reynolds"), 'the exact solution "rays" supports only the turbulent law'
+                yield (
+                    ("links", name, "laminar_reynolds"),
+                    'the exact solution "rays" supports no laminar flow. Remove this key',
+                )
             for end in (link.from_, link.to):
                 valves.setdefault(end, []).append(name)
     for node, names in valves.items():

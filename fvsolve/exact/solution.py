@@ -1,4 +1,4 @@
-"""Exact solution as values of probes over time and fields of pipes, and faults common to several solutions."""
+"""Exact solution as values of probes over time and fields of pipes; messages for cases without such a solution."""
 
 from __future__ import annotations
 

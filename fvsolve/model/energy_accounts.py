@@ -208,7 +208,7 @@ class Accounts:
 
 
 def refuse_unsupported(case) -> None:
-    """Raise FvsolveError if the case has a network on a body whose energy cannot be computed."""
+    """Raise FvsolveError if a network is mounted on a moving body and its energy cannot be computed."""
     faults = [f"{'.'.join(place)}: {text}" for place, text in missing_reactions(case.nodes, case.links)]
     if faults:
         raise FvsolveError(f"the energy of this network on a body is not supported; {'; '.join(faults)}")

@@ -135,7 +135,8 @@ class ScalarCouplings:
                 yield at + here, first + here + offset
 
     def close(self, pipe, right: int) -> np.ndarray:
-        """States of the amounts in cells whose flows depend on an end of a pipe; right : 1 for its `to` end."""
+        """Indices of the states (amounts of scalars) in the cells near one end of a pipe, whose face flows depend on
+        that end; right : 1 for the end `to`, 0 for the end `from`."""
         cells = self.row["y"] + pipe["cell"] + np.arange(pipe["cells"])
         return (cells[::-1] if right else cells)[: self.wide]
 

@@ -45,8 +45,9 @@ class RunQueue:
     def run_ahead(self, requests: Sequence[RunRequest]) -> Iterator[int]:
         """Compute runs before their results are requested; yields the index of each finished run.
 
-        Requests go from cheap to expensive. The first run comes first, then runs from the end of the list. With a
-        single process nothing is computed ahead.
+        requests : runs from cheap to expensive. The cheapest is computed first, because the study needs it first,
+        then the others from the most expensive on, so that processes end together. A single process computes
+        nothing ahead.
         """
         if self.in_process or not requests:
             return

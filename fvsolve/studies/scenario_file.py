@@ -174,7 +174,8 @@ def dotted_path(*keys: str) -> str:
 
 
 def all_conflicts(events: dict, protections: dict) -> Iterator[tuple[str, str, str, str]]:
-    """Conflicts of overrides: (event, protection, key of the event, key of the protection) for each pair of keys."""
+    """Pairs of an event and a protection that set one key, or a key and a part of it: (event, protection, key of the
+    event, key of the protection)."""
     for event, of_event in events.items():
         for protection, of_protection in protections.items():
             yield from (

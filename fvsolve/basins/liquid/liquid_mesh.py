@@ -229,7 +229,8 @@ def clear(w):
 
 @njit
 def put_rates(w, rate_r, rate_x, rate_y):
-    """Copy the rates of a block of cells to their arrays; update the greatest sum for the limit of the time step."""
+    """Copy the rates of a block of cells from its work array `w` to the arrays of the basin, and update the greatest
+    sum of wave speed over cell size in both directions [1/s], which limits the time step."""
     for i in range(BLOCK):
         w[_TOP + i] = max(w[_TOP + i], w[_FAST + i])
     for i in range(rate_r.size):

@@ -116,7 +116,7 @@ class Holes(Value):
 
 
 class File(Value):
-    """A file of the case, read as the name of its copy beside the resolved case."""
+    """Key that names a file; its value is the name of the copy of the file in the run directory."""
 
     def __init__(self, about: str) -> None:
         self.about = about
@@ -211,7 +211,7 @@ class Physics(Table):
                 own, known = keys[key], table.model_fields[key]
                 if (own.metadata, own.default) != (known.metadata, known.default):
                     text = f"physics {show(cls.name)} declares {key} differently from the existing key of a basin"
-                    raise FvsolveError(f"{text}; declare it equally, or choose another name")
+                    raise FvsolveError(f"{text}; declare it identically in both, or choose another name")
         for table, keys in both:
             table.model_fields.update(keys)
             if table.__pydantic_complete__:  # otherwise it is built when a case first has a basin
@@ -238,7 +238,10 @@ class Physics(Table):
 
     @classmethod
     def formulas(cls, basin: Basin, mesh: Any) -> Iterator[tuple[tuple[str, ...], Any, np.ndarray | None]]:
-        """Formulas in the keys of these equations: (keys, formula, points of evaluation or None for cell means)."""
+        """Formulas given in the keys of this set of basin equations.
+
+        Yields (keys, formula, points of evaluation or None for cell means).
+        """
         for key in cls.model_fields:
             if isinstance(shape := getattr(basin, key), SpatialField):
                 yield (key,), shape, None

@@ -63,6 +63,12 @@ class Junction(PlaceOnBody, kind="junction"):
             text = f"{self.required_pressure:g} Pa is not above the pressure of no flow, {least:g} Pa"
             yield ("required_pressure",), text
         if least < around.ambient:
-            yield ("minimum_pressure",), f"{least:g} Pa is below ambient pressure, where nothing flows out"
+            yield (
+                ("minimum_pressure",),
+                (
+                    f"{least:g} Pa is below ambient pressure, at which nothing can flow out. "
+                    f"Expected at least {around.ambient:g} Pa"
+                ),
+            )
         if not (self.demand.value.min() >= 0.0 and self.demand.value.max() > 0.0):
             yield ("demand",), "with `required_pressure`, expected a demand that is never negative and not always 0"

@@ -1,4 +1,4 @@
-"""Greatest step at which no wave grows between a storing node and a delay line."""
+"""Greatest time step at which no wave grows between a node with storage (tank, chamber) and a delay line."""
 
 from __future__ import annotations
 
