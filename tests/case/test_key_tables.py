@@ -25,7 +25,7 @@ def test_every_part_has_a_table_on_the_page_and_every_table_a_row_a_key():
 
 def test_what_holds_where_a_key_is_left_out_has_a_column():
     rows = key_table("accumulator").splitlines()
-    assert "| `initial_pressure` | Pa | in equilibrium | profile | gas pressure at the start |" in rows
+    assert "| `initial_pressure` | Pa | that of the steady state | profile | gas pressure at the start |" in rows
     words = "polytropic exponent n in p V^n: 1 isothermal, 1.4 adiabatic air"
     assert f"| `exponent` | -, at least 1 | 1.2 | profile | {words} |" in rows
 

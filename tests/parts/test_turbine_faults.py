@@ -87,7 +87,7 @@ def test_faults_of_its_keys_come_with_those_of_its_chart():
     ):
         assert one in said
     assert "-1 s lies before the start" in faults(trip=-1.0, inertia=1e4)
-    assert "give the turbine inertia" in torque_on({})
+    assert "give the turbine `inertia`" in torque_on({})
     assert "until it trips" in torque_on({"inertia": 1e4, "trip": 0.5})
 
 

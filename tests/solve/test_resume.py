@@ -136,7 +136,7 @@ def test_nothing_to_resume_is_a_start(tmp_path):
 
 
 def test_resume_needs_a_directory():
-    with pytest.raises(fvsolve.RunError, match="out="):
+    with pytest.raises(fvsolve.RunError, match="give it as the argument `out`"):
         fvsolve.run(branched(), resume=True)
 
 

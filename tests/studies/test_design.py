@@ -237,7 +237,7 @@ def test_the_command_shows_its_runs(fvs, tmp_path) -> None:
 
 
 def test_what_cannot_be_sized_is_said() -> None:
-    with pytest.raises(FvsolveError, match="states no"):
+    with pytest.raises(FvsolveError, match="has no limits"):
         size(throttled() | {"limits": {}}, "nodes.lake.head", 20.0, 80.0)
     with pytest.raises(FvsolveError, match="words or whole numbers"):
         size(still(minimum=3e5), "links.main.cells", 10, 20)
