@@ -264,6 +264,12 @@ def held_column(kind, after, disc, numerics):
 
 
 def leaving(disc, felt):
+    return leaving_of(tuple(disc.items()), felt)
+
+
+@functools.cache
+def leaving_of(disc, felt):
+    disc = dict(disc)
     inertia = 50.0 / area(0.1)
     friction = 0.02 * 50.0 / (0.1 * 2.0 * RHO * area(0.1) ** 2)
     source = lambda t: np.interp(t, [4.0, 9.0], [-1.1e5, 1e4])  # noqa: E731
@@ -320,6 +326,12 @@ def test_so_they_do_in_a_fluid_that_is_all_but_stiff(after):
 
 def slamming(disc, rho=RHO) -> float:
     """When the disc of `held_column` meets its seat, by SciPy under the linear law, as the far end rises past it."""
+    return slamming_of(tuple(disc.items()), rho)
+
+
+@functools.cache
+def slamming_of(disc, rho):
+    disc = dict(disc)
     far, k = (lambda t: np.interp(t, [1.0, 4.0, 9.0], [3e5, 4.4e5, 3.2e5])), area(0.1) / 50.0
     g, friction = 2.0 * rho * (0.61 * 0.01) ** 2, 0.02 * 50.0 / (0.1 * 2.0 * rho * area(0.1) ** 2)
     lag, w, zeta = (disc.get(key, 0.0) for key in ("time_constant", "natural_frequency", "damping_ratio"))

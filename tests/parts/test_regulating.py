@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -221,7 +222,7 @@ def held_column(kind, after, ends, law, numerics):
 
 
 def equations(kind, after, ends):
-    """(source, lifted, G, stroke, inertia, friction) as `truth.stems` wants them."""
+    """(source, lifted, G, stroke, inertia, friction) as `reference.stems` wants them."""
     bore = math.pi * 0.05**2
     up, down = (lambda t, p=p: np.interp(t, p["time"], p["value"]) if isinstance(p, dict) else p for p in ends)
 
@@ -233,6 +234,26 @@ def equations(kind, after, ends):
             0.02 * 50.0 / (0.1 * 2.0 * RHO * bore**2))  # fmt: skip
 
 
+def opening_ends(kind):
+    return far_ends(kind, *((6e5, 3e5) if kind == "pressure-reducing" else (4e5, 7e5)))
+
+
+@functools.cache
+def leaving(kind, after, at):
+    """Lift and mass flow at the times `at` while the valve leaves its seat, by SciPy."""
+    return stems.leaves_with_column(*equations(kind, after, opening_ends(kind)), 8.0 / 3.0, [4.0], at)
+
+
+@functools.cache
+def shutting(kind, after):
+    """Time at which the valve meets its seat, by SciPy."""
+    return stems.shuts_with_column(*equations(kind, after, shutting_ends(kind)), 2.0)
+
+
+def shutting_ends(kind):
+    return far_ends(kind, *((6e5, 2e5) if kind == "pressure-sustaining" else (3e5, 7e5)))
+
+
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("numerics", [{"rtol": 1e-6}, {"method": "dormand-prince", "rtol": 1e-6},
                                       {"method": "rodas-5p", "rtol": 1e-9}, {"method": "radau-iia-5", "rtol": 1e-6},
@@ -241,10 +262,9 @@ def equations(kind, after, ends):
 @pytest.mark.parametrize("after", [False, True])
 def test_it_leaves_its_seat_with_the_column_that_it_holds_as_their_equations_say(kind, after, law, numerics):
     """Both start as s^2, and exchange what they have at a rate that starts at infinity, beyond any given step's."""
-    ends = far_ends(kind, *((6e5, 3e5) if kind == "pressure-reducing" else (4e5, 7e5)))
-    case, name = held_column(kind, after, ends, law, numerics)
+    case, name = held_column(kind, after, opening_ends(kind), law, numerics)
     result, at = fvsolve.run(case), (2.8, 3.0, 3.2, 4.0, 6.0)
-    lift, flow = stems.leaves_with_column(*equations(kind, after, ends), 8.0 / 3.0, [4.0], at)
+    lift, flow = leaving(kind, after, at)
     (leaves,) = result.summary["events"]
     assert result.ok and (leaves["what"], leaves["time"]) == ("leaves its seat", pytest.approx(8.0 / 3.0, abs=1e-9))
     rows = [int(np.argmin(abs(result.t - t))) for t in at]
@@ -260,10 +280,9 @@ def test_it_leaves_its_seat_with_the_column_that_it_holds_as_their_equations_say
 def test_it_comes_to_its_seat_with_the_column_that_it_holds(kind, numerics):
     """Ever faster they exchange what they have, until both stand: nothing is left to be stopped dead."""
     after = kind == "pressure-sustaining"
-    ends = far_ends(kind, *((6e5, 2e5) if after else (3e5, 7e5)))
-    case, name = held_column(kind, after, ends, "linear", numerics)
+    case, name = held_column(kind, after, shutting_ends(kind), "linear", numerics)
     result = fvsolve.run(case)
     (shuts,) = result.summary["events"]
     assert result.ok and shuts["what"] == "is shut" and result.summary["marks"] == []
-    assert shuts["time"] == pytest.approx(stems.shuts_with_column(*equations(kind, after, ends), 2.0), rel=1e-6)
+    assert shuts["time"] == pytest.approx(shutting(kind, after), rel=1e-6)
     assert not result[f"{name}.flow"][result.t > shuts["time"]].any()
