@@ -13,7 +13,7 @@ READER_IMPORTS = (
 HOOK = {hook: k for k, hook in enumerate(calls.HOOKS)}
 RHS_HOOKS, READER_HOOKS = ("set", "move", "step", "slope", "lift"), ("value", "outside", "events", "bends")
 ENERGY_HOOKS = ("power", "stored")
-COMPILE_MARCH = "from fvsolve.steppers.time_loop import compiled; compiled()"
+COMPILE_TIME_LOOP = "from fvsolve.steppers.time_loop import compiled; compiled()"
 
 
 class Functions:
@@ -28,7 +28,8 @@ class Functions:
         self.calls = calls.empty_calls(calls.JOBS, len(rates) + 3)
         self.hooks = calls.empty_calls(len(cast.laws), len(calls.HOOKS))
         others = "" if all(name.startswith("fvsolve.") for name in cast.packages()) else "import fvsolve.parts; "
-        with compile_in_parallel(f"{others}{READER_IMPORTS}compile_readers({cast!r}); {COMPILE_MARCH}", "march_at"):
+        code = f"{others}{READER_IMPORTS}compile_readers({cast!r}); {COMPILE_TIME_LOOP}"
+        with compile_in_parallel(code, "run_steps_at"):
             self.rhs = self.compile_job(calls.RHS, rates, calls.rhs_in_turn)
             self.store_hooks(*RHS_HOOKS, *["lead"] * cast.columns)
         self.store_addresses(calls.CLOSE, cast.functions(*CLOSING))

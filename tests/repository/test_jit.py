@@ -1,5 +1,6 @@
 """The package's njit: an edit in another file is noticed, and a second process starts from the cache."""
 
+import contextlib
 import hashlib
 import json
 import os
@@ -12,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import fvsolve
 from fvsolve import jit, store
 from fvsolve.steppers.signatures import no_algebra
 
@@ -234,3 +236,26 @@ def test_a_compiled_function_of_declared_arguments_takes_no_others():
     for wrong in (whole, numbers.astype(np.float32), numbers[::2], frozen, np.zeros((3, 1)), [0.0], None):
         with pytest.raises(TypeError):
             solve(whole, wrong, numbers)
+
+
+def test_the_second_process_compiles_what_is_then_taken_from_the_store(monkeypatch):
+    """The text that it runs has no fault, and the name by which it is skipped is that of a function in the store."""
+    from fvsolve.kernels import compiled_functions
+    from fvsolve.steppers import integrator
+
+    asked = {}
+
+    @contextlib.contextmanager
+    def noted(code, cached):
+        asked[cached] = code
+        yield
+
+    model = fvsolve.build(fvsolve.load("two-tanks"))
+    monkeypatch.setattr(compiled_functions, "compile_in_parallel", noted)
+    monkeypatch.setattr(integrator, "compile_in_parallel", noted)
+    compiled_functions.Functions(model.functions.cast)
+    integrator.attempt_of.__wrapped__("full", "banded")
+    assert len(asked) == 2
+    for cached, code in asked.items():
+        exec(code, {})
+        assert list(jit.code_folder().glob(f"{cached}-*{store.SUFFIX}")), cached

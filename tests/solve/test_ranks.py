@@ -102,19 +102,19 @@ def test_frames_that_ranks_write_are_those_of_one_process_to_who_reads_them(tmp_
 
 
 def test_a_run_of_three_ranks_is_resumed_by_two_and_by_one(tmp_path):
-    case = water(end=0.12, step=1e-4)
+    case = water(end=0.15, step=1e-4)
     whole = fvsolve.run(case, out=tmp_path / "whole")
     stopping = SCRIPT.replace("**options", "progress=stop").replace("import json", """
 import importlib
 importlib.import_module("fvsolve.solve.solve").CHECKPOINT_SECONDS = 0.0
 def stop(t, *given):
-    if t > 0.03:
+    if t > 0.06:
         raise KeyboardInterrupt
 import json""", 1)  # fmt: skip
     found = ranks(3, sys.executable, "-c", stopping, json.dumps({"run": case}), tmp_path, "{}")
     assert found.returncode == 0, found.stderr
     said = json.loads((tmp_path / "run" / "summary.json").read_text())
-    assert said["reason"].startswith("interrupted") and 0.0 < np.load(tmp_path / "run" / "restart.npz")["t"] < 0.12
+    assert said["reason"].startswith("interrupted") and 0.0 < np.load(tmp_path / "run" / "restart.npz")["t"] < 0.15
     found = ranks(2, sys.executable, "-m", "fvsolve", "run", tmp_path / "run" / "case.toml", "--out", tmp_path / "run",
                   "--resume")  # fmt: skip
     assert found.returncode == 0 and found.stdout.count("finished at") == 1, found.stdout + found.stderr
