@@ -128,7 +128,7 @@ def test_what_is_even_stays_even_and_amounts_and_mass_are_kept_between_walls_tha
         "right": {"side": "east", "travel": straight(-0.3)},
     }
     more = {"start": {"level": "1 + 0.1 * cos(3 * x) * cos(2 * y)", "u": "0.2 * x", "v": "0.1 * y"}}
-    cells = (12, 2) if method != "ssp-rk3" and scheme != "weno5" else (24, 4)
+    cells = (24, 4) if method == "ssp-rk3" else (12, 2)
     nodes = {"b": flume(patches, *cells, **more, scalars={"even": 3.0, "patchy": "1 + x"})}
     scalars = {"even": {"initial": 3.0}, "patchy": {"initial": 1.0}}
     step = {"courant": 0.5} if method == "ssp-rk3" else {"step": 0.01}
@@ -144,6 +144,20 @@ def test_what_is_even_stays_even_and_amounts_and_mass_are_kept_between_walls_tha
     mass, change = model.contents(state.y)
     assert abs(change) < close * mass
     assert np.ptp(values["patchy"]) > 0.5
+
+
+@pytest.mark.parametrize("cells", [(8, 1), (8, 2), (2, 8), (1, 8), (2, 2)])
+@pytest.mark.parametrize("scheme", ["upwind5", "weno5"])
+@pytest.mark.parametrize("method", ["ssp-rk3", "radau-iia-3"])
+def test_no_water_flows_through_the_walls_of_a_basin_of_one_or_two_cells_across(cells, scheme, method):
+    """Ghost cells of so few cells are no exact mirror images."""
+    start = {"level": "1 + 0.1 * cos(3 * x) * cos(2 * y)", "u": "0.2 * x", "v": "0.1 * y"}
+    nodes = {"b": flume({}, *cells, start=start, scalars={"even": 3.0})}
+    case = scene(nodes, {}, 0.1, {"scheme": scheme, "method": method, "step": 0.01}, scalars={"even": {"initial": 3.0}})
+    model, state = moved(case, 0.1)
+    assert model.basins[0].values(state.y)["even"] == pytest.approx(3.0, abs=1e-9)
+    mass, change = model.contents(state.y)
+    assert abs(change) < 1e-12 * mass and np.abs(state.y).max() > 0.01
 
 
 def mass_and_spring(patches, mass, stiff, rest, n=40, start=None, numerics=None, end=1.0, probes=(), **more):
@@ -228,7 +242,7 @@ def test_a_tank_that_joins_a_patch_on_a_side_that_stretches_follows_the_depth_an
                "gate": {"side": "south"}}  # fmt: skip
     nodes = {"b": flume(patches, 20, 4), "t": {"type": "tank", "area": 0.5, "level": 1.0}}
     links = {"v": {"type": "valve", "from": "b.gate", "to": "t", "area": 0.05}}
-    case = scene(nodes, links, 60.0, {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.8},
+    case = scene(nodes, links, 25.0, {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.8},
                  ["t.level", "b.gate.pressure"], every=1.0)  # fmt: skip
     result = run(case)
     level = 1.0 * (2.0 + 0.5) / (1.2 + 0.5)

@@ -67,7 +67,7 @@ def ring_offset(j, i):
 
 @njit
 def factors_of(j, left, right, moves, scratch):
-    """Area over undeformed area, and its reciprocal, of the columns `left` to `right` of row j, two arrays.
+    """(area over undeformed area, its reciprocal) of columns `left` to `right` - 1 of row j: two arrays.
 
     moves : as in `grid_rates`; scratch : work array
     """
@@ -82,10 +82,10 @@ def factors_of(j, left, right, moves, scratch):
 
 @njit
 def put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, work, top, moves):
-    """Write columns `first` to `last` of row j of cells, with ghost cells, to the ring buffer.
+    """Write columns `first` to `last` - 1 of row j of cells, with ghost cells, to the ring buffer in `work`.
 
-    A row beyond the grid is computed from earlier rows. fifth : True for fifth order; top : greatest rate of each
-    column so far [1/s]; other arguments as in `grid_rates`
+    A row beyond the grid is computed from the rows inside, which must be in the buffer. fifth : True for fifth order
+    top : greatest rate of each column so far [1/s], updated here; other arguments as in `grid_rates`
     """
     ring = work[: RING * BLOCK]
     fields, left, right = FIELDS if fifth else FLOW_EAST // STRIDE, max(first - GHOSTS, 0), min(last + GHOSTS, nx)
@@ -127,10 +127,11 @@ def put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy,
 
 @njit
 def close_walls(g, speed, rest, side, f, thrust):
-    """Set the mass flow through a row of boundary faces of moving walls to zero, and write the thrust on them.
+    """Set the mass flow through a row of boundary faces of a moving wall to zero, and write the thrust on these faces.
 
-    speed : speed of the faces [m/s]; rest : depths at rest of the cells; side : depths at the faces; f : fluxes
-    thrust : thrust minus the thrust of the depth at rest, over density and length [m3/s2]
+    speed : speed of the faces [m/s]; if it is 0, the flow is unchanged; rest : depths at rest of the cells
+    side : depths at the faces; f : fluxes
+    thrust : thrust minus that of the depth at rest, over density and length [m3/s2]
     """
     for i in range(thrust.size):
         if speed != 0.0:
@@ -139,25 +140,40 @@ def close_walls(g, speed, rest, side, f, thrust):
 
 
 @njit
+def close_fixed_walls(walls, f, count):
+    """Set the mass flow through a row of boundary faces of walls at rest to zero, with the momentum that it carries.
+
+    In a grid of one or two cells across, ghost cells are not exact mirror images, so in fifth order this flow is not 0.
+    walls : float64[count]  1 for a wall and 0 for open, empty for walls only; f : fluxes; count : number of faces
+    """
+    for i in range(count):
+        if walls.size == 0 or walls[i] == 1.0:
+            f[i], f[i + ALONG] = 0.0, 0.0
+
+
+@njit
 def grid_rates(
     g, scheme, limiter, nx, ny, begin, stop, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y, through, work, rate_h,
     rate_x, rate_y, moves,
 ):  # fmt: skip
-    """Write the rates of the cells of rows `begin` to `stop`; return the greatest (|u| + c) kx + (|v| + c) ky [1/s].
+    """Write the rates of cells of rows `begin` to `stop` - 1; return the greatest (|u| + c) kx + (|v| + c) ky [1/s].
 
     Rows are counted over the whole grid; neighbours within the stencil of the scheme are read too.
-    g : gravity normal to the basin [m/s2]; scheme : UPWIND, MUSCL, LINEAR (upwind5) or WENO5
-    kx float64[nx], ky float64[ny] : 1 / widths of columns and rows [1/m]
+    g : gravity normal to the basin [m/s2]; scheme : UPWIND, MUSCL, LINEAR (upwind5) or WENO5; limiter : of MUSCL
+    nx, ny : numbers of columns and rows
+    kx, ky : float64[nx], float64[ny]  1 / widths of columns, 1 / heights of rows [1/m]
     reflect : float64[2 (nx + ny)]  1 for a wall and 0 for open, in the order west, east, south, north; empty: all walls
     plan : float64[PLANS, n]  depth at rest and surface at rest above the level [m]
-    dh, qx, qy : float64[n]  deviation of depth from rest [m], unit flows [m2/s]; if lines move, times the stretching
+    dh, qx, qy : float64[n]  deviation of depth from rest [m], unit flows [m2/s]; with moving walls, the changes of
+    their amounts over undeformed areas, see `basins.cell_stretching`
     flow_x : float64[ny (nx + 1)], flow_y : float64[(ny + 1) nx]  volume flows per width through faces [m2/s], or empty
     through : float64[2 (nx + ny)]  inward flows through boundary faces [m3/s], in the order of `reflect`, or empty
     work : float64[WORK], fastest if aligned to a cache line; float64[MOVING] if lines move
     rate_h, rate_x, rate_y : float64[n]  rates of dh, qx, qy
     moves : None without moving walls, else a tuple of
-        speeds of the grid lines x = constant and y = constant [m/s], float64[nx + 9] and float64[ny + 9], empty if at
-        rest float64[2 (nx + ny)]  thrust on boundary faces minus that at rest, over density and length [m3/s2]
+        speeds of the grid lines x = constant [m/s], float64[nx + 9], empty if at rest
+        speeds of the grid lines y = constant [m/s], float64[ny + 9], empty if at rest
+        float64[2 (nx + ny)]  thrust on boundary faces minus that at rest, over density and length [m3/s2]
         `wide` : area over undeformed area of columns or rows, and its reciprocal `narrow`, see `basins.cell_stretching`
     """
     most = 0.0
@@ -176,7 +192,7 @@ def column_rates(
     g, scheme, limiter, nx, ny, begin, stop, fresh, first, last, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y,
     through, work, rate_h, rate_x, rate_y, moves,
 ):  # fmt: skip
-    """Write the rates of columns `first` to `last`, at most MAX_COLUMNS, row by row; return their greatest rate [1/s].
+    """Write the rates of columns `first` to `last` - 1, at most MAX_COLUMNS; return their greatest rate [1/s].
 
     fresh : False if the last call ended at row `begin` with the same `work`; then its results are used again
     Other arguments as in `grid_rates`
@@ -233,6 +249,9 @@ def column_rates(
                 at = 2 * ny + first + (nx if j > 0 else 0)
                 rest = plan[0, (0 if j == 0 else (ny - 1) * nx) + first :]
                 close_walls(g, moves[1][j], rest, low if j == 0 else under, north, moves[2][at : at + n])
+        if fifth and ny < REACH and (j == 0 or j == ny):
+            at = 2 * ny + first + (nx if j > 0 else 0)
+            close_fixed_walls(reflect[at : at + n], north, n)
         if flow_y.size > 0:
             copy(north, flow_y[j * nx + first : j * nx + last])
         if through.size > 0 and (j == 0 or j == ny):
@@ -267,6 +286,9 @@ def column_rates(
                 close_walls(g, moves[0][0], rest, right, along, moves[2][j - 1 : j])
             if last == nx:
                 close_walls(g, moves[0][nx], rest[nx - 1 :], left[n:], along[n:], moves[2][ny + j - 1 : ny + j])
+        if fifth and nx < REACH:
+            close_fixed_walls(reflect[j - 1 : j], along, 1)
+            close_fixed_walls(reflect[ny + j - 1 : ny + j], along[n:], 1)
         if flow_x.size > 0:
             at = (j - 1) * (nx + 1)
             copy(along, flow_x[at + first : at + last + 1])
