@@ -34,7 +34,7 @@ for name, case in cases.items():
 NAMES = ("muscl, ssp-rk2", "a tolerance", "a pipe", "delay lines", "a liquid", "a dye in water")
 
 
-def ranks(many: int, *command, timeout=150, **environment) -> subprocess.CompletedProcess:
+def ranks(many: int, *command, timeout=300, **environment) -> subprocess.CompletedProcess:
     command = [str(MPIEXEC), "-n", str(many), *map(str, command)]
     environment = os.environ | environment
     return subprocess.run(command, capture_output=True, text=True, timeout=timeout, env=environment, check=False)
@@ -106,9 +106,10 @@ def test_a_run_of_three_ranks_is_resumed_by_two_and_by_one(tmp_path):
     whole = fvsolve.run(case, out=tmp_path / "whole")
     stopping = SCRIPT.replace("**options", "progress=stop").replace("import json", """
 import importlib
-importlib.import_module("fvsolve.solve.solve").CHECKPOINT_SECONDS = 0.0
+solve = importlib.import_module("fvsolve.solve.solve")
+solve.CHECKPOINT_SECONDS = solve.CHUNK_SECONDS = 0.0  # checkpoints after 1000, 1250, ... steps
 def stop(t, *given):
-    if t > 0.06:
+    if t > 0.11:
         raise KeyboardInterrupt
 import json""", 1)  # fmt: skip
     found = ranks(3, sys.executable, "-c", stopping, json.dumps({"run": case}), tmp_path, "{}")

@@ -78,7 +78,7 @@ def test_steps_do_not_hang_on_rows_and_no_row_lies_beyond_the_extremes(how, scen
     case = SCENES[scene_name](SETTINGS[how])
     alone = with_rows(case, NO_ROWS)
     assert alone.reason == "finished" and len(alone.t) <= 12  # start, jumps and the end alone
-    for every in EVERY:
+    for every in EVERY[:2] if how == "given" else EVERY:  # each row within a step taken in parts costs many solutions
         result = with_rows(case, every)
         for probe, extremes in result.extremes.items():
             assert result[probe][-1] == alone[probe][-1], (probe, every)

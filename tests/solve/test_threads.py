@@ -228,17 +228,18 @@ def test_bands_that_do_not_wait_for_each_other_are_seen():
 
 
 def test_a_run_is_resumed_by_another_number_of_threads_to_the_same_bits(tmp_path, monkeypatch):
-    case = water(end=0.6, step=1e-4)
+    case = water(end=0.2, step=1e-4)
     whole = fvsolve.run(case, out=tmp_path / "whole")
 
-    monkeypatch.setattr(importlib.import_module("fvsolve.solve.solve"), "CHECKPOINT_SECONDS", 0.0)
+    for name in ("CHECKPOINT_SECONDS", "CHUNK_SECONDS"):  # checkpoints after 1000, 1250, ... steps
+        monkeypatch.setattr(importlib.import_module("fvsolve.solve.solve"), name, 0.0)
 
     def stop(t, seconds, steps):
-        if t > 0.15:
+        if t > 0.11:
             raise KeyboardInterrupt
 
     broken = fvsolve.run(case, out=tmp_path / "broken", threads=3, progress=stop)
-    assert broken.reason.startswith("interrupted") and 0.0 < np.load(tmp_path / "broken" / "restart.npz")["t"] < 0.6
+    assert broken.reason.startswith("interrupted") and 0.0 < np.load(tmp_path / "broken" / "restart.npz")["t"] < 0.2
     broken = fvsolve.run(tmp_path / "broken" / "case.toml", out=tmp_path / "broken", resume=True, threads=2)
     assert broken.ok and broken.summary["threads"] == 2
     assert whole.ok and whole.ledger == broken.ledger
