@@ -13,7 +13,10 @@ TABLE_ROWS = 12  # rows of a table in a notebook; `.frame()` contains all rows
 
 
 class Displayable:
-    """Base class of results with a summary line, a table and a plot (`picture`, "module:function" that draws it)."""
+    """Base class of results with a summary line, a table and a plot.
+
+    picture : "module:function" of the function that draws the plot
+    """
 
     picture: ClassVar[str] = ""
 

@@ -33,7 +33,7 @@ class Fault:
 
 @dataclass(frozen=True)
 class Notice:
-    """Notice of a case or a run: a legal but remarkable situation, an item of its `warnings`.
+    """Notice of a case or a run, an item of its `warnings`: a valid but unusual situation.
 
     kind : "start", "mesh", "step-limit", "step-error", "growth", "ledger", "range", ...
     place : part or section, such as "nodes.a"; key : key of that part, or None
@@ -62,7 +62,7 @@ class FvsolveError(Exception):
 
 
 class CaseError(FvsolveError):
-    """Invalid case: all its faults at once, in the order of the file."""
+    """Invalid case, with all its faults: those of the file in the order of their lines, then those of overrides."""
 
     def __init__(self, faults: Iterable[Fault], file: str = "case"):
         self.faults = sorted(faults, key=lambda fault: (fault.override, fault.line or 0))
@@ -90,7 +90,7 @@ def collect_faults(faults: list[Fault], place: str = "") -> Iterator[None]:
 
 
 class MeshError(CaseError):
-    """Invalid mesh: all its faults at once; `file` is the mesh file, or "rectangle"."""
+    """Invalid mesh, with all its faults; `file` is the name of the mesh file, or "rectangle"."""
 
 
 class FluidError(FvsolveError):
@@ -115,7 +115,7 @@ def visible(text: str) -> str:
 
 
 def nearest(name: str, names: Iterable[str]) -> str | None:
-    """Valid name that is most similar to `name`, or None."""
+    """Valid name in `names` that is most similar to `name`; None if no name is similar."""
     if len(name) > LONGEST_NAME:
         return None
     names = [valid for valid in dict.fromkeys(names) if len(valid) <= LONGEST_NAME]
@@ -125,7 +125,7 @@ def nearest(name: str, names: Iterable[str]) -> str | None:
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:
-    """'; did you mean "opening"?' if a similar valid name exists, else the empty string."""
+    """Hint for a message, such as `; did you mean "opening"?`; "" if no valid name in `names` is similar to `name`."""
     close = nearest(name, names)
     return f'; did you mean "{close}"?' if close else ""
 

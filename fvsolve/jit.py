@@ -97,7 +97,7 @@ def njit(function: Callable | None = None, /, **options: Any) -> Callable:
     model the counts cost microseconds per step. So compiled code allocates no memory; a function that must allocate
     sets `_nrt=True`. The GIL is released during a call from Python (`nogil=True`).
     Use the decorator bare or with options of numba. With `NUMBA_DISABLE_JIT=1` it returns the plain function.
-    Only functions of `SOURCE_ROOTS` and of added folders are cached, because the hash does not cover other files.
+    Only functions in the hashed sources (`_sources`) and in added folders are cached: the hash covers no other files.
     """
     if function is None:
         return functools.partial(njit, **options)
@@ -124,7 +124,11 @@ class Function:
 
     @functools.cached_property
     def folder(self) -> str | None:
-        """Subfolder of the code folder for this function's machine code; None if no hash covers its source."""
+        """Subfolder of the code folder for the machine code of this function, "" for the code folder itself.
+
+        None if its source is not hashed, that is, neither a compiled source of the package nor
+        in a folder of `add_sources`.
+        """
         home = Path(self.__code__.co_filename).resolve()
         return "" if home in _sources() else next((EXTRA_FOLDERS[f] for f in home.parents if f in EXTRA_FOLDERS), None)
 
@@ -144,9 +148,10 @@ class Function:
         return _attribute_of, (self.__module__, self.__qualname__)
 
     def declare(self, letters: str, kinds: Callable[[str], tuple]) -> DeclaredFunction:
-        """Compile the function for a single signature; calls from Python then accept no other.
+        """Compile the function for a single signature; calls from Python then accept no other signature.
 
-        letters : signature, see `kernels.calls`; kinds(letters) : numba types of the arguments
+        letters : signature, see `kernels.calls`
+        kinds : function that gives the numba types of the arguments for `letters`
         """
         if self.declared is None:
             self.declared = DeclaredFunction(self, letters, self.code(letters, lambda: kinds(letters)))
@@ -176,7 +181,8 @@ class Function:
     def code(self, letters: str, kinds: Callable[[], tuple], wrappers: bool = True) -> Code:
         """Machine code for a signature, loaded from the store or compiled.
 
-        letters : signature; kinds() : numba types of the arguments
+        letters : signature, see `kernels.calls`
+        kinds : function without arguments that gives the numba types of the arguments
         wrappers : True for code with wrappers for calls from Python and C
         """
         key = letters if wrappers else f".{letters}"
@@ -205,7 +211,11 @@ class Function:
         return code_of(compiled, wrappers)
 
     def _path(self, key: str) -> Path | None:
-        """File for the machine code of a signature; None for closures and local functions without a unique name."""
+        """Path of the file for the machine code of a signature; None for a function whose code is not stored.
+
+        Closures, local functions and functions of sources that are not hashed are not stored.
+        key : text of the signature
+        """
         if self.folder is None or "<" in self.__qualname__ or self.py_func.__closure__ or not store.CAN_LINK:
             return None
         digest = hashlib.sha256(self._identity(key).encode()).hexdigest()[:12]
@@ -222,7 +232,10 @@ def _attribute_of(module: str, name: str) -> Any:
 
 
 def code_of(compiled, wrappers: bool = True) -> Code:
-    """Addresses and Python entry point of a function compiled by numba."""
+    """Addresses and Python entry point of a function compiled by numba.
+
+    wrappers : True if it has wrappers for calls from Python and C
+    """
     find, names = compiled.library.get_pointer_to_function, compiled.fndesc
     pointer = find(names.llvm_cfunc_wrapper_name) if wrappers else 0
     return Code(find(names.llvm_func_name), pointer, compiled.entry_point if wrappers else None, compiled)
@@ -231,7 +244,8 @@ def code_of(compiled, wrappers: bool = True) -> Code:
 class DeclaredFunction:
     """Compiled function of a single signature, for calls from Python and as an argument of compiled functions.
 
-    `.address` is its address for C. Exceptions are lost in such calls: these functions report errors in their output.
+    `.address` is its address for C. Exceptions are lost in calls by address: these functions
+    report errors in their output.
     """
 
     def __init__(self, function: Any, letters: str, code: Code) -> None:
@@ -249,7 +263,7 @@ class DeclaredFunction:
 
 @functools.cache
 def plain_kinds() -> dict:
-    """Numba types of numbers and arrays of numbers : letter of a signature -> type."""
+    """Numba types of numbers and of arrays of numbers : letter of a signature -> type."""
     types = _numba().types
     kinds = {"t": types.float64, "i": types.int64, "b": types.boolean, "c": types.complex128}
     return kinds | {letter: types.Array(getattr(types, kind), axes, "C") for letter, (kind, axes) in ARRAYS.items()}
@@ -270,9 +284,9 @@ WRITABLE, COLUMNS = 0x501, 2  # numpy flags: C-contiguous, aligned and writable;
 
 
 def signature_of(argument: Any) -> str:
-    """Signature of an argument: a letter of `kernels.calls`, or for other arrays and tuples a text in brackets.
+    """Signature of an argument: a letter of `LETTERS` or `ARRAYS`, or a text in brackets.
 
-    Raises KeyError for any other type.
+    Other arrays, records and tuples have such a text. Raises KeyError for any other type.
     """
     if type(argument) is not np.ndarray:
         if isinstance(argument, tuple):
@@ -292,7 +306,7 @@ def _dtype_text(kind: np.dtype) -> str:
 
 
 def compile_once(function: Callable) -> Callable:
-    """Decorate a function that compiles so that it runs once for the same arguments, also if several threads call it.
+    """Decorate a function that compiles, so that it runs only once for the same arguments, even in several threads.
 
     Concurrent calls wait for the first call and get its result, as from `functools.cache`.
     """
@@ -334,12 +348,12 @@ class Intrinsic:
 
 
 def is_cold() -> bool:
-    """True if the code folder is empty, so that functions of this version must be compiled first."""
+    """True if the code folder contains no compiled functions of this version, so that they must be compiled first."""
     return COMPILING and not any(code_folder().glob(f"*{store.SUFFIX}"))
 
 
 def other_caches() -> str:
-    """Text about cached code from other machines or sources, which cannot be used here; "" if there is none."""
+    """Text about cached code from other machines or sources, which cannot be used here; "" without such code."""
     own = code_folder()
     folders = {path.parent for path in cache_folder().glob(f"code/*/*/*{store.SUFFIX}")}
     machines = sorted(path.name for path in folders if path.parent == own.parent and path != own)
@@ -356,7 +370,7 @@ def other_caches() -> str:
 
 @contextlib.contextmanager
 def compile_in_parallel(code: str, cached: str):
-    """Context in which a second process runs the Python text `code` to compile functions.
+    """Context manager during which a second process runs the Python text `code`, to compile functions.
 
     It halves the time of a cold start. cached : name of a function that the process compiles; if the store contains
     this function, no process is started. Functions that the process does not compile are compiled by the caller.
@@ -385,7 +399,7 @@ def _sources() -> tuple[Path, ...]:
 
 @functools.cache
 def _numba():
-    """Module numba, imported when something is first compiled; its warning about first-class functions is disabled."""
+    """Module numba, imported at the first compilation; its warning about first-class functions is disabled."""
     import numba
     from numba.core.errors import NumbaExperimentalFeatureWarning
 
@@ -478,7 +492,7 @@ def _warn_not_cached(reason: str) -> None:
 
 @functools.cache
 def code_folder() -> Path:
-    """Folder of code compiled from these sources for this machine.
+    """Folder for the code compiled from the present sources for this machine.
 
     It is created if missing; the oldest folders of other sources are deleted.
     """
@@ -493,7 +507,10 @@ def code_folder() -> Path:
 
 
 def _prune(present: Path) -> None:
-    """Delete the folders of other sources except the newest; another process may do this at the same time."""
+    """Delete the folders of code from other sources, except the newest; another process may do this at the same time.
+
+    present : folder of the present sources
+    """
     others = []
     for path in present.parent.iterdir():
         try:

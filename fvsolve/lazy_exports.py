@@ -12,7 +12,7 @@ def lazy_names(package: str, modules: Mapping[str, str]) -> list[str]:
     """Make names available as attributes of a package, imported on first use; return the sorted names, for `__all__`.
 
     modules : name -> module in the package, or `.other.module` for a module of a neighbouring package. A function stays
-    visible after the import of a module with the same name.
+    available after the import of a module with the same name.
     """
 
     class LazyModule(ModuleType):

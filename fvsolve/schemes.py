@@ -17,7 +17,11 @@ Weights = tuple[Fraction, ...]
 
 
 class Reach(NamedTuple):
-    """Numbers of cells that the rate of a cell depends on, for a wave that runs forward."""
+    """Numbers of cells that the rate of a cell depends on, for a wave that runs forward.
+
+    behind, ahead : cells before and after the cell
+    entering, leaving : cells under the polynomial beyond an end of a pipe, where a wave enters and where it leaves
+    """
 
     behind: int  # cells before a cell, in its rate
     ahead: int  # cells after it
@@ -33,11 +37,12 @@ class Scheme:
     weights : of cells u-2 .. u+2 in the value at the face after cell u; None for a limited scheme
     twin : linear scheme that a limited scheme equals in smooth solutions
     shorter : scheme for pipes of fewer than `LEAST_CELLS` cells; plane : scheme for basins on rectangles
-    cavities : True if the scheme can treat the edge of a cavity; stencils of other schemes reach across it
+    cavities : True if the scheme is suitable at the edge of a cavity; stencils of other schemes reach across it
     extra_cells : cells read at an end where a wave leaves, in addition to those of the polynomial there
-    own_end_factors : factors on the rate (cells crossed per second) of a pipe of 1, 2, 3, ... cells because of its
-    ends, at least 1. They are 0.9, or 0.9 times the limit of a long pipe if that is less, over the Courant number above
-    which ssp-rk3 is unstable between an open and a shut end (tests/step_limits/test_ends.py).
+    own_end_factors : factors, at least 1, on the rate of a pipe of 1, 2, 3, ... cells, because of its ends
+    The rate is the number of cells that a wave crosses per second. A factor is at least 0.9 min(1, C) / c: C is the
+    Courant limit of ssp-rk3 on a long pipe, c its limit on the short pipe between an open and a shut end
+    (tests/step_limits/test_ends.py).
     """
 
     name: str
@@ -70,7 +75,7 @@ class Scheme:
         return degree
 
     def exact(self, degree: int) -> bool:
-        """True if the scheme gives the exact value of x^degree at the face x = 1, from means over cells [k, k + 1]."""
+        """True if the scheme gives x^degree exactly at the face x = 1, from averages over the cells [k, k + 1]."""
         power = degree + 1
         averages = (Fraction((k + 1) ** power - k**power, power) for k in STENCIL)
         return sum(w * average for w, average in zip(self.smooth.weights, averages, strict=True)) == 1
@@ -82,13 +87,16 @@ class Scheme:
 
     @cached_property
     def reach(self) -> Reach:
-        """Numbers of cells that the rate of a cell depends on."""
+        """Numbers of cells that the rate of a cell depends on, see `Reach`."""
         used = [k for k, w in zip(STENCIL, self.smooth.weights, strict=True) if w != 0]
         return Reach(1 - min(used), max(0, *used), self.degree, self.degree + 1 + self.extra_cells)
 
     @property
     def end_factors(self) -> tuple[float, ...]:
-        """Factors on the rate of a pipe of 1, 2, 3, ... cells because of its ends: those of the linear scheme."""
+        """Factors on the rate of a pipe of 1, 2, 3, ... cells because of its ends, see `Scheme`.
+
+        They are those of the linear scheme `smooth`.
+        """
         return self.smooth.own_end_factors
 
     def for_basin(self, rectangle: bool) -> Scheme:
@@ -145,7 +153,10 @@ LIMITED = {name: scheme for name, scheme in SCHEMES.items() if scheme.limited}
 
 
 def end_rate_factor(scheme: str, cells: int) -> float:
-    """Factor on the rate (cells crossed per second) of a pipe because of its ends; 1 for a long pipe."""
+    """Factor on the rate (cells crossed per second) of a pipe with a number of cells, because of its ends.
+
+    It is 1 for a long pipe.
+    """
     factors = SCHEMES[scheme].end_factors
     return factors[cells - 1] if cells <= len(factors) else 1.0
 
@@ -153,10 +164,10 @@ def end_rate_factor(scheme: str, cells: int) -> float:
 class Limiter(NamedTuple):
     """Limiter of slopes; its code in `kernels.limiters` is its position in `LIMITERS`.
 
-    tangents : for each branch with a slope, the derivatives of the slope by the differences to the cells behind and
-    ahead
-    overshoot : on unstructured meshes with least-squares slopes, bound of the values at sides relative to those of
-    neighbouring cells: 1 for no overshoot, more as linear fields need on distorted meshes
+    tangents : (a, b) for each branch in which the limited slope is not zero but a d + b e; d and e are the differences
+    of values to the cells behind and ahead
+    overshoot : bound of the values at sides relative to those of neighbouring cells, for unstructured meshes with
+    least-squares slopes. It is 1 without overshoot; linear fields on distorted meshes need more than 1.
     """
 
     tangents: tuple[tuple[Fraction, Fraction], ...]
@@ -166,7 +177,7 @@ class Limiter(NamedTuple):
     def branches(self) -> dict[str, Weights]:
         """Weights of the linear schemes that muscl equals, one for each branch of the limiter : name -> weights.
 
-        A branch that is no scheme of its own has twice the slope to the cell behind, or to the cell ahead.
+        The branches with twice the difference to a neighbour as slope are named "twice behind" and "twice ahead".
         """
         half = [(Fraction(), Fraction()), *((a / 2, b / 2) for a, b in self.tangents)]
         schemes = [(ZERO, -a, 1 + a - b, b, ZERO) for a, b in half]
@@ -175,7 +186,7 @@ class Limiter(NamedTuple):
 
     @property
     def steepest(self) -> Fraction:
-        """Greatest ratio of the limited slope to the smaller of the two differences."""
+        """Greatest ratio of the limited slope to the smaller of the differences to the cells behind and ahead."""
         return max(max(pair) for pair in self.tangents)
 
 
@@ -188,5 +199,8 @@ LIMITERS = {
 
 
 def branches(scheme: str, limiter: str) -> dict[str, Weights]:
-    """Weights of the linear schemes that a limited scheme equals, one for each of its branches : name -> weights."""
+    """Weights of the linear schemes that a limited scheme equals, one for each of its branches : name -> weights.
+
+    For muscl the branches are those of the limiter.
+    """
     return LIMITERS[limiter].branches if scheme == "muscl" else dict(SCHEMES[scheme].branches)

@@ -25,8 +25,8 @@ class Edge:
 
     The equation is alpha dM - beta d(drop) = gamma, for changes of the mass flow M [kg/s] and of the potential drop
     [Pa].
-    row : function (flow, drop) -> (alpha, beta, gamma); None keeps the flow at `flow`
-    shut : True if there is no flow; potentials of nodes behind the link may be estimated from its other side
+    row : function (flow, drop) -> (alpha, beta, gamma); None for a fixed flow, which is `flow`
+    shut : True for a link without flow; potentials of nodes behind it may be estimated from its other side
     """
 
     i: int
@@ -46,8 +46,9 @@ class Edge:
 
 @dataclass
 class SteadyState:
-    """Solution of a steady problem: potentials of nodes [Pa], flows of edges [kg/s], nodes without a solution.
+    """Solution of a steady problem: potentials of nodes [Pa] and mass flows of edges [kg/s].
 
+    converged : True if Newton's method converged; no_solution : nodes whose demand cannot be supplied
     split : True if the flows of a loop are not unique; then they are those of least norm
     """
 
@@ -93,10 +94,12 @@ def _no_drop(flow: float) -> float:
 
 
 def _quiet(held, demand, edges) -> set[int]:
-    """Indices of edges in parts of the network without flow.
+    """Indices of the edges in those parts of the network in which nothing drives a flow.
 
-    There all given potentials agree to rounding, and there is no demand. Otherwise rounding of a head would drive a
-    flow: by M |M| = G dP it is the square root of the rounding error (mass flow M, conductance G, potential drop dP).
+    In such a part all given potentials agree to rounding, and all demands are zero. If it were solved, rounding of a
+    head
+    would drive a flow: by M |M| = G dP it is of the order of the square root of the rounding error (mass flow M,
+    conductance G, potential drop dP). held, demand, edges : as for `solve_steady`
     """
     fed = {i for edge in edges if edge.row is None and edge.flow != 0.0 for i in (edge.i, edge.j)}
     quiet = set()
@@ -115,7 +118,10 @@ def _group_of(groups, i):
 
 
 def union(n: int, pairs) -> list[int]:
-    """Label of the connected set to which each of n items belongs; pairs : items that are connected."""
+    """Labels of n items, equal for items that are connected, directly or through others : list of n indices.
+
+    pairs : pairs of items that are connected
+    """
     label = list(range(n))
 
     def root(i: int) -> int:
@@ -129,7 +135,10 @@ def union(n: int, pairs) -> list[int]:
 
 
 def _components(held, edges):
-    """Connected sets of nodes : (all sets joined by edges with unknown flow, the sets without a given potential)."""
+    """Sets of nodes that edges with unknown flow connect : (all sets, the sets without a given potential).
+
+    held, edges : as for `solve_steady`
+    """
     joined = [(edge.i, edge.j) for edge in edges if edge.row is not None and not edge.shut]
     groups: dict[int, set[int]] = {}
     for i, label in enumerate(union(held.size, joined)):
@@ -139,9 +148,12 @@ def _components(held, edges):
 
 
 def _references(held, demand, edges, parts, free_sets):
-    """Equations for the sets of nodes without a given potential that edges with a fixed flow join to known potentials.
+    """Fixed flows that give a potential to sets of nodes without one : (nodes whose balance is dropped, edge -> set).
 
-    Returns (nodes whose balance is dropped, fixed edge that determines the potential -> its set).
+    An edge with a fixed flow joins such a set to known potentials. Its equation determines the potential of the
+    set and replaces the balance of one of its nodes.
+    held, demand, edges : as for `solve_steady`
+    parts, free_sets : as from `_components`
     """
     dropped: set[int] = set()
     entries: dict[int, frozenset[int]] = {}
@@ -162,23 +174,23 @@ def _references(held, demand, edges, parts, free_sets):
 
 
 def _enters(edge, group, known) -> bool:
-    """True if an edge with a fixed flow joins a set of nodes to a node with a known potential."""
+    """True if an edge with a fixed flow and a known drop joins the set of nodes `group` to one in the set `known`."""
     if edge.row is not None or edge.drop is None:
         return False
     return (edge.i in group and edge.j in known) or (edge.j in group and edge.i in known)
 
 
 def _dead_end(group, demand, edges):
-    """Node of a set that is most like a dead end: without demand, with the fewest links."""
+    """Node of the set `group` that is most similar to a dead end: without demand, with the fewest links."""
     count = {i: sum(i in (edge.i, edge.j) for edge in edges) for i in group}
     return min(sorted(group), key=lambda i: (demand[i] != 0.0, count[i]))
 
 
 def _newton(result, edges, active, rows, nodes, balances, demand, scale, anchors):
-    """Newton's method on the flows of `active` edges and the potentials of `nodes`; writes them to `result`.
+    """Solve for the flows of `active` edges and the potentials of `nodes` by Newton's method; write them to `result`.
 
-    The system has a row for each edge in `rows`, each balance of a node, and each node in `anchors`, whose potential is
-    kept because nothing determines it.
+    The system has a row for each edge in `rows`, for the balance of each node in `balances`, and for each node in
+    `anchors`, whose potential is kept because nothing determines it. edges, demand, scale : as for `solve_steady`
     """
     column = {("flow", e): k for k, e in enumerate(active)}
     column |= {("node", i): len(active) + k for k, i in enumerate(nodes)}
@@ -217,7 +229,10 @@ def _newton(result, edges, active, rows, nodes, balances, demand, scale, anchors
 
 
 def _columns(column, e, edge) -> tuple[int, ...]:
-    """Columns of the Newton row of edge e, in the order of `_edge_row`; -1 for a quantity that is not an unknown."""
+    """Columns of the Newton row of edge e, in the order of `_edge_row`; -1 for a quantity that is not an unknown.
+
+    column : unknown -> its column; unknowns are ("flow", edge) and ("node", node)
+    """
     if edge.held_potential is not None:
         return (column["node", edge.held_potential[0]],)
     flow = column.get(("flow", e), -1)
@@ -226,7 +241,10 @@ def _columns(column, e, edge) -> tuple[int, ...]:
 
 
 def _edge_row(values, columns, e, edge, result, scale) -> float:
-    """Append the values of the Newton row of edge e in scaled unknowns to `values`; return its right-hand side."""
+    """Append the values of the Newton row of edge e in scaled unknowns to `values`; return its right-hand side.
+
+    columns : as from `_columns`; result : `SteadyState` of the last iteration; scale : as for `solve_steady`
+    """
     if edge.held_potential is not None:
         values.append(1.0)
         return (edge.held_potential[1] - result.potential[edge.held_potential[0]]) / scale[0]
@@ -252,7 +270,8 @@ def _edge_row(values, columns, e, edge, result, scale) -> float:
 def _solve(places, values, right, size, result):
     """Least-norm solution of the Newton system; sets `result.split` if the system is singular.
 
-    places : index of each value in the matrix, row * size + column. The solution is NaN if a number is not finite.
+    places : index of each of the `values` in the matrix, row * size + column; right : right-hand side
+    size : number of unknowns. The solution is NaN if a number in `values` or `right` is not finite.
     """
     if not (np.isfinite(values).all() and np.isfinite(right).all()):
         return np.full(size, np.nan)
@@ -274,9 +293,11 @@ def _solve(places, values, right, size, result):
 
 
 def _solve_sparse(values, i, j, right, size):
-    """Solution of a large sparse system A x = b : (x, True if the system is singular).
+    """Solution of a large sparse system A x = b : (x, True if the system is singular or not square).
 
-    If it is singular: r + A x = b, A' r = DAMPING x, so that x minimises |A x - b|^2 + DAMPING |x|^2.
+    values, i, j : entries of A with their rows and columns, entries at the same place are added; right : b
+    size : number of unknowns
+    If it is singular or not square: r + A x = b, A' r = DAMPING x, so that x minimises |A x - b|^2 + DAMPING |x|^2.
     """
     from scipy.sparse import bmat, csc_matrix, identity
     from scipy.sparse.linalg import splu
@@ -297,6 +318,8 @@ def _through_shut(result, held, edges, free_sets, floating):
     """Set the potentials of sets of nodes behind shut links, in which nothing else determines them.
 
     They are the limit of equal small leaks through these links, with zero sum of the flows sign(dP) sqrt|dP|.
+    held, edges : as for `solve_steady`; free_sets : as from `_components`
+    floating : nodes whose potential nothing determines
     """
     groups = [group for group in free_sets if group & floating]
     for _ in range(60):

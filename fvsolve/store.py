@@ -34,7 +34,10 @@ LIBRARY_NUMBERS = itertools.count()  # for unique names of libraries
 
 
 class Code(NamedTuple):
-    """Function in memory: address for compiled code, address for C (or 0), callable for Python (or None)."""
+    """Compiled function in memory.
+
+    address : for calls from compiled code; pointer : address for C, or 0; python : callable for Python, or None
+    """
 
     address: int
     pointer: int
@@ -46,7 +49,7 @@ class Code(NamedTuple):
 def target() -> dict[str, str]:
     """Properties on which machine code depends apart from sources: processor, versions, settings of numba.
 
-    The entry `name` is the name of the folder: the processor and eight digits of the hash of all properties.
+    The entry `name` is the name of the folder for the code: processor, and eight digits of the hash of all properties.
     """
     import llvmlite
     import numpy
@@ -87,7 +90,10 @@ def numba_folder() -> Path | None:
 
 
 def write_target(folder: Path) -> None:
-    """Write the properties of the target to the file target.json in a folder, unless it exists."""
+    """Write the properties on which machine code depends (see `target`) to a new file target.json in a folder.
+
+    An existing file is left unchanged.
+    """
     path = folder / "target.json"
     if not path.exists():
         _replace(path, json.dumps(target(), indent=1).encode())
@@ -96,9 +102,9 @@ def write_target(folder: Path) -> None:
 def write(path: Path, identity: str, compiled, code: bytes, wrappers: bool) -> None:
     """Save a function compiled by numba to a file. Raises OSError if the file cannot be written.
 
-    identity : text that identifies function and signature; compiled : result of numba's compilation; code : its object
-    code
-    wrappers : True if the code has wrappers for calls from Python and C
+    identity : text that identifies function and signature; compiled : result of numba's compilation
+    code : its object code; wrappers : True if the code has wrappers for calls from Python and C
+    Code with wrappers that refers to Python objects is not saved.
     """
     names = compiled.fndesc
     symbols = {"address": names.llvm_func_name}
@@ -128,7 +134,7 @@ def read(path: Path, identity: str) -> Code | None:
     """Load a function from a file; None if its code is missing, damaged or cannot be used.
 
     Code for another target, and code that cannot be linked, cause a warning.
-    identity : text that must identify function and signature, as in `write`
+    identity : text that identifies function and signature; it must be that of `write`
     """
     try:
         content = path.read_bytes()
@@ -160,9 +166,10 @@ def _warn(text: str) -> None:
 
 
 def _link(symbols: dict[str, str], needed: list[str], object_code: bytes, identity: str) -> Code:
-    """Link object code to a library of its own, so that symbols of different functions do not conflict.
+    """Load object code into a library of its own, so that symbols of different functions do not conflict.
 
     symbols : name of each entry point of the function; needed : names of symbols of numba and Python that it uses
+    identity : text that identifies function and signature
     """
     from llvmlite import binding
 

@@ -17,7 +17,7 @@ from fvsolve.units import show
 
 
 class Kind(NamedTuple):
-    """Kind of an argument: test that accepts a value, and the expected value in words."""
+    """Kind of an argument: test that accepts a value (`accepts`), and the expected value in words (`expected`)."""
 
     accepts: Callable[[Any], bool]
     expected: str
@@ -38,9 +38,9 @@ def is_name(value: Any) -> bool:
 
 
 def is_array(value: Any, kinds: str, least: int, most: int, finite: bool = True) -> bool:
-    """True if the argument is a number or array of certain numpy kinds ("f", "c", ...).
+    """True if the argument is a number or an array whose numpy kind is in `kinds` ("f", "c", ...).
 
-    It has `least` to `most` dimensions; with `finite`, all numbers are finite.
+    It must have `least` to `most` dimensions, and with `finite` only finite numbers.
     """
     try:
         array = np.asarray(value)
@@ -78,9 +78,9 @@ NAMES = Kind(lambda value: is_name(value) or is_row(value, is_name), "a name or 
 
 
 def validated(**kinds: Kind) -> Callable:
-    """Decorate a function so that it checks arguments: each must be of its kind, or its default; else FvsolveError.
+    """Decorate a function so that it checks its arguments, and raises FvsolveError for an invalid argument.
 
-    kinds : name of an argument -> Kind
+    kinds : name of an argument -> `Kind` that it must have; its default value is also valid
     """
 
     def decorate(function: Callable) -> Callable:

@@ -24,24 +24,30 @@ WENO_COURANT = 0.5  # Courant number up to which weno5 keeps its bounds
 
 @njit
 def put_values(s, depth, c):
-    """Write the values c = s / depth of cells; s : amounts per area, depth [m]."""
+    """Write the values c = s / depth of cells, with a depth of at least THIN.
+
+    s : amounts of a scalar per area; depth : depths of the cells [m]
+    """
     for i in range(c.size):
         c[i] = s[i] / max(depth[i], THIN)
 
 
 @njit
 def stencil_values(nx, ny, begin, stop, s, depth, c):
-    """Write the values c = s / depth of the cells of rows `begin` to `stop` - 1, and of three rows on either side."""
+    """Write the values c = s / depth of the cells of rows `begin` to `stop` - 1, and of three rows on either side.
+
+    nx, ny : numbers of columns and rows of the grid; s, depth : as for `put_values`
+    """
     a, z = nx * max(begin - 3, 0), nx * min(stop + 3, ny)
     put_values(s[a:z], depth[a:z], c[a:z])
 
 
 @njit
 def grid_fastest(nx, ny, kx, ky, flow_x, flow_y, depth, work):
-    """Greatest rate |u| kx + |v| ky of the cells of a grid [1/s], with the greater flow of opposite faces of a cell.
+    """Greatest rate |u| kx + |v| ky over the cells of a grid [1/s].
 
-    u, v : velocities along x and y [m/s]; kx, ky and flows as for `grid_advection`
-    work : float64[nx]
+    u, v : velocities along x and y [m/s], each from the greater flow through two opposite faces of the cell
+    nx, ny, kx, ky, flow_x, flow_y, depth : as for `grid_advection`; work : float64[nx]  scratch
     """
     top = work[:nx]
     for i in range(nx):
@@ -69,16 +75,17 @@ def advection_work(scheme, nx, ny):
 
 @njit
 def grid_advection(scheme, limiter, nx, ny, begin, stop, kx, ky, factor, flow_x, flow_y, depth, outside, s, work, rate):
-    """Write the rates of the amounts `s` by muscl or, for any other scheme, by upwind, in flows times `factor`.
+    """Write the rates of change of the amounts `s` of a scalar by advection, with muscl or (any other scheme) upwind.
 
-    The rates are those of rows `begin` to `stop` - 1; two rows on either side are read too.
-    kx : float64[nx], ky : float64[ny]  1 / widths and heights of cells [1/m]
-    factor : factor of either sign on all flows
+    The rates are those of rows `begin` to `stop` - 1, for all flows times `factor`. Two rows on either side are read
+    too, and the rates of row `begin` - 1 may be overwritten with wrong values.
+    nx, ny : numbers of columns and rows; scheme : MUSCL, else upwind; limiter : limiter of muscl
+    kx, ky : float64[nx], float64[ny]  1 / widths of columns, 1 / heights of rows [1/m]; factor : of either sign
     flow_x : float64[ny (nx + 1)], flow_y : float64[(ny + 1) nx]  flows through faces, row by row: velocity [m/s] times
-        face length, [m2/s], if `depth` is empty; else with depth [m3/s]
-    depth : float64[nx ny]  depths of cells [m]; empty if s is the value c
-    outside : float64[2 (nx + ny)]  values of inflow at boundary faces
-    work : float64[advection_work(scheme, nx, ny)]; s, rate : float64[nx ny]
+    face length [m2/s], and also times the depth [m3/s] if `depth` is not empty
+    depth : float64[nx ny]  depths of cells [m]; empty if s contains the values c themselves
+    outside : float64[2 (nx + ny)]  values of the inflow at boundary faces, in the order west, east, south, north
+    s, rate : float64[nx ny]  amounts per area, and their rates; work : float64[advection_work(scheme, nx, ny)]
     """
     c, rest, first = s, work[nx * ny :], scheme if scheme == MUSCL else UPWIND
     if depth.size > 0:
@@ -93,10 +100,10 @@ def grid_advection(scheme, limiter, nx, ny, begin, stop, kx, ky, factor, flow_x,
 def add_fifth_order(
     scheme, nx, ny, kx, ky, factor, flow_x, flow_y, depth, outside, least, most, fastest, s, work, rate
 ):
-    """Add to rates by upwind their difference from the rates by upwind5 or weno5.
+    """Add the rates by upwind5 or weno5, minus the rates by upwind, to `rate`, which contains the rates by upwind.
 
     scheme : LINEAR for upwind5, or WENO5; least, most : bounds that weno5 keeps, infinite for none
-    fastest : rate of `grid_fastest` for the flows [1/s]; other arguments as for `grid_advection`
+    fastest : result of `grid_fastest` for the flows [1/s]; other arguments as for `grid_advection`
     """
     c, rest, mx, my = s, work[nx * ny :], (nx + 1) * ny, nx * (ny + 1)
     if depth.size > 0:

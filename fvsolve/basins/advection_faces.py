@@ -4,16 +4,17 @@ s_t + div(F c) = div(D depth grad c), with c the value of a scalar, s = depth c 
 width [m2/s] and D the diffusivity. The rate of a uniform c is c times the divergence of F, to the last bit.
 
 Euler steps up to the reciprocal of the returned rate keep all values between two bounds, because the value at a side of
-a cell differs from the value of the cell by no more than the distance to the nearer bound. So the flow that leaves has
-at most twice the distance of the cell from a bound. Up to two thirds of that step, `minmod` keeps values within the
-range of the neighbours. Other limiters have second order on any mesh.
+a cell differs from the value of the cell by no more than the distance to the nearer bound. So the value of the outflow
+is at most twice as far from a bound as the value of the cell. Up to two thirds of that step, `minmod` keeps values
+within the range of the neighbours. Other limiters have second order on any mesh.
 
 Diffusion uses the difference of two cells along the line between their centres. Where this line is not normal to the
-face, the mean of the gradients of both cells gives the oblique part: this is of second order, but without bounds. There
-is no diffusion through walls and where the flow leaves; where it enters, the value outside holds at the face.
+face, the mean of the gradients of both cells gives the oblique part: this is of second order, but without bounds.
+Diffusion
+has no flux through walls and where the flow leaves; where it enters, the value outside holds at the face.
 
-c, d : values and depths of the cells of a block; w : scratch of a block, float64[ROWS BLOCK]; geo, far : measures of
-sides from `floats`, see `cell_sides`.
+c, d : values and depths of the cells of a block; w : scratch of a block, float64[ROWS BLOCK]; geo, far : first and last
+group of measures of sides in `floats`, see `cell_sides`.
 """
 
 import numpy as np
@@ -61,7 +62,10 @@ ROWS = 11
 
 @njit
 def put_values(s, depth, c, d):
-    """Write the values c = s / depth of a block of cells, and their depths d, which are 1 where `depth` is empty."""
+    """Write the values c = s / depth of a block of cells, with a depth of at least THIN, and their depths d.
+
+    s : amounts of a scalar per area; if `depth` is empty, c = s and d = 1
+    """
     if depth.size == 0:
         for i in range(s.size):
             c[i], d[i] = s[i], 1.0
@@ -74,7 +78,9 @@ def put_values(s, depth, c, d):
 def put_gradients(j, floats, integers, values, shown, edges, w, gx, gy):
     """Write the least-squares gradients gx, gy of the values in block j of cells.
 
-    shown : values beyond the boundary sides `edges`; w : float64[BLOCK]  scratch
+    floats, integers : mesh, see `cell_sides`
+    values, gx, gy : float64[ring BLOCK], stored in the ring of blocks that `cell_sides` describes
+    edges : numbers of the boundary sides of the block; shown : values beyond them; w : float64[BLOCK]  scratch
     """
     slots, at, places = integers[0], j % integers[4] * BLOCK, integers[HEAD:].view(np.int32)
     c, gx, gy = values[at:], gx[at:], gy[at:]
@@ -94,9 +100,10 @@ def put_gradients(j, floats, integers, values, shown, edges, w, gx, gy):
 
 @njit
 def gather_flows(faces, factor, flow, out):
-    """Write the outward flows through one side of each cell of a block.
+    """Write the outward flows through one side of each cell of a block to `out`.
 
-    faces : numbers of the faces, ~f where the normal of face f points inwards
+    faces : for each cell the number f of the face, or ~f if the normal of the face points into the cell
+    flow : flows through all faces along their normals; factor : factor on the flows
     """
     for i in range(BLOCK):
         f = faces[i]
@@ -105,17 +112,23 @@ def gather_flows(faces, factor, flow, out):
 
 @njit
 def put_allowed(c, least, most, allowed):
-    """Write the greatest allowed deviation of side values from the cells of a block: distance to the nearer bound."""
+    """Write how far values at the sides of each cell of a block may differ from its value c: up to the nearer bound.
+
+    The difference is 0 if c is beyond a bound. least, most : bounds of c; allowed : the differences
+    """
     for i in range(BLOCK):
         allowed[i] = max(min(c[i] - least, most - c[i]), 0.0)
 
 
 @njit
 def add_advection(count, c, d, cl, far, w):
-    """Subtract the advective outflow through one side of each cell of a block from the rates.
+    """Subtract the outflow by advection through one side of each cell of a block from the rates in the scratch w.
 
-    The outflow of a uniform c is left out here.
-    count : factor of the outflow in the rate that limits the step; cl : values at the side, inside the cell
+    The outflow that the cell value c would have is left out: `put_rates` subtracts it. The flows, the values beyond the
+    side and sums over the sides are in w too.
+    c, d : values and depths of the cells; cl : values at the side inside the cells
+    far : last group of measures of the side in `floats`, see `cell_sides`
+    count : factor on the outflow in the rate that limits the step
     """
     for i in range(BLOCK):
         q = far[PER_AREA * BLOCK + i] * w[_FLOW + i]
@@ -126,7 +139,12 @@ def add_advection(count, c, d, cl, far, w):
 
 @njit
 def add_diffusion(diffusivity, c, d, gx, gy, geo, far, w):
-    """Add the diffusive inflow through one side of each cell of a block to the rates; gx, gy : gradients."""
+    """Add the inflow by diffusion through one side of each cell of a block to the rates in the scratch w.
+
+    c, d, gx, gy : values, depths and gradients of the cells; those of the cells beyond the side are in w
+    geo, far : first and last group of measures of the side in `floats`, see `cell_sides`
+    diffusivity : [m2/s]
+    """
     for i in range(BLOCK):
         a, b = d[i], w[_DEPTH + i]
         k = diffusivity * geo[_REACH + i] * (2.0 * a * b / (a + b + TINY))
@@ -144,7 +162,10 @@ def clear(w):
 
 @njit
 def put_rates(c, w, rate):
-    """Write the rates of a block of cells, and update the greatest outflow rate so far in the scratch w."""
+    """Write the rates of a block of cells to `rate` from the scratch w, and update the greatest outflow rate in w.
+
+    The part c times the divergence of the flow, which `add_advection` leaves out, is subtracted here. c : cell values
+    """
     for i in range(BLOCK):
         w[_TOP + i] = max(w[_TOP + i], w[_OUTFLOW + i])
     for i in range(rate.size):
@@ -152,7 +173,7 @@ def put_rates(c, w, rate):
 
 
 def work_size(integers):
-    """Length of the work array of `advection_rates`."""
+    """Length of the work array of `advection_rates`. integers : mesh, as there"""
     return 8 * integers[4] * BLOCK + 2 * integers[3] + ROWS * BLOCK
 
 
@@ -160,18 +181,19 @@ def work_size(integers):
 def advection_rates(
     scheme, wide_by, diffusivity, factor, floats, integers, flow, depth, outside, least, most, s, work, rate
 ):
-    """Write the rates of the amounts `s`; return the reciprocal of the step that keeps the bounds [1/s].
+    """Write the rates of the amounts `s` of a scalar; return the inverse of the Euler step that keeps bounds [1/s].
 
     The returned rate is the greatest fraction of a cell that leaves it per time, for `muscl` twice that, and more with
     diffusion.
 
-    scheme : UPWIND or MUSCL; wide_by : allowed excess of values at sides over the range of neighbours, 1 for none
-    diffusivity : [m2/s], 0 for none; factor : factor on all flows
+    scheme : UPWIND or MUSCL; wide_by : factor on the range of the neighbours that limits values at sides; with 1 they
+    stay within that range
+    diffusivity : [m2/s], 0 without diffusion; factor : factor on all flows
     floats, integers : mesh, see `cell_sides`; least, most : bounds of c, infinite for none
-    flow : float64[faces]  through faces, from the left to the right cell: velocity [m/s] times length, [m2/s]; with
-        depths [m3/s]
-    depth : float64[cells]  [m]; empty if s is the value c
-    outside : float64[boundary faces]  values of inflow; s, rate : float64[cells]
+    flow : float64[faces]  flows through faces, from the left to the right cell: velocity [m/s] times length [m2/s], and
+    also times the depth [m3/s] if `depth` is not empty
+    depth : float64[cells]  depths [m]; empty if s contains the values c themselves
+    outside : float64[boundary faces]  values of the inflow; s, rate : float64[cells]  amounts per area, and their rates
     work : float64[work_size(integers)]
     """
     slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]

@@ -36,9 +36,9 @@ FRAME_SIZE = 28  # number of numbers
 
 @njit
 def set_frames(t, y, dydt, out, handle):
-    """Compute the motion of all frames, and tilt the beds of basins with a free surface.
+    """Compute the motion of the frames of all basins on bodies, and tilt the beds of those with a free surface.
 
-    Sets the status NO_WEIGHT if a basin with a free surface has no weight along its normal.
+    The status is set to NO_WEIGHT if the water of such a basin has no weight along the normal of its bed.
     """
     tables = open_tables(handle)
     for b in range(tables.basins.size):
@@ -53,9 +53,10 @@ def set_frames(t, y, dydt, out, handle):
 
 @njit
 def frame_component(out, row, plane, at, k, x, y, z):
-    """Component of a vector (x, y, z) in axes of the world along axis k of the frame of a basin.
+    """Component of the vector (x, y, z), given in axes of the world, along axis k of the frame of a basin.
 
-    row : offset of the body in `out`; plane[at] : rotation matrix of the frame in axes of the body, by rows
+    k : 0, 1 or 2 for the x, y or z axis; row : offset of the body of the basin in `out`
+    plane[at] : first entry of the rotation matrix of the frame in axes of the body, by rows
     """
     ax, ay, az = rotate(out, row + ATTITUDE, plane[at + k : at + k + 7 : 3], 0)
     return ax * x + ay * y + az * z
@@ -63,9 +64,10 @@ def frame_component(out, row, plane, at, k, x, y, z):
 
 @njit
 def set_frame(tables, basin, out):
-    """Compute the numbers of the frame of a basin in its axes, and store them in `plane`.
+    """Compute the motion of the frame of a basin, and write it in axes of the basin to `tables.plane`.
 
-    They are gravity minus acceleration of the origin, angular velocity, angular acceleration, and gravity alone.
+    The entries are gravity minus acceleration of the origin [m/s2], angular velocity [rad/s], angular acceleration
+    [rad/s2], and gravity alone [m/s2]. The accelerations are those for zero accelerations of all joints.
     """
     plane, at, row = tables.plane, basin["frame"], body_row(tables, basin["body"])
     rx, ry, rz = rotate(out, row + ATTITUDE, plane[at : at + 3], 0)
@@ -100,7 +102,12 @@ def potential_coefficients(plane, at, per):
 
 @njit
 def tilt_bed(plane, basin):
-    """Write the bed elevation of a basin above the level at rest, plus the frame potential over normal gravity."""
+    """Write the surface at rest of a basin [m], tilted by its frame: undisturbed surface plus potential over gravity.
+
+    The undisturbed surface is 0 (the level at rest), or the height of the bed above that level. The depth at rest is
+    constant, so the bed is tilted by the same heights. Gravity is that along the normal, the potential that of the
+    frame.
+    """
     at, n = basin["frame"], basin["n"]
     to, drawn = basin["plan"] + n, int(plane[at + REST_SURFACE])
     add_potential(plane, basin, 1.0 / plane[at + GN], plane[drawn : drawn + n], plane[to : to + n])
@@ -108,7 +115,10 @@ def tilt_bed(plane, basin):
 
 @njit
 def add_potential(plane, basin, per, values, lifted):
-    """Write values of all cells of a basin plus `per` times the potential of its frame to `lifted`."""
+    """Write values of all cells of a basin plus `per` times the potential of its frame [J/kg] to `lifted`.
+
+    values, lifted : float64[n]
+    """
     n, nx, at = basin["n"], basin["nx"], int(plane[basin["frame"] + CELL_POSITIONS])
     phi = potential_coefficients(plane, basin["frame"], per)
     if nx == 0:
@@ -119,7 +129,7 @@ def add_potential(plane, basin, per, values, lifted):
 
 @njit
 def add_potential_points(phi, x, y, values, lifted):
-    """Write values plus the potential at the points (x, y) to `lifted`; values None count as 0.
+    """Write values plus the potential at the points (x, y) to `lifted`; if `values` is None, the potential alone.
 
     phi : result of `potential_coefficients`
     """
@@ -131,7 +141,10 @@ def add_potential_points(phi, x, y, values, lifted):
 
 @njit
 def add_potential_rows(phi, x, y, values, lifted):
-    """Write values plus the potential at the cells of a grid with columns at x and rows at y to `lifted`."""
+    """Write values plus the potential at the cells of a grid with columns at x and rows at y to `lifted`.
+
+    phi, values : as for `add_potential_points`
+    """
     fx, fy, xx, xy, yy = phi
     for j in range(y.size):
         a, z = j * x.size, (j + 1) * x.size
@@ -141,7 +154,10 @@ def add_potential_rows(phi, x, y, values, lifted):
 
 @inline
 def add_potential_row(x, values, slope, xx, constant, lifted):
-    """Write values plus the potential at a row of cells to `lifted`; the potential is x (slope + xx x) + constant."""
+    """Write values plus the potential at a row of cells to `lifted`; if `values` is None, the potential alone.
+
+    The potential is x (slope + xx x) + constant, at the positions x of the cells along the row.
+    """
     for i in range(lifted.size):
         rise = x[i] * (slope + xx * x[i]) + constant
         lifted[i] = rise if values is None else values[i] + rise
@@ -149,7 +165,7 @@ def add_potential_row(x, values, slope, xx, constant, lifted):
 
 @njit(forceinline=True)
 def cell_position(plane, basin, i):
-    """Centre of cell i in the axes of its basin [m]."""
+    """Centre (x, y) of cell i in the axes of its basin [m]."""
     n, nx, places = basin["n"], basin["nx"], int(plane[basin["frame"] + CELL_POSITIONS])
     if nx == 0:
         return plane[places + i], plane[places + n + i]

@@ -8,21 +8,24 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit(forceinline=True)
 def normal_gravity(st, plane, basin):
-    """Gravity along the normal of a basin [m/s2]; on a body, minus the acceleration of its frame (`basin_frames`)."""
+    """Gravity along the normal of a basin [m/s2].
+
+    On a body it is gravity minus the acceleration of the frame of the basin, see `basin_frames`.
+    """
     return st["gravity"] if basin["frame"] < 0 else plane[basin["frame"] + GN]
 
 
 @njit(forceinline=True)
 def needs_rates(basin, dydt):
-    """True if rates of a basin are requested, or needed for the flows through open patches or for a frame."""
+    """True if rates of a basin are requested (dydt is not empty) or needed for flows at open patches or for frames."""
     return dydt.size > 0 or basin["through"] >= 0 or basin["frame"] >= 0
 
 
 @njit
 def put_open_flows(tables, b, per, out):
-    """Write the flow through each open patch of basin b as supply of the node of the patch [kg/s].
+    """Write the flow through each open patch of basin b to `out`, as the supply of the node of the patch [kg/s].
 
-    per : factor from the flow of the cells to mass flow
+    per : factor that converts the flows that `patch_inflow` returns to mass flows
     """
     patches = tables.patches
     for k in range(patches.size):
@@ -32,7 +35,10 @@ def put_open_flows(tables, b, per, out):
 
 @njit
 def record_patches(t, y, out, handle, values):
-    """Record the first time at which a link takes more water than the basin contains; open patches are excluded."""
+    """Record, for each patch, the first time at which its links take more water than its cells supply.
+
+    Open patches are excluded.
+    """
     tables = open_tables(handle)
     patches, marks, nodes = tables.patches, tables.marks, tables.nodes.size
     for k in range(patches.size):
@@ -44,11 +50,11 @@ def record_patches(t, y, out, handle, values):
 
 @njit
 def add_link_momentum(plane, patch, m, push, dydt, x, y):
-    """Add the part of the momentum flux at face m of a patch that a wall would not transmit to the rates of its cell.
+    """Correct the momentum rates of the cell behind face m of a patch, computed for a wall, for the flow of links.
 
-    A wall stops the flow, so the pressure on it is p + Z u_n, with u_n the velocity of the cell toward the wall and Z
-    the impedance. With a flow at velocity v through the face it is p + Z (u_n - v).
-    push : Z v, v positive outward; x, y : indices in `dydt` of the momentum of the cell
+    A wall stops the flow, so the pressure on it is p + Z u_n: pressure p of the cell, its velocity u_n toward the wall,
+    impedance Z. With a flow through the face at the outward velocity v, the pressure is p + Z (u_n - v).
+    push : Z v; x, y : indices in `dydt` of the momentum of the cell along x and y
     """
     at, count = patch["normals"], patch["faces"]
     share = push * plane[at + 2 * count + m]
@@ -58,9 +64,9 @@ def add_link_momentum(plane, patch, m, push, dydt, x, y):
 
 @njit
 def put_inward(turn, k, flux, inward):
-    """Write inward flows through a row of boundary faces.
+    """Write the inward flows through a row of boundary faces, fluxes times face lengths, to `inward`.
 
-    turn : 1 or -1 for fluxes inward or outward; k : 1 / lengths of faces [1/m]
+    turn : 1 if the fluxes are positive inward, -1 if outward; k : 1 / lengths of faces [1/m]
     """
     for i in range(inward.size):
         inward[i] = turn * flux[i] / k[i]

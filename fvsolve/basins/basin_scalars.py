@@ -35,9 +35,10 @@ def cell_value(tables, basin, q, y, i):
 
 @njit
 def patch_values(t, y, dydt, out, handle):
-    """Compute the value of every scalar in the water that leaves through every patch.
+    """Write the value of every scalar in the water that leaves each patch to `out`.
 
-    It is the mean over the cells at the patch, weighted by their outflow, or by area if all cells are dry.
+    It is the mean over the cells at the patch, with the weights area times `flow_weight`; with the areas alone as
+    weights in a basin without depth, or if all cells are dry.
     """
     tables = open_tables(handle)
     nodes, value = tables.nodes.size, tables.layout[0]["value"]
@@ -57,7 +58,7 @@ def patch_values(t, y, dydt, out, handle):
 
 @njit
 def observe_values(t, y, out, handle, values):
-    """Write the values of the probes of scalars at points of basins."""
+    """Write the values of the probes of scalars at points of basins to `values`."""
     tables = open_tables(handle)
     for k in range(tables.probes.size):
         probe = tables.probes[k]
@@ -70,7 +71,7 @@ def observe_values(t, y, out, handle, values):
 
 @njit
 def put_boundary_values(t, tables, patch, basin, q):
-    """Write the value of scalar q beyond the faces of a patch: the value of its schedule, else its initial value."""
+    """Write the value of scalar q beyond the faces of a patch: that of its schedule there, else its initial value."""
     schedule = tables.integers[patch["values"] + q]
     value = tables.scalars[q]["initial"]
     if schedule >= 0:
@@ -82,7 +83,7 @@ def put_boundary_values(t, tables, patch, basin, q):
 
 @njit
 def prepare_scalars(t, tables, b, y):
-    """Compute the depths of the cells of basin b, and the values of scalars beyond its boundary."""
+    """Write the depths of the cells of basin b, and the values of scalars beyond its boundary, to `tables.work`."""
     plane, basin, patches = tables.plane, tables.basins[b], tables.patches
     n, o, at, seen = basin["n"], basin["y"], basin["plan"], deviations_of(basin, tables.seen, y)
     if basin["deep"] == 1:
@@ -101,19 +102,19 @@ def prepare_scalars(t, tables, b, y):
 
 @njit
 def flow_factor(t, basin):
-    """Factor on the flows of a basin whose given velocity is periodic, cos(pi t / period)."""
+    """Factor on the flows of a basin at time t: cos(pi t / period) for a periodic given velocity, else 1."""
     return cos(pi * t / basin["period"]) if basin["period"] > 0.0 else 1.0
 
 
 @njit
 def depth_count(basin):
-    """Number of depths that `prepare_scalars` computes; 0 where the depth is 1."""
+    """Number of depths that `prepare_scalars` computes: one for each cell, or 0 for a basin without depth."""
     return basin["n"] if basin["deep"] == 1 else 0
 
 
 @njit
 def add_sources(t, y, dydt, out, handle):
-    """Add decay and the inflow of links to the rates of all scalars; record both, and the flow through the boundary."""
+    """Add decay and flows of links to the rates of all scalars; write losses by decay and boundary flows to `out`."""
     tables = open_tables(handle)
     work = tables.work
     for b in range(tables.basins.size if dydt.size > 0 else 0):
@@ -131,9 +132,12 @@ def add_sources(t, y, dydt, out, handle):
 
 @njit
 def add_scalar_sources(tables, b, basin, q, factor, per, depth, outside, y, s, rate, out):
-    """Add decay and the inflow of links to the rates of scalar q; record both, and the flow through the boundary.
+    """Add decay and flows of links to the rates of scalar q; write losses by decay and boundary flows to `out`.
 
-    per : mass per area and depth of the amounts s; factor : factor on given flows; s, rate : amounts and their rates
+    factor : factor on given flows
+    per : factor from amounts per area to mass per area: density [kg/m3], or density times thickness [kg/m2] for depth 1
+    depth : depths of the cells, empty for depth 1; outside : values beyond the boundary faces
+    y : states; s, rate : amounts of the scalar per area, and their rates
     """
     scalar, patches, n = tables.scalars[q], tables.patches, basin["n"]
     if basin["through"] >= 0:
@@ -157,9 +161,10 @@ def add_scalar_sources(tables, b, basin, q, factor, per, depth, outside, y, s, r
 
 @njit
 def record_boundary(tables, b, basin, q, factor, per, rate, outside, out):
-    """Record the inflow of scalar q through each open patch [kg/s].
+    """Write the inflow of scalar q through each open patch to `out` [kg/s].
 
-    The remaining gain of all cells is recorded at the patch with the greatest outflow.
+    The outflow of all patches (the rate of change in all cells minus these inflows) is counted, with its negative sign,
+    at the patch with the greatest outflow. Arguments as for `add_scalar_sources`.
     """
     plane, patches, nodes = tables.plane, tables.patches, tables.nodes.size
     flows = plane if has_given_flows(basin) else tables.work
@@ -185,9 +190,9 @@ def record_boundary(tables, b, basin, q, factor, per, rate, outside, out):
 
 @njit
 def add_link_inflow(tables, patch, basin, q, y, rate, out):
-    """Distribute the inflow of scalar q from the links at a patch over the cells at the patch.
+    """Add the inflow of scalar q from the links at a patch to the rates of the cells at the patch.
 
-    Where water leaves, each cell loses its own value.
+    Where water leaves, each cell loses its own value. rate : rates of the amounts of the scalar per area
     """
     layout, nodes, rho = tables.layout[0], tables.nodes.size, tables.settings[0]["rho"]
     node = patch["node"]

@@ -50,7 +50,7 @@ SCALAR_TERMS = (
 
 
 def terms_of_basins(basins: list, valves: bool) -> tuple[RhsTerms, ...]:
-    """Terms of all basins without their scalars; valves : True if there are valves in the network."""
+    """`RhsTerms` of all basins without those of scalars, each once; valves : True if the network contains valves."""
     shared = [COMMON] if basins and basins[0].case.law.linear else [COMMON, DENSITY_LAWS] if basins else []
     shared += [FRAMES] if any(basin.part.on is not None for basin in basins) else []
     moving = [WALLS] if any(basin.moves for basin in basins) else []
@@ -59,13 +59,13 @@ def terms_of_basins(basins: list, valves: bool) -> tuple[RhsTerms, ...]:
 
 
 def terms_of_scalars(basins: list) -> tuple[RhsTerms, ...]:
-    """Terms of the scalars in all basins; each term selects its basins itself."""
+    """`RhsTerms` of the scalars in all basins, each once; their functions select the basins for which they compute."""
     needed = {piece for basin in basins for piece in scalar_terms(basin)}
     return tuple(terms for terms in SCALAR_TERMS if terms in needed)
 
 
 def scalar_terms(basin) -> Iterator[RhsTerms]:
-    """Terms of the scalars of one basin; none without scalars."""
+    """`RhsTerms` of the scalars of one basin; empty for a basin without scalars."""
     if not basin.scalars:
         return
     yield from (PATCH_VALUES, SOURCES)

@@ -8,7 +8,7 @@ LEAST_DEPTH = 1e-9  # volume at a patch over its area below which its surface te
 
 @njit
 def available_fraction(depth):
-    """Fraction of the demanded outflow that water of a depth [m] supplies."""
+    """Fraction of the demanded outflow that water of a depth [m] supplies: 0 at depth 0 to 1 at the depth SHALLOW."""
     s = min(max(depth, 0.0) / SHALLOW, 1.0)
     return s * s * (3.0 - 2.0 * s)
 
@@ -33,15 +33,18 @@ def depth_at_patch(plane, basin, i, y):
 
 @njit
 def outflow_weight(depth):
-    """Weight of a cell in the outflow: its depth, so that all water has one speed, times the available fraction."""
+    """Weight [m] of a cell of a depth [m] in the outflow through a patch: its depth times `available_fraction`.
+
+    With the depth as factor, the water of all cells leaves at one speed.
+    """
     return depth * available_fraction(depth)
 
 
 @njit
 def flow_weight(plane, basin, leaves, i, y):
-    """Weight of cell i in the flow through a patch [m]; leaves : True for outflow.
+    """Weight of cell i in the flow through a patch [m].
 
-    For inflow, a dry cell has the depth SHALLOW of a film.
+    It is `outflow_weight` for outflow (`leaves` is True). For inflow it is the depth, but at least SHALLOW.
     """
     depth = depth_at_patch(plane, basin, i, y)
     return outflow_weight(depth) if leaves else max(depth, SHALLOW)
@@ -49,7 +52,10 @@ def flow_weight(plane, basin, leaves, i, y):
 
 @njit
 def weighted_volume(tables, patch, leaves, y):
-    """Sum of area times `flow_weight` over the cells at a patch [m3], always positive; leaves : True for outflow."""
+    """Sum of area times `flow_weight` over the cells at a patch [m3], at least LEAST_DEPTH times their area.
+
+    leaves : True for outflow
+    """
     basin, plane, total = tables.basins[patch["basin"]], tables.plane, 0.0
     for m in range(patch["count"]):
         i = tables.integers[patch["first"] + m]
@@ -59,13 +65,13 @@ def weighted_volume(tables, patch, leaves, y):
 
 @njit(forceinline=True)
 def has_given_flows(basin):
-    """True if the flows through faces follow from a given velocity; these are in `plane`, computed flows in `work`."""
+    """True if flows through faces follow from a given velocity; they are in `plane`, computed flows in `work`."""
     return basin["given"] == 1
 
 
 @njit
 def patch_inflow(tables, patch):
-    """Total inflow through all faces of a patch, in the unit of the flows of the basin."""
+    """Inflow through all faces of a patch: [m3/s] of water, [m2/s] by a given velocity, [kg/(m s)] of a liquid."""
     basin, total = tables.basins[patch["basin"]], 0.0
     flows = tables.plane if has_given_flows(basin) else tables.work
     for m in range(patch["faces"]):

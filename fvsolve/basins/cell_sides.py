@@ -42,13 +42,16 @@ _WX, _WY, _DX, _DY, _SIDE = WX * BLOCK, WY * BLOCK, DX * BLOCK, DY * BLOCK, MEAS
 
 @njit
 def blocks(integers):
-    """Number of blocks of BLOCK cells."""
+    """Number of blocks of BLOCK cells of a mesh. integers : see `cell_sides`"""
     return (integers[1] + BLOCK - 1) // BLOCK
 
 
 @njit
 def edges_before(edges, first, side):
-    """Index of the first boundary side, from `first` on, that is not before `side`."""
+    """Index of the first entry of `edges`, from index `first` on, that is at least `side`.
+
+    edges : numbers of boundary sides, ascending
+    """
     while first < edges.size and edges[first] < side:
         first += 1
     return first
@@ -56,22 +59,27 @@ def edges_before(edges, first, side):
 
 @njit
 def ring_place(side, ring):
-    """Place in the ring of blocks of the cell that has a boundary side."""
+    """Place in the ring of blocks (see `cell_sides`) of the cell with the boundary side number `side`.
+
+    ring : number of blocks in the ring
+    """
     return (side // (4 * BLOCK)) % ring * BLOCK + side % BLOCK
 
 
 @njit
 def gather(values, where, out):
-    """Write values[where[i]] to out[i] for a block."""
+    """Write values[where[i]] to out[i] for the BLOCK cells i of a block."""
     for i in range(BLOCK):
         out[i] = values[where[i]]
 
 
 @njit
 def put_inward(edges, number, flux, length, through):
-    """Write inward flows through boundary sides from outward fluxes; all sides have the same number k in a block.
+    """Write the inward flows through boundary sides of a block that have the same side number k in their cells.
 
-    edges, number : boundary sides and numbers of their boundary faces; length : of boundary faces [m]
+    edges, number : these boundary sides, and the numbers of their boundary faces, see `cell_sides`
+    flux : outward flux through side k of each cell of the block; length : lengths of all boundary faces [m]
+    through : inward flows through all boundary faces
     """
     for q in range(edges.size):
         through[number[q]] = -flux[edges[q] % BLOCK] * length[number[q]]
@@ -79,14 +87,16 @@ def put_inward(edges, number, flux, length, through):
 
 @njit
 def limit_three_sides(p, wide, cap, beyond, geo, out):
-    """Limited values at three sides of a block of triangles, from the values beyond the sides.
+    """Write the limited values at the three sides of each triangle of a block, from the values beyond the sides.
 
-    If the neighbours differ from the cell by `least` to `most`, a side rises by no more than wide most, -2 wide least
-    and `cap`, and falls no further than wide least, -2 wide most and -cap. So no side of a local extremum differs from
-    its cell. With wide = 1 all values at sides lie in the range of the neighbours.
+    If the neighbours differ from the cell by least <= 0 to most >= 0, the value at a side is greater than that of the
+    cell by no more than wide most, -2 wide least and `cap`. It is smaller by no more than -wide least, 2 wide most and
+    `cap`. So at an extremum all values at sides equal that of the cell. With wide = 1 they lie in the range of the
+    neighbours.
 
-    p, beyond : values of cells and of neighbours; geo : measures of the sides; out : values at the sides
+    p, beyond : values of cells and of neighbours; geo : first group of measures of the sides, see `cell_sides`
     wide : factor on the range of the neighbours; cap : greatest allowed deviation from the cell
+    out : values at the sides
     """
     back = 2.0 * wide
     for i in range(BLOCK):
@@ -106,9 +116,10 @@ def limit_three_sides(p, wide, cap, beyond, geo, out):
 
 @njit
 def limit_four_sides(p, wide, cap, beyond, geo, out):
-    """Limited values at four sides of a block of cells; arguments as for `limit_three_sides`.
+    """Write the limited values at the four sides of each cell of a block; arguments as for `limit_three_sides`.
 
-    Opposite sides of a rectangle are added first, so that mirror cells give mirror sums.
+    In the gradient, the terms of opposite sides are added first, so that mirrored cells have mirrored values to the
+    bit.
     """
     back = 2.0 * wide
     for i in range(BLOCK):
@@ -137,9 +148,10 @@ def limit_four_sides(p, wide, cap, beyond, geo, out):
 def limited_sides(j, floats, integers, values, wide, cap, shown, edges, scratch, sides):
     """Write the limited values at the sides of all cells of block j to `sides`.
 
-    values : float64[ring BLOCK]; wide, cap : see `limit_three_sides`; scratch : float64[4 BLOCK]
-    sides : float64[4 ring BLOCK]
-    shown : float64[:]  values beyond the boundary at its sides `edges`, int64[:], of this block
+    floats, integers : mesh, see `cell_sides`; wide, cap : see `limit_three_sides`
+    values, sides : float64[ring BLOCK], float64[4 ring BLOCK]  values of cells and at sides, in the ring of
+    `cell_sides`
+    edges : int64[:]  boundary sides of the block; shown : float64[:]  values beyond them; scratch : float64[4 BLOCK]
     """
     slots, ring, places = integers[0], integers[4], integers[HEAD:].view(np.int32)
     for k in range(slots):

@@ -12,7 +12,7 @@ from fvsolve.jit import njit
 
 @njit(forceinline=True)
 def deviations_of(basin, seen, y):
-    """Deviations U - U0 of values per area: the table `seen` where walls move, else the states y themselves."""
+    """Deviations of values per area from rest: the table `seen` if the basin has moving walls, else the states y."""
     if basin["walls"] > 0:
         return seen
     return y
@@ -20,7 +20,7 @@ def deviations_of(basin, seen, y):
 
 @njit(forceinline=True)
 def row_across(basin, i):
-    """Index of the row or column of cell i that stretches; on a mesh i itself."""
+    """Index of the column or row of cell i that stretches as a whole; on a mesh other than a grid, i itself."""
     if basin["nx"] == 0:
         return i
     return i // basin["nx"] if basin["turn"] == 1 else i % basin["nx"]
@@ -64,7 +64,7 @@ def scale_in_place(factor, values):
 def depth_deviations(rest, wide, narrow, content, seen):
     """Write deviations of depths from those at rest to `seen`.
 
-    content : states, changes of the amount in a cell over its undeformed area
+    rest : depths at rest [m]; content : states, changes of the amount in a cell over its undeformed area [m]
     wide : ratio of present to undeformed area; narrow : 1 / wide
     """
     for i in range(seen.size):
@@ -73,14 +73,17 @@ def depth_deviations(rest, wide, narrow, content, seen):
 
 @njit
 def density_deviations(rest, wide, narrow, content, seen):
-    """Write deviations of densities from that at rest to `seen`; arguments as for `depth_deviations`."""
+    """Write deviations of densities from the density `rest` to `seen`; other arguments as for `depth_deviations`."""
     for i in range(seen.size):
         seen[i] = (content[i] - rest * (wide[i] - 1.0)) * narrow[i]
 
 
 @njit
 def stretch_rates(wide, first, second, third):
-    """Convert three arrays of rates per area to rates of the states; wide : ratio of present to undeformed area."""
+    """Convert three arrays of rates per present area to rates of the states, in place.
+
+    wide : ratio of present to undeformed area of each cell, to which the states refer
+    """
     multiply_in_place(wide, first)
     multiply_in_place(wide, second)
     multiply_in_place(wide, third)
@@ -88,9 +91,9 @@ def stretch_rates(wide, first, second, third):
 
 @njit
 def stretch_row_rates(columns, wide, first, j, rate_1, rate_2, rate_3):
-    """Convert three arrays of rates per area of row j of a grid, from column `first` on, to rates of the states.
+    """Convert three arrays of rates of row j of a grid, from column `first` on, as `stretch_rates` does.
 
-    wide : present over undeformed areas; columns : True if columns stretch, False if rows do
+    wide : present over undeformed area of all columns or rows; columns : True if columns stretch, False if rows do
     """
     if columns:
         stretch_rates(wide[first:], rate_1, rate_2, rate_3)

@@ -1,7 +1,7 @@
 """Diffusion and decay of scalars on a grid, added to rates.
 
 s_t = div(D depth grad c) - decay (s - depth ambient), with c the value of a scalar, s = depth c its amount per area, D
-the diffusivity [m2/s], decay [1/s] and ambient the value at which it ends.
+the diffusivity [m2/s], decay [1/s] and ambient the value to which c decays.
 """
 
 from fvsolve.basins.advection import THIN, stencil_values
@@ -10,7 +10,7 @@ from fvsolve.jit import inline, njit
 
 @njit
 def harmonic_mean(a, b):
-    """Harmonic mean of two depths or two numbers of cells per length: 0 if both are 0."""
+    """Harmonic mean of two depths, or of the reciprocal sizes of two cells; 0 if both are 0."""
     return 2.0 * a * b / (a + b) if a + b > 0.0 else 0.0
 
 
@@ -18,7 +18,7 @@ def harmonic_mean(a, b):
 def put_conductances(across, a, b, to):
     """Write conductances of a row of faces: `across` times the harmonic mean of the depths a and b on both sides.
 
-    Empty a and b stand for depth 1.
+    Empty arrays a and b stand for depth 1. to : the conductances
     """
     if a.size == 0:
         for i in range(to.size):
@@ -32,9 +32,10 @@ def put_conductances(across, a, b, to):
 def add_row_diffusion(kx, ky, p, wx, south, ws, here, north, wn, depth, rate, top):
     """Add diffusion to the rates of a row of cells with values `here`.
 
+    kx, ky : 1 / widths of the cells, 1 / height of the row [1/m]; depth : depths of the cells, empty for depth 1
     p : values of the row, with one beyond either end; south, north : values of the rows next to it
     wx, ws, wn : conductances of faces across x, and of the southern and northern faces
-    top : greatest rate of each column so far [1/s]
+    top : greatest rate of each column so far [1/s], updated here
     """
     w, e, ww, we = p, p[2:], wx, wx[1:]
     for i in range(rate.size):
@@ -53,14 +54,13 @@ def diffusion_work(nx, ny):
 
 @njit
 def grid_diffusion(nx, ny, begin, stop, kx, ky, diffusivity, factor, flow_x, flow_y, depth, outside, s, work, rate):
-    """Add the rates of diffusion to rows `begin` to `stop` - 1; return the greatest rate of a cell [1/s].
+    """Add the rates of diffusion to rows `begin` to `stop` - 1 of a grid; return the greatest rate of a cell [1/s].
 
-    This rate is 2 D (kx^2 + ky^2). There is no flux through the boundary, except where factor times a given flow
-    enters:
-    the value on the face is `outside` there. (Flows of water, with depths, may be almost zero there: a value fixed for
-    one sign only would jump.)
+    On equal cells this rate is 2 D (kx^2 + ky^2). The boundary has no flux, except where `factor` times a
+    given velocity (without depths) enters: there the value on the face is `outside`. Flows of water, with depths, may
+    be almost zero at the boundary, and such a condition for one sign of them would jump.
 
-    diffusivity : D [m2/s]; work : float64[diffusion_work(nx, ny)]; other arguments as for `grid_advection`
+    diffusivity : D [m2/s]; work : float64[diffusion_work(nx, ny)]; other arguments as for `advection.grid_advection`
     """
     c, rest = s, work[nx * ny :]
     if depth.size > 0:
@@ -101,6 +101,10 @@ def grid_diffusion(nx, ny, begin, stop, kx, ky, diffusivity, factor, flow_x, flo
 
 @njit
 def add_decay(decay, ambient, depth, s, rate):
-    """Add decay of the amounts s towards an ambient value to their rates; decay [1/s]."""
+    """Add the decay of the amounts s per area towards an ambient value to their rates.
+
+    decay : decay rate [1/s]; ambient : value of the scalar to which it decays
+    depth : depths of the cells, empty for depth 1
+    """
     for i in range(s.size):
         rate[i] -= decay * (s[i] - (depth[i] if depth.size > 0 else 1.0) * ambient)

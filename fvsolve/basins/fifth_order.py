@@ -1,8 +1,9 @@
 """Fifth-order advection over a grid, as the difference from upwind rates.
 
 Values at faces are linear (upwind5) or WENO-Z (Borges et al. 2008), written in differences, so that a uniform value
-stays uniform. The mean of a product over a face is the product of the means plus 1/12 and 1/180 of the products of the
-first and second Legendre coefficients along the face. The flux through a face minus the upwind flux is an excess, which
+stays uniform. The mean of a product over a face is the product of the means plus two terms. These are 1/12 and 1/180 of
+the products of the first and of the second Legendre coefficients along the face. The flux through a face minus the
+upwind flux is an excess, which
 `limit_excesses` may reduce. Arguments as for `advection.grid_advection`; c : values of cells.
 """
 
@@ -16,9 +17,10 @@ LEAST_CELLS = 5  # with fewer cells, values beyond a side are those of its last 
 
 @njit
 def ghost_means(known, o, a, b, c, d, e):
-    """(nearest, next) mean beyond a side of the grid, by the polynomial of degree 4 through means of cells inside.
+    """(nearest, next) mean of two ghost cells beyond a side of the grid, by a polynomial of degree 4.
 
-    a .. e : means of the cells inside, a the nearest; o : value at the side, used in place of e if `known`
+    a, b, c, d, e : means of the five cells inside that determine the polynomial, the nearest first
+    known : True if o, the value at the side, is used in place of e
     """
     p, q, r, s = a - b, b - c, c - d, d - e
     if known:
@@ -29,7 +31,7 @@ def ghost_means(known, o, a, b, c, d, e):
 
 @njit
 def face_difference_linear(p, q, r, s):
-    """Value at the face after a cell minus the mean of the cell, by the linear scheme.
+    """Value at the face after a cell minus the mean of the cell, by the linear scheme of fifth order (upwind5).
 
     p, q, r, s : successive differences of five cells in line, in the direction of the flow; the cell is the third
     """
@@ -38,7 +40,7 @@ def face_difference_linear(p, q, r, s):
 
 @njit
 def face_difference_weno(p, q, r, s):
-    """Value at the face after a cell minus the mean of the cell by WENO-Z, with one common divisor of all weights.
+    """Value at the face after a cell minus the mean of the cell, by WENO-Z with a common denominator of all weights.
 
     p, q, r, s : successive differences of five cells in line, in the direction of the flow; the cell is the third
     """
@@ -52,8 +54,10 @@ def face_difference_weno(p, q, r, s):
 
 @njit
 def face_excesses(scheme, factor, flow, a, b, c, d, e, g, q, excess):
-    """Write the values q at faces between cells c and d, and the flux minus the upwind flux, `excess`.
+    """Write the values q at faces between cells c and d, and the flux minus the upwind flux through them to `excess`.
 
+    A flux is the flow times the value, without `factor`; the sign of factor times flow gives the direction of the flow.
+    scheme : WENO5 or LINEAR (upwind5); flow : flows through the faces
     a, b, c, d, e, g : means of six cells in line, three on either side of each face
     """
     if scheme == WENO5:
@@ -76,7 +80,10 @@ def face_excesses(scheme, factor, flow, a, b, c, d, e, g, q, excess):
 
 @njit
 def pad_sides(nx, ny, factor, flow_x, flow_y, outside, c, v):
-    """Copy the means c to v, float64[ny + 6, nx + 6] as one array, with ghost cells beyond the sides of the grid."""
+    """Copy the cell means c to v, with ghost cells beyond the sides of the grid; see `ghost_values`.
+
+    v : float64[ny + 6, nx + 6] as one array; other arguments as for `advection.grid_advection`
+    """
     wide = nx + 2 * GHOSTS
     for j in range(ny):
         to, fx = v[(j + GHOSTS) * wide :], flow_x[j * (nx + 1) :]
@@ -97,10 +104,11 @@ def pad_sides(nx, ny, factor, flow_x, flow_y, outside, c, v):
 
 @njit
 def ghost_values(n, known, o, v, at, step):
-    """(nearest, next) mean beyond a side, from the cells v[at], v[at + step], ... inward; see `ghost_means`.
+    """(nearest, next) mean of two ghost cells beyond a side, from the cells v[at], v[at + step], ... inward.
 
-    n : number of cells in line; with less than LEAST_CELLS, both means are the value o, or the nearest cell if not
-        `known`
+    n : number of cells in line; with fewer than LEAST_CELLS, both means are the value o, or the nearest cell if not
+    `known`; with more they are those of `ghost_means`
+    known, o : as for `ghost_means`
     """
     if n < LEAST_CELLS:
         return (o, o) if known else (v[at], v[at])
@@ -109,7 +117,7 @@ def ghost_values(n, known, o, v, at, step):
 
 @inline
 def add_products(fa, fb, fc, fd, fe, qa, qb, qc, qd, qe, excess):
-    """Add the mean of products f q over faces minus the product of the means of f and q to `excess`.
+    """Add the mean of products f q over faces, minus the product of the means of f and q, to `excess`.
 
     fa .. fe, qa .. qe : flows and values at five faces in line along the side; c is the face itself
     """
@@ -123,7 +131,10 @@ def add_products(fa, fb, fc, fd, fe, qa, qb, qc, qd, qe, excess):
 
 @njit
 def extrapolate_rows(v, wide, rows):
-    """Extrapolate two rows before and after the rows of v, which start at row 2; wide : length of a row."""
+    """Write two extrapolated rows before the `rows` rows of v, which begin at row 2, and two after them.
+
+    wide : length of a row
+    """
     first, last = 2 * wide, (rows + 1) * wide
     for i in range(wide):
         v[wide + i], v[i] = ghost_values(rows, False, 0.0, v, first + i, wide)
@@ -132,7 +143,7 @@ def extrapolate_rows(v, wide, rows):
 
 @njit
 def pad_line(v, n, to):
-    """Copy v to the middle of to, float64[n + 4], and extrapolate two values beyond either end."""
+    """Copy v to the middle of `to`, float64[n + 4], and extrapolate two values beyond either end."""
     middle = to[2:]
     for i in range(n):
         middle[i] = v[i]
@@ -147,7 +158,11 @@ def grid_excesses_work(nx, ny):
 
 @njit
 def grid_excesses(scheme, nx, ny, factor, flow_x, flow_y, outside, c, work, ax, ay):
-    """Write the fluxes through faces minus the upwind fluxes to ax, ordered as flow_x, and ay, ordered as flow_y."""
+    """Write the fluxes through faces minus the upwind fluxes to ax, ordered as flow_x, and ay, ordered as flow_y.
+
+    scheme : LINEAR (upwind5) or WENO5; c : values of the cells; work : float64[grid_excesses_work(nx, ny)]
+    Fluxes are flows times values, without `factor`. Other arguments as for `advection.grid_advection`
+    """
     wide, m = nx + 2 * GHOSTS, nx + 1
     mx, my = m * (ny + 4), nx * (ny + 1)
     v, rest = work[: wide * (ny + 6)], work[wide * (ny + 6) :]
@@ -190,7 +205,10 @@ def grid_excesses(scheme, nx, ny, factor, flow_x, flow_y, outside, c, work, ax, 
 
 @njit
 def add_excesses(nx, ny, kx, ky, factor, ax, ay, rate):
-    """Add the excess fluxes ax, ay through the faces of each cell to the rates of all cells."""
+    """Add the excess fluxes ax, ay of `grid_excesses` through the faces of each cell to the rates of all cells.
+
+    Other arguments as for `advection.grid_advection`
+    """
     for j in range(ny):
         k, to = ky[j], rate[j * nx : (j + 1) * nx]
         aw, ae, south, north = ax[j * (nx + 1) :], ax[j * (nx + 1) + 1 :], ay[j * nx :], ay[(j + 1) * nx :]

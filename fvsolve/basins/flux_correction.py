@@ -9,14 +9,14 @@ from fvsolve.jit import inline, njit
 
 @njit
 def accepted_fraction(available, need):
-    """Fraction of a need that is available, at most 1."""
+    """Fraction of a need that is available, from 0 to 1."""
     available = available if available > 0.0 else 0.0
     return available / need if need > available else 1.0
 
 
 @njit
 def sum_of_positive(a, b, c, d):
-    """Sum of the positive values of four."""
+    """Sum of those of four values that are positive."""
     a, b = a if a > 0.0 else 0.0, b if b > 0.0 else 0.0
     c, d = c if c > 0.0 else 0.0, d if d > 0.0 else 0.0
     return (a + b) + (c + d)
@@ -24,9 +24,12 @@ def sum_of_positive(a, b, c, d):
 
 @inline
 def row_fractions(step, factor, kx, ky, fw, fe, fs, fn, depth, least, most, s, rate, aw, ae, south, north, up, down):
-    """Write the fractions `up` and `down` of the excess inflow and outflow of a row of cells that keep the bounds.
+    """Write the fractions of excess inflow (`up`) and outflow (`down`) with which each cell of a row keeps the bounds.
 
-    step : Euler step [s]; aw, ae, south, north : excess fluxes; rate : rates by upwind
+    The excess fluxes are fluxes of higher order minus upwind fluxes. Fractions are at most 1.
+    fw, fe, fs, fn : flows through the western, eastern, southern and northern faces
+    aw, ae, south, north : excess fluxes through these faces
+    kx, ky : 1 / widths of the cells, 1 / height of the row [1/m]; other arguments as for `limit_excesses`, of the row
     """
     for i in range(s.size):
         scale = step * (factor * (kx[i] * ky))
@@ -39,9 +42,11 @@ def row_fractions(step, factor, kx, ky, fw, fe, fs, fn, depth, least, most, s, r
 
 @inline
 def limit_faces(factor, up, down, up_then, down_then, excess):
-    """Multiply the excesses of a row of faces by the fraction that both cells of a face allow.
+    """Multiply the excess fluxes through a row of faces by the fraction that the cells on both sides of a face allow.
 
-    up, down : fractions of the cells before the faces; up_then, down_then : of the cells behind them
+    up, down : fractions of the cells before the faces, see `row_fractions`
+    up_then, down_then : fractions of the cells behind the faces
+    factor : factor on all flows, whose sign gives the direction of an excess flux
     """
     for i in range(excess.size):
         forth = down[i] if down[i] < up_then[i] else up_then[i]
@@ -56,9 +61,12 @@ def limit_excesses_work(nx, ny):
 
 @njit
 def limit_excesses(nx, ny, kx, ky, factor, flow_x, flow_y, depth, least, most, step, s, rate, ax, ay, work):
-    """Limit the excesses ax, ay so that s + step times the corrected rates lies between least and most times the depth.
+    """Limit the excess fluxes ax, ay so that the values of a scalar after an Euler step are within their bounds.
 
-    rate : float64[n]  rates by upwind; other arguments as for `advection.grid_advection`
+    After the step, s + step times the corrected rates lies between least and most times the depth.
+    ax, ay : fluxes of higher order minus upwind fluxes, through the faces of flow_x and flow_y, see `grid_excesses`
+    rate : float64[n]  rates by upwind; step : Euler step [s]; least, most : bounds of the value of the scalar
+    nx, ny, kx, ky, factor, flow_x, flow_y, depth, s : as for `advection.grid_advection`
     work : float64[limit_excesses_work(nx, ny)]
     """
     wide = nx + 2

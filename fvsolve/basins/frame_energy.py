@@ -37,7 +37,7 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def origin_velocity(tables, basin, b, out):
-    """Velocity of the origin of basin b, in its own axes [m/s]."""
+    """Velocity (x, y, z) of the origin of basin b, in axes of the basin [m/s]."""
     row, tank = body_row(tables, basin["body"]), tables.layout[0]["tank"] + TANK_OUT * b
     x, y, z = basin_offset(tables, basin, out)
     u, v, w = cross(out, row + SPIN, x, y, z)
@@ -48,7 +48,7 @@ def origin_velocity(tables, basin, b, out):
 
 @njit
 def origin_acceleration(tables, basin, b, out):
-    """Acceleration of the origin of basin b [m/s2] and angular acceleration [rad/s2], in its own axes: six numbers."""
+    """Acceleration [m/s2] and angular acceleration [rad/s2] of the origin of basin b, in its own axes: six numbers."""
     row, tank = body_row(tables, basin["body"]), tables.layout[0]["tank"] + TANK_OUT * b
     x, y, z = basin_offset(tables, basin, out)
     u, v, w = cross(out, row + SPIN, x, y, z)
@@ -68,7 +68,8 @@ def origin_acceleration(tables, basin, b, out):
 def body_load(tables, basin, b, out):
     """Force [N] and torque [N m] of the water of basin b on its body, in axes of the basin: six numbers.
 
-    They are the load for zero joint accelerations plus the inertial part along the normal.
+    They are the load for zero accelerations of joints, plus the inertial load along the normal due to these
+    accelerations.
     """
     ax, ay, az, wx, wy, wz = extra_accelerations(tables, basin, out)
     tank = tables.layout[0]["tank"] + TANK_OUT * b
@@ -85,7 +86,7 @@ def body_load(tables, basin, b, out):
 def add_power(t, y, dydt, out, handle, power):
     """Add the power that bodies supply to the water in their basins to `power` [W].
 
-    The rate of storage, and the power dissipated by the model, are written too.
+    The rate of storage and the power that the model dissipates are written to the entries of `basin_energy` too.
     """
     tables = open_tables(handle)
     plane = tables.plane
@@ -105,7 +106,7 @@ def add_power(t, y, dydt, out, handle, power):
 
 @njit
 def rise_moment(tables, basin, y, dydt):
-    """d/dt of the sum over cells of mass times depth / 2 [kg m/s]; 0 for a liquid."""
+    """Time derivative of the sum over cells of mass times depth / 2 [kg m/s]; 0 for a liquid."""
     plane, total, n, o = tables.plane, 0.0, basin["n"], basin["y"]
     for i in range(n if basin["deep"] == 1 else 0):
         total += plane[basin["area"] + i] * max(plane[basin["plan"] + i] + y[o + i], 0.0) * dydt[o + i]
@@ -156,9 +157,9 @@ def energy_rate(tables, basin, b, y, dydt, out, vx, vy, vz):
 
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
-    """Write kinetic plus potential energy of the water in basins on bodies to `stored` [J].
+    """Write the kinetic plus potential energy [J] of the water in basins on bodies to `stored`.
 
-    It replaces the energy of a fixed basin; for a liquid it is added to the energy there.
+    For a liquid it is added to the energy in its own axes there; for water with a free surface it replaces the entry.
     """
     tables = open_tables(handle)
     plane = tables.plane

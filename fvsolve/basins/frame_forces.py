@@ -3,10 +3,11 @@
 For the forces see `basin_frames`. If forces move the body, its acceleration is solved together with that of the water
 in its basins. Lagrange's equations ((70) of docs/course.md) are those of columns that are point masses at mid depth and
 slide along the bed. The force along the bed depends on the state alone, so the rates of flow are first computed for
-zero joint accelerations. The water then loads the body by its missing momentum (`frame_reaction`). Along the normal it
-acts by its mass and moments, together with the inertia of bodies (`kernels.mechanism.basin_inertia`). After the
-accelerations are solved, the rates of flow are corrected for them (`correct_for_bodies`). A liquid is a layer of this
-kind without height. The total momentum is conserved to the order of the method.
+zero joint accelerations. The load of the water on the body then follows from its rate of momentum (`frame_reaction`).
+Along the normal it acts by its mass and moments, together with the inertia of bodies
+(`kernels.mechanism.basin_inertia`). After the accelerations are solved, the rates of flow are corrected for them
+(`correct_for_bodies`). A liquid is a layer of this kind without height. The total momentum is conserved to the order of
+the method.
 """
 
 from fvsolve.basins.basin_frames import AZ, WZ
@@ -21,9 +22,10 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def add_frame_forces(t, y, dydt, out, handle):
-    """Add Coriolis and Euler forces to the rates of flow, and the loads of the water in basins to their bodies.
+    """Add Coriolis and Euler forces to the rates of flow in basins on bodies, and loads of the water to the bodies.
 
-    Under the linear density law, the inertia of a liquid is its inertia at rest.
+    Under the density law `linear`, the inertia of a liquid is its inertia at rest. Loads are added only where forces
+    move the body or a probe observes the load of a joint.
     """
     tables = open_tables(handle)
     for b in range(tables.basins.size):
@@ -42,7 +44,7 @@ def add_frame_forces(t, y, dydt, out, handle):
 
 @njit
 def correct_for_bodies(t, y, dydt, out, handle):
-    """Correct the rates of flow for the joint accelerations of the bodies that carry basins."""
+    """Correct the rates of flow in basins on bodies for the accelerations of the joints of these bodies."""
     tables = open_tables(handle)
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]

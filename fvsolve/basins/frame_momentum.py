@@ -8,11 +8,10 @@ from fvsolve.jit import inline, njit
 def accelerate_flow(plane, basin, y, rates, first, own, twice, east, north, turn):
     """Add twice (q_y, -q_x) + depth (east + turn y, north - turn x) to the rates of the flow (q_x, q_y) of all cells.
 
-    twice : 2 W_z [1/s]; east, north : uniform acceleration [m/s2]; turn : Euler term [1/s2]; x, y : position of the
-        cell
-
-    depth is the stored quantity per area (density for a liquid).
-    own : 1 to include the deviation of depth, 0 for its value at rest
+    depth : stored quantity per area (density for a liquid); x, y : position of the cell
+    first : index in `rates` of the first rate of the basin
+    own : 1 to include the deviation of depth from rest, 0 for the depth at rest
+    twice : 2 W_z [1/s]; east, north : uniform acceleration [m/s2]; turn : Euler term [1/s2]
     """
     n, o, p, places = basin["n"], basin["y"], basin["plan"], int(plane[basin["frame"] + CELL_POSITIONS])
     for row in range(basin["ny"]):
@@ -25,7 +24,7 @@ def accelerate_flow(plane, basin, y, rates, first, own, twice, east, north, turn
 
 @njit
 def accelerate_row(plane, basin, y, rates, first, row, own, twice, east, north, turn):
-    """Add the terms of `accelerate_flow` to the rates of a row of cells of a grid."""
+    """Add the terms of `accelerate_flow` to the rates of row `row` of the cells of a grid; other arguments as there."""
     n, nx, places = basin["n"], basin["nx"], int(plane[basin["frame"] + CELL_POSITIONS])
     at, level = row * nx, plane[places + nx + row]
     a, p, to = basin["y"] + at, basin["plan"] + at, first + n + at
@@ -38,9 +37,10 @@ def accelerate_row(plane, basin, y, rates, first, row, own, twice, east, north, 
 
 @inline
 def accelerate_arrays(x, rest, dh, qx, qy, own, twice, east, north, turn, rate_x, rate_y):
-    """Add the terms of `accelerate_flow` to the rates of a row of cells, given by its arrays.
+    """Add the terms of `accelerate_flow` to the rates rate_x, rate_y of a row of cells, given by its arrays.
 
-    x : positions; rest, dh : depths at rest and deviations; qx, qy : flows
+    x : positions; rest, dh : depths at rest and deviations from them; qx, qy : flows
+    east : uniform acceleration plus turn y of the row; other arguments as for `accelerate_flow`
     """
     for i in range(rate_x.size):
         depth = max(rest[i] + own * dh[i], 0.0)

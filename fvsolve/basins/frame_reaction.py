@@ -53,8 +53,12 @@ def mass_factor(tables, basin):
 def row_sums(deep, per_area, level, x, area, rest, surface, h, qx, qy, dh, dx, dy):
     """Sums over a row of cells: moments of mass, of its rate, of flow and of the rate of flow, and mass times height.
 
-    Returns the sums of mass, and of its rate, times 1, x, x^2 (6 numbers); flow along x; flow along y times 1, x; the
-    same three numbers of the rates of flow; mass times height of its centre.
+    Returns 13 sums in this order: mass times 1, x, x^2; rate of mass times 1, x, x^2; flow along x; flow along y times
+    1, x; the same three sums of the rates of flow; mass times height of its centre (0 if not `deep`).
+    deep : True for water with a free surface; per_area : result of `mass_factor`
+    level : height of the level at rest above the origin; surface : undisturbed surface above this level
+    x, area : positions and areas of cells; rest : depth or density at rest
+    h, qx, qy : deviation of depth or density, flows; dh, dx, dy : their rates
     The compiler may reorder these sums, so that it can use vector instructions.
     """
     r0 = r1 = r2 = d0 = d1 = d2 = p0 = v0 = v1 = p1 = f0 = f1 = g0 = 0.0
@@ -77,7 +81,8 @@ def mass_moments(tables, basin, y, rates, first, own, twice, euler):
     In this order: moments 1, x, y, xx, xy, yy of mass; sum of mass times height along the normal; moments x, y, xx, xy,
     yy of the rate of mass; momentum along x and y, its moment about z; rates of these three. Units are kg, m and s.
 
-    On grids, the terms that `frame_forces.add_frame_forces` adds to other basins at once are added here, row by row.
+    rates, first, own, twice, euler : as rates, first, own, twice, turn for `accelerate_flow`. On grids its Coriolis and
+    Euler terms are added to `rates` here, row by row; on other meshes `frame_forces.add_frame_forces` has added them.
     """
     plane, n, o, per_area = tables.plane, basin["n"], basin["y"], mass_factor(tables, basin)
     m = sx = sy = xx = xy = yy = lever = 0.0
@@ -109,6 +114,7 @@ def load_body(tables, basin, b, y, rates, first, own, twice, euler, out):
     """Add the force and torque of the water in basin b for zero joint accelerations to the forces on its body.
 
     The moments of mass, axes, origin and load of the basin are written to `out`, see `kernels.mechanism.basin_inertia`.
+    rates, first, own, twice, euler : as for `mass_moments`
     """
     m, sx, sy, xx, xy, yy, lever, dx, dy, dxx, dxy, dyy, qx, qy, turn, fx, fy, spin = mass_moments(
         tables, basin, y, rates, first, own, twice, euler
@@ -152,7 +158,7 @@ def load_body(tables, basin, b, y, rates, first, own, twice, euler, out):
 
 @njit(forceinline=True)
 def vector_difference(out, i, j):
-    """Vector at out[i] minus the vector at out[j]."""
+    """Vector of three numbers at out[i] minus the vector at out[j]."""
     return out[i] - out[j], out[i + 1] - out[j + 1], out[i + 2] - out[j + 2]
 
 
@@ -160,7 +166,7 @@ def vector_difference(out, i, j):
 def extra_accelerations(tables, basin, out):
     """Acceleration of the origin of a basin and angular acceleration, minus their values for zero joint accelerations.
 
-    Six numbers in axes of the world [m/s2, rad/s2].
+    The result is six numbers in axes of the world [m/s2, rad/s2].
     """
     row = body_row(tables, basin["body"])
     rx, ry, rz = basin_offset(tables, basin, out)

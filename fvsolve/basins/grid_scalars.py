@@ -24,13 +24,16 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit(forceinline=True)
 def on_grid(basin):
-    """True if the basin is on a grid and contains scalars."""
+    """True if the basin contains scalars and its mesh is a grid."""
     return basin["carried"] >= 0 and basin["nx"] > 0
 
 
 @njit(forceinline=True)
 def grid_arrays(tables, basin):
-    """Arrays of a grid: 1 / widths, 1 / heights, flows along x and along y, depths (`prepare_scalars`), work array."""
+    """(1 / widths, 1 / heights, flows along x, flows along y, depths, work array) of a grid with scalars.
+
+    For the depths see `prepare_scalars`.
+    """
     plane, work = tables.plane, tables.work
     flows = plane if has_given_flows(basin) else work
     nx, ny, k, f, toil = basin["nx"], basin["ny"], basin["spacing"], basin["flows"], basin["scalar_work"]
@@ -87,9 +90,10 @@ def advect_on_grids(t, y, dydt, out, handle):
 
 @njit
 def by_blocks(sums, at, scheme, limiter, begin, stop, kx, ky, factor, flow_x, flow_y, outside, y, work, rate):
-    """Write rates as `grid_advection` does for depth 1, block by block; form the requested stage sums in the same pass.
+    """Write rates of a scalar as `grid_advection` does for depth 1, block by block, and form the requested stage sums.
 
-    sums : see `kernels.stage_sums`; at : index in y of the first amount
+    Both happen in the same pass. sums : see `kernels.stage_sums`; at : index in the states y of the first amount
+    Other arguments as for `advection.grid_advection`
     """
     nx, ny, n, formed_ahead, formed_end = kx.size, ky.size, rate.size, begin, begin
     rows = max(sums[CELLS] // nx, 1)

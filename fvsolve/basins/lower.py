@@ -10,7 +10,7 @@ from fvsolve.kernels import dtypes as rec
 
 
 def lower_basins(draft) -> None:
-    """Fill the tables of basins and of their patches, and add the states of their cells to the model."""
+    """Fill the tables of basins and of their patches in a draft of a model, and add the states of cells to it."""
     case = draft.case
     draft.basins = [rows_class(case.nodes[name].physics_type)(case, name) for name in case.meshes]
     draft.basin_table = np.zeros(len(draft.basins), rec.BASIN)
@@ -28,16 +28,20 @@ def lower_basins(draft) -> None:
 
 
 def rows_class(physics: type) -> type:
-    """Class that fills the tables of a type of basin, from the module `lower` beside the declaration of the type."""
+    """Subclass of `BasinRows` that fills the tables of a type of basin.
+
+    It is in the module `lower` of the package that declares the type. physics : class with the keys of the type
+    """
     home = physics.__module__.rpartition(".")[0]
     import_module(f"{home}.lower")
     return import_module("fvsolve.basins.lower_basin").BasinRows.physics[home]
 
 
 def basin_start(basins: list, size: int, attitudes: dict[str, np.ndarray] | None = None) -> np.ndarray:
-    """States at the start: deviations from the initial steady state, zero unless a basin has a given start.
+    """States at the start as deviations from the initial steady state : float64[size]; 0 outside basins.
 
-    size : number of states of the model
+    basins : `BasinRows` of all basins, with their stated start and values of scalars; size : number of states of a
+    model
     attitudes : rotation matrices of bodies by name, in place of those at the start
     """
     states = np.zeros(size)

@@ -34,7 +34,7 @@ VELOCITIES = {"u": U, "v": V, "speed": SPEED}
 
 
 class BasinRows:
-    """A basin of a model: its part of the case, its mesh, and its row of the table of basins once that is filled."""
+    """Basin of a model: its part of the case, its mesh, and (after `lower_common`) its row of the table of basins."""
 
     physics: ClassVar[dict[str, type[BasinRows]]] = {}  # by the package that declares it
     units: ClassVar[dict[str, str]] = {}  # of fields
@@ -63,38 +63,50 @@ class BasinRows:
     # defined by each physics --------------------------------------------------------------------------------
 
     def lower(self, draft, row) -> None:
-        """Fill the columns of the row that only this type of basin has, and reserve the work arrays of its kernels."""
+        """Fill the columns of the row of the basin that only its type has, and reserve the work arrays of its kernels.
+
+        row : row of the basin in the table of basins
+        """
         raise NotImplementedError
 
     def pieces(self, valves: bool) -> Iterator[RhsTerms]:
-        """Terms of the right-hand side and probes of the basin, in order; valves : True if the network has valves."""
+        """`RhsTerms` of the basin for the right-hand side and probes, in order.
+
+        valves : True if the network contains valves
+        """
         raise NotImplementedError
 
     def scales(self) -> list[float]:
-        """Size of a small deviation of each state quantity."""
+        """Size of a small deviation of each state quantity, in SI units."""
         return [1.0] * len(self.quantities)
 
     def start(self, attitude: np.ndarray | None = None) -> np.ndarray:
-        """Deviations from the steady state at the start : float64[quantities, n].
+        """Deviations of cells from the steady state at the start : float64[quantities, n].
 
-        attitude : rotation matrix of its body, where it differs from that at the start
+        attitude : rotation matrix of the body that carries the basin, None for that at the start
         """
         return np.zeros((len(self.quantities), self.n))
 
     def fields(self, y: np.ndarray) -> dict[str, np.ndarray]:
-        """Arrays for output by name, a value for each cell, at deviations y float64[quantities, n], in SI units."""
+        """Output fields by name, with a value for each cell, in SI units.
+
+        y : float64[quantities, n]  deviations of cells from rest
+        """
         return {}
 
     def ground(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Elevation of the bottom of the basin at points (x, y) [m]."""
+        """Elevation of the bottom of the basin at points (x, y) of its plane [m]."""
         return np.full(x.shape, self.part.elevation or 0.0)
 
     def ranges(self) -> dict[str, tuple[float, float]]:
-        """Least and greatest value at the start of each quantity that determines waves, by name, in SI units."""
+        """(least, greatest) value over cells at the start of each quantity that determines waves, by name [SI]."""
         return {}
 
     def max_rate(self, y: np.ndarray) -> tuple[float, float]:
-        """Greatest rate of waves or flows at a state y of the model [1/s], and the fraction of it by motion along x."""
+        """(greatest rate of waves or flows at a state y of the model [1/s], fraction of it by motion along x).
+
+        The fraction is 1 on meshes other than grids.
+        """
         velocity, speed = self.speeds(self.deviations(y))
         if not self.is_grid:
             left, right = self.mesh.left, self.mesh.right[: self.mesh.inner]
@@ -110,17 +122,20 @@ class BasinRows:
         return rate, float(along[worst]) / rate if rate > 0.0 else 1.0
 
     def speeds(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Velocity float64[n, 3] and wave speed float64[n] in cells at deviations y float64[quantities, n] [m/s]."""
+        """(velocities, wave speeds) in cells at deviations y : float64[n, 3], float64[n] [m/s].
+
+        y : float64[quantities, n]
+        """
         raise NotImplementedError
 
     @property
     def has_waves(self) -> bool:
-        """True if the basin has waves, in addition to the transport of scalars."""
+        """True if the basin has waves, and not only scalars in a given velocity."""
         return bool(self.quantities)
 
     @property
     def has_constant_speed(self) -> bool:
-        """True if the wave speed is constant."""
+        """True if the wave speed is the same in all states."""
         return False
 
     @property
@@ -129,30 +144,34 @@ class BasinRows:
         return SCHEMES[self.case.numerics.scheme].for_basin(self.is_grid).name
 
     def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
-        """Fill the columns of a probe of a velocity `field`; each type of basin adds its other quantities."""
+        """Fill the row of a probe of a velocity in cells; each type of basin adds its other quantities.
+
+        field : name of the quantity; cells, weights : cells around the probe, and their weights in its value
+        """
         row["side"], row["scale"] = VELOCITIES[field], 1.0
 
     def mass(self) -> tuple[float, np.ndarray]:
-        """Mass in the initial steady state [kg], and mass per deviation of the first quantity : float64[n]."""
+        """(mass in the initial steady state [kg], float64[n] mass of each cell per deviation of its first quantity)."""
         return 0.0, np.zeros(self.n)
 
     def weights(self, y: np.ndarray) -> np.ndarray:
-        """Weights w, so that small deviations d from y store the energy w d^2 : float64[quantities, n]."""
+        """Weights w, for which a small deviation d from y stores the energy w d^2 [J] : float64[quantities, n]."""
         return np.tile(0.5 * self.mesh.area, (len(self.quantities), 1))
 
     def above(self, y: np.ndarray, datum: float) -> float:
-        """Energy at deviations y [J], above water at rest with its surface at the datum, or on a higher bed.
+        """Energy at deviations y [J], relative to water at rest with its surface at the elevation `datum`.
 
-        For a liquid the reference is the state with zero total pressure.
+        Where the bed is above that surface, it is relative to a dry bed. For a liquid it is relative to the state with
+        zero total pressure.
         """
         return 0.0
 
     def notices(self, y: np.ndarray) -> list[Notice]:
-        """Notices on deviations at the start."""
+        """Notices on the deviations y of cells at the start of a run."""
         return []
 
     def watches(self, y: np.ndarray) -> list[Any]:
-        """Checks during a run that starts from deviations y, see `lower_watch.ErrorWatch`."""
+        """Checks (`ErrorWatch`) of a run that starts from the deviations y of cells."""
         return []
 
     # ----------------------------------------------------------------------------------------------------------
@@ -181,9 +200,9 @@ class BasinRows:
 
     @property
     def forms_stages(self) -> bool:
-        """True if the kernel of its rates can form sums of stages too, because nothing is added to these rates later.
+        """True if the kernel of the rates of cells can form sums of stages too, as nothing is added to its rates later.
 
-        Rows of cells at patches, which many functions read, are excluded.
+        Rows of cells at patches, to which many functions add, are excepted: their sums are formed elsewhere.
         """
         return False
 
@@ -194,13 +213,16 @@ class BasinRows:
 
     @cached_property
     def points(self) -> MeshPoints:
-        """Search for the cells at given points of the mesh."""
+        """`MeshPoints` of the mesh, which finds the cell at a given point."""
         from fvsolve.mesh.mesh_points import MeshPoints
 
         return MeshPoints(self.mesh)
 
     def formula(self, shape) -> np.ndarray:
-        """Means of a formula over cells : float64[n]; by nine Gauss points on grids, else values at cell centres."""
+        """Mean of a formula over each cell : float64[n]; by nine Gauss points on grids, else by the centre alone.
+
+        shape : the formula, None for zero
+        """
         return means(samples(shape, self.mesh))
 
     def reflections(self) -> np.ndarray:
@@ -217,7 +239,7 @@ class BasinRows:
         return outer[self.ring()] if self.is_grid else outer
 
     def ring(self) -> np.ndarray:
-        """Numbers of the boundary faces of a grid, counted from the first, in the order west, east, south, north."""
+        """Numbers of the boundary faces of a grid, from 0 for the first one, in the order west, east, south, north."""
         mesh, grid = self.mesh, self.mesh.grid
         normal, left = mesh.normal[mesh.inner :], mesh.left[mesh.inner :]
         row, column = np.divmod(left, grid.nx)
@@ -227,17 +249,17 @@ class BasinRows:
         return np.lexsort((at, side))
 
     def reflection(self, patch) -> float:
-        """Reflection coefficient of waves at a patch: 0 if it is open, 1 for a wall."""
+        """Reflection coefficient of waves at a patch: 0 if it is open, 1 for a wall, other values for impedances."""
         return 0.0 if patch.boundary == "open" else 1.0
 
     def is_open(self, patch: str) -> bool:
-        """True if water flows through a patch without a link."""
+        """True if fluid flows through a patch without a link."""
         stated = self.part.patches.get(patch)
         return stated is not None and self.reflection(stated) != 1.0
 
     @property
     def opening(self) -> str | None:
-        """Name of a patch through which water flows without a link; None if there is none."""
+        """Name of the first patch through which fluid flows without a link; None without such a patch."""
         return next((patch for patch in self.part.patches if self.is_open(patch)), None)
 
     def states_of(self, y: np.ndarray) -> np.ndarray:
@@ -246,7 +268,7 @@ class BasinRows:
         return y[at : at + len(self.quantities) * self.n].reshape(-1, self.n)
 
     def deviations(self, y: np.ndarray) -> np.ndarray:
-        """Deviations in the cells of the basin at the states y of the model : float64[quantities, n]."""
+        """Deviations of quantities of cells from rest at the states y of the model : float64[quantities, n]."""
         if not self.moves:
             return self.states_of(y)
         wide, rest = self.area_ratios(y), np.zeros((len(self.quantities), self.n))
@@ -264,18 +286,25 @@ class BasinRows:
         return bool(self.walls)
 
     def area_ratios(self, y: np.ndarray) -> np.ndarray:
-        """Areas of cells over undeformed areas at the states y of the model : float64[n]."""
+        """Present over undeformed area of each cell at the states y of the model : float64[n]."""
         return 1.0 + sum((y[at] * per for at, per, _ in self.stretches), np.zeros(self.n))
 
     def vectors_at(self, fields: dict[str, np.ndarray], out: np.ndarray, layout) -> dict[str, np.ndarray]:
-        """Velocity in cells of a basin on a body, and its normal, by name, along axes of the world : float64[n, 3]."""
+        """Vectors in cells of a basin on a body, in axes of the world: "velocity" and "normal" -> float64[n, 3].
+
+        "normal" is the unit normal of the basin. fields : result of `fields`; out, layout : output array of the
+        right-hand side, and the places of its parts
+        """
         from fvsolve.basins.lower_frames import axes_in_world
 
         axes = axes_in_world(self, out, layout)[1]
         return {"velocity": fields["velocity"] @ axes.T, "normal": np.tile(axes[:, 2], (self.n, 1))}
 
     def points_at(self, y: np.ndarray, out: np.ndarray, layout) -> np.ndarray:
-        """Corners of cells at the states y of the model; in the world for a basin on a body : float64[p, 3] [m]."""
+        """Positions of corners of cells at the states y of the model : float64[p, 3] [m].
+
+        For a basin on a body they are in axes of the world. out, layout : as for `vectors_at`
+        """
         x, z = np.ascontiguousarray(self.mesh.points.T)
         plan = self.mesh.points + sum((y[at] * weights for at, _, weights in self.stretches), np.zeros((1, 2)))
         points = np.column_stack([plan, self.ground(x, z)])
@@ -287,15 +316,18 @@ class BasinRows:
         return origin + points @ axes.T
 
     def at_rest(self) -> np.ndarray | float:
-        """First state quantity of the cells at rest: depth [m] or density [kg/m3]."""
+        """First state quantity at rest, as a value or a value for each cell: depth [m] or density [kg/m3]."""
         raise NotImplementedError
 
     def thrust_at_rest(self) -> np.ndarray:
-        """Force at rest per metre of wall next to each cell : float64[n] [N/m]."""
+        """Force at rest on a wall next to each cell, per metre of wall : float64[n] [N/m]."""
         raise NotImplementedError
 
     def lower_common(self, draft, row) -> None:
-        """Fill the columns of the row that all types of basin have, and add the states."""
+        """Fill the row of the basin in the table of basins, and add its states to the draft of the model.
+
+        The columns that all types have are filled here, the others by `lower`.
+        """
         numerics, mesh, before = self.case.numerics, self.mesh, draft.used_size()
         self.row, row["n"] = row, self.n
         row["kind"], row["deep"], row["given"] = (
@@ -349,7 +381,7 @@ class BasinRows:
         draft.warnings += [Notice("mesh", place, f"basin {self.name}: {note}", "mesh") for note in mesh.notes]
 
     def lower_scalars(self, draft, row) -> None:
-        """Reserve flows, work arrays and values beyond the boundary of scalars; warn if they may leave their bounds."""
+        """Reserve arrays of scalars: flows, values beyond the boundary, work; warn if values may leave their bounds."""
         mesh, grid = self.mesh, self.mesh.grid
         row["outside"] = draft.to_work(len(self.scalars) * int(row["outer"]))
         if self.is_grid:
@@ -391,24 +423,26 @@ class BasinRows:
         radius = ssp_radius(method)
         if numerics.courant > radius:
             advice = (
-                f"Courant numbers up to {radius:g} keep the bounds" if radius else "no Courant number keeps the bounds"
+                f"Courant numbers up to {radius:g} keep the bounds"
+                if radius
+                else "with this method no Courant number keeps the bounds"
             )
             key = "courant" if radius else "method"
             return key, f"{advice}, with ssp-rk3 up to 1", numerics.courant, radius
         return None
 
     def scalar_scale(self, name: str) -> float:
-        """Size of a small amount of a scalar per area, from its initial values."""
+        """Size of a small amount of a scalar per area: its greatest value at the start."""
         given, scalar = self.part.scalars.get(name), self.case.scalars[name]
         values = np.abs([scalar.initial, scalar.ambient]) if given is None else np.abs(self.formula(given))
         return float(values.max()) or 1.0
 
     def depth_of(self, y: np.ndarray) -> np.ndarray:
-        """Depth over which amounts of scalars are distributed, at deviations y : float64[n]."""
+        """Depth of each cell over which amounts of scalars are distributed, at deviations y : float64[n]."""
         return np.ones(self.n)
 
     def start_scalars(self, y: np.ndarray) -> None:
-        """Write the amounts of scalars at the start into the states y of the model."""
+        """Write the amounts of scalars at the start to the states y of the model."""
         for name, amounts in zip(self.scalars, self.amounts(y), strict=True):
             given = self.part.scalars.get(name)
             value = self.case.scalars[name].initial if given is None else self.formula(given)
@@ -420,16 +454,16 @@ class BasinRows:
         return y[at : at + len(self.scalars) * self.n].reshape(-1, self.n)
 
     def values(self, y: np.ndarray) -> dict[str, np.ndarray]:
-        """Values of scalars in cells at the states y of the model, by name."""
+        """Values of scalars in cells at the states y of the model : name -> float64[n]."""
         depth = np.maximum(self.depth_of(self.deviations(y)), THIN) * (self.area_ratios(y) if self.moves else 1.0)
         return {name: amounts / depth for name, amounts in zip(self.scalars, self.amounts(y), strict=True)}
 
     def mass_per_depth(self) -> np.ndarray:
-        """Mass per depth in each cell : float64[n] [kg/m]; it gives the mass of a scalar from its amount per area."""
+        """Mass of fluid per depth in each cell : float64[n] [kg/m]; times an amount per area, the mass of a scalar."""
         return np.zeros(self.n)
 
     def lower_patch(self, draft, patch: str, row) -> None:
-        """Fill the row of a patch in the table of patches: its cells, faces, sizes and inflow values."""
+        """Fill the row of a patch in the table of patches: its cells, faces, sizes and schedules of inflow values."""
         cells = boundary_cells(self.mesh, patch)
         row["first"], row["count"] = len(draft.integers), cells.size
         draft.integers += cells.tolist()

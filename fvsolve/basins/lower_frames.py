@@ -11,11 +11,13 @@ from fvsolve.case.patches_on_bodies import level_over
 
 
 def lower_frame(draft, basin, row) -> None:
-    """Reserve the numbers of the frame of a basin, and store the undisturbed surface.
+    """Reserve entries for the frame of a basin on a body; store its place, rotation, positions and undisturbed surface.
 
-    The axes of the kernels have their origin in the middle of the basin. Accelerations along the normal are taken
-    there, and the mirror cells at walls neglect the Euler force beyond it. So the error is least, and independent of
-    the corner where the drawing of the basin has its origin.
+    A liquid has no surface; it has potentials, and positions of grid lines or of sides of cells, instead. If an open
+    patch prevents the correct load at an observed joint, a fault is added to the draft.
+    The axes of the kernels have their origin in the middle of the basin. Accelerations along the normal are those at
+    this point, and the mirror cells at walls neglect the Euler force beyond the wall. With this origin the error is
+    least, and independent of the corner where the drawing of the basin has its origin.
     """
     part, grid, middle = basin.part, basin.mesh.grid, basin.mesh.centroid
     places = [*(basin.mesh.centre - middle).T]
@@ -40,19 +42,20 @@ def lower_frame(draft, basin, row) -> None:
     for k, body in joint_probes:
         if basin.opening is not None and body in chain:
             text = f"{body} carries {basin.name}: the joint load omits the flow through {basin.name}.{basin.opening}"
-            draft.fault(f"output.probes[{k}]", f"{text}. Expected no probe of a joint load, or a wall at that patch")
+            remedy = "Leave out the probe of the joint load, or make that patch a wall"
+            draft.fault(f"output.probes[{k}]", f"{text}. {remedy}")
 
 
 def joint_load_probes(case) -> list[tuple[int, str]]:
-    """Probes of joint loads in a case: (number of the probe, name of the body) of each."""
+    """(number of the probe, name of the body) of each probe of a joint load in a case."""
     probes = enumerate(case.probes)
     return [(k, probe.name) for k, probe in probes if probe.part == "nodes" and probe.quantity.startswith("joint_")]
 
 
 def side_positions(basin) -> np.ndarray:
-    """Middles of the sides of cells in the order of `cell_sides` : float64[2, sides] [m].
+    """Middles of the sides of cells, in the order of `cell_sides` : float64[2, sides] [m].
 
-    Both cells of a face have the same numbers.
+    Both cells of a face have equal positions of their sides.
     """
     count = int(blocks(basin.integers) * basin.integers[0] * BLOCK)
     face = basin.integers[-count:]
@@ -60,9 +63,9 @@ def side_positions(basin) -> np.ndarray:
 
 
 def position_in_frame(draft, basin, patch: str) -> list[float]:
-    """Position of a patch in the axes of the kernels, three numbers [m], and g times its depth at rest [J/kg].
+    """[x, y, z, g times depth at rest] of a patch of a basin on a body.
 
-    z counts from the level at rest.
+    x, y : position from the middle of the basin, in axes of the basin [m]; z : height above the level at rest [m]
     """
     place, part = draft.case.places[f"{basin.name}.{patch}"], basin.part
     own = part.rotation.T @ (np.array(place.at) - np.array(part.place))
@@ -70,16 +73,20 @@ def position_in_frame(draft, basin, patch: str) -> list[float]:
 
 
 def potential_at_start(basin) -> np.ndarray:
-    """Gravity potential of cells above the middle of their basin [J/kg], in the attitude of the body at the start."""
+    """Gravity potential of cells, relative to that at the middle of their basin : float64[n] [J/kg].
+
+    It is computed for the attitude of the body at the start.
+    """
     pose, gravity = basin.case.poses[basin.part.on], basin.case.gravity
     up = (pose.attitude @ basin.part.rotation).T @ np.array([0.0, 0.0, gravity])
     return (basin.mesh.centre - basin.mesh.centroid) @ up[:2]
 
 
 def level_at_start(basin, attitude: np.ndarray | None = None) -> np.ndarray:
-    """Depth of water in cells of a tilted basin, with a horizontal surface and the volume of the water at rest [m].
+    """Depth of the water in cells of a basin on a body, with a horizontal surface : float64[n] [m].
 
-    attitude : rotation matrix of its body, that of the start if omitted
+    The volume is that of the water at rest.
+    attitude : rotation matrix of the body, None for that at the start
     """
     part, turn = basin.part, basin.case.poses[basin.part.on].attitude if attitude is None else attitude
     down = (turn @ part.rotation).T @ np.array([0.0, 0.0, -1.0])
@@ -91,7 +98,10 @@ def level_at_start(basin, attitude: np.ndarray | None = None) -> np.ndarray:
 
 
 def axes_in_world(basin, out: np.ndarray, layout) -> tuple[np.ndarray, np.ndarray]:
-    """Origin float64[3] [m] and axes float64[3, 3], as columns, of a basin on a body, in axes of the world."""
+    """(origin [m], axes as columns) of a basin on a body, in axes of the world : float64[3], float64[3, 3].
+
+    out, layout : output array of the right-hand side, and the places of its parts
+    """
     from fvsolve.kernels.dtypes import BODY_OUT
     from fvsolve.kernels.mechanism.body_layout import ATTITUDE, POSITION
 

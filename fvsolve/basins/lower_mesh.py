@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def lower_mesh(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
-    """Geometry and neighbours of the cells of a mesh: (float64[:] floats, int64[:] integers), see `cell_sides`.
+    """(float64[:] floats, int64[:] integers) with geometry and neighbours of the cells of a mesh, see `cell_sides`.
 
     Cells and faces keep their numbers.
     """
@@ -47,10 +47,10 @@ def lower_mesh(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def lower_ends(mesh: Mesh, moves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Blocks that move and the ends of sides: (int64[blocks], int64[:]), see `moving_meshes`.
+    """(blocks : int64[blocks], ends : int64[:]): blocks of cells that move, and corners of cells and of their sides.
 
-    A block has the value 1 if a corner in it or next to it moves.
-    moves : bool[corners]  True if a corner moves
+    A block has the value 1 if a corner of its cells or of cells next to these moves, else 0.
+    For the order in `ends` see `moving_meshes`. moves : bool[corners]  True if a corner moves
     """
     n, inner = len(mesh.area), mesh.inner
     slots, face, own, side = _sides(mesh)
@@ -75,7 +75,7 @@ def lower_ends(mesh: Mesh, moves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _sides(mesh: Mesh) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
-    """Greatest number of sides of a cell, and three arrays over all sides: face, cell, number of the side in the cell.
+    """(slots, face, own, side): 3 or 4 sides per cell, and for each side its face, its cell and its number there.
 
     face is ~f where the cell is to the right of face f.
     """
@@ -91,12 +91,15 @@ def _sides(mesh: Mesh) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _by_block(table: np.ndarray) -> np.ndarray:
-    """Flatten a table with a row for each number of a side to the order of memory: by block, side, row and cell."""
+    """Flatten a table float64[rows, sides] to the order in memory: by block, side number in the cell, row, cell."""
     return table.reshape(len(table), -1, cell_sides.BLOCK).swapaxes(0, 1).ravel()
 
 
 def _side_direction(mesh: Mesh, face: np.ndarray) -> np.ndarray:
-    """Angle of the normal of each side, ordered so that the sides of a rectangle are west, south, east, north."""
+    """Angle of each side by which the sides of a cell are ordered [rad]: for rectangles west, south, east, north.
+
+    It is the angle of the outward normal plus pi. face : face of each side, ~f if the cell is to the right of face f
+    """
     normal = np.where(face[:, None] >= 0, 1.0, -1.0) * mesh.normal[np.where(face >= 0, face, ~face)]
     return np.round(np.arctan2(-normal[:, 1], -normal[:, 0]), 9) % round(2.0 * np.pi, 9)
 

@@ -11,7 +11,7 @@ STENCIL_RADIUS = 3  # stencil radius of the fifth order
 
 
 def interior_pattern(basin) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs (rates, states on which they depend) of all cells and their neighbours, as two arrays of indices in y."""
+    """(rates, states) as indices in y: each rate of each cell, paired with the states on which it depends."""
     near, count = neighbours(basin), len(basin.quantities)
     pattern = kron(coo_array(np.ones((count, count), dtype=bool)), near).tocoo()
     at = int(basin.row["y"])
@@ -19,9 +19,9 @@ def interior_pattern(basin) -> tuple[np.ndarray, np.ndarray]:
 
 
 def scalar_pattern(basin) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs (rates, states) of amounts of scalars, as two arrays of indices in y.
+    """(rates, states) as indices in y: each rate of an amount of a scalar, paired with the states on which it depends.
 
-    The rate of an amount depends on amounts of the same scalar, and on the flow states if the basin has any.
+    These are amounts of the same scalar, and the flow states if the basin has any.
     """
     near, count = scalar_neighbours(basin), len(basin.scalars)
     own = kron(eye_array(count, dtype=bool), near).tocoo()
@@ -34,8 +34,8 @@ def scalar_pattern(basin) -> tuple[np.ndarray, np.ndarray]:
 def scalar_neighbours(basin) -> csr_array:
     """Cells on which the rate of the amount in each cell depends : bool[n, n].
 
-    Fifth order on grids reads along the faces of a cell too, up to four cells from a side; flux correction (weno5)
-    reads further.
+    On grids, schemes of fifth order also read cells beside the faces of a cell, up to four columns and four rows away.
+    The flux correction of weno5 reads further cells.
     """
     near = neighbours(basin)
     if basin.is_grid and basin.row["scheme"] in (rec.LINEAR, rec.WENO5):
@@ -48,17 +48,17 @@ def scalar_neighbours(basin) -> csr_array:
 
 
 def amount_states(basin, q: int, cells: np.ndarray) -> np.ndarray:
-    """Indices in y of the amounts of scalar q in some cells."""
+    """Indices in y of the amounts of scalar q in the given cells."""
     return int(basin.row["carried"]) + q * basin.n + cells
 
 
 def cells_read(near: csr_array, cells: np.ndarray) -> np.ndarray:
-    """Cells on which the rates of some cells depend, including these cells; near : result of `neighbours`."""
+    """Cells on which the rates of the given cells depend, including these cells; near : result of `neighbours`."""
     return np.unique(near[np.unique(cells)].indices)
 
 
 def cell_states(basin, cells: np.ndarray, quantities: int | None = None) -> np.ndarray:
-    """Indices in y of the first `quantities` quantities of some cells, or of all quantities."""
+    """Indices in y of the first `quantities` state quantities of the given cells; of all quantities for None."""
     count = len(basin.quantities) if quantities is None else quantities
     return (int(basin.row["y"]) + np.arange(count)[:, None] * basin.n + cells).ravel()
 
@@ -70,7 +70,10 @@ def all_states(basin) -> np.ndarray:
 
 
 def neighbours(basin) -> csr_array:
-    """Cells on which the rate of each cell depends : bool[n, n]; on grids along both axes, else in all directions."""
+    """Cells on which the rates of each cell depend : bool[n, n].
+
+    On grids they lie along both axes from the cell, on other meshes in all directions.
+    """
     pattern, reach = csr_array(eye_array(basin.n, dtype=bool)), basin.reach
     edge = np.unique(basin.mesh.left[basin.mesh.inner :])
     if reach < STENCIL_RADIUS or not basin.has_wide_closure or not basin.row["outer_given"]:
@@ -87,7 +90,10 @@ def neighbours(basin) -> csr_array:
 
 
 def neighbour_rings(basin) -> list[csr_array]:
-    """Each cell and its next neighbours : list of bool[n, n]; along x and y for a grid, else in all directions."""
+    """Matrices bool[n, n] that are True for each cell and its next neighbours.
+
+    For a grid there is one for neighbours along x and one for neighbours along y, else one for all neighbours.
+    """
     mesh, patterns = basin.mesh, []
     left, right = mesh.left[: mesh.inner], mesh.right[: mesh.inner]
     across = np.abs(mesh.normal[: mesh.inner, 0]) > 0.5

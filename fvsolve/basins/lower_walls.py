@@ -14,7 +14,7 @@ TRAVEL_SCALE = 1e-2  # a small travel [m]
 
 
 def lower_walls(draft) -> None:
-    """Fill the table of moving walls, and add states for their travels."""
+    """Fill the table of moving walls of a draft of a model, and add states for their travels."""
     parts = [(basin, patch) for basin in draft.basins for patch in basin.walls]
     draft.wall_table, draft.wall_names = np.zeros(len(parts), rec.WALL), [f"{b.name}.{patch}" for b, patch in parts]
     for row, (basin, patch) in zip(draft.wall_table, parts, strict=True):
@@ -53,7 +53,7 @@ def lower_walls(draft) -> None:
 
 
 def lower_lines(draft, basin, row) -> None:
-    """Reserve space in `plane` for the speeds and stretching of the moving lines of a basin."""
+    """Reserve space in `plane` for the speeds of the moving lines of a basin, and for the stretching of its cells."""
     mesh, axis = basin.mesh, case.axis_of(basin.part, basin.mesh)
     row["turn"], row["area"] = axis, draft.to_plane(mesh.area)
     row["thrust"] = draft.to_work(2 * row["outer"])
@@ -66,7 +66,10 @@ def lower_lines(draft, basin, row) -> None:
 
 
 def lower_corners(draft, basin, row, axis: int) -> None:
-    """Reserve space in `plane` and `integers` for the moving corners of a basin on a mesh of any cells."""
+    """Reserve space in `plane` and `integers` for the moving corners of a mesh other than a grid.
+
+    axis : axis of the motion, 0 for x and 1 for y
+    """
     mesh, (x, y) = basin.mesh, basin.mesh.points.T
     row["corners"], row["stretch"] = x.size, draft.to_plane(np.ones(2 * basin.n))
     row["lines"] = draft.to_plane(np.zeros(x.size))

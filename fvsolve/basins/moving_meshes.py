@@ -49,13 +49,13 @@ _NX, _NY, _REACH, _DX, _DY, _WX, _WY = (k * BLOCK for k in (NX, NY, REACH, DX, D
 
 @njit(forceinline=True)
 def on_moving_mesh(basin):
-    """True if the basin is a mesh of any cells between moving walls."""
+    """True if the basin has moving walls and a mesh other than a grid."""
     return basin["walls"] > 0 and basin["nx"] == 0
 
 
 @njit(forceinline=True)
 def mesh_positions(plane, basin):
-    """Arrays of a mesh: x, y and undeformed coordinate of corners; x and y of centres of cells; scratch.
+    """(x, y, undeformed coordinate of corners; x, y of centres of cells; scratch) of a mesh: six arrays.
 
     The undeformed coordinate is that along the axis of motion [m].
     """
@@ -67,7 +67,7 @@ def mesh_positions(plane, basin):
 
 @njit(forceinline=True)
 def ends_of(integers, basin):
-    """Flags of blocks where corners move, corners of cells, and ends of sides: parts of `ends`, see the module."""
+    """(flags of blocks where corners move, corners of cells, ends of sides): parts of `ends`, see `moving_meshes`."""
     ends = integers[basin["ends"] :]
     count = ends[0]
     return ends[1 : 1 + count], ends[1 + count :].view(np.int32), ends[1 + count + 2 * basin["n"] :].view(np.int32)
@@ -75,7 +75,7 @@ def ends_of(integers, basin):
 
 @njit
 def update_meshes(t, y, seen, out, handle):
-    """Compute corners, centres, sides and patches of all moving meshes at the states y."""
+    """Compute corners, centres, sides and patches of all meshes (not grids) between moving walls at the states y."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_moving_mesh(tables.basins[b]):
@@ -101,7 +101,10 @@ def move_corners(tables, basin, y):
 
 @njit
 def put_centres(first, last, corners, x, y, cx, cy):
-    """Write the centroids (cx, cy) of the cells `first` to `last` - 1, see `mesh.shapes`."""
+    """Write the centroids (cx, cy) of the cells `first` to `last` - 1; for the formula see `mesh.shapes`.
+
+    corners : four corners of each cell; x, y : positions of corners
+    """
     for i in range(first, last):
         own = corners[4 * i : 4 * i + 4]
         a, b, c, d = own[0], own[1], own[2], own[3]
@@ -115,7 +118,10 @@ def put_centres(first, last, corners, x, y, cx, cy):
 
 @njit
 def gather_cells(area, cx, cy, scratch):
-    """Read 1 / areas and centres of a block of cells; set the sums over their sides to zero."""
+    """Write 1 / areas and centres of a block of cells to `scratch`, and set the sums over their sides there to zero.
+
+    area, cx, cy : areas and centres of these cells
+    """
     for i in range(BLOCK):
         scratch[i], scratch[_XY + i], scratch[_YY + i], scratch[_SHARE + i] = 0.0, 0.0, 0.0, 0.0
     for i in range(area.size):
@@ -124,7 +130,11 @@ def gather_cells(area, cx, cy, scratch):
 
 @njit
 def gather_ends(start, stop, beyond, x, y, cx, cy, scratch):
-    """Read the ends of a side of each cell of a block, and the centre of the cell beyond it, if there is a cell."""
+    """Write the ends of one side of each cell of a block, and the centre of the cell beyond it, to `scratch`.
+
+    start, stop : corners where the side begins and ends; beyond : cell beyond the side, -1 at the boundary
+    x, y : positions of corners; cx, cy : centres of cells
+    """
     for i in range(BLOCK):
         a, b, other = start[i], stop[i], max(beyond[i], 0)
         scratch[_XA + i], scratch[_YA + i], scratch[_XB + i], scratch[_YB + i] = x[a], y[a], x[b], y[b]
@@ -133,7 +143,11 @@ def gather_ends(start, stop, beyond, x, y, cx, cy, scratch):
 
 @njit
 def put_side(scratch, geo):
-    """Write the measures of one side of each cell of a block to geo; add to the sums for the least-squares gradient."""
+    """Write the measures of one side of each cell of a block to `geo`, and add to the sums over sides in `scratch`.
+
+    scratch : ends of the side, see `gather_ends`, and sums for the least-squares gradient
+    geo : first group of measures of the side, see `cell_sides`
+    """
     for i in range(BLOCK):
         xa, ya, xb, yb, cx, cy = (
             scratch[_XA + i], scratch[_YA + i], scratch[_XB + i], scratch[_YB + i], scratch[_CX + i], scratch[_CY + i]
@@ -162,9 +176,10 @@ def put_side(scratch, geo):
 
 @njit
 def put_distance(scratch, geo, far):
-    """Write the measures of a side that diffusion and flows of scalars need to far, for each cell of a block.
+    """Write to `far` those measures of one side of each cell of a block that only scalars need.
 
-    They are 1 / area, 1 / distance to the next centre, and obliqueness.
+    They are 1 / area, 1 / distance to the next centre and obliqueness, see the last group in `cell_sides`.
+    scratch, geo : as for `put_side`
     """
     for i in range(BLOCK):
         nx, ny = geo[_NX + i], geo[_NY + i]
@@ -180,7 +195,10 @@ def put_distance(scratch, geo, far):
 
 @njit
 def invert(scratch):
-    """Invert the least-squares matrix of each cell of a block in place; it gives gradients from sums over sides."""
+    """Invert the least-squares matrix of each cell of a block in `scratch`, in place.
+
+    The inverse times sums over the sides gives the gradient.
+    """
     for i in range(BLOCK):
         xx, xy, yy = scratch[i], scratch[_XY + i], scratch[_YY + i]
         scale = 1.0 / max(xx * yy - xy * xy, TINY)
@@ -189,7 +207,10 @@ def invert(scratch):
 
 @njit
 def put_weights(scratch, geo):
-    """Write the weights of the difference across a side in the gradient of each cell of a block."""
+    """Write the weights of the difference across one side in the gradient, for each cell of a block, to `geo`.
+
+    scratch : result of `invert`; geo : as for `put_side`
+    """
     for i in range(BLOCK):
         wx, wy, cross = geo[_WX + i], geo[_WY + i], scratch[_XY + i]
         geo[_WX + i], geo[_WY + i] = scratch[i] * wx - cross * wy, scratch[_YY + i] * wy - cross * wx
@@ -197,7 +218,7 @@ def put_weights(scratch, geo):
 
 @njit
 def update_sides(tables, basin):
-    """Compute all measures of `cell_sides` in blocks where corners move."""
+    """Write all measures of `cell_sides` in blocks where corners move, and the centres of cells there."""
     floats, integers = tables.plane[basin["mesh"] :], tables.integers[basin["links"] :]
     x, y, _, cx, cy, scratch = mesh_positions(tables.plane, basin)
     area = tables.plane[basin["area"] :]
@@ -239,7 +260,10 @@ def update_sides(tables, basin):
 
 @njit
 def put_lengths(face, side_lengths, lengths):
-    """Write the lengths of faces, read from the cells on their left."""
+    """Write the lengths of faces, read from the cells on their left, for one side of each cell of a block.
+
+    face : face of each side, negative for the cell on the right; side_lengths : lengths of these sides
+    """
     for i in range(BLOCK):
         if face[i] >= 0:
             lengths[face[i]] = side_lengths[i]
@@ -247,7 +271,7 @@ def put_lengths(face, side_lengths, lengths):
 
 @njit
 def size_patch(tables, basin, patch):
-    """Write the sizes of a patch: lengths of its faces, area of the cells next to it."""
+    """Write the present sizes of a patch: lengths of its faces, area of the cells next to it."""
     plane, integers, area, length = tables.plane, tables.integers, 0.0, 0.0
     links = integers[basin["links"] :]
     at = basin["mesh"] + MEASURES * blocks(links) * links[0] * BLOCK + 2 * links[3] + links[2] - links[3]
@@ -263,7 +287,7 @@ def size_patch(tables, basin, patch):
 
 @njit
 def set_side_speeds(t, y, dydt, out, handle):
-    """Compute the speeds of all sides along their normals [m/s]; they raise out[RATE], the rate that limits steps."""
+    """Write the speeds of all sides of moving meshes along their normals [m/s]; raise out[RATE] to limit the step."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_moving_mesh(tables.basins[b]):
@@ -272,9 +296,9 @@ def set_side_speeds(t, y, dydt, out, handle):
 
 @njit
 def put_speeds(tables, basin):
-    """Compute the speeds of sides from the speeds of their corners.
+    """Write the speeds of sides along their normals from the speeds of corners; return the greatest swept rate [1/s].
 
-    Return the greatest fraction of a cell that a side sweeps per time [1/s].
+    This rate is the fraction of a cell that a side sweeps per time.
     """
     plane, slots, most = tables.plane, tables.integers[basin["links"]], 0.0
     v, across = plane[basin["lines"] :], _NY if basin["turn"] == 1 else _NX
@@ -293,7 +317,7 @@ def put_speeds(tables, basin):
 
 @njit(forceinline=True)
 def mesh_motion(tables, basin):
-    """Speeds of sides [m/s], array for pressures and energy losses on boundary faces, area ratios A / A0 of cells."""
+    """(speeds of sides [m/s], pressures and energy losses on boundary faces, present over undeformed cell areas)."""
     sides, thrust, rows = basin["sides"], basin["thrust"], basin["stretch"]
     count = 4 * BLOCK * blocks(tables.integers[basin["links"] :])
     plane, thrust_array = tables.plane, tables.work[thrust : thrust + 2 * basin["outer"]]

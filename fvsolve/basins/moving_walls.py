@@ -37,7 +37,10 @@ VECTOR_MARGIN = 8  # additional speeds of lines that vector loops read beyond th
 
 @njit(forceinline=True)
 def stretching_counts(basin):
-    """(number of rows or columns of cells that stretch, number of moving lines); on a mesh of cells and of corners."""
+    """(number of columns or rows of cells that stretch, number of moving lines).
+
+    For a mesh other than a grid, it is (number of cells, number of corners).
+    """
     if basin["nx"] == 0:
         return basin["n"], basin["corners"]
     count = basin["ny"] if basin["turn"] == 1 else basin["nx"]
@@ -46,10 +49,10 @@ def stretching_counts(basin):
 
 @njit
 def update_geometry(t, y, seen, out, handle):
-    """Compute lines and areas of basins at y; write deviations of values per area from those at rest to `tables.seen`.
+    """Compute lines and areas of basins at y, and write deviations of values per area from rest to `tables.seen`.
 
-    An empty argument `seen` means that kernels of rates follow. For cells whose kernel reads the states themselves,
-    only the deviations next to patches and walls are then computed, unless scalars or friction need all.
+    If the argument `seen` is empty, kernels of rates follow. Then, if the kernel of a basin reads the states
+    themselves, only deviations next to patches and walls are computed, unless scalars or friction need all.
     """
     tables, done = open_tables(handle), 0
     for b in range(tables.basins.size):
@@ -69,7 +72,7 @@ def update_geometry(t, y, seen, out, handle):
 
 @njit(forceinline=True)
 def reads_contents(basin):
-    """True if the kernel of the rates reads the states (amounts in cells), not values per area: water on grids."""
+    """True if the kernel of rates reads the states (amounts in cells), not values per area: for water on grids."""
     return basin["deep"] == 1 and basin["nx"] > 0
 
 
@@ -82,9 +85,9 @@ def copy(source, target):
 
 @njit
 def stretch_cells(tables, basin, y):
-    """Write the ratios of present to undeformed area of columns, rows or cells at the travels y of walls.
+    """Write the ratios of present to undeformed area of columns, rows or cells, for the travels of walls in y.
 
-    Their reciprocals and the table of 1 / widths are updated too.
+    Their reciprocals and, for a grid, the table of 1 / widths are updated too.
     """
     plane, walls, at = tables.plane, tables.walls, basin["stretch"]
     count, lines = stretching_counts(basin)
@@ -103,7 +106,7 @@ def stretch_cells(tables, basin, y):
 
 @njit
 def factors_of(tables, basin, j):
-    """Ratio of present to undeformed area, and its reciprocal : arrays for row j of a grid, or all cells of a mesh."""
+    """(ratio of present to undeformed area, its reciprocal): arrays for row j of a grid, or for all cells of a mesh."""
     plane, nx, at, (count, _) = tables.plane, basin["nx"], basin["stretch"], stretching_counts(basin)
     if nx == 0 or basin["turn"] == 0:
         return plane[at : at + count], plane[at + count : at + 2 * count]
@@ -115,7 +118,7 @@ def factors_of(tables, basin, j):
 
 @njit
 def deviations_of_rows(tables, basin, y):
-    """Compute areas and deviations U - U0 of all cells of a basin from the states (A U - A0 U0) / A0.
+    """Write areas and deviations U - U0 of all cells of a basin, from the states (A U - A0 U0) / A0.
 
     U, U0 : value per area, and its value at rest; A, A0 : present and undeformed area of a cell
     """
@@ -136,7 +139,10 @@ def deviations_of_rows(tables, basin, y):
 
 @njit
 def deviations_at_patches(tables, b, y):
-    """Compute areas and deviations of values per area from those at rest, for cells of water at patches and walls."""
+    """Write areas and deviations from rest, as `deviations_of_rows` does, for the cells of water at patches and walls.
+
+    b : number of the basin; y : states
+    """
     plane, seen, basin, patches = tables.plane, tables.seen, tables.basins[b], tables.patches
     n, first = basin["n"], basin["y"]
     for p in range(patches.size):
@@ -150,7 +156,7 @@ def deviations_at_patches(tables, b, y):
 
 @njit
 def stretch_patches(tables, b):
-    """Compute the sizes of the patches of a grid."""
+    """Write the present sizes of all patches of basin b, a grid; see `stretch_patch`."""
     for p in range(tables.patches.size):
         if tables.patches[p]["basin"] == b:
             stretch_patch(tables, tables.basins[b], tables.patches[p])
@@ -158,9 +164,9 @@ def stretch_patches(tables, b):
 
 @njit
 def stretch_patch(tables, basin, patch):
-    """Compute the sizes of a patch on a side along which lines move, or next to cells that stretch.
+    """Write the present sizes of a patch of a grid: length over area of its faces, total length, area of its cells.
 
-    Rates of the states are proportional to lengths of faces over undeformed areas.
+    Length is over the undeformed area of the cell, because the rates of the states refer to that area.
     """
     plane, integers, area, length = tables.plane, tables.integers, 0.0, 0.0
     for m in range(patch["count"]):
@@ -190,9 +196,9 @@ def speed_of(t, tables, wall, y):
 
 @njit
 def set_line_speeds(t, y, dydt, out, handle):
-    """Compute the speeds of all lines and the rates of the travels of walls; the speeds limit the step.
+    """Write the speeds of all grid lines and the rates of the travels of walls; raise out[RATE], which limits the step.
 
-    Sets the status NO_WIDTH if a cell is narrower than LEAST_WIDTH times its undeformed width.
+    The status is set to NO_WIDTH if a cell is narrower than LEAST_WIDTH times its undeformed width.
     """
     tables = open_tables(handle)
     plane, walls = tables.plane, tables.walls
@@ -220,7 +226,7 @@ def set_line_speeds(t, y, dydt, out, handle):
 
 @njit
 def wall_of_row(tables, basin, i):
-    """Node of the wall whose travel changes the width of column, row or cell i most."""
+    """Node of the wall whose travel changes the width of column or row (on a mesh other than a grid, cell) i most."""
     index, most, (_, lines) = basin["wall"], -1.0, stretching_counts(basin)
     for k in range(basin["wall"], basin["wall"] + basin["walls"]):
         per = abs(tables.plane[tables.walls[k]["weights"] + lines + i])
@@ -234,7 +240,9 @@ def grid_motion(tables, basin):
     """Five arrays of a grid between moving walls, in this order.
 
     - speeds of lines along x, then along y [m/s]; the array for the axis without motion is empty
-    - pressures on boundary faces; present over undeformed area of columns or rows, and the reciprocal
+    - pressures and energy losses on boundary faces, see `liquid_mesh.liquid_rates`; for water the thrusts of
+      `surface_grid.grid_rates`
+    - present over undeformed area of columns or rows, then the reciprocal
     """
     plane, at, rows, (count, lines) = tables.plane, basin["lines"], basin["stretch"], stretching_counts(basin)
     speeds, no_speeds = plane[at : at + lines + VECTOR_MARGIN], plane[:0]
@@ -247,7 +255,7 @@ def grid_motion(tables, basin):
 
 @njit
 def impedance(tables, basin, i, y):
-    """Radiation impedance of one metre of wall next to cell i: force per speed [N s/m2]."""
+    """Radiation impedance of a wall next to cell i, per metre of wall: force over speed [N s/m2]."""
     st = tables.settings[0]
     if basin["deep"] == 0:
         return basin["density"] * basin["speed"] * basin["thickness"]
@@ -257,7 +265,10 @@ def impedance(tables, basin, i, y):
 
 @njit
 def push_body(out, tables, wall, force):
-    """Add the force on a wall, positive outward, to the forces on its body, through the origin of the body [N]."""
+    """Add the force [N] on a wall, positive outward, to the forces on the body that moves with it.
+
+    It acts through the origin of the body, without torque.
+    """
     row, along, force_along = (
         row_of_body(tables, wall["body"]),
         tables.basins[wall["basin"]]["turn"],
@@ -268,7 +279,7 @@ def push_body(out, tables, wall, force):
 
 @njit
 def push_bodies_at_rest(t, y, dydt, out, handle):
-    """Add the forces at rest on walls to the forces on their bodies."""
+    """Add the forces on walls in the steady start to the forces on the bodies that move with the walls."""
     tables = open_tables(handle)
     for k in range(tables.walls.size):
         if tables.walls[k]["body"] >= 0:
@@ -277,7 +288,10 @@ def push_bodies_at_rest(t, y, dydt, out, handle):
 
 @njit
 def add_wall_forces(t, y, dydt, out, handle):
-    """Compute the outward forces on walls minus those at rest; add them to masses and bodies, and limit the step."""
+    """Write the outward forces on walls minus those at rest to `out`, and add them to the moving masses or bodies.
+
+    The waves that walls radiate raise out[RATE], which limits the step. On bodies, the forces at rest are added too.
+    """
     tables = open_tables(handle)
     layout, walls, masses, st = tables.layout[0], tables.walls, tables.masses, tables.settings[0]
     seen = tables.seen
@@ -308,7 +322,7 @@ def add_wall_forces(t, y, dydt, out, handle):
 def stretch_scalar_rates(t, y, dydt, out, handle):
     """Convert rates of amounts of scalars per area s to rates of their states A s / A0.
 
-    The rates of other states are computed in that form directly.
+    A, A0 : present and undeformed area of a cell. The rates of other states are computed in that form directly.
     """
     tables = open_tables(handle)
     for b in range(tables.basins.size if dydt.size > 0 else 0):
@@ -325,7 +339,7 @@ def stretch_scalar_rates(t, y, dydt, out, handle):
 
 @njit
 def observe_walls(t, y, out, handle, values):
-    """Write the probe values of walls: inward force on the water [N], power supplied to the water [W], travel [m]."""
+    """Write the values of probes of walls: inward force on the fluid [N], power supplied to it [W], travel [m]."""
     tables = open_tables(handle)
     for p in range(tables.probes.size):
         probe = tables.probes[p]
@@ -351,9 +365,9 @@ def supplied_power(t, tables, k, y, out):
 
 @njit
 def wall_power(t, y, dydt, out, handle, power):
-    """Write two powers of each wall to `power`, before those of basins [W]: supplied, and dissipated by the law.
+    """Write the power supplied by each wall, and the power at it that the density law dissipates, to `power` [W].
 
-    Add the difference to the inflow power of the basin.
+    The supplied minus the dissipated power is added to the inflow power of the basin.
     """
     tables = open_tables(handle)
     for k in range(tables.walls.size):
@@ -365,9 +379,9 @@ def wall_power(t, y, dydt, out, handle, power):
 
 @njit
 def dissipated_power(tables, wall):
-    """Power at a wall that the linear density law dissipates [W].
+    """Power at a wall that the density law `linear` dissipates [W].
 
-    Under this law the motion of the wall does not carry density and momentum along, see `liquid_mesh`.
+    Under this law the motion of the wall does not carry density and momentum along, see `liquid_mesh.liquid_rates`.
     """
     basin, total = tables.basins[wall["basin"]], 0.0
     for m in range(wall["count"]):
@@ -378,7 +392,7 @@ def dissipated_power(tables, wall):
 
 @njit
 def area_growth_rate(t, tables, basin, y, i):
-    """Rate of the area of cell i over its undeformed area [1/s]."""
+    """Rate of the area of cell i over its undeformed area, by the motion of walls [1/s]."""
     total, (_, lines) = 0.0, stretching_counts(basin)
     for k in range(basin["wall"], basin["wall"] + basin["walls"]):
         wall = tables.walls[k]

@@ -1,4 +1,4 @@
-"""Bands of basins, the rows that one thread steps; and flows through the boundary, to which all bands contribute."""
+"""Bands of basins (rows of cells that one thread steps), and flows through the boundary, from all bands."""
 
 from fvsolve.basins.basin_patches import put_open_flows
 from fvsolve.jit import njit
@@ -25,7 +25,7 @@ def stencil_cells(tables, b):
 
 @njit
 def put_boundary_flows(t, y, dydt, out, handle):
-    """Compute the flows through open boundaries of all basins again, after all bands have computed their fluxes."""
+    """Write the flows through open patches of all basins again, after all bands have computed their fluxes."""
     tables = open_tables(handle)
     band_exchange.get_runs(tables.joint, band_exchange.SEND_FLOWS, tables.work)
     for b in range(tables.basins.size):

@@ -15,23 +15,26 @@ from fvsolve.kernels.limiters import by_limiter, limited, slope
 
 @njit
 def limited_value(limiter, forward, b, c, d, e):
-    """Value at the face between cells c and d, from c if the flow is forward, else from d; with a limiter."""
+    """Value at the face between cells c and d, with a limited slope, from c if the flow is forward, else from d.
+
+    b, c, d, e : values of four cells in line
+    """
     half = 0.5 * slope(limiter, c - b if forward else e - d, d - c)
     return c + half if forward else d - half
 
 
 @inline
 def put_face_values_limited(limiter, factor, flow, b, c, d, e, q):
-    """Write the values q at faces between cells c and d, with a limiter."""
+    """Write the values q at faces between cells c and d as `put_face_values` does, with a limiter function."""
     for i in range(q.size):
         q[i] = limited_value(limiter, factor * flow[i] > 0.0, b[i], c[i], d[i], e[i])
 
 
 @njit
 def cell_rate(scale, own, fw, fe, fs, fn, qw, qe, qs, qn):
-    """Rate of a cell from flows and values at its four faces; scale : kx ky, own : value of the cell.
+    """Rate of a cell from the flows f and values q at its four faces: w, e, s, n for west, east, south, north.
 
-    w, e, s, n : west, east, south, north
+    scale : 1 / area of the cell, times the factor on flows; own : value of the cell
     """
     x = fw * (qw - own) - fe * (qe - own)
     y = fs * (qs - own) - fn * (qn - own)
@@ -40,7 +43,10 @@ def cell_rate(scale, own, fw, fe, fs, fn, qw, qe, qs, qn):
 
 @inline
 def put_face_values(scheme, limiter, factor, flow, b, c, d, e, q):
-    """Write the values q at faces between cells c and d, from the upwind side of factor times flow."""
+    """Write the values q at faces between cells c and d, from the upwind side of factor times flow.
+
+    scheme : UPWIND, else with slopes by the limiter; b, c, d, e : values of four cells in line
+    """
     if scheme == UPWIND:
         for i in range(q.size):
             low, high = c[i], d[i]  # read both first, so that the choice compiles without a branch
@@ -51,7 +57,10 @@ def put_face_values(scheme, limiter, factor, flow, b, c, d, e, q):
 
 @njit
 def single_face_value(scheme, limiter, forward, b, c, d, e):
-    """Value at a single face between cells c and d, from c if the flow is forward, else from d."""
+    """Value at a single face between cells c and d, from c if the flow is forward, else from d.
+
+    scheme : UPWIND, else with a slope by the limiter; b, c, d, e : values of four cells in line
+    """
     if scheme == UPWIND:
         return c if forward else d
     half = 0.5 * limited(limiter, c - b if forward else e - d, d - c)
@@ -62,6 +71,7 @@ def single_face_value(scheme, limiter, forward, b, c, d, e):
 def row_values(scheme, limiter, nx, factor, flow, c, west, east, q):
     """Write the values q at the nx + 1 faces of a row of cells c; west and east are the values outside.
 
+    flow : flows through these faces; other arguments as for `put_face_values`
     The loop continues into the next row, where there is one, so that it fills whole vectors.
     """
     if nx > 3:
@@ -79,7 +89,7 @@ def row_values(scheme, limiter, nx, factor, flow, c, west, east, q):
 
 @inline
 def north_values_and_rates_limited(limiter, factor, ky, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, rate):
-    """Write values and rates as `north_values_and_rates` does, with a limiter."""
+    """Write values and rates as `north_values_and_rates` does, with a limiter function."""
     fe, qe = fx[1:], qx[1:]
     for i in range(rate.size):
         q = limited_value(limiter, factor * fn[i] > 0.0, b[i], c[i], d[i], e[i])
@@ -91,7 +101,10 @@ def north_values_and_rates_limited(limiter, factor, ky, b, c, d, e, fx, qx, fs, 
 def north_values_and_rates(scheme, limiter, factor, ky, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, rate):
     """Write the values qn at the northern faces of a row of cells c, and the rates of the row.
 
-    ky : 1 / height of the row [1/m]; fx, fs, fn : flows through faces; qx, qs : values at other faces
+    b, c, d, e : values of the row before, of this row, and of one and two rows after it
+    kx, ky : 1 / widths of the cells, 1 / height of the row [1/m]; scheme, limiter, factor : as for `put_face_values`
+    fx, fs, fn : flows through the faces along the row, the southern and the northern faces
+    qx, qs : values at the faces along the row and at the southern faces
     """
     if scheme == UPWIND:
         fe, qe = fx[1:], qx[1:]
@@ -115,9 +128,9 @@ def second_order_rates(
 ):  # fmt: skip
     """Write the rates of rows `begin` to `until` - 1 for cell values c, by upwind or muscl, in flows times `factor`.
 
-    Arguments are as for `grid_advection`.
-    fresh : False if the last call ended at `begin` with the same work; then its results are reused
-    stop : first row after those of all calls
+    fresh : False if the last call ended at `begin` with the same work array, whose results are then used again
+    stop : first row after those of all calls; other arguments as for `advection.grid_advection`
+    If fresh, the rates of row `begin` - 1 are overwritten with wrong values.
     """
     below, above, north = work[:nx], work[nx : 2 * nx], work[2 * nx : 3 * nx]
     rows, rest = work[3 * nx : 5 * nx], work[5 * nx :]

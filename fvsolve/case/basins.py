@@ -34,7 +34,7 @@ Faults = Iterator[tuple[tuple, str]]
 
 @dataclass(frozen=True)
 class BasinFields:
-    """Fields of a basin that probes can record (name -> dimension), and its mesh."""
+    """Mesh of a basin, and its fields that probes can record (name -> dimension)."""
 
     fields: dict[str, str]
     mesh: Mesh
@@ -42,9 +42,10 @@ class BasinFields:
     quantities: ClassVar[dict[str, str]] = {}
 
     def point(self, label: str, place: str | None) -> tuple[float, float]:
-        """Point (x, y) [m] of the text `place` after "@", such as "3.5,1.2"; label : probe without it, for messages.
+        """Point (x, y) [m] from the text `place` after "@" in a probe, such as "3.5,1.2".
 
-        Raises ValueError if it is not a point inside the mesh.
+        label : text of the probe before "@", for messages; place : None if the probe has no "@"
+        Raises ValueError if the text is not a point inside the mesh.
         """
         middle = ",".join(f"{value:.4g}" for value in self.mesh.centre[len(self.mesh.centre) // 2])
         if place is None:
@@ -73,7 +74,7 @@ class BasinFields:
 
 
 def lumped_fields(basin: Basin) -> dict[str, str]:
-    """Fields (name -> dimension) of a basin without cells: the depth if its water sloshes in modes, else none."""
+    """Fields (name -> dimension) of a basin without cells: the depth with sloshing modes, otherwise none."""
     return (
         {"depth": basin.physics_type.fields["depth"]}
         if basin.sloshing == "modes" and basin.physics_type.has_modes
@@ -106,7 +107,10 @@ def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
 
 
 def fault_keys(place: str) -> tuple:
-    """Key path from the text of a mesh fault, such as "patches.east" or "holes[0]"; empty if no key of a basin."""
+    """Key path from the place of a mesh fault, such as "patches.east" or "holes[0]".
+
+    It is () if the place does not begin with a key of a basin.
+    """
     path = [int(word) if word.isdigit() else word for word in re.split(r"[.\[\]]", place) if word]
     return tuple(path) if path and path[0] in Basin.keys() else ()
 
@@ -141,7 +145,7 @@ def line_faults(output: Output, nodes: dict[str, Any]) -> Faults:
 
 
 def patch_names(mesh: Mesh) -> tuple[str, ...]:
-    """Names of patches that a file may use; the last patch of the mesh holds all faces without a name."""
+    """Names of the patches of a mesh that a case may use: all but the last, which holds the faces without a name."""
     return mesh.patches[:-1]
 
 
@@ -157,7 +161,7 @@ def place_kind(basin: Basin, patch: str) -> type[PatchNode]:
 
 
 def places(name: str, basin: Basin, mesh: Mesh, pose: Any = None) -> dict[str, PatchNode]:
-    """Nodes that the patches of a basin form for links, by full name BASIN.PATCH, with the state of water at rest.
+    """Nodes that links can join at the patches of a basin, by full name BASIN.PATCH, with the state of water at rest.
 
     pose : pose of the body that carries the basin; if None, elevation and depth are those of the upright basin
     """
@@ -174,7 +178,10 @@ def places(name: str, basin: Basin, mesh: Mesh, pose: Any = None) -> dict[str, P
 
 
 def places_on_bodies(nodes: dict[str, Any], meshes: dict[str, Mesh]) -> dict[str, PatchNode]:
-    """Nodes that patches of basins on bodies form, by full name; basins with faulty formulas are left out."""
+    """Nodes that links can join at the patches of basins on bodies, by full name BASIN.PATCH.
+
+    Elevation and depth are those of the upright basin, see `places`. Basins with faulty formulas are left out.
+    """
     result: dict[str, PatchNode] = {}
     for name, mesh in meshes.items():
         if nodes[name].on is not None:
@@ -184,7 +191,7 @@ def places_on_bodies(nodes: dict[str, Any], meshes: dict[str, Mesh]) -> dict[str
 
 
 def _patch_hint(basin: Basin, known: tuple[str, ...], name: str) -> str:
-    """List the patches of a mesh, or explain how to name them in a mesh file."""
+    """Text that lists the patches `known`, or explains how to give the patch `name` its name in the mesh file."""
     if known or basin.mesh is None:
         return f"patches are {listing(known) or 'none'}"
     file = Path(basin.mesh.file).name
@@ -196,7 +203,8 @@ def find_faults(
 ) -> Faults:
     """Faults (key path, message) of basins: density law, patches, moving walls, formulas.
 
-    meshes : meshes of basins by name; times : start and end of the run [s]; all_nodes : all nodes, also faulty ones
+    meshes : meshes of basins by name; fluid : properties of the fluid, or None if it is faulty
+    times : start and end of the run [s]; all_nodes : tables of all nodes, also of faulty nodes
     """
     pools = {name: node for name, node in nodes.items() if isinstance(node, Basin)}
     joined = {place for link in links.values() for place in link.ports.values()}

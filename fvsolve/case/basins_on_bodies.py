@@ -20,7 +20,10 @@ Faults = Iterator[tuple[tuple, str]]
 
 
 def find_faults(name: str, basin: Any, nodes: dict[str, Any], named: Any) -> Faults:
-    """Faults (key path, message) of the keys of a basin that concern the body it is on."""
+    """Faults (key path, message) of the keys of a basin that apply to the body that carries it.
+
+    named : tables of all nodes, also of faulty nodes
+    """
     key = ("nodes", name)
     yield from place_faults(name, basin, nodes, named)
     if basin.on is None:
@@ -54,7 +57,10 @@ def find_faults(name: str, basin: Any, nodes: dict[str, Any], named: Any) -> Fau
 
 
 def place_faults(name: str, node: PlaceOnBody, nodes: dict[str, Any], named: Any) -> Faults:
-    """Faults of the keys that put a node on a body: `on`, `at`, `attitude`, `elevation`."""
+    """Faults (key path, message) of the keys that place a node on a body: `on`, `at`, `attitude`, `elevation`.
+
+    named : tables of all nodes, also of faulty nodes
+    """
     key = ("nodes", name)
     if node.on is None:
         for other in ("at", "attitude"):
@@ -68,7 +74,11 @@ def place_faults(name: str, node: PlaceOnBody, nodes: dict[str, Any], named: Any
 
 
 def overturned(nodes: dict[str, Any], poses: dict[str, Any]) -> Faults:
-    """Faults of tanks and basins on fixed joints that are tilted by 90 degrees or more, so that the water runs out."""
+    """Faults of tanks and basins that are tilted by 90 degrees or more, so that the water runs out.
+
+    Tanks and basins on bodies that can move, or whose carriers can move, are not checked.
+    poses : name of a body -> `Pose`
+    """
     for name, node in nodes.items():
         on = getattr(node, "on", None)
         wet = node.kind == "tank" or (
@@ -78,12 +88,12 @@ def overturned(nodes: dict[str, Any], poses: dict[str, Any]) -> Faults:
             continue
         turn = poses[on].attitude @ getattr(node, "rotation", np.eye(3))
         if turn[2, 2] <= 0.0:
-            text = f"its bottom is {np.degrees(np.arccos(turn[2, 2])):.3g} deg off level on {on}, which is fixed"
+            text = f"its bottom is inclined by {np.degrees(np.arccos(turn[2, 2])):.3g} deg on {on}, which is fixed"
             yield ("nodes", name, "on"), f"{text}: its contents would run out; expected less than 90 deg"
 
 
 def body_faults(on: str, nodes: dict[str, Any], named: Any) -> Iterator[str]:
-    """Fault text if `on` is not a body; named : tables of all nodes, also of faulty ones."""
+    """Fault text if the name `on` is not that of a body; named : tables of all nodes, also of faulty nodes."""
     bodies = [body for body, node in nodes.items() if isinstance(node, Body)]
     bodies += [body for body in named if body not in nodes and getattr(named[body], "get", {}.get)("type") == "body"]
     if not isinstance(nodes.get(on), Body):
@@ -93,7 +103,7 @@ def body_faults(on: str, nodes: dict[str, Any], named: Any) -> Iterator[str]:
 
 
 def free_joints(on: str, nodes: dict[str, Any]) -> Iterator[str]:
-    """Names of those bodies among `on` and its carriers whose joints move freely (neither fixed nor driven)."""
+    """Names of the bodies, from `on` to the world, whose joints move freely (neither fixed nor driven)."""
     for body in carriers(on, nodes):
         joint = nodes[body].joint
         if joint.kind != "fixed" and joint.drive_schedule is None:
@@ -112,9 +122,11 @@ def carriers(on: str, nodes: dict[str, Any]) -> Iterator[str]:
 def nodes_with_water(
     nodes: dict[str, Any], lumped: dict[str, Any], density: float, gravity: float, t: float
 ) -> dict[str, Any]:
-    """Nodes with lumped water: bodies with the mass, centre and inertia of water, and sloshing modes as extra bodies.
+    """Copy of `nodes` with the water of basins without cells as masses.
 
-    lumped : basin -> mesh, of basins whose water has no cells; density [kg/m3]; gravity [m/s2]; t : start time [s]
+    Bodies have the mass, centre of mass and inertia of the water that they carry; sloshing modes are additional bodies.
+    lumped : basin -> mesh, of the basins without cells; density of the water [kg/m3]; gravity [m/s2]
+    t : start time [s]
     """
     result = dict(nodes)
     for name, mesh in lumped.items():

@@ -39,11 +39,11 @@ class Pose:
     spin: np.ndarray
 
     def at(self, place: Any) -> np.ndarray:
-        """World position [m] of the point `place` in body axes [m], equation (59)."""
+        """World position [m] of the point `place` in body axes [m], equation (59) of docs/course.md."""
         return self.place + self.attitude @ np.asarray(place, dtype=float)
 
     def velocity_at(self, place: Any) -> np.ndarray:
-        """World velocity [m/s] of the point `place` in body axes [m], equation (67)."""
+        """World velocity [m/s] of the point `place` in body axes [m], equation (67) of docs/course.md."""
         return self.velocity + np.cross(self.spin, self.attitude @ np.asarray(place, dtype=float))
 
 
@@ -52,7 +52,7 @@ AT_REST = Pose(np.eye(3), np.zeros(3), np.zeros(3), np.zeros(3))
 
 @dataclass(frozen=True)
 class BodyQuantities:
-    """Quantities of a body that probes can record; they depend on its joint."""
+    """Quantities of one body that probes can record (name -> dimension); they depend on its joint."""
 
     body: Body
     kind: ClassVar[str] = "body"
@@ -93,7 +93,10 @@ def carrier_exists(nodes: dict[str, Any], body: Body) -> bool:
 
 
 def carrier_of(body: Body) -> tuple[str, str]:
-    """Names (node, point) to which the joint of a body is fixed; `WORLD` for the world, "" without a point."""
+    """Place to which the joint of a body is fixed : (name of the node, name of its point).
+
+    The node is `WORLD` for the world; the point is "" for a joint that is not at a point.
+    """
     name, _, point = (body.joint.on or WORLD).partition(".")
     return name, point
 
@@ -116,9 +119,9 @@ def poses(nodes: dict[str, Any], t: float) -> dict[str, Pose]:
 
 
 def body_pose(body: Body, up: Pose, at: np.ndarray, t: float) -> Pose:
-    """Pose of a body at the start time t [s]; at : position of its joint in the axes of its carrier [m].
+    """Pose of a body at the start time t [s], from its joint.
 
-    up : pose of the carrier
+    up : pose of its carrier; at : float64[3]  position of its joint in the axes of the carrier [m]
     """
     joint = body.joint
     turn, place = up.attitude @ joint.attitude.rotation, up.at(at)
@@ -137,12 +140,15 @@ def body_pose(body: Body, up: Pose, at: np.ndarray, t: float) -> Pose:
 
 
 def joint_coordinate(joint: Any, t: float) -> float:
-    """Angle [rad] or travel [m] of a joint at the start time t [s]; 0 if it has none."""
+    """Angle [rad] or travel [m] of a joint at the start time t [s]; 0 for a joint without such a coordinate."""
     return float(value(joint.coordinate, t, left=True)) if joint.coordinate is not None else 0.0
 
 
 def joint_rate(joint: Any, t: float) -> float:
-    """Rate [rad/s, m/s] of a joint at the start time t [s]; for a driven joint by differences of its schedule."""
+    """Rate [rad/s] or [m/s] of a joint at the start time t [s].
+
+    For a driven joint it is a forward difference quotient of its schedule.
+    """
     if joint.drive_schedule is None:
         return float(joint.rate or 0.0)
     h = 1e-4
@@ -151,9 +157,10 @@ def joint_rate(joint: Any, t: float) -> float:
 
 
 def body_point(nodes: dict[str, Any], place: str) -> tuple[str, np.ndarray] | None:
-    """Body and position in its axes [m] of a point BODY.POINT or a node that a link joins; None if it is neither.
+    """Name of the body, and position in its axes [m], of a place that a link joins : (name, float64[3]).
 
-    For a point of a frame the body is `WORLD`.
+    place : BODY.POINT, FRAME.POINT, or the name of a body (its origin) or of another node in space
+    The name is `WORLD` for a point of a frame. The result is None for any other place.
     """
     name, _, point = place.partition(".")
     node = nodes.get(name)
@@ -165,9 +172,9 @@ def body_point(nodes: dict[str, Any], place: str) -> tuple[str, np.ndarray] | No
 
 
 def separation(nodes: dict[str, Any], poses_of: dict[str, Pose], first: str, second: str) -> float | None:
-    """Distance from `first` to `second` at the start [m], names that a link joins; None if a position is unknown.
+    """Distance [m] from the place `first` to the place `second` of a link at the start; None if a position is unknown.
 
-    Between masses on their common axis it is signed: positive if `second` has the greater coordinate.
+    Between masses on their common axis it has a sign: positive if `second` has the greater coordinate.
     """
     ends = [nodes.get(place) for place in (first, second)]
     if all(getattr(end, "domain", "") == "translational" for end in ends):
@@ -180,12 +187,15 @@ def separation(nodes: dict[str, Any], poses_of: dict[str, Pose], first: str, sec
 
 
 def point_inertia(mass: float, r: np.ndarray) -> np.ndarray:
-    """Inertia matrix about the origin of a point mass [kg] at r : float64[3] [m]; result float64[3, 3] [kg m2]."""
+    """Inertia matrix of a point mass about the origin : float64[3, 3] [kg m2].
+
+    mass [kg]; r : float64[3]  position of the mass [m]
+    """
     return mass * (np.dot(r, r) * np.eye(3) - np.outer(r, r))
 
 
 def coincident_ends(nodes: dict[str, Any], links: dict[str, Any], poses_of: dict[str, Pose]) -> Faults:
-    """Faults of links that act along the line between two points, if these coincide at the start: no direction."""
+    """Faults of links that act along the line between two points, if the points coincide at the start."""
     for name, link in links.items():
         ends = [link.ports.get(port) for port in (("case", "rod") if "rod" in link.ports else ("from", "to"))]
         if (
@@ -200,7 +210,7 @@ def coincident_ends(nodes: dict[str, Any], links: dict[str, Any], poses_of: dict
 
 
 def open_pins(nodes: dict[str, Any], links: dict[str, Any], poses_of: dict[str, Pose]) -> Faults:
-    """Faults of pins whose two points do not coincide at the start."""
+    """Faults of pins whose two points lie apart at the start. A distance along the axis of a pin is allowed."""
     for name, link in links.items():
         points = [body_point(nodes, link.ports[port]) for port in ("from", "to")] if link.kind == "pin" else [None]
         if None in points or is_zero_vector(link.axis) or any(body not in (WORLD, *poses_of) for body, _ in points):
@@ -219,7 +229,7 @@ def open_pins(nodes: dict[str, Any], links: dict[str, Any], poses_of: dict[str, 
 def find_faults(nodes: dict[str, Any], named: Any) -> Faults:
     """Faults of the key `on` of joints: unknown body or point, and bodies that carry each other in a loop.
 
-    named : tables of all nodes, also of faulty ones
+    named : tables of all nodes, also of faulty nodes
     """
     own = {name: node for name, node in nodes.items() if hasattr(node, "points")}
     bodies = {name: node for name, node in own.items() if isinstance(node, Body)}
@@ -261,5 +271,5 @@ def carrier_chain(bodies: dict[str, Body], name: str) -> list[str]:
 
 
 def ends_in_loop(nodes: dict[str, Any], bodies: dict[str, Body], name: str) -> bool:
-    """True if the carriers of a body form a loop; False if they end at a missing node."""
+    """True if the carriers of a body form a loop; False if they end at the world, a frame or a missing node."""
     return carrier_of(bodies[carrier_chain(bodies, name)[-1]])[0] in bodies

@@ -33,7 +33,7 @@ class Case(Displayable):
 
     properties : properties of the fluid at its reference state
     nodes, links : name -> part, in the order of the file
-    copies : name in the text of `resolved()` -> path, of the schedule and measurement files that the case used
+    copies : name of a file in the text of `resolved()` -> path of this schedule or measurement file
     """
 
     name: str
@@ -93,7 +93,7 @@ class Case(Displayable):
 
     @cached_property
     def extreme_probes(self) -> list[Probe]:
-        """Probes with only extremes recorded: at points of pipe profiles, and for limits and claims on parts."""
+        """Probes whose extremes alone are recorded: at points of pipe profiles, and for limits and expectations."""
         named = [*of_profiles(self.links)]
         extents = [claim.extent for claim in [*self.limits.values(), *self.expect.values()] if claim.extent is not None]
         for extent in extents:
@@ -102,7 +102,7 @@ class Case(Displayable):
 
     @property
     def schemes(self) -> tuple[str, ...]:
-        """Names of the schemes that can solve the fluid of this case, with or without cavitation."""
+        """Names of the schemes that this case may use: with cavitation only those that can compute cavities."""
         air = self.properties.air
         return CAVITY_SCHEMES if air is not None and air.cavitation else tuple(SCHEMES)
 
@@ -134,7 +134,7 @@ class Case(Displayable):
 
     @cached_property
     def nodes_with_water(self) -> dict[str, Node]:
-        """Nodes at the start, with lumped water: bodies with added mass, and sloshing modes as extra bodies."""
+        """Nodes at the start, with lumped water as added mass of bodies and sloshing modes as extra bodies."""
         from fvsolve.case.basins_on_bodies import nodes_with_water
 
         nodes = {**self.nodes, **self.equilibrium_nodes} if self.equilibrium_nodes else self.nodes
@@ -144,19 +144,25 @@ class Case(Displayable):
 
     @cached_property
     def as_stated(self) -> Case:
-        """Case with bodies and masses at the positions of the file, from which bushings and preloads count."""
+        """Copy of the case that starts at the positions in the file.
+
+        There bushings are not twisted, and springs have their preload.
+        """
         return replace(self, equilibrium_nodes={}) if self.equilibrium_nodes else self
 
     @property
     def needs_equilibrium(self) -> bool:
-        """True if bodies and masses start in equilibrium and at least one of them is free to move."""
+        """True if the case starts in equilibrium and at least one body or mass is free to move."""
         joints = [node.joint for node in self.nodes.values() if node.kind == "body"]
         free = any(joint.kind != "fixed" and joint.drive_schedule is None for joint in joints)
         free = free or any(node.kind == "mass" for node in self.nodes.values())
         return free and self.numerics.initial == "equilibrium"
 
     def separation(self, first: str, second: str) -> float:
-        """Distance from node or point `first` to `second` at the start [m]; between masses on their axis with sign."""
+        """Distance [m] from the node or point `first` to `second` at the start; see `bodies.separation`.
+
+        Between masses on their common axis it is positive if `second` has the greater coordinate, else negative.
+        """
         return bodies.separation(self.nodes_with_water, self.poses, first, second)
 
     @cached_property
@@ -206,9 +212,10 @@ class Case(Displayable):
         return stated.get(dimension) or stated.get(known.base) or known.si
 
     def amount(self, value: float, dimension: str, digits: int = 4, span: bool = False, silent: str = "") -> str:
-        """Number [SI] as text in the unit of `[output]`.
+        """Text of the value [SI] of a quantity, in its unit in `[output]`.
 
-        span : True for a difference, whose zero point does not matter; silent : unit used if `[output]` states none
+        span : True for a difference, for which the zero of the unit has no effect
+        silent : unit to use if `[output]` states none
         """
         unit = self.unit_of(dimension)
         unit = silent if silent and unit == units.DIMENSIONS[dimension].si else unit
@@ -217,7 +224,7 @@ class Case(Displayable):
         return f"{units.convert(value, dimension, unit, self.ambient_pressure):.{digits}g} {unit}"
 
     def step_amount(self, step: float, digits: int = 6) -> str:
-        """Step [s] as text in the unit of times, or in s if that unit is longer than 1 s."""
+        """Text of a time step [s], in the unit of times in `[output]`, or in s if that unit is longer than 1 s."""
         longer = units.find(self.unit_of("time"), "time").si(1.0) > 1.0
         return f"{step:.{digits}g} s" if longer else self.amount(step, "time", digits)
 
@@ -235,7 +242,7 @@ class Case(Displayable):
     def _known(self, name: str, known: dict[str, Any], noun: str) -> Any:
         if not isinstance(name, str) or name not in known:
             text = f"unknown {noun} {show(name)}{did_you_mean(str(name), known)}"
-            raise FvsolveError(f"{text}; expected {listing(known) or 'none: the case has none'}")
+            raise FvsolveError(f"{text}; {f'expected {listing(known)}' if known else 'the case has none'}")
         return known[name]
 
     def resolved(self) -> str:
@@ -290,8 +297,8 @@ def wave_speed(pipe: Pipe, fluid: Any) -> float:
 def default_cells(pipes: dict[str, Pipe], fluid: Any, cell_time: float | None) -> dict[str, int]:
     """Number of cells of each pipe: as stated, else the travel time of a wave divided by `cell_time` [s], at least 1.
 
-    If `cell_time` is None, it is the longest travel time of the pipes over `DEFAULT_CELLS`. A number above 10^18 is
-    replaced by 10^18; the caller refuses it.
+    If `cell_time` is None, the longest travel time of a pipe divided by `DEFAULT_CELLS` is used. A number above 10^18
+    is replaced by 10^18; the caller refuses it.
     """
     travel = {name: pipe.length / wave_speed(pipe, fluid) for name, pipe in pipes.items()}
     if cell_time is None:

@@ -22,7 +22,7 @@ def is_grid(mesh: Mesh) -> bool:
 
 
 def samples(shape: SpatialField | None, mesh: Mesh) -> np.ndarray:
-    """Values of a formula at points in the n cells : float64[points, n]; 0 without a formula.
+    """Values of a formula at points in the n cells of a mesh : float64[points, n]; zeros if `shape` is None.
 
     On full rectangular grids there are nine Gauss points per cell, in the order of `GAUSS`; on other meshes there is
     only the centre.
@@ -40,9 +40,10 @@ def samples(shape: SpatialField | None, mesh: Mesh) -> np.ndarray:
 
 
 def means(values: np.ndarray) -> np.ndarray:
-    """Means over each cell of the result of `samples` : float64[n]. A constant value is returned to the bit.
+    """Means over each cell of the values from `samples` : float64[n].
 
-    The order of the sums makes the result the same to the bit for mirrored and rotated cells.
+    If all values of a cell are equal, its mean is exactly this value. The order of the sums makes the result the same
+    to the bit for mirrored and rotated cells.
     """
     if len(values) == 1:
         return values[0]

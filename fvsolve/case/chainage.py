@@ -39,9 +39,9 @@ Report = Callable[[tuple, str], None]
 
 @dataclass
 class Placed:
-    """Raw part placed on a pipe.
+    """Part placed on a pipe, with its keys as in the file.
 
-    group : "nodes" or "links"; given : keys of the part as in the file; distance : from the `from` end of the pipe [m]
+    group : "nodes" or "links"; given : keys and values; distance : from the `from` end of the pipe [m]
     """
 
     group: str
@@ -62,7 +62,7 @@ class Placed:
 
     @property
     def joins(self) -> tuple[str, str]:
-        """Names of the nodes where the pipe piece before the part ends and the piece after it starts."""
+        """Names (node at the end of the pipe piece before the part, node at the start of the pipe piece after it)."""
         if self.group == "nodes":
             return self.name, self.name
         return (f"{self.name}-in", f"{self.name}-out") if self.inline else (f"{self.name}-at", f"{self.name}-at")
@@ -70,12 +70,12 @@ class Placed:
 
 @dataclass
 class CutTable:
-    """Raw table of a case in which pipes are replaced by their pieces.
+    """Case as nested dicts (`table`), in which pipes are replaced by their pieces.
 
     pieces : cut pipe -> names of its pieces
     origin : (group, name) of an added part -> (group, name) of the part in the file from which it comes
     unreadable : (group, name) of parts that are not read, since the part, its pipe or another part on it is faulty
-    uncut : pipes that are not cut, since a part on them is faulty
+    uncut : name -> pipe that is not cut, since a part on it is faulty
     connections_known : True if it is known which nodes each link joins
     """
 
@@ -89,7 +89,10 @@ class CutTable:
 
 
 def placed(table: dict[str, Any]) -> list[tuple[str, str, dict[str, Any]]]:
-    """List of (group, name, raw part) of each part with a chainage `at`, or with a pipe as `on`."""
+    """List of (group, name, keys) of the parts that are placed on a pipe.
+
+    These are parts with a chainage `at`, or with a pipe as `on`. table : nested dicts of a case as in the file
+    """
     links = table.get("links")
     pipes = [name for name, link in links.items() if is_pipe(link)] if isinstance(links, dict) else []
     bodies = list(table["nodes"]) if isinstance(table.get("nodes"), dict) else []
@@ -112,7 +115,7 @@ def is_pipe(part: Any) -> bool:
 
 
 def kind_of(group: str, part: dict[str, Any]) -> Any:
-    """Class of a raw part; None if its type is unknown."""
+    """Class of a part from its keys in the file; None if its type is unknown."""
     return KINDS[group].get(str(part.get("type")))
 
 
@@ -120,16 +123,18 @@ def unfit_reason(group: str, part: dict[str, Any]) -> str | None:
     """Reason why a part of a known type cannot be placed on a pipe; None if it can."""
     kind = kind_of(group, part)
     if group == "nodes" and (kind.domain != "hydraulic" or kind.own_places(part) is not None):
-        return f"a {kind.kind} cannot be placed on a pipe; expected a place of the fluid"
+        return f"a {kind.kind} cannot be placed on a pipe; expected a hydraulic node, such as a junction"
     if group == "links" and not set(kind.joins) <= {"from", "to"}:
         return (
             f"a {kind.kind} has other ports than `from` and `to`; place a junction on the pipe and join the part to it"
         )
-    return "a pipe has a length; place a junction on the pipe and join to it" if kind is Pipe else None
+    if kind is Pipe:
+        return "a pipe has a length, so it cannot be placed on a pipe; place a junction there and join the pipe to it"
+    return None
 
 
 def add_bends(table: dict[str, Any]) -> dict[str, Any]:
-    """Copy of a raw table with a junction added at every bend of a pipe."""
+    """Copy of a case, as nested dicts, with a junction added at every bend of a pipe."""
     nodes, links = table.get("nodes"), table.get("links")
     result: dict[str, Any] = {}
     for name, link in links.items() if isinstance(nodes, dict) and isinstance(links, dict) else ():
@@ -140,7 +145,10 @@ def add_bends(table: dict[str, Any]) -> dict[str, Any]:
 
 
 def pieces_of(table: dict[str, Any]) -> dict[str, list[str]]:
-    """Cut pipe -> names of the pieces that `cut` makes of it."""
+    """Names of the pieces into which `cut` divides pipes : name of a cut pipe -> names of its pieces.
+
+    table : nested dicts of a case as in the file
+    """
     counts: dict[str, int] = {}
     for _, _, part in placed(add_bends(table)):
         if isinstance(part.get("on"), str):
@@ -149,13 +157,21 @@ def pieces_of(table: dict[str, Any]) -> dict[str, list[str]]:
 
 
 def settings(table: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings (dotted key -> value), with keys of a pipe piece replaced by keys in the table `pieces` of its pipe."""
+    """Copy of overrides (dotted key -> value) with keys that exist in the file.
+
+    A key of a pipe piece is replaced by the key of this piece in the table `pieces` of its pipe.
+    table : nested dicts of a case as in the file; given : overrides
+    """
     return {".".join(own) if (own := original_keys(table, keys := split_key(str(key)))) != keys else key: value
             for key, value in given.items()}  # fmt: skip
 
 
 def original_keys(table: dict[str, Any], keys: tuple[str, ...]) -> tuple[str, ...]:
-    """Key path in the file for a key of a pipe piece: in the table `pieces` of its pipe. Others stay unchanged."""
+    """Key path in the file of the key path `keys`, which may be that of a key of a pipe piece.
+
+    The keys of a piece are in the table `pieces` of its pipe; any other key path is returned unchanged.
+    table : nested dicts of a case as in the file
+    """
     match = re.fullmatch(r"(.+)-\d+", keys[1]) if len(keys) > 2 and keys[0] == "links" else None
     if match and keys[1] not in table.get("links", {}) and keys[1] in pieces_of(table).get(match[1], ()):
         return ("links", match[1], "pieces", *keys[1:])
@@ -163,7 +179,7 @@ def original_keys(table: dict[str, Any], keys: tuple[str, ...]) -> tuple[str, ..
 
 
 def faults(table: dict[str, Any]) -> Iterator[tuple[tuple, str]]:
-    """Faults (key path, message) of the keys `on`, `at` and `from` of placed parts, without the value of `at`."""
+    """Faults (key path, message) of the keys `on`, `at` and `from` of placed parts, except for the value of `at`."""
     links = table.get("links", {})
     pipes = [name for name, link in links.items() if is_pipe(link)]
     for group, name, part in placed(table):
@@ -189,11 +205,12 @@ def faults(table: dict[str, Any]) -> Iterator[tuple[tuple, str]]:
 def cut(
     table: dict[str, Any], read_pipes: dict[str, Pipe], cells: dict[str, int], faulty: set, report: Report
 ) -> CutTable:
-    """Cut the pipes of a raw table at the parts placed on them.
+    """Cut the pipes of a case at the parts placed on them.
 
+    table : nested dicts of the case as in the file
     read_pipes : pipes without faults, as read; cells : number of cells of each of these pipes
-    faulty : (group, name) of parts with faulty keys `on` or `at`; report : function that takes the key path and the
-    message of a fault
+    faulty : (group, name) of parts with faulty keys `on` or `at`
+    report : function that takes the key path and the message of a fault
     """
     result = CutTable({**table, "nodes": dict(table["nodes"]), "links": {}, "routes": dict(table.get("routes", {}))},
                    frozenset(table["links"]))  # fmt: skip
@@ -232,7 +249,10 @@ def cut(
 
 
 def add_unknown_pieces(result: CutTable, name: str, given: dict[str, Any], parts: list[Placed], report: Report) -> None:
-    """Add pieces of a pipe to the table of which only the connections are known, as a part on the pipe is faulty."""
+    """Add the pieces of a pipe with a faulty part to the table of `result`, with their connections as the only keys.
+
+    name, given : name of the pipe and its keys in the file; parts : parts on it; report : as for `cut`
+    """
     names = result.pieces[name] = [f"{name}-{k + 1}" for k in range(len(parts) + 1)]
     name_faults(result, name, given, parts, names, report)
     starts = [given.get("from"), *(part.joins[1] for part in parts)]
@@ -250,7 +270,10 @@ def add_unknown_pieces(result: CutTable, name: str, given: dict[str, Any], parts
 
 
 def read_distance(part: Placed, on: str | None, pipe: Pipe | None, report: Report) -> bool:
-    """Set the distance of a part along its pipe. If its chainage is faulty, report it and return False."""
+    """Set the distance of a part along its pipe. If its chainage is faulty, report it and return False.
+
+    on, pipe : name of the pipe, and the pipe as read (None if faulty: the distance is not set); report : as for `cut`
+    """
     key, given = (part.group, part.name, "at"), part.given["at"]
     try:
         chainage = units.parse(given, "length")
@@ -264,15 +287,14 @@ def read_distance(part: Placed, on: str | None, pipe: Pipe | None, report: Repor
     if not 0.0 < part.distance < pipe.length:
         span = f"{on} runs from {begin:.10g} m to {begin + pipe.length:.10g} m"
         end = pipe.from_ if abs(part.distance) < 1e-9 else pipe.to if abs(part.distance - pipe.length) < 1e-9 else ""
-        report(
-            key, f"{show(given)} is outside: {span}" if not end else f"{show(given)} is the end of {on}, place {end}"
-        )
+        reason = f"is the end of {on} at {end}; expected a chainage between its ends" if end else f"is outside: {span}"
+        report(key, f"{show(given)} {reason}")
         return False
     return True
 
 
 def sort_parts(parts: list[Placed], report: Report) -> bool:
-    """Sort parts by distance. If two parts have the same distance, report it and return False."""
+    """Sort the parts on a pipe by distance. If two have the same distance, report it (see `cut`) and return False."""
     parts.sort(key=lambda part: part.distance)
     pairs = [(part, other) for part, other in zip(parts, parts[1:], strict=False) if part.distance == other.distance]
     for part, other in pairs:
@@ -285,7 +307,8 @@ def cut_pipe(
 ) -> None:
     """Add the pieces of a pipe, the nodes between them and the route along them to the table of `result`.
 
-    given, whole : the pipe raw and as read; parts : parts on it, by distance; cells : number of cells of the pipe
+    given, whole : keys of the pipe in the file, and the pipe as read; parts : parts on it, by distance
+    cells : number of cells of the pipe; report : as for `cut`
     A piece has its share of these cells by length, rounded, at least 1.
     """
     edges = np.array([0.0, *(part.distance for part in parts), whole.length])
@@ -300,7 +323,11 @@ def cut_pipe(
 def name_faults(
     result: CutTable, name: str, given: dict, parts: list[Placed], names: list[str], report: Report
 ) -> None:
-    """Report names that exist already and would be given to pieces, nodes or the route, and keys of unknown pieces."""
+    """Report faults of the names of a cut pipe: names that exist already, and keys of pieces that do not exist.
+
+    The names are those of its pieces (`names`), of nodes between them and of the route along them.
+    Other arguments as for `cut_pipe`.
+    """
     for item in names:
         if item in result.named:
             result.connections_known = False
@@ -313,9 +340,8 @@ def name_faults(
         for place in dict.fromkeys(item.joins) if item.group == "links" else ():
             if place in result.table["nodes"]:
                 result.connections_known = False
-                report(
-                    ("nodes", place), f"{item.name} joins {item.given['on']} at a place of that name; rename this node"
-                )
+                text = f"{item.name} joins {item.given['on']} at a place that also has the name {show(place)}"
+                report(("nodes", place), f"{text}; rename this node")
     own = given.get("pieces", {})
     if not isinstance(own, dict) or not all(isinstance(item, dict) for item in own.values()):
         report(("links", name, "pieces"), f"{show(own)} is not a table; expected tables by the names of pieces")
@@ -333,6 +359,7 @@ def write_pieces(
     """Add the pieces of a pipe and the nodes between them, with their elevations, to the table of `result`.
 
     edges : float64[k + 1]  distances of the ends of the k pieces from the `from` end [m]; counts : cells of each piece
+    Other arguments as for `cut_pipe`.
     """
     links, nodes = result.table["links"], result.table["nodes"]
     rest = {key: value for key, value in given.items() if key not in PIECE_KEYS}
@@ -363,14 +390,14 @@ def write_pieces(
 
 
 def keys_of_piece(given: dict, piece: str) -> Any:
-    """Keys for one piece from the table `pieces` of a cut pipe; empty without such a table."""
+    """Keys for one piece, from the table `pieces` of the cut pipe with the keys `given`; empty without such a table."""
     own = given.get("pieces")
     values = own.get(piece) if isinstance(own, dict) else None
     return values if isinstance(values, dict) else {}
 
 
 def stated_elevation(node: Any) -> float | None:
-    """Stated elevation of a raw node [m]; None if it is missing or unreadable."""
+    """Elevation [m] that the keys of a node in the file state; None if it is missing or unreadable."""
     try:
         return float(units.parse(node["elevation"], "length"))
     except (KeyError, TypeError, ValueError):

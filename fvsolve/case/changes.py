@@ -46,7 +46,7 @@ def changes(case: Case, key: str) -> str:
 
 
 def class_of_key(case: Case, keys: tuple[Any, ...]) -> str:
-    """Effect ("value", "profile" or "shape") of changing the value at a key path of this case."""
+    """Effect of changing the value at a key path of a case: "value", "profile" or "shape", see `changes`."""
     result, links = (
         declaration_of(case.raw, keys).changes,
         [raw_link(case.raw, name) for name in case.raw.get("links", {})],
@@ -62,7 +62,10 @@ def class_of_key(case: Case, keys: tuple[Any, ...]) -> str:
 
 
 def declaration_of(raw: dict[str, Any], keys: tuple[str, ...]) -> Value:
-    """Declaration of a key by its type of part. For a path inside a value such as a list, that of the whole value."""
+    """Declaration (`Value`) of the key at a key path; raw : nested dicts of a case as in the file.
+
+    For a path that leads into a value, such as an entry of a list, it is the declaration of the whole value.
+    """
     result: Value | None = Keys(declarations(raw))
     keys = original_keys(raw, keys)
     for key in (*keys[:2], *keys[4:]) if keys[2:3] == ("pieces",) else keys:
@@ -89,7 +92,10 @@ class Keys(Value):
 
 
 def declarations(raw: dict[str, Any]) -> dict[str, Value]:
-    """Declarations of all keys of a case, as nested tables with the names of its parts."""
+    """Declarations of all keys of a case, as nested tables with the names of its parts.
+
+    raw : nested dicts of the case as in the file
+    """
     signals = Keys(dict.fromkeys(raw.get("signals", {}), Scheduled("number")))
     result = {**values_of(TOP), "ambient_pressure": Quantity("pressure"), "signals": signals}
     result |= {name: Nested(model) for name, model in TABLES.items()}
@@ -110,7 +116,10 @@ def values_of(keys: dict[str, tuple[Value, Any]]) -> dict[str, Value]:
 
 
 def driven_keys(table: Any, signal: str, keys: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """Key paths of all values in a raw table that refer to a signal, outside `[signals]`."""
+    """Key paths of all values of a case that refer to the signal `signal`, outside `[signals]`.
+
+    table : nested dicts of the case as in the file, or a part of them; keys : key path of `table`
+    """
     if isinstance(table, dict):
         if table.get("signal") == signal and keys[:1] != ("signals",):
             yield keys

@@ -23,9 +23,10 @@ Faults = Iterator[tuple[tuple, str]]
 
 
 def network(table: dict[str, Any]) -> Faults:
-    """Faults (key path, message) of connections in a raw table: unknown names, unconnected nodes, wrong domains.
+    """Faults (key path, message) of connections of a case: unknown names, unconnected nodes, wrong domains.
 
-    Also separate networks, and networks in which no part sets a pressure.
+    Separate networks are faults too, and networks in which no part sets a pressure.
+    table : nested dicts of the case as in the file
     """
     nodes, links = ({n: p for n, p in _dict(table.get(group)).items()} for group in ("nodes", "links"))
     gone = [name for name in (*nodes, *links) if has_unknown_places(name, nodes, links)]
@@ -74,7 +75,8 @@ def network(table: dict[str, Any]) -> Faults:
     islands = _islands(own | {f"links.{name}": places for name, places in ends.items()})
     if len(islands) > 1:
         sizes = " | ".join(listing(island, 6) for island in islands)
-        yield ("links",), f"disconnected network of {len(islands)} parts: {sizes}; write a case for each"
+        text = f"disconnected network of {len(islands)} parts: {sizes}"
+        yield ("links",), f"{text}; join these parts, or write a case for each part"
     for island in islands:
         wet = [name for name in island if places[name] in ("hydraulic", None)]
         kinds = [_kind("nodes", nodes[name]) if name in nodes else Chamber for name in wet]
@@ -97,7 +99,8 @@ def parts(
 ) -> Faults:
     """Faults (key path, message) of elevations, of bodies, and of each part in the context of the other parts.
 
-    ambient : ambient pressure [Pa]; gravity [m/s2]; raw : raw case, for values in messages; start : start time [s]
+    ambient : ambient pressure [Pa]; gravity [m/s2]; fluid : properties of the fluid, or None if it is faulty
+    raw : case before its values were read, for messages; start : start time [s]
     meshes, lumped : basin -> mesh, of basins with cells and of basins whose water is lumped masses
     """
     poses = bodies.poses(nodes, start)
@@ -170,7 +173,7 @@ def numerics(numerics: Numerics, has_cells: bool) -> Faults:
 
 
 def follows_cavities(fluid: FluidSpec | None, has_cells: bool) -> bool:
-    """True if cavities in pipes are computed, that is, with cells and `cavitation`; fluid : None if it is faulty."""
+    """True if cavities in pipes are computed: the case has cells and `cavitation`. fluid : None if it is faulty"""
     return has_cells and fluid is not None and bool(fluid.cavitation)
 
 
@@ -182,7 +185,7 @@ def cavities(numerics: Numerics, has_cells: bool, fluid: FluidSpec | None) -> Fa
 
 
 def claims(expect: dict[str, Expect], numerics: Numerics) -> Faults:
-    """Faults of claims in `[expect]` at a time outside the run."""
+    """Faults of expectations (`[expect]`) at a time outside the run."""
     for text, claim in expect.items() if numerics.end > numerics.start else ():
         if claim is not None and claim.time is not None and not numerics.start <= claim.time <= numerics.end:
             run = f"{numerics.start:g} s to {numerics.end:g} s"
@@ -198,54 +201,70 @@ def _kind(group: str, part: Any) -> Any:
 
 
 def _owned_places(name: str, link: Any) -> dict[str, str]:
-    """Full name -> domain of the nodes that a link contains, such as the chambers of a cylinder."""
+    """Domains of the nodes that a link contains, such as the chambers of a cylinder : full name -> domain.
+
+    link : its keys as in the file
+    """
     kind = _kind("links", link)
     return {f"{name}.{place}": domain for place, domain in kind.owns.items()} if kind else {}
 
 
 def own_places(name: str, node: Any) -> list[str] | None:
-    """Full names that links use for a node, such as the patches of a basin; None if they use the node's own name."""
+    """Full names of the places of a node that links join, such as the patches of a basin.
+
+    None for a node that links join by its own name. node : its keys as in the file
+    """
     kind = _kind("nodes", node)
     own = kind.own_places(_dict(node)) if kind else None
     return None if own is None else [f"{name}.{place}" for place in own]
 
 
 def kind_name(part: Any, group: str = "nodes") -> str | None:
-    """Type of a raw part; None if it is unknown."""
+    """Type of a part from its keys in the file; None if the type is unknown."""
     kind = _kind(group, part)
     return None if kind is None else kind.kind
 
 
 def has_mesh_file(node: Any) -> bool:
-    """True if a raw node is a basin with its mesh in a file."""
+    """True if a node is a basin with its mesh in a file; node : its keys as in the file."""
     return _dict(node).get("type") == "basin" and "mesh" in node
 
 
 def named_places(name: str, links: dict[str, Any]) -> list[str]:
-    """Names after "NAME." that raw links use for points, patches or chambers of the part `name`."""
+    """Names of points, patches or chambers of the part `name` that links join, without "NAME." before them.
+
+    links : name -> keys as in the file
+    """
     places = [place for link in links.values() for _, place, _ in _ports(_dict(link)) if isinstance(place, str)]
     return [place.partition(".")[2] for place in places if place.startswith(f"{name}.")]
 
 
 def _ends(link: Any) -> list[str]:
-    """Values of `from` and `to` of a raw link, as text."""
+    """Values of the keys `from` and `to` of a link in the file, as text."""
     return [str(_dict(link).get(key)) for key in ("from", "to")]
 
 
 def _joined_places(name: str, node: Any, places: dict[str, Any]) -> list[str]:
-    """Names that a node connects without a link: its patches or similar, and the body that carries it."""
+    """Names that are connected to a node without a link: its own places (see `own_places`), and bodies in its keys.
+
+    These are the body that carries the node, and bodies that move walls of a basin.
+    node : its keys as in the file; places : names that links can join
+    """
     own, kind = own_places(name, node) or [], _kind("nodes", node)
     return own + [body for body in (kind.bodies(_dict(node)) if kind else ()) if body in places]
 
 
 def points_of(name: str, node: Any) -> list[str]:
-    """Full names of the points of a raw node."""
+    """Full names NODE.POINT of the points of a node; node : its keys as in the file."""
     kind = _kind("nodes", node)
     return [f"{name}.{point}" for point in _dict(_dict(node).get("points"))] if kind and "points" in kind.keys() else []
 
 
 def _carrier_pairs(nodes: dict[str, Any], places: dict[str, Any]) -> list[list[str]]:
-    """Pairs of connected names: each body with its carrier, and each frame that has points with the world."""
+    """Pairs of connected names: each body with its carrier, and one point of each frame with the world.
+
+    nodes : name -> keys as in the file; places : names that links can join
+    """
     pairs = []
     for name, node in nodes.items():
         kind, on = _dict(node).get("type"), _dict(_dict(node).get("joint")).get("on")
@@ -257,12 +276,15 @@ def _carrier_pairs(nodes: dict[str, Any], places: dict[str, Any]) -> list[list[s
 
 
 def _fits(domain: str, domains: str) -> bool:
-    """True if the domain of a node suits a port; domains : domains of the port, joined by " or "."""
+    """True if the domain of a node suits a port; domains : domains that the port accepts, joined by " or "."""
     return domain in domains.split(" or ")
 
 
 def _places(nodes: dict[str, Any], links: dict[str, Any], gone: list[str]) -> dict[str, str | None]:
-    """Domain of every name that links can use, None if it is faulty; gone : parts with unknown points or patches."""
+    """Domain of every place that links can join, by full name; None if its part is faulty.
+
+    gone : parts whose points, patches or chambers are not known; the names that links use for these are included
+    """
     result: dict[str, str | None] = {}
     for name, node in nodes.items():
         kind, own = _kind("nodes", node), own_places(name, node)
@@ -283,7 +305,10 @@ def has_unknown_places(name: str, nodes: dict[str, Any], links: dict[str, Any]) 
 
 
 def _ports(link: dict[str, Any]) -> list[tuple[tuple, Any, str | None]]:
-    """List of (key path in the link, name that the port joins, required domain) of every port of a raw link."""
+    """List of (key path in the link, name that the port joins, required domain) of every port of a link.
+
+    For a link of unknown type the ports are `from` and `to`, with None as domain. link : its keys as in the file
+    """
     kind = _kind("links", link)
     if kind is None:
         return [((key,), link.get(key), None) for key in ("from", "to")]
@@ -318,7 +343,7 @@ def _wrong_domain(place: str, domain: str, places: dict[str, Any], nodes: dict[s
 
 
 def _islands(ends: dict[str, list[str]]) -> list[list[str]]:
-    """Groups of connected names, in order of appearance; ends : link -> names that it connects."""
+    """Groups of connected names, in order of appearance; ends : name of a link or node -> names that it connects."""
     root: dict[str, str] = {}
 
     def find(name: str) -> str:
@@ -382,7 +407,10 @@ def _vacuum(keys: tuple, values: list[float], fluid: Any, raw: Raw) -> Faults:
 
 
 def _raw_value(keys: tuple, index: int, raw: Raw) -> tuple[Any, tuple]:
-    """Raw value of entry `index` of a schedule, and its key path, also if a signal gives the schedule."""
+    """Value of entry `index` of a schedule as in the file, and its key path : (value, key path).
+
+    If the schedule is a signal, the entry is taken from `[signals]`; a value that is not a list is returned whole.
+    """
     given = raw.get(keys)
     if isinstance(given, dict) and "signal" in given:
         keys = ("signals", given["signal"])

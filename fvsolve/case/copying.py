@@ -14,7 +14,7 @@ from fvsolve.errors import FvsolveError, did_you_mean, listing
 def copy(name: str, to: Path) -> list[Path]:
     """Copy a shipped case to the file `to`, and its other files into the same folder; returns the paths.
 
-    Raises FvsolveError if one of these files exists.
+    `to` may also be a folder. Raises FvsolveError if `to` exists, or another of these files with other contents.
     """
     if name not in names():
         raise FvsolveError(f"no shipped case {name}{did_you_mean(name, names())}; cases are {listing(names())}")

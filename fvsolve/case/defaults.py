@@ -17,21 +17,25 @@ COMPLETED = ("wall", "friction")  # tables that other keys may complete: checked
 
 
 def values(kind: str) -> dict[str, Value]:
-    """Keys that may have a default for a type of part (key -> declaration)."""
+    """Declarations of the keys that may have a default in a type of part : key -> declaration."""
     return {key: value for key, value in KINDS[kind].values().items() if key not in NOT_DEFAULT}
 
 
 def defaults_of(table: Mapping[str, Any], kind: Any) -> dict[str, Any]:
-    """Raw defaults for a type of part from `[defaults]`; empty if there are none or if they are not a table."""
+    """Keys and values in `[defaults]` for a type of part; empty if there are none or if they are not a table.
+
+    table : nested dicts of a case as in the file
+    """
     result = table.get("defaults")
     result = result.get(kind) if isinstance(result, dict) and isinstance(kind, str) and kind in KINDS else None
     return result if isinstance(result, dict) else {}
 
 
 def with_defaults(table: Mapping[str, Any], given: dict[str, Any]) -> dict[str, Any]:
-    """Raw table of a part, completed by the defaults for its type.
+    """Keys of a part in the file (`given`), completed by the defaults for its type.
 
     A default is left out if the part states the key, or an alternative to the key.
+    table : nested dicts of a case as in the file
     """
     general = defaults_of(table, given.get("type"))
     if not general:
@@ -44,17 +48,17 @@ def with_defaults(table: Mapping[str, Any], given: dict[str, Any]) -> dict[str, 
 
 
 def raw_link(table: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """Raw table of a link, completed by defaults; for a piece of a cut pipe, the table of the whole pipe."""
+    """Keys of a link in the file, completed by defaults; for a piece of a cut pipe, the keys of the whole pipe."""
     return with_defaults(table, table["links"][pipe_of_piece(table, name)])
 
 
 def pipe_of_piece(table: Mapping[str, Any], name: str) -> str:
-    """Name of a link in the file; for a piece of a cut pipe, the name of the pipe."""
+    """Name in the file of the link `name`; for a piece of a cut pipe, the name of the pipe."""
     return name if name in table.get("links", ()) else name.rpartition("-")[0]
 
 
 def fill_pipes(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Copy of a raw table with the defaults filled into every link and the table `defaults` removed."""
+    """Copy of a case, as nested dicts, with the defaults written into every link and without the table `defaults`."""
     links = {
         name: with_defaults(table, link) if isinstance(link, dict) else link for name, link in table["links"].items()
     }
@@ -62,7 +66,7 @@ def fill_pipes(table: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def default_place(table: Mapping[str, Any], keys: tuple) -> tuple:
-    """Key path at which the key of a part is stated: in the part, or in the defaults."""
+    """Key path at which the file states a key: that of the part, or of `[defaults]` if only a default is stated."""
     if len(keys) < 3 or keys[0] != "links":
         return keys
     links = table.get("links")

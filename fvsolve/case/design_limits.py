@@ -31,7 +31,7 @@ BOUNDS = ("minimum", "maximum", "class_fraction")
 
 
 class Bound(Value):
-    """Value of a key that is a bound: a number with the dimension of the quantity, or "vacuum" or "vapor"."""
+    """Value of a key that bounds a quantity: a number with the dimension of the quantity, or "vacuum" or "vapor"."""
 
     changes = VALUE
 
@@ -54,7 +54,7 @@ class Bound(Value):
 
 
 class On(Value):
-    """Value of the key `on`: names of parts or routes, which are looked up later, when all parts are read."""
+    """Value of the key `on` of a limit: names of parts or routes, which are looked up when all parts are read."""
 
     changes = VALUE
 
@@ -101,7 +101,10 @@ def limit_keys(quantity: str, dimension: str) -> dict[str, tuple[Value, Any]]:
 def read_limit(
     name: str, given: Any, kinds: Kinds, routes: Mapping[str, Any], links: Mapping[str, Any], setting: ReadContext
 ) -> DesignLimit | None:
-    """Read one table of `[limits]`; None if the parts that it names are faulty. Raises ValueError, ValueFault."""
+    """Read one table of `[limits]`; None if the parts that it names are faulty. Raises ValueError, ValueFault.
+
+    name, given : name and content of the table; kinds : as for `read_probe`; routes, links : by name
+    """
     if not isinstance(given, dict):
         raise ValueError(f'{show(given)} is not a table; expected for example {{ on = "pipes", maximum = "16 barg" }}')
     quantity = given.get("quantity", "gauge_pressure" if "class_fraction" in given else "pressure")
@@ -143,7 +146,7 @@ def read_limit(
 
 
 def limit_faults(limit: DesignLimit | None, fluid: Any, gravity: float) -> Iterator[tuple[tuple, str]]:
-    """Faults (key path, message) of a limit that depend on the fluid and gravity [m/s2] of its case."""
+    """Faults (key path, message) of a limit that depend on the properties of the fluid and on gravity [m/s2]."""
     if limit is None:
         return
     if gravity == 0.0 and limit.extent.quantity in ("head", "pressure_head"):
@@ -157,7 +160,7 @@ def limit_faults(limit: DesignLimit | None, fluid: Any, gravity: float) -> Itera
 
 
 def pipes_without_class(extent: Extent, links: Mapping[str, Any]):
-    """Fault of `class_fraction` for a quantity other than pressure, or for parts without a pressure class."""
+    """Fault of the key `class_fraction` if the quantity is not a pressure, or if a part has no pressure class."""
     if extent.quantity not in OF_PRESSURE or extent.quantity == "head":
         yield ("class_fraction",), f"a class limits pressure, not {extent.quantity}; leave out `quantity`"
         return

@@ -1,4 +1,4 @@
-"""Claims (`[expect]`) and measured series (`[compare]`) of a case."""
+"""Expectations (`[expect]`) and measured series (`[compare]`) of a case."""
 
 from __future__ import annotations
 
@@ -25,10 +25,11 @@ _BARE = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 
 @dataclass(frozen=True)
 class Expect:
-    """Claim that a function (max, min, mean, final, at) of a probe equals `value`, or an extreme over a part or route.
+    """Expectation that a function of a probe, or an extreme over a part or route, equals `value`.
 
-    text : claim as in the file, such as "max(gate.pressure)"; time : time of the function `at` [s], else None
-    probe, extent : probe, or parts and quantity; the other is None
+    function : max, min, mean, final or at; time : time of the function `at` [s], else None
+    text : expectation as in the file, such as "max(gate.pressure)"
+    probe, extent : the probe, or the quantity with its parts (`Extent`); the other is None
     value : expected value [SI]; rtol, atol : relative and absolute [SI] tolerance
     """
 
@@ -42,7 +43,7 @@ class Expect:
     atol: float
 
     def table(self) -> dict[str, Any]:
-        """Keys of the claim as in a file."""
+        """Keys of the expectation as in a file."""
         return {"value": self.value, "rtol": self.rtol, "atol": self.atol}
 
 
@@ -70,7 +71,10 @@ class Compare:
 
 
 def read_expect(claim: str, given: Any, kinds: Kinds, routes: Mapping[str, Any], setting: ReadContext) -> Expect | None:
-    """Read one entry of `[expect]`; None if the part that the claim names is faulty. Raises ValueFault."""
+    """Read one entry of `[expect]`; None if the part that it names is faulty. Raises ValueFault.
+
+    claim, given : key and value of the entry; other arguments as for `read_claim`
+    """
     faults, named = [], (None, None, None, None)
     try:
         named = read_claim(claim, kinds, routes, setting)
@@ -97,14 +101,16 @@ def read_expect(claim: str, given: Any, kinds: Kinds, routes: Mapping[str, Any],
 def read_claim(
     claim: str, kinds: Kinds, routes: Mapping[str, Any], setting: ReadContext
 ) -> tuple[str, Probe | None, Extent | None, float | None]:
-    """Split a claim into function, probe, extent and time [s], each None if absent. Raises ValueError.
+    """Split the text `claim` of an expectation into (function, probe, extent, time [s]). Raises ValueError.
 
-    Probe and extent are both None if the part is faulty.
+    Probe or extent is None, both if the part is faulty; time is None except for the function `at`.
+    kinds : as for `read_probe`; routes : routes by name, None if faulty
     """
     match = _CLAIM.fullmatch(claim)
     if match is None or match[1] not in FUNCTIONS:
         hint = did_you_mean(match[1], FUNCTIONS) if match else ""
-        forms = "max, min, mean or final(PROBE), at(PROBE, TIME), or max or min(PART.QUANTITY)"
+        forms = "max(PROBE), min(PROBE), mean(PROBE), final(PROBE), at(PROBE, TIME), max(PART.QUANTITY) or "
+        forms += "min(PART.QUANTITY)"
         raise ValueError(f"is not a claim; expected {forms}{hint}")
     function, probe_text = match.groups()
     when = None
@@ -133,7 +139,10 @@ def read_claim(
 
 
 def expect_keys(dimension: str) -> dict[str, tuple[Any, Any]]:
-    """Keys of a claim on a quantity of that dimension; `atol` of a pressure is a difference of pressures, not gauge."""
+    """Keys of an expectation on a quantity of the given dimension: name -> (declaration, default).
+
+    `atol` of a pressure is a difference of pressures, never a gauge pressure.
+    """
     difference = "modulus" if dimension.endswith("pressure") else dimension
     return {
         "value": (Quantity(dimension, changes=VALUE), NEEDED),

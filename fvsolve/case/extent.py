@@ -1,4 +1,4 @@
-"""Quantity in some parts of a case whose extremes over all steps are recorded, for limits and claims."""
+"""Quantity in some parts of a case whose extremes over all steps are recorded, for limits and expectations."""
 
 from __future__ import annotations
 
@@ -18,7 +18,10 @@ OF_PRESSURE = {"pressure": "pressure", "gauge_pressure": "gauge_pressure", "head
 
 @dataclass(frozen=True)
 class Extent:
-    """Quantity in all `parts` (pairs of group and name); in pipes in every cell, at both ends and at profile points."""
+    """Quantity in all `parts`, pairs (group, name), of which a limit or expectation takes the extreme over all steps.
+
+    In pipes it is taken in every cell and at both ends; a pressure also at the points of elevation profiles.
+    """
 
     on: tuple[str, ...]  # as the file names them
     parts: tuple[tuple[str, str], ...]
@@ -26,7 +29,7 @@ class Extent:
     dimension: str
 
     def probes(self, links: Mapping[str, Any]) -> Iterator[Probe]:
-        """Probes that record the extremes, in addition to the recorded extreme pressures of all cells."""
+        """Probes whose extremes give those of the extent, together with the extreme pressures of all pipe cells."""
         pressed = self.quantity in OF_PRESSURE
         quantity, dimension = ("pressure", "pressure") if pressed else (self.quantity, self.dimension)
         for group, name in self.parts:
@@ -40,7 +43,10 @@ class Extent:
 
 
 def along(pipe: str, quantity: str, share: float, dimension: str) -> Probe:
-    """Probe at the fraction `share` of the length of a pipe, interpolated linearly between cells."""
+    """Probe at the fraction `share` of the length of a pipe, interpolated linearly between cells.
+
+    quantity, dimension : as in `Probe`
+    """
     return Probe(f"links.{pipe}.{quantity}@{share!r}", "links", pipe, quantity, share, dimension, straight=True)
 
 
@@ -56,7 +62,7 @@ def of_profiles(links: Mapping[str, Any]) -> Iterator[Probe]:
 def read_extent(given: Any, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) -> Extent | None:
     """Read a quantity in the parts or routes that `given` (a name or a list) names; None if one of the parts is faulty.
 
-    kinds : classes of all parts by group and name. Raises ValueError for unknown names, ValueFault (at the key
+    kinds : as for `read_probe`; routes : by name. Raises ValueError for unknown names, and ValueFault (at the key
     `quantity`) if a part does not have the quantity.
     """
     names = [given] if isinstance(given, str) else given
@@ -97,9 +103,9 @@ def read_extent(given: Any, quantity: str, kinds: Kinds, routes: Mapping[str, An
 
 
 def parts_of(name: str, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) -> list[tuple[str, str]] | None:
-    """Pairs (group, name) of the parts that a name of a part or route, "pipes" or "nodes" stands for.
+    """Pairs (group, name) of the parts denoted by `name`: a part, the pipes of a route, all "pipes" or all "nodes".
 
-    None if a part is faulty. Raises ValueError for an unknown name or a missing quantity.
+    None if a part is faulty. Raises ValueError for an unknown name or a missing quantity. kinds : as for `read_probe`
     """
     group, dot, rest = name.partition(".")
     if dot and group in ("nodes", "links") and rest in kinds[group]:
@@ -131,7 +137,7 @@ def parts_of(name: str, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) 
 
 
 def counts_as_node(kind: Any, quantity: str) -> bool:
-    """True if the word "nodes" in a limit or claim includes this class of node for a quantity.
+    """True if the word "nodes" in a limit or expectation includes this class of node for a quantity.
 
     A reservoir is not included for pressures and heads, since its pressure is given.
     """

@@ -85,7 +85,10 @@ def model_of(name: str) -> type[Table]:
 
 
 def rows_of(name: str, model: type[Table]) -> list[tuple[str, ...]]:
-    """Rows of the table of a part, one per key; keys that the table of another part lists share one row."""
+    """Rows of the table of a part, one per key. Keys that are listed in the table of another part share one row.
+
+    name, model : name and class of the part
+    """
     rows = [row("type", Text(), NEEDED)] if name in ("every node", "every link") else []
     borrowed: dict[str, str] = {}  # key -> owner
     for base, owner in SHARED.items():
@@ -103,13 +106,19 @@ def rows_of(name: str, model: type[Table]) -> list[tuple[str, ...]]:
 
 
 def row(key: str, value: Value, default: Any, needs: tuple[tuple[str, ...], ...] = ()) -> tuple[str, ...]:
-    """Cells of the table row of a key."""
+    """Cells of the row of a key: name, accepted values, default, effect of a change, description.
+
+    needs : as for `default_cell`
+    """
     words, left_out = about(value)
     return f"`{key}`", value.takes, left_out or default_cell(key, default, needs), value.changes, words
 
 
 def about(value: Value) -> tuple[str, str]:
-    """Description of a key without its unit, and the text of its default, from the words before "if left out"."""
+    """Description of a key without its unit, and the text of its default : (description, default).
+
+    The default is the part of the description before "if left out", or "".
+    """
     unit = DIMENSIONS[value.dimension].si if isinstance(getattr(value, "dimension", None), str) else "-"
     words = value.about.replace(f" [{unit}]", "").replace(f"[{unit}]", "").strip("; ")
     if not words.endswith(LEFT_OUT):
@@ -138,7 +147,7 @@ def default_cell(key: str, default: Any, needs: tuple[tuple[str, ...], ...]) -> 
 
 
 def main(given: list[str]) -> None:
-    """Rewrite the named pages and print the named tables."""
+    """Rewrite the pages (.md) and print the tables that are named in the command line `given`."""
     for argument in given:
         if argument.endswith(".md"):
             Path(argument).write_text(page(Path(argument).read_text(encoding="utf-8")), encoding="utf-8")

@@ -112,7 +112,10 @@ def find_source(source: Any) -> Any:
 
 
 def shortest_cell_time(links: Mapping[str, Any], meshes: Mapping[str, Any], fluid: Any) -> float:
-    """Shortest travel time of a wave through a cell [s], with 1 m/s in basins; inf without cells."""
+    """Shortest travel time of a wave through a cell of a pipe or basin [s]; inf without cells.
+
+    In basins a wave speed of 1 m/s is assumed. meshes : meshes of basins; fluid : properties of the fluid
+    """
     times = [link.length / link.cells / wave_speed(link, fluid) for link in links.values() if isinstance(link, Pipe)]
     return min([*times, *(float(mesh.area.min()) ** 0.5 for mesh in meshes.values())], default=math.inf)
 
@@ -253,12 +256,18 @@ class _Reader:
         return case if named is None else self.exact(case)
 
     def sizes(self, numerics, output, links, meshes, properties) -> Iterator[tuple[tuple, str]]:
-        """Faults of cases too large for the memory, and of steps below the rounding of the time."""
+        """Faults of cases too large for the memory, and of steps below the rounding of the time.
+
+        numerics, output : tables as read; meshes : meshes of basins; properties : properties of the fluid
+        """
         yield from resource_checks.find_faults(numerics, output, links, meshes)
         yield from resource_checks.rounding_faults(numerics, shortest_cell_time(links, meshes, properties))
 
     def exact(self, case: Case) -> Case:
-        """Check that `[exact]` is valid for the case. If overrides make it invalid, it is removed without a fault."""
+        """Return the case if its `[exact]` is valid. If overrides make it invalid, return the case without it.
+
+        Raises CaseError if it is invalid without overrides.
+        """
         faults = list(exact.find_faults(case))
         settings = {keys[0] for keys in self.raw.overridden}
         if faults and settings and "exact" not in settings:
@@ -268,7 +277,7 @@ class _Reader:
         return case
 
     def cut(self, properties: Any, numerics: Numerics | None) -> None:
-        """Cut pipes at the chainages of the parts placed on them."""
+        """Cut pipes at the chainages of the parts placed on them; properties : properties of the fluid, or None."""
         table = chainage.add_bends(self.raw.table)
         tables = (table.get("nodes"), table.get("links"), table.get("routes", {}))
         if not all(isinstance(item, dict) for item in tables) or not chainage.placed(table):
@@ -298,9 +307,10 @@ class _Reader:
         self.origin |= result.origin
 
     def reuse(self, place: tuple, given: Any, make: Callable[[], Any]) -> Any:
-        """Value at a key path as read for the case `before`, if the raw value is the same object; else `make()`.
+        """Value as read for the case `before` if its raw content is the same object, otherwise the result of `make()`.
 
-        A value without faults that uses no file and no signal is kept in `read` for the next reading.
+        place : key path; given : raw content, as in the file. A value without faults that uses no file and no signal is
+        kept in `read` for the next reading.
         """
         before = None if self.before is None else self.before.read.get(place)
         if before is not None and before[0] is given:
@@ -363,7 +373,7 @@ class _Reader:
             return None
 
     def valid_keys(self, name: str, model: Any) -> Any:
-        """Instance of `model` with only the valid keys of a table, perhaps none; it is not checked."""
+        """Instance of `model` with the valid keys of the table `name` as its only keys, without checks of the table."""
         values = {}
         for key, value in model.values().items():
             with suppress(KeyError, TypeError, ValueError):
@@ -388,7 +398,7 @@ class _Reader:
         try:
             ambient, gauge = units.parse(given, "pressure")
             if gauge:
-                raise ValueError(f'{show(given)} is a gauge pressure; expected an absolute one, for example "1 atm"')
+                raise ValueError(f'{show(given)} is a gauge pressure; expected an absolute pressure, such as "1 atm"')
             if ambient <= 0:
                 raise ValueError(f'{show(given)} is absolute and not above 0; expected for example "1 atm"')
             self.setting.ambient = ambient
@@ -421,7 +431,10 @@ class _Reader:
             return spec, None
 
     def in_celsius(self, stated: dict[str, Any], key: str) -> str:
-        """Hint for a message if a temperature in kelvin is out of range but would be valid in degrees Celsius."""
+        """Hint for a message if a temperature in kelvin is out of range but would be valid in degrees Celsius; else "".
+
+        stated : values of `[fluid]`; key : faulty key
+        """
         given = self.raw.get(("fluid", "temperature"))
         if key != "temperature" or isinstance(given, str):
             return ""
@@ -471,13 +484,16 @@ class _Reader:
         return pipes + [name for name in (*nodes, *links) if check.has_unknown_places(name, nodes, links)]
 
     def part(self, kind: Any, given: dict[str, Any]) -> Any:
-        """Read a part of class `kind` from its raw table, completed by defaults."""
+        """Read a part of class `kind` from its keys in the file, completed by defaults."""
         rest = {key: value for key, value in defaults.with_defaults(self.raw.table, given).items() if key != "type"}
         kind = kind.variant(rest) if issubclass(kind, Node) else kind
         return kind.model_validate(rest, context=self.setting)
 
     def meshes(self, nodes: dict[str, Any]) -> dict[str, Any]:
-        """Meshes of basins with cells, by name. Basins with a faulty mesh are removed from `nodes`."""
+        """Meshes of basins with cells, by name. Those of basins without cells are added to `lumped`.
+
+        Basins with a faulty mesh are removed from `nodes`.
+        """
         result = {}
         for name, node in [*nodes.items()]:
             try:
@@ -490,9 +506,10 @@ class _Reader:
         return result
 
     def network_table(self, meshes: dict[str, Any]) -> dict[str, Any]:
-        """Raw table for the check of connections, in which basins have all patches of their meshes.
+        """Nested dicts of the case for the check of connections, in which basins have all patches of their meshes.
 
-        A basin with a faulty mesh file has the patches that links name, and a node that cannot be read is a junction.
+        A basin with a faulty mesh file has the patches that links name. A node that cannot be read
+        is replaced by a junction.
         """
         nodes, links = self.group("nodes"), self.group("links")
         patches = {name: basins.patch_names(mesh) for name, mesh in meshes.items()}
@@ -618,7 +635,10 @@ class _Reader:
         return {name: None if name in lost else route for name, route in result.items()}
 
     def limits(self, kinds: dict, routes: dict, links: dict[str, Any], *about: Any) -> dict[str, DesignLimit | None]:
-        """Design limits by name."""
+        """Design limits by name; None for a limit on faulty parts.
+
+        kinds, routes, links : as for `read_limit`; about : properties of the fluid and gravity [m/s2]
+        """
         result = {}
         for name, given in self.group("limits").items():
             try:

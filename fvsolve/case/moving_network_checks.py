@@ -36,7 +36,7 @@ def has_elevation(node: Node, poses: dict[str, Any]) -> bool:
 def find_faults(nodes: dict[str, Any], links: dict[str, Any], patches: dict[str, Any], named: Any) -> Faults:
     """Faults (key path, message) of nodes on bodies, and of links that join them.
 
-    patches : patches of basins on bodies, by full name; named : tables of all nodes, also of faulty ones
+    patches : patches of basins on bodies, by full name; named : tables of all nodes, also of faulty nodes
     """
     for name, node in nodes.items():
         if isinstance(node, Basin) or not isinstance(node, PlaceOnBody):
@@ -51,13 +51,13 @@ def find_faults(nodes: dict[str, Any], links: dict[str, Any], patches: dict[str,
         ends = [place for port, place in link.ports.items() if link.joins.get(port) == "hydraulic"]
         yield from ((("links", name, *key), text) for key, text in link_faults(link, ends, nodes, patches))
     for place, text in missing_reactions(nodes, links, free=True):
-        yield place, f"{text}, or a driven joint instead of a free one"
+        yield place, f"{text}, or a driven joint instead of a free joint"
 
 
 def missing_reactions(nodes: dict[str, Any], links: dict[str, Any], free: bool = False) -> Faults:
     """Faults of parts whose flow acts on a body by a force that is not modelled.
 
-    free : True for only the faults on bodies that move freely
+    free : True to check only bodies that move freely
     """
 
     def on_body(name: str) -> bool:
@@ -95,7 +95,7 @@ def missing_reactions(nodes: dict[str, Any], links: dict[str, Any], free: bool =
                 reason = "the flow of a pipe" if link.kind == "pipe" else "the flow of a valve"
                 yield (
                     key,
-                    f"{reason} has no inertia at {end}, nor has the tank; expected a rigid-column between",
+                    f"neither {reason} nor the tank has inertia at {end}; expected a rigid-column between them",
                 )
 
 
@@ -106,19 +106,23 @@ def set_by_columns(end: str, nodes: dict[str, Any], links: dict[str, Any]) -> bo
 
 
 def node_of(place: str, nodes: dict[str, Any]) -> Any:
-    """Node of that name, or the basin of a patch BASIN.PATCH; None if there is neither."""
+    """Node with the name `place`, or basin of the patch `place` (BASIN.PATCH); None if neither exists."""
     return nodes.get(place, nodes.get(place.rpartition(".")[0]))
 
 
 def link_faults(link: Any, ends: list[str], nodes: dict[str, Any], patches: dict[str, Any]) -> Faults:
-    """Faults (key path in the link, message) of a link with at least one end on a body."""
+    """Faults (key path in the link, message) of a link with an end on a body, or with a route on a body.
+
+    ends : names of the places that its hydraulic ports join; patches : patches of basins on bodies, by full name
+    """
     stand = [node_of(place, nodes) for place in ends]
     on = [getattr(node, "on", None) for node in stand]
     if None in stand or any(body is not None and body not in nodes for body in on):
         return  # an end is faulty
     if not any(on):
         if getattr(link, "route", None):
-            yield ("route",), "is a route on a body, but no end of the pipe is on a body; give both ends `on` and `at`"
+            text = "is a route on a body, but no end of the pipe is on a body"
+            yield ("route",), f"{text}; give the nodes at both ends the keys `on` and `at`"
         return
     if len(set(on)) > 1:
         each = zip(ends, on, strict=True)
@@ -144,7 +148,10 @@ def link_faults(link: Any, ends: list[str], nodes: dict[str, Any], patches: dict
 
 
 def patch_faults(end: str, node: Any) -> Iterator[str]:
-    """Reasons why no link can join a patch of a basin on a body."""
+    """Reason why a link cannot join the place `end` if that is a patch of a basin on a body; none if it can.
+
+    node : node of the place, see `node_of`
+    """
     if not isinstance(node, Basin):
         return
     if not node.physics_type.links_on_bodies:
@@ -155,7 +162,10 @@ def patch_faults(end: str, node: Any) -> Iterator[str]:
 
 
 def position_text(ends: list[str], patches: dict[str, Any]) -> str:
-    """Text with the computed positions of those ends that are patches; empty if none is."""
+    """Text with the computed positions of the ends of a link that are patches; "" if no end is a patch.
+
+    patches : patches of basins on bodies, by full name
+    """
     texts = [
         f"{end} at [{', '.join(f'{coordinate:.7g}' for coordinate in patches[end].at)}]"
         for end in ends

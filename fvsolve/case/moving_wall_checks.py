@@ -28,14 +28,17 @@ def axis_of(basin: Any, mesh: Any) -> int:
 
 
 def outward(mesh: Any, patch: str) -> tuple[int, float]:
-    """Axis (0 for x, 1 for y) and sign (1 or -1) of the outward normal of a patch perpendicular to this axis."""
+    """Axis and sign of the outward normal of a patch : (0 for x or 1 for y, 1 or -1).
+
+    The patch must be perpendicular to this axis.
+    """
     normal = mesh.normal[mesh.patch(patch)].mean(axis=0)
     axis = int(np.argmax(np.abs(normal)))
     return axis, float(np.sign(normal[axis]))
 
 
 def weights(basin: Any, mesh: Any, patch: str, at: np.ndarray) -> np.ndarray:
-    """Displacement of mesh points over the travel of a wall [-]: 1 at the wall, 0 at the end of its zone.
+    """Displacement of mesh points divided by the travel of a wall [-]: 1 at the wall, 0 at the end of its zone.
 
     at : float64[n]  coordinates of the points along the axis of motion [m]; the result is float64[n]
     """
@@ -46,9 +49,10 @@ def weights(basin: Any, mesh: Any, patch: str, at: np.ndarray) -> np.ndarray:
 
 
 def area_growth(mesh: Any, axis: int, share: np.ndarray) -> np.ndarray:
-    """Relative growth of cell areas per travel of a wall, from the initial areas : float64[n] [1/m].
+    """Relative growth of cell areas per travel of a wall : float64[n] [1/m]. The initial areas are the base.
 
-    axis : axis of motion, 0 for x, 1 for y; share : float64[p]  displacement of mesh points over the wall's travel [-]
+    axis : axis of motion, 0 for x, 1 for y
+    share : float64[p]  displacement of mesh points divided by the travel of the wall [-], see `weights`
     """
     swept = mesh.length * mesh.normal[:, axis] * share[mesh.ends].mean(axis=1)
     inner = mesh.inner
@@ -68,7 +72,7 @@ def find_faults(
     """Faults (key path, message) of the moving walls of a basin.
 
     joined : full names of patches that links join; times : start and end of the run [s]
-    named : tables of all nodes, also of faulty ones
+    named : tables of all nodes, also of faulty nodes
     """
     key = ("nodes", name, "patches")
     for patch, options in basin.patches.items():
@@ -93,7 +97,10 @@ def find_faults(
 def wall_faults(
     basin: Any, mesh: Any, patch: str, options: Any, nodes: dict, times: tuple, named: Any
 ) -> Iterator[tuple[tuple, str]]:
-    """Faults (key path within the patch, message) of one moving wall; arguments as in `find_faults`."""
+    """Faults (key path within the patch, message) of one moving wall.
+
+    patch, options : name and keys of the patch; other arguments as for `find_faults`
+    """
     if not basin.physics_type.moves:
         yield (), f"physics {show(basin.physics)} does not support moving walls"
     for other in ("boundary", "impedance", "scalars"):
@@ -130,7 +137,10 @@ def wall_faults(
 
 
 def body_faults(name: str, nodes: dict[str, Any], axis: int) -> Iterator[str]:
-    """Fault texts for the mass or body `name` that moves a wall; axis : axis of motion, 0 for x, 1 for y."""
+    """Fault texts if the node `name` cannot move a wall: it must be a mass, or a body that slides along the axis.
+
+    axis : axis of motion of the wall, 0 for x, 1 for y
+    """
     known = [other for other, node in nodes.items() if getattr(node, "kind", "") in ("mass", "body")]
     node = nodes.get(name)
     if node is None:
@@ -143,16 +153,17 @@ def body_faults(name: str, nodes: dict[str, Any], axis: int) -> Iterator[str]:
 
 
 def slider_faults(name: str, node: Any, nodes: dict[str, Any], axis: int) -> Iterator[str]:
-    """Fault texts for a body that does not slide on the world along the axis of a wall; axis : 0 for x, 1 for y."""
+    """Fault texts if the body `node` does not slide on the world along the axis of a wall; axis : 0 for x, 1 for y."""
     up = nodes.get((node.joint.on or "").partition(".")[0])
     if node.joint.kind != "prismatic" or getattr(up, "kind", "frame") != "frame":
-        yield f"{name} does not slide on the world; expected a prismatic joint on it, or `travel` instead of `body`"
+        remedy = "expected a prismatic joint to the world, or `travel` instead of `body`"
+        yield f"{name} does not slide on the world; {remedy}"
     elif abs(slide_direction(node)[axis]) < 1.0 - 1e-9:
         yield f"{name} does not slide along {'xy'[axis]}, the axis of the wall; change the axis of its joint"
 
 
 def slide_direction(body: Any) -> np.ndarray:
-    """Unit vector in world axes along which a body on a prismatic joint slides : float64[3]."""
+    """Unit vector in world axes along which a body on a prismatic joint to the world slides : float64[3]."""
     return body.joint.attitude.rotation @ body.joint.unit_axis
 
 
@@ -168,16 +179,19 @@ def travel_faults(travel: Any, side: float, zone: float, times: tuple, mesh: Any
     places = value(travel, np.concatenate([np.linspace(*times, SAMPLES), inside]))
     inward = float((side * (places[0] - places)).max())
     if inward >= zone:
-        yield f"moves {inward:g} m inward, but its zone is only {zone:g} m wide; expected less, or a wider zone"
+        yield f"moves {inward:g} m inward, but its zone is only {zone:g} m wide; expected less travel, or a wider zone"
         return
     least = np.minimum((places.min() - places[0]) * per, (places.max() - places[0]) * per)
     if least.min() <= -1.0:
         x, y = mesh.centre[np.argmin(least)]
-        yield f"inverts the cell at {x:.6g},{y:.6g} m, in which the zone ends; expected less, or another zone"
+        yield f"inverts the cell at {x:.6g},{y:.6g} m, in which the zone ends; expected less travel, or another zone"
 
 
 def outline_faults(basin: Any, mesh: Any, patch: str) -> Iterator[tuple[tuple, str]]:
-    """Fault of a boundary that a moving wall would deform: in the wall's zone it must be parallel to the motion."""
+    """Fault of a moving wall that would deform the boundary.
+
+    Within the zone of the wall the boundary must be parallel to the motion.
+    """
     axis, _ = outward(mesh, patch)
     outer = np.arange(mesh.inner, mesh.left.size)
     own = mesh.patch(patch)
@@ -204,7 +218,10 @@ def bed_faults(basin: Any, mesh: Any, patch: str) -> Iterator[tuple[tuple, str]]
 
 
 def faults_between(basin: Any, mesh: Any, walls: dict[str, Any], times: tuple) -> Iterator[tuple[tuple, str]]:
-    """Faults of several walls together: different axes, inverted cells, fixed patches on the side of a moving wall."""
+    """Faults of several walls together: different axes, inverted cells, fixed patches on the side of a moving wall.
+
+    walls : name of a patch -> its keys, of moving walls; times : start and end of the run [s]
+    """
     yield from crossing_faults(basin, mesh, walls, times)
     axes = {patch: outward(mesh, patch) for patch in walls}
     first = next(iter(axes), None)
@@ -223,7 +240,10 @@ def faults_between(basin: Any, mesh: Any, walls: dict[str, Any], times: tuple) -
 
 
 def crossing_faults(basin: Any, mesh: Any, walls: dict[str, Any], times: tuple) -> Iterator[tuple[tuple, str]]:
-    """Fault of walls whose motions together invert a cell, although each motion alone does not."""
+    """Fault of walls whose motions together invert a cell, although each motion alone does not.
+
+    walls, times : as for `faults_between`
+    """
     driven = {patch: item.travel for patch, item in walls.items() if item.travel is not None}
     if len(driven) < 2 or len({outward(mesh, patch)[0] for patch in driven}) > 1:
         return

@@ -12,8 +12,9 @@ BISECTIONS = 200  # number of bisections
 
 
 def on_body(basin: Any, mesh: Any, patch: str, rest: dict[str, Any], pose: Any) -> dict[str, Any]:
-    """State at rest of a patch, with the keys `on` and `at` added: body and position of the middle of its faces.
+    """State at rest of a patch, with its position on the body that carries the basin.
 
+    The keys `on` and `at` are added: the body, and the middle of the faces in body axes [m].
     rest : state at rest in the upright basin; pose : pose of the body at the start, by which elevation and depth are
     computed; if None, they stay as in `rest`
     """
@@ -46,9 +47,9 @@ def depth_over(basin: Any, mesh: Any, place: np.ndarray, attitude: np.ndarray) -
 
 
 def level_over(drawn: np.ndarray, tilt: np.ndarray, area: np.ndarray, volume: float) -> float:
-    """Level of a volume of water [m3] over a tilted bed, relative to the level without tilt [m].
+    """Level [m] of the surface of a volume of water [m3] over a tilted bed, relative to the level without tilt.
 
-    drawn : float64[n]  height of the bed in each cell above that level, without tilt [m]
+    drawn : float64[n]  height of the bed in each cell above the level without tilt [m]
     tilt : float64[n]  rise of the bed by the tilt [m]; area : float64[n]  areas of the cells [m2]
     """
     ground = drawn + tilt

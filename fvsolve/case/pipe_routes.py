@@ -17,7 +17,10 @@ from fvsolve.units import show
 class PipeNames(Value):
     """Value of a key that lists the names of consecutive pipes."""
 
-    about = "names of consecutive pipes; each begins where the previous pipe ends, or across links without length"
+    about = (
+        "names of consecutive pipes; each begins where the previous pipe ends, or is joined to it by links without "
+        "length"
+    )
     takes = "list of names"
     changes = VALUE
 
@@ -93,12 +96,12 @@ def expand_pieces(route: Route, pieces: dict[str, list[str]], links: dict[str, A
 
 
 def is_pipe(given: Any) -> bool:
-    """True if a raw link is a pipe."""
+    """True if a link is a pipe; given : its keys as in the file."""
     return isinstance(given, dict) and given.get("type") == "pipe"
 
 
 def has_known_type(given: Any) -> bool:
-    """True if a raw link has a known type."""
+    """True if the type of a link is known; given : its keys as in the file."""
     return isinstance(given, dict) and str(given.get("type")) in KINDS["links"]
 
 
@@ -107,7 +110,7 @@ def find_faults(
 ) -> Iterator[tuple]:
     """Faults (key path, message) of routes: names that are not pipes, and pipes that are not consecutive.
 
-    named : raw links, also faulty ones; pieces : cut pipe -> names of its pieces
+    named : links as in the file, also faulty links; pieces : cut pipe -> names of its pieces
     """
     pipes = [
         item for item, given in named.items() if item not in links and (is_pipe(given) or not has_known_type(given))
@@ -140,16 +143,19 @@ def find_faults(
 
 
 def index_in_file(route: Route, pieces: dict[str, list[str]], k: int) -> int:
-    """Index in the list of the file for pipe k of a route; all pieces of a cut pipe have the index of its name."""
+    """Index in the list `pipes` of the file for pipe k of a route; all pieces of a cut pipe have the index of its name.
+
+    pieces : cut pipe -> names of its pieces
+    """
     cut_pipe = {piece: name for name, own in pieces.items() for piece in own}
     names = [cut_pipe.get(pipe, pipe) for pipe in route.pipes[: k + 1]]
     return sum(following != before for following, before in itertools.pairwise(names))
 
 
 def joined_places(links: dict[str, Any], named: dict[str, Any] = {}) -> dict[str, str]:  # noqa: B006
-    """Name of a node -> common name of all nodes that links without length join to it.
+    """Names of nodes that links other than pipes join : name of a node -> common name of its group of joined nodes.
 
-    links : links by name; named : raw links, also faulty ones, which count as joined
+    links : links by name; named : links as in the file, also faulty links, which are assumed to join their nodes
     """
     root: dict[str, str] = {}
 
@@ -169,10 +175,10 @@ def joined_places(links: dict[str, Any], named: dict[str, Any] = {}) -> dict[str
 
 
 def directions(route: Route, links: dict[str, Any], named: dict[str, Any] = {}) -> list[list[tuple[int, bool]]]:  # noqa: B006
-    """Possible directions of the pipes of a route: a list for each pipe with a pair for each possible direction.
+    """Possible directions of the pipes of a route : for each pipe a list with a pair for each direction.
 
     A pair is (index of a suitable pair in the list of the previous pipe, True if the pipe is passed backwards); the
-    index for the first pipe is -1. The result ends with an empty list at the first gap.
+    index for the first pipe is -1. The result ends with an empty list at the first gap. named : as for `joined_places`
     """
     root = joined_places(links, named)
     ends = [[root.get(place, place) for place in (links[pipe].from_, links[pipe].to)] for pipe in route.pipes]
@@ -190,7 +196,10 @@ def directions(route: Route, links: dict[str, Any], named: dict[str, Any] = {}) 
 
 
 def first_gap(route: Route, links: dict[str, Any], named: dict[str, Any] = {}) -> int | None:  # noqa: B006
-    """Index of the first pipe of a route that is not connected to the previous pipe; None if there is no gap."""
+    """Index of the first pipe of a route that is not connected to the previous pipe; None for a route without gaps.
+
+    named : as for `joined_places`
+    """
     result = directions(route, links, named)
     return None if result[-1] else len(result) - 1
 

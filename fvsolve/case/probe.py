@@ -50,7 +50,8 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
     """Probe from its text, such as "gate.pressure"; None if the part is faulty. Raises ValueError.
 
     kinds : "nodes" and "links" -> class of each part by name (None if faulty, `BasinFields` for a basin);
-    "scalars" -> scalars; "routes" -> legs of routes; "pipes" -> pipes; "uncut" -> faulty parts with unknown points
+    "scalars" -> scalars; "routes" -> (legs, links) of each route; "pipes" -> pipes;
+    "uncut" -> faulty parts with unknown points, patches or pieces
     """
     match = _PROBE.fullmatch(given.strip()) if isinstance(given, str) else None
     if match is None:
@@ -84,13 +85,17 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
 
 
 def may_be_piece(name: str, kinds: Kinds) -> bool:
-    """True if a name may denote a pipe piece, bend, point or patch of a faulty part, for which these are unknown."""
+    """True if `name` may denote a piece, bend, point or patch of a faulty part, of which these are not known.
+
+    kinds : as for `read_probe`
+    """
     return any(name.startswith((f"{pipe}-", f"{pipe}.")) for pipe in kinds.get("uncut", ()))
 
 
 def route_probe(text: str, name: str, quantity: str, place: str | None, kinds: Kinds) -> Probe | None:
     """Probe of a quantity on a route; None if the route is faulty. Raises ValueError.
 
+    text : text of the probe; name : name of the route; kinds : as for `read_probe`
     place : text after "@", a fraction of the length of the route or a chainage with unit
     """
     along = Pipe.along | _scalars_of(Pipe, kinds, "along")
@@ -137,7 +142,10 @@ def fraction_of(place: str, length: float | None, begin: float) -> float:
 
 
 def default_probes(kinds: Kinds) -> list[Probe]:
-    """Default probes: main quantities of all nodes (pressure, level, position) and of all links (flow, force)."""
+    """Default probes: main quantities of all nodes (such as pressure and level) and of all links (flow, force).
+
+    kinds : as for `read_probe`
+    """
     probes = []
     for part, quantities in (("nodes", DEFAULT_OF_NODES), ("links", DEFAULT_OF_LINKS)):
         other = kinds["links" if part == "nodes" else "nodes"]
@@ -155,7 +163,10 @@ def default_probes(kinds: Kinds) -> list[Probe]:
 
 
 def _scalars_of(kind: type[Node] | type[Link], kinds: Kinds, where: str) -> dict[str, str]:
-    """Scalars (name -> "number") that a class of part has: all scalars of the case if it has a pressure, else none."""
+    """Scalars (name -> "number") that a class of part has: all scalars of the case if it has a pressure, else none.
+
+    where : attribute of the class that lists its quantities, "along" for those along a pipe, or "quantities"
+    """
     return dict.fromkeys(kinds["scalars"] if "pressure" in getattr(kind, where, {}) else (), "number")
 
 

@@ -1,4 +1,4 @@
-"""Raw case before its values are read: nested dicts, line numbers, overrides."""
+"""Case before its values are read (raw case): nested dicts, line numbers, overrides."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ DEEPEST = 40
 
 @dataclass
 class Raw:
-    """Raw case.
+    """Case before its values are read (raw case), with its source.
 
     table : nested dicts as in the file; text : text of the file; folder : folder of the file, for other files
     overridden : key paths whose values were replaced by overrides
@@ -35,7 +35,7 @@ class Raw:
 
     @functools.cached_property
     def lines(self) -> dict[tuple, int]:
-        """Key path -> line number in the file, computed when first needed."""
+        """Line numbers in the file : key path -> number. They are computed at first use."""
         return key_lines(self.text)
 
     @property
@@ -58,7 +58,7 @@ class Raw:
         return created and any(path[: len(keys)] == keys for path in self.overridden if keys)
 
     def get(self, keys: tuple) -> Any:
-        """Value at a key path; None if there is none."""
+        """Value at a key path; None if the key path does not exist."""
         value: Any = self.table
         for key in keys:
             try:
@@ -69,7 +69,7 @@ class Raw:
 
 
 def read_raw(source: Any) -> Raw:
-    """Read the raw case from a TOML file or a dict. Raises CaseError."""
+    """Read a case from a TOML file or a dict, without its values (see `Raw`). Raises CaseError."""
     if isinstance(source, Mapping):
         return Raw(_copy(source))
     if not isinstance(source, (str, Path)):
@@ -79,7 +79,7 @@ def read_raw(source: Any) -> Raw:
     try:
         table = tomllib.loads(text)
     except RecursionError:
-        raise CaseError([Fault("", "tables or lists nested too deep")], path.name) from None
+        raise CaseError([Fault("", "tables or lists are nested too deep")], path.name) from None
     except ValueError as error:
         if re.search(r"^\s*\[(JUNCTIONS|RESERVOIRS|PIPES)\]", text, re.MULTILINE | re.IGNORECASE):
             message = f"is an EPANET network, not a case; fvsolve import {path} translates it"
@@ -99,7 +99,7 @@ def copy_paths(table: dict[str, Any], paths: list[tuple[str, ...]]) -> dict[str,
 
 
 def override(raw: Raw, settings: Mapping[str, Any], alternatives: list[tuple[str, ...]]) -> list[Fault]:
-    """Override values of a raw case; returns the faults of overrides that cannot be applied.
+    """Override values of a case before it is read (`Raw`); returns the faults of overrides that cannot be applied.
 
     settings : dotted key -> value; a text is parsed as TOML where possible
     alternatives : groups of keys of which a table may have at most one; an override removes the other keys of its group
@@ -130,7 +130,10 @@ def override(raw: Raw, settings: Mapping[str, Any], alternatives: list[tuple[str
 
 
 def locate_faults(error: CaseError, case: Any) -> CaseError:
-    """Copy of an error on a case that was read, with the file's name and line numbers or marks of overrides added."""
+    """Copy of an error on the case `case`, with the file name and the source of each fault added.
+
+    The source is a line number of the file, or the mark that an override set the key.
+    """
     if case.path is None:
         return CaseError(error.faults, case.name)
     try:
@@ -169,7 +172,7 @@ def _read_text(path: Path) -> str:
 
 
 def syntax_fault(error: ValueError, text: str) -> Fault:
-    """Fault of a text that is not valid TOML, with its line."""
+    """Fault of a text that is not valid TOML, with its line; error : error that tomllib raised."""
     message = str(error)
     match = re.search(r"\s*\(at line (\d+), column (\d+)\)", message)
     line = int(match[1]) if match else text.count("\n") + 1
@@ -186,7 +189,7 @@ def syntax_fault(error: ValueError, text: str) -> Fault:
 
 
 def _bare_name(line_text: str) -> str:
-    """Description of an invalid unquoted name in a line of TOML; empty if there is none."""
+    """Description of an invalid unquoted name in a line of TOML; "" if all names are valid."""
     match = re.fullmatch(r"\[+([^\[\]\"']+)\]+\s*(?:#.*)?|([^=\[\]\"'#]+?)\s*=.*", line_text)
     names = [name.strip() for name in (match[1] or match[2]).split(".")] if match else []
     odd = next((name for name in names if name and not re.fullmatch(r"[A-Za-z0-9_-]+", name)), None)

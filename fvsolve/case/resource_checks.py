@@ -25,7 +25,10 @@ FRAME_CELL = 60  # size of a cell of a frame on disk [B]
 def find_faults(
     numerics: Any, output: Any, links: dict[str, Any], meshes: dict[str, Any]
 ) -> Iterator[tuple[tuple, str]]:
-    """Faults of cells or rows that need too much memory, and of output intervals below the rounding of time."""
+    """Faults (key path, message) of cells or rows that need too much memory, and of too short output intervals.
+
+    An output interval must exceed the rounding of the time. meshes : meshes of basins
+    """
     pipes = {name: link for name, link in links.items() if isinstance(link, Pipe)}
     method, span = METHODS.get(numerics.method), numerics.end - numerics.start
     implicit = method is None or not method.explicit
@@ -85,12 +88,12 @@ def byte_text(count: float) -> str:
 
 
 def fits(count: float) -> bool:
-    """True if `count` bytes are free; small counts are accepted without a query."""
+    """True if `count` bytes of memory are free; small counts are accepted without a query."""
     return count <= ALWAYS_FREE or count <= free_memory()
 
 
 def free_memory() -> float:
-    """Available memory [B], or the total memory if the system reports no more; inf if it reports neither."""
+    """Available memory [B]; the total memory if the system does not report it, inf if it reports neither."""
     try:
         with open("/proc/meminfo", encoding="ascii") as file:
             entries = dict(line.split(":", 1) for line in file)

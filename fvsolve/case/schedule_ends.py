@@ -27,9 +27,10 @@ def notices(case: Any) -> list[Notice]:
 
 
 def starts_after_end(part: Any, end: float) -> Iterator[tuple[str, float]]:
-    """Yield (key, time [s]) of each schedule of a part that changes after the time `end` [s], and of a later trip.
+    """Yield (key, time [s]) for schedules of a part that change after the time `end` [s], and for a trip after it.
 
     The time is that of the last change or of the trip; for a periodic schedule it is the end of its first period.
+    Schedules of more than `MAX_ENTRIES` entries are left out.
     """
     for name, info in type(part).model_fields.items():
         value = getattr(part, name)

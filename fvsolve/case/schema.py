@@ -115,7 +115,7 @@ def _is_schema(part: dict[str, Any]) -> bool:
 
 
 def _numbered(names: dict[str, str]) -> dict[str, str]:
-    """Add numbers to equal names, so that each is unique; names : schema text -> name."""
+    """Add numbers to names that occur several times, so that each is unique; names : schema text -> name."""
     counts: Counter[str] = Counter()
     for text, name in names.items():
         counts[name] += 1
@@ -124,7 +124,7 @@ def _numbered(names: dict[str, str]) -> dict[str, str]:
 
 
 def _name(part: dict[str, Any]) -> str:
-    """Name for a shared schema: its dimension, the dimension of a schedule or list, or the keys of a table."""
+    """Name for a shared schema from its dimension, that of a schedule or list, or the keys of a table; else ""."""
     first = next(iter(part.get("anyOf", [])), part)
     if (
         isinstance(first, dict)

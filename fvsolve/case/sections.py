@@ -80,7 +80,7 @@ class FluidSpec(Table):
     law: Annotated[
         str,
         Choice(
-            "density law", tuple(LAWS), "density law of the whole case; linear (with cavitation mixture) if left out"
+            "density law", tuple(LAWS), "density law of the whole case; linear (mixture with cavitation) if left out"
         ),
     ] = "linear"
     density: Annotated[float | None, Quantity("density", positive, "density [kg/m3]", DENSITIES, BY_CELLS)] = None
@@ -215,8 +215,8 @@ class Numerics(Table):
         float | None,
         Number(
             between(0, 1, open=True),
-            f"relative tolerance of the error per step; {DEFAULT_RTOL:g} without cells, with auto or adaptive implicit "
-            "methods if left out",
+            f"relative tolerance of the error per step; {DEFAULT_RTOL:g} (without cells, with auto, or with adaptive "
+            "implicit methods) if left out",
         ),
     ] = None
     linear_algebra: Annotated[
@@ -276,7 +276,10 @@ class Numerics(Table):
 
 
 def uses_error_control(method: str | None) -> bool:
-    """True if a method controls the error of steps by default even with cells: `auto`, adaptive implicit methods."""
+    """True if a method controls the error of its steps by default, even in a case with cells.
+
+    These are `auto` and the adaptive implicit methods.
+    """
     known = METHODS.get(method or "")
     return method == AUTO or (known is not None and known.adaptive and not known.explicit)
 

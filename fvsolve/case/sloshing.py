@@ -50,7 +50,7 @@ class SloshingMode(NamedTuple):
 
     along : direction, 0 for x, 1 for y; number : number of the mode, from 1; k : wave number [1/m]
     mass : moving mass [kg]; height : its height above the bed [m]; square : square of the angular frequency [1/s2]
-    rise : rise of the surface at the wall in the positive direction per travel of the mass [-]
+    rise : rise of the surface at the wall on the positive side (along x or y), per travel of the mass [-]
     """
 
     along: int
@@ -65,7 +65,8 @@ class SloshingMode(NamedTuple):
 class Slowest(NamedTuple):
     """Slowest mode of a tank.
 
-    kh : wave number times depth [-]; excess : excess of its frequency in shallow-water theory over the true one [%]
+    kh : wave number times depth [-]
+    excess : relative error of its frequency in shallow-water theory, which is too high [%]
     """
 
     kh: float
@@ -73,7 +74,10 @@ class Slowest(NamedTuple):
 
 
 def slowest(basin: Any, mesh: Any) -> Slowest | None:
-    """Slowest mode of a tank; None if its modes are not known: no flat bed, no water, or not a box or cylinder."""
+    """Slowest mode of a tank; None if its modes are not known.
+
+    They are known for boxes and upright cylinders with water over a flat bed.
+    """
     bed, outline = means(samples(basin.bed, mesh)), outline_of(mesh)
     if outline is None or np.ptp(bed) > FLAT * abs(basin.level - bed.min()) or not basin.level > bed[0]:
         return None
@@ -105,7 +109,10 @@ def depth_of(basin: Any, mesh: Any) -> float:
 
 
 def modes(outline: Outline, depth: float, density: float, gravity: float, count: int = MODES) -> list[SloshingMode]:
-    """First `count` modes in each direction of water in a tank, alternately along x and y; depth [m]."""
+    """First `count` modes in each direction of water in a tank, alternately along x and y.
+
+    depth [m]; density [kg/m3]; gravity [m/s2]
+    """
     from scipy.special import jnp_zeros
 
     result = []
@@ -154,9 +161,9 @@ def lid_inertia(outline: Outline, depth: float, density: float) -> np.ndarray:
 
 
 def rectangle_inertia(a: float, b: float) -> float:
-    """Inertia of an ideal fluid in a rotating box, per density and height of the box [m4].
+    """Inertia of an ideal fluid in a rotating box, per density and per length along the axis of rotation [m4].
 
-    It is the polar moment of the rectangle with sides a, b [m] less its torsion constant.
+    It is the polar moment of the rectangle with sides a, b [m] minus its torsion constant.
     """
     long, short = max(a, b), min(a, b)
     odd = np.arange(1, 2 * TERMS, 2)
@@ -183,7 +190,10 @@ def cylinder_inertia(a: float, h: float) -> float:
 
 
 def find_faults(nodes: dict[str, Any], lumped: dict[str, Any], poses: dict[str, Any]) -> Faults:
-    """Faults (key path, message) of basins whose water is modelled by sloshing modes; lumped : their meshes."""
+    """Faults (key path, message) of basins whose water is modelled by sloshing modes.
+
+    lumped : basin -> mesh, of basins without cells; poses : name of a body -> `Pose`
+    """
     for name, mesh in lumped.items():
         basin, key = nodes[name], ("nodes", name)
         if basin.sloshing != "modes" or not basin.physics_type.has_modes:
@@ -206,7 +216,7 @@ def find_faults(nodes: dict[str, Any], lumped: dict[str, Any], poses: dict[str, 
 
 
 def weightless(nodes: dict[str, Any], gravity: float | None) -> Faults:
-    """Fault of zero gravity in a case with a free water surface."""
+    """Fault of zero gravity in a case with a free water surface. Frozen water on a body is allowed."""
     for name, basin in nodes.items():
         if gravity == 0.0 and getattr(getattr(basin, "physics_type", None), "has_modes", False):
             if not (basin.on and basin.sloshing == "frozen"):
@@ -220,7 +230,7 @@ def weightless(nodes: dict[str, Any], gravity: float | None) -> Faults:
 def unsupported_keys(key: tuple, basin: Any) -> Faults:
     """Faults of keys of a basin that are not valid with sloshing modes; key : key path of the basin."""
     for key_name in sorted(basin.start.model_fields_set) if basin.start is not None else ():
-        yield (*key, "start", key_name), "modes start from level water at rest; leave it out"
+        yield (*key, "start", key_name), "modes start from level water at rest; leave this key out"
     for patch, patch_options in basin.patches.items():
         if patch_options.boundary == "open":
             yield (*key, "patches", patch, "boundary"), "modes are valid only for closed tanks; expected a wall"
@@ -244,7 +254,7 @@ def mode_bodies(name: str, basin: Any, mesh: Any, pose: Any, density: float, gra
 
     The fixed body of negative mass subtracts the moving masses from the water, which is added to the body with its full
     mass. In a cylinder the modes of one number along x and y share a mass, which slides along y on a massless body
-    that slides along x.
+    that slides along x. pose : pose at the start of the body that carries the basin
     """
     outline, turn, all_modes, result = outline_of(mesh), basin.rotation, modes_of(basin, mesh, density, gravity), {}
     bed = np.array(basin.place) + turn @ (*outline.middle, bed_of(basin, mesh))
@@ -272,7 +282,7 @@ def mode_bodies(name: str, basin: Any, mesh: Any, pose: Any, density: float, gra
 def surface_factors(
     basin: Any, mesh: Any, x: float, y: float, density: float, gravity: float
 ) -> tuple[list[SloshingMode], list[float]]:
-    """Modes of a basin, and the rise of the surface at the point (x, y) [m] per travel of each mode [-].
+    """Modes of a basin, and the rise of the surface at the point (x, y) [m] per travel of the mass of each mode [-].
 
     Higher modes, which are not modelled, would follow the acceleration without delay. Their rise is added to the rise
     of the last modelled mode along each axis, so that a surface in equilibrium is plane.
@@ -300,7 +310,10 @@ def modes_of(basin: Any, mesh: Any, density: float, gravity: float) -> list[Slos
 
 
 def hidden_body(mass: float, inertia: np.ndarray, joint: Joint, centre: np.ndarray) -> Body:
-    """Body that is not in the file; mass [kg], also negative, inertia : float64[3, 3] [kg m2], centre of mass [m]."""
+    """Body that is not in the file, with its mass [kg], which may be negative.
+
+    inertia : float64[3, 3] [kg m2], about the centre of mass; centre : centre of mass in the axes of the body [m]
+    """
     return Body.model_construct(
         mass=mass, inertia=tuple(map(tuple, inertia.tolist())), joint=joint, points={},
         centre_of_mass=tuple(np.asarray(centre).tolist()),

@@ -10,7 +10,11 @@ from fvsolve.errors import LONGEST_NAME
 
 
 def write(table: dict[str, Any]) -> str:
-    """TOML text of nested dicts. Tables at the first two levels have a header; deeper tables are written inline."""
+    """TOML text of nested dicts.
+
+    Tables of the first level, and of the second level in nodes, links, signals and scalars, have a header. All other
+    tables are written inline.
+    """
     lines = [f"{_key(key)} = {inline(value)}" for key, value in table.items() if not isinstance(value, dict)]
     for key, value in table.items():
         if isinstance(value, dict):

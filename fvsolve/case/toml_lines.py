@@ -15,7 +15,7 @@ _SPACE = re.compile(r"[ \t]*")
 
 
 def key_lines(text: str) -> dict[Path, int]:
-    """Line number (from 1) of every key path of a valid TOML text; items of lists count by index."""
+    """Line number (from 1) of every key path of a valid TOML text; the key of an item of a list is its index."""
     scan = _Scan(text)
     try:
         scan.document()
@@ -97,7 +97,7 @@ class _Scan:
             self.skip(_BARE)
 
     def inside(self, close: str, path: Path) -> None:
-        """Read the items of an inline table or list up to its closing bracket."""
+        """Read the items of an inline table or list at the key path `path`, up to its closing bracket `close`."""
         self.at += 1
         number = 0
         while True:

@@ -18,9 +18,9 @@ PRESENCE_KEYS = ("required_pressure",)  # keys whose presence alone changes the 
 
 
 def update_values(reader: Any) -> Case | None:
-    """Copy of the case `reader.before` with new numbers of parts; None if more may change, or for any fault.
+    """Copy of the case `reader.before` with new numbers of parts; None if more may change, or if there is a fault.
 
-    reader : reader of the new case. Names, types, connections, probes, claims and all other tables are kept.
+    reader : reader of the new case. Names, types, connections, probes, expectations and all other tables are kept.
     """
     before, raw = reader.before, reader.raw
     if (
@@ -60,9 +60,9 @@ def update_values(reader: Any) -> Case | None:
 
 
 def read_before(given: dict[str, Any], before: dict[str, Any], part: Any) -> dict[str, Any]:
-    """Table of a part in which unchanged raw schedules are replaced by the schedules read for the earlier case.
+    """Keys of a part (`given`) in which unchanged schedules are replaced by the schedules read for the earlier case.
 
-    given, before : raw tables of the part now and earlier; part : part as read earlier
+    given, before : keys of the part as in the file, now and earlier; part : part as read earlier
     """
     values = vars(part)
     same = {key: schedule for key, value in given.items() if isinstance(schedule := values.get(key), Schedule)
@@ -85,7 +85,10 @@ def is_self_contained(case: Case) -> bool:
 
 
 def is_number_key(raw: Any, keys: tuple) -> bool:
-    """True if the value at a key path is a number or a schedule of a part."""
+    """True if the value at a key path of a case is a number or a schedule of a part.
+
+    Keys in `PRESENCE_KEYS` are excluded. raw : case before its values are read (`Raw`)
+    """
     if len(keys) < 3 or keys[0] not in GROUPS or keys[2] in PRESENCE_KEYS:
         return False
     part = raw.get(keys[:2])

@@ -43,7 +43,10 @@ def notices(case: Any) -> list[Notice]:
 
 
 def _wave_speed(case: Any, name: str, link: Any) -> tuple[float, float, str] | None:
-    """Stated wave speed, wave speed of the wall [m/s] and message, if they contradict each other, else None."""
+    """Stated wave speed [m/s], wave speed from the wall [m/s] and message, as a tuple; None if they agree.
+
+    The result is also None if a pipe does not state both; see `wave_speed_mismatch`.
+    """
     if getattr(link, "wave_speed", None) is None or link.material is None:
         return None
     from fvsolve.case.wave_speed_check import wave_speed_mismatch  # late import: few pipes state both
@@ -52,7 +55,7 @@ def _wave_speed(case: Any, name: str, link: Any) -> tuple[float, float, str] | N
 
 
 def _of_part(part: Table, raw: Any) -> list[tuple[tuple[Any, ...], float, float, str]]:
-    """Result of `_of_table` for a part, cached while the part and its raw table are the same objects."""
+    """Result of `_of_table` for a part, cached while `part` and `raw` (its keys in the file) are the same objects."""
     known = CACHE.get(id(part))
     if known is None or known[0] is not part or known[1] is not raw:
         if len(CACHE) >= MAX_CACHED:
@@ -62,7 +65,10 @@ def _of_part(part: Table, raw: Any) -> list[tuple[tuple[Any, ...], float, float,
 
 
 def _of_table(table: Table, raw: Any) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
-    """Yield (key path, value [SI], limit [SI], message) for each unusual value of a table and of its inner tables."""
+    """Yield (key path, value [SI], limit [SI], message) for each unusual value of a table and of its inner tables.
+
+    raw : content of the table as in the file
+    """
     for name, info in type(table).model_fields.items():
         key, value = info.alias or name, getattr(table, name)
         given = _raw_value(raw, (key,))
@@ -78,7 +84,10 @@ def _of_table(table: Table, raw: Any) -> Iterator[tuple[tuple[Any, ...], float, 
 
 
 def _beyond(declared: Any, value: Any, given: Any) -> tuple[float, float, str] | None:
-    """First number outside the usual range, the limit that it exceeds [SI], and a message; None if all are inside."""
+    """First number of a key outside its usual range : (number [SI], end of the range [SI], message), else None.
+
+    declared : declaration of the key; value, given : its value as read and as in the file
+    """
     usual = getattr(declared, "usual", None)
     for x in _numbers(value) if usual else ():
         if x == 0.0 or usual.least <= x <= usual.greatest:

@@ -48,7 +48,7 @@ def chart(
         typer.Option(
             metavar="ERROR",
             help="greatest accepted error, as a fraction of a probe's range; prints the cheapest [numerics] for it "
-            "(default none, with --models 0.01)",
+            "(default none, or 0.01 with --models)",
         ),
     ] = None,
     models: Annotated[
@@ -99,7 +99,10 @@ def chart(
 
 
 def _refuse(**options) -> None:
-    """Raise FvsolveError that names the options without effect together with --models."""
+    """Raise FvsolveError if options are given that have no effect with --models.
+
+    options : name of an option -> its value, None if it is not given
+    """
     names = [f"--{name}" for name, value in options.items() if value is not None]
     if names:
         raise FvsolveError(
@@ -109,7 +112,10 @@ def _refuse(**options) -> None:
 
 
 def _numbers(name: str, text: str | None) -> list | None:
-    """Convert `50,100` to numbers; raises FvsolveError for a word that is not a positive number."""
+    """Numbers of a list such as `50,100`; None without a list.
+
+    name : name of the option that gives the list. Raises FvsolveError for a word that is not a positive number.
+    """
     numbers = []
     for word in comma_list(text) or ():
         try:
@@ -157,12 +163,15 @@ def _show(result, paths) -> None:
 
 
 def _ms(key: str) -> Callable[[Mapping], str]:
-    """Function that formats the seconds of a row in milliseconds."""
+    """Function that formats the time [s] in the column `key` of a row in milliseconds."""
     return lambda row: "-" if row[key] is None else f"{row[key] * 1e3:.3g}"
 
 
 def _times(row: Mapping) -> str:
-    """CPU time of the default setting divided by the CPU time of the cheapest setting, for the error of a row."""
+    """Text of the ratio of CPU times, default setting over cheapest setting, at the error of a row.
+
+    It is "-" if the default setting does not reach this error.
+    """
     default = row["default_seconds"]
     return "-" if default is None else f"{default / row['seconds']:.2g}"
 

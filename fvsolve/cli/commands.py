@@ -64,7 +64,11 @@ def run(
 
 
 def _run(model, place: Path, force: bool, resume: bool, threads: int, painter, quiet: bool, error: bool):
-    """Solve a case, print its results, then draw them."""
+    """Solve a case, print its results, then draw them.
+
+    place : run directory; painter : `PlotProcess`, or None for no pictures; quiet : True to print no results
+    error : True to estimate the errors of peaks; force, resume, threads : as for the command `run`
+    """
     from fvsolve.cli import printing
     from fvsolve.cli.progress import run_progress
     from fvsolve.run import draw, sink_of, solved
@@ -201,7 +205,7 @@ def view(
     field: Annotated[
         str | None,
         typer.Option(
-            help="quantity to draw: pressure, head, flow, ... (default pressure; without pipes another field)"
+            help="quantity to draw: pressure, head, flow, ... (default pressure, or another field without pipes)"
         ),
     ] = None,
     contours: Annotated[int, typer.Option(metavar="N", min=0, max=100, help="number of contour lines")] = 0,
@@ -210,7 +214,7 @@ def view(
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="picture file (default RUN/view-FIELD.png)")] = None,
 ) -> None:
-    """Draw a quantity in all parts at one time, or an animation of all stored times, into a file with PyVista."""
+    """Draw a quantity in all parts at one time, or an animation of all stored times, into a file."""
     from fvsolve.run import open_run
     from fvsolve.units import parse
 

@@ -90,7 +90,10 @@ def energy(
 
 
 def refuse_without_case(options: dict) -> None:
-    """Raise FvsolveError for options that need a run if there is no case."""
+    """Raise FvsolveError if options are given that need a case, for a command without a case.
+
+    options : name of an option -> its value
+    """
     given = [name for name, value in options.items() if value]
     if given:
         raise FvsolveError(f"{', '.join(given)}: valid only with a case. Expected fvsolve energy CASE {given[0]} ...; "
@@ -99,7 +102,7 @@ def refuse_without_case(options: dict) -> None:
 
 @contextmanager
 def interrupt_message(words: str) -> Iterator[None]:
-    """Context manager: at Ctrl-C print `words` and exit with code 130."""
+    """Context manager that, at Ctrl-C, prints `words` and exits with code 130."""
     try:
         yield
     except KeyboardInterrupt:
@@ -108,7 +111,10 @@ def interrupt_message(words: str) -> Iterator[None]:
 
 
 def ledger(case, port, out, as_json: bool) -> None:
-    """Run a case, write its energy ledger and picture, and print them with the passivity verdict at the port."""
+    """Run a case, write its energy balance and a picture, and print the balance with the passivity verdict at a port.
+
+    port : name of the port, or None; out : folder of the files, or None
+    """
     from fvsolve.cli.progress import run_progress
     from fvsolve.draw.energy_picture import energy_figure
     from fvsolve.output.unit_columns import column, time_column
@@ -157,7 +163,7 @@ def _ledger(result, case, folder) -> None:
     line(terminal, "")
     text, left = f"remainder {case.amount(result.remainder[-1], 'energy')}", result.newton_counts
     if left:
-        text += f"; of it Newton residuals cause {case.amount(result.newton[-1], 'energy')}; the rest is"
+        text += f", of which Newton residuals cause {case.amount(result.newton[-1], 'energy')}; the rest is"
     passed = case.amount(result.throughput, "energy", 6)
     line(
         terminal,
@@ -175,7 +181,10 @@ def _ledger(result, case, folder) -> None:
 
 
 def compare_pairs(case, schemes, methods, port, out, as_json: bool) -> None:
-    """Run a case with several schemes and methods, and print the energy that each pair creates."""
+    """Run a case with several schemes and methods, and print the energy that each pair of them creates.
+
+    port : name of a port, or None; out : folder of the files, or None
+    """
     from fvsolve.cli.progress import interruptible
     from fvsolve.cli.terminal import console, line, print_sheet
     from fvsolve.studies.energy.energy_of_pairs import PAIR_COLUMNS, measure_pairs
@@ -212,7 +221,10 @@ def _in_unit(heading: Column, case) -> Column:
 
 
 def _print_outcome(case, rows, terminal) -> list[dict]:
-    """Print the pairs that create energy, and the refused pairs with reason and remedy; returns the refused pairs."""
+    """Print the pairs of scheme and method that create energy, and the refused pairs with reason and remedy.
+
+    Returns the rows of the refused pairs.
+    """
     from fvsolve.cli.terminal import line
 
     refused = [row for row in rows if row["reason"].startswith("refused")]
@@ -229,7 +241,7 @@ def _print_outcome(case, rows, terminal) -> list[dict]:
         )
     bad = [_pair(row) for row in ran if row["creates"]]
     if bad:
-        line(terminal, f"create energy in this run: {', '.join(bad)}")
+        line(terminal, f"pairs that create energy in this run: {', '.join(bad)}")
     elif ran:
         line(terminal, f"none of {'the pairs that ran' if refused else 'the pairs'} creates energy in this run")
     else:
@@ -238,7 +250,10 @@ def _print_outcome(case, rows, terminal) -> list[dict]:
 
 
 def _by_reason(rows) -> dict[str, list[str]]:
-    """Group pairs by the reason of their refusal; a reason common to several methods appears once."""
+    """Names of the refused pairs of scheme and method, by the reason : reason -> names.
+
+    A reason that is the same for several methods appears once.
+    """
     groups: dict[str, list] = {}
     for row in rows:
         groups.setdefault(row["reason"].replace(f'method "{row["method"]}"', "each"), []).append(row)

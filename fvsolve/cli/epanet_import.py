@@ -20,7 +20,8 @@ SHORT = 'shorter than a cell: with pipe_model = "finite-volume" use --min-pipe-l
 def import_(
     source: Annotated[Path, typer.Argument(metavar="FILE", help="EPANET network to import, for example town.inp")],
     case: Annotated[
-        Path | None, typer.Argument(metavar="CASE", help="case file to write, or its folder (default FILE as .toml)")
+        Path | None,
+        typer.Argument(metavar="CASE", help="case file to write, or its folder (default FILE with the ending .toml)"),
     ] = None,
     hour: Annotated[float, typer.Option(metavar="H", help="hour of the EPANET run that gives the initial state")] = 0.0,
     wave_speed: Annotated[str, typer.Option(metavar="A", help="wave speed of all pipes")] = "1200 m/s",
@@ -56,7 +57,7 @@ def import_(
 
 
 def _positive(option: str, text: str, dimension: str) -> float:
-    """Value of an option in SI. Raises FvsolveError if it is not positive."""
+    """Value [SI] of an option from its text; raises FvsolveError if it is not positive."""
     from fvsolve.units import parse
 
     try:

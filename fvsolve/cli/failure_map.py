@@ -161,7 +161,10 @@ def _show(result, files: list[Path], head: str) -> None:
 
 
 def _by_courant(result) -> bool:
-    """True if columns are labelled with Courant numbers: columns are steps, all of Courant number 0.01 or more."""
+    """True if the columns of a failure map have Courant numbers as labels.
+
+    They do if the columns are time steps that all have a Courant number of 0.01 or more.
+    """
     return result.key == "step" and bool(result.wave_rate) and min(result.values) * result.wave_rate >= 0.01
 
 

@@ -23,7 +23,7 @@ BeforeJump = Annotated[
 
 
 def time_of(text: str | None) -> float | None:
-    """Parse a time in the format of a case file [s]. Raises FvsolveError if the text is not a time."""
+    """Time [s] from a text in the format of a case file; None for None. Raises FvsolveError for any other text."""
     from fvsolve import units
     from fvsolve.cli.app import value_of
     from fvsolve.errors import FvsolveError

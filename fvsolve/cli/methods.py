@@ -22,7 +22,10 @@ MAX_COEFFICIENT = 40  # greatest length of a coefficient of R that is printed ex
 
 @dataclass(frozen=True)
 class MethodOutput:
-    """Output in two forms: plain values for JSON, and a function that prints text."""
+    """Output of `fvsolve methods` in two forms.
+
+    plain : values for JSON; show : function that prints text
+    """
 
     plain: dict
     show: Callable[[], None]
@@ -73,7 +76,7 @@ def _table(all_facts: dict[str, Facts]) -> None:
     )
     terminal.line(
         console,
-        "greatest stable |h lambda| on the axis; SSP: greatest step in steps of Euler; "
+        "greatest stable |h lambda| on the axis; SSP: SSP radius, in Euler steps; "
         "Padé: degrees of numerator and denominator of R",
     )
 
@@ -118,7 +121,7 @@ def _interval_text(value: float, before: str, after: str) -> str:
 
 
 def _tableau_lines(method: Method) -> list[str]:
-    """Lines of the tableau in the notation of its source, in aligned columns; long decimals are cut."""
+    """Lines of the tableau of a method in the notation of its source, in aligned columns; long decimals are cut off."""
     rows, width = [], method.stages
     for text in method.text.strip().splitlines():
         left, bar, right = text.partition("|")
@@ -136,7 +139,10 @@ def _tableau_lines(method: Method) -> list[str]:
 
 
 def _entry_notes(method: Method) -> list[str]:
-    """Notes on the tableau: values of its algebraic numbers, and the weight of f(t, y) in the embedded solution."""
+    """Notes on the tableau of a method.
+
+    They give the values of its algebraic numbers, and the weight of f(t, y) in the embedded solution.
+    """
     notes = [f"{name} = {near:.10g}, a root of {polynomial}" for name, (polynomial, near) in method.numbers.items()]
     if method.start_weight is not None:
         notes.append(f"embedded solution: f(t, y) has weight {method.start_weight}; other weights follow by quadrature")

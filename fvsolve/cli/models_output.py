@@ -14,7 +14,10 @@ TABLE = (
 
 
 def show_models(case, target: float, as_json: bool) -> None:
-    """Run the model hierarchy of a case and print error and cost of each model, and the cheapest within the target."""
+    """Run the model hierarchy of a case and print the error and cost of each model.
+
+    The cheapest model with an error of at most `target` is printed too.
+    """
     from fvsolve.studies import ladder
 
     with progress_line(resumable=False) as progress:
@@ -32,7 +35,8 @@ def show_models(case, target: float, as_json: bool) -> None:
     richest, cheapest = hierarchy.richest, hierarchy.cheapest
     terminal.line(
         console,
-        "error: root mean square over time of the worst probe (of), over its range; greatest: maximum over time;",
+        "error: root mean square over time of the worst probe (column of), over its range; "
+        "greatest: maximum over time;",
     )
     terminal.line(console, f"reference for both: {richest.name}, {richest.law}")
     for reason in dict.fromkeys(level.reason for level in hierarchy.rungs if level.error is None):

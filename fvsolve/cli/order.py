@@ -35,7 +35,8 @@ def order(
     refine: Annotated[
         str | None,
         typer.Option(
-            help="resolution to refine: both (cells and time steps), space or time (default both, time without cells)"
+            help="resolution to refine: both (cells and time steps), space or time "
+            "(default both, or time without cells)"
         ),
     ] = None,
     key: Annotated[
@@ -43,7 +44,7 @@ def order(
         typer.Option(metavar="KEY", help="single key to refine, instead of --refine, for example links.main.cells"),
     ] = None,
     levels: Annotated[
-        int | None, typer.Option(help="number of refinement levels (default 4, with --refine time 6)")
+        int | None, typer.Option(help="number of refinement levels (default 4, or 6 with --refine time)")
     ] = None,
     cells: Annotated[
         int | None,
@@ -99,7 +100,7 @@ def order(
 
 
 def draw(folder: Path, studies) -> list[Path]:
-    """Write a picture of every study; returns the paths."""
+    """Write a picture of every order study into a folder; returns the paths."""
     files = []
     for result in studies:
         name = "order.png" if len(studies) == 1 else f"order-{result.scheme}-{result.method}.png"
@@ -141,7 +142,7 @@ def print_study(result) -> None:
 
 
 def rows_of(result, variable: str) -> ResultTable:
-    """Table of a variable: errors and pairwise orders of all levels."""
+    """Table of a variable of an order study: errors and pairwise orders of all levels."""
     fits, rows, size = result.fits[variable], [], result.error_unit(variable)[0]
     for k, row in enumerate(result.rows):
         step = f"rtol {row.level.size:g}" if result.plan.measure == "rtol" else row.level.step
@@ -156,7 +157,7 @@ def rows_of(result, variable: str) -> ResultTable:
 
 
 def fit_rows(result) -> list[list[str]]:
-    """Fitted orders of all variables, in L1, L2 and max norm."""
+    """Rows of the table of fitted orders: one for each variable, with its orders in the L1, L2 and max norm."""
     return [[f"{name}", *(fit_text(fits[norm]) for norm in NORMS)] for name, fits in result.fits.items()]
 
 
@@ -170,7 +171,7 @@ def fit_text(fit) -> str:
 
 
 def reason_lines(result):
-    """Reasons for missing orders and notes on orders, for the variables on the terminal."""
+    """Lines with reasons for missing orders and notes on orders, of the variables that are printed."""
     from fvsolve.studies.accuracy.fit import NO_ERROR
 
     for name in result.variables[:SHOWN_VARIABLES]:

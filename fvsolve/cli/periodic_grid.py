@@ -37,9 +37,9 @@ def without_case(
 ) -> None:  # fmt: skip
     """Print Courant limits of schemes and methods (names separated by commas; default all, without limited schemes).
 
-    With `cells` or `steps`, limits of explicit methods are also measured by runs on a periodic pipe; limits of limited
-    schemes always are. `courant` : Courant number at which the growth of waves is printed. CSV files are written into
-    the folder `out`, if given. Raises FvsolveError for unknown names.
+    With `cells` or `steps`, limits of explicit methods are also measured by runs on a periodic pipe. Limits of limited
+    schemes are always measured. courant : Courant number at which the growth of waves is printed
+    out : folder for CSV files, or None. Raises FvsolveError for unknown names.
     """
     named, methods = comma_list(scheme, "--scheme") or None, method_names(method) or None
     linear = None if named is None else [name for name in named if name not in LIMITED]
@@ -67,7 +67,11 @@ def without_case(
 
 
 def _measure(named, linear, methods, cells: int | None, steps: int | None) -> tuple[list, list]:
-    """Two lists of limits measured by runs: of linear schemes (if `cells` or `steps` is given), of limited schemes."""
+    """Limits measured by runs, as two lists: of linear schemes, and of limited schemes.
+
+    named : names of all given schemes, or None; linear : the linear schemes among them, or None for all linear schemes
+    methods : names of methods. Linear schemes are measured only if `cells` or `steps` is given.
+    """
     limited = [name for name in named or () if name in LIMITED]
     given = {name: n for name, n in (("cells", cells), ("steps", steps)) if n is not None}
     with progress_line() as progress:
@@ -85,13 +89,13 @@ def _table_of_runs(runs: list[MeasuredLimit]) -> None:
 
 
 def _show_limited(limited: LimitedLimit) -> None:
-    """Print the result for one limited scheme and method."""
+    """Print the limits of one limited scheme with one method, with frozen weights and from runs."""
     console, name = terminal.console(), f"{limited.scheme} ({limited.limiter})" if limited.limiter else limited.scheme
     terminal.line(console, f"{name} with {limited.method}: {LIMIT_EXPLANATIONS[limited.sharp]}", "bold")
     frozen = ", ".join(f"{branch} {_limit(limit.limit)}" for branch, limit in limited.frozen.items())
     terminal.line(console, f"  limits with frozen weights: {frozen}")
     if limited.monotone is not None:
-        terminal.line(console, f"  total variation cannot grow up to {limited.monotone:.6g}")
+        terminal.line(console, f"  total variation cannot grow up to Courant number {limited.monotone:.6g}")
     terminal.line(
         console, f"  least Courant number that failed on {limited.cells} cells, in runs of the limited scheme:"
     )
@@ -103,7 +107,7 @@ def _show_limited(limited: LimitedLimit) -> None:
 
 
 def _show(limit: AdvectionLimit) -> None:
-    """Print the limit of one scheme and method in sentences."""
+    """Print the Courant limit of one scheme with one method in sentences."""
     console = terminal.console()
     terminal.line(console, f"{limit.scheme} with {limit.method}: {_limit_in_words(limit)}", "bold")
     for words in _sentences(limit):
@@ -118,7 +122,7 @@ def _limit_in_words(limit: AdvectionLimit) -> str:
     if math.isinf(limit.limit):
         return "stable at every Courant number"
     if limit.limit == 0.0:
-        return f"no limit, a wave grows at every {'small ' if limit.stable else ''}step"
+        return f"unstable, a wave grows at every {'small ' if limit.stable else ''}step"
     return f"stable up to Courant number {limit.limit:.10g}"
 
 
@@ -150,7 +154,10 @@ def _growth(growth: float) -> str:
 
 
 def _table(limits: list[AdvectionLimit]) -> None:
-    """Print a table, methods down and schemes across; methods stable with all schemes share one line."""
+    """Print a table of Courant limits with a row for each method and a column for each scheme.
+
+    Methods that are stable with all schemes share one line.
+    """
     console, rows, free = terminal.console(), {}, []
     for limit in limits:
         rows.setdefault(limit.method, {})[limit.scheme] = limit

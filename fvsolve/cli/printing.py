@@ -50,7 +50,10 @@ REASONS_SHOWN = 10  # summary.json has all
 
 
 def print_result(run) -> None:
-    """Print extremes of every probe, marks, events, ledgers, expectations, limits, comparisons, notices and steps."""
+    """Print the results of a run: extremes, marks, cavities, events, ledgers, verdicts, comparisons, notices and steps.
+
+    At most ROWS probes, EVENTS_SHOWN events and REASONS_SHOWN reasons of errors are printed.
+    """
     summary, time_text = run.summary, time_formatter(run.summary)
     console = _console()
     if summary["title"]:
@@ -82,14 +85,14 @@ def print_result(run) -> None:
 
 
 def time_column(summary: dict):
-    """Column of times in the unit of a run."""
+    """Column of times in the time unit of a run, from its summary."""
     from fvsolve.output.unit_columns import UnitColumn
 
     return UnitColumn("t", "time", summary["time_unit"])
 
 
 def time_formatter(summary: dict) -> Callable[[float], str]:
-    """Function that formats a time [s] in the unit of a run."""
+    """Function that formats a time [s] in the time unit of a run, from its summary."""
     clock = time_column(summary)
     return lambda t: f"{_number(float(clock.from_si(t)))} {clock.unit}"
 
@@ -112,7 +115,8 @@ def exit_code(run) -> int:
 def print_checks(case, facts: dict, every: bool = False) -> None:
     """Print fluid, parts and basins at the start, moving parts, notices, the step and its cost.
 
-    every : print all rows; otherwise only notable rows of long tables
+    facts : contents of the case, as `Model.checks`
+    every : True for all rows, otherwise only notable rows of long tables
     """
     console = _console()
     _line(console, case.title or case.name, "bold")
@@ -149,7 +153,11 @@ def print_checks(case, facts: dict, every: bool = False) -> None:
 
 
 def _print_rows(console, case, word: str, parts: dict, keys: dict) -> None:
-    """Print a table of basins or patches in the units of `[output]`, if there are any."""
+    """Print a table of basins or patches in the units of `[output]`, if there are any.
+
+    word : header of the column of names; parts : name -> key -> value [SI]
+    keys : key of a column -> (its title, its dimension or "")
+    """
     from fvsolve.output.unit_columns import column
 
     columns = [column(title, dimension, case) if dimension else None for title, dimension in keys.values()]
@@ -162,7 +170,10 @@ def _print_rows(console, case, word: str, parts: dict, keys: dict) -> None:
 
 
 def _wall_lines(case, pipes: dict) -> list[str]:
-    """Lines on pipe walls and the sources of their data; pipes with the same text share a line."""
+    """Lines on pipe walls and the sources of their data; pipes with the same text share a line.
+
+    pipes : name -> values, as in `Model.checks`
+    """
     alike: dict[str, list[str]] = {}
     for name, pipe in pipes.items():
         if text := _wall_text(case, pipe):
@@ -191,18 +202,23 @@ def _wall_text(case, pipe: dict) -> str:
 
 
 def _thread_text(facts: dict) -> str:
-    """Text on threads: rows of basins that threads share, or the reason for a single thread."""
+    """Text on threads: rows of basins that threads share, or the reason for a single thread.
+
+    facts : result of `divisible_rows`
+    """
     if facts["why"]:
         return f"threads: 1; {facts['why']}"
     rows = ", ".join(f"{count} rows of {name}" for name, count in facts["rows"].items())
     undivided = "; ".join(f"{name}: {reason}" for name, reason in facts["whole"].items())
-    return f"threads: up to {facts['most']} share {rows}" + (f"; each computes all of {undivided}" if undivided else "")
+    whole = f"; each thread computes all of {undivided}" if undivided else ""
+    return f"threads: up to {facts['most']} share {rows}{whole}"
 
 
 def _print_states(console, case, word: str, parts: dict, keys: dict, every: bool, odd: set[str]) -> None:
     """Print a table of parts at the start in the units of `[output]`; of a long table only notable rows.
 
-    odd : names of parts with notices, which are notable
+    every : True for all rows; odd : names of parts with notices, which are notable
+    Other arguments as for `_print_rows`.
     """
     from fvsolve.output.unit_columns import column
 
@@ -220,7 +236,10 @@ def _print_states(console, case, word: str, parts: dict, keys: dict, every: bool
 
 
 def _notable_rows(parts: dict, keys: dict, odd: set[str]) -> list[str]:
-    """Names of parts with the least or greatest value of a column, and of parts in `odd`, in the original order."""
+    """Names of parts with the least or greatest value of a column, and of parts in `odd`, in the original order.
+
+    parts, keys : as for `_print_rows`
+    """
     chosen = set(sorted(odd)[:MANY_ROWS])
     for key in keys:
         names = [name for name, part in parts.items() if part[key] is not None]
@@ -254,7 +273,7 @@ def _in_unit(column, value):
 
 
 def _print_first(console, lines: list[str], every: bool) -> None:
-    """Print lines; of many lines only the first ones, unless `every`."""
+    """Print lines; every : True for all lines, False for only the first of many."""
     count = len(lines) if every or len(lines) <= EVENTS_SHOWN + 2 else EVENTS_SHOWN
     for text in lines[:count]:
         _line(console, text)
@@ -263,7 +282,10 @@ def _print_first(console, lines: list[str], every: bool) -> None:
 
 
 def _print_notices(console, warnings: list[dict], every: bool = False) -> None:
-    """Print all notices of wrong results in bold red, then the other notices, of many only the first ones."""
+    """Print all notices of wrong results in bold red, then the other notices.
+
+    every : True for all other notices, False for only the first of many
+    """
     for notice in warnings:
         if not notice["ok"]:
             _line(console, f"note: {notice['text']}", "bold red")
@@ -346,7 +368,10 @@ def _error_text(peak: dict) -> str:
 
 
 def where_and_when(verdict: dict, summary: dict) -> str:
-    """Place, chainage and time at which a quantity is nearest to its limit, in the units of a run's summary."""
+    """Place, chainage and time at which a quantity is nearest to its limit, as text in the units of a run.
+
+    verdict : verdict on the limit; summary : summary of the run
+    """
     from fvsolve.output.unit_columns import UnitColumn
 
     along = UnitColumn("chainage", "length", summary["envelope_units"]["distance"])
@@ -379,7 +404,7 @@ def _limit_text(verdict: dict, summary: dict) -> str:
     if verdict["error"] is not None and verdict["margin"] is not None:
         text += f" within {verdict['error']:.2g}"
     if verdict["time"] is not None and verdict["until"] > 0.0 and verdict["time"] >= verdict["until"] * (1.0 - 1e-9):
-        text += ", at the end of the run: a later end may be worse"
+        text += ", at the end of the run: a longer run may reach a worse value"
     return text
 
 
@@ -394,6 +419,7 @@ def mark_lines(marks: list[dict], time_text) -> list[str]:
     """Lines on marks (first occurrences of events outside the model's validity), sorted by time.
 
     Marks with the same text share a line, which names the first `PLACES_SHOWN` places.
+    time_text : function that formats a time [s]
     """
     alike: dict[str, list[dict]] = {}
     for mark in sorted(marks, key=lambda mark: mark["time"]):

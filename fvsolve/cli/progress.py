@@ -13,7 +13,7 @@ from fvsolve.errors import visible
 
 @contextmanager
 def run_progress(case) -> Iterator[Callable[[float, float, int], None]]:
-    """Context manager that yields a `progress` function for a run: it draws a bar and ends the run at Ctrl-C.
+    """Context manager that yields a `progress` function for a run, which draws a bar and ends the run at Ctrl-C.
 
     The first Ctrl-C ends the run after a complete step; the second interrupts it at once.
     """
@@ -63,7 +63,10 @@ def _no_bar() -> Iterator[None]:
 
 @contextmanager
 def progress_bar(label: str) -> Iterator[Callable[[int, int, str], None]]:
-    """Context manager that yields `progress(done, total, next)`: a bar on a terminal, otherwise lines at intervals."""
+    """Context manager that yields `progress(done, total, next)`: a bar on a terminal, otherwise lines at intervals.
+
+    label : text before the bar; next : text on the next item
+    """
     if not sys.stderr.isatty():
         from fvsolve.cli.study_options import progress_line
 

@@ -59,7 +59,7 @@ def fatigue(
         float | None, typer.Option(metavar="R", help="pressure range of the fatigue strength, in the unit of the probe")
     ] = None,
     allowable_range: Annotated[
-        float | None, typer.Option(metavar="N", help="number of cycles of the range --range until failure")
+        float | None, typer.Option(metavar="N", help="number of cycles until failure at the range --range")
     ] = None,
     slope: Annotated[
         float | None,

@@ -65,7 +65,7 @@ def si_unit(result) -> str:
 
 
 def output_unit(case, result) -> tuple[float, str]:
-    """Factor from SI to the unit of the transfer function H, and that unit, by the units of `[output]`."""
+    """Unit of the transfer function H by the units of `[output]` : (factor from SI to this unit, name of the unit)."""
     flow, pressure = column("", "flow", case), column("", "pressure", case)
     if flow.plain and pressure.plain:
         return 1.0, si_unit(result)

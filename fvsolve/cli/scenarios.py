@@ -84,14 +84,17 @@ def _show(result) -> None:
 
 
 def verdicts_of(row: dict) -> list:
-    """Limit verdicts of a run."""
+    """Verdicts on the limits of a run, from its row in a study, as `LimitVerdict`."""
     from fvsolve.run.result import LimitVerdict
 
     return [LimitVerdict(**verdict) for verdict in row["verdicts"]]
 
 
 def standing(row: dict) -> str:
-    """Status of a run in a word: "FAILS" if it or a limit fails, else "open" or "holds"; "-" without limits."""
+    """Status of a run in a word, from its row in a study.
+
+    It is "FAILS" if the run or a limit fails, else "open" or "holds"; "-" for a good run without limits.
+    """
     from fvsolve.run.result import FAILS, HOLDS, IN_WORDS, OPEN
 
     states = [FAILS] * (not row["ok"]) + [entry.state for entry in verdicts_of(row)]

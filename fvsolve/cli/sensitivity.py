@@ -19,7 +19,11 @@ def sensitivity(
         str, typer.Option(metavar="max(PROBE)", help="outcome to analyse: min, max or final of a probe")
     ],
     samples: Annotated[
-        int, typer.Option(metavar="N", help="base sample size, a power of two, for about N (number of keys + 2) runs")
+        int,
+        typer.Option(
+            metavar="N",
+            help="base sample size, a power of two; the number of runs is about N times (number of keys + 2)",
+        ),
     ] = 64,
     seed: Seed = 0,
     jobs: Jobs = 1,
@@ -80,7 +84,7 @@ def calibrate(
 
 
 def difference_text(case, probe, value: float) -> str:
-    """Text of a difference of a probe [SI], in the unit of the probe's record."""
+    """Text of a difference `value` [SI] of a probe, in the output unit of the probe."""
     from fvsolve.output.unit_columns import column
 
     unit_column = column(probe.text, probe.dimension, case, probe.unit)
@@ -88,7 +92,7 @@ def difference_text(case, probe, value: float) -> str:
 
 
 def print_table(result, text: str, units: dict[str, str] = {}) -> None:  # noqa: B006
-    """Print a table of keys and a line below it; `units` maps a key to its heading with unit."""
+    """Print a table of keys, with a line of text below it; units : key -> its heading with unit."""
     from fvsolve.cli import terminal
 
     console, (heads, rows) = terminal.console(), result.sheet.words()

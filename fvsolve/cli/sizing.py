@@ -91,7 +91,7 @@ def _show(result) -> None:
 
 
 def _no_value_text(result) -> str:
-    """Text for a failed search: the nearest value, its margin, and the direction in which to search."""
+    """Text for a size search without result: the nearest value, its margin, and the direction in which to search."""
     nearest, values = result.nearest, sorted(run.value for run in result.runs)
     unit = f" {result.unit}" if result.unit else ""
     text = (f"none of the values tried between {values[0]:.6g} and {values[-1]:.6g}{unit} holds all limits; "

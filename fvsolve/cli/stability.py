@@ -95,7 +95,10 @@ def stability(
 
 
 def refuse_options(case: str | None, of_a_case: dict, of_a_grid: dict) -> None:
-    """Raise FvsolveError for given options without effect: `of_a_case` need a case, `of_a_grid` need no case."""
+    """Raise FvsolveError if options are given that have no effect.
+
+    of_a_case, of_a_grid : name -> value, of options that apply only with a case, and only without a case
+    """
     from fvsolve.errors import FvsolveError
 
     useless = [name for name, value in (of_a_grid if case else of_a_case).items() if value not in (None, False, [])]
@@ -154,7 +157,10 @@ def print_stability(result, folder: Path, files: list[str]) -> None:
 
 
 def terminal_columns(cells: bool) -> list[Column]:
-    """Columns on the terminal. With cells, steps are also given as Courant numbers, and bounds only as these."""
+    """Columns of the printed table of stable steps.
+
+    cells : True if the case has cells: steps are then also given as Courant numbers, and bounds only as Courant numbers
+    """
     heads = {"scheme": "scheme", "method": "method"}
     for quantity in ("predicted", "measured"):
         heads |= {quantity: f"{quantity} [s]", f"{quantity}_courant": "Courant"}
@@ -167,8 +173,10 @@ def terminal_columns(cells: bool) -> list[Column]:
 
 
 def table_lines(row) -> list[dict]:
-    """Lines of the printed table for one pair of scheme and method; a limited scheme has a further line for each of its
-    linear schemes with frozen weights."""
+    """Lines of the printed table of stable steps for one pair of scheme and method.
+
+    A limited scheme has a further line for each of its linear schemes with frozen weights.
+    """
     from fvsolve.studies.stability.stability_row import json_number
 
     frozen_lines = [{"scheme": f"{row.scheme}: {name}", "method": row.method, "predicted": json_number(h),

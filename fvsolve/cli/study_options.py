@@ -33,7 +33,10 @@ Seed = Annotated[int, typer.Option(metavar="N", help="seed of the random samples
 
 
 def comma_list(text: str | None, option: str = "") -> list[str] | None:
-    """Split `a,b,c` into words without duplicates; None for None. Raises FvsolveError for a list without words."""
+    """Words of a list `a,b,c`, without duplicates; None for None. Raises FvsolveError for a list without words.
+
+    option : name of the option, for the message
+    """
     if text is None:
         return None
     words = list(dict.fromkeys(word.strip() for word in text.split(",") if word.strip()))
@@ -43,7 +46,10 @@ def comma_list(text: str | None, option: str = "") -> list[str] | None:
 
 
 def method_names(text: str | None) -> list[str] | None:
-    """Method names of `--method A,B`. A word that is the path of a file registers the tableau in this file."""
+    """Names of the methods in a list `A,B`; None for None.
+
+    A word may also be the path of a tableau file, see `method_name`.
+    """
     names = comma_list(text, "--method")
     return None if names is None else [method_name(name) for name in names]
 
@@ -57,18 +63,18 @@ def method_name(word: str) -> str:
 
 
 def folder_of(case, study: str, out: Path | None) -> Path:
-    """Create and return the folder of the files of a study: `out`, by default runs/NAME.STUDY."""
+    """Create and return the folder for the files of a study: `out`, or runs/NAME.STUDY if `out` is None."""
     return writable_folder(out or Path("runs") / f"{case.name}.{study}")
 
 
 def warn_replaced(folder: Path, name: str) -> None:
-    """Print a notice that an earlier result is replaced, if the folder has its file `name`."""
+    """Print a notice that an earlier result will be replaced, if the folder contains the file `name`."""
     if (folder / name).exists():
         print(f"{folder}: the results of an earlier command are replaced; to keep them, use --out DIR", file=sys.stderr)
 
 
 def clear_files(folder: Path, *patterns: str) -> Path:
-    """Delete files of an earlier command (glob patterns) from the folder, and return the folder."""
+    """Delete the files of an earlier command that match glob patterns from the folder, and return the folder."""
     for path in [file for pattern in patterns for file in folder.glob(pattern)]:
         path.unlink()
     return folder
@@ -79,9 +85,10 @@ def writable_folder(folder: Path) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise FvsolveError(f"{folder}: cannot be written: {error.strerror or error}. Use another --out") from None
+        text = f"{folder}: cannot be written: {error.strerror or error}"
+        raise FvsolveError(f"{text}. Use another directory with --out DIR") from None
     if not os.access(folder, os.W_OK):
-        raise FvsolveError(f"{folder}: cannot be written: permission denied. Use another --out")
+        raise FvsolveError(f"{folder}: cannot be written: permission denied. Use another directory with --out DIR")
     return folder
 
 
@@ -90,7 +97,7 @@ def progress_line(resumable: bool = True) -> Iterator[Callable[[int, int, str], 
     """Context manager that yields `progress(done, total, label)`; label : text on the next run.
 
     On a terminal it rewrites one line; otherwise it prints a line every `PROGRESS_INTERVAL`. Ctrl-C ends the command
-    with exit code 130, and a message on what is kept.
+    with exit code 130, and with a message that states whether finished runs are kept.
     resumable : True if finished runs are on disk and the same command continues from there
     """
     is_terminal, counts, text, finished = sys.stderr.isatty(), [0, 0], [""], threading.Event()

@@ -76,7 +76,10 @@ def sweep(
 
 
 def ranges(texts: list[str], option: str) -> dict[str, list]:
-    """Parse `KEY=LOW,HIGH` texts: key -> [low, high]. Raises FvsolveError for a key that is given twice."""
+    """Ranges of keys from texts `KEY=LOW,HIGH` : key -> [low, high]. Raises FvsolveError for a key that is given twice.
+
+    option : name of the option, for the message
+    """
     pairs = [key_and_values(text, option, RANGE_FORMAT) for text in texts]
     duplicates = [key for key, _ in pairs if [name for name, _ in pairs].count(key) > 1]
     if duplicates:
@@ -106,7 +109,10 @@ def write_charts(result, outcomes: list[str], folder: Path, heads: dict[str, str
 
 
 def key_and_values(text: str, option: str = "--set", expected: str = VALUES_FORMAT) -> tuple[str, list]:
-    """Parse `KEY=a,b,c` into the key and its values. Raises FvsolveError for any other text."""
+    """Key and list of values from a text `KEY=a,b,c`. Raises FvsolveError for any other text.
+
+    option, expected : name of the option and valid form of the text, for the message
+    """
     key, equals, listed = text.partition("=")
     if not (equals and key.strip() and listed.strip()):
         raise FvsolveError(f"{option} {text}: expected {expected}")

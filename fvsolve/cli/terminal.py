@@ -36,7 +36,7 @@ def table(headers: list[str], rows: list[list[str]], output=None) -> None:
 
 
 def print_sheet(table_data, output=None) -> None:
-    """Print a `ResultTable`, values formatted as its columns state."""
+    """Print a `ResultTable`; its columns state the formats of the values."""
     table(*table_data.words(), output)
 
 

@@ -9,7 +9,7 @@ FRAME_TIME = 100  # duration of a frame [ms]
 
 
 def write_animation(stage: Any, count: int, out: Path) -> None:
-    """Write a single frame as a picture, several frames as .gif or .mp4.
+    """Write a single frame as a picture, several frames as an animation (.gif or .mp4), to the file `out`.
 
     stage : object whose `show(k)` draws frame k on its `sheet`; count : number of frames
     """

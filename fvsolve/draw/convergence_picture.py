@@ -16,9 +16,9 @@ MARKERS = {"": "o", "pre-asymptotic": "^", "floor": "v", "reference": "X", "off 
 def order_figure(sizes: Sequence[float], curves: Mapping, measure: str, title: str = ""):
     """Figure of errors over cell sizes or time steps, with a panel for each variable.
 
-    curves : variable -> norm -> (errors : float64[sizes], fit); measure : label of the sizes
-    A fit has `order`, `constant` and `marks`, the mark of each size. Sizes without a mark (solid markers) are fitted;
-    open markers are not. The line is the fitted slope, with its order in the legend.
+    curves : variable -> norm -> (errors : float64[sizes], fit); measure : label of the axis of sizes
+    A fit has `order`, `constant` and `marks`, a text for each size. Sizes with an empty mark are fitted and have solid
+    markers; other sizes have open markers. The line is the fitted slope, with its order in the legend.
     """
     names = [name for name in curves if any(np.any(np.asarray(e) > 0.0) for e, _ in curves[name].values())]
     columns = min(2, max(1, len(names)))
@@ -44,7 +44,7 @@ def wrap_text(text: str, width: int) -> str:
 
 
 def panel(axes, sizes, norms: Mapping, name: str) -> None:
-    """Draw the errors and fitted lines of the variable `name`. norms : norm -> (errors, fit), see `order_figure`"""
+    """Draw the errors and fitted lines of the variable `name`; norms : norm -> (errors, fit), see `order_figure`."""
     axes.set_xscale("log")
     axes.set_yscale("log")
     for colour, (norm, (errors, fit)) in zip(style.COLOURS, norms.items(), strict=False):
@@ -67,7 +67,10 @@ def panel(axes, sizes, norms: Mapping, name: str) -> None:
 
 
 def dress_panel(axes, name: str, marks: list[str]) -> None:
-    """Style the axes, and draw the title and the legend with the meaning of open markers."""
+    """Style the axes of a panel, and draw its title and its legend.
+
+    name : variable of the panel; marks : marks of sizes that are not fitted, which the legend explains by open markers
+    """
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
     axes.grid(True, which="major", color=style.HAIR, linewidth=0.5)

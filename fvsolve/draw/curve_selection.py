@@ -18,8 +18,8 @@ OF_PRESSURE = ("pressure", "gauge_pressure", "head", "level")  # equivalent quan
 class DrawnLine:
     """Curve of a column of history.csv.
 
-    names : places (part, and position on it) that the curve shows; alike : other quantities there with an equivalent
-    curve
+    column : index of the column; names : places (part, and position on it) whose values the curve shows
+    alike : other quantities at the same place with an equivalent curve, which are not drawn
     """
 
     column: int
@@ -41,7 +41,7 @@ class DrawnPanel:
 
 
 def select_curves(values: np.ndarray, probes, measured=()) -> tuple[list[DrawnPanel], list[tuple[str, str, float]]]:
-    """Panels with the curves to draw, and probes that are constant, as (probe, unit, value).
+    """Panels with the curves to draw, and constant probes : (list of `DrawnPanel`, list of (probe, unit, value)).
 
     values : float64[k, n]; probes : (name, unit) of each column
     measured : names of probes with measurements, which are always drawn
@@ -72,7 +72,10 @@ def select_curves(values: np.ndarray, probes, measured=()) -> tuple[list[DrawnPa
 
 
 def _without_doubles(lines: list[DrawnLine], values: np.ndarray, probes, measured) -> list[DrawnLine]:
-    """Curves of a panel without duplicates, whose places are added to the names of the remaining curve."""
+    """Curves of a panel of which equal curves are drawn once, with the places of all of them as names.
+
+    values, probes, measured : as for `select_curves`
+    """
     seen = np.concatenate([values[:, line.column] for line in lines])
     tolerance = SAME_TOLERANCE * np.ptp(seen[np.isfinite(seen)]) if np.isfinite(seen).any() else 0.0
     result: list[DrawnLine] = []

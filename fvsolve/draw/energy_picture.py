@@ -14,7 +14,7 @@ COLOUR_MAPS = {"stored": "Blues", "dissipated": "Oranges", "supplied": "Greens"}
 
 @style.without_markup
 def energy_figure(t, supplied, stored, dissipated, numerical, title="", port=None, units=("s", None)):
-    """Figure with three panels over time: energy supplied by ports, stored and dissipated by parts, lost numerically.
+    """Figure with three panels over time: supplied energy, stored and dissipated energy, and numerical loss.
 
     supplied, stored, dissipated, numerical : name -> float64[k] [J], cumulative. Positive values are stacked upwards,
     negative values downwards. Stored energy is drawn relative to its least value in the run. The gap between the areas
@@ -55,9 +55,10 @@ def energy_figure(t, supplied, stored, dissipated, numerical, title="", port=Non
 
 
 def _port_panel(axes, t, name, work, bound, given) -> None:
-    """Draw the supplied energy (integral of pressure times flow) at a port, and its lower bound.
+    """Draw the supplied energy at the port `name`, and its lower bound.
 
-    A bound far below is only stated in the legend.
+    work : float64[k]  integral of pressure times flow [J]; bound : its lower bound [J], only in the legend if far below
+    given : (size [J], name) of the unit of energies, or None to choose it by size
     """
     span = max(np.ptp(work), np.max(np.abs(work)))
     far = span > 0.0 and np.max(bound) < -BOUND_DISTANCE * span
@@ -76,7 +77,10 @@ def _port_panel(axes, t, name, work, bound, given) -> None:
 
 
 def energy_unit(greatest: float) -> tuple[float, str]:
-    """Size [J] and name of the unit in which the energy `greatest` is at least 1, else of the smallest unit."""
+    """Size [J] and name of the largest unit in which the energy `greatest` [J] is at least 1.
+
+    For an energy below 1 in all units, they are those of the smallest unit.
+    """
     return next(((size, unit) for size, unit in ENERGY_UNITS if greatest >= size), ENERGY_UNITS[-1])
 
 
@@ -101,7 +105,10 @@ def _stack(axes, t, kinds, size) -> None:
 
 
 def _largest_parts(parts):
-    """Energies of the parts with the largest energies, and the sum of all other parts."""
+    """Energies of the parts with the largest energies, and the sum of all other parts : name -> float64[k] [J].
+
+    parts : name -> float64[k] [J], of all parts
+    """
     order = sorted(parts, key=lambda name: -np.max(np.abs(parts[name]), initial=0.0))
     if len(order) <= MAX_PARTS:
         return {name: parts[name] for name in order}

@@ -17,9 +17,9 @@ DARK_VERDICTS = ("stable", "wrong", "blown up", "refused")  # verdicts with dark
 
 @style.without_markup
 def failure_map_figure(result, title: str = "", head: str = ""):
-    """Figure with a panel for each scheme: a row for each method, a column for each time step or value of a key.
+    """Figure of a failure map with a panel for each scheme: methods down, time steps or values of a key across.
 
-    A bar in a row stands at the predicted stability limit. head : label of the columns if they are values of a key
+    A bar in a row marks the predicted stability limit. head : label of the columns if they are values of a key
     """
     tall = 0.30 * len(result.methods)
     figure = style.figure(1.5 + len(result.schemes) * (tall + 0.75), width=max(7.0, 2.3 + 0.68 * len(result.values)))
@@ -34,7 +34,7 @@ def failure_map_figure(result, title: str = "", head: str = ""):
 
 
 def column_labels(result) -> list[str]:
-    """Labels of the columns: a time step with its Courant number on a second line, or a value."""
+    """Labels of the columns of a failure map: time steps, with Courant numbers on a second line, or values of a key."""
     if result.key != "step":
         return [f"{value:.4g}" if isinstance(value, float) else str(value) for value in result.values]
     if not result.wave_rate:
@@ -81,7 +81,7 @@ def _panel(axes, result, scheme: str) -> None:
 
 
 def _error_text(square) -> str:
-    """Error of a run as a percentage; "" without an error."""
+    """Text of the error of a run as a percentage; "" if the error is not known."""
     error = square.measures.error
     if not math.isfinite(error) or square.verdict in ("blown up", "refused", "not run"):
         return ""

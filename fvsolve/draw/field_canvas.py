@@ -30,7 +30,7 @@ BOX_MARGINS = (62.0, 44.0, 50.0, 14.0)  # margins of a box: left, low, right, hi
 
 
 class FieldCanvas:
-    """Picture of basins and bodies; the range of the field, the bounding box and the projection hold for all frames."""
+    """Picture of basins and bodies. All frames have the same colour range, bounding box and projection."""
 
     def __init__(self, scene: DrawnScene, film: bool) -> None:
         import pyvista
@@ -67,7 +67,7 @@ class FieldCanvas:
         self.sheet.legend(scene.parts)
 
     def show(self, k: int) -> None:
-        """Draw frame `k`."""
+        """Draw frame `k` of the scene."""
         caption, files = self.scene.frames[k]
         self.plotter.clear_actors()
         for file in files:
@@ -112,7 +112,7 @@ class FieldCanvas:
         camera.clipping_range = (0.1 * far, 2.5 * far)
 
     def _lines(self) -> np.ndarray:
-        """Segments of pipes and bodies of the first frame in picture coordinates : float64[c, 2, 2].
+        """Line segments of pipes and bodies of the first frame in picture coordinates : float64[c, 2, 2].
 
         Also sets `cover`, the points that names should not cover, and `labels`, the names of bodies.
         """
@@ -132,7 +132,11 @@ class FieldCanvas:
         return np.concatenate(segments)
 
     def _bodies(self, lines: np.ndarray, line_body: np.ndarray) -> list[tuple[str, np.ndarray]]:
-        """Name of each body with extent, and midpoint of its longest line. line_body : body of each line"""
+        """List of (name, midpoint of the longest line) of each body that is not a single point.
+
+        lines : float64[c, 2, 2]  lines of bodies in picture coordinates
+        line_body : int[c]  index of the body of each line
+        """
         long, names = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1), []
         for k, name in enumerate(self.scene.bodies):
             own = np.flatnonzero(line_body == k)
@@ -190,7 +194,7 @@ class FieldCanvas:
         return None
 
     def _coloured(self, shape: Any, plane: bool) -> None:
-        """Draw a shape in the colours of the field, with contour lines if the shape is a surface."""
+        """Draw a shape in the colours of the field; plane : True for a surface, which then also has contour lines."""
         (low, high), field, count = self.limits, self.scene.quantity.name, self.scene.contours
         self.plotter.add_mesh(shape, scalars=field, cmap=COLOUR_MAP, clim=self.limits, smooth_shading=True,
                               show_scalar_bar=False, lighting=not plane or self.wet,

@@ -18,8 +18,9 @@ TUBE_RADIUS = 0.008  # radius of a pipe as a fraction of the diagonal of the sce
 
 
 def field_extent(scene: DrawnScene) -> tuple[tuple[float, float], np.ndarray, bool]:
-    """Range of the field over all frames, bounding box of all frames float64[6], and True if there is water.
+    """Ends of the colour range, bounding box of all frames float64[6], and True if a frame has depths of water.
 
+    The colour range is that of the field in the wet cells of all frames, see `colour_range`; (0, 1) if all are dry.
     The process exits with a message if no frame has the field, since the function runs in a process of its own.
     """
     known, lows, highs, boxes, wet, field = {}, [], [], [], False, scene.quantity.name
@@ -43,7 +44,7 @@ def field_extent(scene: DrawnScene) -> tuple[tuple[float, float], np.ndarray, bo
 
 
 def read_frame(file: str | Path, scene: DrawnScene) -> Any:
-    """Read a frame, with its lengths and the drawn field in output units; vectors become magnitudes."""
+    """Read a frame, and convert its lengths and the drawn field to output units; a vector becomes its magnitude."""
     import pyvista
 
     mesh, quantity = pyvista.read(file), scene.quantity
@@ -62,14 +63,14 @@ def read_frame(file: str | Path, scene: DrawnScene) -> Any:
 
 
 def array_unit(mesh: Any, field: str) -> str:
-    """Unit stored with the array of a field, "-" if it has none."""
+    """Unit that the file stores with the array of a field; "-" without a unit."""
     from vtkmodules.vtkCommonCore import vtkDataArray
 
     return mesh.GetCellData().GetArray(field).GetInformation().Get(vtkDataArray.UNITS_LABEL()) or "-"
 
 
 def mesh_box(mesh: Any) -> list[float]:
-    """Bounding box of a frame with its water: least and greatest x, then y, then z."""
+    """Bounding box of a frame with its water : least and greatest x, least and greatest y, least and greatest z."""
     bounds = list(mesh.bounds)
     if "surface" in mesh.cell_data:
         bounds[5] = max(bounds[5], float((mesh["depth"] + mesh.points[:, 2].max() if "normal" in mesh.cell_data

@@ -13,9 +13,9 @@ POINT_SPACING, PADDING = 4.0, 3.0  # distance of points along lines, and free sp
 def place_labels(at, sizes, gaps, blocks, lines, within) -> list[tuple[float, float] | None]:
     """Lower left corner of each name [pixels], None for a name without free space; names are placed in order.
 
-    at, sizes : float64[n, 2]  points, and width and height of the names [pixels]
+    at, sizes : float64[n, 2]  points of the names, and widths and heights of the names [pixels]
     gaps : float64[n]          distances from a point to its name [pixels]
-    blocks : float64[b, 4]     boxes (left, low, right, high) that no name may cover
+    blocks : float64[b, 4]     boxes (left, low, right, high) that names may not cover
     lines : float64[l, 2]      points that names should not cover; each covered point has a cost
     within : box (left, low, right, high) that contains all names
     """

@@ -51,7 +51,10 @@ class NetworkPicture:
         self.sheet.legend(scene.parts)
 
     def _pipes(self, segments: np.ndarray):
-        """Draw pipes with dark edges; returns the line collection that shows the field."""
+        """Draw pipes with dark edges; returns the line collection that shows the field.
+
+        segments : float64[c, 2, 2]  pipes in picture coordinates
+        """
         from matplotlib.collections import LineCollection
 
         count = len(self.scene.names)
@@ -64,7 +67,7 @@ class NetworkPicture:
         return inner
 
     def show(self, k: int) -> None:
-        """Draw frame `k`."""
+        """Draw frame `k` of the scene."""
         self.lines.set_array(self._shown(self.scene.pipes[k][2]))
         notes = [self.scene.frames[k][0], *self._notes()]
         self.sheet.caption(self.scene.title, "; ".join(notes))
@@ -76,7 +79,7 @@ class NetworkPicture:
         notes = []
         if self.aspect.kind == "aslant":
             own, times = self.scene.plan == "own scale", self.aspect.rise / self.scene.height_ratio
-            notes.append("heights on a scale of their own" if own else f"heights drawn {times:g} times")
+            notes.append("heights have a separate scale" if own else f"heights drawn {times:g} times")
         if self.scene.plan == "laid out":
             notes.append("laid out by lengths")
         if self.scene.plan == "own scale":
@@ -123,7 +126,7 @@ class NetworkPicture:
             axes.spines["left"].set_visible(False)
 
     def _height_lines(self) -> None:
-        """Draw lines from the nodes down to the floor, and the pipes projected onto it, which show the heights."""
+        """Draw lines that show the heights: from the nodes down to the floor, and the pipes projected onto it."""
         from matplotlib.collections import LineCollection
 
         floor, points, lines = self.all[:, 2].min(), self.scene.shown(self.scene.pipes[0][0]), self.scene.pipes[0][1]

@@ -40,12 +40,15 @@ def case_figure(case):
 
 
 def link_nodes(link) -> list[str]:
-    """Names of the nodes that a link connects; a port of a node is replaced by the node."""
+    """Names of the nodes that a link connects; a place NODE.PLACE is replaced by its node."""
     return [str(place).partition(".")[0] for place in link.ports.values()]
 
 
 def node_positions(case) -> dict[str, tuple[float, float]]:
-    """Position of each node in the figure: as stated if all nodes have one, else (links from the first node, row)."""
+    """Position of each node in the figure of a case : name -> (x, y).
+
+    It is the stated position if all nodes have one, otherwise (number of links from the first node, row).
+    """
     given = {name: node.position for name, node in case.nodes.items()}
     if all(item is not None for item in given.values()):
         return {name: (float(item[0]), float(item[1])) for name, item in given.items()}
@@ -93,7 +96,7 @@ def state_figure(state):
 
 @style.without_markup
 def sweep_figure(sweep):
-    """Figure of extremes of the first probes over the varied key, as maps over two keys, or over the runs."""
+    """Figure of extremes of the first probes of a sweep: over one key, as maps over two keys, or over the runs."""
     names = [name for name in sweep.columns if name.startswith(("max(", "min("))][:MAX_PANELS]
     if len(sweep.keys) == 2 and names:
         return map_figure(sweep, names, {key: key for key in sweep.keys})
@@ -114,7 +117,7 @@ def sweep_figure(sweep):
 
 
 def bar_figure(names, values, label: str, title: str):
-    """Bar chart with a bar for each name, up to MAX_NAMED_NODES bars. label : label of the axis of values"""
+    """Bar chart with a bar for each name, up to MAX_NAMED_NODES bars; label : label of the axis of values."""
     names, values = list(names)[:MAX_NAMED_NODES], list(values)[:MAX_NAMED_NODES]
     figure = style.figure(0.9 + 0.22 * max(len(names), 3))
     axes = figure.subplots()

@@ -28,8 +28,9 @@ EDGE_MARGIN = 5.0  # free margin of the sheet [pixels]
 def draw_parts(stage, scene: DrawnScene, segments: np.ndarray) -> tuple[int, int]:
     """Draw symbols and names of the parts of a scene; return the number of names drawn and the number of all names.
 
-    stage : picture with `sheet`, `axes`, `aspect`, `half` (half width of a symbol [points]), `texts` that no name may
-            cover, `cover` (float64[k, 2], points that names should not cover) and `labels` (other names with points)
+    stage : picture with `sheet`, `axes`, `aspect` (projection), `half` (half width of a symbol [points]), and
+            texts : texts that names may not cover; cover : float64[k, 2]  points that names should not cover
+            labels : list of (name, point), other names to draw
     segments : float64[c, 2, 2]  pipes in picture coordinates
     """
     if not (scene.parts or scene.pipes or stage.labels):
@@ -54,9 +55,10 @@ def draw_parts(stage, scene: DrawnScene, segments: np.ndarray) -> tuple[int, int
 
 
 def symbol_positions(scene: DrawnScene, aspect: Projection, axes, apart: float) -> dict[str, np.ndarray]:
-    """Positions of symbols [pixels], by the key of the part.
+    """Positions of symbols [pixels] : key of a part -> float64[2].
 
-    A node whose position is not fixed is moved if a link to it is shorter than `apart` [pixels]. aspect : projection
+    A node whose position is not fixed is moved if a link to it is shorter than `apart` [pixels].
+    aspect : projection of the picture
     """
     nodes = [part for part in scene.parts if not part.link]
     seen = axes.transData.transform(aspect.on_sheet(scene.shown([item.at for item in scene.parts])))
@@ -87,7 +89,7 @@ def symbol_positions(scene: DrawnScene, aspect: Projection, axes, apart: float) 
 
 @dataclass
 class DrawnName:
-    """Name to draw next to a point `at` [pixels], at a distance `gap` [points]."""
+    """Name to draw next to a point `at` [pixels], at a distance `gap` [points]; look : properties of its text."""
 
     text: str
     at: np.ndarray
@@ -98,7 +100,8 @@ class DrawnName:
 def _write_names(stage, scene: DrawnScene, segments, at, blocks, ties) -> tuple[int, int]:
     """Write the names that have free space; return the number of names written and the number of all names.
 
-    at : positions of symbols [pixels]; blocks : boxes of symbols; ties : lines from parts to their ends
+    at : positions of symbols [pixels], as from `symbol_positions`; blocks : float64[b, 4]  boxes of symbols [pixels]
+    ties : float64[c, 2, 2]  lines from parts to their ends [pixels]; stage, segments : as for `draw_parts`
     """
     from matplotlib.patheffects import withStroke
 
@@ -136,7 +139,11 @@ def _write_names(stage, scene: DrawnScene, segments, at, blocks, ties) -> tuple[
 
 
 def _names_to_draw(scene: DrawnScene, at, pixels, half: float) -> list[DrawnName]:
-    """Names to draw, in order of priority: parts, then pipes if there are few, then plain junctions."""
+    """Names to draw, in order of priority: parts, then pipes if there are few, then plain junctions.
+
+    at : positions of symbols [pixels]; pixels : float64[c, 2, 2]  pipes [pixels]
+    half : half width of a symbol [points]
+    """
     plain, small = {"color": style.INK, "fontsize": 8}, {"color": style.INK, "fontsize": 7.5}
     parts = [DrawnName(item.name, at[item.key], half + 3.0, plain) for item in scene.parts if not item.joint]
     joints = [DrawnName(item.name, at[item.key], 5.0, small) for item in scene.parts if item.joint]

@@ -19,11 +19,11 @@ MAX_POINTS = 4000  # greatest number of rows drawn; of longer tables the extreme
 
 @style.without_markup
 def history_figure(t, values, probes, time_unit="s", marks=(), measured=None, title=""):
-    """Figure of probes over time, with a panel for each quantity and unit; constant probes are only named.
+    """Figure of probes over time, with a panel for each quantity and unit. Constant probes are named in the legend.
 
     t : float64[k] in `time_unit`; values : float64[k, n]; probes : (name, unit) of each column
-    marks : (time, cause) of events after which results are not to be trusted; shaded from the first mark
-    measured : probe -> (times, values), drawn dotted
+    marks : (time, cause) of events after which results are not to be trusted; the panels are shaded after the first
+    measured : probe -> (times, values) of a measurement, which is drawn dotted
     """
     probes = list(probes)
     panels, still = select_curves(values, probes, measured or {})
@@ -61,7 +61,7 @@ def envelope_figure(envelope, units, title=""):
         axes.set_visible(False)
     for axes in grid[:, 0]:
         axes.set_ylabel(f"head [{units['max_head']}]", fontsize=8.5, color=style.INK)
-    figure.supxlabel(f"distance from its start [{units['distance']}]", fontsize=8.5, color=style.INK)
+    figure.supxlabel(f"distance from the start of the pipe [{units['distance']}]", fontsize=8.5, color=style.INK)
     handles = {
         label: handle for axes in grid.flat for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
     }
@@ -77,7 +77,10 @@ def probe_quantity(probe: str) -> str:
 
 
 def thin_series(t, values, points=MAX_POINTS):
-    """Reduce a series to at most about `points` rows: the extremes of equal bins of rows, so that peaks remain."""
+    """Reduce a series to at most about `points` rows, without loss of its peaks : (times, values).
+
+    It keeps the least and the greatest value of each of equal bins of rows.
+    """
     bins = points // 2
     if len(t) <= points:
         return t, values

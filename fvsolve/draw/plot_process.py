@@ -23,7 +23,7 @@ PACKAGE = Path(__file__).resolve().parents[1]
 
 
 class Picture(NamedTuple):
-    """Request for a picture: its path, the name of a function of `fvsolve.draw.plot`, and the arguments by name."""
+    """Request for a picture: path of the file, name of a function of `fvsolve.draw.plot`, and its arguments by name."""
 
     path: Path
     function: str
@@ -31,7 +31,7 @@ class Picture(NamedTuple):
 
 
 def draw_picture(picture: Picture) -> str:
-    """Write a picture atomically; returns the error text, or "" on success."""
+    """Write a picture so that its file is complete or missing; returns the error text, or "" on success."""
     temporary = picture.path.with_name(f"fresh-{picture.path.name}")
     try:
         figure = getattr(import_module("fvsolve.draw.plot"), picture.function)(**picture.arguments)
@@ -46,10 +46,10 @@ def draw_picture(picture: Picture) -> str:
 
 
 class PlotProcess:
-    """Drawing of pictures in a second process if `second_process` is true and that saves time, else in this process.
+    """Drawing of pictures in a second process, if `second_process` is true and it saves time, else in this process.
 
-    The second process starts at once. As a context manager it ends the process on exit, and no incomplete picture is
-    left.
+    The second process starts at once. As a context manager the object ends the process on exit, and no
+    incomplete picture is left.
     """
 
     def __init__(self, second_process: bool) -> None:
@@ -69,7 +69,7 @@ class PlotProcess:
             )
 
     def draw(self, pictures: Iterable[Picture]) -> dict[Path, str]:
-        """Write pictures; returns path -> error text for pictures that could not be drawn."""
+        """Write pictures; returns the error text of each picture that could not be drawn, by its path."""
         pictures = list(pictures)
         try:
             faults = {picture.path: self._draw_by_process(picture) for picture in pictures}
@@ -115,7 +115,7 @@ def processor_count() -> int:
 
 
 def draw_requests() -> None:
-    """Draw the pictures requested on standard input until it ends."""
+    """Draw the pictures that are requested on standard input, until the input ends."""
     from fvsolve.draw import style
 
     requests, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")

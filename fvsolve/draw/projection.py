@@ -27,7 +27,8 @@ class Projection:
 
     kind : "plan", "profile" (elevation view) or "aslant" (oblique view); rise : factor on heights
     along : horizontal axis of a profile; seen : direction to the observer of an oblique view
-    right, up, back : float64[3]  axes of the picture and direction to the observer; begin : origin of a profile
+    right, up, back : float64[3]  axes of the picture, and its normal, which points to the observer
+    begin : horizontal position of the origin of a profile
     """
 
     def __init__(self, kind: str, rise: float = 1.0, along=(1.0, 0.0), seen=NETWORK_VIEW) -> None:
@@ -49,9 +50,10 @@ class Projection:
 
 
 def choose_projection(points: np.ndarray, large: bool = False, slant: float = 1.0) -> Projection:
-    """Projection of a network: profile if it is straight in plan, plan if it is level, else oblique.
+    """Projection of a network: "profile" if it is straight in plan, "plan" if it is level, otherwise "aslant".
 
-    large : True for many parts, seen from a steeper angle; slant : factor from units of height to units of length
+    points : float64[n, 3]  points of the network; large : True for many parts, which are drawn from a steeper angle
+    slant : factor from units of height to units of length
     """
     spans = np.ptp(points, axis=0)
     plan = points[:, :2] - points[0, :2]
@@ -75,7 +77,7 @@ def round_scale(value: float) -> float:
 
 
 def box_corners(low, high) -> np.ndarray:
-    """Corners of a box from its corners low and high, float64[3] : float64[8, 3]."""
+    """Corners of a box : float64[8, 3]; low, high : float64[3]  least and greatest coordinates."""
     return np.array([(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
 
 

@@ -44,7 +44,11 @@ def region_figure(r: Callable, title: str = ""):
 
 
 def _window(r: Callable) -> tuple[float, float, float]:
-    """Left, right and upper end of the drawn window, which contains the boundary |R| = 1 if it is bounded."""
+    """Left, right and upper end of the drawn window.
+
+    It contains the boundary |R| = 1 if there is one and its coordinates are at most 0.95 `MAX_EXTENT` in size.
+    Otherwise the window reaches `DEFAULT_EXTENT` in each direction.
+    """
     wide = np.linspace(-MAX_EXTENT, MAX_EXTENT, 2 * GRID_POINTS)
     stable = _amplification(r, wide, wide) <= 1.0
     edge = stable[1:, 1:] != stable[:-1, 1:]

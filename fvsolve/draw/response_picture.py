@@ -12,7 +12,7 @@ def response_figure(w, h, labels: tuple[str, str], dips=(), poles=(), tolerance=
     """Bode plot of a response h over frequency, with the real part Re h below.
 
     Bands with Re h < 0 are shaded; poles on the imaginary axis are dotted lines.
-    w : float64[k]  angular frequency [rad/s]; h : complex128[k]; labels : name and unit of h
+    w : float64[k]  angular frequency [rad/s]; h : complex128[k]; labels : (name, unit) of h
     dips : (low, high) of bands with Re h < 0 [rad/s]; poles : frequencies of poles [rad/s]
     tolerance : fraction of |h| below which Re h is drawn as zero; note : title of the panel of Re h
     """
@@ -56,7 +56,7 @@ def _logarithmic(axes, size) -> None:
 
 
 def _phase(axes, phase) -> None:
-    """Set the axis of the phase [deg], with lines at -90 and 90, the limits for a passive port."""
+    """Set the axis of the phase [deg] and draw lines at -90 and 90, the limits for a passive port."""
     for level in (-90.0, 90.0):
         axes.axhline(level, color=style.MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
     least, greatest = np.nanmin(phase), np.nanmax(phase)
@@ -66,7 +66,7 @@ def _phase(axes, phase) -> None:
 
 
 def _real(axes, real) -> None:
-    """Make the axis of Re h logarithmic over at most six decades, on both sides of zero for negative values."""
+    """Make the axis of Re h logarithmic over at most six decades, on each side of zero if there are negative values."""
     from matplotlib.ticker import NullLocator
 
     size = np.abs(real[np.isfinite(real)])

@@ -15,6 +15,7 @@ class DrawnPart:
     key : "nodes.NAME" or "links.NAME"
     kinds : kind of the part and the kinds from which it is derived, nearest first
     at : position [m]; between : keys of the parts that a link connects
+    link : True for a link, False for a node
     joint : True for a plain junction; held : True if pipes or a stated position fix its position
     own_place : True for a link that is not drawn at the middle of its ends
     """
@@ -51,7 +52,7 @@ class DrawnScene:
     quantity, length, height : units of the field, of lengths and of heights
     frames : (caption, files) of each time
     pipes : for networks, (points float64[p, 3] [m], lines int[c, 2], values float64[c] in SI, pipe int[c]) of each time
-    plan : origin of plan positions: "given", "laid out" (by lengths), "own scale" or "schematic" (both not to scale)
+    plan : source of plan positions: "given", "laid out" (by lengths), "own scale" or "schematic" (both not to scale)
     contours : number of contour lines
     """
 

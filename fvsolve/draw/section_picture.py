@@ -22,7 +22,8 @@ def section_figure(chainage, along, units, lines, seen, parted=(), beyond=(), po
     chainage : float64[n]; along : quantity of envelope.csv -> float64[n]; lines : name of a line -> float64[n]
     units : unit of each quantity; seen : `HeadWindow`, ends of the head axis and texts of the limits above and below it
     parted : spans of chainage with cavities; beyond : (chainage, head, name) of points where a limit is violated
-    posts : chainages of vertical lines; labels : (chainage, names, True if a device is there)
+    posts : chainages of vertical lines
+    labels : (chainage, names of parts, True if a device and not only a junction is there)
     """
     figure = style.figure(9.2)
     axes = figure.subplots()
@@ -64,7 +65,7 @@ def section_figure(chainage, along, units, lines, seen, parted=(), beyond=(), po
 def phase_figure(pairs, title=""):
     """Figure with a phase plane for each pair of probes; a dot marks the start.
 
-    pairs : two probes each, a probe as (name, unit, values : float64[k])
+    pairs : list of (probe of x, probe of y), each probe as (name, unit, values : float64[k])
     """
     across = min(len(pairs), 2)
     down = -(-len(pairs) // across)
@@ -94,7 +95,7 @@ def _places(axes, posts, labels) -> None:
 
 
 def _thin_path(x, y) -> tuple:
-    """Reduce a long path (x, y) to the extremes of both coordinates in bins of consecutive points."""
+    """Reduce a long path (x, y) to the extremes of both coordinates in bins of consecutive points : (x, y)."""
     rows = np.arange(len(x), dtype=float)
     indices = np.union1d(thin_series(rows, x)[0], thin_series(rows, y)[0]).astype(int)
     return x[indices], y[indices]

@@ -76,7 +76,7 @@ class PictureSheet:
         return [text.get_text() for tick, text in shown if low <= tick <= high]
 
     def legend(self, parts) -> None:
-        """Draw the legend: the symbol and the name of each kind of part."""
+        """Draw the legend: symbol and name of each kind of part."""
         kinds = {part.kinds[0]: part for part in parts}
         place = self.figure.add_axes((0.5, 0.08 / self.high, 0.49, 0.8 / self.high))
         place.set_axis_off()
@@ -114,7 +114,10 @@ def draw_symbol(axes, symbol: str, at, along=(1.0, 0.0), half: float = HALF_SYMB
 
 
 def colour_range(low: float, high: float) -> tuple[float, float]:
-    """Ends of the colour range of a field from `low` to `high`; a uniform field has a band around its value."""
+    """Ends of the colour range of a field with values from `low` to `high`.
+
+    A uniform field has a range of EVEN_RANGE to each side of its value.
+    """
     most = max(abs(low), abs(high))
     if most == 0.0:
         return 0.0, 1.0

@@ -27,7 +27,10 @@ def figure(height: float, width: float = WIDTH):
 
 
 def without_markup(make: Callable) -> Callable:
-    """Decorator of functions that make a figure: `$` in texts is an ordinary letter, except on logarithmic axes."""
+    """Decorator of functions that make a figure, for texts without markup.
+
+    In all texts `$` is an ordinary letter, except in the ticks of logarithmic axes.
+    """
 
     @functools.wraps(make)
     def draw(*arguments, **keywords):

@@ -15,7 +15,7 @@ KEY_WIDTH = 26  # letters of a line of a key
 
 @style.without_markup
 def outcome_figure(sweep, name: str, heads: Mapping[str, str]):
-    """Figure of a column of a `Sweep` over each varied key, or as a map over two keys; failed runs differ in colour.
+    """Figure of a column of a `Sweep` over each varied key, or as a map over two keys; failed runs have another colour.
 
     name : name of the column; heads : key -> label of its axis
     """
@@ -47,7 +47,7 @@ def outcome_figure(sweep, name: str, heads: Mapping[str, str]):
 
 
 def axis_positions(values: list) -> tuple[list[float], list[str]]:
-    """Positions of values on an axis, and texts of the ticks.
+    """Positions of values on an axis, and texts of the ticks : (positions, texts).
 
     Numbers keep their value and have no texts; other values are numbered in order of first appearance.
     """

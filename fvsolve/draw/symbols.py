@@ -56,13 +56,19 @@ WATER = "#8ab6d6"
 
 
 def symbol_of(kinds: Sequence[str], link: bool) -> str:
-    """Symbol of a part. kinds : kind of the part and the kinds from which it is derived, nearest first"""
+    """Symbol of a part, as a text of strokes (see `strokes`).
+
+    kinds : kind of the part and the kinds from which it is derived, nearest first; link : True for a link
+    """
     return next((SYMBOLS[kind] for kind in kinds if kind in SYMBOLS), OTHER_LINK if link else OTHER_NODE)
 
 
 @cache
 def strokes(symbol: str) -> list[tuple[str, tuple[tuple[float, float], ...], bool]]:
-    """Strokes of a symbol in the order of drawing, as (fill, points, True if closed)."""
+    """Strokes of a symbol in the order of drawing : list of (fill, points, True if closed).
+
+    fill : "white", "ink" or "water"
+    """
     result: list[tuple[str, list, bool]] = []
     words, at, fill = symbol.split(), 0, "white"
     while at < len(words):

@@ -12,8 +12,8 @@ from fvsolve.draw.scene import DrawnScene
 from fvsolve.errors import FvsolveError
 
 REMEDY = (
-    "PyVista found no OpenGL to draw with off screen; on Debian or Ubuntu "
-    "`apt install libegl1 libgl1-mesa-dri`, or `apt install libosmesa6`"
+    "PyVista found no OpenGL library to draw without a screen; on Debian or Ubuntu "
+    "run `apt install libegl1 libgl1-mesa-dri`, or `apt install libosmesa6`"
 )
 ANIMATION_FORMATS = "a .gif needs no extra package; .mp4 needs imageio with ffmpeg: pip install imageio imageio-ffmpeg"
 

@@ -14,9 +14,9 @@ BUILDING_INSET = 1e-3  # relative reduction of a building, so that its walls do 
 def water_mesh(mesh: Any, rise: float, fields: tuple[str, ...], least: float = WET_DEPTH) -> Any:
     """Mesh of the water surface of a basin, cut at the shore, with `height` [m] above the bed at its points.
 
-    The surface of wet cells is extrapolated over adjacent dry cells. If it lies above their bed, as at a front on level
-    ground, the shore is drawn at the middle of the dry cells. Cells deeper than `least` [m] are wet. Values of `fields`
-    at points are means over wet cells. rise : factor on heights
+    Cells deeper than `least` [m] are wet. The surface of wet cells is extrapolated over adjacent dry cells. If it lies
+    above their bed, as at a front on level ground, the shore is drawn at the middle of the dry cells.
+    fields : names of fields whose values at points are means over wet cells; rise : factor on heights
     """
     cells, wet = _cells(mesh), mesh.cell_data["depth"] > least
     up = depth_direction(mesh)
@@ -96,7 +96,10 @@ def boundary_loops(mesh: Any) -> list[np.ndarray]:
 
 
 def raised_cells(mesh: Any) -> np.ndarray:
-    """True for cells of the bed that are raised, with walls steeper than WALL_SLOPE around (buildings) : bool[n]."""
+    """Mask of the cells of raised blocks of the bed, such as buildings : bool[n].
+
+    These are cells steeper than WALL_SLOPE, and the higher cells that they enclose.
+    """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -124,12 +127,15 @@ def raised_cells(mesh: Any) -> np.ndarray:
 
 
 def _cells(mesh: Any) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Indices and corners of the cells of each shape, as (int[k], int[k, 3 or 4])."""
+    """Cells of a mesh, by their shape : list of (indices int[k], points of the corners int[k, 3 or 4])."""
     return [(np.flatnonzero(mesh.celltypes == kind), corners) for kind, corners in mesh.cells_dict.items()]
 
 
 def _at_points(cells, chosen: np.ndarray, values: np.ndarray, n: int) -> np.ndarray:
-    """Mean of cell values over the chosen cells around each of n points, NaN if there is none. chosen : bool[cells]"""
+    """Mean of cell values over the chosen cells around each of n points, NaN for a point without such cells.
+
+    cells : as from `_cells`; chosen : bool[cells]; values : float64[cells]
+    """
     total, count = np.zeros(n), np.zeros(n)
     for rows, corners in cells:
         mask = chosen[rows]
@@ -139,9 +145,9 @@ def _at_points(cells, chosen: np.ndarray, values: np.ndarray, n: int) -> np.ndar
 
 
 def _extended(cells, chosen: np.ndarray, at: np.ndarray, n: int) -> np.ndarray:
-    """Extrapolated values at n points: mean over the chosen cells around a point of the finite values at their corners.
+    """Extrapolated values at n points: mean over the chosen cells around a point of the known values at their corners.
 
-    at : float64[n]  values at points, NaN if unknown; chosen : bool[cells]
+    cells : as from `_cells`; at : float64[n]  values at points, NaN if not known; chosen : bool[cells]
     """
     total, count = np.zeros(n), np.zeros(n)
     for rows, corners in cells:

@@ -16,7 +16,7 @@ FAILED_HEIGHT = 0.965  # vertical position of failed points, as a fraction of th
 
 @dataclass(frozen=True)
 class Curve:
-    """Points of a scheme and method, from coarse to fine cells or steps.
+    """Points of one scheme and method in a work-precision chart, from coarse to fine cells or steps.
 
     errors : a float64[n] for each row of panels; costs : a float64[n] for each column; failed : bool[n]
     """
@@ -33,7 +33,8 @@ class Curve:
 def chart_figure(curves: Sequence[Curve], rows: Sequence[str], columns: Sequence[str], floors, title: str = ""):
     """Figure with a panel for each kind of error (rows) and of cost (columns).
 
-    Panels are shaded below the error floor; failed points are at the top. floors : error floor of each row
+    Panels are shaded below the error floor; failed points are at the top. rows, columns : labels of the axes
+    floors : error floor of each row
     """
     figure = style.figure(0.9 + 3.1 * len(rows), width=9.5)
     grid = figure.subplots(len(rows), len(columns), sharex="col", sharey="row", squeeze=False)

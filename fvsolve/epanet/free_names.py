@@ -6,7 +6,10 @@ import re
 
 
 class FreeNames:
-    """Unique names for a group of parts; characters that a case file does not allow are replaced."""
+    """Unique names for a group of parts; characters that a case file does not allow are replaced.
+
+    given : EPANET's name -> name in the case
+    """
 
     def __init__(self) -> None:
         self.given: dict[str, str] = {}  # EPANET's name -> name in the case
@@ -26,5 +29,5 @@ class FreeNames:
         return name
 
     def changed(self) -> dict[str, str]:
-        """EPANET's name -> name in the case, for names that are not equal."""
+        """EPANET's name -> name in the case, for all parts whose names differ."""
         return {name: ours for name, ours in self.given.items() if name != ours}

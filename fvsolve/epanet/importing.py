@@ -24,7 +24,7 @@ class Imported:
     """Case file imported from EPANET.
 
     text : text of the case file; nodes, links : EPANET's name -> name in the case
-    notes : differences from EPANET as (text, names)
+    notes : differences from EPANET, as a list of (text, EPANET's names)
     short_pipes : EPANET's names of pipes shorter than a cell, the shortest first
     """
 
@@ -36,10 +36,11 @@ class Imported:
 
 
 def import_network(path: str | Path, hour: float = 0.0, wave_speed: float = 1200.0, shortest: float = 0.0) -> Imported:
-    """Import an EPANET file with the state at an hour of EPANET's run; every pipe gets the same wave speed [m/s].
+    """Import an EPANET file with the state at an hour of EPANET's run.
 
-    hour : time from the start of EPANET's run [h]; shortest : least length of a pipe in the case [m]; a shorter pipe is
-    lengthened, with the friction loss of its original length
+    hour : time from the start of EPANET's run [h]; wave_speed : wave speed of every pipe [m/s]
+    shortest : least length of a pipe in the case [m]; a shorter pipe is lengthened, and keeps the friction loss of its
+    original length
     Raises FvsolveError if WNTR is missing, or if EPANET finds faults in the file.
     """
     if not (math.isfinite(hour) and hour >= 0.0):
@@ -56,7 +57,10 @@ def import_network(path: str | Path, hour: float = 0.0, wave_speed: float = 1200
 
 
 def cell_time(lengths: list[float], wave_speed: float) -> float:
-    """Travel time of a cell [s]: 10 ms, or longer so that all pipes have at most `MOST_CELLS` cells; two digits."""
+    """Travel time of a cell [s], rounded to two digits: 10 ms, or longer so that all cells are at most `MOST_CELLS`.
+
+    lengths : lengths of all pipes [m]; wave_speed : [m/s]
+    """
     return float(f"{max(CELL_TIME, sum(lengths) / wave_speed / MOST_CELLS):.2g}")
 
 
@@ -84,7 +88,7 @@ def _text(path: Path, network: Any, translation: Translation, hour: float, time:
         "",
         "[numerics]",
         f'end = "{END}"',
-        f'cell_time = "{1e3 * time:.10g} ms"  # pipes that are shorter get one cell',
+        f'cell_time = "{1e3 * time:.10g} ms"  # pipes with a shorter travel time get one cell',
         'pipe_model = "auto"' + (f"  # {_short_pipes_comment(translation, short)}" if short else ""),
     ]
     lines += [
@@ -97,16 +101,17 @@ def _text(path: Path, network: Any, translation: Translation, hour: float, time:
 
 
 def _short_pipes_comment(translation: Translation, short: list[str]) -> str:
-    """Comment for the case file on the pipes that are shorter than a cell."""
+    """Comment for the case file on the pipes that are shorter than a cell; short : their names in EPANET"""
     first = translation.link_names.given[short[0]]
     pipes = f"{first} is" if len(short) == 1 else f"{len(short)} pipes are"
     return (
-        f"{pipes} shorter than a cell; with cells {first} limits the steps, {translation.lengths[short[0]]:.4g} m long"
+        f"{pipes} shorter than a cell; {first}, {translation.lengths[short[0]]:.4g} m long, would limit the steps with "
+        "cells"
     )
 
 
 def _probes(translation: Translation) -> list[str]:
-    """Names of probes: levels of tanks, flows of pumps, and heads of the junctions with the largest demands."""
+    """Names of probes: levels of tanks, flows of pumps, heads of the `PROBES` junctions with the largest demands."""
     nodes, links = translation.nodes, translation.links
     probes = [f"nodes.{name}.level" for name, part in nodes.items() if part["type"] == "tank"]
     probes += [f"links.{name}.flow" for name, part in links.items() if part["type"] == "pump"]

@@ -23,8 +23,9 @@ LISTING_TIME = 60.0  # time limit for EPANET to list the faults of a file [s]
 class HourState:
     """EPANET's solution at a time of its run; each dictionary is EPANET's name -> value in SI.
 
-    seconds : time [s]; head : of nodes [m]; demand : of nodes [m3/s]; flow : of links [m3/s]
-    status : EPANET's code of a link, see `CLOSED`; setting : of a valve or pump, of a pump its relative speed
+    seconds : time [s]; head, demand : of nodes [m], [m3/s]; flow : of links [m3/s]
+    status : EPANET's code of a link, see `CLOSED`
+    setting : EPANET's setting of a valve, or the relative speed of a pump
     factor : Darcy friction factor of a pipe
     """
 
@@ -38,7 +39,7 @@ class HourState:
 
 
 def wntr() -> Any:
-    """Import WNTR. Raises FvsolveError with an installation hint if it is missing."""
+    """Import the package WNTR and return it. Raises FvsolveError with an installation hint if it is missing."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -104,7 +105,7 @@ def state_at(network: Any, hour: float) -> HourState:
 
 
 def _root_cause(error: BaseException) -> str:
-    """Readable text of the first cause in a chain of exceptions."""
+    """Readable text of the first cause in a chain of exceptions, or of the first cause with an error code of EPANET."""
     chain = [error]
     while chain[-1].__cause__ is not None:
         chain.append(chain[-1].__cause__)

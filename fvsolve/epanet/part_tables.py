@@ -27,7 +27,7 @@ def rounded_number(value: float) -> float | int:
 
 
 def junction(elevation: float, demand: float, position: Any) -> Part:
-    """Table of a junction with elevation [m] and demand [m3/s]."""
+    """Table of a junction with elevation [m] and demand [m3/s]; position : coordinates x and y, or None"""
     part = {"type": "junction", "elevation": quantity_text(elevation, "m")}
     if demand:
         part["demand"] = quantity_text(demand, "l/s")
@@ -35,9 +35,10 @@ def junction(elevation: float, demand: float, position: Any) -> Part:
 
 
 def pressure_demand(minimum: float, required: float, exponent: float) -> Part:
-    """Keys of a demand that depends on pressure: zero at the `minimum`, full at the `required` pressure.
+    """Keys of a demand that depends on pressure: zero up to the pressure `minimum`, full from `required` on.
 
-    Both pressures are heads of water [m]; the demand grows with the power `exponent` of the head.
+    Both pressures are heads of water [m].
+    Between them the demand grows with the power `exponent` of the head above `minimum`.
     """
     part = {"required_pressure": gauge_pressure(required)}
     if minimum:
@@ -51,19 +52,25 @@ def gauge_pressure(head: float) -> str:
 
 
 def reservoir(head: float, position: Any) -> Part:
-    """Table of a reservoir of given head [m]."""
+    """Table of a reservoir of given head [m]; position : coordinates x and y, or None"""
     return {"type": "reservoir", "head": quantity_text(head, "m")} | _position(position)
 
 
 def tank(elevation: float, area: float, level: float, height: float, position: Any) -> Part:
-    """Table of a tank: elevation of its bottom [m], area [m2], level and greatest level above its bottom [m]."""
+    """Table of a tank with the elevation of its bottom [m] and its area [m2]; position : coordinates x and y, or None
+
+    level, height : water level at the start and greatest water level, above the bottom [m]
+    """
     part = {"type": "tank", "elevation": quantity_text(elevation, "m"), "area": quantity_text(area, "m2")}
     part |= {"level": quantity_text(level, "m"), "height": quantity_text(height, "m")}
     return part | _position(position)
 
 
 def pipe(ends: tuple[str, str], length: float, diameter: float, friction: Part, minor: float, speed: float) -> Part:
-    """Table of a pipe: length [m], diameter [m], friction table, minor loss coefficient and wave speed [m/s]."""
+    """Table of a pipe with length [m], diameter [m] and its table of friction.
+
+    ends : names of the nodes `from` and `to`; minor : minor loss coefficient; speed : wave speed [m/s]
+    """
     part = _link("pipe", ends) | {"length": quantity_text(length, "m"), "diameter": quantity_text(diameter, "mm")}
     part |= {"friction": friction}
     if minor:
@@ -72,9 +79,9 @@ def pipe(ends: tuple[str, str], length: float, diameter: float, friction: Part, 
 
 
 def friction(formula: str, roughness: float) -> Part:
-    """Table of friction by EPANET's formula ("H-W", "C-M" or "D-W").
+    """Table of friction by a formula of EPANET: "H-W", "C-M" or "D-W".
 
-    roughness : coefficient C [-], coefficient n [s/m^(1/3)] or height [m]
+    roughness : coefficient C [-] for "H-W", coefficient n [s/m^(1/3)] for "C-M", or roughness height [m] for "D-W"
     """
     if formula == "H-W":
         return {"model": "hazen-williams", "coefficient": rounded_number(roughness)}
@@ -89,41 +96,47 @@ def darcy(factor: float) -> Part:
 
 
 def valve(ends: tuple[str, str], diameter: float, loss: float, opening: float = 1.0) -> Part:
-    """Table of a valve: diameter [m], loss coefficient referred to the velocity in the diameter, and opening."""
+    """Table of a valve with diameter [m] and opening; ends : names of the nodes `from` and `to`
+
+    loss : loss coefficient at full opening, for the velocity in the diameter; 0 is replaced by `NO_LOSS`
+    """
     part = _link("valve", ends) | {"diameter": quantity_text(diameter, "mm")}
     part["loss_coefficient"] = rounded_number(loss or NO_LOSS)
     return part if opening == 1.0 else part | {"opening": opening}
 
 
 def pump(ends: tuple[str, str], law: Part, speed: float) -> Part:
-    """Table of a pump with its head law at full speed, relative speed, and check valve.
+    """Table of a pump with a check valve, because EPANET's pumps have no reverse flow.
 
-    EPANET's pumps have no reverse flow.
+    ends : names of the nodes `from` and `to`; law : key of its head law at full speed; speed : relative speed
     """
     return _link("pump", ends) | law | {"speed": rounded_number(speed), "check_valve": True}
 
 
 def curve(points: list[tuple[float, float]]) -> Part:
-    """Head law of a pump by points of flow [m3/s] and head [m]; fvsolve and EPANET interpret the points equally."""
+    """Key `curve` of a pump: head law by points of flow [m3/s] and head [m].
+
+    fvsolve and EPANET make the same curve from the points.
+    """
     flow, head = zip(*points, strict=True)
     return {"curve": {"flow": [quantity_text(q, "l/s") for q in flow], "head": [quantity_text(h, "m") for h in head]}}
 
 
 def power(watts: float) -> Part:
-    """Head law of a pump by constant power [W]."""
+    """Key `power` of a pump: head law by constant power [W]."""
     return {"power": f"{watts * 1e-3:.10g} kW"}
 
 
 def check_valve(ends: tuple[str, str], diameter: float) -> Part:
-    """Table of a check valve; diameter [m]."""
+    """Table of a check valve with diameter [m]; ends : names of the nodes `from` and `to`"""
     return _link("check-valve", ends) | {"diameter": quantity_text(diameter, "mm"), "loss_coefficient": NO_LOSS}
 
 
 def regulating(kind: str, ends: tuple[str, str], diameter: float, setting: float, loss: float) -> Part:
-    """Table of a regulating valve with its diameter [m] and loss coefficient.
+    """Table of a regulating valve with diameter [m]; ends : names of the nodes `from` and `to`
 
-    kind : "PRV" or "PSV", whose setting is a head of water above the controlled end [m], or "FCV", whose setting is a
-    flow [m3/s]
+    kind : "PRV", "PSV" or "FCV"; setting : head of water above the controlled end [m], for "FCV" flow [m3/s]
+    loss : loss coefficient at full opening; 0 is replaced by `NO_LOSS`
     """
     part = _link(REGULATING[kind], ends)
     if kind == "FCV":
@@ -135,9 +148,9 @@ def regulating(kind: str, ends: tuple[str, str], diameter: float, setting: float
 
 
 def leak(place: str, coefficient: float, exponent: float) -> Part:
-    """Table of a leak for an emitter, whose flow [m3/s] is coefficient (head of water [m])^exponent.
+    """Table of a leak that represents an emitter, whose flow [m3/s] is coefficient (head of water [m])^exponent.
 
-    The coefficient is converted to a pressure in Pa.
+    In the table the coefficient refers to a pressure in Pa. place : name of the node
     """
     per_pascal = coefficient / (DENSITY * GRAVITY) ** exponent
     return {
@@ -149,7 +162,7 @@ def leak(place: str, coefficient: float, exponent: float) -> Part:
 
 
 def loss_coefficient(drop: float, flow: float, diameter: float) -> float:
-    """Loss coefficient for a head loss [m] at a flow [m3/s], referred to the velocity in a diameter [m]."""
+    """Loss coefficient of a head loss `drop` [m] at a flow [m3/s], for the velocity in a diameter [m]."""
     velocity = flow / (math.pi / 4.0 * diameter**2)
     return 2.0 * GRAVITY * drop / velocity**2
 

@@ -21,6 +21,7 @@ REGULATING_STATUS = 2  # WNTR's code of a valve that is neither fixed open nor f
 class Translation:
     """Nodes and links of a case made from an EPANET network, and notes on differences from EPANET.
 
+    network : network of WNTR; hour : EPANET's solution at the imported hour; shortest : least length of a pipe [m]
     nodes, links : name -> table of the case file
     lengths : EPANET's name of a pipe -> its length in the case [m]
     notes : list of (text, EPANET's names)
@@ -64,10 +65,10 @@ class Translation:
     # nodes ------------------------------------------------------------------------------------------------
 
     def elevations(self) -> dict[str, float]:
-        """Elevations of junctions and tanks [m], moved where a pipe is shorter than its rise.
+        """Elevation [m] of each junction and tank; one end of a pipe that is shorter than its rise is moved.
 
         EPANET accepts a pipe of 6 m that rises by 200 m. Heads and flows of a network do not depend on elevations,
-        except where a demand depends on pressure: there the pipe is lengthened instead, see `length`.
+        except where a demand depends on pressure: such a pipe is lengthened instead, see `length`.
         """
         result = {name: node.elevation for name, node in self.network.nodes() if node.node_type != "Reservoir"}
         pipes = [
@@ -87,7 +88,8 @@ class Translation:
                 else:
                     name, result[high] = high, result[low] + MAX_SLOPE * pipe.length
                 moved = True
-                self.note("elevation changed, since a pipe cannot be shorter than its rise; heads and flows stay", name)
+                text = "elevation changed, because a pipe cannot be shorter than its rise"
+                self.note(f"{text}; heads and flows do not change", name)
         return result
 
     def depends_on_pressure(self, name: str) -> bool:
@@ -98,7 +100,7 @@ class Translation:
         )
 
     def demand_at(self, node: Any) -> float:
-        """Demand of a junction at the imported hour, from its patterns [m3/s]."""
+        """Demand [m3/s] of a junction at the imported hour, from its patterns."""
         return node.demand_timeseries_list.at(self.clock, multiplier=self.multiplier)
 
     def position(self, node: Any) -> Any:
@@ -123,7 +125,7 @@ class Translation:
         area = math.pi / 4.0 * node.diameter**2
         if node.vol_curve is not None:
             area = curve_slope(node.vol_curve.points, level)
-            self.note("volume curve: replaced by the area at its level", name)
+            self.note("volume curve: replaced by the area at the initial level", name)
         level = min(round(level, 6), node.max_level)  # EPANET's level may exceed it by rounding
         return part_tables.tank(self.elevation[name], area, level, node.max_level, self.position(node))
 
@@ -155,27 +157,30 @@ class Translation:
                 else part_tables.valve(last, link.diameter, 0.0, opening=0.0)
             )
             reason = "check valve" if link.check_valve else "shut at this hour"
-            self.note(
-                f"{reason}: a pipe and {'a check valve' if link.check_valve else 'a shut valve'} at its end", name
-            )
+            valve = "a check valve" if link.check_valve else "a shut valve"
+            self.note(f"{reason}: imported as a pipe with {valve} at its end", name)
             end = place
         law = part_tables.friction(self.formula, link.roughness)
         length = self.lengths[name] = self.length(link)
         if length > link.length:
             law = self.spread(name, link, length)
-            self.note(f"lengthened to {length:.4g} m, with the loss of its own length", name)
+            self.note(f"lengthened to {length:.4g} m, with the loss of the original length", name)
         return part_tables.pipe((start, end), length, link.diameter, law, link.minor_loss, self.speed)
 
     def length(self, link: Any) -> float:
-        """Length of a pipe in the case [m]: at least `shortest`, and at least its rise over `MAX_SLOPE`."""
+        """Length of a pipe in the case [m], at least `shortest`.
+
+        A pipe that is shorter than its rise gets at least the length rise / MAX_SLOPE.
+        """
         low, high = sorted(self.elevation.get(end, 0.0) for end in (link.start_node_name, link.end_node_name))
         inside = {link.start_node_name, link.end_node_name} <= self.elevation.keys()
         return max(link.length, self.shortest, (high - low) / MAX_SLOPE if inside and high - low > link.length else 0.0)
 
     def spread(self, name: str, link: Any, length: float) -> part_tables.Part:
-        """Table of the friction of a lengthened pipe, so that it has the loss of its original length.
+        """Table of the friction of a lengthened pipe, which keeps the friction loss of its original length.
 
-        length : length of the pipe in the case [m]
+        name : EPANET's name; link : pipe of WNTR; length : length of the pipe in the case [m]
+        With formula D-W the Darcy factor becomes constant, so the loss is equal only at the flow of this hour.
         """
         ratio = link.length / length
         if self.formula == "H-W":
@@ -186,10 +191,11 @@ class Translation:
 
     def pump(self, name: str, link: Any) -> part_tables.Part:
         if int(self.hour.status[name]) == SWITCHED_OFF:
-            self.note("pump is off at this hour: a shut valve", name)
+            self.note("pump is off at this hour: imported as a shut valve", name)
             return part_tables.valve(self.ends(link), self.bore(link), 0.0, opening=0.0)
         if link.pump_type == "POWER" and abs(self.hour.flow[name]) < STALL_FLOW:
-            self.note("pump of constant power has zero flow in EPANET, which contradicts its power: a shut valve", name)
+            text = "pump of constant power has zero flow in EPANET, which contradicts its power"
+            self.note(f"{text}: imported as a shut valve", name)
             return part_tables.valve(self.ends(link), self.bore(link), 0.0, opening=0.0)
         given = link.pump_type == "POWER"
         law = part_tables.power(self.gravity * link.power) if given else part_tables.curve(link.get_pump_curve().points)
@@ -199,29 +205,29 @@ class Translation:
         ends, kind, status = self.ends(link), link.valve_type, int(self.hour.status[name])
         diameter = self.size(link)
         if kind in ("PRV", "PSV") and link.initial_status == REGULATING_STATUS and self.set_too_high(name, link):
-            self.note(f"{kind} set above every source: {'an open' if kind == 'PRV' else 'a shut'} valve", name)
+            state = "an open" if kind == "PRV" else "a shut"
+            self.note(f"{kind} set above every source: imported as {state} valve", name)
             return part_tables.valve(ends, diameter, link.minor_loss, opening=1.0 if kind == "PRV" else 0.0)
         if kind in part_tables.REGULATING and link.initial_status == REGULATING_STATUS:
             self.note(f"{kind}: EPANET has no time constant, here {part_tables.TIME_CONSTANT}", name)
             return part_tables.regulating(kind, ends, diameter, self.setting(name, link), link.minor_loss)
         if status in CLOSED:
-            self.note(f"{kind} is shut at this hour: a shut valve", name)
+            self.note(f"{kind} is shut at this hour: imported as a shut valve", name)
             return part_tables.valve(ends, diameter, 0.0, opening=0.0)
         flow = self.hour.flow[name]
         drop = self.hour.head[link.start_node_name] - self.hour.head[link.end_node_name]
         if kind == "TCV" and status == ACTIVE:
             return part_tables.valve(ends, diameter, self.hour.setting[name])
         if kind in ("PBV", "GPV") and flow * drop < 0.0:
-            self.note(
-                f"{kind} raises the head along its flow, which a valve cannot do: an open valve, and heads differ", name
-            )
+            text = f"{kind} raises the head along its flow, which a valve cannot do"
+            self.note(f"{text}: imported as an open valve, so heads differ", name)
         elif kind in ("PBV", "GPV") and flow and drop:
-            self.note(f"{kind}: a valve with the constant loss coefficient of this hour", name)
+            self.note(f"{kind}: imported as a valve with the constant loss coefficient of this hour", name)
             return part_tables.valve(ends, diameter, part_tables.loss_coefficient(abs(drop), flow, diameter))
         return part_tables.valve(ends, diameter, link.minor_loss)
 
     def bore(self, link: Any, otherwise: float = 0.1) -> float:
-        """Diameter of the widest pipe next to a link [m]; `otherwise` without a pipe."""
+        """Diameter [m] of the widest pipe at the ends of a link; `otherwise` [m] if there is no pipe."""
         ends = (link.start_node_name, link.end_node_name)
         near = [self.network.get_link(other) for end in ends for other in self.network.get_links_for_node(end)]
         return max((pipe.diameter for pipe in near if pipe.link_type == "Pipe"), default=otherwise)
@@ -229,16 +235,17 @@ class Translation:
     def size(self, link: Any) -> float:
         """Diameter of a valve in the case [m].
 
-        Without a loss that refers to the diameter, it is at most the diameter of the widest adjacent pipe.
+        It is at most the diameter of the widest adjacent pipe, unless a loss coefficient or a curve refers to the
+        diameter.
         """
         widest = self.bore(link, link.diameter)
         if link.minor_loss or link.valve_type in ("TCV", "GPV") or widest >= link.diameter:
             return link.diameter
-        self.note("valve wider than every pipe next to it: diameter of the widest pipe", link.name)
+        self.note("valve wider than every pipe next to it: imported with the diameter of the widest pipe", link.name)
         return widest
 
     def set_too_high(self, name: str, link: Any) -> bool:
-        """True if the head set for a PRV or PSV exceeds the heads of all sources, and the network has no pump."""
+        """True if the head set for a PRV or PSV exceeds the heads of all sources, in a network without pumps."""
         network, controlled = self.network, link.end_node_name if link.valve_type == "PRV" else link.start_node_name
         sources = [*network.reservoir_name_list, *network.tank_name_list]
         greatest = max(self.hour.head[source] for source in sources)
@@ -246,9 +253,9 @@ class Translation:
         return not network.num_pumps and head > greatest
 
     def setting(self, name: str, link: Any) -> float:
-        """Set point of a valve: head of water above the controlled end [m], or flow [m3/s].
+        """Set point of a valve: head of water above the controlled end [m], or flow [m3/s] of an FCV.
 
-        The head is corrected for a moved elevation of that end.
+        The head is corrected if the import moves the elevation of that end.
         """
         controlled = link.end_node_name if link.valve_type == "PRV" else link.start_node_name
         if link.valve_type == "FCV" or controlled not in self.elevation:
@@ -257,7 +264,10 @@ class Translation:
         return self.hour.setting[name] + self.gravity * moved
 
     def emitters(self) -> None:
-        """Add emitters as leaks; WNTR converts coefficients from psi to metres with exponent 0.5, corrected here."""
+        """Add emitters as leaks.
+
+        WNTR converts their coefficients from psi to metres as if the exponent were 0.5; this is corrected.
+        """
         hydraulic = self.network.options.hydraulic
         exponent = hydraulic.emitter_exponent
         unit = PSI_OF_METRE ** (exponent - 0.5) if hydraulic.inpfile_units in US_UNITS else 1.0
@@ -273,7 +283,7 @@ class Translation:
 
 
 def curve_slope(points: list[tuple[float, float]], at: float) -> float:
-    """Slope of the section of a piecewise linear curve at an abscissa; beyond the points, of the nearest section."""
+    """Slope of a piecewise linear curve at abscissa `at`; beyond its points, the slope of the nearest section."""
     for (x0, y0), (x1, y1) in zip(points[:-1], points[1:], strict=True):
         if at < x1 or (x1, y1) == tuple(points[-1]):
             return (y1 - y0) / (x1 - x0)

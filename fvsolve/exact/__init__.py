@@ -27,9 +27,10 @@ NAMES = {  # name in the case file -> (module of this package, description)
 
 
 def find_faults(case) -> Iterator[tuple[tuple, str]]:
-    """Everything in a case that its exact solution does not cover, as (keys, message).
+    """Yield a fault (keys, message) for everything in a case that its exact solution does not cover.
 
-    Parts of other types are reported first; only without them does the solution check the keys of its parts.
+    keys : key path as a tuple. Parts of types that the solution does not support are reported first; the keys of parts
+    are checked only if there are no such parts.
     """
     module = _module(case.exact.name)
     yield from law_faults(case)
@@ -37,7 +38,7 @@ def find_faults(case) -> Iterator[tuple[tuple, str]]:
 
 
 def solution(case, start: ExactStart) -> Solution:
-    """Exact solution named in a case, from the flows and pressures at the start."""
+    """Exact solution that a case names under `[exact]`, from the flows and pressures at the start."""
     return _module(case.exact.name).solution(case, start)
 
 

@@ -18,7 +18,10 @@ NODES, LINKS = ("reservoir", "junction"), ("rigid-column", "valve", "orifice")
 
 
 def find_faults(case):
-    """Faults of a case that is not a single column between constant pressures."""
+    """Yield a fault (keys, message) for each difference of a case from one rigid column between constant pressures.
+
+    A valve or orifice in series with the column is allowed.
+    """
     name, columns, valves = case.exact.name, *columns_and_valves(case)
     yield from count_faults(case, columns, "rigid-column")
     yield from count_faults(case, valves, "valve") if len(valves) > 1 else ()
@@ -55,13 +58,16 @@ def find_faults(case):
 
 
 def columns_and_valves(case) -> tuple[list, list]:
-    """Columns of a case, and its valves and orifices: two lists of (name, part)."""
+    """(columns of a case, its valves and orifices): two lists of (name, part)."""
     columns = [item for item in case.links.items() if item[1].kind == "rigid-column"]
     return columns, [item for item in case.links.items() if item[1].kind in ("valve", "orifice")]
 
 
 def solution(case, start: ExactStart) -> Solution:
-    """Flow and node pressures of a case without faults, as functions of time."""
+    """Flows [m3/s], and the pressure [Pa] between column and valve, as functions of time.
+
+    The case must be one for which `find_faults` yields nothing.
+    """
     [(name, column)], valves = columns_and_valves(case)
     rho, t0 = case.properties.density, case.numerics.start
     area = 0.25 * math.pi * column.diameter**2
@@ -102,14 +108,14 @@ def solution(case, start: ExactStart) -> Solution:
 
 
 def reservoir_beyond(case, end: str, valve) -> str:
-    """Reservoir at an end of the column, or beyond the valve at this end."""
+    """Name of the reservoir at the node `end` of the column, or on the far side of the valve at that node."""
     if case.nodes[end].kind == "reservoir":
         return end
     return valve.to if valve.from_ == end else valve.from_
 
 
 def orientation(column, valve) -> float:
-    """1 if valve and column have the same positive flow direction, else -1."""
+    """Factor 1 if valve and column have the same positive flow direction, else -1."""
     return 1.0 if valve.from_ == column.to or valve.to == column.from_ else -1.0
 
 
@@ -123,7 +129,7 @@ def _piecewise(pieces, t, law):
 
 
 def flow_after(m: float, drive: float, k: float, a: float, t: np.ndarray) -> np.ndarray:
-    """Solution M at times t after the start of M' = a (drive - k |M| M) with M(0) = m."""
+    """Solution M(t) of M' = a (drive - k |M| M) with M(0) = m, at times t."""
     if drive < 0.0 or (drive == 0.0 and m < 0.0):
         return -flow_after(-m, -drive, k, a, t)
     if k == 0.0:

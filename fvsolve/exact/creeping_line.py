@@ -19,7 +19,7 @@ __all__ = ["LINKS", "NODES", "find_faults", "solution"]
 
 
 def find_faults(case):
-    """Faults of a case that is not a single pipe with wall creep and a demand at its end."""
+    """Yield a fault (keys, message) for each difference of a case from one pipe with wall creep and a demand."""
     name = case.exact.name
     for keys, text in laminar_line.find_faults(case):
         link = case.links[keys[1]] if keys[0] == "links" and len(keys) > 2 else None
@@ -31,7 +31,10 @@ def find_faults(case):
 
 
 def solution(case, start: ExactStart) -> Solution:
-    """Pressures and flows along the pipe of a case without faults, as functions of time."""
+    """Pressures [Pa] and flows [m3/s] along the pipe of a case, as functions of time.
+
+    The case must be one for which `find_faults` yields nothing.
+    """
     [pipe] = case.links.values()
     return line_solution(case, start, CreepDeviation(case, pipe))
 

@@ -26,7 +26,7 @@ TAIL = 1e-10  # relative size at which the transform of a smooth demand is cut o
 
 
 def find_faults(case):
-    """Faults of a case that is not a single laminar pipe with a demand at its end."""
+    """Yield a fault (keys, message) for each difference of a case from one laminar pipe with a demand at its end."""
     name, pipes = case.exact.name, list(case.links.items())
     yield from count_faults(case, pipes, "pipe")
     for node, part in case.nodes.items():
@@ -56,20 +56,26 @@ def find_faults(case):
 
 
 def reynolds(case, pipe) -> float:
-    """Largest Reynolds number of the demand and of the flow reflected at the reservoir."""
+    """Reynolds number of the greatest possible flow: the greatest demand plus its range, which reflections may add."""
     demand = next(case.nodes[end].demand for end in (pipe.from_, pipe.to) if case.nodes[end].kind == "junction")
     flow = float(np.max(np.abs(demand.value)) + np.ptp(demand.value))
     return 4.0 * flow * case.properties.density / (math.pi * pipe.diameter * case.properties.viscosity)
 
 
 def solution(case, start: ExactStart) -> Solution:
-    """Pressures and flows along the pipe of a case without faults, as functions of time."""
+    """Pressures [Pa] and flows [m3/s] along the pipe of a case, as functions of time.
+
+    The case must be one for which `find_faults` yields nothing.
+    """
     [(name, pipe)] = case.links.items()
     return line_solution(case, start, LineDeviation(case, pipe))
 
 
 def line_solution(case, start: ExactStart, line: LineDeviation) -> Solution:
-    """Pressures and flows of a case with a single pipe, from the deviations along it, as functions of time."""
+    """Pressures [Pa] and flows [m3/s] of a case with a single pipe, as functions of time.
+
+    start : state at the start; line : deviations from it along the pipe
+    """
     [(name, pipe)] = case.links.items()
     drop = start.pressure[pipe.to] - start.pressure[pipe.from_]
     flow = start.flow[name]
@@ -86,7 +92,7 @@ def line_solution(case, start: ExactStart, line: LineDeviation) -> Solution:
 
 
 class LineDeviation:
-    """Deviations of pressure and flow from the start along a pipe; x is the distance from the reservoir [m]."""
+    """Deviations of pressure and flow from the start along a pipe. Distances x are from the reservoir [m]."""
 
     def __init__(self, case, pipe) -> None:
         self.reversed = case.nodes[pipe.to].kind == "reservoir"
@@ -97,14 +103,17 @@ class LineDeviation:
         self.scale = 0.25 * pipe.diameter**2 * self.rho / (self.viscosity or 1.0)  # R^2 / nu [s]
 
     def waves(self, x, t):
-        """Deviations of pressure [Pa] and mass flow [kg/s] at distances x [m] and times t [s], arrays of one shape."""
+        """Deviations of pressure [Pa] and mass flow [kg/s] at distances x [m] and times t [s].
+
+        x, t and both results are arrays of one shape.
+        """
         t = np.minimum(t, self.end)
         if self.demand.kind == "smooth":
             return self._smooth_response(x, t)
         return self._jump_response(x, t)
 
     def fronts(self, t: float) -> np.ndarray:
-        """Distances of the wave fronts of all jumps of the demand from the `from` end at time t [m]."""
+        """Distances [m] from the `from` end of the pipe to the wave fronts of all demand jumps, at time t [s]."""
         if self.demand.kind != "step":
             return np.zeros(0)
         places = []
@@ -116,18 +125,24 @@ class LineDeviation:
         return self.length - places if self.reversed else places
 
     def _demand_jumps(self):
-        """Jumps of the demand after the start: (time [s], change of the mass flow [kg/s]) of each."""
+        """(time [s], change of the mass flow [kg/s]) of each jump of the demand from the start on."""
         times, values = self.demand.time, self.demand.value
         for k in range(1, len(times)):
             if times[k] >= self.t0:
                 yield float(times[k]), self.rho * float(values[k] - values[k - 1])
 
     def storage_ratio(self, s):
-        """Storage C(s) of liquid and wall relative to their instantaneous storage [-]. s : Laplace variable [1/s]"""
+        """Storage C(s) of liquid and wall relative to their instantaneous storage [-]: 1 for an elastic wall.
+
+        s : Laplace variable [1/s]
+        """
         return 1.0
 
     def ratio(self, s):
-        """Inertia of the laminar profile relative to plug flow, I0(x) / I2(x) with x = R sqrt(s / nu) [-]."""
+        """Inertia of the laminar profile relative to plug flow, I0(x) / I2(x) with x = R sqrt(s / nu) [-].
+
+        s : Laplace variable [1/s]; R : radius of the pipe; nu : kinematic viscosity; I0, I2 : modified Bessel functions
+        """
         from scipy.special import ive
 
         x = np.sqrt(s * self.scale)
@@ -147,9 +162,10 @@ class LineDeviation:
         return p, m
 
     def _unit_jump(self, d, after):
-        """Pressure and mass flow due to a jump of 1 kg/s at a distance d [m], `after` seconds after its front.
+        """(pressure [Pa], mass flow [kg/s]) of a single wave from a jump of 1 kg/s, at the travelled distance d [m].
 
-        Inverse Laplace transform along a fixed Talbot contour.
+        after : time since the front of the wave passed [s]. The Laplace transform is inverted along a fixed Talbot
+        contour.
         """
         here = after > 0.0
         p, m = np.zeros(d.shape), np.zeros(d.shape)
@@ -185,7 +201,7 @@ class LineDeviation:
         return p.reshape(x.shape), m.reshape(x.shape)
 
     def _input(self):
-        """Points s of the Bromwich line, Laplace transform of the change of mass flow there, and step of s."""
+        """(points s of the Bromwich line, Laplace transform of the change of mass flow there, step of Im s)."""
         if not hasattr(self, "_bromwich_line"):
             span = self.end - self.t0
             step = 2.0 * math.pi / (PERIOD * span)
@@ -201,7 +217,7 @@ class LineDeviation:
         return self._bromwich_line
 
     def _transform(self, s):
-        """Laplace transform of the change of mass flow: integral of its slope times exp(-s t), over s."""
+        """Laplace transform of the change of mass flow: integral of its slope times exp(-s t) dt, divided by s."""
         times = self.demand.time
         places, weights = np.polynomial.legendre.leggauss(4)
         width, middle = np.diff(times), 0.5 * (times[1:] + times[:-1])

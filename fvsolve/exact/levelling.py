@@ -17,7 +17,7 @@ NODES, LINKS = ("reservoir", "tank", "chamber"), ("valve", "orifice")
 
 
 def find_faults(case):
-    """Faults of a case that the solution does not cover from start to end."""
+    """Yield a fault (keys, message) for everything in a case that the solution does not cover from start to end."""
     faults = list(_find_faults(case))
     yield from faults
     if not faults:
@@ -25,7 +25,7 @@ def find_faults(case):
 
 
 def _find_faults(case):
-    """Faults of a case that is not two vessels joined by a single orifice."""
+    """Yield a fault (keys, message) for each difference of a case from two vessels joined by an orifice or valve."""
     yield from count_faults(case, list(case.links), "orifice or valve")
     name, start = case.exact.name, case.numerics.start
     for node, part in case.nodes.items():
@@ -56,7 +56,10 @@ def _find_faults(case):
 
 
 def solution(case, start: ExactStart) -> Solution:
-    """Pressures, levels and flow of a case without faults, as functions of time."""
+    """Pressures [Pa] and levels [m] of the vessels, and flow [m3/s] of the orifice, as functions of time.
+
+    The case must be one for which `find_faults` yields nothing.
+    """
     (link, part), rho, t0 = next(iter(case.links.items())), case.properties.density, case.numerics.start
     ends, weight = (part.from_, part.to), rho * case.gravity
     area = part.flow_area() * float(value(part.opening, t0))
@@ -94,7 +97,7 @@ def initial_pressure(case, node: str) -> float:
 
 
 def pressure_per_volume(case, node: str) -> float:
-    """Pressure rise of a tank, chamber or reservoir (0) per volume of inflow [Pa/m3]."""
+    """Pressure rise of a tank or chamber per volume of inflow [Pa/m3]; 0 for a reservoir."""
     part = case.nodes[node]
     if part.kind == "tank":
         return case.properties.density * case.gravity / part.area

@@ -18,7 +18,7 @@ NODES, LINKS = ("reservoir", "tank"), ("rigid-column",)
 
 
 def find_faults(case):
-    """Faults of a case that the solution does not cover from start to end."""
+    """Yield a fault (keys, message) for everything in a case that the solution does not cover from start to end."""
     faults = list(_find_faults(case))
     yield from faults
     if not faults:
@@ -28,7 +28,7 @@ def find_faults(case):
 
 
 def _find_faults(case):
-    """Faults of a case that is not a single frictionless column between open tanks."""
+    """Yield a fault (keys, message) for each difference of a case from open tanks and a frictionless column."""
     yield from count_faults(case, list(case.links), "rigid-column")
     name = case.exact.name
     for node, part in case.nodes.items():
@@ -46,7 +46,10 @@ def _find_faults(case):
 
 
 def solution(case, start: ExactStart) -> Solution:
-    """Levels, pressures and flow of a case without faults, as functions of time."""
+    """Levels [m] and pressures [Pa] of both end nodes, and flow [m3/s] of the column, as functions of time.
+
+    The case must be one for which `find_faults` yields nothing.
+    """
     name, column = next(iter(case.links.items()))
     rho, g, t0 = case.properties.density, case.gravity, case.numerics.start
     slope = 0.25 * math.pi * column.diameter**2 / column.length

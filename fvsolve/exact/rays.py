@@ -1,4 +1,4 @@
-"""Exact waves in frictionless pipes by ray tracing: density law linear, reservoirs, junctions and valves.
+"""Exact waves in frictionless pipes by ray tracing: density law `linear`, reservoirs, junctions and valves.
 
 At each pipe end a characteristic arrives, P + Z M at `to` and P - Z M at `from`, with P = p + rho g z, Z = a / A (wave
 speed over area) and mass flow M. It left the other end one travel time before, where it was 2 P minus the
@@ -21,7 +21,7 @@ MERGE = 1e-11  # sums of travel times closer than this are merged, relative to t
 
 
 def find_faults(case):
-    """Faults of a case that ray tracing does not cover."""
+    """Yield a fault (keys, message) for everything in a case that ray tracing does not cover."""
     valves: dict[str, list[str]] = {}
     for name, link in case.links.items():
         if link.kind == "pipe":
@@ -60,7 +60,10 @@ def find_faults(case):
 
 
 def solution(case, start: ExactStart) -> Solution:
-    """Pressures of nodes, flows of valves and fields of pipes of a case without faults, as functions of time."""
+    """Pressures of nodes [Pa], flows of valves [m3/s] and fields of pipes, as functions of time.
+
+    The case must be one for which `find_faults` yields nothing.
+    """
     rays = RayPaths(case, start)
     nodes = {name: (lambda t, n=name: rays.pressure(n, t)) for name in case.nodes}
     valves = {name: (lambda t, n=name: rays.valve_flow(n, t)) for name in rays.valves}
@@ -68,7 +71,10 @@ def solution(case, start: ExactStart) -> Solution:
 
 
 class RayPaths:
-    """Wave paths of a case between groups of nodes; nodes joined by a valve form a group, other nodes a group each."""
+    """Wave paths of a case between groups of nodes.
+
+    Nodes joined by a valve form a group; any other node is a group by itself.
+    """
 
     def __init__(self, case, start: ExactStart) -> None:
         self.case, self.rho, self.t0 = case, case.properties.density, case.numerics.start
@@ -99,8 +105,8 @@ class RayPaths:
     def _paths(self, group: str) -> list[tuple[float, str, dict]]:
         """Earlier states of groups of nodes on which the state of a group depends : list of (age [s], group, sources).
 
-        sources : (pipe, end) -> index in the list of the state from which the characteristic comes that arrives at this
-        end The oldest state is first; the last is the state of the group itself at age 0.
+        sources : (pipe, end) -> index in the list of the state from which the characteristic at this end comes
+        The oldest state is first; the last is the state of the group itself at age 0.
         """
         paths, place = [(0.0, group, {})], {(0, group): 0}
         for s, here, sources in paths:
@@ -123,7 +129,10 @@ class RayPaths:
     # characteristics and nodes ---------------------------------------------------------------------------------------
 
     def first(self, pipe: str, end: int, age: np.ndarray) -> np.ndarray:
-        """Characteristic [Pa] from the initial state of a pipe that arrives at an end `age` seconds after the start."""
+        """Characteristic [Pa] from the initial state of a pipe that arrives at an end `age` seconds after the start.
+
+        It is P + Z M at `to` (end 1) and P - Z M at `from` (end 0), with P = p + rho g z, impedance Z and mass flow M.
+        """
         p = [
             self.start.pressure[node] + self.weight * self.z[node] for node in (self.node(pipe, 0), self.node(pipe, 1))
         ]
@@ -160,7 +169,10 @@ class RayPaths:
         return known[-1]
 
     def _node_state(self, group: str, now, arrived) -> dict:
-        """State of a group of nodes at times `now`, as in `trace`, from the characteristics `arrived` there."""
+        """State of a group of nodes at times `now`, as in `trace`, from the characteristics `arrived` there.
+
+        arrived : (pipe, end) -> arriving characteristic [Pa] at these times, see `first`
+        """
         result, admittance, level = {}, {}, {}
         for node in (name for name, own in self.group.items() if own == group):
             ends = [end for end in arrived if self.node(*end) == node]
@@ -212,7 +224,7 @@ class RayPaths:
     def _outgoing(self, pipe: str, end: int, when, x):
         """Characteristic [Pa] at a distance x [m] from an end of a pipe, which left this end at the times `when` [s].
 
-        If it left before the start, it follows from the initial state.
+        If it left before the start, it follows from the initial state. For the characteristic see `first`.
         """
         age = when + x / self.speed[pipe] - self.t0
         early = self.first(pipe, 1 - end, age + self.travel[pipe] - x / self.speed[pipe])
@@ -224,7 +236,7 @@ class RayPaths:
         return result
 
     def kinks(self, pipe: str, t: float) -> np.ndarray:
-        """Positions of kinks of the field in a pipe at time t, from its `from` end [m].
+        """Distances [m] from the `from` end of a pipe to the kinks of its fields at time t [s].
 
         They are on rays that start at kinks of schedules, or at an initial state that is not steady.
         """
@@ -239,7 +251,7 @@ class RayPaths:
         return np.sort(np.concatenate(places))
 
     def _kink_times(self) -> dict[str, np.ndarray]:
-        """Group of nodes -> times of kinks of its schedules [s], and the start if its initial state is not steady."""
+        """Group of nodes -> times of kinks of its schedules [s], with the start if its initial state is not steady."""
         parts = [(self.group[name], node) for name, node in self.case.nodes.items()]
         parts += [(self.group[valve.to], valve) for valve in self.valves.values()]
         result: dict[str, set[float]] = {}
@@ -252,7 +264,7 @@ class RayPaths:
         return {group: np.array(sorted(times)) for group, times in result.items() if times}
 
     def _is_steady(self, group: str) -> bool:
-        """True if the pressures of a group of nodes do not change at the start."""
+        """True if the pressures of a group of nodes do not change just after the start."""
         after = self.trace(group, np.array([self.t0 + self.near]))
         return all(
             abs(float(after["node", node, 0][0]) - self.start.pressure[node] - self.weight * self.z[node])
@@ -262,9 +274,9 @@ class RayPaths:
 
 
 def valve_equation_flow(conductance, slack, drop) -> np.ndarray:
-    """Mass flow M through a valve between two pipe ends, from M |M| = conductance (drop - slack M).
+    """Mass flow M [kg/s] through a valve between two pipe ends, from M |M| = conductance (drop - slack M).
 
-    conductance : 2 rho (Cd A)^2 [kg m]; drop : pressure drop without flow [Pa]; slack : its decrease per flow
+    conductance : 2 rho (Cd A)^2 [kg m]; drop : pressure drop without flow [Pa]; slack : its decrease per mass flow
     """
     b = conductance * slack
     size = np.abs(drop)

@@ -6,7 +6,7 @@ import numpy as np
 
 
 def value(schedule, t: np.ndarray, left: bool = False) -> np.ndarray:
-    """Values of a schedule at times t [SI]; at jumps the right limit, or the left limit if `left` is true."""
+    """Values of a schedule at times t in SI units; at jumps the right limit, or the left limit if `left` is True."""
     t = np.asarray(t, dtype=float)
     times, values = schedule.time, schedule.value
     if schedule.kind == "constant":

@@ -26,8 +26,9 @@ class Solution:
     """Exact solution of a case: functions of time [s] by the name of a part, and fields of pipes.
 
     pressure : of nodes [Pa]; level : of tanks [m]; flow : of links [m3/s]; position, velocity : of masses [m], [m/s]
-    pipe : pipe(name, x, t) -> (pressure [Pa], flow [m3/s]) at positions x [m from `from`] and times t, broadcast
-    kinks : kinks(name, t) -> positions in a pipe at which the field at time t is not smooth [m from `from`]
+    pipe : pipe(name, x, t) -> (pressure [Pa], flow [m3/s]) at distances x from the `from` end [m] and times t; x and t
+    are broadcast
+    kinks : kinks(name, t) -> distances from the `from` end [m] at which the field of a pipe at time t is not smooth
     """
 
     case: object
@@ -40,7 +41,7 @@ class Solution:
     kinks: Callable[[str, float], np.ndarray] | None = None
 
     def probe(self, probe, t: np.ndarray) -> np.ndarray:
-        """Values of a probe at times t : float64[k] [SI]; NaN if the solution does not include it."""
+        """Values of a probe at times t : float64[k], in SI units; NaN if the solution does not include the probe."""
         t = np.asarray(t, dtype=float)
         name, quantity = probe.name, probe.quantity
         if probe.fraction is not None and self.pipe is not None:
@@ -56,13 +57,16 @@ class Solution:
         return self._converted(values, quantity, self.case.elevation(name) if quantity == "head" else 0.0)
 
     def averages(self, name: str, edges: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
-        """Averages of pressure [Pa] and flow [m3/s] of a pipe between `edges` [m], by Gauss points between kinks."""
+        """Averages of pressure [Pa] and flow [m3/s] over the cells of a pipe between `edges` [m] at time t.
+
+        They are computed by Gauss points between kinks. name : of the pipe
+        """
         inner = self.kinks(name, t) if self.kinks is not None else np.zeros(0)
         cuts = np.unique(np.concatenate([edges, inner[(inner > edges[0]) & (inner < edges[-1])]]))
         return averages(lambda x: self.pipe(name, x, t), edges, cuts)
 
     def _force(self, pipe, t):
-        """Unbalanced axial force on a frictionless pipe [N]: area times change of pressure drop since the start."""
+        """Unbalanced axial force on a frictionless pipe [N]: area times change of p(to) - p(from) since the start."""
         start = np.array([self.case.numerics.start])
         rise, first = (self.pressure[pipe.to](at) - self.pressure[pipe.from_](at) for at in (t, start))
         return 0.25 * np.pi * pipe.diameter**2 * (rise - first)
@@ -79,7 +83,10 @@ class Solution:
         return self._converted(p, probe.quantity, here)
 
     def _converted(self, pressure, quantity: str, z: float):
-        """Convert a pressure [Pa] at elevation z [m] to gauge pressure [Pa] or head [m], as `quantity` requests."""
+        """Convert a pressure [Pa] at elevation z [m] to gauge pressure [Pa] or head [m], as `quantity` requests.
+
+        For any other quantity the given values are returned unchanged.
+        """
         case = self.case
         if quantity == "gauge_pressure":
             return pressure - case.ambient_pressure
@@ -89,9 +96,9 @@ class Solution:
 
 
 def averages(f: Callable, edges: np.ndarray, cuts: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
-    """Averages between `edges` of each value that f(x) returns, by five Gauss points between `cuts`.
+    """Average of each value that f(x) returns over each interval of `edges`, by five Gauss points between `cuts`.
 
-    cuts : positions where f is not smooth, including the edges; the edges if None
+    cuts : positions where f is not smooth, including the edges; None for the edges alone
     """
     cuts = edges if cuts is None else cuts
     width, middle = np.diff(cuts), 0.5 * (cuts[1:] + cuts[:-1])
@@ -105,7 +112,7 @@ def averages(f: Callable, edges: np.ndarray, cuts: np.ndarray | None = None) -> 
 
 
 def reservoirs(case) -> dict[str, Law]:
-    """Pressures of the reservoirs of a case [Pa], as functions of time."""
+    """Pressures of the reservoirs of a case [Pa] : name -> function of time."""
     weight = case.properties.density * case.gravity
 
     def law(name, node):
@@ -118,13 +125,13 @@ def reservoirs(case) -> dict[str, Law]:
 
 
 def law_faults(case):
-    """Fault of a case whose density law is not linear, as (keys, message)."""
+    """Yield a fault (keys, message) if the density law of a case is not `linear`."""
     if not case.law.linear:
         yield ("fluid", "law"), f'the exact solution "{case.exact.name}" holds only with the law "linear"'
 
 
 def type_faults(case, nodes: tuple[str, ...], links: tuple[str, ...]):
-    """Faults of nodes and links whose types an exact solution does not support, as (keys, message).
+    """Yield a fault (keys, message) for each node and link of a type that an exact solution does not support.
 
     nodes, links : types that it supports
     """
@@ -139,13 +146,19 @@ def type_faults(case, nodes: tuple[str, ...], links: tuple[str, ...]):
 
 
 def count_faults(case, items: list, noun: str):
-    """Fault unless a case has exactly one of `items`, as (keys, message). noun : name of an item in the message"""
+    """Yield a fault (keys, message) unless there is exactly one of `items` in a case.
+
+    noun : name of an item in the message
+    """
     if len(items) != 1:
         yield ("exact", "name"), f'"{case.exact.name}" needs exactly one {noun}; the case has {len(items)}'
 
 
 def level_faults(exact: Solution):
-    """Faults of tanks that run dry or overflow before the end of the run, after which a solution is not valid."""
+    """Yield a fault (keys, message) for each tank that runs dry or overflows before the end of the run.
+
+    After that time the solution is not valid.
+    """
     numerics = exact.case.numerics
     t = np.linspace(numerics.start, numerics.end, 2001)
     for name, level in exact.level.items():

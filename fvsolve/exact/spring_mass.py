@@ -18,7 +18,7 @@ NODES, LINKS = ("mass", "frame", "reservoir"), ("spring", "damper", "force")
 
 
 def find_faults(case):
-    """Faults of a case that is not a single mass on springs."""
+    """Yield a fault (keys, message) for each difference of a case from one mass on springs and dampers."""
     yield from count_faults(case, [node for node in case.nodes.values() if node.kind == "mass"], "mass")
     if not any(link.kind == "spring" for link in case.links.values()):
         yield ("links",), f'the exact solution "{case.exact.name}" needs a spring'
@@ -30,7 +30,10 @@ def find_faults(case):
 
 
 def solution(case, start: ExactStart) -> Solution:
-    """Position [m] and velocity [m/s] of the mass of a case without faults, as functions of time."""
+    """Position [m] and velocity [m/s] of the only mass of a case, as functions of time.
+
+    The case must be one for which `find_faults` yields nothing.
+    """
     name, mass = next(item for item in case.nodes.items() if item[1].kind == "mass")
     at = {body: part.initial_position for body, part in case.nodes.items() if part.domain == "translational"}
     stiffness = damping = force = 0.0

@@ -23,11 +23,12 @@ USER = dict(density=None, bulk_modulus=None, viscosity=None, vapor_pressure=0.0,
 class Fluid:
     """A fluid at its reference state.
 
-    law : name of the density law; temperature [K], pressure [Pa] absolute, density [kg/m3]
-    bulk_modulus : rho a^2 at constant entropy, a the speed of sound [Pa]; viscosity : dynamic, None if unknown [Pa s]
-    vapor_pressure : absolute, 0 for a fluid without vapour pressure [Pa]; table : density over pressure for the law
-    "table"
-    source : source of the numbers; air : free gas for the law "mixture"
+    law : name of the density law; temperature : [K]; pressure : absolute [Pa]; density : [kg/m3]
+    bulk_modulus : rho a^2 at constant entropy [Pa], with the density rho and the speed of sound a
+    viscosity : dynamic viscosity [Pa s], None if unknown
+    vapor_pressure : absolute [Pa], 0 for a fluid without vapour pressure
+    table : density over pressure for the density law `table`, otherwise None; source : where the properties come from
+    air : free gas for the density law `mixture`, otherwise None
     """
 
     name: str
@@ -67,11 +68,14 @@ def properties(
     saturation_pressure: float | None = None,
     cavitation: bool | None = None,
 ) -> Fluid:
-    """Properties of a CoolProp fluid, an oil, "INCOMP::..." or "user" at temperature [K] and pressure [Pa].
+    """Properties of a CoolProp fluid, an oil, "INCOMP::..." or "user" at temperature [K] and absolute pressure [Pa].
 
-    Given density [kg/m3], bulk_modulus [Pa], viscosity [Pa s] and vapor_pressure [Pa] replace the properties of the
-    fluid; a "user" fluid has no others. `air_fraction`, `gas_exponent`, `saturation_pressure` and `cavitation` are for
-    the law "mixture" (see `Air`), which equals the law "log" without them. Raises FluidError with the key at fault.
+    law : name of the density law
+    density [kg/m3], bulk_modulus [Pa], viscosity [Pa s], vapor_pressure [Pa] : if given, they replace the properties of
+    the fluid; the fluid "user" has only given properties
+    air_fraction, gas_exponent, saturation_pressure, cavitation : for the density law `mixture` (see `Air`), which
+    equals the law `log` without them
+    Raises FluidError with the key at fault.
     """
     given = dict(density=density, bulk_modulus=bulk_modulus, viscosity=viscosity, vapor_pressure=vapor_pressure)
     given = {key: float(value) for key, value in given.items() if value is not None}

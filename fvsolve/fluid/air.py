@@ -16,8 +16,8 @@ class Air:
     """Free gas in a liquid, and cavitation.
 
     fraction : volume of free gas over volume of the mixture, at 1 atm; exponent : polytropic exponent of the gas
-    saturation_pressure : pressure at which all gas is dissolved, after a linear decrease of free gas [Pa]; infinite if
-    gas does not dissolve
+    saturation_pressure : pressure at which all gas is dissolved [Pa], infinite if gas does not dissolve; the amount of
+    free gas decreases linearly with the pressure until then
     cavitation : True if vapour forms at vapour pressure, which is then the lower bound of pressure
     """
 
@@ -27,10 +27,11 @@ class Air:
     cavitation: bool = False
 
     def gas(self, fluid, floor: float) -> float:
-        """Constant G of the gas volume per volume of liquid at the reference pressure.
+        """Constant G of the relative gas volume: volume of free gas over that of the liquid at the reference pressure.
 
-        The volume at a pressure p is G (1 - x / s) / x^(1 / exponent), with x = p - floor and s = saturation_pressure -
-        floor [Pa]. floor : lower bound of the pressure [Pa]
+        At the pressure p the relative gas volume is G (1 - x / s) / x^(1 / exponent), with x = p - floor and s =
+        saturation_pressure - floor [Pa].
+        fluid : fluid at its reference state; floor : lower bound of the pressure [Pa]
         """
         x, saturation = ATMOSPHERE - floor, self.saturation_pressure - floor
         liquid = 1.0 - (ATMOSPHERE - fluid.pressure) / fluid.bulk_modulus
@@ -39,7 +40,7 @@ class Air:
 
 
 def air_of(given: dict[str, float]) -> Air:
-    """Free gas and cavitation from the keys of [fluid] that are given; raises FluidError for a value out of range."""
+    """Free gas and cavitation from the given keys of [fluid]; raises FluidError for a value out of range."""
     fraction, cavitation = given.get("air_fraction", 0.0), bool(given.get("cavitation"))
     if not 0.0 <= fraction < 1.0:
         raise FluidError("air_fraction", f"{fraction:g} is not a volume fraction; expected at least 0 and below 1")

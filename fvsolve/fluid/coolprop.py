@@ -14,7 +14,11 @@ OIL_WORDS = ("oil", "hydraulic oil", "mineral oil", "hydraulic fluid", "hlp", "h
 
 
 def coolprop_properties(name: str, temperature: float, pressure: float, law: str) -> dict[str, Any]:
-    """Fields of `Fluid` from CoolProp; density is None for a boiling fluid, bulk_modulus for an INCOMP fluid."""
+    """Fields of `Fluid` from CoolProp, as a dict; temperature [K], pressure [Pa], law : name of the density law.
+
+    density, bulk_modulus and viscosity are None if the fluid boils at this state; bulk_modulus is None for a fluid
+    "INCOMP::...". Raises FluidError for unknown names and for states outside CoolProp's range.
+    """
     backend, _, rest = name.rpartition("::")
     if backend not in ("", "HEOS", "INCOMP"):
         raise FluidError(
@@ -111,9 +115,10 @@ def _vapor_pressure(state: Any, temperature: float) -> float:
 
 
 def _incompressible_properties(name: str, temperature: float, pressure: float) -> dict[str, Any]:
-    """Fields of `Fluid` of an INCOMP fluid: density, and viscosity and vapour pressure if CoolProp has them.
+    """Fields of `Fluid` of a fluid "INCOMP::...", as a dict; temperature [K], pressure [Pa].
 
-    INCOMP fluids have no compressibility.
+    bulk_modulus is None, because CoolProp has no compressibility of these fluids.
+    Where CoolProp has no data, the viscosity is None and the vapour pressure is 0.
     """
     from CoolProp.CoolProp import PropsSI
 
@@ -140,5 +145,5 @@ def _error_text(reason: str) -> str:
 
 
 def celsius(temperature: float) -> str:
-    """Text of a temperature [K] in degC."""
+    """Text of a temperature in degC, such as "20 degC"; temperature : [K]"""
     return f"{temperature - 273.15:.6g} degC"

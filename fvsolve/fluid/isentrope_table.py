@@ -21,13 +21,13 @@ INTERVALS = (32, 2048)  # least and greatest number of intervals
 class FluidTable:
     """Density along the isentrope through the reference state, for cubic Hermite interpolation of ln rho.
 
-    pressure        : float64[n]  uniform grid from the vapour pressure up, absolute  [Pa]
-    log_density     : float64[n]  ln(rho / (1 kg/m3))  [-]
-    compressibility : float64[n]  d ln rho / dp = 1 / (rho a^2) at constant entropy  [1/Pa]
-    error           : greatest relative density error at the midpoints, against CoolProp  [-]
+    pressure        : float64[n]  absolute pressure [Pa], a uniform grid from the vapour pressure up
+    log_density     : float64[n]  ln(rho / (1 kg/m3)) [-]
+    compressibility : float64[n]  d ln rho / dp = 1 / (rho a^2) at constant entropy [1/Pa], a the speed of sound
+    error           : greatest relative error of the density at the midpoints of the grid, against CoolProp [-]
 
-    Outside the grid compressibility keeps its end value: ln rho is extrapolated linearly. Below the vapour pressure
-    CoolProp has no stable liquid.
+    Outside the grid the compressibility keeps its end value, so that ln rho is extrapolated linearly. Below the vapour
+    pressure CoolProp has no stable liquid.
     """
 
     pressure: np.ndarray
@@ -50,9 +50,11 @@ class FluidTable:
         return hash((self.error, self.pressure.size))
 
     def numbers(self, density: float, pressure: float) -> list[float]:
-        """Four columns for kernels, one after the other: ln(rho / density), its slope, enthalpy [J/kg], its slope.
+        """Values and slopes at the grid for kernels, in one list: ln(rho / density), its slope, enthalpy, its slope.
 
-        Slopes are per pressure; enthalpy is relative to `pressure` [Pa].
+        Each has one number per grid pressure. Slopes are derivatives by pressure [1/Pa], [J/kg/Pa].
+        The enthalpy [J/kg] is the integral of dp / rho from `pressure`.
+        density : density [kg/m3] at the reference pressure `pressure` [Pa]
         """
         p, k = self.pressure, self.compressibility
         step = (p[-1] - p[0]) / (len(p) - 1)
@@ -69,7 +71,7 @@ class FluidTable:
 
 
 def hermite_at(grid, values, slopes, at):
-    """Cubic Hermite interpolant at the abscissas `at`, from values and slopes on a uniform grid."""
+    """Cubic Hermite interpolant at the abscissas `at`, from values and slopes (derivatives) on a uniform grid."""
     step = grid[1] - grid[0]
     k = np.clip(((at - grid[0]) / step).astype(int) if hasattr(at, "astype") else int((at - grid[0]) / step), 0,
                 len(grid) - 2)  # fmt: skip
@@ -80,10 +82,12 @@ def hermite_at(grid, values, slopes, at):
 
 
 def isentrope(state: Any, name: str, vapor_pressure: float) -> FluidTable:
-    """Table of the isentrope through the current state of CoolProp's `state`.
+    """Table of the isentrope through the present state of CoolProp's `state`, from the vapour pressure [Pa] up.
 
-    The number of intervals is doubled until the error at midpoints is at most `TARGET_ERROR`, or to INTERVALS[1].
-    Raises FluidError if the state is not liquid, or the table is not accurate enough.
+    The number of intervals starts at INTERVALS[0]. It is doubled until the error at midpoints is at most
+    `TARGET_ERROR`, or until it is INTERVALS[1].
+    name : name of the fluid for messages
+    Raises FluidError if the state is not liquid, or if the table is not accurate enough.
     """
     temperature, pressure, entropy = state.T(), state.p(), state.smass()
     if not 0.0 < vapor_pressure < pressure:
@@ -100,13 +104,17 @@ def isentrope(state: Any, name: str, vapor_pressure: float) -> FluidTable:
     except ValueError as error:
         raise FluidError("law", f'no "table" of {name} from that state (CoolProp: {error}); use "log"') from None
     if table.error > MAX_ERROR or not _monotone(table):
-        text = f'"table" of {name} has an error of {table.error:.1g}, too near its critical point; use "log"'
+        text = f'"table" of {name} has an error of {table.error:.1g}, too near the critical point; use "log"'
         raise FluidError("law", text)
     return table
 
 
 def _reach(state: Any, temperature: float, pressure: float) -> float:
-    """Upper end of the table [Pa]: `TABLE_PRESSURE`, or twice `pressure` if higher, within the limits of CoolProp."""
+    """Upper end of the table [Pa]: `TABLE_PRESSURE`, or twice `pressure` if that is higher, within CoolProp's limits.
+
+    temperature [K], pressure [Pa] : those of the reference state. CoolProp's limits are its greatest pressure and the
+    melting pressure.
+    """
     from CoolProp import CoolProp
 
     limits = [max(TABLE_PRESSURE, 2.0 * pressure), state.pmax()]
@@ -126,9 +134,10 @@ def _tabulate(state: Any, span: tuple[float, float], intervals: int, temperature
 
 
 def _march(state: Any, grid: np.ndarray, temperature: float, entropy: float) -> tuple[np.ndarray, np.ndarray]:
-    """ln rho and 1 / (rho a^2) [1/Pa] along the isentrope at the pressures of `grid`: two arrays.
+    """(ln rho, 1 / (rho a^2) [1/Pa]) on the isentrope of `entropy` at the pressures of `grid` [Pa] : two float64[n].
 
-    At each pressure the temperature follows by Newton iteration from the previous one, ds/dT = cp/T. a : speed of sound
+    At each pressure the temperature follows by Newton iteration from that of the previous pressure, with ds/dT = cp/T.
+    temperature : start value for the first pressure [K]; rho : density [kg/m3]; a : speed of sound [m/s]
     """
     from CoolProp import CoolProp
 
@@ -149,14 +158,14 @@ def _march(state: Any, grid: np.ndarray, temperature: float, entropy: float) -> 
 
 
 def _monotone(table: FluidTable) -> bool:
-    """True if slopes are 0 to 3 times those of adjacent chords, so that the cubics rise (Fritsch, Carlson 1980)."""
+    """True if all slopes are 0 to 3 times those of adjacent chords, so that the cubics rise (Fritsch, Carlson 1980)."""
     chord = np.diff(table.log_density) / np.diff(table.pressure)
     slopes = np.concatenate([table.compressibility[:-1] / chord, table.compressibility[1:] / chord])
     return bool(np.all(chord > 0.0) and np.all(slopes >= 0.0) and np.all(slopes <= 3.0))
 
 
 def value_or_none(read: Callable[[], float]) -> float | None:
-    """Value of a function of CoolProp; None if CoolProp has no model for it or the value is not finite."""
+    """Value that `read`, a call of CoolProp, returns; None if CoolProp has no model for it, or if it is not finite."""
     try:
         value = read()
     except ValueError:

@@ -27,7 +27,7 @@ def law_names(fits: Callable[[type[Law]], bool]) -> str:
 
 
 def over_weight(rise, weight: float):
-    """Height [m] of a pressure difference `rise` [Pa] over the specific weight `weight` [N/m3]; NaN for zero weight."""
+    """Height [m] equivalent to a pressure difference, rise [Pa] / weight; NaN for zero weight. weight : rho g [N/m3]"""
     return rise / weight if weight > 0.0 else np.full(np.shape(rise), np.nan)[()]
 
 
@@ -35,10 +35,10 @@ class Law:
     """Density law: density of one fluid as a function of pressure. Pressures are absolute, heads relative to ambient.
 
     name, code : name in case files, code in compiled functions
-    linear : True if waves superpose: wave speed and impedance are constant, pressure is linear in mass and in head
-    scalars : True if flows transport scalars
-    tabulated : True if density is a table from CoolProp; keys : keys of [fluid] that only this law has
-    ambient : ambient pressure [Pa]; gravity [m/s2]; arguments z of methods are elevations [m]
+    linear : True if waves superpose: wave speed and impedance are constant, and pressure is linear in mass and in head
+    scalars : True if flows may transport scalars
+    tabulated : True if the density is a table from CoolProp; keys : keys of [fluid] that only this law has
+    ambient : ambient pressure [Pa]; gravity : [m/s2]. The argument z of methods is an elevation [m].
     """
 
     name: ClassVar[str]
@@ -61,16 +61,19 @@ class Law:
 
     @classmethod
     def lower(cls, fluid, s, floats: list[float]) -> None:
-        """Write the parameters of the law to record `s` of `settings`, and append its tables to `floats`."""
+        """Write the parameters of the law to a record `s` of the table `settings`; append its tables to `floats`."""
         s["law"], s["rho"], s["beta"], s["reference"] = cls.code, fluid.density, fluid.bulk_modulus, fluid.pressure
 
     @classmethod
     def check(cls, name: str, given: dict[str, float]) -> None:
-        """Raise FluidError if the law does not allow the fluid `name`, or a property given for it."""
+        """Raise FluidError if the law does not allow the fluid `name`, or one of its given properties."""
 
     @classmethod
     def air(cls, given: dict[str, float]) -> Air | None:
-        """Free gas from the keys of [fluid] in `given`; raises FluidError for a law without gas."""
+        """Free gas from the keys of [fluid] in `given`; None for a law without free gas.
+
+        Such a law raises FluidError if a key is given.
+        """
         for key in given:
             raise FluidError(key, f'law = "{cls.name}" has no free gas; use law = "mixture"')
         return None
@@ -82,9 +85,11 @@ class Law:
 
     @property
     def family(self) -> str:
-        """Family of compiled functions: "linear", "barotropic" or "cavitating".
+        """Name of the family of compiled functions for the law: "linear", "barotropic" or "cavitating".
 
-        States are pressures in "linear" and masses in "barotropic"; "cavitating" adds cavities to "barotropic".
+        In "linear" the pressure is linear in the states.
+        In "barotropic" the states are masses, from which the density law gives the pressure.
+        "cavitating" is "barotropic" with vapour cavities.
         """
         return "linear" if self.linear else "cavitating" if self.cavitates else "barotropic"
 
@@ -92,7 +97,8 @@ class Law:
     def cavity_pressure(self) -> float:
         """Pressure [Pa] below which a location counts as a cavity.
 
-        Vapour pressure; with cavitation twice that: below it the vapour pressure exceeds the pressure of the gas.
+        It is the vapour pressure, or with cavitation twice the vapour pressure.
+        Below twice the vapour pressure, the vapour has a greater partial pressure than the gas.
         """
         return self.fluid.vapor_pressure * (2.0 if self.cavitates else 1.0)
 
@@ -103,30 +109,33 @@ class Law:
 
     @property
     def cavitation_keys(self) -> str:
-        """Text of a message: keys that [fluid] needs besides `cavitation = true`, with "and" at the end."""
+        """Part of a message: the key that cavitation needs besides `cavitation = true`, and "and"; may be empty."""
         return 'law = "mixture" and '
 
     @property
     def advice(self) -> str:
-        """Advice for a run that failed, appended to its message."""
+        """Advice that is appended to the message of a failed run; empty by default."""
         return ""
 
     def wave_speed(self, row, pressure: np.ndarray) -> float:
-        """Wave speed [m/s] of a pipe with elastic walls, as one number. row : row of the pipe in the tables"""
+        """Wave speed [m/s] of a pipe with elastic walls, one value for the whole pipe.
+
+        row : row of the pipe in the tables of the model; pressure : pressures along the pipe [Pa]
+        """
         return float(row["speed"])
 
 
 class LinearLaw(Law, name="linear"):
-    """Law linear: flow of constant density; the mass stored in a volume is linear in pressure."""
+    """Density law `linear`: the fluid flows with constant density; mass stored in a volume is linear in pressure."""
 
     code, linear, scalars = rec.LAW_LINEAR, True, True
 
     def density(self, pressure):
-        """Density [kg/m3] of the flow at pressures [Pa]: constant."""
+        """Density [kg/m3] at given pressures [Pa]: constant under the density law `linear`."""
         return np.full(np.shape(pressure), self.rho)[()]
 
     def potential_of(self, pressure: float, z: float) -> float:
-        """Piezometric pressure [Pa] of `pressure` at elevation z [m]: constant in a fluid at rest."""
+        """Piezometric pressure [Pa] of a fluid with `pressure` [Pa] at elevation z [m]; constant in a fluid at rest."""
         return pressure + self.rho * self.gravity * z
 
     def pressure_of(self, potential: float, z: float) -> float:
@@ -146,9 +155,9 @@ class LinearLaw(Law, name="linear"):
         return self.rho * volume * (1.0 + (pressure - self.fluid.pressure) / self.fluid.bulk_modulus)
 
     def compliance(self, speed: float) -> float:
-        """Wall compliance (1/A) dA/dp [1/Pa] of a pipe of area A with a wave speed [m/s].
+        """Wall compliance (1/A) dA/dp [1/Pa] of a pipe with the area A, from its wave speed `speed` [m/s].
 
-        0 here: compiled functions of the law linear use the wave speed alone.
+        It is 0 under the density law `linear`, whose compiled functions need the wave speed alone.
         """
         return 0.0
 
@@ -157,23 +166,29 @@ class LinearLaw(Law, name="linear"):
         return row["area"]
 
     def cell_pressure(self, row, start: np.ndarray, profile: np.ndarray, waves: np.ndarray) -> np.ndarray:
-        """Pressure [Pa] in the cells of a pipe, from the pressure at the start [Pa] and the sum of both waves [kg/s].
+        """Pressure [Pa] in the cells of a pipe : float64[cells].
 
-        profile : float64[:]  masses per length of the steady start for all pipes [kg/m], not used by the law linear
+        row : row of the pipe in the tables of the model; start : pressures at the start [Pa]
+        waves : sum of forward and backward wave in each cell [kg/s]
+        profile : masses per length [kg/m] of the cells of all pipes at the steady start; not used by the density law
+        `linear`
         """
         return start + waves / row["admittance"]
 
     def mass_in_pipe(self, row, start: np.ndarray, profile: np.ndarray) -> float:
         """Mass [kg] in a pipe at the steady start.
 
-        start : float64[cells]  pressures [Pa]; profile : as in `cell_pressure`
+        row, profile : as for `cell_pressure`; start : float64[cells]  pressures at the start [Pa]
         """
         strain = (start - self.fluid.pressure) / (self.rho * row["speed"] ** 2)
         return float(np.sum(self.rho * row["area"] * row["dx"] * (1 + strain)))
 
 
 class DenseLaw(Law):
-    """Density laws whose compiled functions (`kernels.density`) have masses as states: log, table and mixture."""
+    """Base of the density laws `log`, `table` and `mixture`.
+
+    Their compiled functions (`kernels.density`) have masses as states.
+    """
 
     @cached_property
     def kernels(self):
@@ -182,7 +197,10 @@ class DenseLaw(Law):
         return density
 
     def for_each(self, function, *arguments):
-        """Values of a compiled function at each element of its last argument."""
+        """Values of a compiled function of this law, for each element of the last of its arguments.
+
+        function : called as function(settings record, tables, *arguments)
+        """
         *first, last = arguments
         values = [function(self.st, self.floats, *first, float(x)) for x in np.ravel(last)]
         return np.array(values).reshape(np.shape(last))[()]
@@ -228,13 +246,13 @@ class DenseLaw(Law):
 
 
 class LogLaw(DenseLaw, name="log"):
-    """Law log: p = p_ref + beta ln(rho / rho_ref), with a constant bulk modulus beta [Pa]."""
+    """Density law `log`: p = p_ref + beta ln(rho / rho_ref), with a constant bulk modulus beta [Pa]."""
 
     code = rec.LAW_LOG
 
 
 class TableLaw(DenseLaw, name="table"):
-    """Law table: density of CoolProp along the isentrope through the reference state."""
+    """Density law `table`: density from CoolProp along the isentrope through the reference state."""
 
     code, tabulated = rec.LAW_TABLE, True
 
@@ -258,7 +276,10 @@ class TableLaw(DenseLaw, name="table"):
 
 
 class MixtureLaw(DenseLaw, name="mixture"):
-    """Law mixture: liquid with free gas, and with vapour if `cavitation` is true; without gas it is the law log."""
+    """Density law `mixture`: liquid with free gas, and with vapour if `cavitation` is true.
+
+    Without free gas it is the density law `log`.
+    """
 
     code, keys = rec.LAW_MIXTURE, AIR_KEYS
 
@@ -287,11 +308,14 @@ class MixtureLaw(DenseLaw, name="mixture"):
 
     @property
     def advice(self) -> str:
-        """Advice on strong expansion of gas, which fails without a lower bound of pressure."""
+        """Advice on runs that fail because gas expands strongly; empty with cavitation.
+
+        With cavitation the vapour pressure is a lower bound of pressure.
+        """
         if self.cavitates:
             return ""
         return "; where much gas expands, set `cavitation = true` in [fluid] and a scheme for it (docs/cavitation)"
 
     def wave_speed(self, row, pressure: np.ndarray) -> float:
-        """Harmonic mean of the local wave speeds along the pipe [m/s]."""
+        """Harmonic mean of the local wave speeds along a pipe [m/s]; arguments as for `Law.wave_speed`."""
         return len(pressure) / sum(1.0 / self.for_each(self.kernels.local_speed, row, pressure))

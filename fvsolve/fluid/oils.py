@@ -42,7 +42,10 @@ HEAT_CAPACITY = 1895.4, 2118.1  # cp at 25 and 80 degC [J/kg/K]
 
 
 def oil_name(name: str) -> str | None:
-    """Grade for a name: `ISO VG 46` for "ISO-VG46", "VG 46", "HLP 46" or "HM 46"; None for other fluids."""
+    """Name of the grade of an oil: `ISO VG 46` for "ISO-VG46", "VG 46", "HLP 46" or "HM 46"; None for other fluids.
+
+    Raises FluidError for a grade without data.
+    """
     match = re.fullmatch(r"(?:ISO[\s-]*VG|VG|HLP|HM)[\s-]*(\d+)", name.strip(), re.IGNORECASE)
     if match is None:
         return None
@@ -53,7 +56,10 @@ def oil_name(name: str) -> str | None:
 
 
 def oil_properties(name: str, temperature: float, pressure: float) -> dict[str, Any]:
-    """Fields of `Fluid` for an oil at temperature [K] and pressure [Pa]; raises FluidError outside its range."""
+    """Fields of `Fluid` for an oil at temperature [K] and pressure [Pa].
+
+    Raises FluidError outside the range of the data.
+    """
     if not MIN_TEMPERATURE <= temperature <= MAX_TEMPERATURE:
         text = f"{temperature - ZERO:.6g} degC"
         raise FluidError("temperature", f"{text} is outside the range of {name}, 0 degC to 100 degC")
@@ -80,7 +86,7 @@ def density_1atm(oil: Oil, temperature: float) -> tuple[float, float]:
 
 
 def walther(oil: Oil, temperature: float) -> float:
-    """Kinematic viscosity [m2/s] at 1 atm; log10(log10(nu + 0.7)) is linear in log10(T), nu in mm2/s, ASTM D341."""
+    """Kinematic viscosity [m2/s] at 1 atm by ASTM D341: log10(log10(nu + 0.7)) is linear in log10(T), nu in mm2/s."""
     cold, hot = (math.log10(math.log10(nu + 0.7)) for nu in (oil.viscosity_40, oil.viscosity_100))
     share = math.log(temperature / (ZERO + 40.0)) / math.log((ZERO + 100.0) / (ZERO + 40.0))
     return 1e-6 * (10.0**10.0 ** (cold + share * (hot - cold)) - 0.7)

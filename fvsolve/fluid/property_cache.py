@@ -20,7 +20,10 @@ FORMAT = 1  # version of file format and contents; increase it when either chang
 
 
 def cached_properties(name: str, temperature: float, pressure: float, law: str) -> dict[str, Any]:
-    """CoolProp properties, from disk if cached; a cache hit does not import CoolProp."""
+    """Fields of `Fluid` from CoolProp, read from a file if they are cached there; CoolProp is then not imported.
+
+    Arguments as for `coolprop_properties`.
+    """
     key = json.dumps([FORMAT, coolprop_version(), name, temperature, pressure, law])
     stem = re.sub(r"[^A-Za-z0-9.-]+", "-", name)[:40]
     path = cache_folder() / "fluids" / f"{stem}-{hashlib.sha256(key.encode()).hexdigest()[:24]}.json"
@@ -42,7 +45,10 @@ def coolprop_version() -> str:
 
 
 def _read(path: Path, key: str) -> dict[str, Any] | None:
-    """Properties in a cache file; None if it is absent or damaged, or was written for another key."""
+    """Properties in a cache file; None if the file is missing or damaged, or was written for another key.
+
+    key : text of name, state, law and versions
+    """
     try:
         digest, body = path.read_text(encoding="utf-8").split("\n", 1)
         if digest != hashlib.sha256(body.encode()).hexdigest():
@@ -55,7 +61,7 @@ def _read(path: Path, key: str) -> dict[str, Any] | None:
 
 
 def _write(path: Path, key: str, properties: dict[str, Any]) -> None:
-    """Write a cache file atomically; ignore a folder that cannot be written."""
+    """Write properties to a cache file atomically; do nothing if the folder cannot be written. key : as for `_read`"""
     body = json.dumps(
         [key, properties], default=lambda item: item.tolist() if hasattr(item, "tolist") else asdict(item)
     )

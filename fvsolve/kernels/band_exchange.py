@@ -1,9 +1,9 @@
 """Exchange of data between bands of a state: states of other bands, greatest wave rate, partial sums.
 
-A band is a part of the states that a thread or process of its own steps, with its own arrays. All bands make the same
-calls in the same order. A band writes its data, then all bands wait for each other before any band reads them, and
-again before any band overwrites them. The array `joint` of each band holds the addresses for this. It is empty for a
-single band, which calls none of these functions. Threads share memory; processes exchange data by a Python function
+A band is a part of the states, which one thread or process steps with its own arrays. All bands make the same calls in
+the same order. A band writes its data, then all bands wait for each other before any band reads them, and again before
+any band overwrites them. The array `joint` of each band holds the addresses for this. It is empty for a single band,
+which calls none of these functions. Threads share memory; processes exchange data by a Python function
 (`solve.mpi_ranks`).
 """
 
@@ -27,7 +27,10 @@ SPIN_LIMIT = 2000  # polls at a barrier before the thread yields
 if COMPILING:
 
     def at_address(context, builder, kind, address, size):
-        """Generate code for an array of `size` numbers that starts at a memory address, without a copy."""
+        """Generate code for an array of `size` numbers that starts at a memory address, without a copy.
+
+        context, builder : code generation of numba; kind : numba type of the array
+        """
         from numba.core import types
         from numba.np.arrayobj import make_array, populate_array
 
@@ -149,6 +152,7 @@ else:
 def barrier(joint):
     """Wait until all bands have called this function: poll first, then yield the processor, which a late band may need.
 
+    A band is a part of the states, which one thread or process steps.
     joint : int64 array of this band with counters and memory addresses shared by all bands
     """
     board, count = joint[BOARD], joint[BAND_COUNT]
@@ -165,10 +169,11 @@ def barrier(joint):
 
 @njit
 def get_runs(joint, content, values):
-    """Copy ranges of states or of flows through faces from the bands that own them into the same entries of `values`.
+    """Copy the states or face flows that other bands own and this band reads into the same entries of `values`.
 
-    joint : int64 array of this band with counters and memory addresses shared by all bands
-    content : SEND_STATES or SEND_FLOWS
+    A band is a part of the states, which one thread or process steps.
+    joint : int64 array of this band with counters, shared memory addresses, and the ranges of entries to copy
+    content : SEND_STATES or SEND_FLOWS; values : array of all states or of all flows through faces
     """
     if joint[PROCESS_CALL] != 0:
         call_processes(joint[PROCESS_CALL], content, address_of(values), values.size)
@@ -193,7 +198,7 @@ def get_runs(joint, content, values):
 def exchange_states(t, y, dydt, out, handle):
     """Copy into y the states of other bands on which the rates of this band depend.
 
-    A band is a part of the states that a thread or process of its own steps.
+    A band is a part of the states, which one thread or process steps.
     """
     joint = open_tables(handle).joint
     get_runs(joint, SEND_STATES, y)
@@ -203,7 +208,8 @@ def exchange_states(t, y, dydt, out, handle):
 def reduce_rate(t, y, dydt, out, handle):
     """Set out[RATE] of each band, the rate that limits the step [1/s], to the greatest of all bands.
 
-    A band is a part of the states that a thread or process of its own steps. NaN in any band becomes infinity in all.
+    A band is a part of the states, which one thread or process steps. If the rate of one band is NaN, it becomes
+    infinite in all bands.
     """
     joint = open_tables(handle).joint
     if joint[PROCESS_CALL] != 0:
@@ -224,6 +230,7 @@ def reduce_rate(t, y, dydt, out, handle):
 def gather_sums(sums, spans, handle):
     """Copy partial sums between bands, so that each band has all entries of `sums`.
 
+    A band is a part of the states, which one thread or process steps.
     spans : int64[q, 4]  blocks of states of this band (`row_blocks` in `steppers.step_operations`); columns 2 and 3 are
         the first entry of the block in `sums` and its number of entries. The first `joint[COMMON_SPANS]` blocks are the
         same in all bands and are written by band 0.

@@ -1,4 +1,4 @@
-"""Rigid columns under the density laws log and table: driving pressures, node pressures and rates of flow."""
+"""Rigid columns under the density laws `log` and `table`: driving pressures, node pressures and rates of flow."""
 
 from fvsolve.jit import njit
 from fvsolve.kernels.barotropic_nodes import driving_pressure, mean_density
@@ -36,11 +36,11 @@ def driving_pressure_change(tables, out, k):
 
 @njit
 def add_column_rates_barotropic(t, y, tables, out, n):
-    """Add d/dt of the flow that rigid columns bring into each column junction [kg/s2] to the right-hand side.
+    """Add d/dt of the flow of rigid columns into n column junctions [kg/s2] to the right-hand side of their equations.
 
-    A column junction is a node at which columns join and all valves are closed; n is their number. The right-hand side
-    is that of the equations for their pressures, in scratch. Columns controlled by valves are left out. The entry of a
-    junction with held pressure is set to zero.
+    A column junction joins rigid columns and otherwise only closed valves. The right-hand side is `right` of
+    `column_junctions.junction_work`. Columns whose flow valves control are left out. The entry of a junction with held
+    pressure is set to zero.
     """
     rows, _, _, right, pinned, _ = junction_work(tables, n)
     for k in range(tables.columns.size):
@@ -57,10 +57,10 @@ def add_column_rates_barotropic(t, y, tables, out, n):
 
 @njit
 def junction_pressures_barotropic(t, y, tables, out):
-    """Solve the pressures of column junctions, nodes at which rigid columns join and all valves are closed.
+    """Solve the pressures of column junctions, which join rigid columns and otherwise only closed valves.
 
-    Iteration with the matrix of the linear law, because driving pressures are nearly linear in the end pressures.
-    Writes pressure changes since the start [Pa] to `out`, or STATUS = NOT_CONVERGED.
+    The equations are iterated with the matrix of the density law `linear`, because driving pressures are nearly linear
+    in the end pressures. Writes pressure changes since the start [Pa] to `out`, or sets STATUS to NOT_CONVERGED.
     """
     n = number_junctions(tables, out)
     if n == 0:
@@ -89,10 +89,11 @@ def junction_pressures_barotropic(t, y, tables, out):
 
 @njit
 def column_pressures_barotropic(t, y, dydt, out, handle):
-    """Write the pressures of column junctions, and of the column ends whose flow nearly closed valves control.
+    """Write the pressures of column junctions, and of the column ends at which nearly closed valves control the flow.
 
-    The enthalpy at a controlled end is the enthalpy at the opposite end, less g times the rise, plus the drive of a
-    moving body. The pressure (L / A) dM/dt that accelerates a column of length L, area A and flow M is then subtracted.
+    The enthalpy at a controlled end is that at the opposite end, minus g times the rise in elevation, plus the energy
+    per mass from the motion of a body (`body_drive`). The pressure (L / A) dM/dt, which accelerates a column of length
+    L, area A and flow M, is then subtracted; for a valve near its seat `apply_seating_drop` subtracts it.
     """
     tables = open_tables(handle)
     st, nodes, floats = tables.settings[0], tables.nodes, tables.floats
@@ -119,10 +120,10 @@ def column_pressures_barotropic(t, y, dydt, out, handle):
 
 @njit
 def apply_seating_drop(t, y, tables, out, k, x, index):
-    """Change p' of node x from its value for a column at rest to its value for a moving column and valve disc.
+    """Correct the pressure change p' of node x from a column at rest to a moving column and valve disc.
 
-    p' : pressure change since the start [Pa], in `out`
-    k, index : numbers of the column, and of the valve near its seat that controls it
+    p' : pressure change since the start [Pa], read from `out` and replaced there
+    k, index : number of the column, and number of the valve near its seat that controls the column
     """
     valve, pressure = tables.valves[index], tables.layout[0]["pressure"]
     still, ahead = head_drop(tables, out, index)[1], valve["from_node"] == x

@@ -1,4 +1,4 @@
-"""Power and stored energy of every part under the density laws log and table.
+"""Power and stored energy of every part under the density laws `log` and `table`.
 
 h is the specific enthalpy, integral of dp / rho [J/kg], z the elevation above datum, m the mass per length of a pipe or
 the mass of a vessel, V the volume of a vessel, A the area of a pipe.
@@ -52,10 +52,10 @@ def relative_enthalpy(st, floats, p):
 
 @njit
 def energy_head(st, floats, node, p):
-    """Energy per mass of fluid that enters a node at pressure p [J/kg], under any density law.
+    """Energy per mass of fluid that enters a node at the pressure p [J/kg], under any density law.
 
-    It is (p - p_ambient) / rho + g z under the linear law, else h(p) - h(p_ambient) + g z, with the specific enthalpy h
-    and the elevation z above datum.
+    It is (p - p_ambient) / rho + g z under the density law `linear`, otherwise h(p) - h(p_ambient) + g z, with the
+    specific enthalpy h and the elevation z above datum.
     """
     height = st["gravity"] * (node["elevation"] - st["datum"])
     if st["law"] == LAW_LINEAR:
@@ -73,9 +73,9 @@ def total_head(tables, out, i):
 
 @njit(forceinline=True)
 def profile_mass(profile, pipe, i, point):
-    """Mass per length of the initial steady state [kg/m] at a Gauss point of cell i.
+    """Mass per length of the initial steady state [kg/m] at Gauss point number `point` of cell i.
 
-    A parabola through the values of `profile` at both faces and the centre of the cell.
+    It is the value of a parabola through the values in `profile` at both faces and at the centre of the cell.
     """
     left, right, middle = profile[pipe["face"] + i], profile[pipe["face"] + i + 1], profile[pipe["center"] + i]
     s = GAUSS_POINTS[point]
@@ -84,17 +84,21 @@ def profile_mass(profile, pipe, i, point):
 
 @njit(forceinline=True)
 def mass_at_point(st, profile, pipe, i, point, change):
-    """Mass per length [kg/m] at a Gauss point of cell i: initial steady value plus `change`, never quite zero."""
+    """Mass per length [kg/m] at Gauss point number `point` of cell i: initial steady value plus `change`.
+
+    It is at least the fraction MIN_CONTENT of the mass per length of a full pipe. profile : initial steady values
+    """
     return max(profile_mass(profile, pipe, i, point) + change, MIN_CONTENT * st["rho"] * pipe["area"])
 
 
 @njit
 def pipe_power_barotropic(st, floats, profile, pipe, z, r, l, dr, dl, rows):
-    """Write dissipation by friction to rows[1] and the rate of stored energy to rows[3], both of a pipe [W].
+    """Write the dissipation by friction to rows[1] and the rate of stored energy to rows[3], both of a pipe [W].
 
-    z : elevation of its `from` end above datum [m]
+    profile : values of the initial steady state; z : elevation of the `from` end above datum [m]
     r, l : float64[cells]  forward and backward wave [kg/s]
     dr, dl : float64[cells]  d/dt of both waves [kg/s2]
+    rows : entries of the pipe in `power`, listed in `linear_energy.py`
     """
     n, c, width, dx = r.size, pipe["speed"], polynomial_width(st, r.size), pipe["dx"]
     base, reference = enthalpy(st, floats, st["ambient"]), st["rho"] * pipe["area"]
@@ -117,7 +121,7 @@ def pipe_power_barotropic(st, floats, profile, pipe, z, r, l, dr, dl, rows):
 def pipe_energy_barotropic(st, floats, profile, pipe, z, r, l, rows):
     """Write the energy changes of a pipe since the start [J]: kinetic to rows[0], elastic and potential to rows[1].
 
-    z : elevation of its `from` end above datum [m]
+    profile : values of the initial steady state; z : elevation of the `from` end above datum [m]
     r, l : float64[cells]  forward and backward wave [kg/s]
     """
     n, c, width, dx = r.size, pipe["speed"], polynomial_width(st, r.size), pipe["dx"]
@@ -141,6 +145,7 @@ def pipe_energy_barotropic(st, floats, profile, pipe, z, r, l, rows):
 def jet_losses(profile, pipe, out, end, nodes):
     """Power lost by the jets from both ends of a pipe into tanks, chambers and reservoirs, M v^2 / 2 [W].
 
+    M, v : mass flow and velocity of a jet; profile : values of the initial steady state
     end : index in `out` of the four waves at the ends of the pipe (forward and backward at `from`, then at `to`) [kg/s]
     """
     lost = 0.0
@@ -199,10 +204,10 @@ def power_barotropic(t, y, dydt, out, handle, power):
 
 @njit
 def power_pistons_barotropic(y, dydt, out, tables, power, at):
-    """Write leak loss, friction and zero of each piston [W] to power[at] and following entries.
+    """Write three powers of each piston [W] from power[at] on: loss of the leak, friction, and zero.
 
-    Also write the rate of energy stored in each chamber, H dm/dt - (p - p_ambient) dV/dt [W], with energy per mass H
-    [J/kg], mass m and volume V.
+    Also write the rate of energy stored in each chamber, H dm/dt - (p - p_ambient) dV/dt [W], to the entry of its node.
+    H is the energy per mass [J/kg], m the mass, V the volume.
     """
     nodes, pistons = tables.nodes, tables.pistons
     pressure = tables.layout[0]["pressure"]
@@ -223,8 +228,9 @@ def power_pistons_barotropic(y, dydt, out, tables, power, at):
 
 @njit
 def vessel_energy(st, floats, node, mass, volume, p):
-    """Energy of a vessel, m (h + g z) - (p - p_ambient) V [J]: mass m, volume V, elevation z above datum.
+    """Energy of a vessel, m (h + g z) - (p - p_ambient) V [J].
 
+    m, V : `mass` and `volume` of its fluid; z : elevation above datum
     h : specific enthalpy above its value at ambient pressure [J/kg]
     """
     head = relative_enthalpy(st, floats, p) + st["gravity"] * (node["elevation"] - st["datum"])
@@ -275,7 +281,7 @@ def stored_barotropic(t, y, dydt, out, handle, stored):
 
 @njit
 def vessel_power(dydt, out, tables, device):
-    """Rate of the energy stored in the vessel of a device [W]: energy per mass of entering fluid times dm/dt."""
+    """Rate of the energy stored in the vessel of a device [W]: dm/dt times the energy per mass of entering fluid."""
     i, nodes = device["node"], tables.nodes
     p = nodes[i]["pressure"] + out[tables.layout[0]["pressure"] + i]
     return energy_head(tables.settings[0], tables.floats, nodes[i], p) * dydt[nodes[i]["y"]]

@@ -1,4 +1,4 @@
-"""Pressures and flows at nodes under the density laws log and table.
+"""Pressures and flows at nodes under the density laws `log` and `table`.
 
 Stagnation enthalpy is conserved from pipe ends to nodes, and flows through valves have the upstream density. A simple
 wave leads from the state extrapolated from the cells to the state at the pipe end, where h(p_end) + v^2 / 2 =
@@ -64,7 +64,7 @@ def head_pressure(st, floats, head):
 def known_pressures_barotropic(t, y, dydt, out, handle):
     """Write the pressure changes since the start [Pa] of fixed nodes, tanks and chambers to `out`.
 
-    Also write dp/dm [Pa/kg], pressure rise per stored mass, of chambers that contain gas.
+    For chambers that contain gas, also write their stiffness dp/dm [Pa/kg], the pressure rise per stored mass.
     """
     tables = open_tables(handle)
     st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
@@ -89,10 +89,11 @@ def known_pressures_barotropic(t, y, dydt, out, handle):
 
 @njit
 def end_flow(st, floats, pipe, m_inside, into_inside, p_node, still):
-    """Flow from a pipe end into its node under the laws log and table, by Newton.
+    """Flow from a pipe end into its node under the density laws `log` and `table`, by Newton.
 
-    Returns the flow into the node [kg/s], its derivative by p_node [kg/s per Pa], and the mass per length at the end
-    [kg/m]. A simple wave leads from the extrapolated state to the end: v + integral of dp / (rho c) is constant.
+    Returns the flow into the node [kg/s], its derivative with respect to p_node [kg/s per Pa], and the mass per length
+    at the end [kg/m]. A simple wave leads from the extrapolated state to the end: v + integral of dp / (rho c) is
+    constant, with velocity v, density rho and wave speed c.
 
     m_inside, into_inside : mass per length [kg/m] and mass flow towards the node [kg/s], extrapolated from the cells
     p_node : pressure of the node [Pa]
@@ -122,11 +123,12 @@ def end_flow(st, floats, pipe, m_inside, into_inside, p_node, still):
 
 @njit
 def end_inflows_barotropic(out, tables, slope, final):
-    """Write the change of flow from pipes into every node since the start [kg/s] to out[net], at present pressures.
+    """Write for every node the change of the flow from its pipes since the start [kg/s] to out[net].
 
-    slope : float64[nodes]  receives the derivative of this flow by the pressure of the node [kg/s per Pa]
-    On entry out[ends] holds both waves [kg/s], extrapolated from the cells to each end. If `final` is True, they are
-    replaced with the waves of the solved end states.
+    The flows are those at the present pressures.
+    slope : float64[nodes]  receives the derivative of this flow with respect to the pressure of the node [kg/s per Pa]
+    On entry out[ends] holds the forward and the backward wave at each pipe end, extrapolated from the cells [kg/s]. If
+    `final` is True, they are replaced with the waves of the solved end states.
     """
     st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
     pipes, profile = tables.pipes, tables.profile
@@ -208,11 +210,11 @@ def valve_driving_pressure(tables, out, k):
 
 @njit
 def valve_target(tables, out, k, g):
-    """Flow that the law of valve k gives at the present pressures, and its conductance at upstream density [kg2/s2/Pa].
+    """(flow by the law of valve k at the present pressures, its conductance at the upstream density [kg2/s2/Pa]).
 
-    By the square-root law M |M| = G dp the first result is M |M| [kg2/s2]; if the law has a laminar part, it is the
+    The first result is M |M| [kg2/s2] under the square-root law M |M| = G dp. If the law has a laminar part, it is the
     flow M [kg/s].
-    g : conductance G at reference density [kg2/s2/Pa]
+    g : conductance G at the reference density [kg2/s2/Pa]
     """
     valve = tables.valves[k]
     drop, denser = valve_driving_pressure(tables, out, k)
@@ -228,9 +230,8 @@ def valve_target(tables, out, k, g):
 def assemble_barotropic(cluster, out, tables, g, m, c, connected, slope, wide, a, s, lift, matrix, right):
     """Assemble Newton's linear system for the node pressures of a cluster (nodes that are solved together).
 
-    Arguments and results are those of `node_clusters.assemble`, except that the flows from pipe ends depend on
-    pressure.
-    slope : derivative of these flows into each node by its pressure [kg/s per Pa]
+    Arguments and results are those of `node_clusters.assemble`, but the flows from pipe ends depend on pressure.
+    slope : derivative of these flows into each node with respect to its pressure [kg/s per Pa]
     """
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
     integers, n = tables.integers, c.size
@@ -257,10 +258,10 @@ def assemble_barotropic(cluster, out, tables, g, m, c, connected, slope, wide, a
 def newton_step(cluster, out, tables, g, m, c, connected, slope, wide, work):
     """Make a Newton step for the pressures and valve flows of a cluster (nodes that are solved together).
 
-    Returns the greatest relative change, and True if the step points to the root. It does if the errors of valve flows
-    against their laws are below the fraction FLOW_ERROR of the imbalance of the nodes. Then the second-order error of
-    Newton cannot reverse this imbalance.
-    wide : see `restrictions.restriction_step`
+    Returns the greatest relative change, and True if the step points to the root. This is so if the errors of valve
+    flows against their laws are below the fraction FLOW_ERROR of the imbalance of the nodes: then the second-order
+    error of Newton cannot reverse this imbalance.
+    work : work array; other arguments as for `assemble_barotropic` and `node_clusters.assemble`
     """
     n, k = c.size, g.size
     matrix, right = work[: n * n], work[n * n : n * n + n]
@@ -296,7 +297,7 @@ def largest_magnitude(a):
 def limit_step(most, a, right):
     """Scale a Newton step so that no pressure rises by more than `most` [Pa], over which density grows by a factor e.
 
-    a : changes of valve flows at constant drop [kg/s]; right : changes of node pressures [Pa]
+    a : changes of valve flows at constant drop [kg/s]; right : changes of node pressures [Pa]; both are scaled
     """
     greatest = 0.0
     for r in range(right.size):
@@ -310,9 +311,10 @@ def limit_step(most, a, right):
 
 @njit
 def given_flows(t, y, out, tables):
-    """Write demands, given inflows of junctions, and flows of valves between two nodes of known pressure to `out`.
+    """Write the demands of junctions, and flows of valves between two nodes of known pressure, to `out`.
 
-    The pressures of junctions are reset to the initial steady state.
+    The change since the start of the given inflow of junctions is added to out[net], and their pressures are reset to
+    the initial steady state.
     """
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
     for i in range(nodes.size):
@@ -342,8 +344,9 @@ def is_undisturbed(cluster, tables, out):
 def node_work(tables):
     """Work arrays for solving all clusters (nodes solved together), as parts of `tables.scratch`.
 
-    Four arrays float64[nodes]: slope of the pipe flow into a node by its pressure [kg/s per Pa]; inflow c from all
-    links except valves [kg/s]; 1 if a node is connected to a known pressure, else 0; group number of isolated nodes.
+    Four arrays float64[nodes]: derivative of the pipe flow into a node with respect to its pressure [kg/s per Pa];
+    inflow c from all links except valves, with the initial flows of pipes [kg/s]; 1 if open valves join a node to a
+    pipe or to a known pressure, else 0; group number of isolated nodes.
     Two arrays float64[valves]: conductance [kg2/s2/Pa]; flow [kg/s]. Last, the remaining scratch array.
     """
     n, v, work = tables.nodes.size, tables.valves.size, tables.scratch
@@ -365,7 +368,7 @@ def cluster_work(tables):
 
     done : 1 if the cluster has converged
     change, last_change : greatest relative change in the last step, and in the step before
-    wide : 1 while valves that pressure lifts are held wide open
+    wide : 1 while valves that a pressure lifts are held wide open
     sure : 1 if the last step points to the root; it may point away until the flows of valves have reversed
     """
     n, v, n_clusters = tables.nodes.size, tables.valves.size, tables.clusters.size
@@ -383,7 +386,8 @@ def cluster_work(tables):
 def begin_clusters(out, tables, space):
     """Set flows and conductances of the valves of all clusters (nodes solved together) before the first Newton step.
 
-    A cluster counts as converged if all its values are those of the initial steady state; pipe ends are checked later.
+    A cluster counts as converged if all its values are those of the initial steady state; `step_clusters` checks the
+    flows from pipe ends later.
     space : work arrays of `node_work`
     """
     clusters, (_, c, connected, _, g, m, _), (done, change, _, wide, _) = tables.clusters, space, cluster_work(tables)
@@ -464,10 +468,10 @@ def write_clusters(out, tables, space):
 
 @njit
 def solve_nodes_barotropic(t, y, dydt, out, handle):
-    """Solve all nodes under the laws log and table by Newton: node pressures, valve flows, waves at every pipe end.
+    """Solve all nodes under the density laws `log` and `table`: node pressures, valve flows, waves at every pipe end.
 
-    In each sweep, every cluster (nodes solved together) that has not converged makes a step; then all pipe ends are
-    evaluated again. Each cluster stops by its own change, so its result does not depend on other clusters. An
+    In each Newton sweep, every cluster (nodes solved together) that has not converged makes a step; then all pipe ends
+    are evaluated again. Each cluster stops by its own change, so its result does not depend on other clusters. An
     undisturbed cluster is left as it is.
     """
     tables = open_tables(handle)

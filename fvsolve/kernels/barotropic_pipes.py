@@ -1,4 +1,4 @@
-"""Rates and probes of pipes under the density laws log and table, with the full momentum flux.
+"""Rates and probes of pipes under the density laws `log` and `table`, with the full momentum flux.
 
 m_t + M_x = 0, M_t + (M^2 / m)_x + A p_x = -drag - m g slope, with mass per length m [kg/m], mass flow M [kg/s] and area
 A. The waves r = (c m' + M') / 2 and l = (c m' - M') / 2 [kg/s] are each reconstructed from the side from which they
@@ -51,6 +51,7 @@ def wall_force(pipe, reference, m, flow):
 def pipe_rates_barotropic(st, floats, profile, pipe, r, l, ends, scratch, dr, dl):
     """Write d/dt of both waves of a pipe [kg/s2] to dr and dl; return its greatest wave rate (|v| + c) / dx [1/s].
 
+    v, c : velocity and wave speed; dx : length of a cell; profile : values of the initial steady state
     r, l : float64[cells]  forward and backward wave [kg/s]
     ends : float64[4]  waves at the ends [kg/s]: forward and backward at `from`, then at `to`
     """
@@ -144,8 +145,8 @@ def valve_volume_flow(st, floats, tables, out, k):
 def observe_barotropic(t, y, out, handle, values):
     """Write the values of all probes of nodes, pipes, valves and rigid columns, in SI units, to `values`.
 
-    Volume flows [m3/s] use the local density in pipes, the upstream density in valves, the reference density in
-    columns.
+    Volume flows [m3/s] are computed with the local density in pipes, the upstream density in valves, and the reference
+    density in columns.
     """
     tables = open_tables(handle)
     st, floats, layout, nodes = tables.settings[0], tables.floats, tables.layout[0], tables.nodes

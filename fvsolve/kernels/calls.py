@@ -1,9 +1,10 @@
 """Calls of compiled functions by address: each function is compiled once, and a model is a list of functions.
 
-Numba compiles every function again that a function calls; a call by address avoids this. All functions of a job, such
-as the right-hand side, have the same arguments: `t, y, dydt, out, handle`, and where they read a state also the vector
-that they fill. The law of a part, such as a pump, is a module with functions named as in `HOOKS`, each with arguments
-of its own. Exceptions raised in functions called by address are lost.
+For each function, numba compiles again all functions that it calls; a call by address avoids this. All functions of a
+job, such as the right-hand side, have the same arguments: `t, y, dydt, out, handle` for rates, `t, y, out, handle,
+values` for probes, records and events, `t, y, dydt, out, handle, rows` for energies. The law of a part, such as a pump,
+is a module with functions named as in `HOOKS`, each with arguments of its own. Exceptions raised in functions called by
+address are lost.
 """
 
 from __future__ import annotations
@@ -82,7 +83,7 @@ def function_address(function, letters: str):
 
 
 def hook_of(law, name: str):
-    """Function `name` of the module `law` of a part's law, None if the module has none.
+    """Function `name` of the module `law`, which contains the law of a part; None if the module has no such function.
 
     name : key of `HOOKS`. Raises FvsolveError for a wrong number of arguments.
     """
@@ -178,7 +179,10 @@ if COMPILING:
 
     @Intrinsic
     def call_slope(typingctx, address, out, tables, k, g, drop):
-        """Call the function `slope` of the law of restriction k at `address`: d flow / d drop [kg/s/Pa]."""
+        """Call the function `slope` of the law of restriction k at `address`: d flow / d drop [kg/s/Pa].
+
+        g : present conductance [kg2/s2/Pa]; drop : present drop [Pa]
+        """
         return call(*HOOKS["slope"])
 
     @Intrinsic
@@ -188,12 +192,20 @@ if COMPILING:
 
     @Intrinsic
     def call_bends(typingctx, address, tables, k, drop, g):
-        """Call the function `bends` of the law of restriction k at `address`: event functions, to g; see `HOOKS`."""
+        """Call the function `bends` of the law of restriction k at `address`.
+
+        It writes event functions of the restriction at the drop `drop` [Pa] to g; see `HOOKS`.
+        """
         return call(*HOOKS["bends"])
 
     @Intrinsic
     def call_lead(typingctx, address, t, y, tables, device, before, behind, drop, ahead):
-        """Call the function `lead` of a device's law at `address`, which returns dx/dt of its lift x; see `HOOKS`."""
+        """Call the function `lead` of a device's law at `address`, which returns dx/dt of its lift x and its slope.
+
+        before, behind : upstream and downstream pressure changes since the start [Pa]; drop : drop of the valve [Pa]
+        The slope is the derivative of dx/dt with respect to the drop [1/s/Pa]. It is that for a change of the upstream
+        pressure if `ahead` is True, otherwise of the downstream pressure; see `HOOKS`.
+        """
         return call(*HOOKS["lead"])
 else:
 
@@ -208,7 +220,7 @@ else:
 
 @njit(forceinline=True)
 def derive_state(t, y, seen, out, handle):
-    """Write to `seen` the values that functions read in place of the state, in models where both differ.
+    """Write to `seen` the values that functions read in place of the state, in models where the two differ.
 
     seen : array `seen` of the tables. If it is empty, only values that the right-hand side needs are computed.
     """
@@ -231,8 +243,8 @@ def run_job(job, t, y, dydt, out, handle):
 def rhs_in_turn(t, y, dydt, out, handle):
     """Call every function of the right-hand side in order: rates go to `dydt`, network values to `out`.
 
-    The functions read the states themselves, see `basins.cell_stretching`. If `dydt` is empty and `out` depends on
-    rates, the rates are computed in a work array.
+    The functions read the state y itself and not the values of `derive_state`, see `basins.cell_stretching`. If `dydt`
+    is empty and `out` depends on rates, the rates are computed in a work array.
     """
     tables = open_tables(handle)
     derive_state(t, y, y[:0], out, handle)

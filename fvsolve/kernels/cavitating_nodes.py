@@ -1,4 +1,4 @@
-"""Pressures and flows at nodes under the density law mixture, where a pipe end may hold a cavity.
+"""Pressures and flows at nodes under the density law `mixture`, where a pipe end may hold a cavity.
 
 Differences from `barotropic_nodes.py`: a shock or a rarefaction (`riemann.py`) leads from the state in the cells to the
 state at the end. A node has no effect on an end where the flow out of the pipe is supersonic. No pressure falls below
@@ -33,9 +33,10 @@ def end_side(st, floats, pipe, inside, v_in, p_node, still):
     """State at a pipe end, where h(p) + v^2 / 2 = h(p_node), with specific enthalpy h and velocity v.
 
     Returns the state (see `riemann.state_at`), its velocity towards the node [m/s], and the derivative of this velocity
-    by p_node [m/s/Pa].
+    with respect to p_node [m/s/Pa].
 
     inside, v_in : state extrapolated from the cells, and its velocity towards the node [m/s]
+    p_node : pressure of the node [Pa]
     still : True if the node is a tank, chamber or reservoir
 
     Where the flow runs into the node at more than half the speed of sound, or into a vessel at rest, the pressure of
@@ -66,12 +67,13 @@ def end_side(st, floats, pipe, inside, v_in, p_node, still):
 
 @njit
 def end_flow_of_state(st, floats, pipe, p_in, v_in, p_node, still):
-    """Flow from a pipe end into its node under the law mixture.
+    """Flow from a pipe end into its node under the density law `mixture`.
 
-    Returns the flow into the node [kg/s], its derivative by p_node [kg/s per Pa], and the mass per length at the end
-    [kg/m].
+    Returns the flow into the node [kg/s], its derivative with respect to p_node [kg/s per Pa], and the mass per length
+    at the end [kg/m].
 
     p_in, v_in : pressure [Pa] and velocity towards the node [m/s], extrapolated from the cells
+    p_node : pressure of the node [Pa]
     still : True if the node is a tank, chamber or reservoir
     """
     inside = state_at(st, floats, pipe, p_in)
@@ -84,9 +86,10 @@ def end_flow_of_state(st, floats, pipe, p_in, v_in, p_node, still):
 
 @njit
 def end_flow_cavitating(st, floats, pipe, m_inside, into_inside, p_node, still):
-    """Results of `end_flow_of_state` from other data of the cells.
+    """Results of `end_flow_of_state`, from mass per length and mass flow in the cells instead of pressure and velocity.
 
     m_inside, into_inside : mass per length [kg/m] and mass flow towards the node [kg/s], extrapolated from the cells
+    p_node, still : as for `end_flow_of_state`
     """
     p = pressure_of_mass(st, floats, pipe, m_inside)
     return end_flow_of_state(st, floats, pipe, p, into_inside / m_inside, p_node, still)
@@ -94,11 +97,12 @@ def end_flow_cavitating(st, floats, pipe, m_inside, into_inside, p_node, still):
 
 @njit
 def end_inflows_cavitating(out, tables, slope, final):
-    """Write the change of flow from pipes into every node since the start [kg/s] to out[net], at present pressures.
+    """Write for every node the change of the flow from its pipes since the start [kg/s] to out[net].
 
-    slope : float64[nodes]  receives the derivative of this flow by the pressure of the node [kg/s per Pa]
-    On entry out[ends] holds pressure and velocity [Pa, m/s], extrapolated from the cells to each end. If `final` is
-    True, they are replaced with the waves of the solved end states [kg/s].
+    The flows are those at the present pressures.
+    slope : float64[nodes]  receives the derivative of this flow with respect to the pressure of the node [kg/s per Pa]
+    On entry out[ends] holds pressure [Pa] and velocity [m/s] at each pipe end, extrapolated from the cells. If `final`
+    is True, they are replaced with the waves of the solved end states [kg/s].
     """
     st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
     pipes = tables.pipes
@@ -130,9 +134,10 @@ def bound_steps(sweep, out, tables, before, low, high):
 
     A cluster is a set of nodes that are solved together. The inflow of a node that is alone in its cluster falls as its
     pressure rises. So each step with a sure direction bounds the root on one side. After BISECTION_START sweeps the
-    interval is halved. Nodes of larger clusters are kept above the floor pressure, and take half steps after
-    BISECTION_START sweeps.
+    interval between the bounds is halved. Nodes of larger clusters are kept above the floor pressure, and take half
+    steps after BISECTION_START sweeps.
 
+    sweep : number of the Newton step, from 1
     before : float64[nodes]  pressure changes since the start, before the step [Pa]
     low, high : float64[nodes]  bounds of the pressures [Pa]
     """
@@ -166,9 +171,10 @@ def bound_steps(sweep, out, tables, before, low, high):
 
 @njit
 def reset_bounds(tables, low, high, first):
-    """Reset the pressure bounds of the nodes of clusters whose iteration begins.
+    """Reset the pressure bounds of the nodes in clusters whose Newton iteration begins.
 
-    It begins at the first sweep (`first` is True), and again after the search with lifted valves held wide open.
+    A cluster is a set of nodes that are solved together. Its iteration begins at the first sweep (`first` is True), and
+    again after the search in which lifted valves are held wide open.
     low, high : float64[nodes]  bounds of the pressures [Pa]
     """
     clusters, (_, change, _, _, _) = tables.clusters, cluster_work(tables)
@@ -181,9 +187,10 @@ def reset_bounds(tables, low, high, first):
 
 @njit
 def solve_nodes_cavitating(t, y, dydt, out, handle):
-    """Solve all nodes under the law mixture, as `solve_nodes_barotropic`, with pressures above the floor pressure.
+    """Solve all nodes under the density law `mixture`, with pressures above its floor pressure.
 
-    The iteration of a cluster (nodes solved together) ends when its pressures do not change.
+    The values written are those of `solve_nodes_barotropic`. The iteration of a cluster (nodes solved together) ends
+    when its pressures do not change.
     """
     tables = open_tables(handle)
     space, n, work = node_work(tables), tables.nodes.size, tables.scratch
@@ -208,8 +215,8 @@ def solve_nodes_cavitating(t, y, dydt, out, handle):
 def balance_junctions(t, y, dydt, out, handle):
     """Distribute the flow imbalance of each junction over its pipe ends in proportion to their mass: mass is conserved.
 
-    An imbalance above rounding is a failure at a junction full of liquid. Where a cavity lies, the demand may exceed
-    the inflow, because no flow towards the junction can be faster than sound.
+    The waves at the ends, in `out`, are changed. An imbalance above rounding is a failure at a junction full of liquid.
+    Where a cavity lies, the demand may exceed the inflow: no flow towards the junction can be faster than sound.
     """
     tables = open_tables(handle)
     layout, nodes, pipes, profile = tables.layout[0], tables.nodes, tables.pipes, tables.profile

@@ -1,4 +1,4 @@
-"""Rates and cavity records of pipes under the density law mixture, where cavities open and close.
+"""Rates and cavity records of pipes under the density law `mixture`, where cavities open and close.
 
 m_t + M_x = 0, M_t + (M^2 / m + F)_x = -drag - m g slope, with mass per length m [kg/m], mass flow M [kg/s], area A and
 F the integral of A dp [N]. Pressure and velocity are reconstructed from both sides of a face. The flux is that of the
@@ -23,7 +23,7 @@ DRY = 1e-8  # below it the velocity of a cell goes to zero with its content
 
 @njit
 def cell_state(st, floats, profile, pipe, i, r, l):
-    """(pressure, velocity) of cell i, then (pressure, velocity) of its initial steady state [Pa, m/s].
+    """(pressure [Pa], velocity [m/s] of cell i, pressure [Pa], velocity [m/s] of its initial steady state).
 
     r, l : forward and backward wave of the cells [kg/s]; profile : values of the initial steady state
     """
@@ -40,8 +40,9 @@ def cell_state(st, floats, profile, pipe, i, r, l):
 def extrapolate_ends(a, n):
     """Extrapolate values of n cells to a cell beyond each end of the pipe: write a[0] and a[n + 1].
 
-    The difference used is that between the second and the third cell from the end; a limiter compares it with the
-    difference between the first and the second cell and takes the smaller one.
+    The difference used is that between the second and the third cell from the end. The limiter of the scheme later
+    compares it with the difference between the first and the second cell.
+    a : float64[n + 2]  values of the cells in a[1] .. a[n]
     """
     near, far = min(2, n), min(3, n)
     a[0] = a[1] - (a[far] - a[near] if n > 2 else a[near] - a[1])
@@ -52,8 +53,9 @@ def extrapolate_ends(a, n):
 def fill_cells(st, floats, profile, pipe, first, r, l, p, v, dp, dv):
     """Write pressures and velocities of the cells from number `first` on, and of an extrapolated cell beyond each end.
 
-    p, v : float64[cells + 2]  pressure and velocity [Pa, m/s]
-    dp, dv : float64[cells + 2]  their changes since the initial steady state
+    r, l : forward and backward wave of all cells of the pipe [kg/s]; profile : values of the initial steady state
+    p, v : float64[n + 2]  receive pressure [Pa] and velocity [m/s] of n cells and of the two extrapolated cells
+    dp, dv : float64[n + 2]  receive their changes since the initial steady state
     """
     n = p.size - 2
     for i in range(n):
@@ -65,7 +67,10 @@ def fill_cells(st, floats, profile, pipe, first, r, l, p, v, dp, dv):
 
 @njit(forceinline=True)
 def face_value(st, a, k, ahead):
-    """Value at the face after cell k (ahead = 1) or before it (ahead = -1), reconstructed from cell values a."""
+    """Value at a face of cell k, reconstructed from the values a of cells.
+
+    ahead : 1 for the face after the cell, -1 for the face before it
+    """
     if st["scheme"] == UPWIND:
         return a[k]
     return value_muscl(st["limiter"], a[k - ahead], a[k], a[k + ahead])
@@ -73,9 +78,9 @@ def face_value(st, a, k, ahead):
 
 @njit
 def face_state(st, floats, profile, pipe, i, k, ahead, p, v, dp, dv):
-    """(pressure [Pa], velocity [m/s], True if both are initial steady values) at face i, reconstructed from cell k - 1.
+    """(pressure [Pa], velocity [m/s], True if both are initial steady values) at face i, from the cell on one side.
 
-    k : index of this cell in p, v, dp, dv, which start with the cell beyond the end (see `fill_cells`)
+    k : index of this cell in p, v, dp, dv, see `fill_cells`
     ahead : 1 if the face is after the cell, -1 if it is before it
 
     The reconstructed change is added to the steady pressure, except in two cases. First, if this would bring the gas
@@ -100,6 +105,7 @@ def face_state(st, floats, profile, pipe, i, k, ahead, p, v, dp, dv):
 def end_states(st, floats, profile, pipe, r, l, ends, scratch):
     """Extrapolate pressure and velocity from the cells to both ends of a pipe.
 
+    profile : values of the initial steady state
     r, l : float64[cells]  forward and backward wave [kg/s]
     ends : float64[4]  receives pressure and velocity at the `from` end, then at the `to` end [Pa, m/s]
     """
@@ -117,6 +123,7 @@ def end_states(st, floats, profile, pipe, r, l, ends, scratch):
 def pipe_rates_cavitating(st, floats, profile, pipe, r, l, ends, scratch, dr, dl):
     """Write d/dt of both waves of a pipe [kg/s2] to dr and dl; return its greatest wave rate (|v| + c) / dx [1/s].
 
+    v, c : velocity and wave speed; dx : length of a cell; profile : values of the initial steady state
     r, l : float64[cells]  forward and backward wave [kg/s]
     ends : float64[4]  waves at the ends [kg/s]: forward and backward at `from`, then at `to`
     """
@@ -153,9 +160,9 @@ def pipe_rates_cavitating(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
 
 @njit
 def end_flux(st, floats, profile, pipe, i, r, l):
-    """(mass flow [kg/s], momentum flux [N]) at end face i as changes since the initial steady state.
+    """(mass flow [kg/s], momentum flux [N]) at end face i, as changes since the initial steady state.
 
-    r, l : forward and backward wave at this face [kg/s]
+    r, l : forward and backward wave at this face [kg/s]; profile : values of the initial steady state
     """
     if r == 0.0 and l == 0.0:
         return 0.0, 0.0
@@ -166,7 +173,7 @@ def end_flux(st, floats, profile, pipe, i, r, l):
 
 @njit
 def outgoing_states_cavitating(t, y, dydt, out, handle):
-    """Extrapolate pressure and velocity [Pa, m/s] from the cells to both ends of every pipe, into out[ends]."""
+    """Extrapolate pressure [Pa] and velocity [m/s] from the cells to both ends of every pipe, into out[ends]."""
     tables = open_tables(handle)
     st, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
     floats, profile, scratch = tables.floats, tables.profile, tables.scratch
@@ -194,7 +201,7 @@ def rates_cavitating(t, y, dydt, out, handle):
 
 @njit
 def record_cavity(t, pipe, r, l, at, tables):
-    """Record the cavities of a pipe in marks[at : at + 3].
+    """Record the cavities of a pipe in three entries of `marks`, from index `at` on.
 
     The entries are: position of the first cavity (fraction of the length), greatest volume [m3], time of this volume
     [s].

@@ -1,10 +1,10 @@
 """Junctions of rigid columns whose valves are all closed: balance of flows, pressures, impulses.
 
-No flow leaves a junction of this kind, so the flows of its columns into it add up to zero, and its pressure P keeps
-them so: sum of (A / L) (P_far - P) = sum of friction terms, with area A, length L and pressure P_far at the far end of
-each column. Flows M that do not add up are equalised by an impulse J [Pa s] of pressure, dM = (A / L) J away from the
-junction: momentum is conserved (an inelastic impact). The rounding of the sum is removed in the same way. Columns
-controlled by valves have a given flow here.
+No flow leaves such a junction, so the flows of its columns into it add up to zero. Its pressure P keeps them so: sum of
+(A / L) (P_far - P) = sum of friction terms, with area A, length L and pressure P_far at the far end of each column.
+Flows M that do not add up are equalised by an impulse J [Pa s] of pressure, dM = (A / L) J away from the junction:
+momentum is conserved (an inelastic impact). The rounding of the sum is removed in the same way. Columns controlled by
+valves have a given flow here.
 """
 
 from math import sqrt
@@ -34,9 +34,9 @@ def opens_by_event(tables, out, k):
 
 @njit
 def gate_area(tables, out, i):
-    """Present and full flow area of the valves at node i, as sums of square roots of conductances [kg/s/Pa^0.5].
+    """(present, full) flow area of the valves at node i, as sums of square roots of conductances [kg/s/Pa^0.5].
 
-    The second sum leaves out air valves and valves that only an event opens.
+    The second sum leaves out air valves, and closed valves that only an event opens.
     """
     node, area, full = tables.nodes[i], 0.0, 0.0
     for e in range(node["gate_count"]):
@@ -49,7 +49,7 @@ def gate_area(tables, out, i):
 
 @njit
 def is_column_junction(tables, out, i):
-    """True if at least two rigid columns join at node i and nothing else flows there."""
+    """True if node i joins at least two rigid columns, and otherwise only closed valves."""
     node = tables.nodes[i]
     return node["gates"] >= 0 and node["columns"] > 1 and gate_area(tables, out, i)[0] == 0.0
 
@@ -86,8 +86,8 @@ def driving_offset(tables, out, column):
 def pressure_at(tables, out, i, extra, solved):
     """Pressure change of node i since the start [Pa].
 
-    If nodes are not `solved` yet, the value of a junction is an estimate from the waves of its pipes and `extra` inflow
-    [kg/s].
+    If nodes are not `solved` yet, the value of a junction is an estimate: the change of its inflow at unchanged
+    pressure plus `extra` [kg/s], over the admittance of its pipes; 0 without pipes.
     """
     layout, node = tables.layout[0], tables.nodes[i]
     if node["kind"] != JUNCTION or solved:
@@ -97,9 +97,9 @@ def pressure_at(tables, out, i, extra, solved):
 
 @njit
 def has_pressure_reference(tables, out, i, k, seen):
-    """True if rigid columns other than k join junction i to a node that is not a column junction, also indirectly.
+    """True if rigid columns other than k join junction i, also through column junctions, to a node of another kind.
 
-    Columns that valves control are left out.
+    A column junction joins rigid columns and otherwise only closed valves. Columns that valves control are left out.
     seen : float64[nodes]  work array; 1 for the nodes that these columns join
     """
     columns, controlled = tables.columns, tables.layout[0]["valve_controlled"]
@@ -122,7 +122,8 @@ def has_pressure_reference(tables, out, i, k, seen):
 def is_pinned(tables, out, i, seen):
     """True if column junction i is the first of a connected group in which no node sets the level of pressure.
 
-    The pressure of a pinned junction is held. seen : float64[nodes]  work array
+    A column junction joins rigid columns and otherwise only closed valves. The pressure of the first one of such a
+    group is held. seen : float64[nodes]  work array
     """
     if has_pressure_reference(tables, out, i, -1, seen):
         return False
@@ -165,8 +166,8 @@ def number_junctions(tables, out):
 def assemble_junctions(tables, out, n, k):
     """Assemble the matrix for the pressures of n column junctions: sums of A / L of their columns [m].
 
-    Valve-controlled columns and column k (-1: none) are left out. Clears the right-hand side and marks pinned
-    junctions. A : area, L : length of a column
+    A, L : area and length of a column. Columns that valves control and column k (-1: none) are left out. The right-hand
+    side is cleared, and junctions whose pressure is held (`is_pinned`) are marked; arrays : see `junction_work`.
     """
     rows, seen, matrix, right, pinned, _ = junction_work(tables, n)
     columns, controlled = tables.columns, tables.layout[0]["valve_controlled"]
@@ -190,7 +191,10 @@ def assemble_junctions(tables, out, n, k):
 
 @njit
 def assemble_with_given(tables, out, n):
-    """Call `assemble_junctions`, and copy the flow rates of valve-controlled columns [kg/s2] to the right-hand side."""
+    """Call `assemble_junctions`, and copy the flow rates of valve-controlled columns [kg/s2] to the right-hand side.
+
+    n : number of column junctions; the rates are read from `given`, see `junction_work`
+    """
     assemble_junctions(tables, out, n, -1)
     _, _, _, right, _, given = junction_work(tables, n)
     for r in range(n):
@@ -201,7 +205,8 @@ def assemble_with_given(tables, out, n):
 def solve_junctions(tables, out, n):
     """Solve the linear equations of n column junctions; the solution replaces the right-hand side in scratch.
 
-    The solution of a pinned junction is its value on the right-hand side. STATUS is NO_SOLUTION for a singular matrix.
+    The solution of a junction with held pressure (`is_pinned`) is its value on the right-hand side. STATUS is set to
+    NO_SOLUTION for a singular matrix.
     """
     _, _, matrix, right, pinned, _ = junction_work(tables, n)
     for r in range(n):
@@ -214,7 +219,7 @@ def solve_junctions(tables, out, n):
 
 @njit
 def value_at(rows, right, i):
-    """Entry of `right` for node i, 0 if it is not a column junction; rows : see `junction_work`."""
+    """Entry of `right` for node i, 0 if the node is not a column junction; rows : see `junction_work`."""
     return right[int(rows[i])] if rows[i] >= 0.0 else 0.0
 
 
@@ -256,9 +261,9 @@ def gate_inflow(tables, i):
 
 @njit
 def add_flow_sums(tables, out, rows, right):
-    """Add the sum of the flows of columns into each column junction [kg/s] to `right`; exactly zero at the start.
+    """Add the sum of the flows of columns into each column junction [kg/s] to `right`; it is exactly zero at the start.
 
-    rows : see `junction_work`
+    rows, right : see `junction_work`
     """
     nodes, columns, at = tables.nodes, tables.columns, tables.layout[0]["column"]
     for i in range(rows.size):
@@ -277,9 +282,9 @@ def add_flow_sums(tables, out, rows, right):
 def add_column_rates(y, tables, out, n, skip, solved):
     """Add d/dt of the flows of columns into n column junctions [kg/s2] to the right-hand side of their equations.
 
-    The rates are those at unchanged junction pressures. Valve-controlled columns and column `skip` are left out. Before
-    nodes are `solved`, flows come from the state and pressures are estimates. The entry of a pinned junction becomes
-    its pressure change since the start [Pa].
+    The rates are those at unchanged junction pressures. Valve-controlled columns and column `skip` (-1: none) are left
+    out. Before nodes are `solved`, flows follow from the state and pressures are estimates. The entry of a junction
+    with held pressure (`is_pinned`) becomes its pressure change since the start [Pa].
     """
     rows, _, _, right, pinned, _ = junction_work(tables, n)
     layout, columns = tables.layout[0], tables.columns
@@ -304,8 +309,9 @@ def add_column_rates(y, tables, out, n, skip, solved):
 
 @njit
 def far_end_pressure(y, tables, out, k, end, solved):
-    """Pressure change at the far end of column k at constant flow [Pa], and its fall per d/dt of this flow [Pa s2/kg].
+    """(pressure change at the far end of column k at constant flow [Pa], its fall per d/dt of this flow [Pa s2/kg]).
 
+    The change is counted since the start of the run.
     end : 1 if the near end is the `to` end, -1 if it is the `from` end
     solved : True if the pressures of nodes are solved, False if they are estimates
     """

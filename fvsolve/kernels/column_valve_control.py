@@ -7,10 +7,10 @@ decelerating pressure (L / A) dI/dt = (L / A) sum of dF/dt sqrt(dP). dP is the d
 area of the column. When the last valve closes, no flow is possible: the column is stationary, and the node has the
 pressure of its far end.
 
-A column also follows a disc that leaves its seat, if this disc is its only outlet, or the stem of a regulating valve.
-Lift x and flow M start as powers of time, and dP = M^2 / (G x^2), there 0 / 0, would relax at an infinite rate. Until x
-has grown, dP drives both: (L / A) sqrt(G dP) dx/dt(dP) + dP = the stationary drop. The momentum of the column is
-conserved.
+A column whose only outlet is a self-acting valve follows its disc that leaves the seat, or the stem of a regulating
+valve near its seat. Lift x and flow M start as powers of time, and dP = M^2 / (G x^2), there 0 / 0, would relax at an
+infinite rate. Until x has grown, dP drives both: (L / A) sqrt(G dP) dx/dt(dP) + dP = the stationary drop. The momentum
+of the column is conserved.
 """
 
 from math import sqrt
@@ -40,8 +40,8 @@ RATE_INTERVAL = 1e-7  # interval over which the rate of an area is measured [s]
 def is_controlled(tables, out, i):
     """True if the valves at node i control the flow of the rigid column there.
 
-    The node joins a single column and valves. All valves are closed, or they are nearly closed with known rates of
-    area, or the only valve is near its seat.
+    The node joins a single column and valves. All valves are closed, or they are nearly closed and the rates of their
+    areas are known, or the only valve is near its seat.
     """
     node = tables.nodes[i]
     if node["gates"] < 0 or node["columns"] > 1:
@@ -70,7 +70,8 @@ def area_rate_known(tables, out, i):
 def find_control_end(tables, out, k):
     """End of rigid column k at which valves control its flow: 1 for `to`, -1 for `from`, 0 for none.
 
-    If the far end is a column junction, it must have a pressure reference besides this column.
+    If the far end is a column junction, it must have a pressure reference besides this column
+    (`has_pressure_reference`).
     """
     column, marks = tables.columns[k], tables.scratch[: tables.nodes.size]
     for side in (1, -1):
@@ -104,7 +105,7 @@ def stationary_pressure(y, tables, out, k, end, solved):
     """Pressure change since the start at the controlled end of column k, as if the column were at rest [Pa].
 
     The second result is the fall of this pressure per d/dt of the flow [Pa s2/kg].
-    end : 1 or -1, the controlled end is the `to` or `from` end
+    end : 1 if the controlled end is the `to` end, -1 if it is the `from` end
     solved : True if the pressures of nodes are solved, False if they are estimates
     """
     column = tables.columns[k]
@@ -115,11 +116,11 @@ def stationary_pressure(y, tables, out, k, end, solved):
 
 @njit
 def lift_drop(drop, still, slope, heavy):
-    """Drop across a valve disc that controls a column [Pa], and the rate dx/dt of its lift x [1/s], by Newton.
+    """(drop across a valve disc that controls a column [Pa], rate dx/dt of its lift x [1/s]), by Newton.
 
     The drop is r^2, with the root r of r^2 + heavy r dx/dt(r^2) = drop.
     drop : drop with the column at rest [Pa]; still : dx/dt at this drop [1/s]
-    slope : derivative of dx/dt by the drop [1/s/Pa]
+    slope : derivative of dx/dt with respect to the drop [1/s/Pa]
     heavy : (L / A) sqrt(G), with length L and area A of the column, and conductance G of the valve at full lift
     Newton starts above the root, because the cubic is convex from its greatest root on.
     """
@@ -146,7 +147,7 @@ def seating_valve(tables, i):
 
 @njit
 def seating_drop(t, y, tables, out, k, index, stationary, inertia, other, drop):
-    """Drop across valve `index`, which controls column k near its seat [Pa], and the rate dx/dt of its lift [1/s].
+    """(drop across valve `index`, which controls column k near its seat [Pa], rate dx/dt of its lift x [1/s]).
 
     stationary : pressure change since the start at the controlled end, as if the column were at rest [Pa]
     inertia : pressure per d/dt of the flow, L / A of the column or more [Pa s2/kg]
@@ -168,14 +169,14 @@ def seating_drop(t, y, tables, out, k, index, stationary, inertia, other, drop):
 
 @njit
 def relaxed_root(y, tables, out, k, index, way, root, slope, heavy):
-    """Square root of the valve drop for a fixed time step that does not resolve the exchange of lift and flow.
+    """Square root r of the valve drop for a fixed time step that does not resolve the exchange of lift and flow.
 
-    r = r0 + (M / sqrt(G) - x r0) / max(x, x1), x1 = 2 h 2 r0 (1 / heavy + r0 slope), with `root` r0, flow M, lift x,
-    conductance G at full lift and step h. M relaxes to x sqrt(G) r0 over at least two steps, and not faster than by
-    itself. The sum x / slope + (L / A) M is not changed by this.
+    r = r0 + (M / sqrt(G) - x r0) / max(x, x1), x1 = 4 h r0 (1 / heavy + r0 slope), with `root` r0, flow M, lift x,
+    conductance G at full lift and step h. M relaxes to x sqrt(G) r0 over at least two steps, and not faster than
+    without this correction. The sum x / slope + (L / A) M, with length L and area A of column k, is not changed by it.
 
-    slope, heavy : see `lift_drop`
-    way : 1 if the flow of the column from `from` to `to` passes the valve in its own direction, else -1
+    index : number of the valve; slope, heavy : see `lift_drop`
+    way : 1 if the flow of the column from `from` to `to` passes the valve in the valve's own direction, else -1
     """
     dense, column = tables.valves[index]["conductance"], tables.columns[k]
     x = sqrt(conductance(tables, out, index) / dense)
@@ -186,7 +187,10 @@ def relaxed_root(y, tables, out, k, index, way, root, slope, heavy):
 
 @njit
 def seating_flow(t, y, tables, out, k, end, index, solved):
-    """Results of `controlled_flow` for column k, which valve `index` controls near its seat."""
+    """Results of `controlled_flow` for column k, which valve `index` controls near its seat.
+
+    end, solved : as for `controlled_flow`
+    """
     valve, column = tables.valves[index], tables.columns[k]
     side = 1.0 if valve["from_node"] == (column["to_node"] if end == 1 else column["from_node"]) else -1.0
     stationary, inertia = stationary_pressure(y, tables, out, k, end, solved)
@@ -200,9 +204,9 @@ def seating_flow(t, y, tables, out, k, end, index, solved):
 
 @njit
 def gate_flow(t, tables, out, x, p, solved):
-    """Flow out of node x through its valves [kg/s], and the rate of this flow by the change of their areas [kg/s2].
+    """(flow out of node x through its valves [kg/s], its rate from changes of their areas [kg/s2], slope of this rate).
 
-    The third result is the derivative of this rate by the pressure [kg/s2/Pa].
+    The slope is the derivative of the rate with respect to the pressure of the node [kg/s2/Pa].
     p : pressure change of the node since the start [Pa]
     solved : True if the pressures of nodes are solved, False if they are estimates
     """
@@ -221,7 +225,10 @@ def gate_flow(t, tables, out, x, p, solved):
 
 @njit
 def zero_flow_pressure(tables, out, x, index, solved):
-    """Pressure change of node x since the start [Pa] at which there is no flow through its valve `index`."""
+    """Pressure change of node x since the start [Pa] at which there is no flow through its valve `index`.
+
+    solved : True if the pressures of nodes are solved, False if they are estimates
+    """
     valve = tables.valves[index]
     side = 1.0 if valve["from_node"] == x else -1.0
     other = pressure_at(tables, out, valve["to_node"] if side > 0.0 else valve["from_node"], 0.0, solved)
@@ -230,7 +237,7 @@ def zero_flow_pressure(tables, out, x, index, solved):
 
 @njit
 def zero_flow_range(tables, out, x, solved):
-    """(least, greatest) `zero_flow_pressure` of all valves of node x [Pa]."""
+    """(least, greatest) result of `zero_flow_pressure` for all valves of node x [Pa]."""
     least, most = 1e300, -1e300
     for e in range(tables.nodes[x]["gate_count"]):
         level = zero_flow_pressure(tables, out, x, tables.integers[tables.nodes[x]["gates"] + e], solved)
@@ -240,11 +247,12 @@ def zero_flow_range(tables, out, x, solved):
 
 @njit
 def opening_pressure(t, tables, out, x, stationary, inertia, solved):
-    """Pressure change since the start of node x, whose valves open and control a column [Pa], by bounded Newton.
+    """Pressure change of node x since the start [Pa] while its opening valves control a column, by bounded Newton.
 
-    It is the only root p of p - stationary + inertia rate(p) = 0, with the rate of `gate_flow`.
+    It is the only root p of p - stationary + inertia rate(p) = 0, with the rate of flow in the results of `gate_flow`.
     stationary : pressure change as if the column were at rest [Pa]
     inertia : pressure per d/dt of the flow [Pa s2/kg]
+    solved : True if the pressures of nodes are solved, False if they are estimates
     """
     low, high = zero_flow_range(tables, out, x, solved)
     low, high, p = min(low, stationary), max(high, stationary), stationary
@@ -263,12 +271,13 @@ def opening_pressure(t, tables, out, x, stationary, inertia, solved):
 
 @njit
 def closing_pressure(t, tables, out, x, way, start, stationary, inertia, solved):
-    """(pressure change since the start of node x, whose valves close on a flow [Pa], True if a root exists).
+    """(pressure change of node x since the start while its closing valves control a column [Pa], True if it exists).
 
+    It is a root p of p - stationary + inertia rate(p) = 0 with the flow direction `way`, as in `opening_pressure`. The
+    left side is convex there, and flows tend to the outermost root.
     way : direction of the flow, 1 out of the node, -1 into it
     start : pressure at which Newton starts, outside all roots [Pa]
-    stationary, inertia : see `opening_pressure`
-    p - stationary + inertia rate(p) is convex there; flows tend to its outermost root.
+    stationary, inertia, solved : see `opening_pressure`
     """
     p = start
     for _ in range(200):
@@ -285,9 +294,9 @@ def closing_pressure(t, tables, out, x, way, start, stationary, inertia, solved)
 
 @njit
 def controlled_pressure(t, tables, out, x, own, stationary, inertia, solved):
-    """Pressure change since the start [Pa] of node x, whose valves control a column that brings the flow `own` [kg/s].
+    """Pressure change of node x since the start [Pa] while its valves control the flow of a column.
 
-    stationary, inertia : see `opening_pressure`
+    own : flow of the column into the node by its state [kg/s]; stationary, inertia, solved : see `opening_pressure`
     Closing valves may allow a flow in either direction: the direction of the present flow is tried first.
     """
     flow, rate, _ = gate_flow(t, tables, out, x, stationary, solved)
@@ -312,9 +321,9 @@ def controlled_pressure(t, tables, out, x, own, stationary, inertia, solved):
 def controlled_rate(t, y, tables, out, k, end):
     """d/dt of the flow of column k out of its end that valves control [kg/s2]; the flow keeps its direction.
 
-    At the switch to valve control the state has an error of about 1 %. Below the fraction SWITCH_LOSS of the flow it is
-    relaxed to zero instead of changing sign.
-    end : 1 or -1, the controlled end is the `to` or `from` end
+    At the switch to valve control the state has an error of about 1 %. Below the fraction SWITCH_LOSS of the flow at
+    the switch, the flow is relaxed to zero instead of changing its sign.
+    end : 1 if the controlled end is the `to` end, -1 if it is the `from` end
     """
     flow, rate, _ = controlled_flow(t, y, tables, out, k, end, True)
     column = tables.columns[k]
@@ -327,10 +336,10 @@ def controlled_rate(t, y, tables, out, k, end):
 
 @njit
 def controlled_flow(t, y, tables, out, k, end, solved):
-    """Flow of column k out of its controlled end [kg/s], d/dt of this flow [kg/s2], pressure change of the end [Pa].
+    """(flow of column k out of its controlled end [kg/s], d/dt of this flow [kg/s2], pressure change of the end [Pa]).
 
-    The pressure change is relative to the start.
-    end : 1 or -1, the controlled end is the `to` or `from` end
+    The pressure change is that since the start.
+    end : 1 if the controlled end is the `to` end, -1 if it is the `from` end
     solved : True if the pressures of nodes are solved, False if they are estimates
     """
     column, limit = tables.columns[k], tables.clock[0]["limit"]

@@ -17,8 +17,9 @@ COMPILE_TIME_LOOP = "from fvsolve.steppers.time_loop import compiled; compiled()
 
 
 class Functions:
-    """Compiled functions of a model: `rhs`, `observe`, `record`, `events`, and `energies`, compiled at first use.
+    """Compiled functions of a model: `rhs`, `observe`, `record`, `events`, and `energies` (compiled at first use).
 
+    cast : features of the model, which decide on its functions
     calls : int64[jobs, n]  addresses of functions, a row for each job
     hooks : int64[laws, hooks]  addresses of the functions of parts' laws; the handle of a model contains both arrays
     """
@@ -55,7 +56,7 @@ class Functions:
                     row[HOOK[hook]] = calls.function_address(function, calls.HOOKS[hook][0])
 
     def compile_job(self, job: int, functions: list, in_turn):
-        """Store the addresses of all functions of a job; return `in_turn`, compiled, which calls them in turn."""
+        """Store the addresses of all functions of a job; return the compiled `in_turn`, which calls them in order."""
         self.store_addresses(job, functions)
         return calls.compile_as(in_turn, calls.ARGUMENTS[job].lower())
 

@@ -69,9 +69,9 @@ def observe_devices(t, y, out, handle, values):
 
 @njit
 def record_devices(t, y, out, handle, values):
-    """Record the first time at which each device leaves the range of validity of its law.
+    """Record the first time at which each device leaves the range of validity of its law, in `marks`.
 
-    Temporary violations, which end by themselves, are recorded apart from others.
+    Temporary violations, which end by themselves, have entries of their own.
     """
     tables = open_tables(handle)
     marks, devices = tables.marks, tables.devices

@@ -7,7 +7,7 @@ LEAST = 1e-300
 
 @njit(forceinline=True)
 def event_pair(tables, g, at, left):
-    """Write `left` and -`left` to g[at] and g[at + 1], event functions for the switch from a rule to another and back.
+    """Write `left` and -`left` to g[at] and g[at + 1], the event functions of the switch between two rules.
 
     left : distance to the end of the first rule, negative while it holds (armed[at] > 0) and positive while the second
         rule holds. Zero becomes a tiny number beyond the end of the present rule, so that the switch takes place.

@@ -9,7 +9,10 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def begin_lumped(t, y, dydt, out, handle):
-    """Do the work of `begin_network` and `known_pressures_linear` in a single call, for models without pipes."""
+    """Do the work of `begin_network` and `known_pressures_linear` in a single call, for models without pipes.
+
+    It clears outputs, writes conductances of restrictions and known pressures, and adds given flows into junctions.
+    """
     tables = open_tables(handle)
     clear_outputs(out, tables)
     open_scheduled(t, out, tables)

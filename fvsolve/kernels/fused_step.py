@@ -55,8 +55,9 @@ def fused_block(t, h, pipe, index, at, r, l, r_new, l_new, tables):
 def fused_step_linear(t, h, y, y_new, out, handle, values):
     """Advance y by the step h to y_new at time t, by the upwind scheme and Euler; update `out`, probes and records.
 
-    On entry `out` holds the solved nodes of y. For models whose states are pipes alone, without friction or with a
-    given friction factor. STATUS is NOT_FINITE if a value is not finite.
+    On entry `out` holds the solved nodes of y. The function is valid for models whose states are only those of pipes,
+    without friction or with a given friction factor. `values` receives the values of probes. STATUS is set to
+    NOT_FINITE if a value is not finite.
     """
     tables = open_tables(handle)
     pipes, pad, bad = tables.pipes, tables.scratch[:4], 0

@@ -18,7 +18,7 @@ GHOSTS = 3
 
 
 def solve_fractions(matrix, right):
-    """Matrix product right matrix^-1 as lists of floats, computed exactly in fractions."""
+    """Matrix product `right` times the inverse of `matrix`, computed exactly in fractions, as lists of floats."""
     n = len(matrix)
     rows = [list(row) + [Fraction(int(i == j)) for j in range(n)] for i, row in enumerate(matrix)]
     for i in range(n):
@@ -40,8 +40,8 @@ def cell_averages(cell, degree):
 def end_weights():
     """Weights of cells in the value of a wave at a pipe end and in three ghost cells beyond it, by polynomial degree.
 
-    Three arrays, nearest cell first: end value [degree, cell]; ghost cells where the wave leaves [degree, ghost, cell];
-    ghost cells where it enters [degree, ghost, k], with the end value as k = 0 and then cells.
+    Returns three arrays, nearest cell first: end value [degree, cell]; ghost cells where the wave leaves [degree,
+    ghost, cell]; ghost cells where it enters [degree, ghost, k], with the end value as k = 0 and then cells.
     """
     value = np.zeros((MAX_DEGREE + 1, MAX_DEGREE + 1))
     leaving = np.zeros((MAX_DEGREE + 1, GHOSTS, MAX_DEGREE + 1))
@@ -61,7 +61,7 @@ END_VALUE, END_LEAVING, END_ENTERING = end_weights()
 
 
 def difference_rows(weights, degree):
-    """Weights of cells in the difference F[i] - F[i+1] of face values, for a linear scheme; see `dtypes.SETTINGS`.
+    """(inside, enter, leave) : weights in the difference F[i] - F[i+1] of face values F, for a linear scheme.
 
     inside : [6]  for cell i inside a pipe: weights of cells i-3 .. i+2
     enter : [3, 6]  for the three cells at the end where the wave enters: weights of the end value and of five cells
@@ -106,9 +106,10 @@ def end_degree(degree, n):
 
 @njit
 def roughness(d1, d2, d3, d4, small):
-    """Smoothness indicator of cell values, from 0 (smooth) to 1 (a jump): high undivided differences over low ones.
+    """Smoothness indicator of cell values, from 0 (smooth) to 1 (a jump).
 
-    d1, d2 : low differences; d3, d4 : high differences; small : square of a negligible difference
+    d1, d2 : undivided differences of low order; d3, d4 : of high order; small : square of a negligible difference
+    The indicator rises with the ratio of the squares of high differences to those of low differences.
     """
     ratio = 4.0 * (d3 * d3 + d4 * d4) / (d1 * d1 + d2 * d2 + small)
     return ratio * ratio / (1.0 + ratio * ratio)

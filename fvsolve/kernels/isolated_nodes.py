@@ -52,9 +52,10 @@ def total_pressure(tables, out, i):
 
 @njit
 def leak_balance(cluster, tables, out, g, group, number, level):
-    """Sum of sqrt|dP| of leaks into a group of isolated nodes at the potential `level` [Pa].
+    """(sum of sqrt|dP| of the leaks into a group of isolated nodes, least, greatest potential outside the group [Pa]).
 
-    Two more results: the least and greatest potential P [Pa] behind the closed valves of the group.
+    The group has the potential `level` [Pa]. dP is the drop of a closed valve between the group and another node;
+    outflow counts as negative. The potentials are those of the nodes behind these valves.
     g : conductances of the valves of the cluster (nodes solved together), 0 if closed
     group, number : group number of each node, and number of this group
     """
@@ -75,7 +76,7 @@ def leak_balance(cluster, tables, out, g, group, number, level):
 
 @njit
 def group_by_open_valves(cluster, tables, g, group):
-    """Write the same group number to group[i] for all isolated nodes i that open valves join to each other.
+    """Write the same number to group[i] for all isolated nodes i that open valves join to each other.
 
     g : conductances of the valves of the cluster (nodes solved together); -1 marks an open valve at isolated nodes
     """
@@ -129,8 +130,8 @@ def isolated_pressures(cluster, tables, out, g, connected, group):
 def check_demand(cluster, tables, out, c, connected, group, scale):
     """Set STATUS to NO_SOLUTION if a group of isolated nodes has a demand.
 
-    c : float64[n]  given inflow of the nodes of the cluster [kg/s]; scale : flow to which rounding is relative [kg/s]
-    connected, group : see `isolated_pressures`
+    c : float64[n]  given inflow of the nodes of the cluster (nodes solved together) [kg/s]
+    scale : flow relative to which a demand counts as rounding [kg/s]; connected, group : see `isolated_pressures`
     """
     for number in range(group.size):
         total = 0.0

@@ -22,7 +22,7 @@ def minmod(a, b):
 
 @njit
 def van_leer(a, b):
-    """Van Leer limiter as (numerator, denominator): harmonic mean 2 a b / (a + b), zero for unequal signs (1974)."""
+    """Van Leer limiter (1974) as (numerator, denominator): harmonic mean 2 a b / (a + b), zero for unequal signs."""
     ab = a * b
     alike = ab > LEAST
     return 2.0 * ab if alike else 0.0, a + b if alike else 1.0
@@ -30,9 +30,9 @@ def van_leer(a, b):
 
 @njit
 def monotonized_central(a, b):
-    """Monotonized central limiter as (numerator, denominator), for two differences (van Leer 1977).
+    """Monotonized central limiter (van Leer 1977) as (numerator, denominator), for two differences.
 
-    The central difference, at most twice the smaller difference; zero for differences of unequal sign.
+    It is the central difference, but at most twice the smaller difference, and zero for differences of unequal sign.
     """
     s = a if abs(a) < abs(b) else b
     c = 0.5 * (a + b)
@@ -42,20 +42,23 @@ def monotonized_central(a, b):
 
 @njit
 def unknown_limiter(a, b):
-    """Result for an unknown limiter code: NaN."""
+    """Not-a-number as (numerator, denominator), for an unknown limiter code."""
     return nan, 1.0
 
 
 @njit
 def slope(limiter, a, b):
-    """Slope by a limiter function from two differences."""
+    """Slope from two differences by the function `limiter`: quotient of its results (numerator, denominator)."""
     numerator, denominator = limiter(a, b)
     return numerator / denominator
 
 
 @njit
 def half_slopes(limiter, a, b, c, d):
-    """(half slope from the differences a and b, half slope from c and d) by a limiter, with a single division."""
+    """(half slope from the differences a and b, half slope from c and d) by the function `limiter`.
+
+    Both are computed with a single division.
+    """
     (p, s), (q, t) = limiter(a, b), limiter(c, d)
     r = 1.0 / (s * t)
     return 0.5 * p * (t * r), 0.5 * q * (s * r)

@@ -1,4 +1,4 @@
-"""Power and stored energy of every part under the linear density law.
+"""Power and stored energy of every part under the density law `linear`.
 
 P = p - p_ambient + rho g z is the potential [Pa], z the elevation above datum. A mass flow M at a port carries the
 power P M / rho. A pipe of area A and wave speed c stores A P^2 / (2 rho c^2) + M^2 / (2 rho A) per length. A chamber of
@@ -15,7 +15,7 @@ COLUMN : inflow of power, friction, rate of stored energy
 MASS : rate of stored energy
 BRACE : power absorbed by a spring or damper, or supplied by a force
 STOP : rate of stored energy, loss
-PISTON : leak, friction, residual of the linear law where a volume changes
+PISTON : loss of the leak, friction, residual of the density law where a volume changes
 
 Entries of `stored` [J]: each node; kinetic and elastic (with potential) energy of each pipe, or energy of the forward
 and the backward wave of a delay line; each column, mass, brace, stop.
@@ -39,9 +39,9 @@ MAX_WIDTH = 5  # cells of the widest polynomial
 
 
 def point_weights():
-    """Interpolation weights of w neighbouring cells in the value at the Gauss points of their cell i.
+    """Weights of cell averages in the value of a polynomial at Gauss points : float64[w, i, point, cell].
 
-    float64[w, i, point, cell], from averages of cells to values of the polynomial through them
+    The polynomial has the averages of w neighbouring cells; the Gauss points are those of cell i among them.
     """
     weights = np.zeros((MAX_WIDTH + 1, MAX_WIDTH, 3, MAX_WIDTH))
     for w in range(1, MAX_WIDTH + 1):
@@ -58,7 +58,10 @@ POINTS = point_weights()
 
 @njit
 def polynomial_width(settings, n):
-    """Number of cells of the polynomial for averages of squares: 1 below order three, else the order of the scheme."""
+    """Number of cells of the polynomial from which squares are averaged, for a pipe of n cells.
+
+    It is 1 below order three, otherwise the order of the scheme, and at most n.
+    """
     family, width = scheme_family(settings, n), 1
     if family == WENO5:
         width = MAX_WIDTH
@@ -102,7 +105,7 @@ def height_pressure(st, node):
 def pipe_power(st, pipe, start, r, l, dr, dl, rows):
     """Write dissipation by friction to rows[1], zero to rows[2] and the rate of stored energy to rows[3] of a pipe [W].
 
-    start : potential P of the initial steady state at the `from` end [Pa]
+    rows : entries of the pipe in `power`; start : potential P of the initial steady state at the `from` end [Pa]
     r, l : float64[cells]  forward and backward wave [kg/s]
     dr, dl : float64[cells]  d/dt of both waves [kg/s2]
     """
@@ -142,7 +145,7 @@ def pipe_energy(st, pipe, start, r, l, rows):
 
 @njit
 def power_linear(t, y, dydt, out, handle, power):
-    """Fill `power` [W] for every part under the linear law, from a state, its rates and the values in `out`."""
+    """Fill `power` [W] for every part under the density law `linear`, from a state, its rates and `out`."""
     tables = open_tables(handle)
     st, layout, nodes, pipes = tables.settings[0], tables.layout[0], tables.nodes, tables.pipes
     valves, columns, per = tables.valves, tables.columns, 1.0 / tables.settings[0]["rho"]
@@ -189,7 +192,7 @@ def power_linear(t, y, dydt, out, handle, power):
 def power_masses(t, y, dydt, out, tables, power, at):
     """Write the power entries [W] of masses, then of springs, dampers and forces, then of stops, from power[at] on.
 
-    Returns the index after them. The entries are listed at the top of this file.
+    Returns the index after them. The entries of each part are listed at the top of this file.
     """
     layout, masses, braces, stops = tables.layout[0], tables.masses, tables.braces, tables.stops
     armed = tables.armed
@@ -234,10 +237,10 @@ def piston_side(tables, piston, side):
 
 @njit
 def power_pistons(y, dydt, out, tables, power, at):
-    """Write leak loss, friction and residual of the linear law of each piston [W] to power[at] and following entries.
+    """Write three powers of each piston [W] from power[at] on: loss of the leak, friction, residual of the density law.
 
-    Also write the rate of energy stored in the chambers: V p^2 / (2 beta), with volume V and gauge pressure p, and
-    potential energy of the mass.
+    Also write the rate of energy stored in the chambers to the entries of their nodes: that of V p^2 / (2 beta), with
+    volume V, gauge pressure p and bulk modulus beta, and of the potential energy of the mass.
     """
     st, layout, nodes, pistons = tables.settings[0], tables.layout[0], tables.nodes, tables.pistons
     per = 1.0 / st["rho"]
@@ -264,7 +267,7 @@ def power_pistons(y, dydt, out, tables, power, at):
 
 @njit
 def stored_linear(t, y, dydt, out, handle, stored):
-    """Fill `stored` with the energy changes of every part since the start [J] under the linear law."""
+    """Fill `stored` with the energy changes of every part since the start [J] under the density law `linear`."""
     tables = open_tables(handle)
     st, layout, nodes, pipes = tables.settings[0], tables.layout[0], tables.nodes, tables.pipes
     columns, pistons, per = tables.columns, tables.pistons, 1.0 / tables.settings[0]["rho"]
@@ -306,7 +309,10 @@ def stored_linear(t, y, dydt, out, handle, stored):
 
 @njit
 def tank_energy(st, floats, node, rho, change):
-    """Change of the potential energy g z m of a tank by a `change` of its mass [J]: integral of g (z + level) dm."""
+    """Change of the potential energy of a tank by a `change` of its mass [kg]: integral of g (z + level) dm [J].
+
+    z : elevation of its bottom above datum; rho : density [kg/m3]
+    """
     level, z = node["level"], node["elevation"] - st["datum"]
     if node["shape"] < 0:
         return st["gravity"] * change * (z + level + 0.5 * change / (rho * node["area"]))

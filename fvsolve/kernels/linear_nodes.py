@@ -37,7 +37,7 @@ def stored_pressures(t, y, out, tables):
 
 @njit(forceinline=True)
 def junction_flows(t, out, tables):
-    """Add the change of given flow into each junction since the start to out[net]; write its demand to out[supply].
+    """Add the change since the start of the given flow into each junction to out[net]; write its demand to out[supply].
 
     The demand is written as a negative supply. out[net] then holds the change of inflow at unchanged pressure of the
     junction [kg/s].
@@ -52,7 +52,10 @@ def junction_flows(t, out, tables):
 
 @njit
 def known_pressures_linear(t, y, dydt, out, handle):
-    """Write pressure changes of nodes with storage or given pressure [Pa], and given flows into junctions [kg/s]."""
+    """Write pressure changes since the start [Pa] of nodes with storage or given pressure, and demands of junctions.
+
+    The change of given flow into each junction [kg/s] is added to out[net], see `junction_flows`.
+    """
     tables = open_tables(handle)
     stored_pressures(t, y, out, tables)
     junction_flows(t, out, tables)
@@ -60,7 +63,7 @@ def known_pressures_linear(t, y, dydt, out, handle):
 
 @njit(forceinline=True)
 def solve_free_nodes(out, tables):
-    """Write the pressure changes of junctions without valves [Pa]: sum of inflows over admittance of their pipes."""
+    """Write the pressure changes of junctions without valves [Pa]: change of inflow over admittance of the pipes."""
     layout, nodes = tables.layout[0], tables.nodes
     for i in range(nodes.size):
         if nodes[i]["kind"] == JUNCTION and nodes[i]["solve"] == ALONE:
@@ -77,9 +80,10 @@ def valve_side(out, layout, nodes, i):
 
 @njit(forceinline=True)
 def solve_single_valves(out, tables):
-    """Solve every valve whose end nodes without storage join no other valve: its flow and the pressures of these nodes.
+    """Solve the flow of every valve outside clusters, and the pressures of its end nodes without storage.
 
-    The root has a closed form, or bounded Newton finds it if the law of the valve has a laminar part.
+    These nodes join no other valve. The root has a closed form, or bounded Newton finds it if the law of the valve has
+    a laminar part.
     """
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
     for k in range(valves.size):

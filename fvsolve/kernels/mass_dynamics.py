@@ -3,8 +3,8 @@
 First the pressures of moving chambers and the flows swept by their pistons are computed, then the fluid, then forces
 and accelerations. The state of a chamber is its excess mass e: its mass minus the mass in its present volume V at the
 initial density m0 / V0. So the pressure itself is integrated, not a small difference of two large masses: p - p0 = beta
-e / (rho0 V) under the linear density law, ln(rho / rho_0) = ln(1 + e V0 / (m0 V)) under log and table. The index 0
-marks initial values. For a piston between points of bodies the state is the mass itself, which a closed chamber
+e / (rho0 V) under the density law `linear`, ln(rho / rho_0) = ln(1 + e V0 / (m0 V)) under `log` and `table`. The index
+0 marks initial values. For a piston between points of bodies the state is the mass itself, which a closed chamber
 conserves to the last bit. The force of a spring, stop or piston follows from its change of length (travel) in `out`: on
 the axis from the positions of two masses, between bodies from two points, written by
 `kernels.mechanism.force_elements`. Its two masses are then the same fixed frame, on which the net force is zero.
@@ -131,7 +131,8 @@ def chamber_state(tables, node, volume, excess):
 def excess_of(y, tables, piston, i, sweep, x):
     """Excess mass of chamber i [kg]: its mass minus the mass in its present volume at the initial density.
 
-    It is the state of the chamber. Between points of bodies the state is the mass that has entered.
+    It is the state of the chamber. If the piston joins points of bodies, the state is instead the mass that has
+    entered, from which the swept mass is subtracted.
     sweep : swept mass per travel [kg/m]; x : travel of the piston since the start [m]
     """
     state = y[tables.nodes[i]["y"]]
@@ -142,7 +143,9 @@ def excess_of(y, tables, piston, i, sweep, x):
 def piston_chambers(t, y, dydt, out, handle):
     """Write pressure and stiffness of moving chambers, and the flow that piston and leak take from each, to `out`.
 
-    Pressure change since the start [Pa], stiffness dp/dm [Pa/kg], flow [kg/s].
+    The values are the pressure change since the start [Pa], the stiffness dp/dm [Pa/kg], and the flow [kg/s], which
+    contains only the change of the leak since the start. A piston between points of bodies takes no flow, because the
+    state of its chambers is their mass. First, `write_travels` writes the travels of force elements between masses.
     """
     tables = open_tables(handle)
     layout, nodes, pistons = tables.layout[0], tables.nodes, tables.pistons
@@ -311,7 +314,7 @@ def observe_masses(t, y, out, handle, values):
 
 @njit
 def record_masses(t, y, out, handle, values):
-    """Record the first time at which a piston leaves its stroke."""
+    """Record the first time at which each piston leaves its stroke, in `marks`."""
     tables = open_tables(handle)
     marks, pistons = tables.marks, tables.pistons
     first = tables.pipes.size + 3 * tables.nodes.size + tables.columns.size

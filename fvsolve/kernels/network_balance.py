@@ -32,7 +32,10 @@ def begin_network(t, y, dydt, out, handle):
 
 @njit
 def begin_basins(t, y, dydt, out, handle):
-    """Clear the outputs of a model of basins without links: there is no flow between nodes."""
+    """Clear the outputs of a model that has basins but no links, and so no flow between nodes.
+
+    out[RATE] is set to the greatest constant wave rate of the model [1/s].
+    """
     tables = open_tables(handle)
     clear_outputs(out, tables)
     out[RATE] = tables.settings[0]["rate"]
@@ -97,7 +100,10 @@ def stored_rates(y, dydt, out, tables):
 
 @njit(forceinline=True)
 def node_rate_limit(out, tables):
-    """Greatest rate that limits the step [1/s]: of waves through cells, or of a stored mass with pipes at its node."""
+    """Greatest rate that limits the step [1/s]: of waves through cells, or of stored masses at the ends of pipes.
+
+    The rate of a stored mass is its stiffness times the admittance of the pipes at its node.
+    """
     layout, nodes = tables.layout[0], tables.nodes
     rate = tables.settings[0]["rate"]
     for i in range(nodes.size):
@@ -117,7 +123,11 @@ def balance_network(t, y, dydt, out, handle):
 
 @njit
 def valve_rate_limit(t, y, dydt, out, handle):
-    """Raise out[RATE] to the greatest rate [1/s] at which the masses of two nodes equalise through a valve."""
+    """Raise out[RATE] to the greatest rate [1/s] at which the flow through a valve equalises the pressures at its ends.
+
+    The rate is also high enough that a step does not pass a drop of zero. Valves of vessels are left out, because their
+    devices set a rate.
+    """
     tables = open_tables(handle)
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
     rate = out[RATE]

@@ -1,4 +1,4 @@
-"""Clusters, sets of nodes without storage that several valves join: Newton on pressures and flows, linear density law.
+"""Clusters, nodes without storage that several valves join: Newton on pressures and flows, density law `linear`.
 
 Valve from node i to node j: M |M| = G (dp0 + p_i' - p_j'), with flow M [kg/s], conductance G and initial drop dp0.
 Node: c_i - Y_i p_i' = flow that leaves it through valves, with the other inflow c_i at p_i' = 0 and the admittance Y_i
@@ -106,8 +106,9 @@ def add_valve(i, j, m, a, s, lift, n, matrix, right):
 
     i, j : numbers in the cluster (nodes solved together), -1 for a known pressure
     m : flow [kg/s]
-    a, s : terms of its change, dM = a + s d(drop) [kg/s, kg/s/Pa]
-    lift : derivative of the flow by the upstream pressure at constant drop [kg/s/Pa]
+    a, s : terms of the change of this flow, dM = a + s d(drop) [kg/s, kg/s/Pa]
+    lift : derivative of the flow with respect to the upstream pressure at constant drop [kg/s/Pa]
+    matrix, right : float64[n * n], float64[n]  equations, to which the terms of the valve are added
     """
     if i >= 0:
         right[i] -= m + a
@@ -265,7 +266,10 @@ def solve_cluster(out, tables, index):
 
 @njit
 def has_backflow(cluster, tables, m):
-    """True if a valve of a cluster that upstream pressure lifts carries backflow; m : flows of its valves [kg/s]."""
+    """True if a lifted valve of a cluster, opened by its upstream pressure, has a negative flow.
+
+    cluster : nodes that are solved together; m : flows of its valves [kg/s]
+    """
     for e in range(m.size):
         if has_lifted_backflow(tables, tables.integers[cluster["first_valve"] + e], m[e]):
             return True
@@ -274,7 +278,7 @@ def has_backflow(cluster, tables, m):
 
 @njit
 def close_unstable(cluster, tables, g, m):
-    """Close lifted valves that carry backflow and cannot stay open (g = 0); True if there are any.
+    """Close lifted valves with negative flow, which cannot stay open (g = 0); returns True if there are such valves.
 
     g, m : conductances and flows of the valves of a cluster (nodes solved together)
     Newton, which starts from wide open valves, has reached a matrix with a negative determinant: at smaller lifts the
@@ -334,7 +338,10 @@ def write_cluster(cluster, tables, out, g, m, c, connected, group, change):
 
 @njit
 def solve_clusters(t, y, dydt, out, handle):
-    """Solve the pressures of all clusters (nodes without storage that several valves join) and their valve flows."""
+    """Solve the pressures of clusters (nodes without storage that several valves join) and their valve flows.
+
+    Clusters with a stored inverse matrix are left to `delay_lines.line_rates`.
+    """
     tables = open_tables(handle)
     for k in range(tables.clusters.size):
         if tables.clusters[k]["inverse"] < 0:

@@ -42,7 +42,10 @@ def cell_value(y, tables, q, p, i):
 
 @njit(forceinline=True)
 def end_cell(tables, p, right, k):
-    """Index of the k-th cell from the `from` (0) or `to` (1) end of pipe p; the last cell if there are fewer."""
+    """Index of cell k from the end of pipe p: its `from` end (right = 0) or its `to` end (right = 1).
+
+    k is 0 for the end cell. If there are fewer cells, it is the index of the last one.
+    """
     n = tables.pipes[p]["cells"]
     k = min(k, n - 1)
     return n - 1 - k if right == 1 else k
@@ -92,8 +95,8 @@ def end_conductance(y, tables, q, p, right):
 def pipe_inflows(y, out, tables, q, amount, weight, cells, count):
     """Sum the inflows of scalar q from pipes into every node.
 
-    amount, weight : float64[nodes]  amount of scalar [kg/s], and mass flow plus diffusive conductance [kg/s]
-    cells, count : float64[nodes]  sum and number of the values in pipe cells beside the node
+    amount, weight : float64[nodes]  receive amount of scalar, and mass flow plus diffusive conductance [kg/s]
+    cells, count : float64[nodes]  receive the sum and the number of the values in pipe cells beside the node
     """
     pipes, edge = tables.pipes, tables.layout[0]["edge"]
     for i in range(amount.size):
@@ -129,7 +132,7 @@ def has_storage(kind):
 
 @njit(forceinline=True)
 def mixes(y, out, tables, i):
-    """True if the value of a scalar at node i is that of the present inflow: the node has no volume, or is dry."""
+    """True if the value of a scalar at node i is that of the present inflow: the node is a junction or a dry tank."""
     node = tables.nodes[i]
     if not has_storage(node["kind"]):
         return node["kind"] == JUNCTION
@@ -141,6 +144,7 @@ def mixes(y, out, tables, i):
 def start_values(t, y, out, tables, q, amount, weight, cells, count):
     """Write the values of scalar q at all nodes, as far as they do not depend on other nodes.
 
+    A junction or a dry tank, whose value is that of its inflow, gets the mean of the pipe cells beside it at first.
     amount, weight, cells, count : sums of `pipe_inflows`; a supply from outside is added to the first two
     """
     nodes, layout, scalar = tables.nodes, tables.layout[0], tables.scalars[q]
@@ -197,7 +201,7 @@ def mix_nodes(t, y, out, tables, q):
 
 @njit(forceinline=True)
 def record_loss(out, tables, q, k, lost):
-    """Subtract the decay `lost` [kg/s] of state k of scalar q from the ledger, the record of losses for balances.
+    """Subtract the decay `lost` [kg/s] of state k of scalar q from its entries in the record of gains and losses.
 
     A scalar has a single entry there, or an entry for each state.
     """

@@ -27,7 +27,8 @@ STOP_HERE = -2.0  # in out[WHERE]: the run must end
 def wave_sum(probe, pipe, sign, index, y, out, tables):
     """r + sign l at a probe of a pipe [kg/s], with forward wave r, backward wave l and sign 1 or -1.
 
-    At an end from the node, inside from a polynomial over cells. index : number of the pipe
+    At a pipe end it is computed from the waves of the solved node, inside the pipe from a polynomial through cells.
+    index : number of the pipe
     """
     at = tables.layout[0]["ends"] + 4 * index
     if probe["side"] < 0:
@@ -85,7 +86,7 @@ def update_extremes(envelope, c, t, value):
 
 @njit(forceinline=True)
 def count_new_extremes(r, l, least, greatest):
-    """(number of cells with r + l below `least`, number above `greatest`); NaN counts as below and above.
+    """(number of cells with r + l below `least`, number with r + l above `greatest`); NaN counts as below and above.
 
     r, l : forward and backward wave of cells [kg/s]; their sum is a measure of the pressure change
     """
@@ -133,7 +134,10 @@ def update_maxima(t, r, l, greatest, t_greatest):
 
 @njit
 def count_below(r, l, boiling):
-    """Number of cells below vapour pressure: sum of the waves r + l below `boiling` [kg/s]."""
+    """Number of cells below vapour pressure, where the sum of the waves r + l is below `boiling` [kg/s].
+
+    r, l : forward and backward wave of cells [kg/s]; boiling : float64[cells]  values of r + l at vapour pressure
+    """
     count = 0
     for i in range(r.size):
         count += (r[i] + l[i]) < boiling[i]
@@ -162,7 +166,7 @@ def update_envelope(t, r, l, at, low, high, index, tables):
 
 @njit
 def record_pipe(t, r, l, pipe, index, tables):
-    """Update the envelope of r + l of pipe number `index`; most blocks have no new extreme and are only compared.
+    """Update the envelope of r + l of pipe number `index`; blocks of cells without a new extreme are only compared.
 
     r, l : float64[cells]  forward and backward wave [kg/s]; their sum is a measure of the pressure change
     """
@@ -188,10 +192,11 @@ def record_pipes(t, y, out, handle, values):
 
 @njit
 def record_nodes(t, y, out, handle, values):
-    """Update extremes of probes and first times of low pressures and tank limits, after an accepted step.
+    """Update extremes of probes, and first times of low pressures and tank limits, after an accepted step.
 
     Runs after `record_pipes`. The array `marks` holds the first times [s] at which pipes, then nodes, are below vapour
-    pressure, tanks are dry, tanks spill; NaN for never.
+    pressure, tanks are dry, tanks spill; NaN for never. If the case requires it, a pressure below vapour pressure ends
+    the run: out[WHERE] is set.
     """
     tables = open_tables(handle)
     pipes, nodes, extremes = tables.pipes, tables.nodes, tables.extremes
@@ -219,7 +224,7 @@ def record_nodes(t, y, out, handle, values):
 def tank_events(t, y, out, handle, g):
     """Write the event functions of tanks at bottom and rim to g.
 
-    At a limit they need the net flow, so nodes are solved first.
+    At a limit they depend on the net flow, so nodes are solved first.
     """
     tables = open_tables(handle)
     # event functions of devices have solved the nodes

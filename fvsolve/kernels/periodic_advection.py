@@ -10,7 +10,7 @@ from fvsolve.kernels.table_handle import open_tables
 def rhs_periodic(t, y, dydt, out, handle):
     """Write du_j/dt = F[j] - F[j+1] for values u of cells in a ring, with face values F of a forward wave.
 
-    The wave passes a cell per unit of time; `noise` of the pipe record is the small number of WENO.
+    The wave passes a cell per unit of time. `noise` of the pipe record is the small number of WENO.
     scratch : float64[2 n + 7]  window of values, then face values
     """
     tables = open_tables(handle)

@@ -16,7 +16,10 @@ from fvsolve.kernels.unsteady_friction.relaxation_terms_barotropic import add_un
 
 @njit
 def read_forces(dydt, tables, values):
-    """Write the force of the fluid on the pipe [N] for every force probe: - sum of dM/dt dx over cells, mass flow M."""
+    """Write the force of the fluid on the pipe [N] for every force probe: - sum over cells of dM/dt dx, mass flow M.
+
+    dydt : d/dt of the states, which contains that of the waves in cells
+    """
     for k in range(tables.probes.size):
         probe = tables.probes[k]
         if probe["kind"] == PIPE_FORCE:
@@ -29,7 +32,7 @@ def read_forces(dydt, tables, values):
 
 @njit
 def observe_forces_linear(t, y, out, handle, values):
-    """Write the forces of the fluid on pipes [N] to `values`, under the linear law."""
+    """Write the forces of the fluid on pipes [N] to `values`, under the density law `linear`."""
     tables = open_tables(handle)
     at = tables.layout[0]["forces"]
     dydt = tables.work[at : at + y.size]
@@ -40,7 +43,7 @@ def observe_forces_linear(t, y, out, handle, values):
 
 @njit
 def observe_forces_barotropic(t, y, out, handle, values):
-    """Write the forces of the fluid on pipes [N] to `values`, under the laws log and table."""
+    """Write the forces of the fluid on pipes [N] to `values`, under the density laws `log` and `table`."""
     tables = open_tables(handle)
     at = tables.layout[0]["forces"]
     dydt = tables.work[at : at + y.size]
@@ -51,7 +54,7 @@ def observe_forces_barotropic(t, y, out, handle, values):
 
 @njit
 def observe_forces_cavitating(t, y, out, handle, values):
-    """Write the forces of the fluid on pipes [N] to `values`, under the law mixture, with cavities."""
+    """Write the forces of the fluid on pipes [N] to `values`, under the density law `mixture`, with cavities."""
     tables = open_tables(handle)
     at = tables.layout[0]["forces"]
     dydt = tables.work[at : at + y.size]

@@ -75,7 +75,10 @@ def both_faces(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, fr, fl):
 
 @njit
 def rates_from_faces(k, fr, fl, dr, dl):
-    """Write d/dt of forward and backward wave (dr, dl) from face values fr, fl, no friction; k = wave speed / dx."""
+    """Write d/dt of forward and backward wave (dr, dl) without friction, from their face values fr and fl.
+
+    k : wave speed over cell length [1/s]
+    """
     for i in range(dr.size):
         dr[i] = -k * (fr[i + 1] - fr[i])
         dl[i] = k * (fl[i + 1] - fl[i])
@@ -83,7 +86,10 @@ def rates_from_faces(k, fr, fl, dr, dl):
 
 @njit
 def convolve(e0, e1, e2, e3, e4, e5, c, d):
-    """d[i] = sum of e_k c[i+k], in pairs from the outside in, so that the mirror image has the same bits."""
+    """Write the sums d[i] = sum over j of e_j c[i+j].
+
+    Terms are added in pairs from the outside in, so that mirrored arguments give the mirrored result to the bit.
+    """
     c1, c2, c3, c4, c5 = c[1:], c[2:], c[3:], c[4:], c[5:]
     for i in range(d.size):
         d[i] = (e0 * c[i] + e5 * c5[i]) + ((e1 * c1[i] + e4 * c4[i]) + (e2 * c2[i] + e3 * c3[i]))
@@ -93,7 +99,7 @@ def convolve(e0, e1, e2, e3, e4, e5, c, d):
 def rates_linear(settings, k, backward, c, datum, edge, d):
     """Write k (F[i] - F[i+1]) along a wave to d, by a linear scheme with face values F, from its cells c.
 
-    k : wave speed / dx [1/s]; backward : 1 for the backward wave; there must be at least five cells
+    k : wave speed / dx [1/s]; backward : 1 for the backward wave; c must have at least five cells
     datum : value of the wave at the end where it enters [kg/s]; edge : float64[5]  work array
     """
     n, inside, enter, leave = c.size, settings["inside"], settings["enter"], settings["leave"]
@@ -121,9 +127,10 @@ def subtract_friction(k, flow, loss, base, r, l, dr, dl):
     """Subtract the friction loss |M| M minus the initial steady drag from the rates of both waves.
 
     dr, dl : float64[cells]  rates; on entry -k and k times the differences of face values [kg/s2], k = wave speed / dx
+    r, l : float64[cells]  forward and backward wave [kg/s]
     flow : initial steady mass flow [kg/s]; base : half of the initial steady drag [kg/s2]
     loss : coefficient of |M| M [1/kg], M : mass flow
-    Averaged over two Gauss points of a cell: fourth order, and no kink of the law is missed.
+    The friction is averaged over two Gauss points of a cell: fourth order, and no kink of the law is missed.
     """
     half, spread = 0.25 * loss, GAUSS / k
     for i in range(r.size):
@@ -139,7 +146,7 @@ def subtract_friction(k, flow, loss, base, r, l, dr, dl):
 def subtract_friction_rough(k, pipe, base, r, l, dr, dl):
     """Subtract friction as `subtract_friction` does, with a friction factor that follows from the wall roughness.
 
-    k : wave speed / dx [1/s]; base : half of the initial steady drag [kg/s2]
+    k : wave speed / dx [1/s]; base : half of the initial steady drag [kg/s2]; r, l, dr, dl : see `subtract_friction`
     """
     loss, rough = pipe["loss"], pipe["rough"]
     e, reynolds, flow, spread = pipe["roughness"], pipe["reynolds"], pipe["flow"], GAUSS / k
@@ -159,6 +166,7 @@ def subtract_friction_hazen(k, flow, loss, rough, base, r, l, dr, dl):
 
     M (M^2 + 1.852 d^2)^0.426 is the mean of |M|^0.852 M over M - d and M + d with a relative error of 0.43 (d/M)^4. M
     is the mass flow at the centre of a cell, M - d and M + d are its values at the Gauss points.
+    rough : coefficient of |M|^0.852 M; other arguments as for `subtract_friction`
     """
     spread, half, quarter = GAUSS / k, 0.5 * rough, 0.25 * loss
     for i in range(r.size):
@@ -205,7 +213,7 @@ def pipe_rates(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, dr, dl):
     """Write d/dt of forward and backward wave of a pipe to dr and dl, from its cells and four wave values at its ends.
 
     r, l : float64[cells]  waves of cells [kg/s]
-    r_in, l_out : forward and backward wave at the `from` end; r_out, l_in : at the `to` end
+    r_in, l_out : forward and backward wave at the `from` end [kg/s]; r_out, l_in : at the `to` end
     """
     n = r.size
     k = pipe["speed"] / pipe["dx"]

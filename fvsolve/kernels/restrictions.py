@@ -42,9 +42,9 @@ def restriction_step(tables, out, k, g, m, drop, denser, wide):
 
     m, drop : present flow [kg/s] and drop [Pa]
     g : present conductance [kg2/s2/Pa], above zero
-    denser : upstream density over reference density, 1 under the linear law
-    wide : True to start with wide open restrictions where pressure lifts them; where two flows are possible, Newton
-        then comes from above
+    denser : upstream density over reference density, 1 under the density law `linear`
+    wide : True to treat restrictions that a pressure lifts as wide open, which is the start of Newton; where two
+        flows are possible, Newton then reaches the root with the greater lift
     """
     valve = tables.valves[k]
     if valve["hooks"] >= 0:
@@ -54,7 +54,10 @@ def restriction_step(tables, out, k, g, m, drop, denser, wide):
 
 @njit
 def root_step(tables, k, g, m, drop, denser):
-    """(a, s) of `restriction_step` for the square-root law M |M| = G dp, flow M, conductance G, drop dp."""
+    """(a, s) of `restriction_step` for the square-root law M |M| = G dp, flow M, conductance G, drop dp.
+
+    Arguments as for `restriction_step`.
+    """
     valve, g = tables.valves[k], g * denser
     if drop < 0.0:
         g *= valve["back"]
@@ -71,7 +74,10 @@ def root_step(tables, k, g, m, drop, denser):
 
 @njit
 def head_drop(tables, out, k):
-    """(density at the `from` end [kg/m3], this density times the drop of specific energy over restriction k [Pa])."""
+    """(density at the `from` end [kg/m3], this density times the drop of specific energy over restriction k [Pa]).
+
+    Under the density law `linear` the second result is the drop of P = p + rho g z.
+    """
     st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
     valve = tables.valves[k]
     i, j = valve["from_node"], valve["to_node"]
@@ -86,7 +92,7 @@ def head_drop(tables, out, k):
 
 @njit
 def restriction_slope(tables, out, k, drop):
-    """Derivative of the flow of restriction k by its drop, at a drop [Pa], [kg/s/Pa]."""
+    """Derivative d flow / d drop of restriction k [kg/s/Pa], at the drop `drop` [Pa]."""
     valve, g = tables.valves[k], conductance(tables, out, k)
     if valve["hooks"] >= 0:
         return call_slope(tables.hooks[valve["hooks"], SLOPE], out, tables, k, g, drop)
@@ -95,7 +101,7 @@ def restriction_slope(tables, out, k, drop):
 
 @njit
 def root_slope(tables, k, g, drop):
-    """`restriction_slope` for the square-root law with conductance g [kg2/s2/Pa]."""
+    """Result of `restriction_slope` for the square-root law with conductance g [kg2/s2/Pa]."""
     valve = tables.valves[k]
     if drop < 0.0:
         g *= valve["back"]
@@ -104,7 +110,10 @@ def root_slope(tables, k, g, drop):
 
 @njit
 def is_lifted(tables, k):
-    """True if pressure lifts restriction k by its law: it is neither closed (flag 0) nor fully open (flag 2)."""
+    """True if a pressure can lift restriction k by its law: the restriction is neither closed nor fully open.
+
+    Its flags armed[event] and armed[event + 2] are zero.
+    """
     valve = tables.valves[k]
     if valve["hooks"] < 0 or tables.hooks[valve["hooks"], LIFT] == 0:
         return False
@@ -114,9 +123,9 @@ def is_lifted(tables, k):
 
 @njit
 def restriction_lift(tables, out, k, g, drop, denser, wide):
-    """Derivative of the flow of restriction k by its upstream pressure at constant drop [kg/s/Pa].
+    """Derivative of the flow of restriction k with respect to its upstream pressure at constant drop [kg/s/Pa].
 
-    It is 0 if pressure does not lift the restriction. Arguments as in `restriction_step`.
+    It is 0 if no pressure lifts the restriction. Arguments as for `restriction_step`.
     """
     if not is_lifted(tables, k):
         return 0.0
@@ -143,5 +152,8 @@ def restriction_events(t, y, out, handle, g):
 
 @njit
 def step_at(hook, out, handle, k, g, m, drop, denser):
-    """(a, s) of `restriction_step` by the compiled function `hook` of its law, for calls from Python."""
+    """(a, s) of `restriction_step` by the compiled function `hook` of its law, for calls from Python.
+
+    Other arguments as for `restriction_step`, with `wide` False.
+    """
     return call_step(hook, out, open_tables(handle), k, g, m, drop, denser, False)

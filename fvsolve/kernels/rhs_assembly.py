@@ -18,8 +18,9 @@ KERNELS = "fvsolve.kernels"
 
 @dataclass(frozen=True)
 class RhsTerms:
-    """Functions that a component adds to a model, as `module: function`, "" for none; phases come first, in order.
+    """Names of the functions that a component adds to a model: one for each phase of the right-hand side, and each job.
 
+    A name is "module: function", or "" for none. The fields of phases come first, in the order in which they run.
     package : package of the modules
     """
 
@@ -218,10 +219,13 @@ class ModelFeatures:
 
     family : kernels of the density law, "linear", "barotropic" or "cavitating"
     laws : names of the modules of parts' laws, in the order of the rows of `hooks`
+    lines : True if force elements join points of bodies
     basins, carried : terms of basins, and of the scalars that they carry; see `basins.basin_terms`
     alone : True if there are only basins, and no link
     bands : True if threads or processes step bands of the state
     boundary_exchange : True if several bands have an open boundary
+    forces : True if forces on pipes are probed
+    other fields : True if the model has such parts or properties
     """
 
     family: str
@@ -249,7 +253,7 @@ class ModelFeatures:
     forces: bool = False
 
     def components(self) -> Iterator[RhsTerms]:
-        """Terms of the model, in the order in which functions of a phase run."""
+        """Terms (`RhsTerms`) of all components of the model, in the order in which functions of a phase run."""
         if self.bands:
             yield BANDS
         if self.boundary_exchange:
@@ -310,11 +314,11 @@ class ModelFeatures:
         yield ALWAYS
 
     def modules(self) -> list:
-        """Modules of the laws of parts, loaded."""
+        """Loaded modules of the laws of parts, in the order of `laws`."""
         return [import_module(name) for name in self.laws]
 
     def packages(self) -> list[str]:
-        """Modules and packages that the model needs."""
+        """Names of the modules of laws, and of the packages with functions of basins, that the model needs."""
         return [*self.laws, *(member.package for member in self.basins)]
 
     def functions(self, *jobs: str) -> list:
@@ -329,6 +333,6 @@ class ModelFeatures:
 
 
 def load_function(home: str, name: str):
-    """Load a function by its `module: function` within the package `home`."""
+    """Load the function `name`, written "module: function", from the package `home`."""
     module, function = name.split(": ")
     return getattr(import_module(f"{home}.{module}"), function)

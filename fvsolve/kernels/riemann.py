@@ -1,4 +1,4 @@
-"""Riemann problem of a pipe under the law mixture: two states, and a wave to either side.
+"""Riemann problem of a pipe under the density law `mixture`: two states, and a wave to either side.
 
 Across a shock [v]^2 = [F] [-1 / m], with brackets for the differences of velocity v, pressure integral F (of A dp) and
 1 over mass per length m (Rankine-Hugoniot for mass and momentum); across a rarefaction dv = dp / (rho c). The law is
@@ -20,9 +20,10 @@ UNBOUNDED = 1e300
 
 @njit(forceinline=True)
 def isothermal_integral(st, compliance, x):
-    """Integral of sqrt((a + b / x + gas / x^2) / rho_ref) dx [m/s]: dp / (rho c) without the stretch of the wall.
+    """Integral of dp / (rho c) up to the gas pressure x [m/s], for isothermal gas and without the stretch of the wall.
 
-    x is the gas pressure, a = 1 / beta + compliance, b = compliance gas; closed form by sqrt(R), R = a x^2 + b x + gas.
+    It is the integral of sqrt((a + b / x + gas / x^2) / rho_ref) dx, with a = 1 / beta + compliance, b = compliance
+    gas, wall compliance [1/Pa] and `gas` of the settings. The closed form contains sqrt(a x^2 + b x + gas).
     """
     a, gas = 1.0 / st["beta"] + compliance, st["gas"]
     b = compliance * gas
@@ -33,9 +34,10 @@ def isothermal_integral(st, compliance, x):
 
 @njit
 def state_at(st, floats, pipe, p):
-    """State of a pipe at the pressure p [Pa], under the law mixture.
+    """State of a pipe at the pressure p [Pa], under the density law `mixture`.
 
-    Tuple of pressure [Pa], mass per length m [kg/m], integral of A dp [N], m c [kg/s], integral of dp / (rho c) [m/s].
+    It is the tuple (pressure [Pa], mass per length m [kg/m], integral of A dp [N], m c [kg/s], integral of dp / (rho c)
+    [m/s]), with the wave speed c. The last integral is 0 if the gas dissolves or is not isothermal.
     """
     m, dm = mass_of_pressure(st, floats, pipe, p)
     over = p - st["reference"]
@@ -53,7 +55,10 @@ def is_isothermal(st):
 
 @njit
 def stretch_factor(st, floats, pipe, p):
-    """Exact integrand of dp / (rho c) over that of `isothermal_integral` at a pressure; 1 for a rigid wall."""
+    """Ratio of 1 / (rho c) to the integrand of `isothermal_integral` at the pressure p [Pa]; 1 for a rigid wall.
+
+    rho : density; c : wave speed
+    """
     x = p - st["floor"]
     plain = 1.0 / st["beta"] + pipe["compliance"] + st["gas"] / x * (pipe["compliance"] + 1.0 / x)
     return sqrt(st["rho"] / plain) / impedance(st, floats, pipe, p)
@@ -63,7 +68,7 @@ def stretch_factor(st, floats, pipe, p):
 def rarefaction_change(st, floats, pipe, low, high):
     """Integral of dp / (rho c) between two states [m/s], the velocity change in a rarefaction.
 
-    low, high : states of `state_at`
+    rho : density; c : wave speed; low, high : states of `state_at`
     """
     if not is_isothermal(st):
         return velocity_change(st, floats, pipe, low[0], high[0])
@@ -76,9 +81,9 @@ def rarefaction_change(st, floats, pipe, low, high):
 
 @njit
 def wave_jump(st, floats, pipe, side, to):
-    """Velocity that a wave subtracts on its way from state `side` to state `to` [m/s], and its slope [m/s/Pa].
+    """(velocity that a wave subtracts on its way from state `side` to state `to` [m/s], its slope [m/s/Pa]).
 
-    The slope is the derivative by the pressure of `to`. side, to : states of `state_at`
+    The slope is the derivative with respect to the pressure of `to`. side, to : states of `state_at`
     """
     area = pipe["area"] * area_ratio(st, pipe["compliance"], to[0])
     if abs(to[0] - side[0]) <= NEAR * (to[0] - st["floor"]):
@@ -92,11 +97,11 @@ def wave_jump(st, floats, pipe, side, to):
 
 @njit
 def star_state(st, floats, pipe, left, v_l, right, v_r):
-    """State between the two waves of a Riemann problem, and its velocity after the left and after the right wave.
+    """(state between the two waves of a Riemann problem, its velocity behind the left wave, and behind the right wave).
 
     left, right : states of `state_at`; v_l, v_r : their velocities [m/s]
-    By Newton. Both resulting velocities are equal, except where the states part so fast that a vacuum remains between
-    them.
+    The solution is found by Newton. Both resulting velocities [m/s] are equal, except where the states part so fast
+    that a vacuum remains between them.
     """
     floor, low, high = st["floor"], st["floor"], UNBOUNDED
     both = right[3] * left[0] + left[3] * right[0] + left[3] * right[3] * (v_l - v_r) / pipe["area"]
@@ -122,9 +127,10 @@ def star_state(st, floats, pipe, left, v_l, right, v_r):
 
 @njit(forceinline=True)
 def intermediate_pressure(floor, low, high, p):
-    """Pressure between the bounds `low` and `high`, of which one may be unknown, by the ratio of gas pressures [Pa].
+    """Pressure between the bounds `low` and `high` [Pa]: geometric mean of their distances from the floor pressure.
 
-    floor : lowest pressure of the density law; p : present pressure, used where a bound is unknown
+    One of the bounds may be unknown; then p - floor is multiplied or divided by the factor FALL.
+    floor : floor pressure of the density law; p : present pressure [Pa]
     """
     if low <= floor:
         return floor + max(FALL * (p - floor), LEAST)
@@ -160,7 +166,7 @@ def sample_wave(st, floats, pipe, side, v0, end, v):
     """(mass per length m [kg/m], velocity [m/s], pressure integral F [N]) at a face from the wave between two states.
 
     side, v0 : state of `state_at` before the wave, and its velocity; end, v : state and velocity behind the wave
-    The wave runs left and leaves v >= 0 behind it.
+    The wave travels to the left; the velocity v behind it is not negative. F : integral of A dp
     """
     if end[0] > side[0]:
         if end[1] * v >= side[1] * v0 and end[1] > side[1]:
@@ -175,7 +181,7 @@ def sample_wave(st, floats, pipe, side, v0, end, v):
 
 @njit
 def face_flux(st, floats, pipe, p_l, v_l, p_r, v_r):
-    """Flux of mass M [kg/s] and of momentum M^2 / m + F [N] between a left and a right state.
+    """(flux of mass M [kg/s], flux of momentum M^2 / m + F [N]) at the face between a left and a right state.
 
     p_l, v_l, p_r, v_r : pressures [Pa] and velocities [m/s] of both states
     m : mass per length [kg/m]; F : integral of A dp [N]

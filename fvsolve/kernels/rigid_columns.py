@@ -1,6 +1,6 @@
 """Rigid columns, each with a single flow, which valves (`column_valve_control`) or junctions may control.
 
-Junctions of columns: `column_junctions`.
+The flows and pressures at junctions of columns are computed in `column_junctions`.
 """
 
 from fvsolve.jit import njit
@@ -48,6 +48,7 @@ def column_inflows(t, y, dydt, out, handle):
 def add_controlled_rates(t, y, tables, out, n):
     """Write d/dt of the flow that valve-controlled columns bring into each of n column junctions [kg/s2] to `given`.
 
+    A column junction joins rigid columns and otherwise only closed valves.
     `given` is a work array, see `column_junctions.junction_work`.
     """
     rows, _, _, _, _, given = junction_work(tables, n)
@@ -81,10 +82,10 @@ def junction_pressures(t, y, tables, out):
 
 @njit
 def column_pressures(t, y, dydt, out, handle):
-    """Write the pressures of column junctions, and of the column ends whose flow nearly closed valves control.
+    """Write the pressures of column junctions, and of the column ends at which nearly closed valves control the flow.
 
-    At the controlled end of a stationary column it is the pressure of the far end plus the weight between them. A flow
-    through a vanishing area would not determine it.
+    At the controlled end of a stationary column, the pressure is that of the far end plus the weight between them. A
+    flow through a vanishing area would not determine it.
     """
     tables = open_tables(handle)
     pressure = tables.layout[0]["pressure"]
@@ -98,7 +99,7 @@ def column_pressures(t, y, dydt, out, handle):
 
 @njit
 def column_rates(t, y, dydt, out, handle):
-    """Write d/dt of the flow in rigid columns [kg/s2] to `dydt`, under the linear law."""
+    """Write d/dt of the flow in rigid columns [kg/s2] to `dydt`, under the density law `linear`."""
     tables = open_tables(handle)
     columns, pressure = tables.columns, tables.layout[0]["pressure"]
     for k in range(columns.size if dydt.size > 0 else 0):
@@ -112,9 +113,10 @@ def column_rates(t, y, dydt, out, handle):
 def column_rate(t, y, tables, out, k, change):
     """d/dt of the flow of column k [kg/s2]: (A / L) (change of driving pressure) - (drag - initial steady drag).
 
+    A, L : area and length of the column
     change : change of the pressure difference and of the body force along it since the start [Pa]
-    The rate of a stationary or valve-controlled column follows from its valves. If a valve controls it near its seat,
-    the node pressure beside the valve contains this and the general formula holds.
+    If valves control the column, the rate follows from them. For a valve near its seat the general formula holds,
+    because the pressure of the node beside the valve already contains its effect.
     """
     column, end = tables.columns[k], control_end(tables, out, k)
     node = column["to_node"] if end == 1 else column["from_node"]
@@ -129,7 +131,8 @@ def column_rate_limit(t, y, dydt, out, handle):
     """Raise out[RATE] to the greatest rate [1/s] at which valves alone brake a column, (A / L) dp / dM.
 
     A, L : area and length of the column; dp / dM : slope of the drop of its valves over their flow
-    Clears out[CLOSING]; discs, which are evaluated later, write there how fast they close on a column.
+    Columns that valves control are left out. Clears out[CLOSING]; discs, which are evaluated later, write there how
+    fast they close on a column.
     """
     tables = open_tables(handle)
     out[CLOSING] = 0.0

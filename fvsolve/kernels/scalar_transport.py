@@ -47,7 +47,10 @@ def concentrations(s, m, c):
 
 @inline
 def inner_slopes(limiter, c, d):
-    """Write limited differences of c over all cells except those at the ends to d."""
+    """Write limited slopes of c (differences over a cell) to d, for all cells except those at the ends.
+
+    limiter : limiter function of two differences; c : float64[cells]  values of a scalar
+    """
     here, next, inside = c[1:], c[2:], d[1:]
     for i in range(c.size - 2):
         inside[i] = slope(limiter, here[i] - c[i], next[i] - here[i])
@@ -58,7 +61,8 @@ def inner_fluxes(conductance, c, d, m, flow, f):
     """Write the flux of a scalar after cell i to f[i + 1]: flow times upstream value, minus D m c_x [kg/s].
 
     conductance : D / (2 dx), multiplied with the sum of both masses per length m; D : diffusivity, dx : cell length
-    c, d : values of the scalar in cells and their limited differences
+    c, d : values of the scalar in cells and their limited slopes; m : mass per length of cells [kg/m]
+    flow : mass flow at faces [kg/s]
     """
     next, bend, mass, through, f = c[1:], d[1:], m[1:], flow[1:], f[1:]
     for i in range(c.size - 1):
@@ -92,7 +96,10 @@ def subtract_decay(decay, ambient, s, m, ds):
 
 @njit
 def greatest_velocity(m, flow):
-    """Upper bound of velocity in a pipe [m/s]: greatest |mass flow| of faces over least mass per length of cells."""
+    """Upper bound of velocity in a pipe [m/s]: greatest |mass flow| of faces over least mass per length of cells.
+
+    m : mass per length of cells [kg/m]; flow : mass flow at faces [kg/s]
+    """
     least, most = m[0], abs(flow[m.size])
     for i in range(m.size):
         least, most = min(least, m[i]), max(most, abs(flow[i]))
@@ -103,7 +110,7 @@ def greatest_velocity(m, flow):
 def pipe_scalar_rates(y, dydt, out, tables, p):
     """Write d/dt of the amounts of all scalars in pipe p to `dydt`; raise out[RATE] to the rate of transport [1/s].
 
-    Also subtract the decay from the record of losses.
+    On entry `dydt` holds d/dt of the waves. The decay is also subtracted from the record of gains and losses.
     """
     st, layout, pipe, scratch = tables.settings[0], tables.layout[0], tables.pipes[p], tables.scratch
     n, o, dx = pipe["cells"], pipe["y"], pipe["dx"]
@@ -167,7 +174,10 @@ def pipe_outlet_values(t, y, dydt, out, handle):
 
 @njit
 def mix_scalars(t, y, dydt, out, handle):
-    """Write values of scalars at all nodes, flows of scalars into them, and rates of storage unless `dydt` is empty."""
+    """Write values of scalars at all nodes, flows of scalars into them, and rates of storage unless `dydt` is empty.
+
+    Also raise out[RATE] to the rate at which inflow replaces stored mass [1/s].
+    """
     tables = open_tables(handle)
     for q in range(tables.scalars.size):
         mix_nodes(t, y, out, tables, q)

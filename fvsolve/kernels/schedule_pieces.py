@@ -9,7 +9,7 @@ POLYNOMIAL, POWER, WAVE, CREST = 0.0, 1.0, 2.0, 3.0  # kinds of pieces; CREST: w
 
 @njit(forceinline=True)
 def piece_at(pieces, first, count, t, limit):
-    """Row of `pieces` that applies at time t; from the time `limit` on the piece that ends there (left limit).
+    """Row of `pieces` that applies at time t [s]; from time `limit` on, row of the piece that ends there (left limit).
 
     first, count : first row and number of pieces of the schedule
     """
@@ -29,7 +29,7 @@ def piece_value(pieces, row, t):
     """Value at time t of a piece of a schedule: polynomial, power or wave of s = t - origin.
 
     Polynomial: a + b s + c s^2 + d s^3. Power: v1 + (v0 - v1) (1 - s / duration)^exponent. Wave: mean + amplitude
-    sin(frequency s + phase). The coefficients are in this row of `pieces`.
+    sin(frequency s + phase), cut off below zero for the kind CREST. The coefficients are in pieces[row].
     """
     s = t - pieces[row, 2]
     if pieces[row, 1] == POLYNOMIAL:
@@ -43,7 +43,10 @@ def piece_value(pieces, row, t):
 
 @njit(forceinline=True)
 def piece_slopes(pieces, row, t):
-    """(first, second) derivative of a piece of a schedule by time; not for a CREST."""
+    """(first, second) derivative of a piece of a schedule at time t [per s, per s2]; not valid for the kind CREST.
+
+    row : row of the piece in `pieces`
+    """
     s = t - pieces[row, 2]
     if pieces[row, 1] == POLYNOMIAL:
         c, d = pieces[row, 5], pieces[row, 6]
@@ -60,9 +63,9 @@ def piece_slopes(pieces, row, t):
 
 @njit
 def schedule_slopes(tables, index, t):
-    """(first, second) derivative of schedule `index` at time t [per s, per s2].
+    """(first, second) derivative of schedule number `index` at time t [per s, per s2].
 
-    From the end of the integration segment on, they are the derivatives from the left there.
+    From the end of the integration segment on, they are the derivatives from the left at this end.
     """
     record, limit = tables.schedules[index], tables.clock[0]["limit"]
     if record["pieces"] == 1:
@@ -73,13 +76,13 @@ def schedule_slopes(tables, index, t):
 
 @njit(forceinline=True)
 def schedule_value(tables, index, t):
-    """Value of schedule `index` at time t [s]; from the end of the integration segment on its left limit there."""
+    """Value of schedule `index` at time t [s]; from the end of the integration segment on, its left limit there."""
     return value_with_limit(tables.schedules, tables.pieces, index, t, tables.clock[0]["limit"])
 
 
 @njit(forceinline=True)
 def value_with_limit(schedules, pieces, index, t, limit):
-    """Value of schedule `index` at time t [s], continuous from the right; from time `limit` on its left limit there."""
+    """Value of schedule `index` at time t [s], continuous from the right; from `limit` [s] on, its left limit there."""
     record = schedules[index]
     if record["pieces"] == 1:
         return piece_value(pieces, record["first"], t)

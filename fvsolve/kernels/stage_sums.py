@@ -33,6 +33,7 @@ def copy(source, target):
 def combine(begin, end, y, h, weights, count, k, out):
     """Write y + h sum over j < count of weights[j] k[j] to `out`, for the states begin .. end - 1.
 
+    y : float64[n]  state; h : step; weights, k : weights and rates of stages, float64[stages, n]
     Three terms are added in a pass where possible.
     """
     first, second, copied = -1, -1, False
@@ -65,7 +66,7 @@ def combine(begin, end, y, h, weights, count, k, out):
 
 @njit(forceinline=True)
 def count_not_finite(begin, end, y):
-    """Number of values y[begin:end] that are not finite or have no finite square; integers are vectorised."""
+    """Number of values y[begin:end] that are NaN, or not below 1e100 in size."""
     bad = 0
     for i in range(begin, end):
         bad += not abs(y[i]) < HUGE
@@ -77,7 +78,7 @@ def request_sums(sums, mode, y, h, weights, count, k, to, last):
     """Request the sum y + h sum of weights[j] k[j], written to `to`, from the function that computes the next rates.
 
     sums : int64 array that describes the request; mode : CHECK, STAGE or STAGE_AND_END
-    weights, count, k : weights and number of earlier stages, and their rates
+    y, h : state and step; weights, count, k : weights and number of earlier stages, and their rates
     last : weights of all stages at the end of the step
     """
     sums[MODE], sums[NOW], sums[TO], sums[RATES] = mode, address_of(y), address_of(to), address_of(k)
@@ -88,9 +89,9 @@ def request_sums(sums, mode, y, h, weights, count, k, to, last):
 
 @njit
 def sum_runs(sums, first, last, y, h, weights, count, k, to):
-    """Form the sums of the runs of states `first` to `last` - 1, which no rate function forms, or not in time.
+    """Form the requested sums for runs number `first` to `last` - 1, which no rate function forms, or not in time.
 
-    y, h, weights, count, k, to : see `request_sums`
+    A run is a range of states, listed in `sums`; y, h, weights, count, k, to : see `request_sums`
     """
     at = HEAD + sums[BASINS]
     for r in range(first, last):
@@ -99,7 +100,7 @@ def sum_runs(sums, first, last, y, h, weights, count, k, to):
 
 @njit(forceinline=True)
 def requested_mode(tables, b):
-    """Mode of the requested sums of basin b: OFF, CHECK, STAGE or STAGE_AND_END."""
+    """Mode of the stage sums requested for basin b (see `request_sums`): OFF, CHECK, STAGE or STAGE_AND_END."""
     if tables.sums.size == 0 or tables.sums[HEAD + b] == 0:
         return OFF
     return tables.sums[MODE]
@@ -109,6 +110,7 @@ def requested_mode(tables, b):
 def form_rows(sums, behind, at, width, begin, stop, left, right):
     """Form the requested sums for cells of a basin: columns left .. right - 1 of rows begin .. stop - 1.
 
+    sums : array that describes the request, see `request_sums`
     behind : True for the end of the step instead of the stage
     at, width : offset of the quantity in the state, and number of cells in a row
     """
@@ -140,7 +142,7 @@ def check_rows(sums, y, at, width, begin, stop, left, right):
 def form_checked_runs(sums):
     """Form the stage again in cells that all bands read, where the end of the step has replaced it.
 
-    A band is a part of the state that a thread steps.
+    A band is a part of the states, which one thread or process steps. sums : see `request_sums`
     """
     size, stages = sums[SIZE], sums[STAGES]
     y, to, h = floats_at(sums[NOW], size), floats_at(sums[TO], size), floats_at(address_of(sums) + 8 * STEP, 1)[0]

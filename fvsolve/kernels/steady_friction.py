@@ -23,8 +23,9 @@ LAMINAR, TURBULENT = 2000.0, 4000.0  # Reynolds numbers; both laws are blended b
 
 @njit
 def factor_turbulent(reynolds, roughness):
-    """Darcy factor of Colebrook, 1/sqrt(f) = -2 log10(e/3.7 + 2.51/(Re sqrt(f))), by two steps of Halley from Haaland.
+    """Darcy factor of Colebrook, 1/sqrt(f) = -2 log10(e/3.7 + 2.51/(Re sqrt(f))), by two steps of Halley's method.
 
+    They start from Haaland's approximation.
     reynolds : Reynolds number Re [-]; roughness : roughness e relative to the diameter [-]
     """
     a, b = roughness / 3.7, 2.51 / reynolds
@@ -41,7 +42,7 @@ def factor_turbulent(reynolds, roughness):
 def factor_times_reynolds(reynolds, roughness):
     """Darcy factor times Reynolds number: 64 below Re 2000, Colebrook above 4000, a smooth blend between.
 
-    So the drop is a monotone function of the flow. roughness : relative to the diameter [-]
+    This makes the drop a monotone function of the flow. roughness : relative to the diameter [-]
     """
     if reynolds <= LAMINAR:
         return 64.0
@@ -57,8 +58,8 @@ def factor_times_reynolds(reynolds, roughness):
 def power_of_square(square):
     """|M|^0.852 = (M^2)^0.426 from `square` = M^2 >= 0, relative error 2e-14 for 1e-150 <= |M| <= 1e150.
 
-    The mantissa in [1, 2) goes through a Chebyshev interpolation polynomial, the exponent through a table. Without
-    branch and call a loop over cells is vectorised by four, and a product and its sum are a single instruction.
+    The power of the mantissa in [1, 2) is a Chebyshev interpolation polynomial; that of the exponent is in a table.
+    Without branch and call a loop over cells is vectorised by four, and a product and its sum are a single instruction.
     """
     bits = np.float64(square).view(np.int64)
     u = np.int64((bits & MANTISSA) | BITS_OF_ONE).view(np.float64) - 1.5
@@ -79,8 +80,8 @@ def drag_hazen(loss, rough, flow):
 def drag(kind, loss, rough, roughness, reynolds, flow):
     """Momentum loss by wall and fittings per length and time [kg/s2] of a mass flow M [kg/s].
 
-    It is loss |M| M + rough f(Re) |M| M, or for Hazen-Williams loss |M| M + rough |M|^0.852 M.
-    kind : FRICTION_FACTOR, FRICTION_ROUGH or FRICTION_HAZEN
+    It is loss |M| M + rough f(Re) |M| M with the Darcy factor f, or for Hazen-Williams loss |M| M + rough |M|^0.852 M.
+    kind : FRICTION_FACTOR (without the second term), FRICTION_ROUGH or FRICTION_HAZEN; flow : M
     roughness : relative to the diameter [-]; reynolds : Reynolds number per mass flow [s/kg]
     """
     if kind == FRICTION_HAZEN:
@@ -94,9 +95,10 @@ def drag(kind, loss, rough, roughness, reynolds, flow):
 
 @njit
 def drag_slope(kind, loss, rough, roughness, reynolds, flow):
-    """Derivative of `drag` by the mass flow [1/s], for a positive or negative flow.
+    """Derivative of `drag` with respect to the mass flow [1/s], for a positive or negative flow.
 
-    A difference quotient where the friction factor depends on roughness, else exact.
+    It is a difference quotient where the friction factor depends on roughness, otherwise exact.
+    Arguments as for `drag`.
     """
     size = abs(flow)
     slope = 2.0 * loss * size

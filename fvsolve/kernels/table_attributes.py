@@ -27,7 +27,7 @@ def handle_address(context, builder, kind, args):
 
 @infer_getattr
 class TableOf(AttributeTemplate):
-    """Numba type of `tables.name`."""
+    """Numba type of an attribute of an open handle, such as `tables.nodes`: the type of the table of this name."""
 
     key = Tables
 
@@ -37,9 +37,9 @@ class TableOf(AttributeTemplate):
 
 @lower_getattr_generic(Tables)
 def load_table(context, builder, kind, value, name):
-    """Generate code that loads the array of a table from a handle.
+    """Generate code that loads the array of the table `name` from a handle.
 
-    Its address, rows and columns are three words of the handle, which never change.
+    Address, rows and columns of the table are three words of the handle, which never change.
     """
     member, word = getattr(table_types(), name), context.get_value_type(types.intp)
     base, first = builder.bitcast(value, word.as_pointer()), 3 * HandleTables._fields.index(name)

@@ -13,11 +13,11 @@ from fvsolve.kernels.dtypes import HandleTables
 if COMPILING:
 
     def addresses_of(tables: tuple) -> tuple:
-        """Memory address, rows and columns of each table, in sequence."""
+        """Memory address, number of rows and number of columns of each table, one after another in a flat tuple."""
         return tuple(x for a in tables for x in (a.ctypes.data, a.shape[0], a.shape[-1]))
 
     def handle_of(places: tuple) -> np.ndarray:
-        """Handle of the tables at these addresses (results of `addresses_of`): int64[3 n]."""
+        """Handle of the tables at these addresses (results of `addresses_of`): int64[3 n] for n tables."""
         return np.array(places, dtype=np.int64)
 
     def empty_handle() -> np.ndarray:
@@ -26,7 +26,7 @@ if COMPILING:
 
     @Intrinsic
     def open_tables(typingctx, handle):
-        """Tables behind a handle, without reference counts; `tables.nodes` loads a table."""
+        """Tables behind a handle, without reference counts; an attribute such as `tables.nodes` loads a table."""
         from fvsolve.kernels.table_attributes import Tables, handle_address
 
         return Tables()(handle), handle_address
@@ -57,8 +57,8 @@ def make_handle(tables: tuple):
 def linked_handles(shared: tuple, sharp: tuple, written: tuple, called: tuple):
     """Handle of the tables of a model, the arrays of a run and the addresses of functions.
 
-    The array `sharp` of the run receives a second handle, with some of the tables replaced, for the time at which a
-    jump of a delay line arrives.
+    The array `sharp` of the run receives a second handle, in which some tables of the model are replaced. It is used at
+    the time at which a jump of a delay line arrives.
     shared, sharp : addresses of the tables of the model, without and with these replacements
     written, called : arrays that the run writes, and tables of function addresses
     """

@@ -16,13 +16,16 @@ LEAST = 1e-300
 
 @njit(forceinline=True)
 def mass_per_metre(node):
-    """Mass per metre of water level of a tank [kg/m]; its area counts as at least MIN_AREA."""
+    """Mass per metre of water level of a tank [kg/m], with an area of at least MIN_AREA."""
     return node["density"] * max(node["area"], MIN_AREA)
 
 
 @njit(forceinline=True)
 def is_near(node, distance):
-    """True if a tank is at its bottom or rim, from which it is `distance` [kg] of stored mass away."""
+    """True if a tank is at its bottom or its rim, to within the tolerance NEAR of its level.
+
+    distance : stored mass between the tank and this limit [kg]
+    """
     return distance <= NEAR * mass_per_metre(node)
 
 
@@ -46,7 +49,10 @@ def limit_events(node, armed, g, k, distance, away):
 
 
 def overshoot_correction(node, armed, stored: float) -> float:
-    """Mass [kg] to add to a held tank that event location has left below its bottom or above its rim; else 0."""
+    """Mass [kg] to add to a held tank that event location has left below its bottom or above its rim; else 0.
+
+    armed : event flags, which are positive while a tank is held; stored : present mass of the tank [kg]
+    """
     k = EVENTS * int(node["row"])
     if armed[k + BOTTOM] > 0.0 and stored < 0.0 and is_near(node, -stored):
         return -stored

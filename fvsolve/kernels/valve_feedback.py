@@ -21,7 +21,7 @@ def loop_rate(out, tables, k, i, speed):
 
     speed : rate dx/dt per fall of the pressure, dx/dt = -speed p' [1/s/Pa], p' : pressure change
     The pressure follows the flow M: dM/dx = sqrt(G dP), with conductance G and drop dP, reduced because the drop falls
-    as the flow rises. The node responds by its pipes or by its stored mass.
+    as the flow rises. The pressure of the node responds by its pipes or by its stored mass.
     """
     layout, valve = tables.layout[0], tables.valves[k]
     drop = head_drop(tables, out, k)[1]

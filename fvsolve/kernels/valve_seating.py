@@ -1,8 +1,9 @@
 """Valves near their seat that control the single rigid column connected to them.
 
-A disc controls its column from its seat on, the stem of a regulating valve also down to its seat. The flag is
-armed[event + 4], of a stem armed[event + 6]. Control ends when the lift exceeds CONTROL_LIFT and a given step resolves
-the exchange between lift and flow: `kernels.column_valve_control`. A disc that moves to its seat may slam.
+A disc controls its column from the time at which it leaves its seat; the stem of a regulating valve also before it
+reaches its seat. The flag is armed[event + 4], that of a stem armed[event + 6]. Control ends when the lift exceeds
+CONTROL_LIFT and a given step resolves the exchange between lift and flow: `kernels.column_valve_control`. A disc that
+moves to its seat may slam.
 """
 
 from math import sqrt
@@ -27,7 +28,7 @@ def controls_column(tables, k):
 def control_limit(out, tables, device, speed):
     """Lift above which the valve of a device does not control its column; 0 if it is not the only outlet of a column.
 
-    speed : derivative of dx/dt by the drop [1/s/Pa], x : lift
+    speed : derivative of dx/dt with respect to the drop [1/s/Pa], x : lift
     """
     valve, columns, limit = tables.valves[device["valve"]], tables.columns, 0.0
     for k in range(columns.size):
@@ -46,7 +47,7 @@ def column_control_limit(out, tables, device, mobility, speed):
 
     It is CONTROL_LIFT, or more until a given step resolves the exchange between lift x and flow. The rate of this
     exchange is (2 dP / x) (speed + (A / L) / sqrt(G dP)), with drop dP and conductance G.
-    speed : derivative of dx/dt by the drop [1/s/Pa]
+    speed : derivative of dx/dt with respect to the drop [1/s/Pa]
     """
     root = sqrt(abs(head_drop(tables, out, device["valve"])[1]))
     rate = 2.0 * root * (root * speed + mobility / sqrt(tables.valves[device["valve"]]["conductance"]))
@@ -55,10 +56,10 @@ def column_control_limit(out, tables, device, mobility, speed):
 
 @njit
 def control_events(out, tables, device, g, x, share, speed):
-    """Write two event functions of the lift x to g: for the end of control of a column, and for its begin.
+    """Write two event functions of the lift x to g: for the end of the control of a column, and for its beginning.
 
     Control ends at the lift of `control_limit`, and begins at the fraction `share` of it; never if `share` is 0.
-    speed : derivative of dx/dt by the drop [1/s/Pa]
+    speed : derivative of dx/dt with respect to the drop [1/s/Pa]
     """
     at, most = device["controls_column"], control_limit(out, tables, device, speed)
     if tables.armed[at] > 0.0:

@@ -14,11 +14,11 @@ LEAST = 1e-4  # chords are not steeper than at a drop of LEAST squared [Pa], the
 
 @njit(forceinline=True)
 def relative_area(kind, floats, table, size, opening):
-    """Relative flow area at a stem position `opening`, by characteristic `kind`.
+    """Relative flow area at a stem position `opening`, by the characteristic `kind`.
 
     0 : linear
     1 : equal-percentage, rangeability 50, shut at 0
-    else : table of `size` openings, then areas, from floats[table] on
+    else : table of `size` openings, then areas, in `floats` from index `table` on
     """
     if kind == 0:
         return opening
@@ -74,7 +74,10 @@ def flow_at_drop(conductance, transition, drop):
 
 @njit(forceinline=True)
 def flow_slope(conductance, transition, drop):
-    """Derivative of the mass flow of a valve by its drop [kg/s per Pa]; law as in `flow_at_drop`."""
+    """Derivative of the mass flow of a valve with respect to its drop [kg/s per Pa].
+
+    Law and arguments as for `flow_at_drop`.
+    """
     if conductance <= 0.0:
         return 0.0
     size = conductance * abs(drop)

@@ -12,7 +12,7 @@ from numba.core.types.npytypes import Array
 
 
 class Vector(Array):
-    """Numba type of a contiguous vector of numbers; it differs from an array only in how it is passed."""
+    """Numba type of a contiguous vector of numbers; it differs from an array only in the way in which it is passed."""
 
     def __init__(self, dtype: types.Type) -> None:
         super().__init__(dtype, 1, "C", name=f"vector({dtype})")
@@ -34,7 +34,7 @@ class VectorModel(ArrayModel):
         return self.get(builder, value, "data"), self.get(builder, value, "nitems")
 
     def from_argument(self, builder, value):
-        """Array from its two words, address and length: without reference count, a single row without gaps."""
+        """Array from its two words, address and length; it has no reference count, and a single row without gaps."""
         data, count = value
         size = count.type(self.fe_type.dtype.bitwidth // 8)
         empty = cgutils.get_null_value(self.get_value_type())

@@ -12,11 +12,12 @@ BLOCK = 1 << 14  # number of segments per pass; the search ends after a pass wit
 
 
 def contacts(a: np.ndarray, b: np.ndarray, thin: np.ndarray) -> tuple[dict[str, np.ndarray], bool]:
-    """Pairs of segments that touch other than at common ends, by kind, and True if all segments were searched.
+    """(pairs of segments that touch other than at common ends, by kind; True if all segments were searched).
 
     a, b : float64[k, 2]  ends of the segments; thin : bool[k]  True for segments that may coincide with another
-    Returns {"same": pairs, "middle": pairs, "cross": pairs}, each int64[m, 2]. same : both ends coincide, and neither
-    segment is thin; middle : an end of the second lies within the first; cross : the segments intersect
+    The pairs are {"same": int64[m, 2], "middle": int64[m, 2], "cross": int64[m, 2]}. same : both ends coincide, and
+    neither segment is thin; middle : an end of the second segment lies within the first; cross : the segments intersect
+    The search stops after a block of BLOCK segments in which it has found pairs.
     """
     middle, length = 0.5 * (a + b), np.hypot(*(b - a).T)
     tree = cKDTree(middle)
@@ -31,7 +32,8 @@ def contacts(a: np.ndarray, b: np.ndarray, thin: np.ndarray) -> tuple[dict[str, 
 def _pairs(tree: cKDTree, middle: np.ndarray, length: np.ndarray, block: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Numbers i, j of pairs of segments that may touch: two arrays.
 
-    i is in `block` and not shorter than j, and the distance between their middles is below the length of i.
+    Segment i is in `block` and not shorter than j, and the distance between their middles is below the length of i.
+    tree, middle, length : of all segments
     """
     near = tree.query_ball_point(middle[block], (1.0 + CONTACT_DISTANCE) * length[block], return_sorted=False)
     i = np.repeat(block, np.fromiter(map(len, near), np.int64, len(near)))
@@ -63,7 +65,7 @@ def _distance(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 
 def _within(a: np.ndarray, b: np.ndarray, i: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """True where point p lies on segment i, away from its ends."""
+    """True where the point p lies on segment i, away from its ends. a, b : ends of all segments"""
     along, to = b[i] - a[i], p - a[i]
     square = np.sum(along * along, axis=1)
     share = np.sum(along * to, axis=1) / square
@@ -75,7 +77,10 @@ def _within(a: np.ndarray, b: np.ndarray, i: np.ndarray, p: np.ndarray) -> np.nd
 
 
 def _on_both_sides(a: np.ndarray, b: np.ndarray, i: np.ndarray, j: np.ndarray) -> np.ndarray:
-    """True where the ends of segment j lie on different sides of the line through segment i."""
+    """True where the ends of segment j lie on different sides of the line through segment i.
+
+    a, b : ends of all segments
+    """
     along = b[i] - a[i]
     least = CONTACT_DISTANCE * np.sum(along * along, axis=1)
     start, stop = cross(along, a[j] - a[i]), cross(along, b[j] - a[i])

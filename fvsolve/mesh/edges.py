@@ -18,7 +18,7 @@ class Edges:
 
     cell : int64[e]  cell of the edge; start, stop : int64[e]  points at its ends
     key : int64[e]  number of the pair of points, equal for both directions
-    mate : int64[e]  index of the edge in the neighbour, NO_NEIGHBOUR on the boundary, CROWDED where cells overlap
+    mate : int64[e]  index of the same edge in the neighbour, NO_NEIGHBOUR on the boundary, CROWDED where cells overlap
     """
 
     cell: np.ndarray
@@ -29,7 +29,7 @@ class Edges:
 
     @cached_property
     def inner(self) -> np.ndarray:
-        """Indices of the edges between two cells, once each, in the cell with the lower number."""
+        """Indices of the edges between two cells, each once: that in the cell with the lower number."""
         return np.flatnonzero(np.arange(self.mate.size) < self.mate)
 
     @cached_property
@@ -38,22 +38,34 @@ class Edges:
         return np.flatnonzero(self.mate == NO_NEIGHBOUR)
 
     def pieces(self, cells: int) -> np.ndarray:
-        """Number of the connected part to which each cell belongs : int64[cells]; only shared faces connect cells."""
+        """Number of the connected part to which each cell belongs : int64[cells].
+
+        Cells are connected by shared faces only. cells : number of cells
+        """
         return connected_components(self.graph(cells), directed=False)[1].astype(np.int64)
 
     def order(self, cells: int) -> np.ndarray:
-        """Order of the cells that places neighbours close together (reverse Cuthill-McKee) : int64[cells]."""
+        """Order of the cells in which neighbours are close together (reverse Cuthill-McKee) : int64[cells].
+
+        cells : number of cells
+        """
         graph = self.graph(cells)
         return reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True).astype(np.int64)
 
     def graph(self, cells: int) -> coo_array:
-        """Adjacency matrix : int8[cells, cells], 1 where two cells share a face, at (lower number, higher number)."""
+        """Adjacency matrix : int8[cells, cells], 1 at (lower number, higher number) of two cells that share a face.
+
+        cells : number of cells
+        """
         pair = self.cell[self.inner], self.cell[self.mate[self.inner]]
         return coo_array((np.ones(self.inner.size, np.int8), pair), shape=(cells, cells))
 
 
 def edges_of(cells: np.ndarray, points: int) -> Edges:
-    """Edges of cells : int64[n, 4] corners, -1 last in a triangle. points : number of points"""
+    """Edges of cells.
+
+    cells : int64[n, 4]  corners of cells, anticlockwise, -1 last in a triangle; points : number of points
+    """
     stop = np.roll(cells, -1, axis=1)
     triangle = cells[:, 3] < 0
     stop[triangle, 2] = cells[triangle, 0]

@@ -19,7 +19,7 @@ MAX_CELLS = 3
 
 @dataclass(frozen=True, eq=False)
 class Sketch:
-    """A mesh while it is read, with coordinates in the unit of the file, and texts that describe its places."""
+    """Mesh while it is read, with coordinates in the unit of the file; methods return texts for its places."""
 
     points: np.ndarray
     cells: np.ndarray
@@ -42,13 +42,13 @@ class Sketch:
         return f"the face from {self.at(self.points[ends[0]])} to {self.at(self.points[ends[1]])}"
 
     def list(self, cells: np.ndarray) -> str:
-        """Text like '3 of 40 cells: cell 7 at ..., cell 9 at ..., cell 12 at ...'."""
+        """Text like '2 of 40 cells: cell 7 at ..., cell 9 at ...', with a list of at most MAX_CELLS cells."""
         texts = [self.show(c) for c in cells[:MAX_CELLS]] + (["..."] if len(cells) > MAX_CELLS else [])
         return f"{len(cells)} of {len(self.cells)} cells: {', '.join(texts)}"
 
 
 def shape_faults(sketch: Sketch) -> tuple[list[Fault], np.ndarray, np.ndarray]:
-    """Faults of single cells, and two arrays bool[n]: True for cells with a fault, and for clockwise cells.
+    """(faults of single cells, bool[n] True for cells with a fault, bool[n] True for clockwise cells).
 
     A cell without a fault is clockwise if it has a right turn at a corner.
     """
@@ -76,7 +76,7 @@ def shape_faults(sketch: Sketch) -> tuple[list[Fault], np.ndarray, np.ndarray]:
 
 
 def overlap_faults(sketch: Sketch, edges: Edges, number: np.ndarray) -> list[Fault]:
-    """Faults of faces shared by more than two cells, or by two cells on one side of the face.
+    """List with the fault of faces that more than two cells share, or two cells on one side; empty without such faces.
 
     number : int64[:]  numbers of the cells of `edges` in the file
     """
@@ -95,9 +95,10 @@ def overlap_faults(sketch: Sketch, edges: Edges, number: np.ndarray) -> list[Fau
 
 
 def contact_faults(sketch: Sketch, edges: Edges, named: np.ndarray) -> list[Fault]:
-    """Faults of boundary faces that touch other than at their ends. named : bool[outer]  True for faces in a group
+    """List with a fault for each kind of contact of boundary faces other than at their ends; empty without contacts.
 
-    Two coincident faces are the sides of a thin wall if a group contains one of them.
+    Two coincident faces are the sides of a thin wall if a group contains one of them, and then are not a fault.
+    named : bool[outer]  True for boundary faces in a group
     """
     start, stop, cell = edges.start[edges.outer], edges.stop[edges.outer], edges.cell[edges.outer]
     contact_pairs, complete = contacts(sketch.points[start], sketch.points[stop], named)
@@ -122,7 +123,7 @@ def contact_faults(sketch: Sketch, edges: Edges, named: np.ndarray) -> list[Faul
 
 
 def piece_faults(sketch: Sketch, edges: Edges) -> list[Fault]:
-    """Fault of a mesh that consists of several parts without a common face; empty list if there is one part."""
+    """List with the fault of a mesh of several parts without a common face; empty if there is one part."""
     piece = edges.pieces(len(sketch.cells))
     size, first = np.bincount(piece), np.unique(piece, return_index=True)[1]
     if size.size == 1:
@@ -143,7 +144,8 @@ def assign_patches(
 ) -> tuple[list[Fault], list[str], np.ndarray]:
     """Assign a patch to each boundary edge, by the groups of lines in the file.
 
-    Returns faults, names of patches, and int64[outer] the patch of each boundary edge, -1 for edges in no group.
+    lines : int64[k, 2]  points of the lines; groups : name -> numbers of its lines
+    Returns (faults, names of patches, int64[outer] patch of each boundary edge, -1 for edges in no group).
     """
     names = [*(name for name in groups if name != WALL), WALL]
     keys = edges.key[edges.outer]
@@ -174,7 +176,7 @@ def assign_patches(
 
 
 def _line_location(sketch: Sketch, edges: Edges, ends: np.ndarray) -> str:
-    """Text that says where a line lies that is not a boundary face. ends : int64[2]  its points"""
+    """Text with the location of a line that is not a boundary face. ends : int64[2]  its points, -1 if in no cell"""
     if (ends < 0).any():
         return "a line ends at a point that belongs to no cell"
     where = sketch.face(ends).removeprefix("the face ")

@@ -24,8 +24,8 @@ TAGS = ("gmsh:physical", "medit:ref", "su2:tag")  # names of group numbers in th
 class Content:
     """Content of a mesh file.
 
-    points : float64[p, 3]  coordinates in the unit of the file; cells : int64[n, 4]  points of cells, -1 last in a
-    triangle
+    points : float64[p, 3]  coordinates in the unit of the file
+    cells : int64[n, 4]  points of cells, -1 last in a triangle
     lines : int64[k, 2]  points of lines; groups : name -> int64[:] numbers of lines, in the order of the file
     notes : remarks about the file for the user
     """
@@ -38,7 +38,7 @@ class Content:
 
 
 def load_file(path: Path) -> Content:
-    """Triangles, quadrilaterals and named lines of a file; raises MeshError if it contains no plane mesh."""
+    """Triangles, quadrilaterals and named lines of a mesh file; raises MeshError if it contains no plane mesh."""
     file_mesh, notes = _read_by_meshio(path)
     kinds: dict[str, int] = {}
     for block in file_mesh.cells:
@@ -64,7 +64,8 @@ def load_file(path: Path) -> Content:
     )
     beyond = [
         Fault(
-            place, f"number {int(rows[0])} refers to a point that the file does not contain; it contains {len(points)}"
+            place,
+            f"number {int(rows[0])} refers to a point that is not in the file; the file has {len(points)} points",
         )
         for place, table, least in (("cells", content.cells, -1), ("lines", content.lines, 0))
         if (rows := np.flatnonzero(_bad_rows(table, least, len(points)))).size
@@ -75,7 +76,7 @@ def load_file(path: Path) -> Content:
 
 
 def _read_by_meshio(path: Path) -> tuple[Any, tuple[str, ...]]:
-    """Mesh object of meshio, and the messages that meshio printed."""
+    """(mesh object of meshio, messages that meshio printed)."""
     import meshio
 
     if not path.is_file():
@@ -104,7 +105,7 @@ def _single_line(text: str) -> str:
 
 
 def _bad_kinds(kinds: dict[str, int]) -> list[Fault]:
-    """Faults of cells that are not triangles or quadrilaterals, or of a file without cells.
+    """List with the fault of a file with cells other than triangles and quadrilaterals, or without cells; else empty.
 
     kinds : type of cell -> number of cells
     """
@@ -132,7 +133,7 @@ def _bad_rows(table: np.ndarray, least: int, points: int) -> np.ndarray:
 
 
 def _groups(file_mesh: Any) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
-    """Lines of each group by name, and notes on groups that have only a number in the file."""
+    """(name -> numbers of the lines of each group, notes on groups that have only a number in the file)."""
     name_of = {int(tag): name for name, (tag, dimension) in _named_groups(file_mesh.field_data)}
     members: dict[str, list[np.ndarray]] = {name: [] for name in name_of.values()}
     unnamed: set[int] = set()
@@ -154,14 +155,17 @@ def _groups(file_mesh: Any) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
 
 
 def _named_groups(field_data: Any) -> Iterable[tuple[str, np.ndarray]]:
-    """Groups of lines that have a name in the file, as (name, (number, dimension))."""
+    """(name, (number, dimension)) of each group of lines that has a name in the file."""
     for name, entry in (field_data or {}).items():
         if np.shape(entry) == (2,) and int(entry[1]) == 1:
             yield name, entry
 
 
 def _tagged_lines(cell_data: Any, k: int) -> Iterable[tuple[int, np.ndarray]]:
-    """Numbers of groups in block k of the file, each with the lines of that group; 0 stands for no group."""
+    """(number of the group, indices of its lines in the block) of each group in block k of lines of the file.
+
+    The number 0 stands for no group.
+    """
     for key in TAGS:
         if key in cell_data:
             tags = np.asarray(cell_data[key][k]).astype(np.int64)

@@ -29,7 +29,7 @@ class MeshPoints:
         self.cells_of_points, self.first = order // 4, first  # cells at a point: around[first[p] : first[p + 1]]
 
     def cell(self, x: float, y: float) -> int:
-        """Number of the cell that contains the point (x, y) [m]; the lowest on an edge, -1 outside and in holes."""
+        """Number of the cell that contains the point (x, y) [m]; the lowest number on an edge, -1 outside all cells."""
         n = len(self.mesh.cells)
         if not np.all((self.low <= (x, y)) & ((x, y) <= self.high)):  # far points, whose distances overflow, and NaN
             return -1
@@ -49,7 +49,10 @@ class MeshPoints:
         return (left >= -self.near * np.hypot(along[..., 0], along[..., 1])).all(axis=1)
 
     def nearest(self, x: float, y: float) -> tuple[float, float]:
-        """Position (x, y) [m] inside the mesh that is nearest to a point outside."""
+        """Position (x, y) [m] just inside the mesh, near the boundary point that is nearest to a point outside.
+
+        It lies a thousandth of the way from that boundary point to the centre of the cell there.
+        """
         mesh = self.mesh
         outer = slice(mesh.inner, None)
         a, b = (mesh.points[mesh.ends[outer, k]] for k in (0, 1))
@@ -63,9 +66,9 @@ class MeshPoints:
     def cell_weights(self, x: float, y: float) -> tuple[np.ndarray, np.ndarray]:
         """Cells around a point inside, and their weights in the value of a field there : int64[k], float64[k].
 
-        Weights have the sum 1 and are not negative. Bilinear between centres on grids without holes. Otherwise the
-        cells share a corner with the cell of the point, or with a neighbour of that cell. Exact for linear fields,
-        except beyond the outermost centres, where the nearest position between centres is used.
+        Weights have the sum 1 and are not negative. On grids without holes they are bilinear between centres. Otherwise
+        the cells share a corner with the cell of the point, or with a neighbour of that cell. Weights are exact for
+        linear fields, except beyond the outermost centres, where the nearest position between centres is used.
         """
         grid = self.mesh.grid
         if grid is not None and len(self.mesh.cells) == grid.nx * grid.ny:
@@ -103,9 +106,9 @@ class MeshPoints:
 
 
 def _neighbour_columns(lines: np.ndarray, value: float) -> tuple[np.ndarray, np.ndarray]:
-    """Two columns with `value` between their centres, and their weights : int64[2], float64[2]. lines : grid lines [m]
+    """Two columns with `value` between their centres, and their weights : int64[2], float64[2].
 
-    Beyond the outermost centres the outermost column has weight 1.
+    Beyond the outermost centres the outermost column has weight 1. lines : grid lines [m]; value : coordinate [m]
     """
     centres = 0.5 * (lines[1:] + lines[:-1])
     k = int(np.clip(np.searchsorted(centres, value) - 1, 0, max(centres.size - 2, 0)))

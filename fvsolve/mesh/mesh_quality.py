@@ -14,7 +14,7 @@ from fvsolve.mesh.shapes import corners
 class Quality:
     """Quality measures of a mesh.
 
-    smallest, largest : areas of cells [m2]
+    smallest, largest : least and greatest area of a cell [m2]
     angle : least angle at a corner [rad]; sharpest : cell with this angle
     ratio : greatest ratio of the areas of two neighbours [-]; steepest : face between them
     A mesh without inner faces has ratio 1 and steepest -1.

@@ -70,7 +70,7 @@ def _factor(unit: str, path: Path) -> float:
 
 
 def _place_faults(content: Content, unit: str) -> list[Fault]:
-    """Faults of points whose coordinates are not finite, or that do not lie in one plane z = constant."""
+    """List with the fault of points with invalid coordinates, or not in one plane z = constant; else empty."""
     used = np.unique(content.cells[content.cells >= 0])
     points = content.points[used]
     invalid = used[~(np.abs(points) < FAR).all(axis=1)]  # nan too
@@ -88,7 +88,8 @@ def _place_faults(content: Content, unit: str) -> list[Fault]:
         return []
     far = content.points[:, 2] - points[:, 2].min() > 0.5 * extent[2]
     cell = int(np.argmax(far[content.cells].any(axis=1)))
-    text = f"z runs from {points[:, 2].min():.6g} to {points[:, 2].max():.6g} {unit}, beyond the middle in cell {cell}"
+    span = f"{points[:, 2].min():.6g} to {points[:, 2].max():.6g} {unit}"
+    text = f"z runs from {span}, above the middle of this range in cell {cell}"
     constant = "".join(
         f"; {axis} is constant: turn the mesh" for axis, e in zip("xy", extent, strict=False) if e <= near
     )
@@ -108,7 +109,11 @@ def _reversed(cells: np.ndarray) -> np.ndarray:
 
 
 def _notes(sketch: Sketch, factor: float, patch: np.ndarray, grouped: bool) -> list[str]:
-    """Notes on boundary faces without a group, and on an extent that suggests another unit."""
+    """Notes on boundary faces without a group, and on an extent that suggests another unit.
+
+    factor : length of the unit of the file [m]; patch : int64[outer]  patch of each boundary face, -1 without a group
+    grouped : True if the file contains groups of lines
+    """
     notes = []
     unnamed = int((patch < 0).sum())
     if not grouped:

@@ -29,10 +29,9 @@ def rectangle(
     """Mesh of a rectangle of a size [m] from its south-west corner, `origin` [m]; cells are numbered row by row.
 
     size, cells, origin, grading : two values, along x and y; cells : numbers of columns and rows
-    grading : ratio of last to first spacing, geometric between them
-    patches : name -> a side, "west", "east", "south" or "north", or (side, from, to) with coordinates along the side
-    [m]
-    holes : (x0, y0, x1, y1) on grid lines [m], removed; the remaining cells must be connected by faces
+    grading : ratio of last to first spacing of grid lines; it changes geometrically between them
+    patches : name -> a side ("west", "east", "south" or "north"), or (side, from, to) with coordinates along it [m]
+    holes : rectangles (x0, y0, x1, y1) [m] on grid lines, without cells; faces must connect the remaining cells
     Raises MeshError with all faults.
     """
     faults = _bad_numbers(size, cells, origin, grading)
@@ -54,7 +53,7 @@ def rectangle(
     edges = edges_of(corners, len(points))
     pieces = np.bincount(edges.pieces(len(corners)))
     if pieces.size > 1:
-        faults.append(Fault("holes", f"they leave {pieces.size} pieces that share no face; expected one"))
+        faults.append(Fault("holes", f"they leave {pieces.size} pieces that share no face; expected one piece"))
     names, patch = _patches(patches or {}, lines, solid, points, edges, faults)
     if faults:
         raise MeshError(faults, "rectangle")
@@ -94,7 +93,10 @@ def _list_text(given: Sequence) -> str:
 
 
 def _graded(start: float, size: float, cells: int, grading: float) -> np.ndarray:
-    """Grid lines whose spacings change geometrically to `grading` times the first : float64[cells + 1] [m]."""
+    """Grid lines from `start` over the length `size`, with geometrically graded spacings : float64[cells + 1] [m].
+
+    grading : ratio of last to first spacing
+    """
     share = np.arange(cells + 1) / cells
     if grading != 1.0:
         rate = math.log(grading) / (cells - 1)
@@ -105,20 +107,26 @@ def _graded(start: float, size: float, cells: int, grading: float) -> np.ndarray
 
 
 def _line(lines: np.ndarray, value: float) -> int | None:
-    """Number of the grid line at the position `value` [m]; None if no line is near."""
+    """Number of the grid line at the position `value` [m]; None without a line near this position."""
     k = int(np.argmin(np.abs(lines - value)))
     return k if abs(lines[k] - value) <= LINE_TOLERANCE * (lines[-1] - lines[0]) else None
 
 
 def _nearest(lines: np.ndarray, value: float) -> str:
-    """Text like '0.25 and 0.5', the positions of the grid lines on both sides of `value`."""
+    """Text like '0.25 and 0.5' with the positions of the grid lines on both sides of `value`.
+
+    If `value` is beyond all lines, the text contains only the position of the outermost line next to it.
+    """
     k = int(np.clip(np.searchsorted(lines, value), 1, lines.size - 1))
     around = [lines[0]] if value < lines[0] else [lines[-1]] if value > lines[-1] else lines[k - 1 : k + 1]
     return " and ".join(f"{line:.9g}" for line in around)
 
 
 def _cut(solid: np.ndarray, lines: Sequence[np.ndarray], place: str, hole: Sequence[float]) -> list[Fault]:
-    """Mark the cells of a hole as False in `solid` : bool[ny, nx]; return the faults of the hole."""
+    """Mark the cells of a hole as False in `solid` : bool[ny, nx]; return the faults of the hole.
+
+    lines : grid lines along x, along y; place : key of the hole for faults; hole : (x0, y0, x1, y1) [m]
+    """
     names = ("x0", "y0", "x1", "y1")
     if len(hole) != 4 or not all(math.isfinite(v) for v in hole) or not (hole[0] < hole[2] and hole[1] < hole[3]):
         return [Fault(place, f"{_list_text(hole)}; expected [x0, y0, x1, y1] [m] with x0 below x1 and y0 below y1")]
@@ -138,7 +146,10 @@ def _cut(solid: np.ndarray, lines: Sequence[np.ndarray], place: str, hole: Seque
 
 
 def _corners(lines: Sequence[np.ndarray], solid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points of the cells of a grid, and the corners of each cell : float64[p, 2], int64[n, 4], row by row."""
+    """(points of the cells of a grid, corners of each cell), row by row : float64[p, 2], int64[n, 4].
+
+    lines : grid lines along x, along y; solid : bool[ny, nx]  False in holes
+    """
     row, column = np.nonzero(solid)
     wide = lines[0].size
     first = row * wide + column
@@ -157,7 +168,11 @@ def _patches(
     edges: Edges,
     faults: list[Fault],
 ) -> tuple[list[str], np.ndarray]:
-    """Names of the patches, and the patch of each boundary edge : int64[outer]; faults are appended to `faults`."""
+    """Names of the patches, and the patch of each boundary edge : int64[outer]; faults are appended to `faults`.
+
+    given : as `patches` of `rectangle`; lines, solid : as for `_corners`; points : result of `_corners`
+    edges : edges of the cells
+    """
     names = [*(name for name in given if name != WALL), WALL]
     patch = np.full(edges.outer.size, len(names))  # no patch yet
     a, b = points[edges.start[edges.outer]], points[edges.stop[edges.outer]]
@@ -181,7 +196,11 @@ def _patches(
 
 
 def _patch_range(place: str, side: str, span: list, lines: Sequence[np.ndarray], solid: np.ndarray) -> tuple | Fault:
-    """Start and end of a patch along a side, on grid lines [m], or the fault of its range `span`."""
+    """(start, end) of a patch along a side, on grid lines [m], or the fault of its range.
+
+    place : key of the patch for faults; span : [] for the whole side, else stated start and end
+    lines, solid : as for `_corners`
+    """
     if side not in SIDES:
         return Fault(place, f'unknown side "{side}"; expected {", ".join(SIDES)}{did_you_mean(str(side), SIDES)}')
     along = lines[SIDES[side]]
@@ -203,6 +222,6 @@ def _patch_range(place: str, side: str, span: list, lines: Sequence[np.ndarray],
         return Fault(place, f"{text} does not consist of whole faces of the {side} side; nearest is {near}")
     if not cells[first:last].all():
         ends = np.flatnonzero(np.diff(cells.astype(int), prepend=0, append=0)).reshape(-1, 2)
-        free = " and ".join(f"{along[i]:.9g} to {along[j]:.9g} m" for i, j in ends)
-        return Fault(place, f"{text} on the {side} side runs along a hole; free is {free}")
+        free = " or ".join(f"{along[i]:.9g} to {along[j]:.9g} m" for i, j in ends)
+        return Fault(place, f"{text} on the {side} side runs along a hole; expected a span within {free}")
     return along[first], along[last]

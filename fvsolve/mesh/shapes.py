@@ -32,10 +32,10 @@ def area_and_centre(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, 
 
 
 def corners(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Three arrays float64[n, 4] for the corners of cells.
+    """(cross product, scalar product, length) for the corners of cells : three float64[n, 4].
 
-    They are cross product and scalar product of the sides into and out of a corner, and the length of the side out of
-    it. In a triangle the fourth corner is the first again.
+    The products are those of the side into a corner and the side out of it; the length is that of the side out of it.
+    In a triangle the fourth corner is the first again.
     """
     out = np.empty((3, len(cells), 4))
     for selected, count in ((cells[:, 3] < 0, 3), (cells[:, 3] >= 0, 4)):
@@ -63,7 +63,11 @@ def assemble(
     grid: Grid | None = None,
     notes: Sequence[str] = (),
 ) -> Mesh:
-    """Mesh of valid, anticlockwise cells. patch : int64[outer]  number of the patch of each boundary edge"""
+    """Mesh of valid, anticlockwise cells.
+
+    points, cells, grid, notes : as in `Mesh`; patches : names of the patches
+    patch : int64[outer]  number of the patch of each boundary edge
+    """
     area, centre = area_and_centre(points, cells)
     order = np.argsort(patch, kind="stable")
     chosen = np.concatenate([edges.inner, edges.outer[order]])

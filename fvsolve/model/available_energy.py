@@ -26,8 +26,8 @@ def available_energy(model: Model) -> dict[str, float]:
     """Energy of every part at the start [J], above its energy at rest and at P = 0 : name -> energy.
 
     P = p - p_ambient + rho g z is the reduced pressure [Pa], z the elevation above the datum in the settings [m]. A
-    tank at P = 0 has its surface at the datum, or as near to it as its bottom and rim allow. The sum over all parts is
-    an upper bound of the energy that the model can release.
+    tank at P = 0 has its surface at the datum, or as near to it as its bottom and rim allow. Bodies and bushings are
+    not included; without them the sum over all parts is an upper bound of the energy that the model can release.
     """
     tables, nodes, energies = model.tables, model.tables.nodes, {}
     datum = float(tables.settings[0]["datum"])
@@ -78,7 +78,7 @@ def vessel_energy_function(model: Model):
 
 
 def potential(model: Model, row) -> float:
-    """Reduced pressure P = p - p_ambient + rho g z of a node at the start [Pa], under the linear density law."""
+    """Reduced pressure P = p - p_ambient + rho g z of a node at the start [Pa], under the density law `linear`."""
     st = model.tables.settings[0]
     height = float(row["elevation"] - st["datum"])
     return float(row["pressure"]) - model.case.ambient_pressure + float(st["rho"] * st["gravity"]) * height

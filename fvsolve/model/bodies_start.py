@@ -16,7 +16,10 @@ EQUILIBRIUM_SHARE = (
 
 
 def refuse_massless(draft, at: StaticForces) -> None:
-    """Add a fault for a body whose joint allows a motion without inertia, of the body or of bodies attached to it."""
+    """Add a fault for a body whose joint allows a motion without inertia, of the body or of bodies attached to it.
+
+    Likewise for a body that the fluid in its tanks outweighs. Only the last such body in the table gets a fault.
+    """
     at.run(MOTION, ACCELERATE)
     n = len(draft.freedom_table)
     for name, row in reversed(list(zip(draft.body_names, draft.body_table, strict=True))):
@@ -36,7 +39,11 @@ def refuse_massless(draft, at: StaticForces) -> None:
 
 
 def start_bodies(draft, start) -> list[str]:
-    """Set start lengths of lines of action and balanced forces of joints; return texts of motions at the start."""
+    """Set lengths and rates of lines of action, data of pins and `balance` of freedoms at the start.
+
+    Returns texts of motions at the start. Raises CaseError for motions without inertia and for pins that are redundant
+    or open.
+    """
     if not len(draft.body_table):
         return []
     at = StaticForces(draft, start.t)
@@ -79,7 +86,7 @@ def pin_rows(draft, at: StaticForces) -> np.ndarray:
 
 
 def start_pins(draft, at: StaticForces) -> np.ndarray:
-    """Set gaps and constraint forces of pins at the start, and add faults of pins.
+    """Set gaps and constraint forces of pins at the start; raises CaseError for pins that are redundant or open.
 
     Returns the remaining generalised force on each joint freedom : float64[freedoms] [N] or [N m].
     """
@@ -90,7 +97,7 @@ def start_pins(draft, at: StaticForces) -> np.ndarray:
     rows = pin_rows(draft, at)
     names = [name for name, row in zip(draft.pin_names, draft.pin_table, strict=True) for _ in range(row["rows"])]
     for name in dict.fromkeys(redundant_pins(rows, names)):
-        text = "it is redundant: in some direction joints or other pins already prevent its opening"
+        text = "this pin is redundant: in some direction joints or other pins already prevent its opening"
         draft.fault(f"links.{name}", f"{text}. Give the key `axis` for a loop in a plane, else remove one pin")
     slips = dict(zip(names, rows @ at.rates(), strict=True))
     for name, slip in slips.items():

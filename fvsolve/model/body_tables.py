@@ -164,10 +164,10 @@ def relative_turn(draft, places: tuple[str, str]) -> float:
 
 
 def distance_and_rate(draft, places: tuple[str | None, str], line) -> tuple[float, float]:
-    """Distance between two points at the start [m], and its rate [m/s].
+    """Distance between two points at the start [m], and its rate [m/s]; a point None is the origin of the world.
 
     For a line that acts TOWARD a direction, 0 and the relative velocity in it. For a line that acts ABOUT an axis, 0
-    and the relative angular velocity about it [rad/s].
+    and the relative angular velocity about it [rad/s]. line : entry of `draft.lines`
     """
     ends = []
     for place in places:

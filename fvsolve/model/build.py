@@ -46,8 +46,8 @@ from fvsolve.steppers.tableau import method_named
 def build(case) -> Model:
     """Build the model of a case, with its initial steady state.
 
-    Raises CaseError if no steady state exists: a frictionless pipe between unequal heads, a demand that no link can
-    supply, a node joined only by rigid columns.
+    Raises CaseError if the case has faults in its model, for example no steady state: a frictionless pipe between
+    unequal heads, a demand that no link can supply, a node joined only by rigid columns.
     """
     if not isinstance(case, Case):
         raise FvsolveError(f"build takes a Case, not {type(case).__name__}; expected the result of load()")
@@ -75,9 +75,10 @@ def build_like(case: Case, like: Model | None = None) -> Model:
 
 
 def tables_with_start(case: Case, draft: ModelDraft | None = None, unfit: Collection[str] = ()) -> ModelDraft:
-    """Tables of a case with its initial steady state.
+    """Tables of a case with its initial steady state; raises CaseError if there are faults.
 
-    draft : tables before the start, built if None; unfit : names of pipes that cannot be delay lines
+    draft : tables before the start, to be filled, or None to make them; unfit : names of pipes that cannot be delay
+    lines
     """
     draft = draft or tables_before_start(case, unfit)
     draft.check()
@@ -132,9 +133,10 @@ def fill_links(draft: ModelDraft) -> None:
 def profile_size(draft: ModelDraft) -> int:
     """Size of the array `profile`, with data of the initial steady state along pipes; sets the offsets of each pipe.
 
-    It starts with the sum of both waves at which each cell reaches vapour pressure [kg/s]. Under density laws other
-    than `linear`, each pipe adds masses per length at faces [kg/m], momentum fluxes at faces [N], masses per length at
-    centres and, unless it is straight, rises above its `from` end [m].
+    It starts with the sum of both waves at which each cell reaches vapour pressure [kg/s]. Under the density law
+    `linear`, masses per length at centres follow if the case has scalars. Under other density laws, each pipe adds
+    masses per length at faces [kg/m], momentum fluxes at faces [N], masses per length at centres and, unless it is
+    straight, rises above its `from` end [m].
     """
     at = draft.cells
     if draft.case.law.linear:
@@ -163,6 +165,7 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
     """Make the tuple of tables and the shapes of run arrays.
 
     The tuple contains the tables of the draft themselves, so that later changes of their records appear in it.
+    `integers` and `floats` are copied.
     """
     settings = settings_of(draft)
     draft.probe_table = lower_probes(draft)
@@ -208,7 +211,7 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
 
 
 def column_rates(draft: ModelDraft):
-    """Natural angular frequencies of rigid columns between nodes with storage [1/s]."""
+    """Natural angular frequency [1/s] of each rigid column and its end nodes, of which constant stiffnesses count."""
     stiff = draft.node_table["stiffness"]
     for row in draft.column_table:
         k = stiff[row["from_node"]] + stiff[row["to_node"]]

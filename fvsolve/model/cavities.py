@@ -10,7 +10,10 @@ ENOUGH = 200  # number of cells from which on there is no notice
 
 
 def coarse_for_cavities(draft) -> list[Notice]:
-    """List with a notice if the pipe with the longest travel time has too few cells to resolve cavities; else empty."""
+    """List with a notice if cavities can form, but the pipe with the longest travel time has few cells; else empty.
+
+    The notice states the error of the duration of a first cavity. It is made below ENOUGH cells.
+    """
     pipes = draft.meshes
     if not draft.case.law.cavitates or not pipes:
         return []
@@ -19,6 +22,7 @@ def coarse_for_cavities(draft) -> list[Notice]:
         return []
     error = DURATION * longest.cells**-RATE
     better = DURATION * ENOUGH**-RATE
-    text = (f"{longest.name}: with {longest.cells} cells a first cavity lasts some {100.0 * error:.2g} % too short "
-            f"with little damping; with {ENOUGH} cells it is {100.0 * better:.2g} %")  # fmt: skip
+    text = (f"{longest.name}: with {longest.cells} cells the duration of a first cavity is about "
+            f"{100.0 * error:.2g} % too short with little damping; "
+            f"with {ENOUGH} cells it is {100.0 * better:.2g} %")  # fmt: skip
     return [Notice("cells", f"links.{longest.name}", text, "cells", float(longest.cells), float(ENOUGH))]

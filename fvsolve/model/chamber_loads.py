@@ -16,7 +16,7 @@ def supporting_pressures(draft, start) -> dict[int, float]:
 
     Forces of pistons are the least-squares solution that balances the forces on joints and masses. If both chambers of
     a cylinder are closed, the chamber that does not push keeps the pressure of its closed links, or ambient pressure
-    without links. A chamber that would need a pressure below that of cavities is left out.
+    without links. A chamber that would need at most the `cavity_pressure` of the density law is left out.
     """
     pistons = draft.locked
     if not pistons:
@@ -70,7 +70,10 @@ class UnbalancedForces:
 
 
 def find_closed_chambers(draft, start) -> None:
-    """Record the sides of each piston with a closed chamber that can carry a load, and the sides with trapped fluid."""
+    """Record, for each piston, the sides with a closed chamber that can carry a load, and those with trapped fluid.
+
+    They are written to `draft.locked` and `draft.shut`, see `ModelDraft`.
+    """
     for k, row in enumerate(draft.piston_table):
         closed = [side for side in "ab" if is_closed(draft, start, int(row[side]))]
         isolated = [side for side in "ab" if start.connected_nodes(int(row[side])) == [row[side]]]

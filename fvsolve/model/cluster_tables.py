@@ -12,7 +12,10 @@ from fvsolve.steady import union
 
 
 def classify_nodes(draft) -> None:
-    """Choose the solution method of nodes without storage and of valves; fill the table of groups solved by Newton."""
+    """Choose the solution method of nodes without storage and of valves; fill the table of groups solved by Newton.
+
+    Adds faults of nodes whose pressure nothing sets.
+    """
     nodes, valves = draft.node_table, draft.valve_table
     inner = nodes["kind"] == rec.JUNCTION
     short = np.flatnonzero(draft.delay_table["now"] > 0.0)
@@ -159,12 +162,13 @@ def refuse_isolated_groups(draft, members) -> None:
             continue
         first = int(air[0]["from_node"]) if air else group[0]
         place, other = (names[i] for i in sorted(group, key=lambda i: i != first)[:2])
-        reason, span = "a valve joins this air valve", " while it is shut"
+        reason, span = "a valve joins this air valve", " while the air valve is shut"
         if not air:
             joins = [name for name, v in zip(draft.valve_names, valves, strict=True) if int(v["from_node"]) in group]
             reason, span = f"{listing(joins)} {'joins' if len(joins) == 1 else 'join'} it", ""
-        draft.fault(f"nodes.{place}", f"{reason} to {other}, and only rigid columns join beyond, so nothing sets their "
-                    f"pressure{span}; make {other} a chamber, or make one of the columns a pipe")  # fmt: skip
+        draft.fault(f"nodes.{place}", f"{reason} to {other}, and otherwise only rigid columns join these nodes, so "
+                    f"nothing sets their pressure{span}; make {other} a chamber, or make one of the columns "
+                    "a pipe")  # fmt: skip
 
 
 def is_sensed(draft, device: int) -> bool:
@@ -195,7 +199,8 @@ def regularise(draft, ks) -> None:
     """Make valves without an adjacent pipe laminar below Reynolds number 10, to bound their slope at zero drop.
 
     They are also laminar below the drop of `tolerated_drop`, and at a bladder accumulator below at least 1 Pa, as its
-    neck stores hardly any mass. ks : rows of the valves
+    neck stores hardly any mass. Valves with a law of their own or a stated transition are not changed. ks : rows of the
+    valves
     """
     places, unseen = list(draft.case.places.values()), tolerated_drop(draft, ks)
     for k in ks:
@@ -213,11 +218,11 @@ def set_transition(draft, name: str, link, row) -> None:
 
 
 def tolerated_drop(draft, ks) -> float:
-    """Pressure drop [Pa] whose decay changes each adjacent vessel by at most a few error tolerances.
+    """Pressure drop [Pa] whose decay changes each adjacent storing node by at most a few error tolerances.
 
-    It is 0 without error control. Near zero drop the slope of the square-root law is unbounded. Linearly implicit steps
-    then alternate in sign: each error is below the tolerance, but the flow never comes to rest. A chamber of 10 l took
-    1e6 steps in 10 s.
+    It is 0 without error control or without such nodes. Near zero drop the slope of the square-root law is unbounded.
+    Linearly implicit steps then alternate in sign: each error is below the tolerance, but the flow never comes to rest.
+    A chamber of 10 l took 1e6 steps in 10 s.
     """
     rtol, nodes = draft.case.numerics.rtol, draft.node_table
     ends = {int(draft.valve_table[k][end]) for k in ks for end in ("from_node", "to_node")}

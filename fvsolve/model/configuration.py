@@ -21,7 +21,9 @@ CHAMBERS, PUSHES = "kernels.mass_dynamics: piston_chambers", "kernels.mass_dynam
 class Configuration(StaticForces):
     """Forces on joint freedoms and masses in any configuration.
 
-    A configuration is a state vector y : float64[n], deviations from the start. `size` is the number of unknowns.
+    A configuration is a state vector y : float64[n], deviations from the start. `size` is the number of unknowns,
+    `count` the number of constraints. Tables of the draft are changed: forces of pins and supporting pistons, `balance`
+    of freedoms.
     """
 
     def __init__(self, draft) -> None:
@@ -75,7 +77,10 @@ class Configuration(StaticForces):
         return np.concatenate([own, net[self.free]])
 
     def scale(self) -> np.ndarray:
-        """Sum of force magnitudes on each joint freedom and mass, in the current configuration : float64[size]."""
+        """Upper bound of the sum of force magnitudes on each joint freedom and mass : float64[size].
+
+        It is that in the configuration of the last call of `move_to` or `force`.
+        """
         sizes, first = np.zeros(self.size), int(self.layout["push"])
         pushes = self.out[first : first + len(self.draft.push_names)].copy()
         if self.freedoms:
@@ -91,7 +96,10 @@ class Configuration(StaticForces):
         return sizes
 
     def rows(self, y: np.ndarray) -> np.ndarray:
-        """Generalised forces that each constraint force of magnitude 1 causes : float64[constraints, size]."""
+        """Generalised forces that each constraint force of magnitude 1 causes : float64[constraints, size].
+
+        Afterwards the constraint forces are 0.
+        """
         effects = np.zeros((self.count, self.size))
         if not self.count:
             return effects
@@ -143,7 +151,7 @@ class Configuration(StaticForces):
         return matrix
 
     def gaps(self, y: np.ndarray) -> np.ndarray:
-        """Gaps of the constraints in a configuration [m]: of pins, then the travel of supporting pistons."""
+        """Gaps of pins, then travel of supporting pistons, in a configuration : float64[constraints] [m]."""
         self.move_to(y)
         pin_gaps, travel = [], int(self.layout["travel"])
         if len(self.draft.pin_table):

@@ -22,9 +22,9 @@ LEAST_STEPS = 16  # steps
 
 
 def set_rings(delays: np.ndarray, longest: float) -> None:
-    """Set the size of the ring buffer of each segment of delay lines, in entries.
+    """Set the size of the ring buffer of each stretch of delay lines, in entries, and its place among the rings.
 
-    It holds the delay, in steps of length `longest` [s], and spare entries; sizes are powers of two.
+    A ring holds HISTORY_DELAYS times the delay in steps of `longest` [s], and spare entries; sizes are powers of two.
     """
     if not len(delays):
         return
@@ -46,7 +46,7 @@ def history_size(delays: np.ndarray, wider: int = 1) -> int:
 
 
 def jump_capacity(count: int) -> int:
-    """Number of jumps of each wave that can be stored at the same time, for `count` segments."""
+    """Number of jumps of each wave that can be stored at the same time, for `count` stretches."""
     return max(LEAST_JUMPS, min(MOST_JUMPS, TOTAL_JUMPS // count))
 
 
@@ -81,12 +81,12 @@ def split_memory(memory: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def stored_entries(past: np.ndarray) -> np.ndarray:
-    """Indices of all entries whose times are still stored."""
+    """Numbers of all entries whose times are still stored, without those of the initial steady state."""
     return np.arange(max(at.PROFILE_ENTRIES, int(past[at.COUNT]) - int(past[at.CAPACITY])), int(past[at.COUNT]))
 
 
 def jump_times(past: np.ndarray, delays: np.ndarray, begin: float, end: float) -> np.ndarray:
-    """Times at which jumps reach ends or middles of segments, between `begin` and `end` [s], increasing."""
+    """Times at which jumps reach ends or middles of stretches, between `begin` and `end` [s], increasing."""
     places, queue = at.offsets_of(past), int(past[at.JUMP_CAPACITY])
     heads = past[places[1] : places[2]].reshape(-1, at.HEAD_SIZE)
     line_of, arrivals = np.repeat(np.arange(len(delays)), delays["stretches"]), []
@@ -134,7 +134,7 @@ def with_doubled_rings(past: np.ndarray, delays: np.ndarray) -> np.ndarray:
 
 
 def jump_overflow_notices(past: np.ndarray) -> list[Notice]:
-    """Notice if there was no storage for some jumps, which were smoothed; else an empty list."""
+    """List with a notice if there was no storage for some jumps, which were smoothed; else empty."""
     if not past.size or past[at.GREATEST_UNSTORED_JUMP] == 0.0:
         return []
     share = past[at.GREATEST_UNSTORED_JUMP] / past[at.GREATEST_JUMP]

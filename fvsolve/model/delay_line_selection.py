@@ -1,7 +1,7 @@
-"""Choice of the pipes that become delay lines, their division into segments, and bounds of the error.
+"""Choice of the pipes that become delay lines, their division into stretches, and bounds of the error.
 
 Bounds are relative to the greatest jump of a schedule, and have three causes:
-Friction acts in the middle of a segment only: a quarter of the attenuation of a wave in a segment.
+Friction acts in the middle of a stretch only: a quarter of the attenuation of a wave in a stretch.
 Interpolation of a change that a schedule smooths over a time T: derivatives of half a cosine of duration T.
 A line with a travel time tau shorter than the longest step h: curvature of the wave over it, tau (h - tau) / 2.
 """
@@ -36,7 +36,8 @@ class LineMethod:
     """Method for a pipe ("finite-volume" or "delay-line"), the reason for it, and the steps that it implies.
 
     rate : cells that a wave crosses per second in the delay line with the longest travel time [1/s]
-    longest : longest step, for which delay lines are divided into segments [s]
+    longest : longest step, for which delay lines are divided into stretches [s]
+    For "finite-volume" they are 0 and infinite.
     """
 
     pipe_model: str
@@ -77,7 +78,7 @@ def line_methods(case, unfit: Collection[str] = ()) -> dict[str, LineMethod]:
     for name in lines:
         reason = "waves travel along it unchanged except for friction"
         if travel[name] < longest:
-            reason += f", and faster than a step of {case.step_amount(longest, 4)}"
+            reason += f", and in less than a step of {case.step_amount(longest, 4)}"
         methods[name] = LineMethod("delay-line", reason, rate, longest)
     return {name: methods[name] for name in pipes}
 
@@ -103,7 +104,10 @@ def reason_for_cells(case, name: str, link) -> str:
 
 
 def lower_delays(draft) -> None:
-    """Fill the table of delay lines; add a fault for each pipe that is stated to be a delay line but cannot be one."""
+    """Fill the table of delay lines and, at each node, the list of their ends.
+
+    Adds a fault for each pipe that is stated to be a delay line but cannot be one.
+    """
     case, rows = draft.case, []
     for k, name in enumerate(draft.pipe_names):
         link, chosen = case.links[name], draft.followed[name]
@@ -170,10 +174,11 @@ def end_admittance_ratio(draft, pipe) -> float:
 
 
 def divide_lines(draft) -> list[str]:
-    """Divide all delay lines into segments by friction at the start; write their facts for `fvsolve check`.
+    """Divide all delay lines into stretches by friction at the start; write their facts for `fvsolve check`.
 
     Returns the names of lines that must be computed with cells instead: under `auto` their error bound exceeds the
-    tolerance, or friction does not balance their pressure drop at the start.
+    tolerance, or friction does not balance their pressure drop at the start. Adds a fault where a pipe is stated to be
+    a delay line but cannot be one, and a notice of schedules that are too fast for its steps.
     """
     case, at, unfit = draft.case, 0, []
     facts = draft.steady["lines"] = {}
@@ -235,7 +240,7 @@ def fast_schedule_notice(case, name: str, step: float, scale: float, bound: floa
 def interpolation_bound(tau: float, step: float, scale: float, ramp: float) -> float:
     """Bound of the error of interpolation between steps, relative to the change of a schedule.
 
-    tau : travel time of a segment [s]; step : longest step [s]
+    tau : travel time of a stretch [s]; step : longest step [s]
     scale : duration of the fastest smooth change, half a cosine [s]; 0 for none
     ramp : duration of the fastest straight ramp [s]; 0 for none. At its kinks a polynomial through six entries
     overshoots by up to a tenth of the change in a step.
@@ -277,7 +282,7 @@ def shape_history(draft) -> None:
 
 
 def longest_step(draft) -> float:
-    """Longest step, for which delay lines are divided into segments [s]; infinite without delay lines."""
+    """Longest step, for which delay lines are divided into stretches [s]; infinite without delay lines."""
     return min(
         (method.longest for method in draft.followed.values() if method.pipe_model == "delay-line"), default=math.inf
     )

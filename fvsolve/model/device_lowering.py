@@ -37,7 +37,7 @@ class Device(Restriction):
         row["kind"], row["row"] = rec.VESSEL, draft.stiff()
 
     def pressure_at_start(self, start, i: int, node: Any, row) -> float | None:
-        """Pressure [Pa] of a vessel at the start."""
+        """Stated pressure [Pa] of a vessel at the start; None if it has none."""
         return node.initial_pressure
 
     def motion_text(self, name: str, node: Any, row, inflow: float, flow: float, amount: Callable[..., str]) -> str:
@@ -96,7 +96,8 @@ class Device(Restriction):
         """Rows of the energy matrix L that this part adds, each state -> factor.
 
         |L d|^2 is the energy [J] that a small deviation d of the states from y stores in the part. For a vessel the
-        energy is m^2 dp/dm / (2 rho), m the deviation of its mass [kg]; other devices have none.
+        energy is m^2 dp/dm / (2 rho), m the deviation of its mass [kg]. Other kinds that store energy override this
+        function.
         """
         if not self.vessel:
             return []
@@ -105,7 +106,7 @@ class Device(Restriction):
         return [{int(node["y"]): float(np.sqrt(stiffness / (2.0 * model.case.properties.density)))}]
 
     def above(self, model, part: Any, row) -> float:
-        """Energy of the device at the start [J], above its least possible energy."""
+        """Energy of the device at the start [J], above its least possible energy; 0 if it stores none."""
         return 0.0
 
 
@@ -141,9 +142,9 @@ def lower_devices(draft) -> None:
 
 
 def link_device(valve, device: Device, k: int, row) -> None:
-    """Write the device to its VALVE row: its number if its law has a function `set`, offsets of flags and numbers.
+    """Write the offsets of flags and numbers of a device to its VALVE row, and its number if it sets the opening.
 
-    The function `set` sets the opening of the valve.
+    A device sets the opening of the valve if its law has a function `set`.
     """
     valve["device"] = k if calls.hook_of(device.law, "set") is not None else -1
     valve["event"], valve["data"] = row["event"], row["data"] if valve["data"] < 0 else valve["data"]
@@ -153,6 +154,8 @@ def opening_of(start, k: int) -> float:
     """Opening x between 0 and 1 at which valve k passes its steady flow, M |M| = G x^2 dP.
 
     M [kg/s] : mass flow; G [kg2/s2/Pa] : conductance fully open; dP [Pa] : pressure drop
+    Below the valve's transition flow or rounding drop the law of `flow_at_drop` applies instead. Without a flow, or
+    without a positive drop, x is 0; a greater flow than the open valve passes gives 1.
     """
     valve = start.valves[k]
     conductance, drop = start.valve_law(k)

@@ -21,7 +21,7 @@ class Account:
     place : name of the part; rows : indices of the powers or energies; signs : sign of each
     """
 
-    category: str  # "supplied" | "stored" | "dissipated" | "scheme" | "law"
+    category: str  # "supplied" | "stored" | "rate" (of stored) | "dissipated" | "scheme" | "law"
     place: str
     kind: str  # "reservoir", "friction", "valve", ...
     rows: tuple[int, ...]
@@ -31,7 +31,9 @@ class Account:
 class Accounts:
     """Energy accounts of a model, for the run data of a run.
 
-    Accounts of stored energy (`stored_accounts`) and of its rates (category "rate") are in the same order.
+    Accounts of stored energy (`stored_accounts`) and of its rates (category "rate") are in the same order. Tables of
+    `run_data` are changed, so that all loads of fluid on bodies are computed. Raises FvsolveError if the energy of the
+    case cannot be computed.
     """
 
     def __init__(self, run_data: RunData) -> None:

@@ -26,13 +26,13 @@ ROUNDING_SHARE = 1e-6  # rates below this share of the sum of magnitudes of thei
 
 @dataclass(frozen=True, eq=False)
 class EnergyForm:
-    """Energy |L d|^2 [J] of a small deviation d of n states, and coordinates z = forward d with |z|^2 that energy.
+    """Energy |L d|^2 [J] of a small deviation d of n states, and coordinates z = forward d with this energy |z|^2.
 
     rows : sparse float64[m, n]  matrix L, a row for each store of energy; parts : name of the part of each row
     forward : sparse float64[r, n], back : sparse float64[n, r]  forward back = 1
-    idle : float64[n, d]  motions without energy, such as a common displacement of all masses of a train; each is small
-    idle_rows : float64[d, n]  matrix that gives the amount of each motion without energy in a deviation
-    least : least energy of a small deviation [J]
+    idle : float64[n, k]  motions without energy, such as a common displacement of all masses of a train; each is small
+    idle_rows : float64[k, n]  matrix that gives the amount of each motion without energy in a deviation
+    least : least energy of a deviation of the size `Model.scale` [J]
     """
 
     rows: Any
@@ -66,7 +66,10 @@ class EnergyForm:
         return self if self.closed(a) else self.full_norm()
 
     def full_norm(self) -> EnergyForm:
-        """Energy form in which motions without energy have the least weight, so that it is a norm of all states."""
+        """Energy form in which motions without energy of amount 1 has the energy `least`.
+
+        Thus it is a norm of all states.
+        """
         from scipy.sparse import csr_array, hstack, vstack
 
         if self.idle.shape[1] == 0:
@@ -94,10 +97,11 @@ def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
     excess mass e [kg] and travel x in a chamber of a cylinder : dp/dm (e - x A e0 / V)^2 / (2 rho), with piston area A,
     volume V and excess mass e0 at y
 
-    Devices add rows (`energy_rows`), basins weights of their cells (`weights`). The form is exact for the law `linear`
-    about a steady state at rest. A scalar stores no energy, and no other state depends on it; a deviation of its
-    amount, divided by its greatest possible value, counts as 1e-6 of the energy that the same mass would store.
-    Displacements without stiffness store nothing, see `EnergyForm.idle`.
+    Devices add rows (`energy_rows`), basins weights of their cells (`weights`). The form is exact under the density law
+    `linear` about a steady state at rest. A scalar stores no energy, and no other state depends on it; a deviation of
+    its amount, divided by its greatest possible value, counts as 1e-6 of the energy that the same mass would store.
+    Displacements without stiffness store nothing, see `EnergyForm.idle`. Raises FvsolveError if springs join too many
+    positions.
     """
     from scipy.sparse import csr_array
 
@@ -154,7 +158,10 @@ def form_of(rows: Any, parts: tuple[str, ...], scale: np.ndarray) -> EnergyForm:
 
 
 def split_states(rows: Any) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Split states : (indices of states that are alone in their row of L, groups of other states that rows join)."""
+    """Split states : (indices of states that are alone in their row of L, groups of other states that rows join).
+
+    A state without a row is a group of its own.
+    """
     from scipy.sparse.csgraph import connected_components
 
     single = np.diff(rows.tocsr().indptr) == 1

@@ -62,7 +62,10 @@ class StaticState:
         return float(np.max(np.abs(self.gaps), initial=0.0))
 
     def clearly_better(self, other: StaticState) -> bool:
-        """True if this configuration is clearly nearer to equilibrium than the other."""
+        """True if the unbalanced share or the greatest gap is less than half that of the other configuration.
+
+        Values below the limits of rounding count as these limits.
+        """
         own, others = ((max(place.share, ROUNDING_SHARE), max(place.open, GAP_TOLERANCE)) for place in (self, other))
         return own[0] < 0.5 * others[0] or own[1] < 0.5 * others[1]
 
@@ -71,7 +74,7 @@ def with_equilibrium(case, draft) -> tuple[Any, list[Notice]]:
     """Case with bodies and masses in static equilibrium, and notices about it : (case, notices).
 
     draft : tables of the case with its steady start. If a velocity is stated, nothing moves from its stated position.
-    Raises CaseError if no equilibrium is found.
+    Raises CaseError if no equilibrium is found, or if the positions found are not possible.
     """
     at = Configuration(draft)
     if not at.size or at.moving():
@@ -107,7 +110,7 @@ def evaluate_configuration(at: Configuration, y: np.ndarray) -> StaticState:
 
 
 def search(at: Configuration) -> StaticState:
-    """Equilibrium reached by Newton steps, or if there is none the best configuration that was visited."""
+    """Equilibrium reached by Newton steps, or if none is reached the best configuration that was visited."""
     here = best = evaluate_configuration(at, at.y.copy())
     intended = here.share <= STATED_TOLERANCE
     for _ in range(MAX_STEPS):
@@ -173,7 +176,7 @@ def limited_step(at: Configuration, here: StaticState, move: np.ndarray, free: n
 
 
 def instability_notices(at: Configuration, result: StaticState) -> list[Notice]:
-    """Notice if the equilibrium is unstable; closed chambers count as springs."""
+    """List with a notice if the equilibrium is unstable; else empty. Closed chambers count as springs."""
     inverse_root, free, _ = free_directions(at, result)
     own = free.T @ inverse_root @ (at.stiffness(result.y) + at.fluid_stiffness(result.y)) @ inverse_root.T @ free
     values, modes = np.linalg.eigh(0.5 * (own + own.T))

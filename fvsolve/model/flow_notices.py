@@ -15,7 +15,7 @@ WIDE_PIPE, WATER_DENSITIES = 0.05, (950.0, 1050.0)
 
 
 def flow_notices(draft: Any) -> list[Notice]:
-    """Notices of high velocity and of laminar flow of water, at most one of each kind, for the worst pipe."""
+    """Notices of high velocity and of laminar flow of water, at most one of each kind, for the worst pipe or column."""
     moving = _flows(draft)
     return [*_fast_flow(draft, *moving), *_laminar_flow(draft, *moving)]
 
@@ -40,7 +40,10 @@ def _fast_flow(draft: Any, names: list[str], flow: np.ndarray, area: np.ndarray)
 
 
 def _laminar_flow(draft: Any, names: list[str], flow: np.ndarray, area: np.ndarray) -> list[Notice]:
-    """Notice if the fastest flow of water in wide pipes is laminar, probably by a wrong unit of flow or viscosity."""
+    """List with a notice if water flows in wide pipes with laminar Reynolds numbers only; else empty.
+
+    The probable cause is a wrong unit of flow or viscosity.
+    """
     fluid = draft.fluid
     if not names or not fluid.viscosity or not WATER_DENSITIES[0] <= fluid.density <= WATER_DENSITIES[1]:
         return []

@@ -20,7 +20,7 @@ class Hydraulics:
     def add_head(self, schedules, head, row) -> int:
         """Add a schedule of head [m] as pressure [Pa] at the elevation of a node's row; return its index.
 
-        Under nonlinear density laws the schedule remains a head, and the row is marked.
+        Under density laws other than `linear` the schedule remains a head, and `head_given` of the row is set.
         """
         if not self.case.law.linear:
             row["head_given"] = 1
@@ -32,8 +32,9 @@ class Hydraulics:
     def friction(self, name: str, link, row, fault) -> None:
         """Set the friction coefficients of a pipe or rigid column in its row, for mass flow M [kg/s].
 
-        They give dM/dt = -loss |M| M - rough f(Re) |M| M with the Darcy factor f, see `kernels.steady_friction`. For
-        `steady` friction by roughness the factor is set later, from the starting flow.
+        They give dM/dt = -loss |M| M - rough f(Re) |M| M with the Darcy factor f, or for Hazen-Williams -loss |M| M -
+        rough |M|^0.852 M, see `kernels.steady_friction`. For `steady` friction by roughness the factor is set later,
+        from the starting flow. Adds a fault if the law needs a viscosity and the fluid has none.
         """
         area = math.pi / 4.0 * link.diameter**2
         law, row["loss"] = link.friction, link.minor_loss / (2.0 * self.rho * area**2 * link.length) * area
@@ -71,7 +72,8 @@ class Hydraulics:
     def compliance(self, name: str, speed: float, fault) -> float:
         """Relative growth of a pipe's area with pressure [1/Pa], from the density law and the wave speed [m/s].
 
-        Adds a fault if it is negative, as the wave speed then exceeds the speed of sound in the fluid.
+        Growth below rounding is 0. Adds a fault if it is negative, as the wave speed then exceeds the speed of sound in
+        the fluid.
         """
         growth = self.case.law.compliance(speed)
         if growth < -1e-9 / self.fluid.bulk_modulus:
@@ -83,9 +85,11 @@ class Hydraulics:
         return growth if growth > 1e-9 / self.fluid.bulk_modulus else 0.0
 
     def transition_flow(self, name: str, link, reynolds: float, fault) -> float:
-        """Mass flow [kg/s] of a fully open restriction at the Reynolds number Re = 4 M / (pi d mu).
+        """Mass flow [kg/s] of a fully open restriction at the Reynolds number `reynolds` = 4 M / (pi d mu).
 
         M : mass flow [kg/s]; d : diameter of the opening [m]; mu : viscosity [Pa s]
+        If the fluid has no viscosity, the kinematic viscosity of water is used; a stated key `laminar_reynolds` is then
+        a fault.
         """
         area = link.flow_area()
         if link.diameter is not None:

@@ -12,7 +12,10 @@ if TYPE_CHECKING:
 
 
 class InputKind(NamedTuple):
-    """Kind of an input: unit, expected value in words, range of values, and size of a small change [SI]."""
+    """Kind of an input: unit, expected value in words, range of values, and size of a small change [SI].
+
+    For HEAD the small change is that of the pressure [Pa].
+    """
 
     unit: str
     expected: str
@@ -39,7 +42,11 @@ VALUE = InputKind("-", "a finite number")
 
 
 class Input(NamedTuple):
-    """Schedule that can be held at a value; kernels read scale * value + offset."""
+    """Schedule that can be held at a value; kernels read scale * value + offset.
+
+    Under density laws other than `linear`, kernels read the value itself for pressures and heads.
+    sort : kind of the input; schedule : its index in the table of schedules
+    """
 
     sort: InputKind
     schedule: int

@@ -11,9 +11,10 @@ from fvsolve.model.state_couplings import Couplings
 
 
 def jacobian_pattern(model) -> csc_array:
-    """Sparsity pattern : bool[n + ledger, n], True where a derivative may differ from zero in any state of the model.
+    """Sparsity pattern : bool[n + m, n], True where a derivative may differ from zero in any state of the model.
 
-    Rows are the rates of the n states, then the flows in the stepper's ledger; columns are the states.
+    Rows are the rates of the n states, then the m flows in the stepper's ledger (`Model.ledgers`); columns are the
+    states.
     """
     n, couplings = model.y_size, Couplings(model)
     pairs = [(np.arange(n), np.arange(n)), *couplings.pairs(), *scalar_pairs(couplings, model)]
@@ -24,10 +25,10 @@ def jacobian_pattern(model) -> csc_array:
 
 
 def lumped_states(model) -> np.ndarray:
-    """Indices of the states of lumped parts such as tanks, chambers and masses : int64[q].
+    """Indices of all states except waves in cells of pipes, states of basins and travels of their walls : int64[q].
 
-    Their pressures are hundreds of bars, while the flow of restrictions bends within few pascals. Empty under density
-    laws whose pressures come from iterations.
+    Most are states of lumped parts such as tanks, chambers and masses. Their pressures are hundreds of bars, while the
+    flow of restrictions bends within few pascals. Empty under density laws whose pressures come from iterations.
     """
     if model.case.law.name not in ("linear", "log"):  # pressures come from iterations, rougher than rounding
         return np.zeros(0, dtype=np.int64)

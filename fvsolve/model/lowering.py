@@ -131,7 +131,10 @@ class Restriction(Lowering):
         draft.restriction(name, link, row)
 
     def edge(self, start, k: int) -> Edge | None:
-        """Edge of VALVE row k in the steady flow problem; None for the square-root law, which the caller treats."""
+        """Edge of VALVE row k in the steady flow problem; None for the square-root law, which the caller treats.
+
+        Also sets `open` of the row to the conductance at the start.
+        """
         if not self.steps:
             return None
         row, (density_ratio, drive_ratio) = start.valves[k], start.density_ratios.get(k, (1.0, 1.0))
@@ -161,7 +164,8 @@ class Restriction(Lowering):
     def follow(self, start, k: int) -> None:
         """Set the steady drop of valve k to the drop that belongs to its flow by its own law.
 
-        If the drop found in the steady problem does not agree with the flow, the restriction counts as not open.
+        If the drop found in the steady problem does not agree with the flow, the restriction counts as not open. Under
+        density laws other than `linear` the drop is unchanged.
         """
         row, (drop, density_ratio) = start.valves[k], start.valve_drive(k)
         if row["open"] <= 0.0:
@@ -184,7 +188,10 @@ NEWTON_STEPS = 5  # Newton steps from a drop that is accurate to 1e-6
 
 @functools.cache
 def lowering_of(part: type) -> Lowering:
-    """Conversion of a kind of part, from the module `lower` in the package of its declaration."""
+    """Conversion of a kind of part, from the module `lower` in the package of its declaration.
+
+    It is `NO_ROWS` if the kind has none.
+    """
     package = part.__module__.rpartition(".")[0]
     if find_spec(f"{package}.lower") is not None:
         import_module(f"{package}.lower")

@@ -68,8 +68,9 @@ def join_ports(
 ) -> tuple[float, float]:
     """Write to the row of a force element the two masses or points that it joins.
 
-    Returns the offset of the second from the first at the start [m] and its relative velocity [m/s].
-    line_options : for points, further arguments of `body_tables.add_line`
+    Returns the offset of the second mass from the first at the start [m] and its relative velocity [m/s]; for points
+    the result of `body_tables.distance_and_rate`.
+    ports : names of the fields for the masses; line_options : for points, further arguments of `body_tables.add_line`
     """
     row["line"] = -1
     if are_points(draft, *places):
@@ -116,7 +117,7 @@ def pushed_masses(draft) -> np.ndarray:
 def forces_on_masses(draft, pushes: np.ndarray) -> np.ndarray:
     """Sum of the forces on each mass from force elements and from still water on moving walls : float64[masses] [N].
 
-    pushes : force of each element [N], in the order of `pushed_masses`
+    pushes : force of each element on its second mass [N], opposite on its first, in the order of `pushed_masses`
     """
     total = np.zeros(len(draft.mass_table))
     for push, (first, second) in zip(pushes, pushed_masses(draft), strict=True):

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PipeMesh:
-    """Cells of a pipe, counted from its `from` end.
+    """Cells of a pipe, counted from its `from` end; for a delay line the places at which fields are computed.
 
     x, edges : centres and edges of cells, as distances along the pipe [m]; elevation : elevations of the centres [m]
     profile : elevation profile; None for a straight pipe
@@ -58,7 +58,10 @@ class PipeMesh:
 
 @dataclass(repr=False)
 class State(Displayable):
-    """Time [s], flat state vector y, and memory of the integrator in one flat array (empty at a fresh start)."""
+    """Time [s], flat state vector y, and memory of the run in one flat array (empty at a fresh start).
+
+    memory : data of step control, event flags, and with delay lines the history of their waves
+    """
 
     t: float
     y: np.ndarray
@@ -81,7 +84,7 @@ class State(Displayable):
 
 
 def flags_of(state: State, model: Model) -> np.ndarray | float:
-    """Event flags of devices in a state that `advance` returned; 0 for any other state."""
+    """Event flags (as `RunData.armed`) of a state that `advance` returned; 0 for any other state."""
     memory = state.memory
     if len(model.tables.delays) and memory.size:
         memory = split_memory(memory)[0]
@@ -89,9 +92,9 @@ def flags_of(state: State, model: Model) -> np.ndarray | float:
 
 
 def as_numbers(name: str, values: Any) -> np.ndarray:
-    """Convert to a writable float64[...] array, without a copy where possible.
+    """Convert to a writable, C-contiguous float64[...], without a copy where possible; a number gets the shape ().
 
-    Raises FvsolveError if the values are not real numbers.
+    Raises FvsolveError if the values are not real numbers. name : name of the values in its message
     """
     if type(values) is float:
         return np.float64(values)
@@ -109,7 +112,10 @@ def as_numbers(name: str, values: Any) -> np.ndarray:
 
 
 def as_limit(limit: Any) -> float:
-    """End of a segment of a run [s], or infinity. Raises FvsolveError if the argument is not a time."""
+    """Time from which on schedules keep their left limit, as a float [s]; may be infinite.
+
+    Raises FvsolveError if the argument is not a time.
+    """
     value = as_numbers("limit", limit)
     if value.ndim or np.isnan(value):
         raise FvsolveError(f"limit = {show(value)} is not a time; expected a number of seconds, or infinity")
@@ -131,6 +137,7 @@ class Model(Displayable):
     tables : arrays that kernels read, by name; shapes : shapes of the arrays that a run writes, see `RunData`
     scale : float64[n]  size of a small deviation of each state, for relative measures
     breaks : times within the run at which steps must end, increasing : (time [s], True if a schedule's value jumps)
+    step_max : greatest step under error control, which resolves periods and samples of schedules [s]
     """
 
     case: Case
@@ -156,11 +163,11 @@ class Model(Displayable):
     profiles: dict[int, np.ndarray]  # pipe -> pressure of the profile at cell centres [Pa]
     devices: list[tuple]  # (name, part, lowering), in the order of their table
     laws: list[str]  # modules of compiled laws of parts, in the order of the rows of `hooks`
-    start: np.ndarray  # state at the start: deviations are zero, except behind the dam of a basin
-    events: list[tuple[str, str]]  # of devices: (name, meaning of a zero of its event function)
+    start: np.ndarray  # state at the start: zero except scalar amounts and basins that deviate from the steady state
+    events: list[tuple[str, str]]  # of devices and valves: (name, meaning of a zero of its event function)
     basins: list[BasinRows]  # in the order of their table
     watched: list[Probe]  # read in addition to the probes, for their extremes only
-    watched_start: np.ndarray  # pressures of `watched` along pipes in the profile [Pa], nan of other quantities
+    watched_start: np.ndarray  # pressures of `watched` along pipes in the profile [Pa], nan for others
     sharp: dict[str, np.ndarray]  # tables that replace these while a jump is solved, see `model.delay_line_selection`
     idle_run_data: deque[RunData] = field(
         default_factory=deque, init=False
@@ -194,17 +201,20 @@ class Model(Displayable):
 
     @property
     def cells(self) -> int:
-        """Number of cells of all pipes."""
+        """Number of cells of all pipes, see `PipeMesh`."""
         return sum(pipe.cells for pipe in self.pipes)
 
     @property
     def all_cells(self) -> int:
-        """Number of cells of all pipes and basins."""
+        """Number of cells of all pipes (see `PipeMesh`) and basins."""
         return self.cells + sum(basin.n for basin in self.basins)
 
     @cached_property
     def wave_rates(self) -> np.ndarray:
-        """Cells that a wave crosses per second in each pipe : float64[pipes] [1/s]."""
+        """Cells that a wave crosses per second in each pipe : float64[pipes] [1/s].
+
+        For each delay line it is the value of the delay line with the longest travel time.
+        """
         pipes = self.tables.pipes
         rates = pipes["speed"] / pipes["dx"] * np.where(pipes["delay"] >= 0, pipes["rate_factor"], 1.0)
         rates.flags.writeable = False
@@ -212,7 +222,7 @@ class Model(Displayable):
 
     @property
     def wave_rate(self) -> float:
-        """Cells that the fastest wave of the model crosses per second [1/s]; in basins at the start."""
+        """Greatest of `wave_rates` [1/s]; with basins at least the step-limiting rate of all parts at the start."""
         rate = float(self.wave_rates.max(initial=0.0))
         if not self.basins:
             return rate
@@ -281,7 +291,7 @@ class Model(Displayable):
     def checked(self, t: Any, y: Any) -> tuple[float, np.ndarray]:
         """Time and state in the form that kernels read : (t [s], y : float64[n]).
 
-        Raises FvsolveError if the state does not fit this model or is not finite.
+        Raises FvsolveError if the state does not fit this model, or if the time or a state is not a finite number.
         """
         state = self.checked_size(y)
         if not np.isfinite(state).all():
@@ -301,7 +311,8 @@ class Model(Displayable):
         """Right-hand side dy/dt = f(t, y) : float64[n].
 
         Schedules take their right limit at t; devices are in the position in which a run would start at (t, y).
-        With delay lines the argument must be a `State`, whose memory holds their history; otherwise FvsolveError.
+        With delay lines the argument must be a `State`, whose memory contains their history (without memory no waves
+        arrive); otherwise FvsolveError is raised.
         """
         if isinstance(t, State) and y is None:
             with self.run_data() as run_data:
@@ -319,7 +330,8 @@ class Model(Displayable):
     def evaluate(self, t: float, y: np.ndarray, limit: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
         """Right-hand side and further values at (t, y), see `rhs` : (dydt, out).
 
-        From time `limit` [s] on, schedules keep their left limit at `limit`.
+        From time `limit` [s] on, schedules keep their left limit at `limit`. Delay lines are allowed, but no waves
+        arrive from them.
         """
         limit = as_limit(limit)
         with self.run_data() as run_data:
@@ -340,12 +352,15 @@ class Model(Displayable):
         self.idle_run_data.append(run_data)
 
     def jacobian(self, t: float, y: np.ndarray) -> np.ndarray:
-        """Jacobian df/dy : float64[n, n], by central differences with steps in proportion to `scale`."""
+        """Jacobian df/dy : float64[n, n], by central differences with steps of 1e-6 (scale + |y|).
+
+        Raises FvsolveError if the model has delay lines.
+        """
         self.refuse_delay_lines("jacobian")
         return self.jacobian_without_delays(t, y)
 
     def jacobian_without_delays(self, t: float, y: np.ndarray) -> np.ndarray:
-        """Jacobian by central differences, with the waves that arrive from delay lines held constant."""
+        """Jacobian as `jacobian`, where delay lines are allowed, but no waves arrive from them."""
         (t, y), n = self.checked(t, y), self.y_size
         jacobian = np.empty((n, n))
         for j in range(n):
@@ -359,8 +374,9 @@ class Model(Displayable):
     def observe(self, t: float | State, y: np.ndarray | None = None, limit: float = np.inf) -> np.ndarray:
         """Values of all probes, in the order of `.probes`, at a `State` or at (t, y) : float64[probes] [SI].
 
-        Devices are in the position of a start at (t, y), or as stored in a state that `advance` returned. From time
-        `limit` [s] on, schedules keep their left limit at `limit`.
+        Devices are in the position of a start at (t, y), or as stored in a state that `advance` returned. Delay lines
+        contain the waves in the memory of the `State`; at (t, y) they are empty. From time `limit` [s] on, schedules
+        keep their left limit at `limit`.
         """
         armed, limit, past = 0.0, as_limit(limit), None
         if isinstance(t, State) and y is None:
@@ -373,7 +389,10 @@ class Model(Displayable):
     # physical meaning of states --------------------------------------------------------------------------------
 
     def cell_pressure(self, k: int, waves: np.ndarray) -> np.ndarray:
-        """Pressure [Pa] in the cells of pipe k from the sum of both waves [kg/s]."""
+        """Pressure [Pa] in the cells of pipe k from the sum of both waves [kg/s] : float64[cells].
+
+        Raises FvsolveError if there is no such pipe, or if `waves` does not have a number for each of its cells.
+        """
         waves = as_numbers("waves", waves)
         if (
             not isinstance(k, (int, np.integer))
@@ -395,9 +414,12 @@ class Model(Displayable):
         return self.case.law.cavitates
 
     def fields(self, y: np.ndarray, out: np.ndarray, lines: dict[int, tuple] | None = None) -> dict[str, Any]:
-        """Values along all pipes, in all basins and at all nodes in a state [SI] : name of part -> quantity -> values.
+        """Values along pipes, in basins and at nodes in a state [SI] : pipe or basin -> quantity -> values of cells.
 
-        out : array that `evaluate` returns; lines : pipe -> both waves of a delay line, as returned by `RunData.along`
+        Further keys: "nodes" : node -> quantity -> float; "points" : basin that moves or is on a body -> corners of its
+        cells.
+        out : array that `evaluate` returns; lines : pipe -> both waves of a delay line, as returned by `RunData.along`,
+        zero if left out
         """
         y = self.checked_size(y)
         if np.shape(out) != (int(self.layout["size"]),):
@@ -432,7 +454,7 @@ class Model(Displayable):
         return fields
 
     def contents(self, y: np.ndarray) -> tuple[float, float]:
-        """Mass stored in the initial steady state, and change of mass in state y [kg]."""
+        """Mass stored at the start, and its change from the start to state y [kg]."""
         y = self.checked_size(y)
         initial, change = 0.0, 0.0
         for k, row in enumerate(self.tables.pipes):

@@ -194,7 +194,7 @@ class ModelDraft:
         return first
 
     def hooks(self, lowering: Lowering) -> int:
-        """Row of the functions of a part's law in the table `hooks`."""
+        """Row of the functions of a part's law in the table `hooks`; added on first use."""
         law = lowering.law.__name__
         self.laws += [] if law in self.laws else [law]
         return self.laws.index(law)
@@ -237,7 +237,10 @@ class ModelDraft:
         return self.moving - 1
 
     def restriction(self, name, link, row) -> None:
-        """Set the conductance of a fully open valve [kg2/s2/Pa], and the flow below which it is laminar [kg/s]."""
+        """Set the conductance of a fully open valve [kg2/s2/Pa] in its row.
+
+        If `laminar_reynolds` is stated, also the flow below which the valve is laminar [kg/s].
+        """
         row["conductance"] = 2.0 * self.fluid.density * link.flow_area() ** 2
         if link.laminar_reynolds is not None:
             row["transition"] = self.hydraulics.transition_flow(name, link, link.laminar_reynolds, self.fault)

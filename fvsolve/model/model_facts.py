@@ -85,7 +85,10 @@ def checks(model) -> dict[str, Any]:
 
 
 def wall_facts(link) -> dict[str, Any]:
-    """Material of a pipe's wall and source of its data; empty if only wall or wave_speed is stated."""
+    """Facts about a pipe's wall, as far as known: material, source of its data, allowable pressure, restraint factor.
+
+    The entry "unread" lists properties of the material without a source that the case does not state either.
+    """
     facts = {
         key: value for key in ("material", "allowable_pressure", "source") if (value := getattr(link, key)) is not None
     }
@@ -111,7 +114,11 @@ def wall_loss(loss: float, link, rho: float, velocity: float) -> float:
 
 
 def cost_notices(model, steps: int | None, set_by: str) -> list[Notice]:
-    """Notice if an explicit method needs very many steps, because a part is much faster than waves."""
+    """List with a notice if an explicit method needs very many steps because a part is much faster than waves.
+
+    It is empty otherwise, and for given steps (`numerics.step`). steps, set_by : number of steps and reason as in
+    `checks`
+    """
     numerics, start = model.case.numerics, model.case.numerics.start
     explicit = numerics.method != AUTO and method_named(numerics.method).explicit
     waves = max([*model.wave_rates, *(basin.max_rate(model.start)[0] for basin in model.basins)], default=0.0)
@@ -147,7 +154,10 @@ def basin_facts(basin) -> dict[str, Any]:
 
 
 def start_speed(model, k: int) -> float:
-    """Wave speed of pipe k in its liquid and wall [m/s]; under the law `mixture` the mean along it at the start."""
+    """Wave speed of pipe k in its liquid and wall [m/s].
+
+    Under the density law `mixture` it is the harmonic mean along the pipe at the start.
+    """
     mesh = model.pipes[k]
     return model.case.law.wave_speed(model.tables.pipes[k], model.cell_pressure(k, np.zeros(mesh.cells)))
 
@@ -173,7 +183,7 @@ def rhs_seconds(model) -> float:
 def step_and_reason(model) -> tuple[float | None, str]:
     """Time step at the start, and the part that limits it : (step [s], text).
 
-    The step is None if error control chooses it.
+    The step is None if error control chooses it, or if nothing limits it.
     """
     numerics = model.case.numerics
     if numerics.step is not None:
@@ -205,9 +215,10 @@ def step_and_reason(model) -> tuple[float | None, str]:
 
 
 def fastest_valve(model, rate: float) -> tuple[str, float]:
-    """Valve between two nodes with storage whose closing lowers the greatest rate most : (name, remaining rate [1/s]).
+    """Valve between storing or fixed nodes whose closing lowers the greatest rate most : (name, remaining rate [1/s]).
 
-    The name is "" if no valve matters.
+    rate : greatest rate [1/s]. The name is "" if no valve lowers it by VALVE_SHARE. At most MAX_VALVES valves without
+    devices are tried.
     """
     valves, name, least = model.tables.valves, "", rate * (1 - VALVE_SHARE)
     start = model.case.numerics.start

@@ -12,7 +12,10 @@ ROUNDING = 1e-9  # specific force times length [J/kg] below which it counts as r
 
 
 def lower_moving_segments(draft) -> None:
-    """Fill a row for every pipe cell, every segment of a rigid column and every node on a body."""
+    """Fill a row for every pipe cell, every segment of a rigid column and every node (except patches) on a body.
+
+    Adds faults if a probe reads forces of joints, but the force of a part on its body is not modelled.
+    """
     rows: list[tuple] = []
     links, places = draft.case.conduits, draft.case.places
     for name, row in [*zip(draft.pipe_names, draft.pipe_table, strict=True),

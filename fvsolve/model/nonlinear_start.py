@@ -64,7 +64,10 @@ class NonlinearStart(SteadyStart):
         return self.nodes["kind"][i] != rec.JUNCTION
 
     def correct_drops(self) -> None:
-        """Set corrections of pressure drops relative to those at constant density, from the latest solution."""
+        """Set corrections of pressure drops relative to those at constant density, from the latest solution.
+
+        Raises CaseError if the pressure in a pipe falls below the range of the density law.
+        """
         potential = self.answer.potential
         names = self.draft.pipe_names
         for k, (row, mesh) in enumerate(zip(self.pipes, self.draft.meshes, strict=True)):
@@ -103,7 +106,8 @@ class NonlinearStart(SteadyStart):
     def density_and_drive(self, i: int, j: int) -> tuple[float, float]:
         """Ratios for the flow from node i to j : (upstream density over reference density, driving ratio).
 
-        The driving ratio is the driving pressure over the change of potential.
+        The driving ratio is the driving pressure over the change of potential; for a negligible change it is the
+        density ratio.
         """
         z, p = self.nodes["elevation"], [self.pressure(i), self.pressure(j)]
         drop, rho = driving_pressure(self.st, self.floats, p[0], z[i], p[1], z[j])
@@ -114,7 +118,8 @@ class NonlinearStart(SteadyStart):
     def march(self, row, mesh, flow: float):
         """Steady state along a pipe, integrated from its `from` end : (masses at faces, masses at centres, constant).
 
-        The masses are per length [kg/m]. The constant is h + v^2 / 2 + g z at the `to` end [J/kg].
+        The masses are per length [kg/m]; those at both ends are also written to `ends`. The constant is h + v^2 / 2 + g
+        z at the `to` end [J/kg]; it is not finite if the pressure falls below the range of the density law.
         """
         i = int(row["from_node"])
         z = float(self.nodes["elevation"][i])

@@ -12,7 +12,7 @@ from fvsolve.model.probe_weights import lower_position
 
 
 def lower_probes(draft) -> np.ndarray:
-    """Table of the probes of a case. Pressures of the initial steady state are filled in later, by `probe_offsets`."""
+    """Table of all probes (`all_probes`). Data of the initial steady state are filled in later, by `probe_offsets`."""
     case, table = draft.case, np.zeros(len(all_probes(draft.case)), rec.PROBE)
     parts = {"nodes": {**case.places, **case.nodes}, "links": {**case.links, **case.conduits}}
     for row, probe in zip(table, all_probes(case), strict=True):
@@ -85,9 +85,10 @@ def lower_surface(draft, row, probe) -> None:
 
 
 def probe_offsets(draft, start) -> None:
-    """Set scale and offset of every probe from the initial steady state.
+    """Set scale and offset of the probes of nodes, links and masses from the initial steady state.
 
-    Also sets the steady pressures of watched quantities along pipes.
+    Probes of basins and bodies, and of forces on pipes, do not need them. Also sets the steady pressures of watched
+    quantities along pipes.
     """
     count = len(draft.case.probes)
     draft.watched_start = np.full(len(draft.probe_table) - count, np.nan)
@@ -95,7 +96,7 @@ def probe_offsets(draft, start) -> None:
         if probe.straight and row["kind"] == rec.PIPE_PRESSURE:
             draft.watched_start[k] = start.profile_at(int(row["index"]), probe.fraction)[0]
     for row, probe in zip(draft.probe_table, all_probes(draft.case), strict=True):
-        if row["kind"] >= rec.CELL_FIELD:  # basins hold the profile of these
+        if row["kind"] >= rec.CELL_FIELD:  # basins hold the profile of theirs, the others need none
             continue
         if draft.case.law.linear:
             linear_offsets(draft, start, row, probe)
@@ -104,9 +105,9 @@ def probe_offsets(draft, start) -> None:
 
 
 def linear_offsets(draft, start, row, probe) -> None:
-    """Set scale and offset of a probe under the linear law.
+    """Set scale and offset of a probe under the density law `linear`.
 
-    Its value is scale * (deviation of pressure or flow) + offset.
+    Its value is scale * (deviation of the pressure, or flow) + offset.
     """
     weight = draft.fluid.density * draft.case.gravity
     row["scale"], row["offset"] = 1.0, 0.0
@@ -128,9 +129,10 @@ def linear_offsets(draft, start, row, probe) -> None:
 
 
 def barotropic_offsets(draft, start, row, probe) -> None:
-    """Set the offset of a probe under nonlinear laws, which converts pressure to gauge pressure or head.
+    """Set offset, code `head` and mass per length of a probe under density laws other than `linear`.
 
-    Also sets the steady mass per length at the probe.
+    With the offset, kernels convert a pressure to gauge pressure or head. The mass per length is that of the steady
+    state at a probe along a pipe.
     """
     if row["kind"] == rec.DEVICE_VALUE:
         return

@@ -14,7 +14,7 @@ TIE_TOLERANCE = 1e-6  # in cells; two sets of cells that differ by less count as
 def lower_position(draft, row, fraction: float, degree: int | None = None) -> None:
     """Set the position of a probe along its pipe: an end, or cells and weights of a polynomial through their means.
 
-    degree : degree of the polynomial; if None, that of the scheme
+    degree : degree of the polynomial, at most cells - 1; if None, that of the scheme, at least 1
     """
     if fraction in (0.0, 1.0):
         row["side"] = -1 if fraction == 0.0 else 1

@@ -35,7 +35,10 @@ def too_few_cells(draft: Any) -> list[Notice]:
 
 
 def events(case: Any) -> Iterator[tuple[str, float]]:
-    """Changes that a case states within its run : (dotted key, duration [s]); the duration of a sudden change is 0."""
+    """Changes that a case states within its run : (dotted key, duration [s]); the duration of a sudden change is 0.
+
+    Trips are included at any time.
+    """
     span = case.numerics.start, case.numerics.end
     for group in ("nodes", "links"):
         for name, part in getattr(case, group).items():
@@ -50,7 +53,7 @@ def events(case: Any) -> Iterator[tuple[str, float]]:
 def duration(schedule: Schedule, start: float, end: float) -> float:
     """Time that a schedule needs to cross its whole range at its steepest slope between `start` and `end` [s].
 
-    It is inf if the schedule does not change.
+    It is inf if the schedule does not change between `start` and `end`.
     """
     if schedule.kind == "harmonic":
         return schedule.wave[2] / math.pi
@@ -83,8 +86,8 @@ def _behind_events(draft: Any, cells: np.ndarray) -> list[Notice]:
     took, passed = (case.amount(time, "time") for time in (durations[key], cell[worst]))
     text = (
         f"{name}: {_cells(cells[worst])} with a travel time of {passed} each, too few for the waves of {key}, a change "
-        f"within {took}; with {scheme} peaks are accurate to a tenth from "
-        f"links.{name}.cells = {least} on{_others(draft, few, worst)}"
+        f"within {took}; for peaks accurate to 10 % with {scheme}, give "
+        f"links.{name}.cells = {least} or more{_others(draft, few, worst)}"
     )
     return [Notice("range", f"links.{name}", text, "cells", float(cells[worst]), float(least))]
 
@@ -92,7 +95,7 @@ def _behind_events(draft: Any, cells: np.ndarray) -> list[Notice]:
 def _diffusion(draft: Any) -> np.ndarray:
     """Numerical diffusion in each pipe, relative to that of its scheme with small steps : float64[pipes].
 
-    It is 1 - Courant number for upwind with Euler's method, else 1.
+    It is 1 - Courant number for `upwind` with `euler` and given steps, else 1.
     """
     numerics, rate = draft.case.numerics, draft.pipe_table["speed"] / draft.pipe_table["dx"]
     if numerics.scheme != "upwind" or numerics.method != "euler" or numerics.rtol is not None:
@@ -101,7 +104,11 @@ def _diffusion(draft: Any) -> np.ndarray:
 
 
 def _near_events(draft: Any, durations: dict[str, float], travel: np.ndarray) -> np.ndarray:
-    """True for each pipe with a schedule at an end that changes within a few of its travel times : bool[pipes]."""
+    """True for each pipe with a fast change of a node or link at one of its ends : bool[pipes]; trips are left out.
+
+    A change is fast if it is shorter than FAST_EVENT travel times of the pipe.
+    durations : key of a schedule -> duration of its change [s]; travel : travel times of the pipes [s]
+    """
     case, shortest = draft.case, {}
     for key, time in durations.items():
         group, name, key_name = (*key.split("."), "", "")[:3]

@@ -42,8 +42,8 @@ class RunData:
 
     clock : end of the segment (schedules take their left limit there) and the given step, see `kernels.dtypes.CLOCK`
     armed : flag of each event, 1.0 while its condition holds; marks : first times at which the model does not hold [s]
-    envelope : least and greatest value of each cell, with their times; extremes : the same of probes, watched
-    quantities
+    envelope : float64[4, cells]  least sum of both waves in each cell [kg/s], its time [s], greatest sum, its time
+    extremes : float64[4, probes]  likewise of probes, then of watched quantities
     bands : for each basin, first row (of a mesh: first cell) that this thread computes, and the one after its last
     joint : see `kernels.band_exchange`, empty if one thread computes all; sums : see `kernels.stage_sums`
     """
@@ -73,7 +73,10 @@ class RunData:
         return self.linked_handle(self.written, (functions.calls, functions.hooks))
 
     def linked_handle(self, written: rec.RunArrays, callables: tuple) -> np.ndarray:
-        """Handle of the model's tables with other written arrays and functions."""
+        """Handle of the model's tables with other written arrays and functions.
+
+        callables : (calls, hooks) of `kernels.compiled_functions.Functions`
+        """
         from fvsolve.kernels.table_handle import addresses_of, linked_handles
 
         model = self.model
@@ -97,14 +100,18 @@ class RunData:
         self.__dict__.pop("handle", None)
 
     def restore_history(self, state) -> None:
-        """Restore the history of delay lines from the memory of a state; without memory the history stays empty."""
+        """Set the history of delay lines from the memory of a state; it is unchanged if state or memory are missing.
+
+        Raises ValueError if the memory contains no history.
+        """
         if len(self.model.tables.delays) and state is not None and state.memory.size:
             self.past = split_memory(state.memory)[1].copy()
 
     def history_capacity(self) -> float:
         """Number of steps that fit before a ring of delay-line history would lose an entry that is still needed.
 
-        Enlarges the rings where needed; infinite without delay lines.
+        Infinite without delay lines. Where rings are nearly full they are doubled; then `past` and `handle` are new
+        arrays.
         """
         delays = self.model.tables.delays
         if not len(delays):
@@ -117,7 +124,11 @@ class RunData:
         return float(self.full_at - count)
 
     def along(self, t: float, out: np.ndarray, parts: int = 1) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-        """Waves along delay lines : pipe -> (forward, backward) [kg/s], in the middle of `parts` parts of each cell."""
+        """Waves along delay lines [kg/s] : number of the pipe -> (forward, backward), each float64[parts * cells].
+
+        They are the waves in the middle of each of `parts` equal parts of every cell.
+        t, out : time and the result of `evaluate` there
+        """
         waves = {}
         if len(self.model.tables.delays):
             from fvsolve.kernels.delay_lines.line_interior import waves_along_line_number
@@ -129,7 +140,10 @@ class RunData:
         return waves
 
     def evaluate(self, t: float, y: np.ndarray, limit: float) -> tuple[np.ndarray, np.ndarray]:
-        """Right-hand side and `out`, as `Model.evaluate`, with event flags set to the conditions at (t, y)."""
+        """Right-hand side and `out`, as `Model.evaluate`, with event flags set to the conditions at (t, y).
+
+        Waves arrive from delay lines as stored in `past`.
+        """
         t, y = self.model.checked(t, y)
         self.clock["limit"] = limit
         dydt, out = np.zeros(y.size), self.model.new_out()
@@ -153,7 +167,10 @@ class RunData:
                 return
 
     def fields(self, t: float, y: np.ndarray, out: np.ndarray) -> dict[str, Any]:
-        """Values as in `Model.fields`, with the least and greatest pressures in pipes up to now."""
+        """Values as in `Model.fields`, with the least and greatest pressures in pipes up to now, and a key "out".
+
+        out : result of `evaluate`, which is also the value of this key
+        """
         fields = self.model.fields(y, out, self.along(t, out))
         fields["out"] = out
         for k, (pipe, row) in enumerate(zip(self.model.pipes, self.model.tables.pipes, strict=True)):

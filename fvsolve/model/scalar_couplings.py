@@ -17,7 +17,7 @@ LIMITER_CELLS = 2  # cells that a limited value at a face reads on each side; at
 class ScalarCouplings:
     """Couplings of one scalar: pairs (rate, state on which it depends).
 
-    They are in addition to the couplings of the flow that carries the scalar.
+    They are in addition to the couplings of the flow that carries the scalar. q : number of the scalar
     """
 
     def __init__(self, couplings, model, q: int) -> None:
@@ -42,7 +42,7 @@ class ScalarCouplings:
         self.values = self.mixed_values()
 
     def own(self, i: int) -> list:
-        """States that set the scalar's value at node i if it stores or is a patch of a basin; else none."""
+        """States that set the scalar's value at node i if it stores or is a patch of a basin; else an empty list."""
         if i in self.of.patches:
             return [self.behind(i), self.of.behind(i, 1)]
         return [self.places[i], self.of.own(i)] if self.stores[i] else []
@@ -76,7 +76,10 @@ class ScalarCouplings:
         return [joined[group[i]] if inner[i] else unique_states(*self.own(i)) for i in range(len(group))]
 
     def pairs(self) -> Iterator[Pairs]:
-        """All couplings of the scalar except those of a state with itself."""
+        """All couplings of the scalar, except some of a state with itself.
+
+        Those within basins are yielded for all scalars together, with the first scalar.
+        """
         sources = [[self.values[i], *self.through[i]] for i in range(len(self.values))]
         for valve in self.of.valves:
             i, j = ends_of(valve)
@@ -135,13 +138,18 @@ class ScalarCouplings:
                 yield at + here, first + here + offset
 
     def close(self, pipe, right: int) -> np.ndarray:
-        """Indices of the states (amounts of scalars) in the cells near one end of a pipe, whose face flows depend on
-        that end; right : 1 for the end `to`, 0 for the end `from`."""
+        """Indices of the states (amounts) of cells near one end of a pipe, whose face flows depend on that end.
+
+        right : 1 for the end `to`, 0 for the end `from`
+        """
         cells = self.row["y"] + pipe["cell"] + np.arange(pipe["cells"])
         return (cells[::-1] if right else cells)[: self.wide]
 
     def read(self, pipe, right: int, i: int) -> np.ndarray:
-        """States on which the flows near an end of a pipe depend, in addition to those of adjacent cells."""
+        """States on which the flows near an end of a pipe depend, in addition to those of adjacent cells.
+
+        right : as for `close`; i : node at this end
+        """
         enters, leaves = self.of.sides(pipe, right)
         reach = self.of.reach
         return unique_states(

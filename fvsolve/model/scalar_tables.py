@@ -60,7 +60,7 @@ def bounds(case, name: str) -> tuple[float, float]:
 
 
 def scale_scalars(draft) -> None:
-    """Set steady masses per length in pipes, and the size of a small deviation of each scalar amount."""
+    """Set steady masses per length in pipes, and the size of a small deviation of scalar amounts in pipes and nodes."""
     profile, rho = draft.tables.profile, draft.fluid.density
     for k, row in enumerate(draft.pipe_table if len(draft.case.scalars) else ()):
         strain = (draft.profiles[k] - draft.fluid.pressure) / (rho * row["speed"] ** 2)
@@ -86,7 +86,7 @@ def indices_at_nodes(draft, row) -> np.ndarray:
 
 
 def start_amounts(draft, y: np.ndarray) -> None:
-    """Write the amounts of all scalars at the start into the state vector y."""
+    """Write the amounts of all scalars in pipes, tanks and chambers at the start into the state vector y."""
     case, profile = draft.case, draft.tables.profile
     for row, (name, scalar) in zip(draft.scalar_table, case.scalars.items(), strict=True):
         for pipe, mesh in zip(draft.pipe_table, draft.meshes, strict=True):
@@ -137,8 +137,9 @@ def total_amount(model, q: int, y: np.ndarray) -> float:
 
 
 def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[str, Any]]:
-    """Balance of each scalar in a run: initial, final, inflow, outflow, decayed, remainder [kg times its unit].
+    """Balance of each scalar in a run : name -> initial, final, inflow, outflow, decayed, remainder [kg x its unit].
 
+    Further entries list the inflow and outflow of each node; `relative` is the remainder over the greatest term.
     ledger : float64[2, m]  integrals of positive rates, and of negative rates, of each row of the stepper's ledger
     """
     ledgers, n = {}, len(model.node_names)

@@ -26,7 +26,7 @@ class Schedules:
     records: list[tuple[int, int]] = field(default_factory=list)
     rows: list[list[float]] = field(default_factory=list)
     breaks: dict[float, bool] = field(default_factory=dict)  # time -> True if a value jumps
-    spacing: float = np.inf  # greatest step that does not skip samples [s]
+    spacing: float = np.inf  # greatest step for periods and samples [s]
     known_values: dict[tuple[int, float], float] = field(
         default_factory=dict
     )  # (index, time) -> value, after all are added
@@ -181,7 +181,10 @@ def piece_value(piece: np.ndarray, t: float) -> float:
 
 
 def piece_roots(piece: np.ndarray) -> list[float]:
-    """Times at which a piece is zero, increasing; none for a constant piece."""
+    """Times at which a polynomial or power piece is zero, increasing; none for a constant piece.
+
+    Roots of a polynomial may be outside the interval of the piece.
+    """
     if piece[1] == 1:
         v0, v1, duration, exponent = piece[3:]
         return [piece[2] + duration * (1.0 - (v1 / (v1 - v0)) ** (1.0 / exponent))] if v0 * v1 < 0.0 else []

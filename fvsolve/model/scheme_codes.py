@@ -16,7 +16,10 @@ def family(scheme: str) -> int:
 
 
 def scheme_settings(settings, scheme: str, limiter: str) -> None:
-    """Write the code, weights and degree of a scheme, and the code of a limiter, to the settings record."""
+    """Write the code and degree of a scheme, the weights of a linear scheme, and the code of a limiter to `settings`.
+
+    settings : record of the type `kernels.dtypes.SETTINGS`
+    """
     row, settings["limiter"] = SCHEMES[scheme], CODES[limiter]
     settings["scheme"], settings["degree"] = family(scheme), row.degree
     if settings["scheme"] == rec.LINEAR:

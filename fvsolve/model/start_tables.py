@@ -12,7 +12,10 @@ from fvsolve.model.wall_creep import limit_creep_step
 
 
 def start_profile(draft) -> dict[str, Any]:
-    """Compute the initial steady state and fill it into the tables of a draft; return facts for `fvsolve check`."""
+    """Compute the initial steady state and fill it into the tables of a draft; return facts for `fvsolve check`.
+
+    Raises CaseError if no steady state is found.
+    """
     if draft.case.law.linear:
         start = SteadyStart(draft)
     else:

@@ -28,7 +28,7 @@ def state_bounds(model) -> tuple[np.ndarray, np.ndarray]:
 def bound_rows(states, first, second, base, gain, least, most) -> tuple[np.ndarray, np.ndarray]:
     """Bounds of `states` : (int64[q, 3], float64[q, 4]), see `state_bounds`; arguments are arrays or numbers.
 
-    A state lies between `least` and `most` times base + gain (y[first] + y[second]).
+    A state lies between `least` and `most` times the amount base + gain (y[first] + y[second]).
     """
     at = np.column_stack(np.broadcast_arrays(states, first, second)).astype(np.int64)
     return at, np.column_stack(np.broadcast_arrays(base, gain, least, most, np.zeros(len(at)))[:4])
@@ -62,7 +62,7 @@ def in_nodes(model, q: int):
 
 
 def in_basins(model, q: int):
-    """Bounds of a scalar's amounts per area in basins, by the depth."""
+    """Bounds of a scalar's amounts per area in basins, by the depth; by 1 in basins without variable depth (`deep`)."""
     row = model.tables.scalars[q]
     for basin in model.basins:
         if basin.row["carried"] < 0:

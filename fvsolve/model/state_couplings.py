@@ -30,7 +30,10 @@ def reach_of(scheme: str, settings) -> Reach:
 
 
 class Couplings:
-    """Couplings of a model: pairs (rate, state on which it depends), both by index."""
+    """Couplings of a model: pairs (rate, state on which it depends), both by index.
+
+    Rates with an index from the number of states on are flows in the stepper's ledger.
+    """
 
     def __init__(self, model) -> None:
         tables = model.tables
@@ -57,7 +60,7 @@ class Couplings:
         self.sets = self.pressures()  # for each node, the states that set its pressure
 
     def pairs(self) -> Iterator[Pairs]:
-        """All couplings of the model except those of a state with itself."""
+        """All couplings of the model, except some of a state with itself."""
         for pipe in self.pipes:
             if pipe["delay"] >= 0:
                 yield all_pairs(unique_states(pipe["y"]), unique_states(*(self.sets[i] for i in ends_of(pipe))))
@@ -111,7 +114,11 @@ class Couplings:
         return pattern.cell_states(self.basins[row["basin"]], cells, quantities)
 
     def pressure_states(self, i: int) -> np.ndarray:
-        """States that set the pressure of node i if it stores or is a patch: mass, basin cells, piston positions."""
+        """Indices of the states that set the pressure of a storing node or a patch.
+
+        For a node they are its mass, positions of pistons and states of its device. For a patch they are the first
+        quantity of the cells behind it, and the travels of walls of its basin.
+        """
         if i in self.patches:
             return unique_states(self.behind(i, 1), *(self.walls["y"][self.walls["basin"] == self.patches[i]["basin"]]))
         of_devices = (self.device_states(row) for row in self.devices if row["row"] >= 0 and row["node"] == i)
@@ -123,7 +130,7 @@ class Couplings:
         return device["y"] + np.arange(device["states"] if device["y"] >= 0 else 0)
 
     def opening_states(self, link) -> np.ndarray:
-        """Indices of the states that open and close a link."""
+        """Indices of the states of the device that opens and closes a link; empty if it has none."""
         if "device" not in link.dtype.names or link["device"] < 0:
             return unique_states()
         return self.device_states(self.devices[link["device"]])
@@ -137,7 +144,7 @@ class Couplings:
         return np.array([self.masses[row[end]] + order for end in ends if self.masses[row[end]] >= 0], dtype=np.int64)
 
     def ends_of_line(self, row) -> tuple[int, int]:
-        """Rows of the two points of a force element's line of action."""
+        """Rows of the two points of a force element's line of action; -1 for the world instead of a first point."""
         line = self.lines[row["line"]]
         return int(line["from_point"]), int(line["to_point"])
 
@@ -257,7 +264,10 @@ class Couplings:
             yield all_pairs(self.device_states(row), unique_states(self.device_states(row), *read))
 
     def wall_pairs(self) -> Iterator[Pairs]:
-        """Couplings of basin cells with moving walls of the basin, and of bodies with the cells at their walls."""
+        """Couplings of basin cells with the travel of moving walls, and of the travel with the parts that move a wall.
+
+        Also couplings of these masses and bodies with the cells at the walls.
+        """
         for wall in self.walls:
             basin, mass = self.basins[wall["basin"]], self.masses[wall["mass"]] if wall["mass"] >= 0 else -1
             speed = unique_states(mass + 1) if mass >= 0 else unique_states()
@@ -324,7 +334,8 @@ class Couplings:
     def friction_memory_pairs(self, pipe) -> Iterator[Pairs]:
         """Couplings of waves with memory states of unsteady friction, and of these with the waves in their cell.
 
-        Under nonlinear laws the memory is that of the velocity, which depends on neighbouring cells too.
+        Under density laws other than `linear` the memory is that of the velocity, which depends on neighbouring cells
+        too.
         """
         n = int(pipe["cells"])
         cells = np.arange(n)

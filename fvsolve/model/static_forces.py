@@ -35,9 +35,9 @@ NONE = np.zeros(0)
 
 
 def call_pieces(tables: tuple, pieces: tuple[str, ...], t: float, y: np.ndarray, out: np.ndarray, rates=NONE) -> None:
-    """Call the named kernel functions in turn, in the way of the right-hand side.
+    """Call the named kernel functions in turn, in the way of the right-hand side; they write to `out` and run arrays.
 
-    pieces : names "MODULE: FUNCTION" below the package
+    tables : tables of a model, then arrays of a run; pieces : names "MODULE: FUNCTION" below the package
     """
     from fvsolve.kernels import calls  # not loaded for cases without bodies
     from fvsolve.kernels.rhs_assembly import load_function
@@ -59,9 +59,10 @@ def arrays_without_seen(shapes: rec.RunArrays) -> rec.RunArrays:
 
 
 def mass_factor(model, y: np.ndarray) -> np.ndarray:
-    """Work array `scratch` as `solve_accelerations` leaves it at a state.
+    """Work array `scratch` after `solve_accelerations` at the state y, which contains the factor of the mass matrix.
 
-    From index 8 * freedoms on it holds the factor L of the mass matrix M = L' L, by the rows of `freedoms`.
+    From index 8 * freedoms on it holds the factor L of the mass matrix M = L' L, by the rows of `freedoms`. Its
+    diagonal, of which kernels store reciprocals, is restored.
     """
     written, t = arrays_without_seen(model.shapes), model.case.numerics.start
     written.clock["limit"] = np.inf
@@ -106,7 +107,10 @@ class StaticForces:
         return np.concatenate([row["speed"][: row["freedoms"]] for row in self.draft.body_table])
 
     def forces(self) -> np.ndarray:
-        """Generalised forces on all freedoms from loads in `out`, minus inertial forces : float64[freedoms]."""
+        """Generalised forces on all freedoms from loads in `out`, minus inertial forces : float64[freedoms] [N], [N m].
+
+        Springs and dampers of joints are included.
+        """
         n = len(self.draft.freedom_table)
         self.run(WEIGH)
         return self.written.scratch[6 * n : 7 * n].copy()
@@ -124,7 +128,10 @@ class StaticForces:
         return self.out[first : first + rec.BODY_OUT * count].reshape(count, rec.BODY_OUT)[:, FORCE : FORCE + 6]
 
     def under(self, pushes: np.ndarray) -> np.ndarray:
-        """Generalised forces on all freedoms from weights, fluid and given pushes of force elements [N]."""
+        """Generalised forces on all freedoms from weights, fluid, bushings and given pushes of force elements [N].
+
+        Inertial forces are subtracted, see `forces`.
+        """
         self.run(MOTION)
         at = int(self.layout["push"])
         self.out[at : at + pushes.size] = pushes
@@ -199,6 +206,9 @@ class StaticForces:
         return effects
 
     def by(self, loads: np.ndarray) -> np.ndarray:
-        """Generalised forces on all freedoms from given forces and torques on bodies : float64[bodies, 6]."""
+        """Result of `forces` for given loads on bodies.
+
+        loads : float64[bodies, 6]  force [N] and torque [N m] on each body, which replace those in `out`
+        """
         self.loads()[:] = loads
         return self.forces()

@@ -55,7 +55,7 @@ class SteadyStart:
         self.extra: dict[str, float] = {}  # pressure drop in addition to the law's [Pa], for laws with changing density
         self.exit_losses: dict[
             str, tuple[float, float]
-        ] = {}  # of pipes: loss of the flow that leaves at each end, per M^2 [Pa]
+        ] = {}  # of pipes: loss of the flow that leaves at each end, per M^2 [Pa s2/kg2]
         self.density_ratios: dict[
             int, tuple[float, float]
         ] = {}  # of valves: density relative to reference, driving pressure drop relative to potential drop
@@ -100,7 +100,10 @@ class SteadyStart:
         return values[key]
 
     def solve(self) -> None:
-        """Solve for the steady state in which the state of every device agrees with its pressures and flows."""
+        """Solve for the steady state in which the state of every device agrees with its pressures and flows.
+
+        Raises CaseError if there is none.
+        """
         random, devices = Random(0), list(zip(self.draft.devices, self.draft.device_table, strict=True))
         for turn in range(MAX_REVISIONS):
             self.balance()
@@ -119,7 +122,7 @@ class SteadyStart:
         self.draft.check()
 
     def scatter(self, random: Random) -> None:
-        """Set regulating devices to random states, after revisions of their states did not converge."""
+        """Shut regulating devices at random or reset their modes, after revisions of their states did not converge."""
         for k in sorted(self.valve_modes):
             if random.random() < 0.5:
                 self.shut = self.shut | {k}
@@ -167,7 +170,10 @@ class SteadyStart:
         self.pipe_flow, self.column_flow, self.valve_flow = flow[:n], flow[n:m], flow[m : m + len(valves)]
 
     def boundary_values(self) -> tuple[np.ndarray, np.ndarray]:
-        """Fixed potentials of nodes [Pa], nan where unknown, and demands of junctions [kg/s]."""
+        """Fixed potentials of nodes [Pa], nan where unknown, and demands of junctions [kg/s] : float64[nodes] each.
+
+        Demands are 0 for `initial = "rest"`.
+        """
         held, demand = np.full(len(self.nodes), np.nan), np.zeros(len(self.nodes))
         for i, (node, row) in enumerate(zip(self.case.places.values(), self.nodes, strict=True)):
             if row["kind"] == rec.JUNCTION:
@@ -194,9 +200,10 @@ class SteadyStart:
         return any(np.any((table["from_node"] == i) | (table["to_node"] == i)) for table in tables)
 
     def friction_edge(self, name: str, row, length: float) -> Edge:
-        """Edge of a pipe or rigid column in the steady problem: its potential drop is length / area times its drag.
+        """Edge of a pipe or rigid column in the steady problem, with its potential drop.
 
-        The drag [kg/s2] is the friction of the mass flow, see `kernels.steady_friction.drag`.
+        The drop is length / area times the drag, plus the entries of `extra` and `exit_losses`. The drag [kg/s2] is the
+        friction of the mass flow, see `kernels.steady_friction.drag`. A stated `initial_flow` is a fixed flow.
         """
         law = tuple(row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds"))
         per = length / row["area"]
@@ -223,9 +230,9 @@ class SteadyStart:
         return Edge(i, j, newton, first, drop=drop)
 
     def valve_edge(self, k: int) -> Edge:
-        """Edge of a valve in the steady problem, M |M| = G dP, with the slope of a chord of the root.
+        """Edge of a valve in the steady problem, M |M| = G dP, linearised with the slope of a chord of the root.
 
-        M : mass flow [kg/s]; G : conductance [kg2/s2/Pa]; dP : drop of potential [Pa]
+        Also sets `open` of its row. M : mass flow [kg/s]; G : conductance [kg2/s2/Pa]; dP : drop of potential [Pa]
         """
         row = self.valves[k]
         own = self.valve_lowering(k).edge(self, k)
@@ -286,7 +293,7 @@ class SteadyStart:
         return self.law.density(max(p_a, p_b)) * row["leakage"] * (p_a - p_b)
 
     def report_faults(self, held) -> None:
-        """Add a fault for each part for which no steady state exists.
+        """Add a fault for each part for which no steady state exists; raises CaseError if there is any.
 
         held : float64[n]  fixed potentials of nodes [Pa]
         """
@@ -307,8 +314,8 @@ class SteadyStart:
                 a, b = (self.case.amount(head, "head", 6) for head in (a, b))
                 self.draft.fault(
                     f"links.{name}",
-                    f"no steady state: it has no friction, and heads of {a} and {b} at its ends; "
-                    'give it friction or initial_flow, or use initial = "rest"',
+                    f"no steady state: this pipe has no friction, but different heads at its ends, {a} and {b}; "
+                    'give it `friction` or `initial_flow`, or use initial = "rest"',
                 )
         if not self.draft.faults and not self.answer.converged:
             self.draft.fault("numerics.initial", "no steady state was found; check for demands that cannot be supplied "
@@ -352,7 +359,7 @@ class SteadyStart:
     def freeze_factors(self) -> None:
         """Set the constant factors of `steady` friction by roughness, from the starting flow.
 
-        Without flow at the start the factor is that of fully rough flow.
+        Without flow at the start the factor is that of fully rough flow, 0 for a smooth wall, and a notice is added.
         """
         rows = [*zip(self.draft.pipe_names, self.pipes, self.pipe_flow, strict=True),
                 *zip(self.draft.column_names, self.columns, self.column_flow, strict=True)]  # fmt: skip
@@ -385,7 +392,7 @@ class SteadyStart:
         return drag(*law)
 
     def fill_pipes(self) -> None:
-        """Set the steady pressures along pipes, linear between the ends.
+        """Set the steady pressures along pipes, from a potential that is linear between the ends.
 
         Pressure that friction does not balance drives the flow.
         """
@@ -484,9 +491,8 @@ class SteadyStart:
                 moving += [text] if text else []
         amount = self.case.amount
         for name, pressure in self.unbalanced_drops.items():
-            moving.append(
-                f"pipe {name}: {amount(pressure, 'pressure', span=True)} drives its flow, not balanced by friction"
-            )
+            drop = amount(pressure, "pressure", span=True)
+            moving.append(f"pipe {name}: a pressure difference of {drop}, not balanced by friction, drives its flow")
         for name, row in zip(self.draft.column_names, self.columns, strict=True):
             if row["offset"] != 0.0:
                 moving.append(

@@ -82,10 +82,12 @@ def _power_of_two(x: float) -> float:
 def fit(transform: str, top: float, low: float, accuracy: float) -> tuple[np.ndarray, np.ndarray]:
     """Weights and decays (m, n) whose sum of m / (s + n) fits a transform W(s) at s = i w, from w = low on.
 
-    All m are nonnegative, n is increasing and at most `top`, and there are as few terms as possible. The relative error
-    is at most `accuracy`; where decays up to `top` cannot follow, at most 2 (w / top)^3. As 1 / top is near the travel
+    All m are positive, n is increasing, and there are as few terms as possible. The relative error is at most
+    `accuracy`; where decays up to `top` cannot follow, at most 2 (w / top)^3 and 0.3. As 1 / top is near the travel
     time of a cell, that is third order in the cell size. Decays are in geometric progression; m follows from
-    nonnegative least squares of (sum of m / (s + n)) / W(s) - 1. The result is checked at every w.
+    nonnegative least squares of (sum of m / (s + n)) / W(s) - 1. The result is checked at all samples of w. Raises
+    ArithmeticError if MAX_TERMS terms are too few.
+    transform : "zielke" or "root" (`inverse_root`)
     """
     exact, heads = (zielke, _zeros()) if transform == "zielke" else (inverse_root, [np.zeros(0)])
     w = np.geomspace(min(low, 0.01 * top), LAST_FREQUENCY * top, 32 + int(10 * math.log(max(top / low, 4.0))))
@@ -136,7 +138,11 @@ def reserve_terms(draft, row) -> None:
 
 
 def add_terms(draft) -> dict[str, dict]:
-    """Add terms and states of pipes with unsteady friction, from flows at the start; return facts for `check`."""
+    """Add terms and states of pipes with unsteady friction, from flows at the start; return facts for `check`.
+
+    Raises the rate that limits explicit steps where terms need it. Adds a fault if the weighting function needs a flow
+    at the start, or if no sum of exponentials is accurate enough.
+    """
     facts, settings, floats = {}, draft.tables.settings[0], draft.tables.floats
     numerics, fluid = draft.case.numerics, draft.fluid
     for name, row, mesh in zip(draft.pipe_names, draft.pipe_table, draft.meshes, strict=True):

@@ -27,8 +27,8 @@ def gains(link, density: float, speed: float) -> tuple[np.ndarray, np.ndarray]:
     """Coefficients of every Kelvin-Voigt element of a pipe : (gain G / tau [1/s], rate 1 / tau [1/s]).
 
     tau : retardation time [s]. G is the final volume that the element takes up, relative to the volume that wall and
-    liquid take up elastically: G = c D K J / e, with restraint factor c, diameter D, elastic modulus K = rho a^2, creep
-    compliance J, wall thickness e.
+    liquid take up elastically: G = c D K J / e, with restraint factor c, diameter D, effective bulk modulus K = rho
+    a^2, creep compliance J, wall thickness e.
     """
     growth, time = np.array(link.creep_elements).T
     return growth * density * speed**2 / time, 1.0 / time
@@ -49,7 +49,11 @@ def mass_in_creep(floats: np.ndarray, row, y: np.ndarray) -> float:
 
 
 def limit_creep_step(draft, unsteady: dict) -> dict[str, dict]:
-    """Raise the rate that limits explicit steps to that of the fastest creep element; return facts for `check`."""
+    """Raise the rate that limits explicit steps to the greatest rate of a pipe with creep; return facts for `check`.
+
+    unsteady : result of `add_terms`
+    The result is name of a pipe -> facts, with the wave speed after complete creep as `slow_speed` [m/s].
+    """
     result, settings = {}, draft.tables.settings[0]
     for name, row in zip(draft.pipe_names, draft.pipe_table, strict=True):
         if row["elements"] == 0:

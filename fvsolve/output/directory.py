@@ -32,7 +32,7 @@ class RunDirectory:
     """Writer of the files of a run: appends to history.csv and the fields, replaces restart.npz at every checkpoint.
 
     The run is unfinished while summary.json is absent. Raises RunError if the directory contains another run and
-    neither `force` nor `resume` is set, or if its restart.npz does not fit the case.
+    neither `force` nor `resume` is set, if its restart.npz does not fit the case, or if it cannot be locked or written.
     """
 
     def __init__(self, folder: Path, model, force: bool = False, resume: bool = False):
@@ -47,7 +47,7 @@ class RunDirectory:
         self.fields = FieldSeries(self.folder, model) if drawn else None
         self.lines = LineSeries(self.folder, model) if model.case.output.lines else None
         if self.folder.exists() and not self.folder.is_dir():
-            raise RunError(f"{self.folder} is a file. Expected a directory; choose another one with --out DIR")
+            raise RunError(f"{self.folder} is a file. Expected a directory; choose another directory with --out DIR")
         self.lock = lock_folder(self.folder, "a run")
         try:
             self.restart = self._checkpoint() if resume else None
@@ -61,14 +61,21 @@ class RunDirectory:
 
     @property
     def ended(self) -> bool:
-        """True if the directory holds the finished run of the same case and versions, up to numerics.end."""
+        """True if `resume` is set and the directory holds the finished run of this case up to numerics.end.
+
+        Case and versions must agree with those of the run.
+        """
         if self.restart is None or not (self.folder / SUMMARY_FILE).is_file():
             return False
         summary = read_summary(self.folder / SUMMARY_FILE)
         return summary["ok"] and summary["versions"] == self.identity and summary["t"] >= self.model.case.numerics.end
 
     def begin(self, model, state) -> None:
-        """Open the files: new files, or the files of an earlier part of the run, truncated to the checkpoint."""
+        """Open the files: new files, or the files of an earlier part of the run, truncated to the checkpoint.
+
+        Deletes summary.json, pictures and reports of earlier results. Raises RunError if the files do not fit the
+        checkpoint.
+        """
         for name in (SUMMARY_FILE, *PICTURE_FILES):
             (self.folder / name).unlink(missing_ok=True)
         clear_reports(self.folder)
@@ -90,10 +97,7 @@ class RunDirectory:
             self.history.write(t, values)
 
     def field(self, t: float, frame: dict) -> None:
-        """Write the fields of all pipes, basins and bodies at time `t` [s].
-
-        frame : pipe or basin -> quantity -> float64[cells] in SI
-        """
+        """Write the fields of all pipes, basins and bodies at time `t` [s]; frame : result of `RunData.fields`."""
         with self.report_write_errors():
             if self.lines:
                 self.lines.write(self.fields.frames, frame)

@@ -66,7 +66,10 @@ class FieldSeries:
         (self.folder / "fields.pvd").write_bytes((PVD_HEAD + PVD_TAIL).encode())
 
     def continue_from(self, frames: int) -> None:
-        """Keep the first `frames` frames of the series and delete later frames, to continue from a checkpoint."""
+        """Keep the first `frames` frames of the series and delete later frames, to continue from a checkpoint.
+
+        Raises RunError if frames are missing.
+        """
         index = self.folder / "fields.pvd"
         lines = index.read_text(encoding="utf-8").splitlines() if index.is_file() else []
         n = frames * (len(self.basins) + (1 if self.pipes else 0) + (1 if self.bodies else 0))
@@ -83,7 +86,7 @@ class FieldSeries:
         self.frames = frames
 
     def write(self, t: float, frame: dict) -> None:
-        """Write the frame at time `t` [s]; frame : pipe or basin -> quantity -> float64[cells] in SI."""
+        """Write the frame at time `t` [s]; frame : result of `RunData.fields`."""
         name = f"fields/{self.frames:06d}.vtu"
         for part, (basin, (points, cells, units)) in enumerate(self.basins.items(), 1):
             file, owner_basin = f"fields/{basin}-{self.frames:06d}.vtu", self.model.basins[part - 1]

@@ -27,7 +27,10 @@ class HistoryFile:
         self._file.write(f"{headers}\n".encode())
 
     def continue_from(self, rows: int, size: int) -> None:
-        """Open the file of a checkpoint of `rows` rows, truncated to `size` bytes; raises RunError if it is shorter."""
+        """Open the file to continue from a checkpoint, at which it had `rows` rows and `size` bytes.
+
+        What follows is cut off. Raises RunError if the file is missing or shorter.
+        """
         if not self.path.is_file() or self.path.stat().st_size < size:
             raise RunError(f"{self.path} is shorter than at its checkpoint; start the run again with --force")
         self._file = open(self.path, "r+b")

@@ -29,7 +29,10 @@ class LineSeries:
         self.folder.mkdir(exist_ok=True)
 
     def continue_from(self, frames: int) -> None:
-        """Keep the first `frames` frames of every line and delete later frames, to continue from a checkpoint."""
+        """Keep the first `frames` frames of every line and delete later frames, to continue from a checkpoint.
+
+        Raises RunError if frames are missing.
+        """
         for name in self.lines:
             if frames and not self.path(name, frames - 1).is_file():
                 raise RunError(f"{self.folder}: frames of {name} are missing; start the run again with --force")

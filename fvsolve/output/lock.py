@@ -31,7 +31,8 @@ def lock_folder(folder: Path, writer: str) -> FileLock:
     except NotImplementedError:
         raise RunError(f"{folder} is on a file system without locks; choose another directory with --out DIR") from None
     except OSError as error:
-        raise RunError(f"{folder}: cannot be written: {error.strerror or error}; choose another with --out") from None
+        text = f"{folder}: cannot be written: {error.strerror or error}"
+        raise RunError(f"{text}; choose another directory with --out DIR") from None
     return lock
 
 

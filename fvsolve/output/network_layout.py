@@ -20,7 +20,10 @@ BEND_SIZE = 0.15  # sideways bend of parallel links, as a fraction of their leng
 
 
 def plan_positions(case, lengths: dict[str, float]) -> dict[str, np.ndarray]:
-    """Plan position [m] of every part that links connect : name -> float64[2]. lengths : link -> length [m]"""
+    """Plan position [m] of every node, and of links that own places : name -> float64[2].
+
+    lengths : link -> length [m]
+    """
     ports = {name: [place(port) for port in link.ports.values()] for name, link in case.links.items()}
     named = [part for ends in ports.values() for part in ends] + [place(part) for part in case.places]
     owners = dict.fromkeys(part for part in named if part not in case.nodes)
@@ -110,7 +113,7 @@ def _plan(count: int, edges: list[tuple[int, int, float]]) -> np.ndarray:
 def _distances(count: int, edges: list[tuple[int, int, float]]) -> np.ndarray:
     """Lengths of the shortest paths between all nodes : float64[count, count] (Floyd 1962).
 
-    edges : (node, node, length) of each link
+    It is twice the greatest length between nodes that no path joins. edges : (node, node, length) of each link
     """
     distance = np.full((count, count), np.inf)
     np.fill_diagonal(distance, 0.0)
@@ -163,7 +166,10 @@ def _minimise_stress(plan: np.ndarray, distance: np.ndarray) -> np.ndarray:
 
 
 def _oriented(plan: np.ndarray) -> np.ndarray:
-    """Plan rotated and shifted: longer side along x, first node to the left, lower left corner at the origin."""
+    """Plan rotated, mirrored and shifted: longer side along x, least x and y at the origin.
+
+    The first node is to the left of the centre of all nodes, and below it.
+    """
     plan = plan - plan.mean(0)
     _, _, axes = np.linalg.svd(plan, full_matrices=False)
     plan = plan @ axes.T

@@ -37,7 +37,10 @@ class Restart:
 
 
 def identity(case) -> dict[str, str]:
-    """Hash of the case without its end time, and versions of programs; a run can only continue if all are equal."""
+    """Hash of the case and of its files, and `versions`; a run can only continue if all are equal.
+
+    The hash leaves out the end time and the keys that change only the report, `UNCHECKED_KEYS`.
+    """
     table = {key: value for key, value in case.table().items() if key not in UNCHECKED_KEYS}
     table["numerics"].pop("end")
     digest = hashlib.sha256(json.dumps(table, sort_keys=True, default=str).encode())

@@ -16,7 +16,7 @@ from fvsolve.output.unit_columns import column
 def route_envelopes(envelope: dict, case) -> dict[str, dict[str, Any]]:
     """Envelopes along all routes: route -> "chainage", "pipe" or quantity -> array along the route.
 
-    envelope : pipe -> quantity -> float64[cells] in the units of envelope.csv, also of the result
+    envelope : pipe -> quantity -> float64[cells]; both it and the result are in the units of envelope.csv
     """
     distances = column("distance", "length", case)
     return {name: joined_envelopes(envelope, legs(route, case.links), distances) for name, route in case.routes.items()}

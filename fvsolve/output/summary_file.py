@@ -98,7 +98,7 @@ def read_summary(path: Path) -> dict:
 def _extremes(summary, model) -> dict:
     """Extremes of each probe and their times, in the unit of the probe.
 
-    They are None if reached after the time from which a diverged run is invalid.
+    They are None if reached at or after the time from which a diverged run is invalid.
     """
     extremes = {}
     for col in probe_columns(model):

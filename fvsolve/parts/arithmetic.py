@@ -38,9 +38,10 @@ ERRORS = ("divides by zero", "is the logarithm of zero", "is not a number", "ove
 
 
 class Step(NamedTuple):
-    """Step of the evaluation of a formula with a stack of values.
+    """Step in the evaluation of a formula with a stack of values.
 
-    rule : a number or name to push (count 0), or a function of the last `count` values; part : its text in the formula
+    rule : a number or name, which is pushed on the stack (count 0), or a function of the last `count` values
+    part : text of the step in the formula
     """
 
     rule: Callable | str | float
@@ -49,9 +50,9 @@ class Step(NamedTuple):
 
 
 class Arithmetic:
-    """Formula of x and y. Raises ValueError for an invalid text, and where a value is not finite.
+    """Formula of x and y, called with arrays. Raises ValueError for an invalid text or a value that is not finite.
 
-    All values are floats; comparisons give 1 or 0. Values that `where` does not select may be invalid.
+    All values are floats; comparisons give 1 or 0. Values that the function `where` does not select may be invalid.
     """
 
     def __init__(self, text: str, otherwise: str = "") -> None:
@@ -114,7 +115,7 @@ class Arithmetic:
             operator_function(getattr(node, "op", node))
 
     def call(self, node: ast.Call, part: str) -> Iterator[Step]:
-        """Yield the steps that compute a function call."""
+        """Yield the steps that compute a function call; part : its text in the formula"""
         name = node.func.id if isinstance(node.func, ast.Name) else ""
         if name not in FUNCTIONS:
             text = self.source_of(node.func)
@@ -156,10 +157,10 @@ class Arithmetic:
 
 
 def apply_step(at: int, rule: Callable, values: tuple, wrongs: tuple) -> tuple[np.ndarray, np.ndarray]:
-    """Result of a function of arrays, and its error codes : float64[n], int64[n].
+    """(values, error codes) of a function of arrays : float64[n], int64[n].
 
     at : index of the step; rule : function; values : its arguments; wrongs : error codes of the arguments
-    An error code is -1 for a valid value, else len(ERRORS) * index of the step + index in `ERRORS`.
+    An error code is -1 for a valid value, otherwise len(ERRORS) * index of the step + index in `ERRORS`.
     """
     if rule is np.where:
         condition, a, b = wrongs
@@ -193,7 +194,7 @@ def decimal_number(text: str) -> float:
 
 
 def bracket_fault(text: str) -> str:
-    """Text of the fault of the brackets in a formula; "" if there is none."""
+    """Text of the fault of the brackets in a formula; "" for valid brackets."""
     depth = 0
     for sign in text:
         depth += (sign == "(") - (sign == ")")

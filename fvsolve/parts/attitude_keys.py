@@ -20,7 +20,7 @@ ANGLES = ("roll", "pitch", "yaw")
 
 
 def Angle(about: str) -> Quantity:
-    """Declaration of an angle of an attitude."""
+    """Declaration of a key for an angle of an attitude."""
     return Quantity("angle", about=about, usual=USUAL_ANGLES)
 
 
@@ -117,7 +117,7 @@ class Attitude(Table):
                 ("matrix",),
                 off,
                 ROUNDING,
-                f"R'R differs from the identity by {off:.2g}, R the matrix; the nearest rotation is used",
+                f"is not exactly a rotation: R'R differs from the identity by {off:.2g}; the nearest rotation is used",
             )
         for key, text, apart in self._deviations():
             if apart > ROUNDING:
@@ -135,7 +135,11 @@ class Attitude(Table):
         return result
 
     def _deviations(self) -> Iterator[tuple[str, str, float]]:
-        """(key, text, angle [rad]) of the deviation of every form but the first from the first form."""
+        """Compare each given form except the first with the first form; yield (key, text, angle [rad]).
+
+        key : first key of the form; text : description of the deviation
+        angle : angle of the rotation between both attitudes
+        """
         (first, rotation), *others = self._rotations().items() or [("", None)]
         for key, other in others:
             angle = attitude.axis_angle(attitude.deviation(other, rotation))[1]
@@ -148,7 +152,10 @@ class Attitude(Table):
 
 
 def valid_values(table: type[Table], given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
-    """Read the values of the keys that are valid; leave out other keys, whose faults the table itself reports."""
+    """Read the keys that have valid values : key -> value.
+
+    Other keys are left out; the table itself reports their faults.
+    """
     result = {}
     for key, value in table.values().items():
         try:
@@ -160,10 +167,13 @@ def valid_values(table: type[Table], given: dict[str, Any], setting: ReadContext
 
 
 def length_notices(key: str, given: tuple[float, ...] | None) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
-    """Notice of a direction or Euler parameters with a length other than 1; they are divided by their length."""
+    """Yield a notice if a direction or Euler parameters have a length other than 1; they are divided by their length.
+
+    key : key of the vector; given : its components
+    """
     length = math.hypot(*given) if given else 1.0
     if abs(length - 1.0) > ROUNDING:
-        yield (key,), length, 1.0, f"its length is {length:.6g}, not 1; it is divided by it"
+        yield (key,), length, 1.0, f"its length is {length:.6g}, not 1; it is divided by its length"
 
 
 def is_zero_vector(given: tuple[float, ...] | None) -> bool:

@@ -18,7 +18,7 @@ class Scalar(Table):
     """
 
     unit: Annotated[str, Text("unit, a label in headers", VALUE)] = "-"
-    initial: Annotated[float, Number(about="initial value, unless a part states another")] = 0.0
+    initial: Annotated[float, Number(about="initial value where a part states no other value")] = 0.0
     diffusivity: Annotated[
         float, Quantity("diffusivity", nonnegative, "diffusivity along pipes [m2/s]", changes=VALUE)
     ] = 0.0
@@ -28,7 +28,7 @@ class Scalar(Table):
 
 @dataclass(frozen=True)
 class ScalarValues(Value):
-    """Values of transported scalars, name -> number or schedule."""
+    """Value of a case file for transported scalars, name -> number or schedule."""
 
     about: str = "value of each scalar, by its name"
     value: Value = Scheduled("number")

@@ -37,7 +37,7 @@ MAX_ROUGHNESS = 0.05  # relative roughness, Moody 1944
 
 
 class Fittings(Value):
-    """List of names of fittings; names may repeat."""
+    """Value of a case file for a list of names of fittings; names may repeat."""
 
     about = "names of fittings; their loss coefficients are added to minor_loss"
     takes = "list of names"
@@ -105,7 +105,7 @@ class Conduit(TwoPort):
 
     @classmethod
     def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
-        """Table with catalogue names replaced by `diameter`, wall `thickness` and `minor_loss`.
+        """Table in which `diameter`, wall `thickness` and `minor_loss` replace catalogue names.
 
         Raises ValueFault for unknown names.
         """
@@ -132,7 +132,7 @@ class Conduit(TwoPort):
 
 
 def pipe_size(nominal: str, schedule: Any) -> tuple[float, float]:
-    """Inner diameter and wall thickness of a nominal size and schedule [m]. Raises ValueFault with the faulty key."""
+    """(inner diameter [m], wall thickness [m]) of a nominal size and schedule; raises ValueFault with the wrong key."""
     try:
         return pipe_bore(nominal, str(schedule))
     except ValueError as error:

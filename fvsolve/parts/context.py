@@ -11,12 +11,13 @@ Faults = Iterator[tuple[tuple[Any, ...], str]]  # (keys below the part, text of 
 
 @dataclass(frozen=True)
 class CaseContext:
-    """Parts and properties of a case after its parts are read.
+    """Parts and properties of a case, for checks after its parts are read.
 
     nodes, links : parts by name; ambient : ambient pressure [Pa]
     gravity : [m/s2], None if faulty; fluid : properties of the fluid, None if faulty
-    boiling_faults : function of (group, name, key, pressures [Pa]) of a part; yields a fault if the fluid boils there
-    place_distance : function of two places; distance from the first to the second at the start [m], None if unknown
+    boiling_faults : function of (group, name, key, pressures [Pa]) of a part, which yields a fault if the fluid boils
+    at one of the pressures
+    place_distance : function of two places: distance [m] from the first to the second at the start, None if unknown
     """
 
     nodes: dict[str, Any]
@@ -34,9 +35,9 @@ class CaseContext:
         return getattr(node, "domain", "") == "spatial" or bool(point) and point in getattr(node, "points", {})
 
     def separation(self, link: Any, first: str, second: str) -> float | None:
-        """Distance from the place at port `first` of a link to the place at port `second` at the start [m].
+        """Distance [m] from the place at port `first` of a link to that at port `second` at the start; None if unknown.
 
-        A signed difference of positions for masses on the axis, a distance for points in space; None if unknown.
+        It is a signed difference of positions for masses on the axis, and a distance for points in space.
         """
         ends = [link.ports.get(port) for port in (first, second)]
         return None if None in ends else self.place_distance(*ends)

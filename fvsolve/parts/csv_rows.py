@@ -69,9 +69,10 @@ class CsvRows:
         raise ValueError(f"{self.file} has no column {show(name)}{shown}")
 
     def numbers(self, column: int, dimension: str, ambient: float = 101325.0) -> np.ndarray:
-        """Values of a column in SI by the unit in its header, pressures absolute : float64[n].
+        """Values of a column in SI : float64[n].
 
-        dimension : expected kind of unit; ambient : ambient pressure, added to gauge pressures [Pa]
+        The header of the column states its unit; pressures become absolute.
+        dimension : dimension that the unit must have; ambient : ambient pressure [Pa], added to gauge pressures
         """
         unit = split_header(self.header[column])[1]
         try:
@@ -84,7 +85,7 @@ class CsvRows:
         return known.si(values) + (ambient if known.gauge and dimension == "pressure" else 0.0)
 
     def plain(self, column: int) -> list[float]:
-        """Numbers of a column without conversion of units. Raises CsvError."""
+        """Numbers of a column without conversion of units. Raises CsvError for other texts."""
         values, points = [], False
         for k, (line, row) in enumerate(zip(self.lines, self.cells, strict=True)):
             text = row[column]
@@ -102,7 +103,7 @@ class CsvRows:
 
 
 def split_header(header: str) -> tuple[str, str]:
-    """Name and unit of a header; the unit is empty if there is none."""
+    """(name, unit) of a header such as "t [s]"; the unit is empty if the header has none."""
     match = re.fullmatch(r"(.*?)\s*\[(.*)\]", header)
     return (match[1], match[2]) if match else (header, "")
 
@@ -140,12 +141,12 @@ def read_rows(path: Path) -> CsvRows:
 
 
 def is_uniform(rows: list[list[str]]) -> bool:
-    """True if all rows have the same number of cells, more than one."""
+    """True if all rows have the same number of cells, and that is more than one."""
     return {len(row) for row in rows} == {len(rows[0])} and len(rows[0]) > 1
 
 
 def split_lines(path: Path, lines: list[tuple[int, str]], mark: str = ",") -> list[list[str]]:
-    """Texts of the cells of each line; `mark` is the separator."""
+    """Split each line into the texts of its cells; mark : separator; path : file, for messages"""
     try:
         return [[cell.strip() for cell in next(csv.reader([line], delimiter=mark))] for _, line in lines]
     except csv.Error as error:
@@ -153,7 +154,7 @@ def split_lines(path: Path, lines: list[tuple[int, str]], mark: str = ",") -> li
 
 
 def read_text(path: Path) -> str:
-    """Text of a file in UTF-8 or UTF-16, with or without byte order mark. Raises ValueError."""
+    """Text of a file in UTF-8 or UTF-16, with or without byte order mark. Raises ValueError if it cannot be read."""
     try:
         data = path.read_bytes()
     except OSError as error:

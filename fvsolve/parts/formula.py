@@ -39,7 +39,7 @@ class SpatialField:
         return values
 
     def table(self) -> Any:
-        """Value as in a case file."""
+        """Value of the field as in a case file."""
         return self.given
 
     def __eq__(self, other: object) -> bool:
@@ -56,7 +56,10 @@ def uniform(value: float) -> SpatialField:
 
 @dataclass(frozen=True)
 class SpatialFieldKey(Value):
-    """Field over a plane in a case file: a quantity, a formula of x and y in SI, or { file } with x, y, value."""
+    """Value of a case file for a field over a plane: a quantity, a formula of x and y in SI, or points of a file.
+
+    A file has the columns x, y and the value.
+    """
 
     dimension: str
     about: str = ""
@@ -98,7 +101,10 @@ class SpatialFieldKey(Value):
 
 
 def read_points(path: Path, dimension: str) -> np.ndarray:
-    """Columns x [m], y [m] and the value [SI] : float64[n, 3]. Raises ValueError with the faulty line."""
+    """Points of a CSV file : float64[n, 3] with x [m], y [m] and the value [SI].
+
+    Raises ValueError with the faulty line. dimension : dimension of the value
+    """
     rows = read_rows(path)
     if len(rows.header) != 3:
         raise ValueError(f"{path.name} has {len(rows.header)} columns; expected x, y and the value")
@@ -109,7 +115,7 @@ def read_points(path: Path, dimension: str) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Linear interpolation between scattered points, and the value of the nearest point outside them.
+    """Linear interpolation between scattered points; outside them, the value of the nearest point.
 
     columns : float64[n, 3]  x [m], y [m] and value of the points
     """
@@ -125,7 +131,7 @@ class Samples:
 
 
 def number_or_text(text: str) -> Any:
-    """Number that a text contains, else the text unchanged."""
+    """Number, if the text is a number, otherwise the text unchanged."""
     try:
         return float(text)
     except ValueError:

@@ -54,7 +54,7 @@ class TwoPort(Link):
 
     @property
     def ports(self) -> dict[str, str]:
-        """Places that the ports join, port name -> place."""
+        """Places that the ports join: port name -> place."""
         return {"from": self.from_, "to": self.to}
 
 
@@ -71,7 +71,7 @@ class Coupling(TwoPort):
 
 @dataclass(frozen=True)
 class Ports(Value):
-    """The key `ports` of a link whose ports are not `from` and `to`: port name -> place."""
+    """Value of a case file for the key `ports` of a link with other ports than `from` and `to`: port name -> place."""
 
     names: tuple[str, ...]
     about: str = "place of each port"

@@ -37,7 +37,7 @@ class Node(Table):
         Quantity(
             "length",
             about="elevation above datum, at all nodes or none [m]; "
-            "0 (reservoir with `head`: that of the far end) if left out",
+            "0 (reservoir with `head`: that of the other end of its first link) if left out",
             usual=USUAL_ELEVATIONS,
         ),
     ] = None
@@ -55,12 +55,12 @@ class Node(Table):
 
     @classmethod
     def own_places(cls, given: dict[str, Any]) -> tuple[str, ...] | None:
-        """Names in the file of the places that replace the node; None if the node itself is a place."""
+        """Names of the places that replace the node, as in the case file; None if the node itself is a place."""
         return None
 
     @classmethod
     def bodies(cls, given: dict[str, Any]) -> tuple[str, ...]:
-        """Names of the bodies that carry the node, as given in the file."""
+        """Names of the bodies that carry the node, as in the case file."""
         return ()
 
     def inner(self, name: str) -> tuple[dict[str, Node], dict[str, Any]]:
@@ -100,5 +100,5 @@ class PlaceOnBody(Node):
 
     @property
     def place(self) -> tuple[float, ...]:
-        """Position of the node in the axes of its body [m]."""
+        """Position [m] of the node in the axes of its body; the origin if not given."""
         return self.at or (0.0, 0.0, 0.0)

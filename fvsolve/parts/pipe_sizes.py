@@ -61,7 +61,7 @@ def parse_inches(text: str) -> float:
 
 
 def pipe_bore(nominal: str, schedule: str) -> tuple[float, float]:
-    """Inner diameter and wall thickness [m] of a size such as "DN100" or "NPS 4" in a schedule.
+    """(inner diameter [m], wall thickness [m]) of a nominal size such as "DN100" or "NPS 4" in a schedule.
 
     Raises ValueError for an unknown size or schedule.
     """
@@ -85,7 +85,7 @@ def pipe_bore(nominal: str, schedule: str) -> tuple[float, float]:
 
 
 def fittings_loss(names: list[str], diameter: float) -> float:
-    """Sum of the loss coefficients of fittings in a pipe of an inner diameter [m]."""
+    """Sum of the loss coefficients of fittings in a pipe with a given inner diameter [m]."""
     from fluids import fittings
     from fluids.friction import ft_Crane
 

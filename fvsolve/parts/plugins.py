@@ -25,8 +25,9 @@ PLUGIN_PACKAGE = "fvsolve_parts"  # package in which registered folders appear
 def register_part(folder: str | os.PathLike) -> None:
     """Register the part in a folder: `part.py`, and `lower.py` and `law.py` if the part has a compiled law.
 
-    Modules of the folder use relative imports. Their sources belong to the key of the compilation cache: an edit
-    recompiles them. Child processes register the part too; the environment variable FVSOLVE_PARTS lists the folders.
+    Modules of the folder use relative imports. Their sources belong to the key of the compilation cache, so they are
+    recompiled after an edit.
+    Child processes register the part too; the environment variable FVSOLVE_PARTS lists the folders.
     Raises FvsolveError if there is no part.py, or if the name of the part exists already.
     """
     path = Path(folder).resolve()

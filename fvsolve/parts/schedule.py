@@ -47,7 +47,8 @@ class Schedule:
     harmonic schedule has its minimum and maximum, at infinite times
     exponent : for a ramp, value = v1 + (v0 - v1) (1 - s)^exponent, with v0 and v1 its first and last value, and s from
     0 to 1 between its two times
-    wave : mean, amplitude, period [s] and phase if harmonic, value = mean + amplitude sin(2 pi t / period + phase)
+    wave : (mean, amplitude, period [s], phase [rad]) of a harmonic schedule,
+    value = mean + amplitude sin(2 pi t / period + phase)
     origin : table as in a case file, in SI
     """
 
@@ -80,7 +81,7 @@ class Schedule:
 
     @property
     def constant(self) -> bool:
-        """True if the value never changes."""
+        """True if the schedule is a constant."""
         return self.kind == "constant"
 
     def table(self) -> Any:
@@ -120,7 +121,7 @@ class Scheduled(Value):
 
     @cached_property
     def forms(self) -> dict[str, dict[str, tuple[Value, Any]]]:
-        """Forms of a schedule table, name -> key -> (declaration, default)."""
+        """Forms of a schedule table: name of the form -> key -> (declaration, default)."""
         item, kind = (self.dimension, self.range), (Choice("kind of schedule", KINDS), "linear")
         return {
             "table": {"time": (Rows("time"), NEEDED), "value": (Rows(*item), NEEDED), "kind": kind},

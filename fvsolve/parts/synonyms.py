@@ -1,4 +1,4 @@
-"""Engineering terms for parts that have another name in fvsolve, each with the name of the part."""
+"""Engineering terms for parts that have another name in fvsolve, each with text on the equivalent part."""
 
 SYNONYMS = {
     "hose": 'a "pipe" with a low wave_speed, or wall = { youngs_modulus, thickness }',

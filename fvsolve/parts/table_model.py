@@ -14,7 +14,7 @@ from fvsolve.units import show
 
 
 def read_keys(given: dict[str, Any], keys: dict[str, tuple[Value, Any]], setting: ReadContext) -> dict[str, Any]:
-    """Read a table by its keys, each with a declaration and a default. Raises ValueFault with all faults."""
+    """Read a table by its keys; keys : key -> (declaration, default). Raises ValueFault with all faults."""
     result = {key: default for key, (_, default) in keys.items()}
     faults = [((key,), f"unknown key{_key_hint(str(key), list(keys))}") for key in given if key not in keys]
     for key, (value, default) in keys.items():
@@ -33,7 +33,7 @@ def read_keys(given: dict[str, Any], keys: dict[str, tuple[Value, Any]], setting
 
 
 def keys_json(keys: dict[str, tuple[Value, Any]]) -> dict[str, Any]:
-    """JSON schema of a table with the given keys."""
+    """JSON schema of a table; keys : key -> (declaration, default)"""
     return {
         "type": "object",
         "properties": {key: value.json() for key, (value, _) in keys.items()},
@@ -47,7 +47,7 @@ def _key_hint(name: str, keys: list[str]) -> str:
 
 
 class Table(BaseModel):
-    """Base of all tables of a case file: frozen, without unknown keys, all faults in a single error."""
+    """Base of all tables of a case file: frozen, without unknown keys; a single error states all faults of a table."""
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", populate_by_name=False, arbitrary_types_allowed=True,
@@ -66,7 +66,7 @@ class Table(BaseModel):
 
     @classmethod
     def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
-        """Replace keys that stand for other keys. Raises ValueFault for meaningless values."""
+        """Table in which keys that stand for other keys are replaced. Raises ValueFault for invalid values."""
         return given
 
     @model_validator(mode="wrap")
@@ -97,7 +97,7 @@ class Table(BaseModel):
 
     @classmethod
     def values(cls) -> dict[str, Value]:
-        """Declaration of each key, by its name in a case file."""
+        """Declaration of each key: name in a case file -> declaration."""
         declared = {info.alias or name: (info.metadata, info.annotation) for name, info in cls.model_fields.items()}
         return {key: next((value for value in metadata if isinstance(value, Value)), Nested(model))
                 for key, (metadata, model) in declared.items()}  # fmt: skip
@@ -108,15 +108,15 @@ class Table(BaseModel):
         return f"keys of {listing(cls.keys())}"
 
     def faults(self, name: str, around: CaseContext) -> Faults:
-        """Faults of the part in the context of its case: (key path, text)."""
+        """Faults of the part in the context of its case, each as (key path, text)."""
         yield from ()
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
-        """Unusual combinations of keys, which give notices: (key path, value, limit, text)."""
+        """Unusual combinations of keys, which give notices, each as (key path, value, limit, text)."""
         yield from ()
 
     def table(self) -> dict[str, Any]:
-        """Table that reads back as this object: SI numbers, defaults filled in, missing keys left out."""
+        """Table of a case file that reads back as this object: SI numbers, with defaults, without missing keys."""
         result = {}
         for name, info in type(self).model_fields.items():
             value = plain_value(getattr(self, name))
@@ -154,7 +154,7 @@ class Nested(Value):
 
 
 class NamedTables(Value):
-    """Value of a case file with tables of the same type, name -> table."""
+    """Value of a case file that contains tables of the same type, name -> table."""
 
     def __init__(self, model: type[Table], about: str) -> None:
         self.model, self.about = model, about
@@ -199,13 +199,13 @@ def plain_value(value: Any) -> Any:
 
 
 def exclusive_key_faults(given: dict[str, Any], keys: tuple[str, ...]) -> list[tuple[tuple[Any, ...], str]]:
-    """Fault if two or more of the keys are given."""
+    """List with a fault if two or more of the keys are given, otherwise empty."""
     present = [key for key in keys if key in given]
     return [((present[1],), f"{' and '.join(present)} are given; keep one")] if len(present) > 1 else []
 
 
 def missing_key_faults(given: dict[str, Any], keys: tuple[str, ...]) -> list[tuple[tuple[Any, ...], str]]:
-    """Fault if none of the keys is given."""
+    """List with a fault if all of the keys are missing, otherwise empty."""
     if any(key in given for key in keys):
         return []
     return [((), f"expected one of {', '.join(keys)}" if len(keys) > 1 else f"{keys[0]} is missing")]
@@ -216,7 +216,10 @@ def faults_of_error(
     keys: list[str],
     synonyms: dict[str, str] = {},  # noqa: B006
 ) -> list[tuple[tuple[Any, ...], str]]:
-    """Faults of a pydantic error, with their key paths; synonyms : keys of other programs -> equivalent here"""
+    """Faults (key path, text) in an error of pydantic.
+
+    keys : keys of the table; synonyms : keys of other programs -> equivalent here
+    """
     result = []
     for entry in error.errors(include_url=False):
         place, cause = tuple(entry["loc"]), entry.get("ctx", {}).get("error")

@@ -13,7 +13,7 @@ from fvsolve.units import show
 
 
 def find_file(name: str, setting: ReadContext) -> Path:
-    """Path of a file named relative to the case; add it to the files of the context.
+    """Path of a file whose name is relative to the case; add the file to those of the context.
 
     Raises ValueError if it is missing.
     """
@@ -43,8 +43,9 @@ def copy_name(path: Path, setting: ReadContext) -> str:
 def read_columns(
     path: Path, time: str | None, value: str | None, dimension: str, setting: ReadContext
 ) -> tuple[np.ndarray, np.ndarray, str, str]:
-    """Times [s] : float64[n], values [SI, pressures absolute] : float64[n], and the headers of both columns.
+    """(times [s], values [SI, pressures absolute], header of the times, header of the values) of a CSV file.
 
+    Times and values are float64[n].
     time, value : headers of the columns, with or without unit; None for the first and the second column
     Raises ValueError with the faulty line of the file.
     """

@@ -26,9 +26,9 @@ SHAPE = "shape"  # a new model: cells, parts, methods
 
 
 class ValueFault(ValueError):
-    """Faults of a value: list of (keys below the value, message).
+    """Error with the faults of a value: list of (keys below the value, message).
 
-    replacement : values with which reading continues, so that it finds further faults; None for none
+    replacement : values with which reading continues, so that it finds further faults, or None
     """
 
     def __init__(self, faults: list[tuple[tuple[Any, ...], str]], instead: dict[str, Any] | None = None):
@@ -38,7 +38,7 @@ class ValueFault(ValueError):
 
 @dataclass
 class ReadContext:
-    """Context for reading a value: ambient pressure [Pa], folder, signals and files of the case."""
+    """Context in which a value is read: ambient pressure [Pa], folder, signals and files of the case."""
 
     ambient: float = 101325.0
     folder: Path | None = None
@@ -49,7 +49,7 @@ class ReadContext:
 
 
 def context_of(info: Any) -> ReadContext:
-    """Context with which a pydantic validator was called."""
+    """Context in the arguments `info` of a validator of pydantic; the default context if it has none."""
     return info.context if info is not None and info.context is not None else ReadContext()
 
 
@@ -68,7 +68,7 @@ class Range:
 
     @property
     def bounds(self) -> str:
-        """Text of the range such as ", above 0" to append to a unit; "" if all numbers are valid."""
+        """Text of the range, such as ", above 0", that is appended to a unit; "" if all numbers are valid."""
         return "" if self == Range() else f", {self}".replace("of at least", "at least")
 
     def __str__(self) -> str:
@@ -127,7 +127,7 @@ class Value:
 
     @property
     def takes(self) -> str:
-        """Valid values in Markdown: unit, range, words."""
+        """Text on the valid values, in Markdown: unit, range, words."""
         return ""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
@@ -138,7 +138,7 @@ class Value:
 
 
 class Anything(Value):
-    """Any value: its declaration is unknown, because another key is faulty."""
+    """Value of a key whose declaration is unknown, because another key is faulty; all values are valid."""
 
     def read(self, given: Any, setting: ReadContext) -> Any:
         return given
@@ -146,7 +146,7 @@ class Anything(Value):
 
 @dataclass(frozen=True)
 class Quantity(Value):
-    """Number in SI, or text with a number and a unit, in a range; pressures become absolute."""
+    """Value of a case file in a range: a number in SI, or text with a number and a unit; pressures become absolute."""
 
     dimension: str
     range: Range = anything
@@ -182,13 +182,13 @@ class Quantity(Value):
 def Number(
     range: Range = anything, about: str = "", usual: UsualRange | None = None, changes: str = PROFILE
 ) -> Quantity:
-    """Declaration of a number without a unit."""
+    """Declaration of a key for a number without a unit; arguments as for `Quantity`."""
     return Quantity("number", range, about, usual, changes)
 
 
 @dataclass(frozen=True)
 class Whole(Value):
-    """Whole number in a range."""
+    """Value of a case file: a whole number in a range."""
 
     range: Range = anything
     about: str = ""
@@ -210,7 +210,10 @@ class Whole(Value):
 
 @dataclass(frozen=True)
 class Choice(Value):
-    """Choice of a word from a list; noun : name of the choice for messages; words : valid words"""
+    """Value of a case file: a word from a list.
+
+    noun : name of the choice, for messages; words : valid words
+    """
 
     noun: str
     words: Collection[str]
@@ -242,7 +245,7 @@ class Choice(Value):
 
 @dataclass(frozen=True)
 class Flag(Value):
-    """Boolean, `true` or `false`."""
+    """Value of a case file: `true` or `false`."""
 
     about: str = ""
     changes: str = SHAPE
@@ -262,7 +265,7 @@ class Flag(Value):
 
 @dataclass(frozen=True)
 class Text(Value):
-    """Any text."""
+    """Value of a case file: any text."""
 
     about: str = ""
     changes: str = SHAPE
@@ -282,9 +285,9 @@ class Text(Value):
 
 @dataclass(frozen=True)
 class Rows(Value):
-    """List of quantities.
+    """Value of a case file: a list of quantities.
 
-    rising : True if the values must increase; length : number of values, None for any
+    rising : True if the values must increase; length : number of values, None for any number
     """
 
     dimension: str
@@ -326,7 +329,7 @@ class Rows(Value):
 
 @dataclass(frozen=True)
 class Matrix(Value):
-    """Matrix of quantities, three rows of three."""
+    """Value of a case file: a matrix of quantities, three rows of three."""
 
     dimension: str
     about: str = ""
@@ -356,7 +359,7 @@ class Matrix(Value):
 
 
 def check_increasing(values: Any, given: Any, noun: str = "values") -> None:
-    """Raise ValueError with the first pair of values that does not increase.
+    """Raise ValueError if a value is not greater than the one before it; the message states the first such pair.
 
     given : values as written in the file; noun : plural name of the values for the message
     """

@@ -32,14 +32,14 @@ class FatigueStrength:
     slope: float
 
     def allowed(self, range: float) -> float:
-        """Number of cycles of another pressure range that the part endures."""
+        """Number of cycles of the pressure range `range` that the part endures, N (R0 / range)^m."""
         return self.cycles * (self.range / range) ** self.slope
 
 
 def count_cycles(values: np.ndarray, bins: int = 10) -> list[tuple[float, float]]:
-    """Pairs (range, number of cycles) of a series, greatest range first.
+    """Cycles of a series by rainflow counting : list of (range, number of cycles), greatest range first.
 
-    bins : number of equal bins of ranges; each range in the result is the upper end of its bin.
+    bins : number of equal bins of ranges; each range in the result is the upper end of its bin
     """
     cycles = list(import_library("rainflow").extract_cycles(values.tolist()))
     greatest = max((cycle[0] for cycle in cycles), default=0.0)
@@ -53,10 +53,12 @@ def count_cycles(values: np.ndarray, bins: int = 10) -> list[tuple[float, float]
 
 
 def cycles(result, probes: list[str] | None = None, strength: FatigueStrength | None = None) -> list[dict[str, Any]]:
-    """Cycles of pressure or head at the named probes (default all probes of these quantities), a dict for each probe.
+    """Cycles of pressure or head at the probes `probes` (None for all of these quantities) : a dict for each probe.
 
-    cycles : pairs (range, number of cycles); share : fraction of the fatigue life that a run uses, if `strength` is
-    given. Ranges are upper ends of bins, so that the share is on the safe side. Raises FvsolveError for probes of other
+    Keys of a dict:
+    probe : name of the probe; unit : unit of the ranges; cycles : as from `count_cycles`
+    share : fraction of the fatigue life that a run uses, if `strength` is given
+    Ranges are upper ends of bins, so that the share is on the safe side. Raises FvsolveError for probes of other
     quantities and for values that are not finite.
     """
     known = [name for name in result.probes if result.column(name).dimension in PRESSURE_QUANTITIES]

@@ -12,13 +12,13 @@ from fvsolve.output.unit_columns import UnitColumn
 
 
 def envelope_column(result, name: str) -> UnitColumn:
-    """Unit of a quantity of the envelope (extremes along pipes), with conversions from and to SI."""
+    """Column of a quantity of the envelope (extremes along pipes), with its unit and conversions from and to SI."""
     unit, ambient = result.summary["envelope_units"][name], result.summary["ambient_pressure"]
     return UnitColumn(name, ENVELOPE_QUANTITIES[name], unit, ambient)
 
 
 def head_of(result, pressure: float | np.ndarray, elevation: np.ndarray) -> np.ndarray:
-    """Head of absolute pressures [Pa] at elevations; heads and elevations are in the units of the envelope."""
+    """Heads of absolute pressures [Pa] at elevations; heads and elevations are in the units of the envelope."""
     height = envelope_column(result, "elevation")
     law: Callable[..., Any] = result.case.law.head
     return envelope_column(result, "max_head").from_si(law(pressure, height.to_si(elevation)))

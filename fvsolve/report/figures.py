@@ -46,8 +46,8 @@ FONT = 'system-ui, -apple-system, "Segoe UI", "Helvetica Neue", Arial, sans-seri
 def section_figure(section: Section, moving: HeadAnimation | None, unit: str, along: str, bins: int) -> dict[str, Any]:
     """Figure of a long section: heads, pipe, vapour and class lines, spans of cavities, devices, animated head.
 
-    moving : animated head, or None; unit, along : units of head and chainage; bins : a long line is divided into so
-    many bins, of which only the extremes are drawn
+    moving : animated head, or None; unit, along : units of head and chainage
+    bins : number of bins into which a long line is divided; only the extremes of each bin are drawn
     """
     k = section.drawn_indices(bins)
     x, lines = (
@@ -98,9 +98,9 @@ def section_figure(section: Section, moving: HeadAnimation | None, unit: str, al
 
 
 def study_section_figure(several: list[tuple[str, Section]], unit: str, along: str) -> dict[str, Any]:
-    """Figure of one long section in several runs: pipe, vapour line and limits once, heads of each run in a colour.
+    """Figure of a long section in several runs: pipe, vapour line and limits once, heads of each run in another colour.
 
-    several : (name of the run, section) of each; unit, along : units of head and chainage
+    several : list of (name of the run, section); unit, along : units of head and chainage
     """
     first = max((section for _, section in several), key=lambda section: len(section.devices))
     k = first.drawn_indices()
@@ -120,7 +120,10 @@ def study_section_figure(several: list[tuple[str, Section]], unit: str, along: s
 
 
 def history_figure(panel: HistoryPanel, time_unit: str, doubt: float | None) -> dict[str, Any]:
-    """Figure of the series of a quantity over time; shaded from the time `doubt`, from which results are not valid."""
+    """Figure of the series of a panel over time; shaded from the time `doubt`, from which results are not valid.
+
+    time_unit : unit of times; doubt : None if all results are valid
+    """
     data, names = [], [line.name for line in panel.lines if not line.measured]
     for line in panel.lines:
         place = names.index(line.name)
@@ -198,7 +201,7 @@ def _vertical_line(x: float) -> dict[str, Any]:
 
 
 def _limits(section: Section, x, k: np.ndarray) -> list[dict[str, Any]]:
-    """Traces of the vapour line and of limits at chainages x; k : indices of the points to draw."""
+    """Curves of the vapour line and of limits for plotly.js; x : drawn chainages, k : their indices in the section."""
     return [
         _line(name, x, packed_array(line[k], "f4"), **(LINE_LOOKS.get(name) or LIMIT_LOOKS[name.rpartition(", ")[2]]))
         for name, line in section.lines.items()
@@ -206,7 +209,10 @@ def _limits(section: Section, x, k: np.ndarray) -> list[dict[str, Any]]:
 
 
 def _section_layout(sections: list[Section], unit: str, along: str) -> dict[str, Any]:
-    """Layout of a figure of sections, with the chainages and devices of the first section."""
+    """Layout of a figure of sections, with the chainages and devices of the first section.
+
+    unit, along : units of head and chainage
+    """
     first, seen = sections[0], head_window(sections, unit)
     layout, names = _layout(f"head [{unit}]", f"chainage [{along}]", SECTION_HEIGHT), _place_names(first)
     layout["margin"]["t"] = (
@@ -220,7 +226,10 @@ def _section_layout(sections: list[Section], unit: str, along: str) -> dict[str,
 
 
 def _limit_arrow(limits: list[str], edge: int) -> list[dict[str, Any]]:
-    """Arrow at the upper (edge = 1) or lower (0) edge that names limits outside the axis; [] without such limits."""
+    """Arrow at the upper (edge = 1) or lower (edge = 0) edge of the axes, with texts on limits beyond that edge.
+
+    limits : these texts; the result is [] without texts
+    """
     text, away = "<br>".join(map(escape_markup, limits)), 7 * len(limits) + 6  # pixels from the edge
     arrow = {"xref": "paper", "yref": "paper", "x": 0.97, "y": edge, "ax": 0, "ay": away if edge else -away,
              "showarrow": True, "arrowhead": 2, "arrowwidth": 1.2, "arrowcolor": CLASS_COLOUR, "xanchor": "right",

@@ -30,7 +30,10 @@ class HeadAnimation(NamedTuple):
 
 
 def head_animations(result, ways: Iterable[SectionPath]) -> list[HeadAnimation]:
-    """Animated heads of the sections `ways`; [] if no frames were stored. Raises RunError if a frame cannot be read."""
+    """Animated heads of the sections `ways`, with at most `MAX_NUMBERS` values in all; [] if no frames were stored.
+
+    Raises RunError if a frame cannot be read.
+    """
     ways, frames = list(ways), _pipe_frames(result)
     if not frames or not ways:
         return []
@@ -47,7 +50,7 @@ def head_animations(result, ways: Iterable[SectionPath]) -> list[HeadAnimation]:
 
 
 def _pipe_frames(result) -> list[tuple[float, Path]]:
-    """Times [s] and files of the frames of pipes."""
+    """Times [s] and files of the stored frames of pipes : list of (time, path)."""
     index = None if result.directory is None else result.directory / "fields.pvd"
     if index is None or not index.is_file():
         return []
@@ -57,7 +60,7 @@ def _pipe_frames(result) -> list[tuple[float, Path]]:
 def _cells_along(result, way: SectionPath, counts: dict[str, int]) -> tuple[np.ndarray, np.ndarray]:
     """Chainages of cells along a section (at most `MAX_POINTS`, evenly chosen), and their indices in a frame.
 
-    counts : pipe -> number of cells, in the order of a frame
+    counts : pipe -> number of its cells, in the order of a frame
     """
     first = dict(zip(counts, np.cumsum([0, *counts.values()]).tolist(), strict=False))
     chainage, indices = [], []

@@ -14,7 +14,10 @@ MAX_NUMBERS = 40_000  # greatest number of values of all series of a report toge
 
 
 class Series(NamedTuple):
-    """Series of a probe or a measurement, in the units of history.csv; seen : True if it is visible at first."""
+    """Series of a probe or of a measurement, in the units of history.csv.
+
+    seen : True if it is visible at first; measured : True for a measurement
+    """
 
     name: str
     t: np.ndarray
@@ -32,7 +35,10 @@ class HistoryPanel(NamedTuple):
 
 
 def history_panels(result) -> list[HistoryPanel]:
-    """Panels of histories in the order of the probes; in a large panel only series of the widest range are visible."""
+    """Panels of histories in the order of the probes.
+
+    In a panel of more than `SHOWN_LINES` series, only those with the widest range are visible at first.
+    """
     groups: dict[tuple[str, str], list[str]] = {}
     for name in chosen_probes(result):
         groups.setdefault((probe_quantity(name), result.units[name]), []).append(name)
@@ -49,7 +55,7 @@ def history_panels(result) -> list[HistoryPanel]:
 
 
 def chosen_probes(result) -> list[str]:
-    """Names of the probes in the report: all, or of many probes the probes of the widest range in each panel."""
+    """Names of the probes in the report: all, or if they are many, those with the widest range in each panel."""
     if len(result.probes) <= MAX_PROBES:
         return result.probes
     groups: dict[tuple[str, str], list[str]] = {}

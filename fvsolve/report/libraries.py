@@ -9,7 +9,7 @@ from fvsolve.errors import FvsolveError
 
 
 def import_library(name: str) -> Any:
-    """Import a module of the extra `report`; raises FvsolveError with the install command if it is missing."""
+    """Import a module of the extra `report`; raises FvsolveError with the command to install it if it is missing."""
     try:
         return import_module(name)
     except ImportError:

@@ -32,7 +32,10 @@ MAX_BINS = 150  # greatest number of bins of a long line; the extremes of head a
 
 
 class SectionDevice(NamedTuple):
-    """Node of a section, with its devices: the node itself, if it is not a junction, and links other than pipes."""
+    """Node of a section with its devices: the node itself, if it is not a junction, and links other than pipes.
+
+    chainage : of the node; place : name of the node; parts : devices as texts "NAME (kind)"
+    """
 
     chainage: float
     place: str
@@ -45,9 +48,9 @@ class Section:
 
     chainage : float64[n]; pipe : str[n]  pipe of each point
     along : quantity -> float64[n]
-    lines : name -> float64[n]  heads of vapour pressure, pressure class and limits, NaN where there is none
+    lines : name -> float64[n]  heads of vapour pressure, pressure class and limits; NaN where a line does not apply
     ends : chainages of both ends
-    cavity_spans : (begin, end) of chainage where the vapour pressure was reached
+    cavity_spans : (begin, end) of chainage where cavities formed, see `cavity_pressure`
     violations : (chainage, head, name of the limit) of points where a limit is violated
     """
 
@@ -78,7 +81,7 @@ class Section:
         return np.unique([0, *rows, n - 1])
 
     def labels(self) -> list[tuple[float, str, bool]]:
-        """Labels that do not overlap: (chainage, names, True if a device is there) of each.
+        """Labels of devices and nodes that do not overlap : list of (chainage, names, True if a device is there).
 
         Devices and ends have priority over plain junctions; devices close to each other share a label.
         """
@@ -96,7 +99,10 @@ class Section:
 
 
 class HeadWindow(NamedTuple):
-    """Ends of the head axis of a picture, and texts on limits above and below it, which are not drawn."""
+    """Range of the head axis of a picture of sections, and texts on the limits outside it, which are not drawn.
+
+    low, high : ends of the axis; above, below : texts on limits above and below it
+    """
 
     low: float
     high: float
@@ -105,9 +111,9 @@ class HeadWindow(NamedTuple):
 
 
 def head_window(sections: Sequence[Section], unit: str) -> HeadWindow:
-    """Head axis for a picture of sections, with heads, pipe elevations, vapour line and limits close to them.
+    """Range of the head axis for a picture of sections: heads, pipe elevations, vapour line and limits close to them.
 
-    Limits far away are only named, so that they do not compress the heads.
+    Limits far away are only named, so that they do not compress the heads. unit : unit of heads, for their texts
     """
     heads = value_range([section.along[name] for section in sections for name in HEAD_QUANTITIES]) or (0.0, 1.0)
     shown = [section.along["elevation"] for section in sections]
@@ -133,14 +139,14 @@ def head_window(sections: Sequence[Section], unit: str) -> HeadWindow:
 
 
 def value_range(lines: list[np.ndarray]) -> tuple[float, float] | None:
-    """Least and greatest of all finite values in some arrays; None if there is none."""
+    """Least and greatest of all finite values in some arrays : (least, greatest); None without finite values."""
     values = np.concatenate([np.ravel(line) for line in lines] or [np.empty(0)])
     values = values[np.isfinite(values)]
     return (float(values.min()), float(values.max())) if values.size else None
 
 
 def section_of(result, way: SectionPath) -> Section:
-    """Long section of a run along a path."""
+    """Long section of a run along the path `way`."""
     distances = envelope_column(result, "distance")
     strung_up = joined_envelopes(result.envelope, way.legs, distances)
     chainage, pipe = distances.to_si(strung_up["chainage"]), strung_up["pipe"]
@@ -162,12 +168,19 @@ def section_of(result, way: SectionPath) -> Section:
 
 
 def cavity_pressure(result) -> float | None:
-    """Pressure [Pa] below which a pipe has a cavity: vapour pressure, or twice it for laws with cavities; or None."""
+    """Pressure [Pa] below which a pipe has a cavity; None for a fluid without vapour pressure.
+
+    It is the vapour pressure, or twice the vapour pressure under a density law that computes cavities.
+    """
     return None if result.summary["fluid"]["vapor_pressure"] is None else result.case.law.cavity_pressure
 
 
 def _cavity_spans(result, least: np.ndarray, chainage: np.ndarray, way: SectionPath) -> list[tuple[float, float]]:
-    """Spans of chainage [m] around points where the pressure fell to the vapour pressure."""
+    """Spans (begin, end) of chainage [m] around points whose pressure fell to that of `cavity_pressure`.
+
+    least : float64[n]  least pressures in the unit of the envelope; chainage : float64[n] [m]
+    way : path of the section
+    """
     limit = cavity_pressure(result)
     if limit is None:
         return []
@@ -178,7 +191,7 @@ def _cavity_spans(result, least: np.ndarray, chainage: np.ndarray, way: SectionP
 
 
 def _violations(result, way: SectionPath, chainage: np.ndarray, along: dict) -> list[tuple[float, float, str]]:
-    """Points of a path where a limit on pressure or head is violated: (chainage [m], head, name of the limit) of each.
+    """Points of a path where a limit on pressure or head is violated : list of (chainage [m], head, name of the limit).
 
     chainage : float64[n]  chainages of the section [m]; along : quantity -> float64[n]  results of the section
     """
@@ -198,7 +211,7 @@ def _violations(result, way: SectionPath, chainage: np.ndarray, along: dict) -> 
 
 
 def _devices(result, way: SectionPath) -> list[SectionDevice]:
-    """Nodes of a path with their devices; chainages in m."""
+    """Nodes of the path `way` with their devices; here the chainages of `SectionDevice` are in m."""
     case, devices = result.case, []
     for place, chainage in way.places:
         owner = place.partition(".")[0]

@@ -37,7 +37,7 @@ def all_tables(result) -> list[ReportTable | None]:
 
 
 def fluid(result) -> ReportTable:
-    """Table of the properties of the liquid at its reference state, and their source."""
+    """Table of the fluid: properties at the reference state, ambient pressure, gravity, density law and source."""
     case, liquid = result.case, result.summary["fluid"]
     rows = []
     for key, words, dimension in FLUID_ROWS:
@@ -79,7 +79,7 @@ def pipes(result) -> ReportTable | None:
 
 
 def walls(result) -> ReportTable | None:
-    """Table of pipe walls: allowable pressure, thickness, modulus and source; None if no pipe states any."""
+    """Table of pipe walls: allowable pressure, thickness, modulus and source; None if no pipe states a wall."""
     case, rows = result.case, []
     thick, allowable = column("", "length", case), column("", "pressure", case)
     modulus = _pressure_column(column("", "modulus", case), case)
@@ -132,7 +132,7 @@ def key_text(part: Keys, case) -> str:
 
 
 def _value_text(value: Any, given: Any, case) -> str:
-    """Text of the value of a key; value : declaration of the key, given : its value in SI."""
+    """Text of the value of a key in the units of [output]; value : declaration of the key, given : its value in SI."""
     dimension = getattr(value, "dimension", None)
     if isinstance(given, dict):
         text = ", ".join(
@@ -154,9 +154,9 @@ def _value_text(value: Any, given: Any, case) -> str:
 
 
 def _value_of_key(value: Any, key: str) -> Any:
-    """Declaration of a key within a table with declaration `value`; None if unknown.
+    """Declaration of the key `key` in a table with the declaration `value`; None if unknown.
 
-    A column of a curve, such as `flow`, has the dimension of its name.
+    A key with the name of a dimension, such as the column `flow` of a curve, has this dimension.
     """
     for form in getattr(value, "forms", {}).values():
         if key in form:
@@ -174,7 +174,10 @@ def _is_numeric(given: Any) -> bool:
 
 
 def _pressure_column(shown, case):
-    """Column for a modulus or a pressure drop with the unit of pressures, but as a difference (bar for barg)."""
+    """Column `shown` with the unit of a pressure difference if its quantity is one: bar instead of barg.
+
+    Such quantities are moduli and pressure drops; any other column is returned unchanged.
+    """
     if shown.dimension in ("modulus", "pressure_drop") and (UNITS[shown.unit].gauge or UNITS[shown.unit].absolute):
         return column(shown.name, shown.dimension, case, shown.unit[:-1])
     return shown

@@ -25,7 +25,7 @@ MAX_WARNINGS = 40  # greatest number on the page; summary.json has all
 
 
 def page(result, ways: list[SectionPath]) -> str:
-    """HTML report of a run; ways : paths of its long sections."""
+    """HTML text of the report of a run; ways : paths of its long sections."""
     sections = [section_of(result, way) for way in ways]
     figures: dict[str, Any] = {}
     probes = worst_places.extremes_of_probes(result)
@@ -80,7 +80,7 @@ def render_page(name: str, filled: dict[str, Any], figures: dict[str, Any]) -> s
 
 
 def css_string(text: str) -> str:
-    """Text as a CSS string; all but ASCII letters and digits are escaped, so that nothing can end it early."""
+    """CSS string of a text; all but ASCII letters and digits are escaped, so that the text cannot end the string."""
     text = text if len(text) <= MAX_PAPER_TITLE else f"{text[: MAX_PAPER_TITLE - 1]}\u2026"
     return (
         '"'
@@ -90,7 +90,7 @@ def css_string(text: str) -> str:
 
 
 def script_json(data: Any) -> str:
-    """JSON for a <script> element of the page, escaped so that no text can end it; NaN and infinity become null."""
+    """JSON text for a <script> element of the page; no text in it can end the element. NaN and infinity become null."""
     try:
         text = json.dumps(data, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
     except ValueError:  # a run that stopped at a value that is not finite
@@ -102,7 +102,7 @@ def script_json(data: Any) -> str:
 
 
 def _sections(result, sections: list[Section], figures: dict[str, Any]) -> list[dict[str, Any]]:
-    """Values for the template on each section, such as name and length; adds the figures to `figures`."""
+    """Values for the template on each section, such as name and length; its figure is added to `figures`."""
     moving = head_animations(result, [item.way for item in sections])
     height, along = envelope_column(result, "max_head").unit, envelope_column(result, "distance").unit
     entries, bins = [], min(MAX_BINS, MAX_SHARED_BINS // max(len(sections), 1))
@@ -117,7 +117,7 @@ def _sections(result, sections: list[Section], figures: dict[str, Any]) -> list[
 
 
 def _histories(result, figures: dict[str, Any]) -> list[dict[str, Any]]:
-    """Values for the template on each panel of histories; adds the figures to `figures`."""
+    """Values for the template on each panel of histories; its figure is added to `figures`."""
     drawn = result.history_drawn()
     doubt = min((time for time, _ in drawn.get("marks", ())), default=None)
     entries = []

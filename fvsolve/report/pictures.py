@@ -55,7 +55,10 @@ def write_pictures(
 
 
 def parse_probes(result, text: str, faults: list[str]) -> list[str]:
-    """Split `a.head,tank.depth@1,2` into names of probes, which may contain commas; adds unknown names to `faults`."""
+    """Names of probes in a list such as `a.head,tank.depth@1,2`, in which a name may contain commas.
+
+    Unknown names are added to `faults`.
+    """
     names, pieces = [], [piece.strip() for piece in text.split(",")] if text else []
     while pieces:
         ends = [k for k in range(1, len(pieces) + 1) if ",".join(pieces[:k]) in result.units]

@@ -1,4 +1,4 @@
-"""Sentences and tables at the top of a report: early stop, unreliable results, verdicts of limits and claims."""
+"""Sentences and tables at the top of a report: early stop, unreliable results, verdicts of limits and expectations."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MAX_LATER_MARKS = 6  # greatest number of marks named after the first
 
 
 class Sentence(NamedTuple):
-    """Sentence at the top of the page.
+    """Sentence at the top of a report.
 
     level : "bad", "doubt", "good" or "none"; head : first words, in bold; links : (name, address) of pages
     """
@@ -26,7 +26,7 @@ class Sentence(NamedTuple):
 
 
 def top_sentences(result) -> list[Sentence]:
-    """Sentences at the top of a report: early stop, errors, doubts, verdict on the limits, failed or open claims."""
+    """Sentences at the top of a report: early stop, errors, doubts, verdict on limits, failed or open expectations."""
     summary = result.summary
     rows = []
     if result.reason != "finished":
@@ -59,7 +59,7 @@ def _mark_sentences(result) -> list[Sentence]:
 
 
 def is_sound(result) -> bool:
-    """True if the run finished, is ok and has no marks."""
+    """True if a run reached its end, its results are ok and it has no marks."""
     return result.reason == "finished" and result.ok and not result.marks
 
 
@@ -90,7 +90,7 @@ def verdict_sentence(result) -> Sentence:
 
 
 def open_reason(result) -> str:
-    """Reason for which limits of a run are open (undecided)."""
+    """Reason for which the limits of a run are open (undecided), as a part of a sentence."""
     if text := not_valid(result.summary):
         return f"the run is {text}"
     if not result.ok:

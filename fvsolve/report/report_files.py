@@ -19,8 +19,9 @@ REQUIRED_KEYS = ("fluid", "cells", "methods", "steps", "rejections", "rhs", "sec
 
 
 def write_report(directory: str | Path, out: str | Path | None = None, xlsx: bool = False) -> list[Path]:
-    """Write the HTML report of the directory of a run or a study; returns the paths of the files written.
+    """Write the HTML report of the directory of a run or a study; returns the paths of the page and of the workbook.
 
+    The report of a study also writes report.html into the directory of each of its runs; these paths are not returned.
     out : path of the page, by default report.html in the directory; xlsx : write also a workbook of the tables
     Raises RunError if the directory does not hold a finished run, FvsolveError if a library is missing or a file cannot
     be written.
@@ -46,7 +47,8 @@ def write_page(path: Path, text: str) -> None:
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise FvsolveError(f"{path}: cannot be written: {error.strerror or error}; choose another with --out") from None
+        text = f"{path}: cannot be written: {error.strerror or error}"
+        raise FvsolveError(f"{text}; choose another file with --out") from None
 
 
 def _write_study(directory: Path, path: Path, xlsx: bool) -> list[Path]:

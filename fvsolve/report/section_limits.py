@@ -11,10 +11,10 @@ MAX_LIMIT_LINES = 6  # greatest number of limit lines in a section
 
 
 def limit_lines(result, pipe: np.ndarray, elevation: np.ndarray) -> dict[str, np.ndarray]:
-    """Heads of pressure classes and limits along a section: name -> float64[n] in the unit of heads.
+    """Heads of pressure classes and limits along a section : name -> float64[n], at most `MAX_LIMIT_LINES` lines.
 
     The line of pressure classes is first; values are NaN where a limit does not apply.
-    pipe : str[n]  pipe of each point; elevation : float64[n]  in the unit of heads
+    pipe : str[n]  pipe of each point; elevation : float64[n]; heads and elevations are in the units of the envelope
     """
     case, lines = result.case, {}
     classes = {name: getattr(case.links[name], "allowable_pressure", None) for name in np.unique(pipe).tolist()}
@@ -40,7 +40,10 @@ def limit_lines(result, pipe: np.ndarray, elevation: np.ndarray) -> dict[str, np
 
 
 def _as_head(result, quantity: str, value, elevation: np.ndarray) -> np.ndarray:
-    """Convert a pressure, gauge pressure, pressure head or head [SI] to a head in the unit of heads."""
+    """Head that corresponds to a `value` [SI] of pressure, gauge pressure, pressure head or head, in the unit of heads.
+
+    quantity : quantity of the value; elevation : float64[n]  in the unit of heads
+    """
     shown = envelope_column(result, "max_head")
     if quantity == "head":
         return shown.from_si(value + 0.0 * elevation)

@@ -1,7 +1,7 @@
 """Pipes of each long section of a run, in order and direction.
 
-Sections are the routes of the case, then the longest paths through the remaining pipes, without common pipes. A path
-continues through common nodes and through links without length between two junctions.
+Sections are the routes of the case, then the longest paths through the remaining pipes. No pipe is in two such paths.
+A path continues through common nodes and through links other than pipes between two junctions.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ MAX_SECTIONS = 6  # greatest number of sections of a run, unless it has more rou
 class SectionPath(NamedTuple):
     """Path of a long section.
 
-    legs : pipes in order, with chainages and directions; places : (node, chainage [m]) of the ends of the pipes
+    legs : pipes in order, with chainages and directions; places : (node, chainage [m]) of the ends of its pipes
     """
 
     name: str
@@ -43,7 +43,10 @@ class SectionPath(NamedTuple):
 
 
 def section_paths(result) -> list[SectionPath]:
-    """Section paths of a run: routes of the case, then the longest other paths; [] without pipes or if diverged."""
+    """Paths of the long sections of a run: routes of the case, then the longest other paths.
+
+    The list is empty without pipes, or if the run diverged.
+    """
     if not_valid(result.summary):
         return []
     links = result.case.links
@@ -65,7 +68,7 @@ def section_paths(result) -> list[SectionPath]:
 
 
 def _is_covered(way: SectionPath, ways: list[SectionPath]) -> bool:
-    """True if a path is only a pipe cut into pieces, and all pieces are on another path."""
+    """True if a path consists of the pieces of one cut pipe, and all these pieces are on another path."""
     pipes = [leg.pipe for leg in way.legs]
     return is_cut(way.name, pipes) and any(
         set(pipes) <= {leg.pipe for leg in other.legs} for other in ways if other is not way
@@ -73,14 +76,14 @@ def _is_covered(way: SectionPath, ways: list[SectionPath]) -> bool:
 
 
 def _joins_junctions(link, case) -> bool:
-    """True if a section may continue through a link: all its ends are junctions."""
+    """True if a section may continue through a link: all places that it joins are junctions."""
     return all(getattr(case.nodes.get(place), "kind", "") == "junction" for place in link.ports.values())
 
 
 def _path_of_chain(chain: list[tuple[str, bool, float]], result) -> SectionPath:
-    """Section path of a chain of pipes (name, backwards, length [m]), directed so that the initial head falls along it.
+    """Section path of a chain of pipes, directed so that the initial head falls along it.
 
-    A single pipe keeps its direction.
+    chain : list of (name of the pipe, True if it is passed backwards, length [m]). A single pipe keeps its direction.
     """
     if len(chain) == 1:
         pipe = chain[0][0]
@@ -140,8 +143,8 @@ def _longest_chain(pipes: dict) -> list[tuple[str, bool, float]]:
 def _farthest(around: dict, start: str) -> tuple[str, dict]:
     """Node farthest from `start` along pipes, and the shortest way to each node (Dijkstra 1959).
 
-    around : node -> list of (other node, pipe, backwards, length); the way is a dict: node -> (previous node, pipe,
-    backwards, length)
+    around : node -> list of (other node, pipe, backwards, length)
+    The way is a dict: node -> (previous node, pipe, backwards, length).
     """
     distance, came, queue, end = {start: 0.0}, {}, [(0.0, start)], start
     done = set()

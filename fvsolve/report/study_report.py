@@ -27,10 +27,10 @@ CAPTION = "Maximum (solid) and minimum (dashed) head over all accepted steps, by
 
 
 def study_page(study: dict[str, Any], runs: list[tuple[dict[str, Any], Any]]) -> str:
-    """HTML report of a study.
+    """HTML text of the report of a study.
 
-    study : data of study.json; runs : (row of study.json, `Result`) of each run, with the address of its report as
-    row["page"]
+    study : data of study.json
+    runs : (row of study.json, `Result`) of each run; row["page"] is the address of its report
     """
     figures: dict[str, Any] = {}
     first = runs[0][1]
@@ -51,12 +51,15 @@ def study_page(study: dict[str, Any], runs: list[tuple[dict[str, Any], Any]]) ->
 
 
 def run_name(row: dict[str, Any]) -> str:
-    """Name of a run from its event and protection, such as `trip with vessel`."""
+    """Name of a run from its event and protection, such as `trip with vessel`; row : row of study.json."""
     return visible(" with ".join(name for name in (row["event"], row["protection"]) if name) or "the case")
 
 
 def study_sentences(study: dict[str, Any], runs: list) -> list[Sentence]:
-    """Sentences at the top: runs that stopped early or are not valid, then protections with which all limits hold."""
+    """Sentences at the top of the report of a study, on runs that stopped early or are not valid, and on limits.
+
+    study, runs : as for `study_page`
+    """
     sentences = [Sentence("bad", f"{run_name(row)} stopped early.", f"{result.reason}.")
              for row, result in runs if result.reason != "finished"]  # fmt: skip
     sentences += [Sentence("bad", f"{run_name(row)} is not to be trusted.", item.text)
@@ -86,18 +89,24 @@ def study_sentences(study: dict[str, Any], runs: list) -> list[Sentence]:
 
 
 def run_state(result) -> str:
-    """Worst state of the limits of a run; "fails" for a run that is not ok, "" without limits."""
+    """Worst state of the limits of a run: `FAILS`, `OPEN` or `HOLDS`; "" without limits.
+
+    For a run that is not ok the state is `FAILS`.
+    """
     states = [FAILS] * (not result.ok) + [item.state for item in result.verdicts]
     return next((item for item in (FAILS, OPEN, HOLDS) if item in states), "")
 
 
 def run_links(runs: list) -> tuple[tuple[str, str], ...]:
-    """Names of runs and the addresses of their reports, as pairs."""
+    """Names of runs and the addresses of their reports, as pairs; runs : as for `study_page`."""
     return tuple((run_name(row), row["page"]) for row, _ in runs)
 
 
 def run_matrix(runs: list) -> ReportTable:
-    """Table with a row for each run: verdict and the margin of each limit, with a link to its report."""
+    """Table with a row for each run: verdict and the margin of each limit, with a link to its report.
+
+    runs : as for `study_page`
+    """
     names = {verdict.name: verdict.unit for _, result in runs for verdict in result.verdicts}
     with_error = any(verdict.error is not None for _, result in runs for verdict in result.verdicts)
     rows = []
@@ -116,7 +125,10 @@ def run_matrix(runs: list) -> ReportTable:
 
 
 def failing_limits(runs: list) -> ReportTable | None:
-    """Table of the limits that fail or are open in each run, with position and time; None if all hold."""
+    """Table of the limits that fail or are open in each run, with position and time; None if all hold.
+
+    runs : as for `study_page`
+    """
     length, time = (column("", dimension, runs[0][1].case) for dimension in ("length", "time"))
     pages = [row["page"] for row, result in runs for item in result.verdicts if not item.ok]
     rows = [[run_name(row), item.name, IN_WORDS[item.state], item.value, item.limit, item.unit, item.margin,
@@ -143,9 +155,10 @@ def change_tables(study: dict[str, Any]) -> list[ReportTable]:
 
 
 def event_figures(event: str | None, number: int, runs: list, figures: dict[str, Any]) -> list[dict[str, Any]]:
-    """Values for the template on the figures of an event, in which the runs of all protections are overlaid.
+    """Values for the template on the figures of an event, each of which shows the runs of all protections.
 
-    number : number of the event, for the keys under which the figures are added to `figures`
+    event : name of the event; number : its number, for the keys under which the figures are added to `figures`
+    runs : as for `study_page`
     """
     own = [(row["protection"] or "", result) for row, result in runs if row["event"] == event]
     runs_drawn = [(name, result, section_paths(result)) for name, result in own]
@@ -169,7 +182,10 @@ def event_figures(event: str | None, number: int, runs: list, figures: dict[str,
 
 
 def warning_texts(runs: list) -> list[str]:
-    """Texts of the warnings of all runs, each once, with the names of its runs."""
+    """Texts of the warnings of all runs, each once, with the names of the runs in which it occurs.
+
+    runs : as for `study_page`
+    """
     by_text: dict[str, list[str]] = {}
     for row, result in runs:
         for item in result.warnings:

@@ -22,7 +22,7 @@ NARROW_SPACE, FIGURE_SPACE, POINT_SPACE = (
 
 
 def in_unit(unit_column, value: float | None) -> float | None:
-    """Convert a number [SI] to the unit of a column; None stays None."""
+    """Convert a number from SI to the unit of a column; None is returned unchanged."""
     return None if value is None else float(unit_column.from_si(value))
 
 
@@ -30,12 +30,12 @@ def in_unit(unit_column, value: float | None) -> float | None:
 class ReportTable:
     """Table of a report with headers; cells are words, numbers, truth values or None.
 
-    units : unit of each column, "" for words and pure numbers
+    units : unit of each column, "" for words and numbers without unit
     bad : indices of highlighted rows
     mixed_units : indices of columns whose rows have different units
     most : greatest number of rows on the page
-    more : where to find the rows that the page leaves out
-    links : for each row, the page to which its first word links
+    more : text that states where the rows are that the page leaves out
+    links : address of a page for each row, to which the first cell links
     """
 
     title: str
@@ -60,7 +60,7 @@ class ReportTable:
 
     @property
     def numeric(self) -> list[bool]:
-        """For each column, True if it holds numbers and no words, so that it is aligned to the right."""
+        """For each column, True if it holds numbers and no words; it is then aligned to the right."""
         columns = [[row[k] for row in self.rows] for k in range(len(self.headers))]
         return [any(is_number(value) for value in column) and not any(isinstance(value, str) for value in column)
                 for column in columns]  # fmt: skip
@@ -77,7 +77,7 @@ class ReportTable:
 
     @property
     def left_out(self) -> str:
-        """Note below a table with more rows than the page shows; "" if all are shown."""
+        """Note below a table that has more rows than the page shows; "" if all rows are shown."""
         hidden = len(self.rows) - self.most
         return f"{hidden} more rows: {self.more or 'in the workbook (--xlsx)'}" if hidden > 0 else ""
 
@@ -87,7 +87,10 @@ def is_number(value: Any) -> bool:
 
 
 def aligned_texts(values: Sequence[Any], loose: bool = False) -> list[str]:
-    """Texts of a column, padded so that decimal points align; loose : True if the rows have different units."""
+    """Texts of the values of a column, padded so that decimal points align.
+
+    loose : True if the rows have different units, so that numbers may have different numbers of decimals
+    """
     places = None if loose else decimal_places([value for value in values if is_number(value)])
     words = [value_text(value, places) for value in values]
     behind = [text.partition(".")[1:] for text, value in zip(words, values, strict=True) if is_number(value)]
@@ -104,7 +107,7 @@ def _padded(text: str, widest: int) -> str:
 
 
 def decimal_places(numbers: Sequence[float]) -> int | None:
-    """Number of decimals of a column; None if its numbers differ too much in size for a common number."""
+    """Number of decimals of all numbers in a column; None if they differ too much in size for a common number."""
     sizes = [abs(size) for size in numbers if math.isfinite(size) and size != 0.0]
     if not sizes:
         return 0
@@ -121,7 +124,7 @@ def decimal_places(numbers: Sequence[float]) -> int | None:
 
 
 def value_text(value: Any, places: int | None = None) -> str:
-    """Text of a value; a number has `places` decimals, or by default `DIGITS` significant digits."""
+    """Text of a value; a number has `places` decimals, or if that is None `DIGITS` significant digits."""
     if value is None or is_number(value) and not math.isfinite(value):
         return "\u2013"
     if isinstance(value, bool):

@@ -38,12 +38,12 @@ def write_tables(report_tables: list[ReportTable], path: Path) -> Path:
     try:
         book.close()
     except Exception as error:  # XlsxWriter wraps errors of the operating system
-        raise FvsolveError(f"{path}: cannot be written: {error}; choose another with --out") from None
+        raise FvsolveError(f"{path}: cannot be written: {error}; choose another file with --out") from None
     return path
 
 
 def run_tables(result, sections: list[SectionPath]) -> list[ReportTable]:
-    """All tables of a run; tables of sections have a row for each point."""
+    """All tables of a run for a workbook; a table of a section has a row for each point."""
     words = ReportTable("Summary", ("", ""), [[item.head, item.text] for item in reliability.top_sentences(result)])
     notes = ReportTable(
         "Warnings", ("kind", "place", "text"), [[item.kind, item.place, item.text] for item in result.warnings]
@@ -122,7 +122,7 @@ def _write_sheet(book, table: ReportTable, name: str, bold) -> None:
 
 
 def _sheet_name(title: str, taken: set[str]) -> str:
-    """Valid name for a sheet from a title, different from all names in `taken`; adds it to `taken`."""
+    """Valid name for a sheet, from a title; it differs from all names in `taken`, to which it is added."""
     plain = "".join("-" if sign in FORBIDDEN_SIGNS else sign for sign in visible(title)).strip() or "table"
     name, k = plain[:MAX_SHEET_NAME], 1
     while name.casefold() in taken:

@@ -23,7 +23,8 @@ EXTREMES = (  # quantity, its text, function of the index of the extreme, quanti
 def extremes_of_pipes(result, ways: list[SectionPath]) -> ReportTable | None:
     """Table of the extremes over all pipes: value, pipe, distance, elevation, time; None without pipes or if diverged.
 
-    The chainage is added if the run has a single section whose chainage differs from the distance along the pipe.
+    The chainage is added if the run has a single section, and if the chainage differs from the
+    distance along the pipe.
     """
     envelope = result.envelope
     if not envelope or not_valid(result.summary):
@@ -93,6 +94,9 @@ def extremes_of_probes(result) -> ReportTable | None:
 
 
 def _chainage(result, leg: Leg | None, distance: float) -> float | None:
-    """Chainage of a distance from the start of a pipe; None without a leg, for a pipe on no section."""
+    """Chainage of a point at a distance from the start of a pipe, in the units of the envelope.
+
+    leg : leg of the pipe in a section, or None: then the result is None
+    """
     shown = envelope_column(result, "distance")
     return None if leg is None else float(shown.from_si(leg.chainage(shown.to_si(distance))))

@@ -65,7 +65,10 @@ def expectation(text: str, expect, column: UnitColumn, value: float, complete: b
 
 
 def _at_places(model, summary, expect) -> tuple[float, float]:
-    """Greatest or least value [SI] in all parts of the extent of a claim, over all steps, and its time [s]."""
+    """Greatest or least value [SI] in all parts of the extent of a claim, over all steps, and its time [s].
+
+    It is nan if an extreme of a part is not valid.
+    """
     extent, low = expect.extent, expect.function == "min"
     values, times = [], []
     for part in part_extremes(model, summary, extent):
@@ -81,8 +84,9 @@ def _at_places(model, summary, expect) -> tuple[float, float]:
 def _at_probe(expect, probe: str, summary, result) -> tuple[float, float]:
     """Value of a probe [SI] for a claim, and its time [s].
 
-    `max` and `min` are over all steps and rows; `at` is interpolated between rows; `mean` is over time (trapezoids),
-    with the end of the run as its time.
+    `max` and `min` are over all steps and rows; `final` is the last row; `at` is interpolated between rows; `mean` is
+    over time (trapezoids), with the end of the run as its time. The value is nan if there are no rows, and for an `at`
+    outside their times.
     """
     if expect.function == "min":
         return summary.extremes[probe][:2]

@@ -46,7 +46,10 @@ def comparison(compare, column: UnitColumn, result) -> dict:
 
 
 def interpolated(t: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Values at `times`, linear between rows (t, values); at a jump (two rows of one time) of the later row."""
+    """Values at `times`, linear between rows (t, values); at a jump (two rows of one time) of the later row.
+
+    Beyond the rows they are those of the first and last row.
+    """
     times = np.asarray(times, float)
     after = np.clip(np.searchsorted(t, times, side="right"), 1, max(len(t) - 1, 1))
     if len(t) == 1:
@@ -62,7 +65,8 @@ def differences(a, b) -> dict:
     """Greatest and rms difference `b` - `a` of two results, for each probe that both have.
 
     The differences are in the units of `a`, at those times of `a` that are within both runs; if the times of `b`
-    differ, its values are interpolated. "only_a" and "only_b" list probes of one run only.
+    differ, its values are interpolated. The greatest is that of the greatest magnitude, with its sign. Without common
+    times they are None. "only_a" and "only_b" list probes of one run only.
     """
     shared = [probe for probe in a.probes if probe in b.units]
     return {

@@ -22,7 +22,10 @@ EXTRA = 'pip install "fvsolve[mpi]"'
 
 @cache
 def world():
-    """MPI communicator of all ranks; None for a single process. Raises FvsolveError without mpi4py."""
+    """MPI communicator of all ranks; None for a single process.
+
+    Raises FvsolveError if mpi4py is not installed or belongs to another MPI.
+    """
     count = max(int(os.environ.get(name, "1")) for name in SIZES)
     if count < 2:
         return None
@@ -102,7 +105,7 @@ def serve_rank(make: Callable) -> None:
     try:
         model = make()
         if digest(model) != expected:
-            fault = f"rank {comm.rank} has another case than rank 0; expected the same file and the same --set on all"
+            fault = f"rank {comm.rank} has another case than rank 0; expected the same file and --set on all ranks"
     except Exception as error:
         fault = f"rank {comm.rank}: {error}"
     comm.gather(fault)

@@ -31,7 +31,10 @@ class PartExtremes:
 
 
 def part_extremes(model, summary, extent) -> list[PartExtremes]:
-    """Extremes of every part of an extent; quantities of pressure as absolute pressures."""
+    """Extremes of every part of an extent; quantities of pressure as absolute pressures.
+
+    Extremes from the time at which a diverged run is not valid are nan.
+    """
     is_pressure = extent.quantity in OF_PRESSURE
     pipes = {pipe.name: pipe for pipe in model.pipes}
     envelope = with_initial_heads(summary, model) if is_pressure else {}

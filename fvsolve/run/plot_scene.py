@@ -25,7 +25,8 @@ def scene_of(case, title: str, field: str, frames: list[tuple[float, list[Path]]
     """Scene of a quantity of a run, for drawing; without frames, only its parts.
 
     field : name of the quantity; frames : list of (time [s], files with the fields); contours : number of contour lines
-    Raises FvsolveError for an unknown quantity.
+    Raises FvsolveError for an unknown quantity of a case with pipes that has no basins and no bodies; for other cases
+    the drawing raises it.
     """
     clock = column("t", "time", case)
     captions = [(f"{field.replace('_', ' ')} at t = {clock.from_si(t):.6g} {clock.unit}", files) for t, files in frames]
@@ -54,7 +55,7 @@ def scene_of(case, title: str, field: str, frames: list[tuple[float, list[Path]]
 
 
 def unit_of(case, field: str) -> DrawnUnit:
-    """Unit of a quantity in pictures: as in `[output]`, by default bar for pressures; none for unknown names."""
+    """Unit of a quantity in pictures: as in `[output]`, by default bar for pressures; "" for unknown names."""
     if field in case.scalars:
         return DrawnUnit(field, case.scalars[field].unit)
     own = {

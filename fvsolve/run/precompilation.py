@@ -43,8 +43,9 @@ def warm(
 ) -> CacheState:  # fmt: skip
     """Compile the code that some cases need, in several processes, and return the state of the cache.
 
-    cases : paths of case files; whole : True to compile the steps of all kinds of methods too; jobs : number of
-    processes; progress(done, total, task) is called after each task. Raises CaseError, FvsolveError.
+    cases : paths of case files; whole : True to compile the steps and linear algebra of all kinds of methods too; jobs
+    : number of processes; progress(done, total, task) is called after each task. Raises CaseError, FvsolveError, and
+    RunError if a process is killed.
     """
     folder, began = _folder(), time.perf_counter()
     before = code_files(folder)
@@ -85,7 +86,10 @@ def code_files(folder: Path) -> dict[str, int]:
 
 
 def _all(tasks: list[tuple[str, str]], jobs: int, progress: Callable[[int, str], None]) -> None:
-    """Run tasks (kind, name) in up to `jobs` processes, in order; tasks that take longest should be first."""
+    """Run tasks (kind, name) in up to `jobs` processes, in order; tasks that take longest should be first.
+
+    Raises the exception of a task, and RunError if a process is killed.
+    """
     pool, started = ProcessPool(run_task, min(jobs, len(tasks))), 0
     progress(0, "compiling")
     try:

@@ -23,6 +23,7 @@ class ProcessPool:
     """Pool of up to `size` processes, which are started when needed.
 
     work : function that each process applies to every task of a chunk. If a process is killed, only its chunk is lost.
+    The caller keeps the number of unfinished chunks at most `capacity`.
     """
 
     def __init__(self, work: Any, size: int) -> None:
@@ -40,7 +41,7 @@ class ProcessPool:
     def next_result(self) -> tuple[int, list | None, float]:
         """Wait for a finished chunk; returns its number, the answers (None if the process ended) and its time [s].
 
-        Raises the exception that a task raised.
+        Raises the exception that a task raised, and RunError if a process could not be started.
         """
         while True:
             ready = wait([worker.pipe for worker in self.busy])
@@ -120,7 +121,7 @@ def end_with_parent() -> None:
 
 
 def compute(work: Any, tasks: list) -> tuple[Any, float]:
-    """Apply `work` to all tasks; returns the list of answers, or the exception raised, and the duration [s]."""
+    """Apply `work` to all tasks : (list of answers, duration [s]); (exception, 0) if a task raises one."""
     began = time.perf_counter()
     try:
         answers = [work(task) for task in tasks]

@@ -45,7 +45,7 @@ class ResultMark(NamedTuple):
 class Extremes(NamedTuple):
     """Least and greatest value of a probe over all accepted steps and rows, in its unit, and their times [s].
 
-    Values of a diverged run from the time at which it is not valid are left out.
+    A value and its time are None if it was reached after the time from which a diverged run is not valid.
     """
 
     minimum: float
@@ -202,7 +202,10 @@ class Result(Displayable):
 
     @cached_property
     def envelope(self) -> dict:
-        """Pipe -> distance, elevation, minimum and maximum pressure and head over all steps, times: float64[cells]."""
+        """Pipe -> distance, elevation, initial head, extremes of pressure and head over all steps, times: float64[k].
+
+        The k positions are the cells, and observed points between cells. Values are in the units of `[output]`.
+        """
         tables = self._read_envelope()
         for arrays in tables.values():
             for array in arrays.values():
@@ -281,7 +284,7 @@ class Result(Displayable):
 
     @validated(path=PATH)
     def plot_envelope(self, path=None):
-        """Figure (matplotlib) of least and maximum head along the pipes, also written to `path` if given."""
+        """Figure (matplotlib) of least and greatest head along the pipes, also written to `path` if given."""
         from fvsolve.draw.plot import envelope_figure
 
         return save_if_path(envelope_figure(**self.envelope_drawn()), path)
@@ -296,8 +299,10 @@ class Result(Displayable):
 
     @validated(time=NUMBER, field=TEXT, path=PATH, contours=COUNT_FROM_ZERO)
     def view(self, time: float | None = None, field: str | None = None, path=None, contours: int = 0) -> Path:
-        """Draw the quantity `field` at the frame nearest to `time` [s] (default: last) with PyVista; return the path.
+        """Draw the quantity `field` at the frame nearest to `time` [s] (default: last); return the path of the picture.
 
+        Matplotlib draws cases without basins and bodies, PyVista draws the others.
+        path : default: `view-FIELD.png` in the run directory
         By default `field` is pressure, or without pipes the first field of the first basin, or without basins the
         speed of bodies; without all of these only the parts are drawn. `contours` : number of contour lines. Raises
         RunError without frames, FvsolveError if drawing is not possible.
@@ -364,7 +369,10 @@ class Result(Displayable):
         }
 
     def column(self, probe: str) -> UnitColumn:
-        """Name, dimension and unit of a probe, with conversions to and from SI."""
+        """Name, dimension and unit of a probe, with conversions to and from SI.
+
+        Raises FvsolveError for an unknown probe.
+        """
         return UnitColumn(self._known(probe), **self.summary["probes"][probe], ambient=self.summary["ambient_pressure"])
 
     def si(self, probe: str) -> np.ndarray:

@@ -35,7 +35,7 @@ def check(summary: dict[str, Any], path: Path) -> None:
 
 
 def field_faults(summary: dict[str, Any]) -> Iterator[str]:
-    """Yield texts on missing and unknown entries, for each key of a summary."""
+    """Yield a text for each key of a summary with missing entries, and for each with unknown entries."""
     for key, expected in ROWS.items():
         rows = as_rows(summary.get(key, []))
         if missing := [name for name in expected if any(name not in entry for entry in rows)]:

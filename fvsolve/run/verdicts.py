@@ -104,6 +104,8 @@ def worst(rows: list[dict]) -> list[dict]:
 def nearest(model, summary, limit, part: PartExtremes, complete: bool):
     """Yield, for every bound of a limit, the position in a part with the least margin.
 
+    A position with unknown value has a margin just within rounding. If the minimum is the cavity pressure and fails,
+    the position of the first cavity of the pipe is yielded instead.
     complete : True if the run can decide that a limit holds
     """
     quantity = limit.extent.quantity
@@ -178,7 +180,7 @@ def first_cavity(summary, part: PartExtremes, margin: np.ndarray, at: int) -> in
 def extremes(model, quantity: str, part: PartExtremes):
     """Pairs (values [SI], times [s]) of the least and greatest values of a quantity at all positions of a part.
 
-    Values of velocities and forces are magnitudes.
+    Values of velocities and forces are magnitudes; the least is 0, at the time nan, where the sign changes.
     """
     if quantity in OF_PRESSURE:
         low, high = (
@@ -219,7 +221,10 @@ class Chainages:
         self.legs = {name: legs(route, case.links) for name, route in case.routes.items()}
 
     def of(self, part: PartExtremes, at: int, on: tuple[str, ...]) -> float | None:
-        """Chainage of position `at` of a part [m]; None for a node that is on no route. on : names in the limit."""
+        """Chainage of position `at` of a part [m]; None for a node on no route, and for a link other than a pipe.
+
+        on : names of routes in the limit
+        """
         if part.group == "links":
             distance = part.distance[at]
             return float(self.leg(part.part, on).chainage(distance)) if math.isfinite(distance) else None
@@ -231,7 +236,7 @@ class Chainages:
         return None
 
     def leg(self, pipe: str, on: tuple[str, ...]) -> Leg:
-        """Leg (pipe with chainages and direction) of a pipe for chainages; on : names in the limit."""
+        """Leg (pipe with chainages and direction) of a pipe for chainages; on : names of routes in the limit"""
         result = next((leg for name in self.ordered(on) for leg in self.legs[name] if leg.pipe == pipe), None)
         return pipe_leg(pipe, self.case.links) if result is None else result
 

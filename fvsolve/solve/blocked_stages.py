@@ -40,7 +40,7 @@ def blocked_sums(cut: Partition, k: int) -> np.ndarray:
 
 
 def rows_at(model, b: int, q: int, first: int, stop: int) -> tuple[int, int]:
-    """First state and last state + 1 of the rows from `first` to `stop` - 1 of quantity q of basin b."""
+    """(first state, last state + 1) of the rows from `first` to `stop` - 1 of quantity q of basin b."""
     basin = model.tables.basins[b]
     at, nx = int(basin["y"] + q * basin["n"]), int(basin["nx"])
     return at + nx * first, at + nx * stop

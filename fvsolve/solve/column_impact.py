@@ -11,7 +11,7 @@ ROUNDING = 1e-9  # relative to a small flow: columns that separate more slowly s
 
 
 def shut_places(model: Model, out: np.ndarray) -> list[int]:
-    """Numbers of the nodes that join only rigid columns and shut valves."""
+    """Numbers of the nodes that join only rigid columns and shut valves; out : output array of the right-hand side."""
     places, nodes, at = [], model.tables.nodes, model.layout["conductance"]
     for i in np.flatnonzero(nodes["gates"] >= 0):
         if not out[at + gates_of(model, i)].any():
@@ -55,7 +55,8 @@ def impact_impulses(model: Model, carried: np.ndarray, out: np.ndarray, places: 
     J follows from the momentum: at each node, the sum over its columns of A / L (J - J_far) is the sum of their
     inflows, with area A [m2] and length L [m] of a column and the impulse J_far at its far end. Columns whose flow a
     valve controls keep their flow. The result is J times the sum of A / L.
-    carried : float64[columns]  result of `flow_before`; places : nodes from `shut_places`
+    carried : float64[columns]  result of `flow_before`; out : output array of the right-hand side
+    places : nodes from `shut_places`
     """
     sums = np.array([model.tables.nodes["inflow"][i] - gate_inflow(model.tables, i) for i in places])
     matrix = np.zeros((len(places), len(places)))
@@ -75,7 +76,10 @@ def impact_impulses(model: Model, carried: np.ndarray, out: np.ndarray, places: 
 
 
 def separate(run_data: RunData, t: float, y: np.ndarray, out: np.ndarray) -> int | None:
-    """Number of the opening event of the air valve where columns separate fastest; None if no columns separate."""
+    """Number of the opening event of the air valve where columns separate fastest; None if no columns separate.
+
+    y : state at time t [s]; out : output array of the right-hand side there
+    """
     model = run_data.model
     places = shut_places(model, out)
     events = [air_valve_of(model, i) for i in places]

@@ -34,7 +34,10 @@ class Partition:
 
     @property
     def sum_count(self) -> int:
-        """Number of partial sums of all bands: one for each range of common states and each row of each quantity."""
+        """Number of partial sums of the error norm of a step, over all bands.
+
+        There is one for each range of `common_states`, and one for each row of each quantity of the divided basins.
+        """
         rows = self.model.tables.basins["ny"][[*self.basins]] * [quantities(self.model, b) for b in self.basins]
         return len(self.common_states()) + int(sum(rows))
 
@@ -113,7 +116,7 @@ def quantities(model: Model, b: int) -> int:
 
 
 def common_cells(model: Model, b: int):
-    """Numbers of the cells of basin b that all bands read: cells at its patches and at probes, as several arrays."""
+    """Yield the numbers of the cells of basin b that all bands read: an array for each patch and probe in cells."""
     integers = model.tables.integers
     for patch in model.tables.patches[model.tables.patches["basin"] == b]:
         yield integers[patch["first"] : patch["first"] + patch["count"]]

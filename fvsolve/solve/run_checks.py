@@ -89,9 +89,9 @@ def split_step_notices(numerics, counts: dict[str, int]) -> list[Notice]:
     if not counts.get("parted"):
         return []
     key = "step" if numerics.step is not None else "courant"
-    text = (f"{counts['parted']} of {counts['steps']} steps were too long, for Newton or for a disc that shuts on a "
-            "rigid column, and were taken in parts, which end where the full step would have ended; give a smaller "
-            f"numerics.{key}, or rtol instead")  # fmt: skip
+    text = (f"{counts['parted']} of {counts['steps']} steps were too long for Newton's method, or for a disc that "
+            "shuts on a rigid column, and were taken in parts that end where the full step would have ended; give a "
+            f"smaller numerics.{key}, or rtol instead")  # fmt: skip
     return [Notice("step-limit", "numerics", text, key, float(counts["parted"]), 0.0, True)]
 
 

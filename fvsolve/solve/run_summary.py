@@ -29,7 +29,11 @@ class Mark:
 
 @dataclass(frozen=True)
 class Cavity:
-    """First column separation of a pipe: place, time [s], distance [m]; greatest total volume of its cavities [m3]."""
+    """First column separation of a pipe.
+
+    place : key path of the pipe; time : [s]; distance : distance from the `from` end [m]
+    volume : greatest total volume of all cavities of the pipe [m3], reached at `t_volume` [s]
+    """
 
     place: str
     time: float
@@ -52,9 +56,9 @@ class Event:
 class Summary:
     """Results of a run without output rows and field frames, in SI units with absolute pressures.
 
-    reason : reason of the end; ok : True if the results are valid; t : time of the end [s]; seconds : elapsed time of
-    the steps, seconds_setup : of the preparation [s]; dicts of extremes and envelopes are as `find_extremes` and
-    `find_envelope` return them
+    reason : reason of the end; ok : True if the results are valid; t : time of the end [s]
+    seconds, seconds_setup : elapsed time of the steps, and of the preparation of the run [s]
+    extremes : result of `find_extremes`; envelope : result of `find_envelope`
     """
 
     reason: str
@@ -97,8 +101,8 @@ class Summary:
 def find_marks(run_data: RunData) -> list[Mark]:
     """First time of each condition outside the model's validity, at each place.
 
-    Pressures below vapour pressure are left out under a density law that models cavities, and overflow of tanks always,
-    as the mass ledger contains it.
+    Pressures below vapour pressure are left out under a density law that models cavities. Overflow of tanks is always
+    left out, because the mass ledger contains it.
     """
     model, marks = run_data.model, run_data.marks
     if np.isnan(marks).all():
@@ -124,7 +128,7 @@ def find_marks(run_data: RunData) -> list[Mark]:
             "pressure falls below vapour pressure; the liquid column would separate; to model this, set "
             f"{model.case.law.cavitation_keys}cavitation = true in [fluid]"
         ),
-        "dry": "no water is left for the outflow; the missing water is added, `made_up` in the mass balance",
+        "dry": "no water is left for the outflow; the missing water is added (`made_up` in the mass balance)",
     }
     return [
         Mark(kind, place, float(time), f"{place.split('.', 1)[1]}: {texts[kind]}")
@@ -204,7 +208,8 @@ def find_watched(run_data: RunData) -> dict[str, tuple[float, float, float, floa
 def find_point_envelopes(run_data: RunData) -> dict[str, dict[str, np.ndarray]]:
     """Envelopes, as `find_envelope`, at the ends of pipes and the points of their elevation profiles.
 
-    Each envelope has in addition the initial pressure, `initial_pressure` [Pa].
+    Pipes without an elevation profile are left out, unless a limit or expectation refers to their pressure. Each
+    envelope has in addition the initial pressure, `initial_pressure` [Pa].
     """
     model, probe_count, points = run_data.model, len(run_data.model.probes), {}
     rows: dict[str, list[int]] = {}

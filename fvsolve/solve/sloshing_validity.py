@@ -86,7 +86,7 @@ class SloshingCheck:
                 notices.append(Notice("sloshing", f"nodes.{name}", text, "sloshing", height, SMALL_WAVE))
             if change > WEIGHT_CHANGE:
                 text = f"{name}: at {amount(change_time, 'time')} the vertical acceleration of its body changes the "
-                text += f"weight of its water by a fraction of {change:.2g}, which its waves do not include"
+                text += f"weight of its water by a fraction of {change:.2g}; the waves do not include this change"
                 notices.append(Notice("weight", f"nodes.{name}", text, None, change, WEIGHT_CHANGE))
         return notices
 

@@ -38,7 +38,7 @@ CHECKPOINT_SECONDS = 1.0
 CHUNK_SECONDS = 0.1
 FREQUENT_CHECK_STEPS = (
     loop_indices.GROWTH_CHECK_STEPS
-)  # steps between two checks by `RunChecks.look` where it is needed often
+)  # steps between two checks by `RunChecks.check` where it is needed often
 PERSISTENT = ("extremes", "envelope", "marks", "armed")
 
 
@@ -238,8 +238,9 @@ class Run:
             self.sink.field(t, self.run_data.fields(t, y, out))
 
     def pass_outputs(self, t: float, out: np.ndarray) -> None:
-        """Count the rows due up to time t [s], a jump or the end, and write the field frame if one is due.
+        """Count the rows due up to time t [s] as written, and write the field frame if one is due.
 
+        t : time of a jump or of the end of the run, whose row is written already
         out : output array of the right-hand side at t
         """
         memory, orders = self.loop.loop_state, self.loop.controls
@@ -368,9 +369,10 @@ class Run:
         self.saved = time.perf_counter()
 
     def failure(self, code: int) -> str:
-        """Reason why a run stopped: failure, place, time and remedy, with the advice of the density law.
+        """Reason why a run stopped: failure, place, time and remedy.
 
         code : code of `steppers.loop_indices` that the time loop returned
+        The advice of the density law is added for BAD_VALUE, NEWTON_STUCK and TINY_STEP.
         """
         numbers = code in (loop_indices.BAD_VALUE, loop_indices.NEWTON_STUCK, loop_indices.TINY_STEP)
         return self.failure_text(code) + (self.model.case.law.advice if numbers else "")
@@ -405,7 +407,7 @@ class Run:
             return (f"stopped: Newton did not converge at {when}, however short the step, worst in {worst}; check the "
                     "parts there for jumps, or try an explicit method")  # fmt: skip
         if code == loop_indices.TINY_STEP:
-            return f"stopped: the step became too small at {when}; try a larger rtol, or courant instead"
+            return f"stopped: the step became too small at {when}; try a larger rtol, or numerics.courant instead"
         if code == loop_indices.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_SOLUTION:
             return f"stopped: the demand{place} cannot be supplied at {when}; all connections to it are shut"
         if code == loop_indices.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_VOLUME:

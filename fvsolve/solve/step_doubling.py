@@ -57,8 +57,9 @@ class StepDoubling:
             self.restart_data[1], self.small = self.interval, state_ranges(model, LEAST_RANGE)[self.states]
 
     def begin(self, steps: float) -> None:
-        """Order a check of the first step of a segment under implicit methods, which stay stable at any change there.
+        """Order a check of the first step of a segment if the method is implicit.
 
+        An implicit method stays stable there, however great the change at the start of the segment.
         steps : number of steps at the start of the segment
         """
         if self.states.size and self.implicit:
@@ -96,7 +97,8 @@ class StepDoubling:
         """Add the errors of the steps since the last check to the accumulated errors.
 
         h : length of the last step [s]; steps : number of steps since the last check
-        error : float64[n]  error of the last step; the other steps count with the smaller error of both checks
+        error : float64[n]  error of the last step
+        For each step between the two checks, the lesser of the errors at this check and at the last check is added.
         """
         widths, own = self.widths(), np.abs(error[self.states])
         size = float(np.linalg.norm(own / widths))
@@ -135,7 +137,7 @@ class StepDoubling:
         return self.stepper.single_step(loop.rhs, loop.run_data.handle, int(self.model.layout["supply"]), t, h, y)
 
     def widths(self) -> np.ndarray:
-        """Greatest minus least value so far of each checked state, at least the small range of that state."""
+        """Greatest minus least value so far of each checked state, at least its `state_ranges` with the share 0.1."""
         return np.maximum(self.greatest - self.least, self.small)
 
     def worst(self) -> tuple[str, float]:
@@ -153,7 +155,7 @@ class StepDoubling:
         if not DOUBTFUL <= share < np.inf:  # a state that is not finite has stopped the run
             return None
         ok = share < WRONG
-        verdict = "it may be wrong" if ok else "the numbers are not to be trusted"
+        verdict = "the results may be wrong" if ok else "the numbers are not to be trusted"
         steps = self.model.case.step_amount(self.step)
         text = (f"{place}: steps of {steps} give a mean error of about {100 * share:.2g} % of its range, by "
                 f"comparison with two half steps; {verdict}; halve the step")  # fmt: skip
@@ -162,9 +164,10 @@ class StepDoubling:
 
 
 def corrected_store(loop) -> bool:
-    """True if a delay line corrected the mass of a storing node for a jump within the last step of the loop.
+    """True if the present state of the loop is marked as corrected for a jump in a delay line within the last step.
 
-    Half steps have no such correction, so such a step is not checked.
+    A correction changes masses of storing nodes and flows of rigid columns. Half steps have no such correction, so such
+    a step is not checked. The mark is removed when the corrected state is recorded again.
     """
     past = loop.run_data.past
     return past.size > 0 and past[CORRECTED_TIME] == loop.t

@@ -93,7 +93,7 @@ class BandWorker:
         self.bounds = np.ascontiguousarray(at.reshape(-1, 3)[owned]).ravel(), bounds[owned]
 
     def open(self) -> None:
-        """Make the handle of the arrays that the run writes; again when the wave history of delay lines has grown."""
+        """Make the handle of the arrays that the run writes; repeated when the wave history has grown."""
         self.written = self.run_data.written._replace(**self.own_arrays)
         self.handle = self.run_data.linked_handle(self.written, self.call_tables)
 

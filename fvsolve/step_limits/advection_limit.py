@@ -187,7 +187,7 @@ def _slow_growth(weights: Sequence[Fraction], method: str, courant: Fraction) ->
 
 
 def _modulus(p: Polynomial, real: Fraction, size: Fraction) -> Fraction:
-    """|p(s)|^2 of the polynomial p at a complex s, from its real part and size = |s|^2.
+    """|p(s)|^2 of the polynomial p at a complex number s with the real part `real` and the squared modulus `size`.
 
     It is the sum over j, k of p_j p_k |s|^2k Re(s^(j-k)).
     """
@@ -220,7 +220,10 @@ def _is_a_stable(method: Method) -> bool:
 
 
 def _rational(method: str) -> tuple[StabilityFunction, Fraction]:
-    """Stability function R with rational coefficients, and relative size below which a coefficient of E is rounding."""
+    """Stability function R with rational coefficients, and relative size below which a coefficient of E is rounding.
+
+    E is the polynomial of `_e_polynomial`.
+    """
     tableau, r = method_named(method), _function(method)
     parts = (*r.numerator.coefficients, *r.denominator.coefficients)
     exact = all(isinstance(x, Fraction) for x in parts)
@@ -240,9 +243,10 @@ def _fraction(x) -> Fraction:
 
 
 def _e_polynomial(weights: Sequence[Fraction], r: StabilityFunction, tolerance: Fraction) -> list[list[int]]:
-    """Integer coefficients g[m][i] of nu^m t^i of a positive multiple of E, without the common factors of its terms.
+    """Integer coefficients g[m][i] of nu^m t^i of a positive multiple of E(nu, t), without common factors of the terms.
 
-    n and d are the coefficients of numerator and denominator of r, z is the symbol of the scheme:
+    A wave of phase theta per cell grows at the Courant number nu if E < 0 at t = sin^2(theta / 2). With the
+    coefficients n and d of numerator and denominator of the stability function r, and the symbol z of the scheme:
     E = sum_jk (d_j d_k - n_j n_k) nu^(j+k) Re(z^j conj(z)^k);
     Re(z^j conj(z)^k) = |z|^2k c_j-k, c_0 = 1, c_1 = Re z, c_m+1 = 2 Re z c_m - |z|^2 c_m-1.
     tolerance : relative size below which a coefficient is rounding
@@ -279,9 +283,10 @@ def _without_rounding(p: Polynomial, doubt: Polynomial, tolerance: Fraction) -> 
 def _reduced(rows: list[Polynomial]) -> list[list[int]]:
     """Integer coefficients g[m][i] of nu^m t^i, without common powers of nu and the common factor in t.
 
-    rows : polynomials in t, one for each power of nu. The result is empty for the zero polynomial.
-    The common factor is zero where the symbol of the scheme is zero: at t = 0, and at t = 1 for central differences.
-    If it changes its sign in between, E is negative somewhere at every nu, and [[-1]] is returned.
+    rows : polynomials in t, the coefficients of the powers of nu in E(nu, t) (see `_e_polynomial`)
+    The result is empty for the zero polynomial. The common factor is zero where the symbol of the scheme is zero: at t
+    = 0, and for central differences also at t = 1. If it changes its sign in between, E is negative somewhere at every
+    nu, and [[-1]] is returned.
     """
     while rows and rows[0].degree < 0:
         rows = rows[1:]
@@ -344,8 +349,10 @@ def _cached_stable_ranges(weights: tuple, numerator: tuple, denominator: tuple, 
 
 
 def _counterexample(g, low: float, high: float):
-    """Result of `negative_point` for Courant numbers from low to high, with a margin inside the finite ends.
+    """Courant number from low to high at which a wave grows, and t = sin^2(theta / 2) of this wave.
 
+    The search keeps a margin from the finite ends. Returns None if no wave grows, and "open" if the search ends
+    undecided, as `negative_point`.
     g : integer coefficients from `_e_polynomial`
     """
     start = Fraction(low) * (1 + MARGIN)
@@ -371,13 +378,14 @@ def _fails_outside(g, gaps, rays) -> bool:
 
 
 def _negative_at_small_nu(g, t: Fraction) -> bool:
-    """True if E(nu, t) with the coefficients g is negative for all small nu > 0."""
+    """True if E(nu, t) is negative for all small Courant numbers nu > 0; g : its coefficients from `_e_polynomial`."""
     return next((x < 0 for x in _coefficients_at(g, t) if x), False)
 
 
 def _candidates(g, rays: list[Fraction]):
-    """Ranges of Courant numbers that are stable for all tested t, with ends refined between the tested values.
+    """Ranges of Courant numbers, as pairs of `RangeEnd`, that are stable for all tested t.
 
+    The ends are refined between the tested values.
     g : integer coefficients from `_e_polynomial`; rays : tested values of t = sin^2(theta / 2), sorted
     """
     unstable = sorted(range_ for t in rays for range_ in _negative(_coefficients_at(g, t)))
@@ -390,7 +398,10 @@ def _candidates(g, rays: list[Fraction]):
 
 
 def _sharpened(g, rays, low: float, high: float):
-    """Stable range from low to high with ends refined between the tested t in `rays`; None if it becomes empty."""
+    """Ends (`RangeEnd`) of the stable range of Courant numbers from low to high; None if the range becomes empty.
+
+    The ends are refined between the tested values of t; g, rays : as in `_candidates`
+    """
     inside = (low + high) / 2 if math.isfinite(high) else 2 * low + 1
     start = _edge(g, rays, inside, -1) if low > 0 else RangeEnd(0.0)
     end = _edge(g, rays, inside, 1) if math.isfinite(high) else RangeEnd(math.inf)
@@ -400,8 +411,8 @@ def _sharpened(g, rays, low: float, high: float):
 def _edge(g, rays: list[Fraction], inside: float, side: int) -> RangeEnd:
     """End of the stable range that contains the Courant number `inside`.
 
-    It is the nearest change of sign of E over all t, found by successive refinement between the values `rays`.
-    side : 1 for the upper end, -1 for the lower end
+    It is the nearest change of sign of E (see `_e_polynomial`) over all t, refined between the tested values `rays`.
+    g, rays : as in `_candidates`; side : 1 for the upper end, -1 for the lower end
     """
 
     def reach(t: Fraction) -> float:
@@ -437,7 +448,7 @@ def _dyadic(x, bits: int) -> Fraction:
 
 
 def _coefficients_at(g, t: Fraction) -> np.ndarray:
-    """Coefficients of the powers of nu in E(nu, t) at t, as floats up to a common positive factor.
+    """Coefficients of the powers of nu in E(nu, t) at t, as floats up to a common positive factor, lowest power first.
 
     g : integer coefficients from `_e_polynomial`
     """

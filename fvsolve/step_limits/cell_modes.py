@@ -44,8 +44,9 @@ def friction_modes(model) -> Modes:
 
 @functools.lru_cache(maxsize=256)
 def pipe_symbol(weights: tuple, n: int) -> np.ndarray:
-    """Symbol of a scheme (complex rate of a wave, in cells per time) for waves between the ends of a pipe of n cells.
+    """Symbol of a scheme for 65 waves between the ends of a pipe of n cells : complex128[65].
 
+    It is the complex growth rate of a wave, divided by the rate of cells that a wave crosses.
     weights : weights of cells in the value at a face
     """
     values = symbol(weights, PHASES * (1.0 - 0.5 / n))
@@ -54,10 +55,11 @@ def pipe_symbol(weights: tuple, n: int) -> np.ndarray:
 
 
 def memory_modes(model) -> Modes:
-    """Modes of unsteady friction and creeping walls: one estimate of the fastest decay for each pipe.
+    """Modes of unsteady friction and creeping walls: for each pipe an estimate of the eigenvalue of the fastest decay.
 
-    It is the rate of the fastest memory term plus the gains of all terms, and for unsteady friction plus the slope of
-    the steady friction.
+    It is minus the sum of the rate of the fastest relaxation term and the gains of all terms; for unsteady friction the
+    sum includes the slope of the steady friction.
+    Returns pairs of the name and the eigenvalue [1/s].
     """
     modes, floats = [], model.tables.floats
     for mesh, row in zip(model.pipes, model.tables.pipes, strict=True):
@@ -71,7 +73,10 @@ def memory_modes(model) -> Modes:
 
 
 def friction_slope(row) -> float:
-    """Slope of the friction force per length over the mass flow [1/s], at the initial flow; row : data of the pipe."""
+    """Derivative of the friction force per length with respect to mass flow [1/s], at the initial flow.
+
+    row : row of the pipe in the table of pipes
+    """
     return float(drag_slope(*(row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds", "flow"))))
 
 
@@ -87,7 +92,10 @@ def pipe_scalar_modes(model) -> Modes:
 
 
 def basin_scalar_modes(model) -> Modes:
-    """Modes of scalars in basins: decay, and diffusion of the shortest wave of the mesh."""
+    """Modes of scalars in basins, from decay and from diffusion of the shortest wave of the mesh.
+
+    Returns pairs of "basin.scalar" and eigenvalue [1/s].
+    """
     return [
         (f"{basin.name}.{name}", np.array([-scalar.decay - scalar.diffusivity * greatest_diffusion_rate(basin.mesh)]))
         for name, scalar in model.case.scalars.items()
@@ -97,7 +105,7 @@ def basin_scalar_modes(model) -> Modes:
 
 
 def greatest_diffusion_rate(mesh) -> float:
-    """Greatest eigenvalue of diffusion on a mesh, without flux through its boundary [1/m2]."""
+    """Greatest decay rate by diffusion on a mesh, over the diffusivity [1/m2]; no flux passes the boundary."""
     from scipy.sparse import coo_array, diags_array
     from scipy.sparse.linalg import eigsh
 

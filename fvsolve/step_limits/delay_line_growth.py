@@ -25,11 +25,14 @@ ANGLES = np.pi * (np.arange(720) + 1.0) / 720.0  # phases theta per step
 
 
 def wave_growth(model, method: Method, h: float, span: float) -> tuple[float, str, float]:
-    """Growth factor in a run of waves between a storing node and a delay line, name of the node, h k Y there.
+    """(growth factor of waves in a run, name of the storing node, h k Y of the node).
 
-    h : step [s]; k : stiffness of the node [Pa/kg]; Y : admittance of its lines; span : duration of the run [s]
-    The node is the one with the greatest growth; far ends of lines reflect fully. The factor is 0 without storing
-    nodes at delay lines, and for Rosenbrock methods, where it is not computed.
+    The waves are those between a storing node and the far end of a delay line, which reflects fully. The node is the
+    one with the greatest growth.
+    h : step [s]; k : stiffness of the node [Pa/kg]; Y : admittance of its lines [kg/s per Pa]
+    span : duration of the run [s]
+    The factor is 0 without storing nodes at delay lines, where waves cannot grow noticeably, and for Rosenbrock
+    methods, for which it is not computed.
     """
     candidates = []
     if method.kind == "linear":  # Rosenbrock: stages use the time slope of arriving waves
@@ -59,13 +62,13 @@ def line_growth_notices(model, method: Method, h: float, span: float) -> list[No
     wrong, other = grows >= LEAST_GROWTH**2, '"rk4" or "trapezoid"' if a < RK4_BOUND else '"trapezoid"'
     text = (f"{name}: waves between it and the delay lines grow {grows:.3g} times in the run (an estimate), with "
             f"{method.name} and steps of {model.case.step_amount(h)}, {a:.3g} times its filling time; "
-            f"{'the numbers are not to be trusted' if wrong else 'it may be wrong'}; give method = {other}, "
-            "or shorter steps")  # fmt: skip
+            f"{'the numbers are not to be trusted' if wrong else 'the results may be wrong'}; "
+            f"give method = {other}, or shorter steps")  # fmt: skip
     return [Notice("step-limit", name, text, "method", a, None, not wrong)]
 
 
 def storing_nodes(model, h: float):
-    """Name, number and h k Y of each storing node that is connected to delay lines.
+    """Yield (name, number, h k Y) of each storing node that is connected to delay lines.
 
     h : step [s]; k : stiffness of the node [Pa/kg]; Y : admittance of its lines [kg/s per Pa]
     """
@@ -87,7 +90,7 @@ def lines_at(model, i: int):
 
 
 def reflection_factor(method: Method, a: float, steps: float) -> np.ndarray:
-    """Complex reflection factor of a storing node for waves with the phases ANGLES per step : complex[720].
+    """Complex reflection factor of a storing node for waves with the phases ANGLES (0 to pi) per step : complex[720].
 
     a : h k Y of the node, see `storing_nodes`; steps : delay of the line in steps
     """
@@ -97,7 +100,10 @@ def reflection_factor(method: Method, a: float, steps: float) -> np.ndarray:
 
 
 def interpolation_factor(steps: float) -> np.ndarray:
-    """Complex factor of waves with the phases ANGLES per step, interpolated `steps` steps after they were sent."""
+    """Complex ratio of the waves read `steps` steps after they were sent to the waves that are sent now : complex[720].
+
+    The waves have the phases ANGLES per step. The ratio includes the delay and the interpolation between steps.
+    """
     steps_up = int(np.ceil(steps - 1e-9))
     x = max(0.0, steps_up - steps)
     weights = lagrange_six(x) if steps_up >= 3 else lagrange_four(x) if steps_up >= 2 else lagrange_three(x)

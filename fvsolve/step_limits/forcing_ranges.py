@@ -35,7 +35,11 @@ def forcing_sizes(model) -> np.ndarray:
 
 
 def pressure_and_flow_range(model) -> tuple[float, float]:
-    """Range of pressures [Pa] and greatest mass flow [kg/s] from the initial state and the schedules of nodes."""
+    """Greatest range of pressures [Pa] and greatest magnitude of mass flow [kg/s] that the forcing of nodes gives.
+
+    The range is that of the initial pressures of all nodes, or of a single schedule if it is greater. The flow is that
+    of schedules only.
+    """
     rho, gravity = model.case.properties.density, model.case.gravity
     at_start = model.tables.nodes["pressure"]
     pressures, flow = [float(np.ptp(at_start)) if len(at_start) else 0.0], 0.0
@@ -62,7 +66,8 @@ def states_outside_cells(model) -> np.ndarray:
 def state_ranges(model, share: float = 1.0) -> np.ndarray:
     """Range of each state : float64[n].
 
-    It is the change of mass of a storing node over the range of pressures, and `share` times the scale of other states.
+    For a storing node it is the change of mass over the range of pressures of `pressure_and_flow_range`, for other
+    states `share` times their scale.
     """
     ranges, spread = share * model.scale, pressure_and_flow_range(model)[0]
     for row in model.tables.nodes:

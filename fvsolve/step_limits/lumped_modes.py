@@ -29,9 +29,10 @@ RESOLVED = 1.0  # |h s| up to which a mode is resolved by the steps, and grows a
 
 
 class Mode(NamedTuple):
-    """Mode with the greatest growth in the run.
+    """Fastest growing of several modes of a model, in a run with a given step; see `fastest_growing`.
 
-    place : name of the part or state; growth : growth factor in the run; limit : greatest stable step [s]
+    place : name of the part or state; growth : growth factor in the run, over the exact growth factor
+    limit : step [s] up to which the growth is below the factor `enough` of `fastest_growing`
     outside_cells : True for states outside cells, whose growth may end because the state changes or a law bounds it
     resolved : True if the steps resolve the mode; frequency : frequency of its oscillation [Hz]
     """
@@ -45,9 +46,10 @@ class Mode(NamedTuple):
 
 
 def lumped_modes(model, method: str, step: float) -> list[Mode]:
-    """Fastest growing mode of the states outside cells, and of the cells, with a step `step` [s]; only growing modes.
+    """Fastest growing mode of the states outside cells, and that of the cells, with steps of `step` [s], as a list.
 
-    Raises FvsolveError for a method without a stability function.
+    Modes that grow less than 10 times in the run are left out. Under a given Courant number only modes of waves with
+    friction are computed. Raises FvsolveError for a method without a stability function.
     """
     r, numerics = stability_function(method_named(method)), model.case.numerics
     span, fixed = numerics.end - numerics.start, numerics.step is not None
@@ -60,7 +62,8 @@ def lumped_modes(model, method: str, step: float) -> list[Mode]:
 def fastest_growing(r, modes: Modes, step: float, span: float, own: bool, enough: float = LEAST_GROWTH) -> Mode | None:
     """Mode with the greatest growth, if it grows by the factor `enough` in a run of `span` [s]; otherwise None.
 
-    r : stability function of the method; step : time step [s]; own : True if the modes are of states outside cells
+    r : stability function of the method; modes : pairs of a name and eigenvalues [1/s]; step : time step [s]
+    own : True if the modes are of states outside cells
     """
     if not modes:
         return None

@@ -68,7 +68,8 @@ def pipe_modes(scheme: str, cells: int, returned: tuple[float, ...] = WORST) -> 
 def wave_matrices(scheme: str, cells: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Matrices A, b, v of dr/dt = A r + b r_in, r_out = v r for a wave r through a pipe of `cells` cells.
 
-    r_in is the wave that enters, r_out the wave that leaves, extrapolated as in `kernels.ghost_cells`.
+    r_in is the wave that enters, r_out the wave that leaves, extrapolated as in `kernels.ghost_cells`. The unit of time
+    is the travel time of a wave through a cell.
     """
     degree, weights = SCHEMES[scheme].degree, [float(w) for w in weights_of(scheme)]
     known = np.eye(cells + 1)  # rows: the datum, then the cells

@@ -33,9 +33,9 @@ MARGIN = 1.01  # margin of the Courant number: a step stable with it needs no fu
 
 @functools.lru_cache(maxsize=64)
 def plane_limit(scheme: str, method: str, share: float, waves: bool = True) -> float:
-    """Greatest Courant number, rate times step, up to which no wave grows; 0 if waves always grow.
+    """Greatest Courant number, step times wave rate, up to which no wave grows; 0 if waves always grow.
 
-    share : fraction of the wave rate c / dx + c / dy in x
+    share : part of x in the wave rate c / dx + c / dy, with the wave speed c, between 0 and 1
     waves : True for waves of pressure and velocity, False for advection
     Raises FvsolveError for a nonlinear scheme.
     """

@@ -60,7 +60,10 @@ def negative_point(g: Matrix, low: Fraction, high: Fraction) -> tuple[Fraction, 
 
 
 def _bernstein(g: Matrix, low: Fraction, high: Fraction) -> np.ndarray:
-    """Bernstein coefficients of the polynomial g on low <= x <= high, 0 <= y <= 1, scaled to integers, rounded down."""
+    """Bernstein coefficients of the polynomial g on low <= x <= high, 0 <= y <= 1, scaled to integers, rounded down.
+
+    g : coefficients g[m][i] of x^m y^i
+    """
     a = np.array([[Fraction(entry) for entry in row] for row in g], dtype=object)
     for k in range(a.shape[0] - 1):  # x = low + s, by repeated Horner schemes
         for m in range(a.shape[0] - 2, k - 1, -1):
@@ -86,7 +89,10 @@ def _to_bernstein(a: np.ndarray) -> np.ndarray:
 
 
 def _bisect(b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Bernstein coefficients on both halves of a box along the first axis (de Casteljau), rounded down."""
+    """Bernstein coefficients on the lower and upper half of a box along the first axis (de Casteljau), rounded down.
+
+    b : Bernstein coefficients on the whole box
+    """
     left, right, now = [b[0]], [b[-1]], b
     for _ in range(b.shape[0] - 1):
         now = (now[:-1] + now[1:]) >> 1
@@ -96,7 +102,10 @@ def _bisect(b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _curvature(b: np.ndarray) -> int:
-    """Greatest second difference of the coefficients along the first axis, times the square of the degree."""
+    """Greatest absolute second difference of Bernstein coefficients b along the first axis, times the squared degree.
+
+    It is 0 for a degree below 2.
+    """
     if b.shape[0] < 3:
         return 0
     return max(abs(difference) for difference in (b[:-2] - 2 * b[1:-1] + b[2:]).flat) * (b.shape[0] - 1) ** 2

@@ -35,7 +35,7 @@ SMOOTH_GROWTH = (
 # Mean error of a state outside cells, relative to its range: no error, doubtful, wrong.
 NO_ERROR, DOUBTFUL, WRONG = 1e-9, 0.005, 0.05
 LIMITED_EXCESS = (
-    0.3  # SHARE for limiters between few cells, which are stable up to this excess (tests/step_limits/test_ends.py)
+    0.3  # EXCESS for limiters between few cells, which are stable up to this excess (tests/step_limits/test_ends.py)
 )
 
 
@@ -58,13 +58,12 @@ class CourantCheck(NamedTuple):
 def step_limits(
     model, rates: dict[str, float] | None = None, step_error: float | None = None, run_data: RunData | None = None
 ) -> list[Notice]:
-    """Notices for the worst pipe, for basins, and for modes other than waves, whose step exceeds its limit.
+    """Notices for the worst pipe, the basins, delay lines and other modes for which the step exceeds the limit.
 
     rates : greatest wave rate of each basin in the run so far, by name [1/s]; default: the initial rates
-    step_error : greatest mean error of a state in the run, relative to its range (`solve.step_doubling`); None before
-    a run
+    step_error : greatest mean error of a state, relative to its range (`solve.step_doubling`); None before a run
     run_data : data of a run, used to compute the initial rates and reset afterwards
-    Returns no notices under error control.
+    The list is empty under error control. For implicit methods it contains only the notice on delay lines.
     """
     numerics = model.case.numerics
     method = method_named(automatic.first_method(numerics.method))
@@ -93,7 +92,11 @@ def step_limits(
 
 
 def first_step(model, run_data: RunData | None = None) -> float:
-    """Given step of a run, or its first step under a given Courant number [s]; 0 if the step is unknown."""
+    """Given step of a run, or its first step under a given Courant number [s]; 0 if the step is unknown.
+
+    run_data : data of a run, or None. In a model without basins they are used to compute the initial rates, and reset
+    afterwards; otherwise new data are used.
+    """
     numerics = model.case.numerics
     if numerics.step is not None:
         return numerics.step
@@ -129,7 +132,7 @@ def mode_notice(case, h: float, mode: Mode, method: str, step_error: float | Non
         else SMOOTH_GROWTH
     )
     wrong = seen and mode.growth >= enough
-    doubt = "it may be wrong" if seen or step_error >= DOUBTFUL else "this run shows no growth"
+    doubt = "the results may be wrong" if seen or step_error >= DOUBTFUL else "this run shows no growth"
     ends = "the numbers are not to be trusted" if wrong else doubt
     key, unit = ("step", " s") if numerics.step is not None else ("courant", "")
     size = rounded_down(getattr(numerics, key) * mode.limit / h)
@@ -140,7 +143,12 @@ def mode_notice(case, h: float, mode: Mode, method: str, step_error: float | Non
 
 
 def pipe_checks(model, method: str) -> list[CourantCheck]:
-    """Check of the pipe that is farthest beyond its limit, as a list; empty if no pipe is beyond its limit."""
+    """Check of the pipe whose step is the worst, as a list; empty if waves do not grow enough in any checked pipe.
+
+    Checks that are not `only_doubtful` come first, then the greatest ratio of Courant number to limit. All pipes of few
+    cells are checked, and the one longer pipe with the greatest Courant number. The Courant number of the check may be
+    below its limit.
+    """
     own = model.tables.pipes["delay"] < 0  # pipes divided into cells
     if not own.any():
         return []
@@ -163,7 +171,10 @@ def pipe_checks(model, method: str) -> list[CourantCheck]:
 
 
 def long_pipe(model, method: str, k: int, courant: float) -> list[CourantCheck]:
-    """Check of pipe number k as a grid without ends, as a list; empty if no wave grows at the Courant number."""
+    """Check of pipe number k as a grid without ends, as a list.
+
+    The list is empty if no wave grows at the Courant number, or if waves grow less than 10 times in the run.
+    """
     scheme = smooth_scheme(model.case.numerics.scheme)[0]
     if is_stable_with_margin(scheme, method, courant):
         return []
@@ -216,8 +227,9 @@ def reflection_products(model, k: int) -> tuple[float, ...]:
 def basin_checks(model, method: str, rates: dict[str, float]) -> list[CourantCheck]:
     """Checks of all basins whose waves grow.
 
-    rates : greatest wave rate of each basin in the run so far, by name [1/s]. Courant numbers count the parts of a cell
-    if the basin's time step uses parts of cells.
+    rates : greatest wave rate of each basin in the run so far, by name [1/s]
+    Courant numbers and limits refer to the rate that limits the steps of a basin. This rate is the wave rate times the
+    factor `unsplit` of the table of basins.
     """
     numerics, checks = model.case.numerics, []
     for basin, row in zip(model.basins, model.tables.basins, strict=True):
@@ -255,7 +267,10 @@ def smooth_scheme(scheme: str) -> tuple[str, bool]:
 
 
 def only_doubtful(check: CourantCheck) -> bool:
-    """True if a check beyond its limit is only doubtful: small excess over an estimate, or small growth."""
+    """True if a Courant number beyond its limit makes results doubtful, but not certainly wrong.
+
+    Reasons are a small excess over an estimated limit, or small growth in the run.
+    """
     return not check.proved and (
         check.courant <= check.limit * (1.0 + check.allowed_excess) or check.growth < LEAST_GROWTH**2
     )
@@ -277,7 +292,7 @@ def courant_notice(model, check: CourantCheck, method: str) -> Notice:
         remedy = f"{check.scheme} needs another method, for example ssp-rk3"
     text = (
         f"{check.place}: Courant number {check.courant:.6g}: with {scheme}{about} and {method} {limit}; "
-        f"{'it may be wrong' if only_doubtful(check) else 'the numbers are not to be trusted'}; {remedy}"
+        f"{'the results may be wrong' if only_doubtful(check) else 'the numbers are not to be trusted'}; {remedy}"
     )
     return Notice("step-limit", check.place, text, key, check.courant, check.limit, only_doubtful(check))
 
@@ -288,6 +303,6 @@ def growth(scheme: str, method: str, courant: float, crossed: float) -> float:
 
 
 def rounded_down(x: float) -> float:
-    """Round a number down to four digits."""
+    """Round a positive number down to four significant digits."""
     scale = 10.0 ** (3 - math.floor(math.log10(x)))
     return math.floor(x * scale * (1.0 + 1e-12)) / scale

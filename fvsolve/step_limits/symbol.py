@@ -21,9 +21,10 @@ WEIGHTS: dict[str, Weights] = {name: scheme.weights for name, scheme in LINEAR.i
 
 
 def weights_of(scheme: str) -> Weights:
-    """Five weights of a linear scheme: of the cells from two upstream to two downstream of a cell, at its outflow face.
+    """Five weights of a linear scheme in the value at the outflow face of a cell.
 
-    Raises FvsolveError for a nonlinear scheme.
+    They belong to the cells from two upstream to two downstream of this cell. Raises FvsolveError for a nonlinear
+    scheme.
     """
     if scheme in WEIGHTS:
         return WEIGHTS[scheme]
@@ -59,7 +60,7 @@ def square(weights: Sequence) -> Polynomial:
 
 
 def _waves(weights: Sequence) -> dict[int, Fraction]:
-    """Amplitudes a_m of the symbol z = sum_m a_m exp(i m theta) of a scheme, by m."""
+    """Amplitudes of the symbol z = sum_m a_m exp(i m theta) of a scheme : {m: a_m}."""
     amplitudes: dict[int, Fraction] = {}
     for k, w in enumerate(weights, start=-2):
         amplitudes[k] = amplitudes.get(k, Fraction(0)) - w

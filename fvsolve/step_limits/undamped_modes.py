@@ -23,7 +23,11 @@ GREATEST_DAMPING = 0.1  # greatest damping rate of a mode that counts as undampe
 
 
 def undamped_notices(model, method: str, step: float, span: float) -> list[Notice]:
-    """Notice for the oscillation that grows most in a run of `span` [s] with a first step of `step` [s]."""
+    """Notice for the oscillation that grows most in a run of `span` [s] with a first step of `step` [s], as a list.
+
+    The list is empty if no oscillation grows by more than 1 %, without a given Courant number, and for a method whose
+    stability region contains a part of the imaginary axis near 0.
+    """
     numerics = model.case.numerics
     if numerics.courant is None or covers_axis(method_named(method)):
         return []

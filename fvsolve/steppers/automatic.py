@@ -20,9 +20,9 @@ def first_method(name: str) -> str:
 
 
 def implicit_method(rtol: float) -> str:
-    """Name of the implicit method for a tolerance.
+    """Name of the implicit method of `auto` for the relative tolerance `rtol`.
 
-    Near zero pressure drop linearly implicit steps oscillate; Newton iterations do not.
+    Below TIGHT_BELOW it is a method with Newton iterations: near zero pressure drop linearly implicit steps oscillate.
     """
     return IMPLICIT if rtol >= TIGHT_BELOW else TIGHT_IMPLICIT
 
@@ -35,17 +35,20 @@ def step_cost_ratio(structure: Structure) -> float:
 
 
 def watch(stepper: Integrator, structure: Structure) -> None:
-    """Switch on the stiffness test of the time loop, with which the method `auto` chooses between its methods."""
+    """Switch on the stiffness test of the time loop, by which the method `auto` chooses between its two methods."""
     stepper.controls[loop_indices.WATCH], stepper.controls[loop_indices.PRICE] = 1.0, step_cost_ratio(structure)
 
 
 def is_change_due(stepper: Integrator) -> bool:
-    """True if the loop returned because the other kind of method would be cheaper."""
+    """True if the time loop has returned because the other kind of method (explicit or implicit) would be cheaper."""
     return stepper.loop_state[loop_indices.SWITCH_COUNT] < 0.0
 
 
 def change(stepper: Integrator) -> tuple[float, float, float]:
-    """Switch to the other method; returns time [s], spectral radius [1/s] and last step [s] at the switch."""
+    """Switch from the explicit to the implicit method of `auto`, or back.
+
+    Returns (time [s], spectral radius [1/s], last step [s]) at the switch.
+    """
     loop_state = stepper.loop_state
     implicit = implicit_method(stepper.controls[loop_indices.SIZE])
     stepper.use(method_named(implicit if stepper.method.explicit else EXPLICIT))
@@ -59,9 +62,10 @@ def change(stepper: Integrator) -> tuple[float, float, float]:
 
 
 def method_history(start: float, changes: list[tuple[float, float, float]], price: float, rtol: float) -> list[dict]:
-    """List the methods used in a run with the method `auto`: dicts with start time, method and reason.
+    """List of the methods used in a run with the method `auto`, each a dict with start time, method and reason.
 
-    changes : results of `change`; price : cost of an implicit step in explicit steps; rtol : tolerance of the run
+    start : start time of the run; changes : results of `change`
+    price : cost of an implicit step in explicit steps; rtol : tolerance of the run
     """
     entries = [{"time": start, "method": EXPLICIT, "why": "until stability limits the explicit steps"}]
     for k, (t, radius, h) in enumerate(changes):

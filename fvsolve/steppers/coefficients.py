@@ -1,8 +1,9 @@
 """Butcher array of a method as one flat array that the compiled steps read.
 
-The array holds A (s x s), b, c and the weights of the error estimate, for s stages, then for implicit methods the data
-of their Newton iterations (`newton_transform.py`). An implicit method whose first stage is not the rate f at the start
-of the step gets this rate as an extra first stage with weight zero.
+The array holds A (s x s), b, c and the weights of the error estimate, for s stages. For fully implicit methods the data
+of their Newton iterations follow (`newton_transform.py`), and last the result of `start_slope_correction` and its
+length. An implicit method whose first stage is not the rate f at the start of the step gets this rate as an extra first
+stage with weight zero.
 """
 
 from __future__ import annotations
@@ -19,8 +20,9 @@ from fvsolve.steppers.tableau import Method
 
 @functools.cache
 def coefficients(method: Method, damped: bool = False) -> tuple[np.ndarray, np.ndarray, int]:
-    """Flat coefficients of a method, coefficients of its dense output : float64[s, d], and number of stages s.
+    """(flat coefficients of a method, coefficients of its dense output : float64[s, d], number of stages s).
 
+    The flat coefficients are listed at the top of this file, those of Rosenbrock methods in `Rosenbrock.coefficients`.
     The stages include the start of the step as an explicit stage where the method is implicit.
     damped : True for `semi_implicit`, which stores the rates at the start in addition to the rates of its first stage
     Raises FvsolveError if A, without an explicit first stage, is singular or has no basis of eigenvectors.
@@ -51,8 +53,9 @@ def start_slope_correction(method: Method) -> np.ndarray:
     """Correction of the dense output of a collocation method whose last stage is the end of the step.
 
     The collocation polynomial p(theta) does not have the slope f of the solution at the start. The polynomial
-    p + h psi(theta) (f - p'(0)), psi = int prod (x - c_i) / prod (-c_i) with the nodes c_i, has this slope, the same
-    slopes at the stages and, from two stages on, the same end, as psi(1) = 0: its order is one higher.
+    p + h psi(theta) (f - p'(0)) has this slope, with the nodes c_i and psi = integral from 0 to theta of
+    prod (x - c_i) / prod (-c_i). It has the same slopes at the stages and, from two stages on, the same end, as
+    psi(1) = 0; its order is one higher.
     Returns the weights of the stages in p'(0), then the coefficients of psi; an empty array for other methods.
     """
     c, dense = method.c, method.dense

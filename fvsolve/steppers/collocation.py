@@ -20,7 +20,7 @@ def lagrange(c: Sequence) -> list[Polynomial]:
 
 
 def integrals(c: Sequence) -> list[Polynomial]:
-    """Integrals int_0^theta l_i of the Lagrange polynomials l_i on the nodes c, as polynomials in theta."""
+    """Integrals from 0 to theta of the Lagrange polynomials l_i on the nodes c, as polynomials in theta."""
     return [
         Polynomial([0, *(x / (k + 1) for k, x in enumerate(polynomial.coefficients))]) for polynomial in lagrange(c)
     ]
@@ -51,8 +51,8 @@ def collocation(a: Sequence, b: Sequence, c: Sequence, rounding: Fraction = Frac
 def extrapolated(c: Sequence, start) -> tuple:
     """Weights of the stages in the embedded solution of Radau IIA methods (Hairer and Wanner 1996, IV.8).
 
-    Together with the weight `start` at time 0 they integrate polynomials of degree below the number of stages over 0
-    to 1. c : times of the stages
+    Together with the weight `start` at time 0, they integrate exactly from 0 to 1 all polynomials of a degree below the
+    number of stages. c : times of the stages
     """
     return tuple(
         integral(Fraction(1)) - start * basis(Fraction(0))

@@ -32,10 +32,10 @@ def colors(pattern) -> np.ndarray:
 
 @njit
 def greedy(starts, rows, row_starts, columns, order, seen, result):
-    """Give each column in `order` the lowest colour that no column with a common row has.
+    """Give each column in `order` the lowest colour that no other column with a common row has.
 
     starts, rows : pattern by columns; row_starts, columns : pattern by rows
-    seen : int64[n + 1]  work array, initially -1; result : int64[n]  colours, initially -1
+    seen : int64[n + 1]  work array, initially -1; result : int64[n]  receives the colours, initially -1
     """
     for at in range(order.size):
         j = order[at]

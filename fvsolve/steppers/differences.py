@@ -10,10 +10,11 @@ LEAST = 2.0**-34
 
 @njit(forceinline=True)
 def differences(rhs, handle, structure, ledger_offset, t, y, f, rates0, scale, y_work, f_work, out, jacobian):
-    """Compute the Jacobian of the rates f and the ledger rates by one-sided differences; returns the calls of rhs.
+    """Compute the Jacobian of f and of the ledger rates by one-sided differences; returns the number of rhs calls.
 
     f, rates0 : float64[n], float64[m]  f(t, y) and the ledger rates out[ledger_offset : ledger_offset + m] at y,
     evaluated there and not taken from a stage
+    structure : flat array of `Structure.shape`
     scale : float64[n]  size of a small deviation; the increment is 2^-26 max(|y|, scale), with 2^-34 |y| in place of
     2^-26 |y| for states marked fine in the structure, and 2^-26 |scale| for a negative scale
     y_work, f_work : float64[n]  work arrays
@@ -46,7 +47,10 @@ def differences(rhs, handle, structure, ledger_offset, t, y, f, rates0, scale, y
 
 @njit
 def multiply(structure, jacobian, x, product):
-    """product <- J x with the Jacobian J : float64[n + m], first n states, then m ledger rates."""
+    """product <- J x with the Jacobian J; product : float64[n + m], first n states, then m ledger rates.
+
+    jacobian : float64[nnz]  entries of J, in the order of the pattern; x : float64[n]
+    """
     n = structure[SIZE]
     starts, rows = structure[structure[STARTS] :], structure[structure[ROWS] :]
     for i in range(n + structure[LEDGERS]):

@@ -53,6 +53,7 @@ def predict(b, c, x, first, vectors, k):
     The prediction is the slope of a parabola through both ends of the last step, with the slope at its end. The slope
     at the end is the slope of the last stage if c_s = 1, because a new evaluation of a stiff f would amplify the Newton
     residual; otherwise it is `first`, the rate f.
+    b, c : weights and nodes of the method; vectors : rows with the slopes of the stages of the last step
     """
     s, n = b.size, k.size
     slopes = vectors[s - 1] if c[s - 1] == 1.0 else first
@@ -72,7 +73,8 @@ def solve_stage(
 ):  # fmt: skip
     """Solve stage i, k[i] = f(t, base + h_gamma k[i]), by Newton iterations; returns CONVERGED or FAILED.
 
-    h_gamma : step times the diagonal coefficient of the method
+    base : state from earlier stages, in `vectors`; h_gamma : step times the diagonal coefficient of the method
+    nnz : number of Jacobian entries; other arguments as for `attempt`
     The stored stage is exactly f + J d with the last increment d, so it conserves the quantities that f and the
     Jacobian J conserve.
     """
@@ -106,6 +108,8 @@ def try_stages(
     """Solve all stages with the current Jacobian; returns CONVERGED or FAILED.
 
     A stage that fails is solved again by damped Newton if the Jacobian is of this step.
+    y : state at the start of the step; y_stage : work array; nnz : number of Jacobian entries
+    Other arguments as for `attempt`.
     """
     s, fresh = k.shape[0], work[JACOBIAN_STEP] == loop_state[STEPS]
     c, b, base = nodes_of(coefficients, s), weights_of(coefficients, s), vectors[s + BASE]
@@ -154,7 +158,12 @@ def attempt(
 ):  # fmt: skip
     """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
-    It uses the functions for real matrices only. Returns NEWTON_FAILED if Newton fails with a fresh Jacobian too.
+    The error is 0 unless the step is under error control, and NEWTON_FAILED if Newton fails with a fresh Jacobian too.
+    structure : flat array of `Structure.shape`; factor, solve : its functions for real shifts (`Structure.functions`)
+    work : header of `loop_indices`, Jacobian and work space, kept between steps
+    vectors : float64[rows, n]  data of the last step and work space, listed in `newton`
+    factors : factors of the matrix shift I - J with the Jacobian J; other arguments as for `erk.attempt`
+    Functions and factors for complex shifts are not used.
     """
     s = k.shape[0]
     nnz = structure[structure[STARTS] + structure[STATES]]

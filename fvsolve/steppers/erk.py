@@ -13,7 +13,8 @@ from fvsolve.steppers.step_operations import BEGIN, STOP, combine, error_of_band
 def quotient(f_new, f, y_new, y, scale):
     """Estimate of the spectral radius of the Jacobian from two stages at the end of a step (Hairer and Wanner IV.2).
 
-    It is |f_new - f| / |y_new - y| with weighted norms of states and rates.
+    It is |f_new - f| / |y_new - y|, with the rates f_new, f and states y_new, y of the two stages. The weight of each
+    state in the norms is 1 / (scale + |y|).
     """
     above, below = 0.0, 0.0
     for i in range(y.size):
@@ -30,7 +31,13 @@ def attempt(
 ):  # fmt: skip
     """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
-    ledger_rates[i] receives the ledger rates of stage i.
+    The error is 0 unless the step is under error control.
+    t, h : start and length of the step; rhs(t, y, dydt, out, handle) : function for the rates f
+    y : float64[4, n]  states, y[3] is work space; k : float64[s, n]  rates at the stages
+    ledger_rates : float64[s, m]  receives out[ledger_offset : ledger_offset + m] at the stages
+    coefficients : flat array, see `coefficients.coefficients`; scale : see `step_operations.error_scale`
+    controls, loop_state : arrays of the time loop, see `loop_indices`
+    join, row_blocks, sums : exchange of partial sums between bands of states, see `step_operations`
     structure : description of stage sums that rhs forms in blocks, see `kernels.stage_sums`; empty if rhs forms none
     Arguments for linear algebra and Newton iterations are not used.
     """

@@ -56,8 +56,10 @@ def locate(
     """Shorten a step so that it ends just past the first event, by the Illinois rule; returns its length and error.
 
     h, e : length and error of the full step; y[new] receives the end of the shortened step
-    The error is NEWTON_FAILED if a stage could not be solved, or if an event function jumps over zero in a step of
-    given length: then the stages of the step have several solutions, but the stages of a shorter step only one.
+    g, g_new : float64[events]  values of the event functions at the start and the end of the step
+    attempt, events : step of the method, event functions; other arguments as for `erk.attempt`
+    The error is NEWTON_FAILED if a stage could not be solved, or if an event function jumps over zero in an implicit
+    step (Newton) of given length: then the stages of the step have several solutions, those of a shorter step only one.
     """
     t, low, high, at_low, past = loop_state[T], 0.0, h, 1.0, event_ratio(g, g_new)
     guess, at_high, side = h, past, 0

@@ -132,7 +132,7 @@ class Integrator:
             reset(self.work)
 
     def restart_arrays(self) -> list[np.ndarray]:
-        """Views of all arrays that the next step depends on, except t and y."""
+        """Views of all arrays on which the next step depends, except t and y."""
         views = [self.loop_state, self.ledger, self.carry]
         if self.restart_size:  # header and Jacobian; f at the start of the last step, and its stages
             views += [self.work[: self.restart_size], self.vectors[self.k.shape[0]], self.k]
@@ -149,7 +149,10 @@ class Integrator:
         return loop_state
 
     def counts(self) -> dict[str, int]:
-        """Numbers of steps, rejections, rhs calls, Jacobians, factorisations, Newton iterations and failures."""
+        """Numbers of steps, rejections, rhs calls, Jacobians, factorisations, Newton iterations, failures, split steps.
+
+        The keys of the dict are those of `loop_indices.COUNTS`.
+        """
         return {name: int(self.loop_state[index]) for name, index in loop_indices.COUNTS.items()}
 
     def single_step(self, rhs, handle, ledger_offset: int, t: float, h: float, y: np.ndarray) -> np.ndarray:

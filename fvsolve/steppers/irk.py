@@ -73,20 +73,27 @@ DEFECT_WEIGHT = 1e-2
 
 @functools.cache
 def pairs_of(method: Method) -> int:
-    """Number of complex conjugate pairs among the eigenvalues of A^-1."""
+    """Number of complex conjugate pairs among the eigenvalues of A^-1; A : coefficients of the implicit stages."""
     a = method.a[1:, 1:] if not method.a[0].any() else method.a
     return int(np.count_nonzero(np.linalg.eigvals(a).imag > 0))
 
 
 @njit(inline="always")
 def matrix(coefficients, s, index):
-    """Flat coefficients from matrix number `index` of `newton_transform` on: its q x q entries by rows, then others."""
+    """Flat coefficients of a method from matrix number `index` of its Newton data on.
+
+    The data are listed in `newton_transform.transformed`; each of its matrices has q x q entries, row by row.
+    s : number of stages, q = s - 1
+    """
     return coefficients[s * s + 3 * s + index * (s - 1) * (s - 1) :]
 
 
 @njit
 def blend(base_weight, base, m, at, q, first, vectors, target):
-    """target <- base_weight base + sum of m[at + j] vectors[first + j] over j < q, three terms in each pass."""
+    """target <- base_weight base + sum of m[at + j] vectors[first + j] over j < q, three terms in each pass.
+
+    m : flat matrix; target, base : float64[n]
+    """
     n = target.size
     for j in range(0, q, 3):
         v0, v1, v2 = vectors[first + j], vectors[first + min(j + 1, q - 1)], vectors[first + min(j + 2, q - 1)]
@@ -103,6 +110,7 @@ def blend(base_weight, base, m, at, q, first, vectors, target):
 def predict(coefficients, h, h_last, s, buffer, vectors):
     """Predict the transformed stage increments W = T^-1 Z by extrapolation of the slopes of the last step.
 
+    Z : increments of the implicit stages over the start of the step; T : see `newton_transform.transformed`
     h, h_last : this step and the last step; buffer : float64[q q]  work array; W is stored in `vectors`
     """
     q, c = s - 1, nodes_of(coefficients, s)
@@ -123,9 +131,10 @@ def predict(coefficients, h, h_last, s, buffer, vectors):
 
 @inline
 def factor_blocks(factor, factor_complex, structure, coefficients, s, h, work, factors, complex_factors, n):
-    """Factor shift I - J for every block (shift) of L / h, and store the factors one after another.
+    """Factor shift I - J for every block (real or complex shift) of L / h, and store the factors one after another.
 
-    Returns the number of factors, or 0 if a pivot is zero.
+    L : block diagonal matrix of `newton_transform.transformed`; J : Jacobian; n : number of states
+    Returns the number of factors, or 0 if a pivot is zero. Other arguments as for `attempt`.
     """
     q, blocks, b, real, pair, count = s - 1, matrix(coefficients, s, BLOCKS), 0, 0, n, 0
     jacobian, size = work[HEADER:], int(work[FACTOR_SIZE])
@@ -148,7 +157,11 @@ def factor_blocks(factor, factor_complex, structure, coefficients, s, h, work, f
 
 @inline
 def solve_blocks(solve, solve_complex, structure, coefficients, s, size, factors, complex_factors, vectors):
-    """Solve (L / h x I - I x J) dW = R with the factors of the blocks; dW replaces R in `vectors`."""
+    """Solve (L / h x I - I x J) dW = R with the factors of `factor_blocks`; dW replaces R in `vectors`.
+
+    L : block diagonal matrix of `newton_transform.transformed`; J : Jacobian; x : Kronecker product
+    size : length of the factors of one block; other arguments as for `attempt`
+    """
     q, blocks, b, real, n = s - 1, matrix(coefficients, s, BLOCKS), 0, 0, vectors.shape[1]
     first, pair, both = s + STAGES + R * q, n, complex_factors[:n]
     while b < q:
@@ -170,9 +183,10 @@ def iterate(
     rhs, solve, solve_complex, handle, coefficients, structure, t, h, y, y_stage, k0, ledger_rates, ledger_offset, out,
     controls, loop_state, work, vectors, factors, complex_factors,
 ):  # fmt: skip
-    """Compute the transformed stage increments W by Newton iterations; returns CONVERGED or FAILED.
+    """Compute the transformed stage increments W = T^-1 Z by Newton iterations; returns CONVERGED or FAILED.
 
-    k0 : float64[n]  rates at the start of the step
+    Z : increments of the implicit stages over the start of the step; T : see `newton_transform.transformed`
+    y, k0 : float64[n]  state and rates at the start of the step; y_stage : work array; other arguments as for `attempt`
     """
     s, n = ledger_rates.shape[0], y.size
     q, c, weights = s - 1, nodes_of(coefficients, s), vectors[s + WEIGHTS]
@@ -231,7 +245,11 @@ def iterate(
 
 @inline
 def finish(coefficients, structure, nnz, h, k, ledger_rates, work, vectors):
-    """Compute the slopes k of the stages from the increments W, and correct the ledger rates by the last increment."""
+    """Compute the slopes k of the stages from their increments W, and correct the ledger rates by the last increment.
+
+    W : transformed increments of `iterate`, in `vectors`; nnz : number of Jacobian entries
+    Other arguments as for `attempt`.
+    """
     s = k.shape[0]
     q, d = s - 1, vectors[s + INCREMENT]
     slopes, start, buffer = matrix(coefficients, s, SLOPES), matrix(coefficients, s, START), work[work.size - q * q :]
@@ -271,6 +289,7 @@ def filtered_error(
     real eigenvalue 1 / g of A^-1 (Hairer and Wanner 1996, IV.8).
     retry : True for a repeated step or the first after a kink; then an error of 1 or more is estimated once more with
     f(t, y + e)
+    Other arguments as for `attempt`.
     """
     s, n = k.shape
     error, d, f = error_of(coefficients, s), vectors[s + INCREMENT], vectors[s + RATE]
@@ -321,6 +340,7 @@ def defect_before_end(
     Stages do not show a stiff state that becomes free just before the end, where an opening closes. The defect is
     e = h g (p' - f(p + d)) with d = (I - h g J)^-1 h g (p' - f(p)), where 1 / g is the first real eigenvalue of A^-1.
     It is as small as d if the Jacobian J is valid there; otherwise it is the full defect.
+    Arguments as for `attempt`.
     """
     s, n = k.shape
     q, ahead, buffer = s - 1, matrix(coefficients, s, EXTRAPOLATION), work[work.size - (s - 1) * (s - 1) :]
@@ -360,7 +380,9 @@ def attempt(
 ):  # fmt: skip
     """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
-    Returns NEWTON_FAILED if Newton fails with a fresh Jacobian too.
+    The error is 0 unless the step is under error control, and NEWTON_FAILED if Newton fails with a fresh Jacobian too.
+    factor_complex, solve_complex, complex_factors : linear algebra and factors for complex shifts
+    Other arguments as for `dirk.attempt`.
     """
     s, n = k.shape
     nnz = structure[structure[STARTS] + structure[STATES]]

@@ -24,7 +24,7 @@ LEAST = 1e-3  # amount added to the reference amount, so that it is never zero [
 
 @njit(forceinline=True)
 def weight(theta, dense, j):
-    """Weight of stage j in the dense output at the fraction theta of a step, and its slope over theta.
+    """(weight of stage j in the dense output at the fraction theta of a step, slope of the weight over theta).
 
     The weight is the sum of dense[j, m] theta^(m + 1).
     """
@@ -36,10 +36,11 @@ def weight(theta, dense, j):
 
 @njit
 def amount_and_rate(theta, total, r0, r1, m, ledger_rates, dense):
-    """Amount of rate number m from the start to the fraction theta of a step, divided by the step, and rate there.
+    """(amount of rate number m from the start to the fraction theta of a step, divided by the step; rate there).
 
     They follow from the dense output of the method, or from the cubic through both ends of the step.
     total : amount of the whole step, divided by the step; r0, r1 : rates at its start and its end
+    ledger_rates : float64[s, m]  rates at the stages; dense : float64[s, d]  coefficients of the dense output, or empty
     """
     if dense.shape[0] == 0:
         s, r = theta, 1.0 - theta
@@ -55,9 +56,9 @@ def amount_and_rate(theta, total, r0, r1, m, ledger_rates, dense):
 
 @njit
 def smaller_side(total, r0, r1, m, ledger_rates, dense):
-    """Size of the smaller of the inflow and outflow in a step in which rate number m changes its sign.
+    """Size of the smaller of inflow and outflow in a step in which rate number m changes its sign, divided by the step.
 
-    The size is divided by the step; arguments are as for `amount_and_rate`.
+    Arguments as for `amount_and_rate`.
     """
     low, high = 0.0, 1.0
     at_low, at_high = (
@@ -86,7 +87,8 @@ def book_error(h, error, k, stored, ledger_rates, tolerance, ledger):
 
     The part of the error that equals the errors of stored masses is left out, because the error of the states contains
     it already.
-    h : step; error : weights of the error estimate; stored : int64[q]  numbers of the states that are stored masses
+    h : step; error : weights of the error estimate; k, ledger_rates : rates of states and ledger at the stages
+    stored : int64[q]  numbers of the states that are stored masses; ledger : sums of all amounts so far
     """
     s, count = ledger_rates.shape
     worst, reference, covered = 0.0, LEAST, 0.0

@@ -1,8 +1,8 @@
 """Banded LU factors of shift I - J with partial pivoting, for models that are a single line of cells.
 
 States are reordered so that neighbours are adjacent. The array `factors` holds the rows of U from the first column that
-they can reach, multipliers column by column, the original row of each pivot, a work vector, and the upper
-bandwidth of U.
+they can reach, multipliers column by column, and the row exchanged with each pivot. A work vector and the upper
+bandwidth of U follow.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ DIAGONAL_PIVOT = 0.1
 
 
 def prepare(pattern) -> tuple[np.ndarray, int]:
-    """Data that the compiled functions of this solver read : int64[n], and length of the array `factors`.
+    """(data that the compiled functions of this solver read : int64[:], length of the array `factors`).
 
     pattern : sparse pattern of the Jacobian, by columns. The data are bandwidths and row length, the order of the
     states, and for every Jacobian entry its index in `factors`.
@@ -39,7 +39,10 @@ def prepare(pattern) -> tuple[np.ndarray, int]:
 
 
 def band(pattern) -> tuple[np.ndarray, int, int]:
-    """Order of the states by the reverse Cuthill-McKee rule (1969), and bandwidth below and above the diagonal."""
+    """(order of the states by the reverse Cuthill-McKee rule (1969), bandwidth below, bandwidth above the diagonal).
+
+    pattern : sparse pattern of the Jacobian, by columns
+    """
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 
@@ -69,7 +72,10 @@ def subtract(factor, x, y, chunks):
 
 
 def factor(structure, jacobian, shift, factors):
-    """factors <- L U of shift I - J, with row exchanges; returns 0, or 1 + the state without a pivot."""
+    """factors <- L U of shift I - J, with row exchanges; returns 0, or 1 + the number of a state without a pivot.
+
+    structure : flat array of `Structure.shape`; jacobian : entries of J in the order of the pattern
+    """
     n, own = structure[SIZE], structure[structure[SOLVER_DATA] :]
     below, above, width, order = own[BELOW], own[ABOVE], own[WIDTH], own[ORDER:]
     place, lower = order[n:], factors[n * width :]
@@ -115,7 +121,7 @@ def factor(structure, jacobian, shift, factors):
 
 
 def solve(structure, factors, x):
-    """x <- (shift I - J)^-1 x."""
+    """x <- (shift I - J)^-1 x, with the factors that `factor` has computed."""
     n, own = structure[SIZE], structure[structure[SOLVER_DATA] :]
     below, width, order = own[BELOW], own[WIDTH], own[ORDER:]
     lower = factors[n * width :]

@@ -10,13 +10,19 @@ from fvsolve.steppers.structure import ROWS, SIZE, STARTS
 
 
 def prepare(pattern) -> tuple[np.ndarray, int]:
-    """Data of this solver (none, an empty array), and length of the array `factors`."""
+    """(empty array, because this solver needs no data; length of the array `factors`).
+
+    pattern : sparse pattern of the Jacobian, by columns
+    """
     n = pattern.shape[1]
     return np.zeros(0, dtype=np.int64), n * n + n
 
 
 def factor(structure, jacobian, shift, factors):
-    """factors <- L U of shift I - J, with row exchanges; returns 0, or 1 + the column without a pivot."""
+    """factors <- L U of shift I - J, with row exchanges; returns 0, or 1 + the number of a column without a pivot.
+
+    structure : flat array of `Structure.shape`; jacobian : entries of J in the order of the pattern
+    """
     n = structure[SIZE]
     starts, rows, pivots = structure[structure[STARTS] :], structure[structure[ROWS] :], factors[n * n :]
     a = factors[: n * n].reshape((n, n))
@@ -50,7 +56,7 @@ def factor(structure, jacobian, shift, factors):
 
 
 def solve(structure, factors, x):
-    """x <- (shift I - J)^-1 x."""
+    """x <- (shift I - J)^-1 x, with the factors that `factor` has computed."""
     n = structure[SIZE]
     pivots = factors[n * n :]
     for k in range(n):

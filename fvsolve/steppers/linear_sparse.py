@@ -22,10 +22,10 @@ LEAST_DETERMINANT = (
 
 
 def prepare(pattern) -> tuple[np.ndarray, int]:
-    """Data that the compiled functions of this solver read : int64[n], and length of the array `factors`.
+    """(data that the compiled functions of this solver read : int64[:], length of the array `factors`).
 
-    pattern : sparse pattern of the Jacobian J, by columns. The data are offsets, then the order of the states and the
-    patterns of L, U and J by rows.
+    pattern : sparse pattern of the Jacobian J, by columns. The data are the number of blocks, offsets, then the order
+    of the states and the patterns of L, U and J by rows.
     """
     members, rows, columns, places = blocks(pattern)
     count = len(members)
@@ -44,9 +44,10 @@ def prepare(pattern) -> tuple[np.ndarray, int]:
 
 
 def blocks(pattern) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Pairs of states, and for each Jacobian entry between states its row, its column and its index in the Jacobian.
+    """(pairs of states, rows, columns, indices in the Jacobian) of the Jacobian entries between states.
 
     Row and column are 2 pair + member, with the number of the pair and 0 or 1 for the member of the pair.
+    pattern : sparse pattern of the Jacobian, by columns
     """
     n = pattern.shape[1]
     members = pairs(pattern[:n])
@@ -59,7 +60,10 @@ def blocks(pattern) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
 
 
 def pattern_of(rows, columns, count: int):
-    """Sparse pattern, count x count by columns, of the 2 x 2 blocks that contain an entry at (rows, columns)."""
+    """Sparse pattern, count x count by columns, of the 2 x 2 blocks that contain an entry at (rows, columns).
+
+    rows, columns : positions of entries; entry (i, j) is in block (i // 2, j // 2)
+    """
     from scipy.sparse import coo_array, csc_array
 
     pattern = csc_array(coo_array((np.ones(rows.size, dtype=bool), (rows // 2, columns // 2)), shape=(count, count)))
@@ -140,21 +144,25 @@ def eliminate(starts, columns, l_starts, l_columns, u_starts, u_columns, chain):
 
 @njit(forceinline=True)
 def place(structure, index):
-    """Offset of list number `index` of this solver in the structure array."""
+    """Offset of list number `index` of this solver in the array `structure`.
+
+    The lists, such as the patterns of L and U, are those of `prepare`.
+    """
     return structure[SOLVER_DATA] + structure[structure[SOLVER_DATA] + index]
 
 
 @njit(forceinline=True)
 def clear(block):
-    """Set a block to zero."""
+    """Set the four entries of a 2 x 2 block to zero."""
     block[0] = block[1] = block[2] = block[3] = 0.0
 
 
 def factor(structure, jacobian, shift, factors):
     """factors <- L, U and inverse diagonal blocks of shift I - J; returns 0, or 1 + a state without a good pivot.
 
-    The pivot of a diagonal block is good if its determinant is above 1e-13 times its two products, now and before
-    elimination. This measure does not depend on the units of states.
+    The pivot of a diagonal block is good if its determinant is above 1e-13 times the sum of the sizes of its two
+    products, after and before elimination. This measure does not depend on the units of states.
+    structure : flat array of `Structure.shape`; jacobian : entries of J in the order of the pattern
     """
     count, order = structure[structure[SOLVER_DATA]], structure[place(structure, ORDER) :]
     l_starts, l_columns = structure[place(structure, L_STARTS) :], structure[place(structure, L_COLUMNS) :]
@@ -208,7 +216,7 @@ def factor(structure, jacobian, shift, factors):
 
 
 def solve(structure, factors, x):
-    """x <- (shift I - J)^-1 x."""
+    """x <- (shift I - J)^-1 x, with the factors that `factor` has computed."""
     count, order = structure[structure[SOLVER_DATA]], structure[place(structure, ORDER) :]
     l_starts, l_columns = structure[place(structure, L_STARTS) :], structure[place(structure, L_COLUMNS) :]
     u_starts, u_columns = structure[place(structure, U_STARTS) :], structure[place(structure, U_COLUMNS) :]

@@ -66,7 +66,11 @@ def reset(work: np.ndarray) -> None:
 
 @inline
 def begin(k, y, scale, controls, loop_state, work, vectors):
-    """Prepare the first attempt of a step: store the last stages for prediction, discard a slow Jacobian."""
+    """Prepare the first attempt of a step: store the last stages for prediction, discard a slow Jacobian.
+
+    A Jacobian is slow if the greatest ratio of successive Newton increments in the last step was above STALE.
+    Arguments as for `dirk.attempt`; y : state at the start of the step.
+    """
     s, n = k.shape
     if work[STAGES_STEP] == loop_state[STEPS]:
         return
@@ -89,6 +93,7 @@ def renew(rhs, handle, structure, ledger_offset, t, y, f, ledger_rates, scale, o
     """Compute the Jacobian at (t, y) and store it in `work`.
 
     f, ledger_rates : rates evaluated at (t, y); moved, rate : float64[n]  work arrays for a state and its rates
+    Other arguments as for `dirk.attempt`.
     """
     calls = differences(
         rhs, handle, structure, ledger_offset, t, y, f, ledger_rates, scale, moved, rate, out, work[HEADER:]
@@ -100,7 +105,10 @@ def renew(rhs, handle, structure, ledger_offset, t, y, f, ledger_rates, scale, o
 
 @inline
 def spectral_radius(structure, work, nnz, scale, v):
-    """Approximate largest |eigenvalue| of the Jacobian, by five iterations of the power method; v : work array."""
+    """Approximate largest |eigenvalue| of the Jacobian in `work`, by five iterations of the power method.
+
+    nnz : number of Jacobian entries; scale : float64[n]  sizes of the states; v : float64[n]  work array
+    """
     n, product, before, now = v.size, work[HEADER + nnz :], 0.0, 0.0
     for e in range(n):
         v[e] = scale[e] if e % 2 == 0 else -scale[e]
@@ -126,7 +134,7 @@ def size_of(d, weights):
 
 @inline
 def next_increment(d, other, weights):
-    """Component of the next increment `other` along the increment d, and its squared length, both relative to d.
+    """(component of the next increment `other` along the increment d, its squared length), both relative to d.
 
     The results are <d, other> / <d, d> and |other|^2 / |d|^2, with the given weights of the states.
     """
@@ -158,7 +166,10 @@ def damping_factor(part, ahead, size):
 
 @inline
 def stop_limits(controls):
-    """Size of the increment at which Newton may stop, and size that counts as rounding, in units of the tolerance."""
+    """(size of the increment at which Newton may stop, size that counts as rounding), in units of the tolerance.
+
+    controls : array of the time loop, see `loop_indices`
+    """
     if controls[CONTROL] == TOLERANCE:
         enough = max(1e-15 / controls[SIZE], STOP_FRACTION)
         return enough, enough
@@ -167,10 +178,10 @@ def stop_limits(controls):
 
 @inline
 def damped_limits(controls):
-    """Limits of damped Newton: increment to stop at, increment that counts as rounding, greatest increment accepted.
+    """(increment at which damped Newton stops, increment that counts as rounding, greatest increment accepted).
 
     All are in units of the tolerance. Newton is as accurate as for steps of given length, because f amplifies the
-    Newton residual.
+    Newton residual. controls : array of the time loop, see `loop_indices`
     """
     unit = controls[SIZE] if controls[CONTROL] == TOLERANCE else FIXED
     floor = stop_limits(controls)[1] if controls[CONTROL] == TOLERANCE else FLOOR / unit
@@ -179,7 +190,10 @@ def damped_limits(controls):
 
 @inline
 def find_worst(d, f, weights, loop_state):
-    """Store in loop_state[WORST] a state whose rate f is not finite, or the state with the greatest increment d."""
+    """Store in loop_state[WORST] a state whose rate f is not finite, or the state with the greatest increment d.
+
+    weights : factors that express increments in units of the tolerance
+    """
     worst = -1.0
     for i in range(weights.size):
         e = abs(d[i] * weights[i]) if abs(f[i]) < np.inf else np.inf
@@ -189,9 +203,10 @@ def find_worst(d, f, weights, loop_state):
 
 @inline
 def convergence(turn, size, before, controls, work):
-    """Stopping test after Newton iteration `turn`: True to stop, and CONVERGED or FAILED.
+    """(True to stop after Newton iteration `turn`, CONVERGED or FAILED).
 
     size, before : norms of this and of the previous increment, in units of the tolerance
+    controls, work : as for `dirk.attempt`
     """
     enough, rounded = stop_limits(controls)
     if not size < np.inf:
@@ -215,7 +230,10 @@ def convergence(turn, size, before, controls, work):
 
 @inline
 def book_increment(structure, nnz, d, ledger_rates, i, work):
-    """Correct the ledger rates of stage i by their change J d, with the last increment d of the state of the stage."""
+    """Correct the ledger rates of stage i by their change J d, with the last increment d of the state of the stage.
+
+    J : Jacobian in `work`; nnz : number of its entries; structure : flat array of `Structure.shape`
+    """
     n, product = d.size, work[HEADER + nnz :]
     multiply(structure, work[HEADER : HEADER + nnz], d, product)
     for m in range(ledger_rates.shape[1]):
@@ -224,7 +242,11 @@ def book_increment(structure, nnz, d, ledger_rates, i, work):
 
 @inline
 def evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, loop_state, residual):
-    """Compute the rates f at the state base + h_gamma ki of a stage with slope ki, and the residual f - ki."""
+    """Compute the rates f at the state base + h_gamma ki of a stage with slope ki, and the residual f - ki.
+
+    t : time of the stage; base : state from earlier stages; h_gamma : step times the diagonal coefficient of the method
+    y_stage : float64[n]  receives the state
+    """
     for j in range(ki.size):
         y_stage[j] = base[j] + h_gamma * ki[j]
     rhs(t, y_stage, f, out, handle)
@@ -241,8 +263,9 @@ def damped_newton(
 ):  # fmt: skip
     """Solve stage i, k[i] = f(t, base + h_gamma k[i]), by damped Newton, with a new Jacobian for every iterate.
 
-    h_gamma : step times the diagonal coefficient of the method
-    Returns CONVERGED or FAILED.
+    t : time of the stage; base : state from earlier stages, in `vectors`
+    h_gamma : step times the diagonal coefficient of the method; nnz : number of Jacobian entries
+    Returns CONVERGED or FAILED. Other arguments as for `dirk.attempt`.
     """
     s, n = k.shape
     base, d, f, weights = vectors[s + BASE], vectors[s + INCREMENT], vectors[s + RATE], vectors[s + WEIGHTS]
@@ -313,6 +336,7 @@ def solve_stage_from_start(
 
     If the first try fails in a step of given length, the iteration starts again from the state y, and then follows the
     solution from a step of zero length. Under error control a shorter step is cheaper, so there is only one try.
+    y : state at the start of the step; other arguments as for `damped_newton`
     """
     base, reached, ki = vectors[k.shape[0] + BASE], vectors[k.shape[0] + FALLBACK], k[i]
     done, part, turn, worst = 0.0, 1.0, 0, loop_state[WORST]  # WORST keeps the result of simplified Newton
@@ -353,6 +377,7 @@ def smoothed_error(
     It is the norm of (I - J / shift)^-1 h sum e_j k_j with the Jacobian J at the start of the step and the weights e_j
     in `error`. The matrix reduces the error of stiff components (Hosea and Shampine 1996). If it reverses the error,
     because J jumps, the unfiltered error is used. Returns NEWTON_FAILED if the matrix is singular.
+    y, y_new : states at the start and the end of the step; other arguments as for `dirk.attempt`
     """
     s, n = k.shape
     d, f, plain, dot, smooth = vectors[s + INCREMENT], vectors[s + RATE], 0.0, 0.0, 0.0

@@ -35,7 +35,7 @@ def integrate(
     method : a name, a tableau, or "auto": explicit while stability allows it, implicit where that is cheaper
     rtol : relative tolerance for methods with an error estimate; default 1e-6
     atol : absolute tolerance, a number or float64[n]; default: equal to rtol
-    step : fixed step [s], possible with every method
+    step : fixed step [s], possible with every method except "auto"
     counts : dict that receives the numbers of steps, rejections, rhs calls, Jacobians, factorisations and so on
     Values at the times t come from dense output if it is accurate enough. Otherwise steps end there under `rtol`, and
     separate steps lead there under `step`.
@@ -100,9 +100,10 @@ def _solve_steps(stepper: Integrator, functions: tuple, key: int, t, y0) -> np.n
 
 
 def _prepare(f, t0, y0) -> tuple:
-    """Functions of the time loop for f, and f as a Python function of (t, y, dydt); cached if f is a compiled function.
+    """(functions of the time loop for f, f as a Python function of (t, y, dydt)); cached if f is a compiled function.
 
     A plain Python function is not cached, because compiled code does not notice changes of its global variables.
+    t0, y0 : arguments of a trial call
     """
     if f not in _COMPILED:
         _check_rates(f, t0, y0)
@@ -138,7 +139,10 @@ def _numbers(name, given) -> np.ndarray:
 
 
 def _scale(atol, rtol: float, n: int) -> np.ndarray:
-    """Size that is added to the size of each state in its error tolerance, atol / rtol : float64[n]."""
+    """Size that is added to the size of each state in its error tolerance, atol / rtol : float64[n].
+
+    n : number of states
+    """
     atol = _numbers("atol", atol)
     if atol.shape not in ((), (n,)) or not np.all(np.isfinite(atol) & (atol > 0)):
         raise FvsolveError(f"atol is not valid. Expected a positive number, or {n} of them, one for each state")
@@ -219,7 +223,10 @@ def in_place(f) -> bool:
 
 
 def _functions(f, t0, y0):
-    """Functions of the time loop for f: fused step, observe, record, events, rhs; compiled if numba can compile f."""
+    """(fused step, observe, record, events, rhs), functions of the time loop for f; compiled if numba can compile f.
+
+    t0, y0 : arguments of a trial call
+    """
     if not COMPILING:
 
         def plain(t, y, dydt, out, handle):
@@ -240,7 +247,7 @@ def _compile(function, letters: str) -> DeclaredFunction:
 
 @compile_once
 def observers() -> tuple:
-    """Functions fused step, observe, record and events of a system without events, whose output rows are its states."""
+    """(fused step, observe, record, events) for the time loop of a system without events; its rows are its states."""
     functions = (_no_fused_step, FUSED_STEP), (_row, OBSERVE), (_nothing, OBSERVE), (_no_events, EVENTS)
     return tuple(_compile(numba.njit(function), letters) for function, letters in functions)
 

@@ -41,7 +41,7 @@ NEGLIGIBLE = 1e-9  # reference amount below which shares of it are not computed
 def output_due(controls, loop_state, count_at, every, limit):
     """Time [s] of the next output row or field: start of the run + count * every, or 1e308 after the last.
 
-    count_at : index of the count in `loop_state`; limit : greatest count
+    count_at : index of the count in `loop_state`; limit : greatest count; every : interval [s], 0 for no output
     """
     if every <= 0.0 or loop_state[count_at] > limit:
         return 1e308
@@ -50,7 +50,10 @@ def output_due(controls, loop_state, count_at, every, limit):
 
 @njit(forceinline=True)
 def row_due(controls, loop_state, times):
-    """Time of the next row, from `times` if it is not empty [s]."""
+    """Time of the next output row [s], from the array `times` if it is not empty.
+
+    controls, loop_state : arrays of the time loop, see `loop_indices`
+    """
     if times.size == 0:
         return output_due(controls, loop_state, NEXT_OUTPUT, controls[EVERY], 1e300)
     count = int(loop_state[NEXT_OUTPUT])
@@ -59,7 +62,10 @@ def row_due(controls, loop_state, times):
 
 @njit(forceinline=True)
 def next_due(controls, loop_state, times):
-    """Time of the next row or field, whichever comes first [s]."""
+    """Time of the next output row or field frame, whichever comes first [s].
+
+    times : times of the rows, or empty if they are equidistant
+    """
     row = row_due(controls, loop_state, times)
     return min(row, output_due(controls, loop_state, NEXT_FIELD, controls[FIELD_EVERY], controls[FIELD_COUNT]))
 
@@ -118,6 +124,7 @@ def separate_step(
     The step uses separate arrays and no data of earlier steps, so that neither the steps of a run nor the stages that
     energy studies read depend on the output rows. Its calls of rhs are counted.
     ledger_rates : float64[s, ledgers]; spare : float64[s + vectors, n]; spare_flat : float64[work + factors]
+    spare_complex : factors for complex shifts; other arguments as for `erk.attempt` and `dirk.attempt`
     """
     s, worst, radius = ledger_rates.shape[0], loop_state[WORST], loop_state[RADIUS]
     if work.size > 0:  # no Jacobian and no earlier stages
@@ -152,6 +159,9 @@ def emit(
     """Write the output rows due up to the present time; returns a code of `loop_indices`.
 
     DONE : all rows are written; FIELD : a field frame is due, its state is in y_out; ROWS_FULL : `rows` has no space
+    t_old : time of the last state; now, old : rows of the present and the last state in y
+    f_old, f : rates of the last and the present state; start_slope : result of `start_slope_correction`
+    Other arguments as for `time_loop.run_steps`.
     """
     t, h, separate = loop_state[T], loop_state[T] - t_old, needs_separate_step(controls, work)
     while True:

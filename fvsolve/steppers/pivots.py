@@ -8,19 +8,19 @@ LEAST = 1e-150  # least size of a pivot: its square and the square of its recipr
 
 @njit(forceinline=True)
 def size_of(x):
-    """|Re x| + |Im x|, which is quicker to compute than the modulus."""
+    """Size |Re x| + |Im x| of a number, which is quicker to compute than its modulus."""
     return abs(x.real) + abs(x.imag)
 
 
 @njit(forceinline=True)
 def reciprocal(x):
-    """1 / x of a number whose square neither overflows nor underflows."""
+    """Reciprocal 1 / x of a real or complex number whose square neither overflows nor underflows."""
     return x.conjugate() / (x.real * x.real + x.imag * x.imag)
 
 
 @njit
 def bad_row(structure, jacobian):
-    """Number + 1 of the state in whose row the first invalid Jacobian entry is; 0 if all entries are valid.
+    """1 + number of a state whose row contains an invalid Jacobian entry; 0 if all entries are valid.
 
     An entry is invalid if it is not finite or its size is 1e150 or more. Ledger rows are not tested.
     """

@@ -41,6 +41,7 @@ def slope_in_time(rhs, handle, t, h, y, k, ledger_rates, ledger_offset, out, loo
     """Compute the time slopes of f and of the ledger rates at constant y, by a difference within the step.
 
     The slope of f is stored in a row of `vectors`, the slopes of the ledger rates at the end of `work`.
+    y : state at the start of the step; other arguments as for `dirk.attempt`
     """
     s, n = k.shape
     slope, ledgers = vectors[s + SLOPE], ledger_rates.shape[1]
@@ -59,8 +60,9 @@ def slope_in_time(rhs, handle, t, h, y, k, ledger_rates, ledger_offset, out, loo
 def book_stage(structure, nnz, i, gamma, time_weight, row, d, ledger_rates, ledger_offset, out, work):
     """Compute the ledger rates of stage i: gamma (rates + J d + time_weight slope + sum of C_ij ledger_rates_j).
 
-    d : float64[n]  solution u_i of the stage; row : float64[s]  row C_i of the coefficients
+    d : float64[n]  solution u_i of the stage; row : float64[s]  row C_i of the coefficients; J : Jacobian in `work`
     `out` holds the rates computed with f, the end of `work` their time slopes
+    nnz : number of Jacobian entries; structure : flat array of `Structure.shape`
     """
     n, ledgers, product = d.size, ledger_rates.shape[1], work[HEADER + nnz :]
     multiply(structure, work[HEADER : HEADER + nnz], d, product)
@@ -78,7 +80,8 @@ def attempt(
 ):  # fmt: skip
     """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
-    It uses the functions for real matrices only. Returns NEWTON_FAILED if the matrix I / (h g) - J is singular.
+    The error is 0 unless the step is under error control, and NEWTON_FAILED if the matrix I / (h g) - J is singular,
+    with the Jacobian J and the diagonal coefficient g of the method. Arguments as for `dirk.attempt`.
     """
     s, n = k.shape
     ledgers, nnz = ledger_rates.shape[1], structure[structure[STARTS] + structure[STATES]]

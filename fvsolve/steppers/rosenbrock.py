@@ -34,7 +34,10 @@ class Rosenbrock(Method):
 
     @functools.cached_property
     def printed(self) -> tuple:
-        """Printed coefficients c, d, A, C, H as fractions; A and C are square, with zeros on and above the diagonal."""
+        """Printed coefficients (c, d, A, C, H) as fractions.
+
+        A and C are square, with zeros on and above the diagonal; the class names the coefficients.
+        """
         blocks: list[list[list[Fraction]]] = [[], [], []]
         at, sums = 0, []
         for line in self.text.strip().splitlines():
@@ -52,7 +55,10 @@ class Rosenbrock(Method):
 
     @functools.cached_property
     def forms(self) -> tuple:
-        """Coefficients alpha, Gamma, weights b and weights of the embedded solution, as fractions."""
+        """(alpha, Gamma, weights b, weights of the embedded solution), as fractions.
+
+        alpha and Gamma are the coefficients of the form with products of the Jacobian, see the top of this file.
+        """
         _, _, a, c, _ = self.printed
         s = len(a)
         inverse = [
@@ -67,7 +73,7 @@ class Rosenbrock(Method):
 
     @functools.cached_property
     def exact(self) -> Array:
-        """Butcher array with A = alpha + Gamma of the diagonally implicit method that it equals on y' = lambda y."""
+        """Butcher array, A = alpha + Gamma, of the diagonally implicit method that is equal on y' = lambda y."""
         alpha, gamma, b, embedded = self.forms
         beta = tuple(tuple(x + y for x, y in zip(*rows, strict=True)) for rows in zip(alpha, gamma, strict=True))
         return Array(beta, tuple(b), tuple(sum(row) for row in beta), tuple(embedded), Fraction(0), ())
@@ -82,19 +88,20 @@ class Rosenbrock(Method):
 
     @property
     def diagonally_implicit(self) -> bool:
-        """False, as no stage is solved by Newton."""
+        """False, because no stage is solved by Newton."""
         return False
 
     @property
     def kind(self) -> str:
-        """Kind "linear": each stage by a linear solve."""
+        """Kind of the equations of a step, "linear": each stage is a linear solve."""
         return "linear"
 
     @functools.cached_property
     def coefficients(self) -> tuple[np.ndarray, np.ndarray, int]:
-        """Flat coefficients A, m, c, e, C, d, gamma, coefficients of the dense output, and number of stages.
+        """(flat coefficients, coefficients of the dense output, number of stages) for the compiled steps.
 
-        e are the weights of the error estimate. The rate f at the start of the step is added as a first stage.
+        The flat coefficients are A, m, c, weights e of the error estimate, C, d, gamma, and 0. The printed coefficients
+        are described at the top of this file. The rate f at the start of the step is added as a first stage.
         """
         c, d, a, big_c, h = self.printed
         s = len(c)

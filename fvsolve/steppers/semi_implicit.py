@@ -17,7 +17,7 @@ def second_order_correction(begin, end, b, damping, k):
     """Correct k of the last stage so that y + h sum b_j k_j is second order in h, for states from `begin` to `end` - 1.
 
     The correction is an Euler step of length h (h R) from the end of the step, implicit in the decay. Its rate f + G y
-    is that of the stage at the end of the step, k[2] (1 + h R).
+    is that of the stage at the end of the step, k[2] (1 + h R). f + G y are the rates, with a fast decay G = -r.
     b : weights of the stages; damping : float64[n]  h R with the rate R of each state
     """
     last = b.size - 1
@@ -35,9 +35,9 @@ def attempt(
 ):  # fmt: skip
     """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]), a stage of weight zero; returns 0.
 
-    k[1] is k[0] divided by 1 + h R, see the module. ledger_rates[i] receives the ledger rates of stage i.
+    k[1] is k[0] divided by 1 + h R, with the step h and the rate R of fast decay of each state.
     factors : float64[2 n]  h R of the first two stages, then of the later stages; zero for states without fast decay
-    Arguments for linear algebra and Newton iterations are not used.
+    Other arguments as for `erk.attempt`; those for linear algebra and Newton iterations are not used.
     """
     s, b, c, n = k.shape[0], weights_of(coefficients, k.shape[0]), nodes_of(coefficients, k.shape[0]), scale.size
     for m in range(row_blocks.shape[0]):

@@ -33,7 +33,7 @@ def function_types():
 
 
 def argument_types(letters: str) -> tuple:
-    """Numba types of arguments given as letters, see the module; F stands for all functions that a step takes."""
+    """Numba types of arguments given as letters of `jit.plain_kinds`; F stands for all functions that a step takes."""
     kinds = plain_kinds()
     return tuple(kind for letter in letters for kind in (function_types()[5:] if letter == "F" else (kinds[letter],)))
 
@@ -90,7 +90,7 @@ def single_band(sums, row_blocks, handle):
 
 @functools.cache
 def no_exchange():
-    """Compiled function that exchanges nothing, for a model that is not divided into bands."""
+    """Compiled function that exchanges no data, for a model that is not divided into bands."""
     return compiled_as(njit(single_band), JOIN)
 
 

@@ -30,10 +30,11 @@ def sweep(
     rhs, factor, solve, handle, coefficients, low, structure, t, h, y, y_stage, k, ledger_rates, ledger_offset, out,
     scale, controls, loop_state, nnz, first_row, work, vectors, factors,
 ):  # fmt: skip
-    """Compute the slopes k of the stages and their ledger rates; returns CONVERGED or FAILED.
+    """Compute the slopes k of the stages and their ledger rates in sweeps; returns CONVERGED or FAILED.
 
-    low : float64[q q]  lower triangular matrix C by rows
+    low : float64[q q]  lower triangular matrix C by rows, with A = C U, see `newton_transform.lower`
     first_row : first of 3 q rows of `vectors`, for the slopes before a sweep, their changes, and the slopes after it
+    y : state at the start of the step; nnz : number of Jacobian entries; other arguments as for `dirk.attempt`
     """
     s, n = k.shape
     q, c, base, weights = s - 1, nodes_of(coefficients, s), vectors[s + BASE], vectors[s + WEIGHTS]
@@ -88,8 +89,9 @@ def sweep(
 def extrapolate(q, k, first_row, weights, vectors, weight):
     """Extrapolate the slopes K after a sweep, and store the change d and the result of this sweep.
 
-    K <- K - weight g (K - K_before), g = <d, d - d_before> / |d - d_before|^2 with the changes d, d_before of this and
-    of the last sweep.
+    K <- K - weight g (K - K_last), g = <d, d - d_before> / |d - d_before|^2, but at least -GREATEST_EXTRAPOLATION, with
+    the changes d, d_before in this and in the last sweep, and the result K_last of the last sweep before extrapolation.
+    q : number of implicit stages; first_row : as in `sweep`; weights : float64[n]  factors on states in the products
     weight : 1 to extrapolate, 0 to store only
     """
     dot, square = 0.0, 0.0

@@ -48,7 +48,7 @@ DEAD_BAND = 1.2  # an implicit step that may grow by a smaller factor keeps its 
 
 @njit(forceinline=True)
 def shortest(controls, loop_state):
-    """Least step [s] to which stability may reduce a step: a water column at a closing valve has an unbounded rate."""
+    """Least step [s] to which stability may reduce a step; the rate of a column at a closing valve is unbounded."""
     return 1e-13 * max(abs(loop_state[T]), abs(controls[END]))
 
 
@@ -71,7 +71,10 @@ def first_step(k, scale, controls, loop_state):
 
 @njit(forceinline=True)
 def next_step(controls, loop_state, out_rate, k, scale):
-    """Length of the step to try [s], without regard to the end of the segment; out_rate : greatest wave rate [1/s]."""
+    """Length of the step to try [s], without regard to the end of the segment; out_rate : greatest wave rate [1/s].
+
+    k, scale : rates and sizes of the states, for `first_step`; controls, loop_state : see `loop_indices`
+    """
     if controls[CONTROL] == TOLERANCE:
         if too_short(controls, loop_state, loop_state[STEP]):  # no step is stored, or it does not change the time
             loop_state[STEP] = first_step(k, scale, controls, loop_state)
@@ -92,7 +95,8 @@ def next_step(controls, loop_state, out_rate, k, scale):
 def approaches(controls, loop_state, rest):
     """True if a step under error control should end after 95 % of the rest of its segment, followed by a short step.
 
-    A valve that closes at the end of the segment has laminar flow just before, where a long step has no stage.
+    A valve that closes at the end of the segment has laminar flow just before, where the equations of the stages of a
+    long step have no solution.
     rest : remaining time of the segment [s]
     """
     if controls[CONTROL] != TOLERANCE or rest <= 2.0 * (1.0 - APPROACH) * loop_state[STEP]:
@@ -148,7 +152,7 @@ def closing_step(loop_state, closing, h, least):
 
 @njit(forceinline=True)
 def arriving_step(controls, loop_state, arrives, h):
-    """Length of the next step [s]: h, or its part up to the time `arrives` [s] of a jump of a wave at its end."""
+    """Length of the next step [s]: h, or its part up to the time `arrives` [s] at which a jump of a wave arrives."""
     rest = arrives - loop_state[T]
     if not 0.0 < rest < h * (1.0 - 1e-9):
         return h
@@ -203,7 +207,7 @@ def watch(controls, loop_state, h, e, out_rate):
 
 @njit(forceinline=True)
 def retains_length(controls, grow):
-    """True if an implicit step keeps its length, and so its factorisation, as it could grow by a factor up to 1.2 only.
+    """True if an implicit step keeps its length, and so its factorisation: it could grow by a factor of 1.2 at most.
 
     grow : factor by which the error would allow the step to grow
     """

@@ -49,7 +49,11 @@ def error_norm(h, error, k, y, y_new, scale, tolerance):
 
 @njit
 def error_of_bands(join, handle, row_blocks, sums, h, error, k, y, y_new, scale, tolerance):
-    """Result of `error_norm` over the states of all bands, which exchange the partial sums of their rows in `sums`."""
+    """Result of `error_norm` over the states of all bands, which exchange the partial sums of their rows in `sums`.
+
+    A band is a part of the states, which one thread or process steps.
+    join : function that exchanges `sums`; row_blocks : int64[q, 4]  states of this band and their partial sums
+    """
     for m in range(row_blocks.shape[0]):
         begin, count = row_blocks[m, BEGIN], row_blocks[m, SUMS]
         length = (row_blocks[m, STOP] - begin) // count
@@ -93,6 +97,7 @@ def interpolate(begin, end, theta, h, y, f, y_new, f_new, k, dense, start_slope,
     """out <- state at t + theta h within a step, for the states from `begin` to `end` - 1 (dense output).
 
     It is the method's own polynomial, or the Hermite cubic with values y, y_new and slopes f, f_new at both ends.
+    k : rates at the stages; dense : coefficients of the dense output, empty for the cubic
     start_slope : result of `start_slope_correction`; if it is not empty, f is the result of `start_slope_defect`
     """
     if dense.shape[0] > 0:
@@ -127,6 +132,7 @@ def interpolate(begin, end, theta, h, y, f, y_new, f_new, k, dense, start_slope,
 def all_finite(join, handle, row_blocks, sums, y, stage_sums, checked):
     """True if the states y of all bands are finite and below 1e100.
 
+    A band is a part of the states, which one thread or process steps.
     sums : partial sums that bands exchange; a single entry means a single band
     stage_sums : array `sums` of `kernels.stage_sums`
     checked : True if the rhs has already counted the invalid values of the stages that it formed
@@ -146,7 +152,10 @@ def all_finite(join, handle, row_blocks, sums, y, stage_sums, checked):
 
 @njit(forceinline=True)
 def sum_of_bands(own, join, handle, row_blocks, sums):
-    """Sum of the number `own` of this band and the numbers of the other bands; sums : array that bands exchange."""
+    """Sum of the number `own` of this band and the numbers of the other bands; sums : array that bands exchange.
+
+    A band is a part of the states, which one thread or process steps.
+    """
     if sums.size == 1:
         return float(own)
     for m in range(row_blocks.shape[0]):
@@ -162,7 +171,10 @@ def sum_of_bands(own, join, handle, row_blocks, sums):
 
 @njit
 def exceeded(join, handle, row_blocks, sums, y, largest):
-    """True if the size of a state of any band exceeds the value in `largest` or is not a number."""
+    """True if the size of a state of any band exceeds its entry in `largest` or is not a number.
+
+    A band is a part of the states, which one thread or process steps; other arguments as for `sum_of_bands`.
+    """
     beyond = 0
     for m in range(row_blocks.shape[0]):
         for i in range(row_blocks[m, BEGIN], row_blocks[m, STOP]):
@@ -172,7 +184,7 @@ def exceeded(join, handle, row_blocks, sums, y, largest):
 
 @njit(forceinline=True)
 def add_up(total, part, carry):
-    """Sum total + part with the previous rounding error `carry` added back, and new rounding error (Kahan 1965)."""
+    """(sum total + part with the previous rounding error `carry` added back, new rounding error) (Kahan 1965)."""
     corrected = part + carry
     new = total + corrected
     return new, corrected - (new - total)
@@ -182,6 +194,7 @@ def add_up(total, part, carry):
 def add_stored(h, b, k, y, y_new, stored, carry):
     """Recompute the states `stored` (masses) with compensated sums, so that rounding does not accumulate over steps.
 
+    h : step; b, k : weights and rates of the stages; stored : numbers of these states
     carry : rounding errors of the previous sums. Returns True if this changed a bit of y_new.
     """
     changed = False

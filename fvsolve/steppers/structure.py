@@ -61,7 +61,7 @@ class Structure:
 
     @classmethod
     def full(cls, n: int, m: int = 0) -> Structure:
-        """Structure of a function with unknown pattern: dense, with a colour for each column."""
+        """Structure for n states and m ledger rates with unknown pattern: dense, with a colour for each column."""
         return cls(np.ones((n + m, n), dtype=bool), "dense")
 
     @property
@@ -93,12 +93,12 @@ class Structure:
 
     @cached_property
     def _own(self) -> tuple[np.ndarray, int]:
-        """Data for the compiled functions of this kind : int64[:], and length of the array for the factors."""
+        """(data for the compiled functions of this kind : int64[:], length of the array for the factors)."""
         return kind_module(self.kind).prepare(self.pattern)
 
     @cached_property
     def shape(self) -> np.ndarray:
-        """Structure as one flat array for compiled functions : int64[:], see the module."""
+        """Structure as one flat array for compiled functions : int64[:], laid out as at the top of this file."""
         counts = np.bincount(self.colors, minlength=self.color_count)
         color_starts = np.concatenate(([0], np.cumsum(counts)))
         parts = [self.pattern.indptr, self.pattern.indices, color_starts, np.argsort(self.colors, kind="stable")]
@@ -122,7 +122,7 @@ class Structure:
 
 
 def choose(pattern) -> str:
-    """Quickest kind of factorisation for a pattern, by its size and density.
+    """Quickest kind of factorisation for a pattern, by its size and density: "dense" or "sparse".
 
     Sparse factors of a line of cells are banded, and quicker than the kind "banded" (1000 cells of two waves, upwind:
     19 us a factor and 7 a solution, against 24 and 18). Banded factors exchange rows, so they can be used where sparse

@@ -29,7 +29,8 @@ EXACT_DECIMALS = 6  # decimals with at most this many digits are exact
 class Array:
     """Exact coefficients of a tableau: fractions, or algebraic numbers with a common root.
 
-    a, b, c : Butcher array; dense : coefficients of the dense output, see `Method`
+    a, b, c : Butcher array; embedded : weights of the embedded solution, empty without one
+    start : weight of f(t, y) in the embedded solution; dense : coefficients of the dense output, see `Method`
     """
 
     a: tuple[tuple, ...]
@@ -126,7 +127,7 @@ class Method:
 
     @property
     def control_order(self) -> int:
-        """Power of the step h in the error estimate; without an error estimate the order of the method."""
+        """Power of the step h in the error estimate; for a method without an error estimate its order."""
         return min(self.order, self.error_order) + 1 if self.adaptive else self.order
 
     @functools.cached_property
@@ -160,7 +161,7 @@ class Method:
 
     @functools.cached_property
     def first_same_as_last(self) -> bool:
-        """True if the last stage derivative of a step is the first one of the next step."""
+        """True if the rate at the last stage of a step is that at the first stage of the next step."""
         return self.stiffly_accurate and self.exact.c[-1] == 1 and not np.any(self.a[0])
 
     @functools.cached_property
@@ -307,7 +308,7 @@ def _exact(method: Method) -> Array:
 
 
 def _rows(text: str, numbers: Mapping, faults: list[str]) -> tuple[list, list]:
-    """Exact rows [c, a1, ...] above the ruled line of a tableau and rows [b1, ...] below it.
+    """(rows [c, a1, ...] above the ruled line of a tableau, rows [b1, ...] below it), in exact numbers.
 
     numbers : names of irrational numbers and their values; faults are added to the list `faults`
     """
@@ -340,7 +341,7 @@ def _mixed_roots(rows: list) -> list[str]:
 
 
 def _faults(head: list, weights: list, rounding: Fraction) -> list[str]:
-    """Faults of a tableau: rows of wrong length or wrong sum.
+    """Texts of the faults of a tableau: rows of wrong length or wrong sum.
 
     head, weights : results of `_rows`; rounding : relative error of a coefficient
     """

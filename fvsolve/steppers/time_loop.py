@@ -117,7 +117,7 @@ if COMPILING:
 
 @njit(forceinline=True)
 def can_use_fused_step(controls, loop_state, times, h):
-    """True if fused steps are allowed and a step of length h ends before the segment and the next row or field."""
+    """True if fused steps are allowed, and a step of length h ends before the next row, field or end of the segment."""
     if (
         controls[ALLOW_FUSED] == 0.0
         or too_short(controls, loop_state, h)
@@ -129,7 +129,10 @@ def can_use_fused_step(controls, loop_state, times, h):
 
 @njit(forceinline=True)
 def error_with_ledger(h, e, coefficients, k, stored, ledger_rates, controls, ledger):
-    """Error of a step in units of the tolerance: the greater of the errors of its states and of its ledger amounts."""
+    """Error of a step in units of the tolerance: the greater of the errors of its states and of its ledger amounts.
+
+    e : error of the states; h : step; other arguments as for `run_steps`. Without error control it is e.
+    """
     if controls[CONTROL] != TOLERANCE:
         return e
     return max(e, book_error(h, error_of(coefficients, k.shape[0]), k, stored, ledger_rates, controls[SIZE], ledger))
@@ -137,9 +140,9 @@ def error_with_ledger(h, e, coefficients, k, stored, ledger_rates, controls, led
 
 @njit(forceinline=True)
 def acceptable(e, near_kink):
-    """True if a step of error e is accepted.
+    """True if a step with the error e, in units of the tolerance, is accepted.
 
-    near_kink : the segment ends so soon that rounding dominates; then every error except NaN is accepted
+    near_kink : True if the segment ends so soon that rounding dominates; then every error except NaN is accepted
     """
     return e <= 1.0 or (e == e and near_kink)
 
@@ -160,15 +163,19 @@ def run_steps(
     the record of its end; used if controls[ALLOW_FUSED] allows it and no output row is due
     join(sums, row_blocks, handle) : exchange of partial sums between bands that are stepped in parallel
     row_blocks, sums : states of this band, and an array of partial sums of all bands, see `step_operations`
+    controls, loop_state, progress : arrays described in `loop_indices`; values : probe values of the present state
     dense : coefficients of the dense output; ledger : float64[5 m]  integrals of out[ledger_offset:], see `ledger`
     y : float64[4, n]  present, last and next state, and a stage; k : float64[s, n]  stages
+    f_old : float64[n]  rates at the start of the last step, or result of `start_slope_defect`
+    out_row, y_out : results and state of an output row
     g, g_new, armed : values of the event functions at the start and the end of a step, and event flags
     stored, carry : int64[q], float64[q]  states with compensated sums, and the rounding errors of these sums
     rows : float64[capacity, 1 + probes]  output rows; times : times of the rows if given as a list
     bounded_states, bounds : limits of interpolated rows, see `limit_to_bounds`
-    work, vectors, factors, complex_factors : data that implicit steps keep
+    work, vectors, factors, complex_factors : data that implicit steps keep, see `dirk.attempt`
     spare, spare_ledger_rates, spare_flat, spare_complex : arrays for `separate_step`
     largest : float64[n]  largest allowed states, checked every 16 steps, or empty
+    Other arguments as for `erk.attempt` and `dirk.attempt`.
     """
     # event_known: g_new belongs to the end of the last step
     s, reuse, event_known, t_new = k.shape[0], False, False, 0.0
@@ -415,14 +422,20 @@ def attempt_with(
 
 
 def compiled():
-    """Time loop to be called from Python: functions from `addresses`, then the other arguments of `run_steps`."""
+    """Time loop `run_steps`, compiled for calls from Python.
+
+    Its arguments are the result of `addresses` for all functions, then the other arguments of `run_steps`.
+    """
     if not COMPILING:
         return lambda functions, *others: run_steps(*functions, *others)
     return compiled_as(run_steps_at, "hhvhsvwvvvhwwvwivvvvvvvvhvvwhwvwvzwwvzv")
 
 
 def compiled_attempt():
-    """Single step to be called from Python: functions from `addresses`, then the other arguments of `attempt_with`."""
+    """Single step `attempt_with`, compiled for calls from Python.
+
+    Its arguments are the result of `addresses` for all functions, then the other arguments of `attempt_with`.
+    """
     if not COMPILING:
         return lambda functions, *others: functions[0](*functions[1:], *others)
     return compiled_as(attempt_with, "h" + ATTEMPT)

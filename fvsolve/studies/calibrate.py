@@ -39,8 +39,9 @@ class Calibration(PlainData):
     values : key of the case, such as "links.main.wave_speed" -> fitted value [SI]
     sigma : key -> standard deviation of the fitted value [SI], infinite for a key without effect
     correlation : correlation matrix of the errors of the fitted values, in the order of the keys [-]
-    rms : probe -> root mean square of computed less measured values [SI]
-    doubts : texts on values that the measurements do not determine; runs : number of runs
+    rms : probe -> root mean square of the computed minus the measured values [SI]
+    doubts : texts on keys that the measurements do not determine, and on values at an end of their range
+    runs : number of runs
     """
 
     values: dict[str, float]
@@ -58,13 +59,16 @@ class Calibration(PlainData):
 
 
 class Residuals(RowMaker):
-    """Callable that runs a case with values of keys; returns the differences of every measured series.
+    """Callable that runs a case with values of keys; returns the differences between run and measured series.
 
-    A difference is the computed less the measured value, divided by the range of the measured series.
+    The differences of a series are computed minus measured values, divided by the range of the measured series.
     """
 
     def __call__(self, values: Mapping[str, Any]) -> list[np.ndarray] | str:
-        """Run the case; returns float64[times within the run] for each series, or the reason of a failure as text."""
+        """Run the case with values of keys; returns the differences of each series, or the reason of a failure.
+
+        The differences are as in the class : list of float64[times within the run].
+        """
         from fvsolve.run import run
 
         try:
@@ -91,7 +95,7 @@ class Residuals(RowMaker):
 
 
 def series_range(measured: np.ndarray) -> float:
-    """Greatest less least value of a measured series, which divides its differences; 1 for a constant series."""
+    """Range of a measured series, by which its differences to the run are divided; 1 for a constant series."""
     return float(np.ptp(measured)) or 1.0
 
 
@@ -111,9 +115,9 @@ def calibrate(
     set : key -> value for all runs; seed : seed of the sample; jobs, dask : processes for the sample, as in `sweep`
     progress : called as progress(done, total, text)
 
-    A sample of all ranges is run first. Minimisations start at the best points of the sample, because waves out of
-    phase cause many local minima. Each of several series is weighted by the inverse of its scatter about the fit, in
-    rounds that begin with equal weights (Aitken 1935).
+    A sample of values within the ranges is run first. Minimisations start at the best points of the sample, because
+    waves out of phase cause many local minima. Several series are weighted by the inverse of their standard deviations
+    about the fit, in rounds that begin with equal weights (Aitken 1935).
     Raises FvsolveError if the case has no measured series, and if every run of the sample fails.
     """
     loaded = load(case, set)
@@ -127,7 +131,10 @@ def calibrate(
 
 
 class LeastSquaresFit:
-    """Least-squares fit of keys. The unknowns x : float64[keys] are fractions of the ranges, from 0 to 1."""
+    """Least-squares fit of keys. The unknowns x : float64[keys] are 0 at the low end of a range and 1 at its high end.
+
+    bounds : key -> (low, high) [SI]; points : values of the keys in the runs of the sample
+    """
 
     def __init__(
         self, case: Case, bounds: dict[str, tuple[float, float]], points: list[dict], progress: Callable
@@ -142,6 +149,7 @@ class LeastSquaresFit:
         """Minimise from several start points; returns the best fit with standard deviations.
 
         With several series, weights are computed and the best fit is repeated until the weights hardly change.
+        jobs, dask : processes for the sample, as in `sweep`
         """
         from scipy.optimize import least_squares
 
@@ -157,10 +165,11 @@ class LeastSquaresFit:
     def scatter(self, answer: Any) -> np.ndarray:
         """Standard deviation of each series about the fit, relative to the range of the series : float64[series].
 
-        answer : result of `least_squares`, with the Jacobian J of the weighted differences. The square of a deviation
-        is the sum of squared differences over the degrees of freedom. These are the number of points of the series less
-        its part of the trace of J (J' J)^-1 J'. A series with at most one degree of freedom has the deviation of all
-        series together.
+        answer : result of `least_squares`, with the Jacobian J of the weighted differences
+
+        The square of a deviation is the sum of squared differences divided by the degrees of freedom. These are the
+        number of points of the series, minus the part of the trace of J (J' J)^-1 J' that belongs to the series. A
+        series with at most one degree of freedom has the common deviation of all series.
         """
         differences = self.differences(answer.x)
         parts = np.split(answer.jac, np.cumsum([series.size for series in differences])[:-1])
@@ -177,7 +186,10 @@ class LeastSquaresFit:
         return np.concatenate([weight * series for weight, series in zip(self.weights, differences, strict=True)])
 
     def start_points(self, jobs: int, dask: str | None) -> list[np.ndarray]:
-        """Run the sample; returns its best points, at most `DESCENTS`, as starts x of minimisations."""
+        """Run the sample; returns its best points, at most `DESCENTS`, as starts x of minimisations.
+
+        The best points have the least sums of squared differences. jobs, dask : processes, as in `sweep`
+        """
         costs, reason = np.full(len(self.points), np.inf), ""
         for k, answer in run_tasks(self.work, self.points, jobs, dask):
             self.runs += 1
@@ -192,7 +204,7 @@ class LeastSquaresFit:
         return [(np.array([*self.points[k].values()]) - self.low) / self.width for k in best]
 
     def minimise(self, least_squares: Callable, x: np.ndarray) -> Any:
-        """Minimise the weighted squares from the start x; returns the result of `least_squares`.
+        """Minimise the sum of squared weighted differences from the start x; returns the result of `least_squares`.
 
         Derivatives are finite differences over `SLOPE_STEP`.
         """
@@ -210,7 +222,8 @@ class LeastSquaresFit:
     def slope(self, x: np.ndarray, k: int, size: int) -> np.ndarray:
         """Derivatives of all weighted differences with respect to x[k] : float64[size], column k of the Jacobian.
 
-        They come from two runs near x that finish, central if possible; 0 if fewer than two runs finish.
+        They are difference quotients of two finished runs at or near x, central if possible; 0 if fewer than two runs
+        finish.
         """
         results = []
         for at in (x[k] - SLOPE_STEP, x[k] + SLOPE_STEP, x[k]):
@@ -222,7 +235,7 @@ class LeastSquaresFit:
         )
 
     def differences(self, x: np.ndarray) -> list[np.ndarray]:
-        """Run the case at x; returns the differences of every series, an empty list if the run fails."""
+        """Run the case at x; returns the differences of every series as `Residuals`, an empty list if the run fails."""
         self.runs += 1
         answer = self.work(self.values(x))
         self.progress(len(self.points), len(self.points), f"{self.runs} runs")
@@ -232,7 +245,7 @@ class LeastSquaresFit:
         return dict(zip(self.bounds, (self.low + x * self.width).tolist(), strict=True))
 
     def result(self, answer: Any) -> Calibration:
-        """Calibration from a result of `least_squares`: values, standard deviations, correlations and doubts."""
+        """`Calibration` from a result of `least_squares`, with standard deviations, correlations and doubts."""
         keys, differences = [*self.bounds], self.differences(answer.x)
         degrees = max(1, answer.fun.size - answer.x.size)
         scatter = 2.0 * answer.cost / degrees
@@ -254,7 +267,7 @@ class LeastSquaresFit:
 def identifiability(slopes: np.ndarray, keys: list[str]) -> tuple[np.ndarray, list[str]]:
     """Find the keys that the measurements do not determine.
 
-    slopes : J, float64[points, keys], derivatives of weighted differences by the fractions of the ranges of the keys
+    slopes : J, float64[points, keys], derivatives of the weighted differences with respect to x of `LeastSquaresFit`
     Returns (inverse of J' J : float64[keys, keys], texts on keys that are not determined). Singular values of J are
     bounded from below, so that the inverse is finite also for keys without effect.
     """

@@ -11,9 +11,9 @@ from fvsolve.steppers.tableau import BUILT_IN, METHODS
 
 
 class PickledCase:
-    """Case that can be pickled. A `Case` is sent as the values of its file, because it may contain functions.
+    """Case that can be pickled. A `Case` is pickled as the values of its file, because it may contain functions.
 
-    source : argument of `load`, such as a path, a dict or a `Case`
+    User-defined methods are pickled too. source : argument of `load`, such as a path, a dict or a `Case`
     """
 
     def __init__(self, source: Any) -> None:

@@ -28,8 +28,8 @@ SIMPLEX_SIZE = 1.0  # edge length of the first simplex
 class ValveSchedule:
     """Piecewise-linear schedule and the peak of its run.
 
-    time, value : times [s] and values [SI] of the knots, with both ends; peak : peak in `Optimum.unit`, None if the run
-    failed
+    time, value : times [s] and values [SI] of all knots, including both ends; peak : peak in the unit `Optimum.unit`,
+    None if the run failed
     """
 
     time: list[float]
@@ -69,8 +69,9 @@ class Optimum:
 class ClosureSearch:
     """Search for the schedule with the least peak, between fixed end times and end values.
 
-    The schedule has knots + 1 linear pieces of equal duration. Unknowns z : float64[knots] are logarithms of the
-    changes of value over the pieces, divided by the change over the last piece.
+    The schedule has knots + 1 linear pieces of equal duration. The unknowns are z : float64[knots], for each piece
+    except the last the logarithm of (change of value over the piece / change over the last piece).
+    span : as returned by `span_of`; other arguments as for `optimise`
     """
 
     def __init__(self, case: Case, key: str, minimise: str, span: tuple, knots: int, progress: Callable | None) -> None:
@@ -80,7 +81,7 @@ class ClosureSearch:
         self.unit = self.failure_reason = ""
 
     def law(self, z: np.ndarray) -> tuple[list[float], list[float]]:
-        """(times [s], values [SI]) of the knots of a schedule, with both ends; z : float64[knots]  see the class."""
+        """(times [s], values [SI]) of all knots of a schedule, including both ends; z : unknowns, as in the class."""
         rises = np.exp(np.clip(np.append(z, 0.0), -12.0, 12.0))
         shares = np.concatenate([[0.0], np.cumsum(rises / rises.sum())])
         shares[-1] = 1.0
@@ -88,7 +89,7 @@ class ClosureSearch:
         return times.tolist(), (self.first + (self.last - self.first) * shares).tolist()
 
     def __call__(self, z: np.ndarray) -> float:
-        """Run a schedule and return its peak; infinite if the run does not finish."""
+        """Run the case with the schedule of z, see the class; returns its peak, infinite if the run fails."""
         time, value = self.law(z)
         quiet = {"output.fields": 0, "output.lines": {}, "expect": peak_expectation(self.minimise)}
         result = run(load(self.case, {self.key: {"time": time, "value": value}, **quiet}))
@@ -110,14 +111,14 @@ def optimise(
 ) -> Optimum:  # fmt: skip
     """Find the piecewise-linear schedule that gives the least peak.
 
-    key : key of a schedule between two values, such as a ramp; minimise : a quantity as in `[expect]`, such as
-    "max(gate.pressure)" or "max(main.head)"
-    knots : number of knots between the ends of the schedule; runs : greatest number of runs; set : key -> value
-    progress : called as progress(run, text) after every run
+    key : key of a schedule between two values, such as a ramp; minimise : peak to minimise, a quantity as in
+    `[expect]`, such as "max(gate.pressure)" or "max(main.head)"
+    knots : number of knots between the ends of the schedule; runs : greatest number of runs
+    set : key -> value for all runs; progress : called as progress(run, text) after every run
 
-    The result is monotonic, with the end values and the duration of the original schedule. Simplex searches (Nelder
-    and Mead 1965) start from schedules that are linear, fast first and slow first. Raises CaseError for an invalid case
-    or an unsuitable key, FvsolveError if no run has a finite peak.
+    The result is monotonic, with the end values and the duration of the original schedule. Simplex searches (Nelder and
+    Mead 1965) start from three schedules: linear, fast at first, and slow at first. Raises CaseError for an invalid
+    case or an unsuitable key, FvsolveError if no run has a finite peak.
     """
     from scipy.optimize import minimize
 

@@ -37,7 +37,7 @@ class Cluster:
         self.finished: queue.SimpleQueue = queue.SimpleQueue()
 
     def submit(self, chunk: int, tasks: list) -> None:
-        """Send the tasks of the chunk with this number to a worker."""
+        """Send a chunk of tasks to a worker; chunk : number of the chunk, which `next_result` returns."""
         future = self.client.submit(run_on_worker, self.name, self.work, tasks, pure=False)
         self.given[future] = chunk
         future.add_done_callback(self.finished.put)
@@ -107,7 +107,7 @@ def connect(address: str) -> Any:
     except Exception as error:  # Dask raises many types of exceptions
         text = str(error).split("\n")[0] or type(error).__name__
         raise FvsolveError(f'no Dask scheduler answers at "{address}": {text}. Expected an address such as '
-                           "tcp://10.0.0.1:8786; the command dask scheduler prints it") from None  # fmt: skip
+                           "tcp://10.0.0.1:8786; the command `dask scheduler` prints it") from None  # fmt: skip
     return client
 
 
@@ -152,14 +152,17 @@ def program_differences(reported: Any) -> list[str]:
 
 
 def version_numbers(reported: dict) -> dict[str, str]:
-    """Package -> version of `MATCHING_PACKAGES`, from the report of a Dask process; Python as major.minor."""
+    """Versions of `MATCHING_PACKAGES` from the report of a Dask process : package -> version; Python as major.minor."""
     host, packages = reported.get("host", {}), reported.get("packages", {})
     numbers = {name: str(packages.get(name)) for name in MATCHING_PACKAGES[1:]}
     return {"python": ".".join(str(host.get("python", packages.get("python"))).split(".")[:2]), **numbers}
 
 
 def differing_versions(here: dict[str, str], there: dict[str, str]) -> list[str]:
-    """Texts on packages with another version there than here, such as "numpy 2.1 (here 2.2)"."""
+    """Texts on packages whose version there differs from that here, such as "numpy 2.1 (here 2.2)".
+
+    here, there : package -> version
+    """
     return [
         f"{name} {there.get(name)} (here {version})" for name, version in here.items() if there.get(name) != version
     ]

@@ -37,7 +37,7 @@ def slowest_line(case) -> str:
 def fixed_choices(case) -> dict[str, str]:
     """Overrides that replace `pipe_model = "auto"` by its present choice for each pipe.
 
-    With these overrides the changes of a study do not alter the choice. Empty if no pipe needs them.
+    With these overrides the changes of a study do not alter the choice. Empty if no pipe has "auto".
     """
     from fvsolve.run import model_of
 
@@ -54,12 +54,12 @@ def fixed_choices(case) -> dict[str, str]:
 
 
 def as_cells(names: Iterable[str]) -> dict[str, str]:
-    """Overrides that compute all pipes of a case with cells; names : its delay lines."""
+    """Overrides with which all pipes of a case have cells; names : its delay lines."""
     return {"numerics.pipe_model": "finite-volume"} | pipe_model_keys(dict.fromkeys(names, "finite-volume"))
 
 
 def cells_for_lines(case, step: float) -> dict:
-    """Overrides that compute all delay lines with cells, which a wave crosses in at most the time `step` [s].
+    """Overrides with which all delay lines have cells that a wave crosses in at most the time `step` [s].
 
     For step = 0 the numbers of cells stay as the case states them.
     """
@@ -76,10 +76,11 @@ def pipe_model_keys(chosen: dict[str, str]) -> dict[str, str]:
 
 
 def line_averages(run_data, t: float, out: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Averages of the waves in delay lines over their cells of output, at the time t [s].
+    """Averages of the waves in delay lines over the cells of their output, at the time t [s].
 
-    out : array of outputs of the model at t. Returns {name of the delay line: (sum, difference)}, float64[cells] each
-    [kg/s], of the waves that travel in the direction of the pipe and against it.
+    out : output array of the right-hand side at t, as from `RunData.evaluate`
+    Returns {name of the delay line: (r + l, r - l)}, float64[cells] each [kg/s], with the forward wave r and the
+    backward wave l.
     """
     sums = {}
     for k, (r, l) in run_data.along(t, out, POINTS).items():  # noqa: E741

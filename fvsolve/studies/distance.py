@@ -1,7 +1,8 @@
 """Errors of a run against a reference: values in cells at the end, values of probes over time, and extremes.
 
-Errors are in SI or relative to a range, the greatest less the least value in the reference. A component is a probe, or
-a quantity in the cells of a pipe or basin. A relative error of 0.01 is a hundredth of the range of the component.
+Errors are in SI or relative to a range, the greatest minus the least value in the reference. A component is a probe, or
+a quantity in the cells of a pipe or basin. A relative error of 0.01 is a hundredth of the range of the component. The
+argument `truth` is a `Reference`.
 """
 
 from __future__ import annotations
@@ -23,10 +24,11 @@ CONSTANT = 1e-9  # a component whose range is below this fraction of its size co
 
 @dataclass(frozen=True)
 class Deviation:
-    """Error of a component at k cells or times.
+    """Error of a probe at k times, or of a quantity of a pipe or basin in k cells.
 
-    error : float64[k]  run less reference [SI]; weights : float64[k]  lengths, areas or durations of the values
-    span : range of the component in the reference [SI]; nan if it is constant
+    error : float64[k]  run minus reference [SI]; weights : float64[k]  durations of the values, or lengths or areas of
+    cells
+    span : range of the probe or quantity in the reference [SI]; nan if it is constant
     """
 
     error: np.ndarray
@@ -34,23 +36,23 @@ class Deviation:
     span: float = math.nan
 
     def norms(self) -> dict[str, float]:
-        """Weighted mean "L1", weighted root mean square "L2" and maximum "max" of the absolute error [SI]."""
+        """Norms of the error [SI]: weighted mean of its magnitude "L1", weighted rms "L2", and maximum "max"."""
         size, share = np.abs(self.error), self.weights / self.weights.sum()
         return {"L1": float(share @ size), "L2": math.sqrt(float(share @ size**2)), "max": float(size.max(initial=0.0))}
 
     def ranges(self) -> dict[str, float]:
-        """The three `norms` divided by the range `span` [-]."""
+        """The three norms of `norms`, divided by the range `span` [-]."""
         return {norm: value / self.span for norm, value in self.norms().items()}
 
 
 @dataclass(frozen=True)
 class Distance:
-    """Errors of a run relative to ranges [-], each for the component with the greatest error; nan if not known.
+    """Errors of a run, relative to ranges in the reference [-]; nan if not known.
 
-    trajectory : mean error of a probe over time; greatest : error of a probe at any time
-    end : error at the end, of a probe or as mean over the cells of a pipe or basin
-    overshoot : amount by which a probe leaves its range in the reference
-    worst : probe with the greatest trajectory error
+    trajectory : greatest mean error of a probe over time; greatest : greatest error of a probe at any time
+    end : greatest of two kinds of errors at the end: of a probe, and the mean over the cells of a pipe or basin
+    overshoot : greatest amount by which a probe leaves its range in the reference
+    worst : probe with the greatest mean error over time
     """
 
     trajectory: float = math.nan
@@ -64,7 +66,7 @@ class Distance:
 
 
 def recording_keys(case, keys: Mapping | None = None) -> dict:
-    """Overrides `keys`, and those with which a run also records the probes of `end_probes` and no values of cells."""
+    """Overrides `keys`, with two more: a run also records the probes of `end_probes`, and writes no values of cells."""
     own = [probe.text for probe in case.probes]
     return {**(keys or {}), "output.probes": list(dict.fromkeys([*own, *end_probes(case)])), "output.fields": 0}
 
@@ -72,7 +74,7 @@ def recording_keys(case, keys: Mapping | None = None) -> dict:
 def end_probes(case) -> list[str]:
     """Probes whose end values are compared: quantities of nodes, and flows of links other than pipes.
 
-    Nodes are those other than reservoirs and frames, their quantities are pressure, level, position and velocity.
+    The quantities of nodes are pressure, level, position and velocity. Reservoirs and frames are left out.
     """
     probes = []
     for name, node in case.nodes.items():
@@ -89,7 +91,7 @@ def end_probes(case) -> list[str]:
 
 
 def error_norms(run: Outcome, truth, own: tuple[str, ...] | None = None) -> dict[str, dict[str, float]]:
-    """Errors of a run against a `Reference` : {variable: {"L1" | "L2" | "max": error [SI]}}.
+    """Errors of a run against the `Reference` truth : {variable: {"L1" | "L2" | "max": error [SI]}}.
 
     Variables are pressure and flow in the cells of all pipes at the end, quantities of basins at the end, probes over
     time, and end values of nodes and links.
@@ -115,7 +117,7 @@ def error_norms(run: Outcome, truth, own: tuple[str, ...] | None = None) -> dict
 
 
 def distance(run: Outcome, truth) -> Distance:
-    """Errors of a run against a `Reference`, relative to ranges; all nan if the run did not reach its end."""
+    """Errors of a run against the `Reference` truth, relative to ranges; all nan if the run did not reach its end."""
     if not run.ok:
         return Distance()
     with np.errstate(invalid="ignore", over="ignore"):
@@ -132,12 +134,18 @@ def distance(run: Outcome, truth) -> Distance:
 
 
 def extremes_distance(run: Outcome, truth) -> float:
-    """Greatest error in the least or greatest value of a probe, relative to its range; nan if all are constant."""
+    """Greatest error of the least and greatest values of all probes, each relative to the range of its probe.
+
+    The result is nan if all probes are constant. truth : the `Reference`
+    """
     return max((max(abs(low), abs(high)) for low, high in extreme_differences(run, truth)), default=math.nan)
 
 
 def extreme_differences(run: Outcome, truth) -> list[tuple[float, float]]:
-    """Run less reference, relative to ranges: (of the least value, of the greatest value) for each changing probe."""
+    """(error of the least value, error of the greatest value) of each probe that changes, relative to its range [-].
+
+    An error is the value of the run minus that of the `Reference` truth.
+    """
     values, reference_values = run.rows[:, 1:], truth.rows(run)
     span = column_ranges(reference_values)
     low, high = ((pick(values, axis=0) - pick(reference_values, axis=0)) / span for pick in (np.min, np.max))
@@ -148,12 +156,12 @@ def extreme_differences(run: Outcome, truth) -> list[tuple[float, float]]:
 
 
 def moving_probes(run: Outcome, truth) -> dict[str, Deviation]:
-    """Probe -> deviation over time, for the probes that change in the reference."""
+    """Errors of the probes that change in the `Reference` truth : probe -> `Deviation` over time."""
     return {name: gap for name, gap in probe_deviations(run, truth).items() if gap.span > 0.0}
 
 
 def probe_deviations(run: Outcome, truth) -> dict[str, Deviation]:
-    """Probe -> deviation over time, for probes with values in the reference."""
+    """Errors of the probes that have values in the `Reference` truth : probe -> `Deviation` over time."""
     weights, reference_values = time_weights(run.rows[:, 0]), truth.rows(run)
     off, span = run.rows[:, 1:] - reference_values, column_ranges(reference_values)
     columns = [k for k in range(len(run.probes)) if not np.isnan(reference_values[:, k]).all()]
@@ -161,11 +169,11 @@ def probe_deviations(run: Outcome, truth) -> dict[str, Deviation]:
 
 
 def field_deviations(run: Outcome, truth) -> dict[tuple, Deviation]:
-    """(name of a pipe or basin itself, quantity) -> deviation over the cells at the end.
+    """Errors in cells at the end of a run : (pipe name or basin object, quantity) -> `Deviation`.
 
-    A pipe has the range of its pressure over the run; its flow has that range times A / (rho a), with area A, density
-    rho and wave speed a. A quantity of a basin has its range over the cells; flows along x and y both have the greater
-    of their two ranges.
+    The range of a pressure in a pipe is that over the run; the range of its flow is this range times A / (rho a), with
+    area A, density rho and wave speed a. The range of a quantity in a basin is that over the cells at the end; flows
+    along x and y both have the greater of their two ranges. truth : the `Reference`
     """
     model, deviations = run.model, {}
     reference_fields = truth.fields(model) if model.pipes or model.basins else {}
@@ -198,22 +206,22 @@ def field_deviations(run: Outcome, truth) -> dict[tuple, Deviation]:
 
 
 def time_weights(t: np.ndarray) -> np.ndarray:
-    """Trapezoidal weights [s] of values at the times t in a mean over time; all 1 if all times are equal."""
+    """Weights of the trapezoidal rule [s] for a mean over values at the times t [s]; all 1 if all times are equal."""
     steps = 0.5 * np.diff(t)
     weights = np.append(steps, 0.0) + np.append(0.0, steps)
     return weights if weights.sum() > 0.0 else np.ones(t.size)
 
 
 def column_ranges(values: np.ndarray) -> np.ndarray:
-    """Greatest less least value of every column : float64[columns], nan for constant columns."""
+    """Greatest minus least value of every column : float64[columns], nan for constant columns."""
     span, size = np.ptp(values, axis=0), np.abs(values).max(axis=0)
     return np.where(span > CONSTANT * size, span, np.nan)
 
 
 def pressure_ranges(envelope: Mapping[str, Mapping]) -> dict[str, float]:
-    """Pipe -> range of its pressure over a run [Pa].
+    """Range of the pressure in each pipe over all cells and the run : pipe -> range [Pa], nan if it is constant.
 
-    envelope : pipe -> least and greatest pressures of its cells, as in `Outcome`
+    envelope : pipe -> {"min_pressure", "max_pressure": float64[cells] [Pa]}, as in `Outcome`
     """
     pressures = {name: np.append(entry["min_pressure"], entry["max_pressure"]) for name, entry in envelope.items()}
     return {name: float(column_ranges(entry)) for name, entry in pressures.items()}
@@ -225,7 +233,7 @@ def pressure_ranges(envelope: Mapping[str, Mapping]) -> dict[str, float]:
 def fields(model, waves: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> dict:
     """Pressures and flows in the cells of all pipes : {pipe: (float64[cells] [Pa], float64[cells] [m3/s])}.
 
-    waves : pipe -> (sum, difference) of the waves in both directions, averages over its cells [kg/s]
+    waves : pipe -> (r + l, r - l), cell averages of the forward wave r and the backward wave l [kg/s]
     """
     by_pipe = {}
     for k, pipe in enumerate(model.pipes):
@@ -236,7 +244,10 @@ def fields(model, waves: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> dict:
 
 
 def wave_sums(run: Outcome) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Pipe -> (sum, difference) of the waves in both directions in its cells at the end, float64[cells] [kg/s]."""
+    """Waves in the cells of all pipes at the end of a run : pipe -> (r + l, r - l), float64[cells] each [kg/s].
+
+    r, l : forward and backward wave
+    """
     sums = dict(run.lines)
     for row, pipe in zip(run.model.tables.pipes, run.model.pipes, strict=True):
         if pipe.name not in sums:
@@ -263,7 +274,7 @@ def cell_averages(fine: np.ndarray, cells: int) -> np.ndarray:
 
 
 def variable_size(run: Outcome, name: str) -> float:
-    """Greatest absolute value of a variable of a run [SI]."""
+    """Greatest absolute value of a variable over its cells or times [SI]; name : variable as in `error_norms`."""
     if name in ("pressure", "flow"):
         k = ("pressure", "flow").index(name)
         return max(float(np.max(np.abs(pair[k]))) for pair in fields(run.model, wave_sums(run)).values())

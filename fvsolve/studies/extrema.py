@@ -12,7 +12,7 @@ this bound is enough. The bound is at least the larger of two terms: a fifth of 
 the difference between the signals at the times of their greatest values, because a moving crest may still grow. Both
 terms are limited to 16 times the difference of the greatest value. The ratio r of the greatest value may be small by
 chance, so the bound is also at least 1.6 / 2.15 of its remainder with the ratio of whole signals. The constants were
-chosen to hold for random mains (benchmarks/peak_bands.py --random) at the least median.
+chosen so that the bound holds for random mains (benchmarks/peak_bands.py --random) and its median is least.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ Signal = tuple[np.ndarray, np.ndarray]  # times and values
 
 
 def greatest_error(places: Sequence[Sequence[Signal]], triple: Sequence[float], believed: bool = True) -> float:
-    """Error bound of the greatest value of several signals at the middle resolution.
+    """Error bound of the greatest value of several signals at the middle of three resolutions, or the first of two.
 
-    places : for each place in the network, its signals at two or three increasing resolutions
-    triple : greatest value over all places and steps, at each resolution
-    believed : False if no order of convergence may be assumed
+    places : for each place in the network, its signals (times, values) at two or three increasing resolutions
+    triple : greatest value over all places and steps at each resolution; believed : False if no order of convergence
+    may be assumed
     """
     own_maxima, maxima = three_values(np.array([triple], float)), [local_maxima(signals) for signals in places]
     if not places:
@@ -61,20 +61,26 @@ def greatest_error(places: Sequence[Sequence[Signal]], triple: Sequence[float], 
 
 
 def three_values(maxima: np.ndarray) -> np.ndarray:
-    """Values at three resolutions : float64[maxima, 3]; from two columns, a coarser one is extrapolated linearly."""
+    """Values at three resolutions : float64[maxima, 3]; from two columns, a coarser one is extrapolated linearly.
+
+    maxima : float64[maxima, 2 or 3], values of local maxima at increasing resolutions
+    """
     return maxima if maxima.shape[1] == 3 else np.column_stack([2.0 * maxima[:, 0] - maxima[:, 1], maxima])
 
 
 def greatest_segment(cuts: np.ndarray, signal: Signal) -> int:
-    """Index of the local maximum with the greatest value of a signal; cuts : times that separate the maxima."""
+    """Index of the local maximum at which a signal (times, values) is greatest.
+
+    cuts : times that separate the local maxima, as from `local_maxima`
+    """
     return int(np.searchsorted(cuts, signal[0][np.argmax(signal[1])]))
 
 
 def local_maxima(signals: Sequence[Signal]) -> tuple[np.ndarray, np.ndarray]:
-    """Local maxima of a signal at increasing resolutions.
+    """Local maxima of a signal; signals : (times, values) of this signal at two or three increasing resolutions.
 
-    Returns (times that separate the local maxima of the finest signal, greatest values of the signals at the three
-    resolutions between these times : float64[maxima, 3]).
+    Returns (times that separate the local maxima of the finest signal, greatest values between these times :
+    float64[maxima, 3]). The columns of the values are as from `three_values`.
     """
     t, v = signals[-1]
     cuts = t[troughs(v, RISE * float(np.ptp(v)))]
@@ -85,7 +91,7 @@ def local_maxima(signals: Sequence[Signal]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def troughs(values: np.ndarray, rise: float) -> list[int]:
-    """Indices of the minima between successive maxima, both of which are higher than the minimum by `rise` or more."""
+    """Indices of the least values between successive maxima, both of which are higher by more than `rise`."""
     turns = np.concatenate([[0], 1 + np.flatnonzero(np.diff(np.sign(np.diff(values)))), [len(values) - 1]])
     positions, rising, high, low = [], True, 0, 0
     for i in turns.tolist():
@@ -101,7 +107,8 @@ def troughs(values: np.ndarray, rise: float) -> list[int]:
 def error_of_maxima(maxima: np.ndarray, off: np.ndarray) -> float:
     """Error bound of the greatest of several local maxima at the middle resolution.
 
-    maxima : float64[maxima, 3]  values at the three resolutions; off : float64[maxima]  remainders
+    maxima : float64[maxima, 3]  values at the three resolutions; off : float64[maxima]  bounds of the changes of the
+    middle values, as from `remainders`
     """
     c, m, f = maxima.T
     sways, most = (m - c) * (f - m) < 0.0, float(np.max(m))
@@ -113,7 +120,8 @@ def error_of_maxima(maxima: np.ndarray, off: np.ndarray) -> float:
 def remainders(triples: np.ndarray, believed: bool = True) -> np.ndarray:
     """Bounds of the changes of the middle values by all finer resolutions : float64[values].
 
-    triples : float64[values, 3]  values at three resolutions; believed : False if no order may be assumed
+    triples : float64[values, 3]  values at three resolutions; believed : False if no order of convergence may be
+    assumed
     """
     first, second = np.diff(triples, axis=1).T
     a, b, sways = np.abs(first), np.abs(second), first * second < 0.0
@@ -126,7 +134,8 @@ def remainders(triples: np.ndarray, believed: bool = True) -> np.ndarray:
 def remainder_by_ratio(ratio: float, values: np.ndarray) -> float:
     """Bound of the change of the middle value by all finer resolutions, without a safety factor.
 
-    values : float64[3] at three resolutions; ratio : used if it is larger than the ratio of their differences
+    values : float64[3] at three resolutions; ratio : ratio of successive differences, used if it is larger than that of
+    the values
     """
     a, b = np.abs(np.diff(values)).tolist()
     r = min(max(b / a if a > 0.0 else 0.0, ratio, QUICK), SLOW)
@@ -134,7 +143,10 @@ def remainder_by_ratio(ratio: float, values: np.ndarray) -> float:
 
 
 def convergence_ratio(signals: Sequence[Signal]) -> float:
-    """Mean difference of the two finest signals over that of the two coarsest; `SLOW` for only two signals."""
+    """Mean difference between the two finest of three signals, divided by that between the two coarsest.
+
+    The result is `SLOW` for only two signals. signals : (times, values) at increasing resolutions
+    """
     if len(signals) < 3:
         return SLOW
     t = signals[-1][0]
@@ -144,6 +156,6 @@ def convergence_ratio(signals: Sequence[Signal]) -> float:
 
 
 def difference_at_peaks(middle: Signal, fine: Signal) -> float:
-    """Greatest difference between two signals, at the two times at which either has its greatest value."""
+    """Greatest difference between two signals at two times, those of the greatest values of both signals."""
     times = [signal[0][np.argmax(signal[1])] for signal in (middle, fine)]
     return float(np.max(np.abs(np.interp(times, *fine) - np.interp(times, *middle))))

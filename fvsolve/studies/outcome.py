@@ -18,7 +18,7 @@ def name_list(given: str | Sequence[str] | None) -> list[str] | None:
 
 
 def has_diverged(reason: str) -> bool:
-    """True if a run ended because its values grew without bound."""
+    """True if a run ended because a value was not finite or grew without bound; reason : reason of its end."""
     return "not finite" in reason or "has grown to" in reason
 
 
@@ -26,9 +26,10 @@ def has_diverged(reason: str) -> bool:
 class Outcome:
     """Outcome of a run, in SI; the outcome of a refused case has only a reason.
 
-    ok : True if the run reached its end; t : time of the last state [s]
-    y : float64[n]  last state; rows : float64[k, 1 + probes]  time [s], then the probes named in `probes`
-    envelope : pipe -> "min_pressure", "max_pressure" [Pa], ... of its cells over the run
+    reason : reason of the end of the run, or of the refusal; ok : True if the run reached its end
+    t : time of the last state [s]; y : float64[n]  last state
+    rows : float64[k, 1 + probes]  time [s], then the values of the probes, whose names are in `probes`
+    envelope : pipe -> {"min_pressure", "max_pressure" [Pa], ...: float64[cells]}, extremes over the run
     counts : numbers of `steps`, `rejections`, evaluations of the rates `rhs`, ...
     seconds : wall time of the steps alone [s]; processor : their CPU time [s]; run_data : `RunData` of the run
     lines : waves in delay lines at the end, see `delay_line_keys.line_averages`
@@ -55,9 +56,9 @@ class Outcome:
 
     @property
     def cell_updates(self) -> int:
-        """Cost that is independent of the machine: evaluations of the rates times cells and segments of delay lines.
+        """Cost that is independent of the machine: evaluations of the rates, times cells plus stretches of delay lines.
 
-        Without cells and segments, states are counted instead.
+        Without cells and stretches, the evaluations are multiplied by the number of states.
         """
         delays, cells = self.model.tables.delays, self.model.all_cells
         if len(delays):  # of delay lines only the stretches are stepped
@@ -76,7 +77,7 @@ class RowSink:
         self.blocks.append(np.column_stack([t, values]))
 
     def field(self, t: float, frame: dict) -> None:
-        """Ignore the values of cells at a time."""
+        """Ignore a field frame with values of cells."""
 
     def checkpoint(self, state, extra: dict) -> None:
         """Ignore a checkpoint."""
@@ -99,9 +100,9 @@ def outcome(
     """Run a case (or a model) with changed keys. A refused case gives an outcome with its reason.
 
     y : float64[n]  initial state (default zero, no deviation from the initial steady state)
-    best_of : number of runs, of which the fastest counts; later runs are compiled and cached, and are omitted if the
-    first took more than `budget` [s]
-    run : function that makes a run from (model, state, sink, progress) (default `solve.Run`)
+    best_of : number of runs, of which the fastest counts. Runs after the first contain no compilation; they are omitted
+    if the first took more than `budget` [s].
+    run : function(model, state, sink, progress) that returns the `Run` (default `solve.Run` itself)
     """
     try:
         model = study_model(case, set) if not hasattr(case, "tables") else case
@@ -113,7 +114,7 @@ def outcome(
 
 
 def refusal_text(error: CaseError) -> str:
-    """Reason of a refusal in one line: each different fault once, with the first key that has it."""
+    """Reason of a refusal in one line: each different message once, after the first key at which it occurs."""
     first = {fault.message: fault.place for fault in reversed(error.faults)}
     return f"refused: {'; '.join(f'{place}: {message}' for message, place in reversed(first.items()))}"
 

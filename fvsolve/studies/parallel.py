@@ -1,4 +1,4 @@
-"""Parallel computation of tasks in chunks of about a second: in this process, other processes or on Dask workers.
+"""Parallel computation of tasks in chunks of about a second: in this process, in other processes or by Dask workers.
 
 The result of a task must not depend on the process, the order or the other tasks of its chunk.
 """
@@ -80,7 +80,7 @@ class TaskPool:
 
 
 def open_pool(work: Work, jobs: int, dask: str | None) -> Workers:
-    """Start local processes, or connect to a Dask scheduler."""
+    """Start local processes, or connect to a Dask scheduler; arguments as for `TaskPool`."""
     if dask is not None:
         from fvsolve.studies.dask_cluster import Cluster
 
@@ -93,7 +93,8 @@ def open_pool(work: Work, jobs: int, dask: str | None) -> Workers:
 def distribute(work: Work, tasks: Sequence, workers: Workers, first: int) -> Iterator[tuple[int, Any]]:
     """Distribute the tasks from index `first` on to workers; yields (index, answer) of each finished task.
 
-    If a process crashes, its chunk is split in two halves and repeated, so that only tasks that crash are lost.
+    If a process crashes, its chunk is divided into two halves and repeated, so that only tasks that crash are lost (see
+    `Work.lost_result`).
     """
     waiting, retry = deque(range(first, len(tasks))), deque()
     in_work: dict[int, list[int]] = {}
@@ -121,5 +122,9 @@ def distribute(work: Work, tasks: Sequence, workers: Workers, first: int) -> Ite
 
 
 def next_chunk_size(done: int, seconds: float, size: int) -> int:
-    """Number of tasks of the next chunk, after a chunk of `done` tasks took `seconds`; size : number before."""
+    """Number of tasks of the next chunk, so that it takes about `CHUNK_TIME`, at most `MAX_GROWTH` times `size`.
+
+    done : number of tasks of a finished chunk; seconds : its computing time [s]; size : present number of tasks of a
+    chunk
+    """
     return max(1, min(MAX_GROWTH * size, int(done * CHUNK_TIME / max(seconds, 1e-6))))

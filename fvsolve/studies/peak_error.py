@@ -1,9 +1,9 @@
 """Error bounds of peaks and limit margins, from runs at half, one and twice the resolution.
 
-Each error is bounded from the local extrema of a signal (`extrema.py`). The error of a limit margin is bounded from the
-signals at some places of each part under the limit. With column separation no order of convergence is assumed, because
-peaks after cavity collapse converge slowly (docs/cavitation.md). Without cells, a peak between two rows of output is
-higher than the rows by up to an eighth of their second difference.
+Each error is bounded from the local extrema of a signal (`extrema.py`). The error of the margin of a design limit is
+bounded from the signals at some places of each part to which the limit applies. With column separation no order of
+convergence is assumed, because peaks after cavity collapse converge slowly (docs/cavitation.md). Without cells, a peak
+between two rows of output is higher than the rows by up to an eighth of their second difference.
 """
 
 from __future__ import annotations
@@ -39,10 +39,12 @@ PLACES_PER_PART, MAX_PLACES = (
 def peak_errors(result: Result, case: Any, progress: Callable[[str], None] | None = None) -> dict[str, Any]:
     """Add errors of peaks, expectations and limit verdicts to the summary of a run, from further runs of its case.
 
-    `peaks`: probe -> unit, and `least` and `greatest` as {value, error, order, reason}; `error` is None if another run
-    did not finish or a pipe is too short; `order` is None if no order can be determined; `reason` is the reason of an
-    unknown or wide error. Each expectation and each bound of a limit at each place gets its `error`; a limit is open if
-    a margin is smaller than its error. `resolution` describes the method.
+    Returns the summary. Its entry `peaks` has for each probe the `unit`, and `minimum` and `maximum` as {value, error,
+    order, reason}. The `error` is None if the run at twice the resolution did not finish or a pipe is too short. The
+    `order` is None if no order can be determined. The `reason` is that of an unknown or wide error. Each expectation
+    and each bound of a limit at each place gets its `error`; a limit is open if a margin is smaller than its error. The
+    entry `resolution` describes the method.
+    progress : called with a text before each run
     """
     own = result if result.places is not None else run(case, set=NO_FIELDS, pictures=False)
     runs = refined_runs(own, case, progress)
@@ -58,7 +60,7 @@ def peak_errors(result: Result, case: Any, progress: Callable[[str], None] | Non
 
 
 def reason_texts(summary: dict[str, Any]) -> list[str]:
-    """Reasons of unknown or wide errors in a summary, each once, after the names of the peaks and limits concerned."""
+    """Reasons of unknown or wide errors in a summary, each once, after the names of its peaks and limits."""
     names_by_reason: dict[str, dict[str, None]] = {}
     for probe, peak in summary["peaks"].items():
         for side in SIDES:
@@ -72,7 +74,8 @@ def reason_texts(summary: dict[str, Any]) -> list[str]:
 def refined_runs(own: Result, case: Any, progress: Callable[[str], None] | None) -> dict[float, Result]:
     """Run a case at half, one and twice the resolution, with rows dense enough to resolve every peak.
 
-    Returns {0.5 | 1.0 | 2.0: result}; own : result of the case itself; progress : called with a text before each run
+    Returns {0.5 | 1.0 | 2.0: result}, without resolutions that the case cannot have.
+    own : result of the case itself; progress : called with a text before each run
     """
     named = [probe.text for probe in case.output.probes]
     rows = min(max(own.summary["steps"], MIN_ROWS), MAX_ROWS)
@@ -88,9 +91,9 @@ def refined_runs(own: Result, case: Any, progress: Callable[[str], None] | None)
 
 
 def limit_probes(own: Result, case: Any, named: list[str]) -> list[str]:
-    """Names of further probes, at selected places under limits; without those that the case does not accept.
+    """Names of additional probes, at selected places of the parts to which design limits apply (see `selected_places`).
 
-    named : names of the probes of the case
+    Probes that the case does not accept are left out. own : result of the case; named : names of the probes of the case
     """
     rows = [row[PLACES_KEY] for rows in own.places for row in rows]
     texts = dict.fromkeys(
@@ -101,10 +104,11 @@ def limit_probes(own: Result, case: Any, named: list[str]) -> list[str]:
 
 
 def selected_places(neighbours: PlaceMargins, rows: int) -> list[int]:
-    """Indices of the places under a limit whose signals are recorded.
+    """Indices of the places of a part whose signals are recorded, for one bound of a design limit.
 
     They are the place with the least margin, local minima of the margin along the part, and some evenly spaced places.
-    neighbours : margins at all places of a part under a bound; rows : number of parts and bounds of all limits
+    neighbours : margins at all places of the part; rows : number of pairs of a part and a bound in all limits of the
+    case
     """
     margins, most = np.where(np.isfinite(neighbours.margins), neighbours.margins, -np.inf), max(MAX_PLACES // rows, 1)
     padded = np.pad(margins, 1, constant_values=np.inf)
@@ -119,7 +123,7 @@ def selected_places(neighbours: PlaceMargins, rows: int) -> list[int]:
 
 
 def accepts_probes(case: Any, texts: list[str]) -> bool:
-    """True if the case accepts these probes."""
+    """True if the case accepts these probes; texts : their names."""
     try:
         load(case, {"output.probes": texts})
     except CaseError:
@@ -128,7 +132,10 @@ def accepts_probes(case: Any, texts: list[str]) -> bool:
 
 
 def peak_rows(result: Result, runs: dict[float, Result], unresolved: Unresolved) -> dict[str, Any]:
-    """Entry `peaks` of a summary: probe -> unit, least and greatest value with their errors, see `peak_errors`."""
+    """Entry `peaks` of a summary, as in `peak_errors`: unit, least and greatest value of each probe, with their errors.
+
+    result : result of the case; runs : results at all resolutions, as from `refined_runs`
+    """
     summary, largest, rows = result.summary, {"rad": 1.0}, {}
     parts = {probe.text: (probe.part, probe.name) for probe in unresolved.case.probes}
     for extreme in summary["extremes"].values():
@@ -171,12 +178,18 @@ def error_bound(runs: dict[float, Result], triple: Sequence[float | None], place
 
 
 def usable(signals_of_place: Sequence) -> bool:
-    """True if there are at least two signals and all values are finite."""
+    """True if there are at least two signals and all values are finite.
+
+    signals_of_place : signals (times, values) of one place at several resolutions
+    """
     return len(signals_of_place) > 1 and all(len(v) > 0 and bool(np.isfinite(v).all()) for _, v in signals_of_place)
 
 
 def signals(runs: dict[float, Result], probe: str, rising: Callable[[np.ndarray], np.ndarray]) -> list:
-    """(times, rising(values)) of a probe from every finished run that recorded the probe, coarsest first."""
+    """Signals (times [s], rising(values)) of a probe, from all finished runs that recorded it, coarsest first.
+
+    rising : function of the values after which the peak is a maximum
+    """
     finished = [runs[times] for times in sorted(runs) if runs[times].reason == "finished"]
     return [(run.seconds, rising(run[probe])) for run in finished if probe in run.units]
 
@@ -184,7 +197,8 @@ def signals(runs: dict[float, Result], probe: str, rising: Callable[[np.ndarray]
 def limit_row(runs: dict[float, Result], limit: int, k: int, row: dict[str, Any], unresolved: Unresolved) -> dict:
     """Row of a limit with its error. A limit that holds becomes open if the error is unknown or above the margin.
 
-    limit, k : indices of the limit and of the row in the results of all runs; row : part, bound, margin and places
+    runs : results at all resolutions, as from `refined_runs`; limit, k : indices of the limit and of the row in these
+    results; row : dict with part, bound, margin and places
     """
     sign, magnitude = SIGNS[row["bound"]], row["quantity"] in MAGNITUDES
     triple = values_of_runs(runs, lambda run: run.places[limit][k]["margin"], -1.0)
@@ -242,9 +256,9 @@ def observed_order(triple: Sequence[float | None], separated: bool) -> float | N
 
 
 def between_rows(result: Result, probe: str, side: str) -> float:
-    """Height of a smooth peak above the highest row of a probe: an eighth of the second difference of rows there.
+    """Height of a smooth peak above the highest row of a probe (or depth of a minimum below the lowest row).
 
-    side : "minimum" or "maximum"
+    It is an eighth of the second difference of the three rows around this row. side : "minimum" or "maximum"
     """
     t, v = result.t, result[probe]
     position = int(np.argmin(v) if side == "minimum" else np.argmax(v))

@@ -78,10 +78,11 @@ class Reference:
     ("basin", name): float64[quantities, cells]}
     rows : rows(run) -> float64[k, probes]  reference values of the probes of a run at its rows; NaN if not known
     spans : pipe -> range of its pressure over the run [Pa], as far as known
-    own_error : variable -> {"L1", "L2", "max"}  error of the reference [SI]; uncertainty : the same error relative to
-    ranges; both are at least the error from refinements, and the difference to the second reference if there is one
+    own_error : variable -> {"L1", "L2", "max"}  error of the reference [SI]
+    uncertainty : error of the reference relative to ranges. Both errors are at least the error from refinements, and
+    the difference to the second reference if there is one.
     second : description of the second reference; failures : reasons of reference runs that did not finish
-    run : the run that is the reference, or the nearest run to an exact solution
+    run : the run that is the reference, or the most accurate run if the reference is an exact solution
     """
 
     kind: str
@@ -97,7 +98,7 @@ class Reference:
 
 
 def capped_outcome(case, keys: Mapping) -> Outcome:
-    """Make a run that is stopped if it becomes too expensive."""
+    """Outcome of a case with changed keys; its run is stopped after REFERENCE_CPU_LIMIT seconds of CPU time."""
     return outcome(case, keys, run=long_capped_run)
 
 
@@ -108,6 +109,7 @@ def find_reference(
 ) -> Reference:  # fmt: skip
     """Find the most accurate reference for runs of a case with the keys `finest` or coarser ones.
 
+    finest : overrides with the resolution of the finest run under study
     opinions : number of kinds of reference runs (default all); a second kind shows errors that the first kind hides
     exclude_own : True if scheme and method of the case are under study, so that the reference must use others
     way : "both", or "time" if only the step is under study, so that the reference has the cells and scheme of the case
@@ -153,9 +155,10 @@ def find_reference(
 
 
 def submit_ahead(queue: RunQueue, stages: tuple[dict, ...], kinds: Sequence, report: Callable[[str], None]) -> Callable:
-    """Submit all runs of these kinds to a queue, coarse runs first; returns run(case, keys) that gives the results.
+    """Submit all runs of some kinds to a queue, coarse runs first; returns run(case, keys), which gives their outcomes.
 
-    kinds : kinds of reference runs as from `candidates`; stages : overrides applied to the case of the queue before
+    kinds : kinds of reference runs as from `candidates`; stages : overrides that turn the case of the queue into that
+    of the study, in order; report : called with the descriptions of the kinds
     """
     report(", ".join(name for name, _ in kinds))
     by_level = zip(*(trials for _, trials in kinds), strict=True)
@@ -165,7 +168,10 @@ def submit_ahead(queue: RunQueue, stages: tuple[dict, ...], kinds: Sequence, rep
 
 
 def best_reference(references: Sequence[Reference], failures: tuple[str, ...] = ()) -> Reference:
-    """Reference with the least uncertainty; the uncertainty is raised to its difference from the second best."""
+    """Reference with the least uncertainty, which is raised to its difference from the second best if that is larger.
+
+    failures : reasons of reference runs that did not finish
+    """
     first, *later = sorted(references, key=_uncertainty)
     if not later:
         return replace(first, failures=failures)
@@ -186,7 +192,7 @@ def best_reference(references: Sequence[Reference], failures: tuple[str, ...] = 
 
 
 def _uncertainty(reference: Reference) -> float:
-    """Uncertainty of a reference over the trajectory; infinite if not known."""
+    """Uncertainty of a reference for the trajectory error (mean over time, see `Distance`); infinite if not known."""
     return reference.uncertainty.trajectory if math.isfinite(reference.uncertainty.trajectory) else math.inf
 
 
@@ -206,7 +212,10 @@ def exact_reference(case) -> Reference:
 
 
 def reference_of_solution(solution: room.Solution, kind: str, words: str) -> Reference:
-    """Reference from a solution, evaluated on the cells and at the times of runs; results are cached."""
+    """Reference from a solution, evaluated on the cells and at the times of runs; the values are cached.
+
+    kind, words : as in `Reference`
+    """
     cells, times = {}, {}
 
     def fields_of(model) -> dict:
@@ -226,7 +235,7 @@ def reference_of_solution(solution: room.Solution, kind: str, words: str) -> Ref
 
 
 def split_jump_times(t: np.ndarray) -> np.ndarray:
-    """Times of rows; two rows at the same time, before and after a jump, are moved apart by a small offset."""
+    """Times t of rows, in which two equal times, before and after a jump, are moved apart by a small offset."""
     shifted, offset = t.copy(), 1e-12 * max(1e-300, float(np.ptp(t)))
     repeated = np.flatnonzero(np.diff(t) == 0.0)
     shifted[repeated] -= offset
@@ -311,13 +320,19 @@ def alternative_method(explicit: bool, judged: str) -> str:
 
 
 def run_text(case, scheme: str, cells, method: str, control: str, size: float) -> str:
-    """Description of a run, such as "upwind5 on 800 cells with rk4 at courant 0.8"."""
+    """Description of a run, such as "upwind5 on 800 cells with rk4 at courant 0.8".
+
+    cells : numbers of cells as from `cell_counts`; control : "courant", "step" or "rtol"; size : value of `control`
+    """
     where = f"{scheme} on {total_cells(case, cells)} cells with " if cells else ""
     return f"{where}{method} at {control} {size:.4g}"
 
 
 def _is_characteristic(case, keys: dict) -> bool:
-    """True if waves cross exactly one cell in nearly every step (Courant number 1), without numerical diffusion."""
+    """True if waves cross exactly one cell in nearly every step (Courant number 1), without numerical diffusion.
+
+    keys : overrides of the case
+    """
     model = study_model(case, keys)
     if model.basins:
         return False
@@ -328,7 +343,10 @@ def _is_characteristic(case, keys: dict) -> bool:
 
 
 def reference_of_refinements(words: str, runs: Sequence[Outcome]) -> Reference:
-    """Reference from the last and finest of three runs; its own error is extrapolated from their differences."""
+    """Reference from the last and finest of three runs; its own error is extrapolated from their differences.
+
+    words : description of the reference
+    """
     coarse, middle, fine = runs
     fine_reference, middle_reference = reference_of_run(fine, words), reference_of_run(middle, words)
     coarse_errors, fine_errors = error_norms(coarse, middle_reference), error_norms(middle, fine_reference)

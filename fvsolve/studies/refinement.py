@@ -10,10 +10,10 @@ from fvsolve.studies.delay_line_keys import delay_lines, fixed_choices, slowest_
 
 
 def refined_keys(case, times: float) -> dict[str, Any]:
-    """Overrides for `times` the resolution: cells of pipes and basins, segments of delay lines, steps, tolerances.
+    """Overrides that multiply the resolution by `times`: cells, stretches of delay lines, steps and tolerances.
 
-    `rtol` changes with the inverse square of `times`; the Courant number stays, except by `refined_step_keys`. Empty if
-    the coarser case is invalid, for example because a patch of a basin would begin within a cell.
+    The tolerance `rtol` is divided by the square of `times`. The Courant number stays, except by `refined_step_keys`.
+    Empty if the coarser case is invalid, for example because a patch of a basin would begin within a cell.
     """
     keys = cell_keys(scaled(cell_counts(case), times))
     if times < 1.0 and not is_valid(case, scaled(cell_counts(case), times)):

@@ -71,18 +71,18 @@ class ResultCache:
         return self.store(case_key(case, extra), extra, make()) if known is None else known
 
     def find(self, case, extra: dict) -> dict | None:
-        """Earlier result for a case and settings, or None."""
+        """Stored result for a case and settings, or None."""
         return self.lookup(case_key(case, extra))
 
     def lookup(self, key: str) -> dict | None:
-        """Earlier result of a hash `key`, or None."""
+        """Stored result with the hash `key` (of a case and settings), or None."""
         known = self.results.get(key)
         if known is not None and key not in self.new_keys:
             self.reused_keys.add(key)
         return known
 
     def store(self, key: str, settings: Any, result: dict) -> dict:
-        """Store the result of a hash `key` and return it as plain values. Raises RunError if it cannot be written.
+        """Store a result under the hash `key` and return it as plain values. Raises RunError if it cannot be written.
 
         settings : written with the result, for readers of the file
         """
@@ -122,7 +122,10 @@ def package_hash() -> str:
 
 
 def digest_of(who: dict) -> str:
-    """Hash of all that a point depends on: the values `who`, the sources of fvsolve, plugins, user-defined methods."""
+    """Hash of the values `who`, the sources of fvsolve and plugins, and user-defined methods.
+
+    The result of a point of a study depends on these alone.
+    """
     who = who | {"package": package_hash(), "outside": sorted(jit.EXTRA_FOLDERS.values())}
     text = json.dumps(who, sort_keys=True, default=str)
     arrays = [method.text for name, method in METHODS.items() if name not in BUILT_IN and f'"{name}"' in text]

@@ -40,7 +40,7 @@ class Column:
 
     @property
     def title(self) -> str:
-        """Header in files."""
+        """Header of the column in files."""
         return self.header or self.key
 
     def formatted(self, row: Mapping) -> str:

@@ -16,8 +16,8 @@ from fvsolve.studies.parallel import TaskPool
 class RunRequest(NamedTuple):
     """Request for a run with changed keys.
 
-    function : function(case, keys) at module level that makes the run; returns an `Outcome` or a collection with it
-    keys : dotted key -> value; stages : overrides applied to the case of the study before, in order
+    function : function(case, keys) at module level that makes the run; returns an `Outcome`, or a collection with one
+    keys : dotted key -> value; stages : overrides that are applied first, in order, to the case of the study
     """
 
     function: Callable[[Case, Mapping[str, Any]], Any]
@@ -57,7 +57,7 @@ class RunQueue:
             yield order[position]
 
     def __call__(self, case: Case, request: RunRequest) -> Any:
-        """Result of a run, computed now unless it was computed ahead; `case` is the case with the stages applied."""
+        """Result of a run, computed now unless it was computed ahead; case : the case after `request.stages`."""
         answer = self.results.pop(repr(request), None)
         if answer is None:
             return request.function(case, request.keys)
@@ -73,7 +73,10 @@ class RunQueue:
 
 
 class RequestRunner:
-    """Callable that makes the run of a `RunRequest`, in this or another process; reuses the cases after stages."""
+    """Callable that makes the run of a `RunRequest`, in this or another process.
+
+    The case after each sequence of stages (see `RunRequest`) is stored and used again for later runs.
+    """
 
     def __init__(self, source: Any) -> None:
         self.sent = PickledCase(source)
@@ -90,7 +93,7 @@ class RequestRunner:
         return request.function(self.staged[name], request.keys)
 
     def lost_result(self, request: RunRequest) -> Any:
-        """Raise RunError: a study cannot continue without the run."""
+        """Raise RunError, because a study cannot continue without the run of a request that crashed its process."""
         keys = ", ".join(f"{key} = {value}" for key, value in request.keys.items())
         raise RunError(f"the process that made the run with {keys} was killed repeatedly. Is there enough memory?")
 

@@ -107,7 +107,7 @@ def si_unit_of(raw: dict[str, Any], key: str) -> str:
 
 
 def key_with_unit(raw: dict[str, Any], key: str, values: Iterable[Any]) -> str:
-    """Heading of a key: with the SI unit if all values are bare numbers, such as `links.main.length [m]`."""
+    """Heading of the column of a key, with the SI unit if all values are bare numbers: `links.main.length [m]`."""
     all_bare = all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in values)
     unit = si_unit_of(raw, key) if all_bare else ""
     return f"{key} [{unit}]" if unit else key
@@ -137,7 +137,7 @@ def is_known(raw: dict[str, Any], key: str) -> bool:
 def points_from_file(path: Path, source: Any, raw: dict[str, Any]) -> list[dict[str, Any]]:
     """Read the values of runs from a CSV file: a column for each key, units in its header (`KEY [mm]`) or its cells.
 
-    Raises FvsolveError with all faults of the file.
+    source : the case; raw : its nested dicts. Raises FvsolveError with all faults of the file.
     """
     try:
         table = read_rows(path)
@@ -184,12 +184,16 @@ class Heading:
         return cls(name, unit, quantity)
 
     def read(self, cell: str, place: str, faults: list[str]) -> Any:
-        """Value of a cell of the file, as for an override; adds its faults; place : name of the cell in messages."""
+        """Value of a cell of the file, in the form of an override; faults of the cell are added to `faults`.
+
+        place : name of the cell in messages
+        """
         value = number(cell)
         if not cell:
             faults.append(f"{place}: is empty. Expected a value in every row")
         elif self.unit and value is None:
-            faults.append(f"{place}: {show(cell)} is not a number. The unit is in the header")
+            expected = "Expected a number without unit: the unit is in the header"
+            faults.append(f"{place}: {show(cell)} is not a number. {expected}")
         elif self.unit:
             return f"{value!r} {self.unit}"
         elif value is not None and self.quantity is not None:

@@ -91,8 +91,8 @@ def read_scenarios(path: str | Path) -> Scenarios:
 def possible_paths(keys: tuple) -> Iterator[tuple]:
     """Paths in the TOML file under which an override may be written, to find its line; most specific first.
 
-    keys : (group, name of the event or protection, dotted key). The key may be nested tables or a quoted key; the
-    tables that contain it follow.
+    keys : (group, name of the event or protection, dotted key). The dotted key may be written as nested tables or as
+    one quoted key. The paths of the tables that contain it follow.
     """
     below = split_key(keys[2]) if len(keys) > 2 else ()
     for n in range(len(below), 0, -1):
@@ -117,9 +117,13 @@ def read_text(path: Path) -> tuple[dict[str, Any], dict[tuple, int]]:
 
 
 def case_path(case: Any, folder: Path, fault: AddFault) -> Path | None:
-    """Path of the case file; adds a fault and returns None if there is no such file."""
+    """Path of the case file of a study; adds a fault and returns None if there is no such file.
+
+    case : value of the key `case`; folder : folder of the study; fault : fault(keys, message) records a fault
+    """
     if not isinstance(case, str):
-        text = "case is missing, the case file of the study" if case is None else f"{show(case)} is not a text"
+        missing = "case is missing. Expected the name of the case file of the study"
+        text = missing if case is None else f"{show(case)} is not a text"
         fault(() if case is None else ("case",), text)
         return None
     place = folder / case
@@ -174,8 +178,10 @@ def dotted_path(*keys: str) -> str:
 
 
 def all_conflicts(events: dict, protections: dict) -> Iterator[tuple[str, str, str, str]]:
-    """Pairs of an event and a protection that set one key, or a key and a part of it: (event, protection, key of the
-    event, key of the protection)."""
+    """Conflicts between events and protections, which set the same key, or a key and a part of it.
+
+    Yields (event, protection, key of the event, key of the protection).
+    """
     for event, of_event in events.items():
         for protection, of_protection in protections.items():
             yield from (
@@ -200,7 +206,7 @@ def run_faults(design: Scenarios, fault: AddFault) -> None:
     """Add the faults of all runs whose case is invalid, each at the override that causes it.
 
     If only some runs with an event (or protection) have a fault, the message names their protections (or events). Runs
-    with conflicting overrides are omitted.
+    with conflicting overrides are omitted. fault : fault(keys, message) records a fault
     """
     try:
         base = load(design.case)
@@ -228,9 +234,10 @@ def run_faults(design: Scenarios, fault: AddFault) -> None:
 
 
 def responsible_sets(design: Scenarios, place: str | None, pairs: list) -> Iterator[tuple]:
-    """(group, name, place) of the events and protections in `pairs` that set the key `place`, or keys around it.
+    """(group, name, place) of the events and protections that set the key `place`, a part of it, or a table around it.
 
-    Without a place: (group, name) of the events, or of the protections if there are no events.
+    pairs : (event, protection) of the runs with a fault at `place`. If `place` is None: (group, name) of the events, or
+    of the protections if there are no events.
     """
     for position, group in enumerate(("events", "protections")):
         for name in dict.fromkeys(pair[position] for pair in pairs if pair[position] is not None):
@@ -243,5 +250,5 @@ def responsible_sets(design: Scenarios, place: str | None, pairs: list) -> Itera
 
 
 def within(place: str, key: str) -> bool:
-    """True if the dotted path `place` is the key, or lies below it."""
+    """True if the dotted path `place` is equal to `key` or lies below it."""
     return place == key or place.startswith((f"{key}.", f"{key}["))

@@ -50,7 +50,7 @@ class ScenarioResults:
 
     @property
     def limited(self) -> bool:
-        """True if a run has limits."""
+        """True if at least one run has design limits."""
         return any(row["verdicts"] for row in self.rows)
 
     @property
@@ -68,7 +68,7 @@ class ScenarioResults:
 
 
 def run_passes(row: dict[str, Any]) -> bool:
-    """True if a run is ok and satisfies all its limits."""
+    """True if a run is ok and satisfies all its limits; row : as in `ScenarioResults.rows`."""
     return row["ok"] and all(verdict["ok"] for verdict in row["verdicts"])
 
 
@@ -122,12 +122,12 @@ class ScenarioRun:
         }
 
     def lost_result(self, task: dict[str, Any]) -> Any:
-        """Raise RunError: a run directory has no substitute result."""
+        """Raise RunError, because a run that crashed its process has no results."""
         raise RunError(f"the process that ran {task['directory']} was killed repeatedly. Is there enough memory?")
 
 
 def row_name(row: dict[str, Any]) -> str:
-    """Name of a run, such as "trip with vessel"."""
+    """Name of the run of a row, such as "trip with vessel"."""
     return " with ".join(name for name in (row["event"], row["protection"]) if name) or "the case"
 
 
@@ -157,7 +157,7 @@ def write_study(results: ScenarioResults) -> None:
 
 
 def open_study(folder: str | Path) -> dict[str, Any]:
-    """Read study.json of a folder; run directories become paths that start with the folder.
+    """Read study.json of a folder; the paths of run directories are changed to start with the folder.
 
     Raises FvsolveError if the file is missing or invalid.
     """

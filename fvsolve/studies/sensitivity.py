@@ -147,6 +147,8 @@ def sample_points(bounds: Mapping[str, tuple[float, float]], samples: int, seed:
 def analyse_values(bounds, sobol_points, sobol_values, morris_points, morris_values, seed: int) -> list[list[float]]:
     """Sensitivity indices from the values of an outcome : for each entry of `COLUMNS` a list over the keys.
 
+    sobol_points, morris_points : sample points as from `sample_points`; sobol_values, morris_values : outcome at these
+    points; bounds, seed : as for `sample_points`
     Raises FvsolveError if the outcome is constant.
     """
     from SALib.analyze import morris, sobol

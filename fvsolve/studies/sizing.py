@@ -29,12 +29,14 @@ _VALUE = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*"
 
 @dataclass(frozen=True)
 class SizeRun:
-    """Result of a run with a value of the key.
+    """Result of a run with one value of the key that a sizing varies.
 
-    ok : True if all limits hold; limit : name of the limit with the least margin
-    margin : margin of that limit, less its error if the error is known, relative to the limit [-]; None if not known
-    reason : reason of the end of the run; open : reason for which limits are undecided, else empty: a schedule
-    continues after the end of the run, results are not valid, or an error is larger than the margin
+    value : value of the key in the unit of the search; ok : True if all limits hold
+    limit : name of the limit with the least margin
+    margin : margin of that limit, minus its error if the error is known, relative to the limit [-]; None if not known
+    reason : reason of the end of the run
+    open : reason for which limits are undecided, or empty. Limits are undecided if a schedule continues after the end
+    of the run, if results are not valid, or if an error is larger than the margin.
     """
 
     value: float
@@ -49,7 +51,8 @@ class SizeRun:
 class Size:
     """Result of a sizing.
 
-    key : key that is sized; unit : unit of its values, for bare numbers the SI unit of the key, "" if it has none
+    key : key whose value is searched; unit : unit of its values, for bare numbers the SI unit of the key, "" if it has
+    none
     goal : "minimum" or "maximum"; value : least or greatest value at which all limits hold, None if none was found
     bracket : (value with which limits fail, value with which all limits hold), None without such a pair
     runs : all runs in order; ties : dependent keys as texts "KEY = formula"
@@ -69,7 +72,7 @@ class Size:
         return max(self.runs, key=lambda run: -math.inf if run.margin is None else run.margin)
 
     def plain(self) -> dict[str, Any]:
-        """Plain values for JSON; with the nearest run if no value was found."""
+        """Plain values for JSON; if no value was found, also the run with the greatest margin as `nearest`."""
         data = {"key": self.key, "unit": self.unit, "goal": self.goal, "value": self.value, "bracket": self.bracket,
                 "ties": list(self.ties), "runs": [vars(run) for run in self.runs]}  # fmt: skip
         return data if self.value is not None else data | {"nearest": vars(self.nearest)}
@@ -104,10 +107,10 @@ def parse_range(low: Any, high: Any) -> tuple[float, float, str]:
 
 
 class SizeSearch:
-    """Search for the least or greatest value of a key at which all limits hold, with its runs.
+    """Search for the least or greatest value of a key at which all limits hold; all its runs are stored.
 
     unit : unit of the values; ties : dependent key -> formula of x, the value in SI
-    error : True to require margins larger than their errors, from two more runs of each value
+    error : True to require margins larger than their errors, which are found by two more runs for each value
     """
 
     def __init__(self, case: Case, key: str, unit: str, ties: Mapping[str, str], progress: Callable | None,
@@ -151,7 +154,7 @@ class SizeSearch:
         return self.runs[-1]
 
     def search(self, low: float, high: float, goal: str, rtol: float) -> tuple[float | None, tuple | None]:
-        """Search between `low` and `high`; returns (value, bracket) as in `Size`, (None, None) if no value was found.
+        """Search between `low` and `high`; returns (value, bracket) as in `Size`, or (None, None) if no value is found.
 
         goal : "minimum" or "maximum"; rtol : relative width of the bracket at which the search ends
         """
@@ -169,9 +172,10 @@ class SizeSearch:
         return good, (bad, good)
 
     def find_interior(self) -> float | None:
-        """Search a value at which all limits hold, near the run with the greatest margin, in ever smaller intervals.
+        """Search for a value at which all limits hold, in the middle of intervals between earlier runs.
 
-        Returns None after `INTERIOR_TRIALS` runs without such a value.
+        Each interval is the larger one beside the run with the greatest margin so far. Returns None after
+        `INTERIOR_TRIALS` runs without such a value.
         """
         for _ in range(INTERIOR_TRIALS):
             runs = sorted(self.runs, key=lambda run: run.value)
@@ -184,9 +188,10 @@ class SizeSearch:
         return None
 
     def next_value(self, bad: float, good: float) -> float:
-        """Next value between `bad`, with which limits fail, and `good`, with which they hold.
+        """Next value to run between `bad`, with which limits fail, and `good`, with which they hold.
 
-        In turn it is the midpoint, and the zero of the margin by linear interpolation, kept away from both ends.
+        It is alternately the midpoint and the zero of the linearly interpolated margin, at some distance from both
+        ends. It is the midpoint if a margin is not known.
         """
         margins = [self(x).margin for x in (bad, good)]
         share = 0.5
@@ -196,7 +201,7 @@ class SizeSearch:
 
 
 def size_run(value: float, result: Any) -> SizeRun:
-    """Evaluate the limit verdicts in the result of a run with a value of the key."""
+    """`SizeRun` from the limit verdicts in the result of a run with this value of the key."""
     margins = [
         (relative_margin(row, verdict.quantity), verdict.name) for verdict in result.verdicts for row in verdict.worst
     ]
@@ -217,7 +222,7 @@ def size_run(value: float, result: Any) -> SizeRun:
 
 
 def relative_margin(row: Mapping[str, Any], quantity: str) -> float:
-    """Margin of a row of a limit verdict, less its error, relative to the limit [-].
+    """Margin of a row of a limit verdict, minus its error, relative to the limit [-].
 
     The divisor is at least the usual size of the quantity, such as an atmosphere for pressures and heads.
     """
@@ -237,10 +242,10 @@ def size(
 
     low, high : numbers, or texts with a unit; goal : "minimum" or "maximum"; set : key -> value for all runs
     ties : dependent key -> formula of x, the value in SI; rtol : relative tolerance of the bracket
-    progress : called as progress(runs, text); error : True to require margins larger than their errors, from two more
-    runs of each value
-    If limits fail at both ends, values between them with the greatest margins are tried. Raises CaseError for an
-    invalid case, a case without limits, and wrong arguments.
+    progress : called as progress(runs, text)
+    error : True to require margins larger than their errors, which are found by two more runs for each value
+    If limits fail at both ends, values near the one with the greatest margin are tried. Raises CaseError for an invalid
+    case, a case without limits, and wrong arguments.
     """
     faults: list[Fault] = []
     loaded = None
@@ -261,7 +266,8 @@ def find_faults(
 ) -> list[Fault]:
     """Faults of the arguments of `size`, found before any run.
 
-    case : None if the case itself has faults; span : (low, high), empty if the range itself has faults
+    case : None if the case itself has faults; span : (low, high), empty if the range itself has faults; other arguments
+    as for `size`
     """
     faults: list[Fault] = []
     if goal not in GOALS:
@@ -294,7 +300,7 @@ def find_faults(
 
 
 def parse_ties(texts: Sequence[str]) -> dict[str, str]:
-    """Parse `KEY = formula` texts: key -> formula. Raises CaseError with all faults."""
+    """Formulas of dependent keys, from texts `KEY = formula` : key -> formula. Raises CaseError with all faults."""
     ties: dict[str, str] = {}
     faults = []
     for text in texts:

@@ -37,12 +37,14 @@ TEXT_KEYS = ("title", "description", "source")  # keys of a case that do not cha
 class Sweep(Displayable):
     """Results of a sweep, rows in the order of the values (last key fastest); a missing value is None.
 
-    keys : the keys that vary
-    rows : their values, `ok`, `reason`, `t [s]`, `marks` (text of the first event outside the validity of the model,
-    or empty); `warnings` and `fluid` as in the summary; for each probe `min(...)`, `max(...)`, their times and
-    `final(...)` in the units of `[output]`, None if the run diverged; `expectations` (True if all hold), `verdicts`
-    (True if all limits hold), `steps`, `seconds` of stepping
-    reused : number of rows from earlier sweeps
+    keys : the keys that vary; reused : number of rows from earlier sweeps
+    rows : for each run a dict of the values of the keys and of the columns below
+
+    `ok` : True if the run reached its end without a warning of wrong numbers; `reason` : reason of its end
+    `t [s]` : its last time; `marks` : text of the first mark, or empty; `warnings`, `fluid` : as in the summary
+    `min(...)`, `max(...)`, their times, `final(...)` : of each probe in units of `[output]`, None if the run diverged
+    `expectations`, `verdicts` : True if all expectations hold, and if all limits hold
+    `steps`, `seconds` : number of steps, and their wall time [s]
     """
 
     keys: tuple[str, ...]
@@ -67,11 +69,11 @@ class Sweep(Displayable):
 
     @property
     def outcomes(self) -> list[str]:
-        """Names of the columns of probes."""
+        """Names of the columns of probes, such as "max(gate.pressure) [bar]"."""
         return self.columns[len(self.keys) + len(FIRST_COLUMNS) : -len(LAST_COLUMNS)]
 
     def outcome(self, name: str) -> str:
-        """Name of the column of an outcome, which is given with or without its unit.
+        """Name of the column of the outcome `name`, which is given with or without its unit.
 
         Raises FvsolveError for an unknown outcome.
         """
@@ -176,7 +178,10 @@ def sweep(
 def planned_values(
     source: Any, raw: dict, base: dict, vary: Mapping, points, sample: str | None, seed: int
 ) -> list[dict]:
-    """Values of every run, key -> value, from points, a sample or a grid; arguments as for `sweep`."""
+    """Values of every run, key -> value, from points, a sample or a grid.
+
+    source : case as for `load`; raw : its nested dicts; base : overrides of all runs; other arguments as for `sweep`
+    """
     if points is not None:
         if vary or sample:
             raise FvsolveError("`points` has all values of every run. Expected no `vary` and no `sample` in addition")
@@ -267,7 +272,7 @@ class SweepRun:
         )
 
     def files(self, values: Any) -> Iterator[str]:
-        """Hashes of the contents of all files that are named in values, searched recursively."""
+        """Hashes of the contents of all files whose names occur in nested dicts and lists of values."""
         for value in (
             values.values() if isinstance(values, Mapping) else values if isinstance(values, (list, tuple)) else ()
         ):
@@ -287,12 +292,12 @@ class SweepRun:
 
 
 def raw_of(source) -> dict[str, Any]:
-    """Nested dicts of a case given as for `load`."""
+    """Nested dicts of a case, as read from its file; source : as for `load`."""
     return source.raw if isinstance(source, Case) else read_raw(find_source(source)).table
 
 
 def folder_of(source) -> Path:
-    """Folder to which the paths of files in a case are relative."""
+    """Folder to which the paths of files in a case are relative; source : as for `load`."""
     if isinstance(source, Case):
         return source.folder or Path.cwd()
     source = find_source(source)

@@ -55,7 +55,7 @@ class RowMaker:
         return load(self.case, {**self.base_for(values), **values})
 
     def base_for(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Overrides of `base` in the same tables of the case as `values`.
+        """Overrides of `base` in those tables of the case in which `values` change a key, and in the table [exact].
 
         They are set again together with `values`, because keys of a table may conflict.
         """
@@ -75,7 +75,10 @@ class RowMaker:
 
 
 def row_of(model, summary, sink) -> dict[str, Any]:
-    """Row of a run: column -> value as in `summary.json`, None for values that are not finite; sink : its output."""
+    """Row of a run: column -> value as in `summary.json`, None for values that are not finite.
+
+    sink : `MemorySink` with the output of the run
+    """
     row = {"ok": bool(summary.ok), "reason": summary.reason, "t [s]": plain(float(summary.t))}
     row["marks"] = min(summary.marks, key=lambda mark: mark.time).text if summary.marks else ""
     row["warnings"] = [plain(column.plain()) for column in (*model.warnings, *summary.warnings)]
@@ -95,7 +98,7 @@ def row_of(model, summary, sink) -> dict[str, Any]:
 
 
 def expectations_of(model, summary, sink) -> list[dict[str, Any]]:
-    """Expectations of the case with their results, as in the summary of a run."""
+    """Expectations of the case with their results, as in the summary of a run; sink : output of the run."""
     from fvsolve.run import Result
     from fvsolve.run.case_claims import expectations
 

@@ -1,4 +1,4 @@
-"""Reasons of unknown or wide errors of peaks from runs at half and twice the resolution, with remedies."""
+"""Reasons why errors of peaks, from runs at several resolutions, are unknown or wide, with remedies."""
 
 from __future__ import annotations
 
@@ -69,9 +69,9 @@ def pulse_width(value: Any) -> float:
 
 
 class Unresolved:
-    """Reasons of unknown peaks or wide errors of a case, each with a remedy.
+    """Reasons of unknown or wide errors of the peaks of a case, each with a remedy.
 
-    unknown : (group, name) of a part -> reason for which its peaks are unknown
+    unknown : (group, name) of a part -> reason for which the errors of its peaks are unknown
     shared : reasons of wide errors that concern all peaks
     tolerance : accumulated error of the steps of delay lines under error control, relative to the range of a signal
     """
@@ -100,7 +100,7 @@ class Unresolved:
 
 
 def unknown_parts(case: Any) -> dict[Part, str]:
-    """(group, name) of a part -> reason for which its peaks are unknown.
+    """Parts with unknown errors of their peaks : (group, name) of a part -> reason.
 
     With a short pulse in a schedule these are all parts, otherwise pipes that are too short, and their end nodes.
     """
@@ -123,22 +123,25 @@ def unknown_parts(case: Any) -> dict[Part, str]:
 
 
 def stopped_runs_text(case: Any, runs: dict[float, Any]) -> str:
-    """Reason for which the runs at other resolutions give no value of a peak."""
+    """Reason for which runs at other resolutions give no value of a peak; runs : factor of resolution -> result."""
     ended = [f"{times:g} times the resolution: {run.reason}" for times, run in runs.items() if run.reason != "finished"]
     if len(runs) == 1:
         ended = [
             f"cells of {listing(basins_from_files(case), MAX_NAMES)} come from a file; use a file with finer cells"
         ]
-    return "; ".join(ended) or "at another resolution it is not a number; use more cells or shorter steps"
+    return "; ".join(ended) or "at another resolution the peak is not a number; use more cells or shorter steps"
 
 
 def difference_text(triple: Sequence[float | None], error: float, unit: str, case: Any) -> str:
-    """Reason of a wide error from the values of a peak at three resolutions, with a remedy."""
+    """Reason of a wide error, from the values of a peak at three resolutions, with a remedy.
+
+    triple : values from coarse to fine; error : error of the middle value; unit : unit of the values and the error
+    """
     remedy = "more cells" if cell_counts(case) else "shorter steps"
     peaks = [peak for peak in triple if peak is not None]
     steps = np.diff(peaks)
     if np.abs(steps).max() < SMALL_DIFFERENCE * error:
-        return f"another peak of the signal, or a moving peak, may exceed it; use {remedy}"
+        return f"another peak of the signal, or a moving peak, may exceed the computed peak; use {remedy}"
     steps_text = " and ".join(f"{abs(peak):.2g}" for peak in steps)
     if len(steps) == 1:
         return f"a difference of {steps_text} {unit} between the only two resolutions; use {remedy}"
@@ -165,7 +168,7 @@ def coarse_pipes_at_devices(case: Any) -> list[str]:
 
 
 def differing_events(runs: dict[float, Any]) -> list[str]:
-    """List with a text on the devices whose numbers of events differ between resolutions; empty if there are none."""
+    """List with a text on the devices whose numbers of events differ between resolutions, or an empty list."""
     finished = [runs[times] for times in sorted(runs) if runs[times].reason == "finished"]
     counts = [Counter(event["name"] for event in run.summary["events"]) for run in finished]
     names = sorted(set().union(*counts)) if len(finished) > 1 else []

@@ -25,10 +25,11 @@ _NUMBER = re.compile(r"\s*([+-]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*
 
 
 def parse(given: Any, dimension: str) -> Any:
-    """SI value of a bare number or of text with a unit.
+    """SI value of a bare number, or of text with a number and a unit.
 
-    A pressure is returned as (value, True for a gauge pressure), a kinematic viscosity as `Kinematic` [m2/s] if
-    `dimension` is "viscosity". Raises ValueError with the text found, the dimension expected and a suggestion.
+    For a pressure the result is (value, True if the unit is a gauge unit).
+    For a kinematic viscosity, where `dimension` is "viscosity", it is a `Kinematic` [m2/s].
+    Raises ValueError with the text found, the dimension expected and a suggestion.
     """
     if isinstance(given, str):
         value, unit = _parse_text(given, dimension)
@@ -52,9 +53,10 @@ class Kinematic(float):
 
 
 def find(spelling: str, dimension: str, number: str = "") -> Unit:
-    """Unit with a given spelling that measures `dimension`; raises ValueError with a suggestion if there is none.
+    """Unit with a given spelling that measures `dimension`.
 
-    number : number before the unit, for the message
+    Raises ValueError with a suggestion if the spelling is unknown, or belongs to a unit of another dimension.
+    number : text of the number before the unit, for the message
     """
     if len(spelling) > LONGEST:  # pint would take minutes to read it
         raise ValueError(
@@ -90,7 +92,10 @@ def find(spelling: str, dimension: str, number: str = "") -> Unit:
 
 
 def vacuum(given: Any, pressure: float, vapor_pressure: float = 0.0, ambient: float = 101325.0) -> str:
-    """Text of a message for a given pressure whose absolute value `pressure` [Pa] is too low for a liquid."""
+    """Text of a message about a given pressure that is too low for a liquid; pressure : its value in Pa, absolute
+
+    vapor_pressure : of the fluid [Pa]; ambient : ambient pressure [Pa]
+    """
     below = "a vacuum" if pressure <= 0 else f"not above the vapour pressure of {vapor_pressure:.4g} Pa"
     match = _NUMBER.fullmatch(given) if isinstance(given, str) else None
     number, spelling = match.groups() if match else (str(given), "Pa")
@@ -102,7 +107,10 @@ def vacuum(given: Any, pressure: float, vapor_pressure: float = 0.0, ambient: fl
 
 
 def convert(value_si: Any, dimension: str, unit: str, ambient: float = 101325.0) -> Any:
-    """Convert an SI value or array to `unit`; an absolute pressure in a gauge unit is relative to `ambient` [Pa]."""
+    """Value or array in `unit`, from an SI value or array.
+
+    In a gauge unit, an absolute pressure becomes a pressure relative to `ambient` [Pa].
+    """
     target = find(unit, dimension)
     if target.gauge and dimension == "pressure":
         value_si = value_si - ambient
@@ -116,7 +124,7 @@ def span(unit: str) -> str:
 
 
 def likely(given: Any, dimension: str, least: float, greatest: float) -> str:
-    """Text '; did you mean "304.8 mm"?' with the number of `given` in a unit in which it is usual, or empty text.
+    """Text '; did you mean "304.8 mm"?': the number of `given` with a unit that gives a usual value; else empty text.
 
     least, greatest : usual range of the quantity [SI]
     """

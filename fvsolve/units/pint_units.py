@@ -41,12 +41,15 @@ def pint_unit(spelling: str) -> Unit | None:
 
 
 def base_units(dimensionality: Mapping[str, float]) -> str:
-    """Base units of a quantity in alphabetical order, "kg·m²/s³"; the order of pint changes with its version."""
+    """Text of the base units of a quantity, such as "kg·m²/s³", in alphabetical order above and below the bar.
+
+    dimensionality : pint's dimension, such as "[length]" -> power. Pint's own order changes with its version.
+    """
     powers = sorted((BASE.get(name, name), power) for name, power in dimensionality.items())
     over = "·".join(unit + superscript(power) for unit, power in powers if power > 0) or "1"
     return "/".join([over, *(unit + superscript(-power) for unit, power in powers if power < 0)])
 
 
 def superscript(power: float) -> str:
-    """Superscript text of a power; empty for 1."""
+    """Text of a power in superscript digits; empty for 1."""
     return "" if power == 1 else f"{power:g}".translate(str.maketrans("0123456789.-", "⁰¹²³⁴⁵⁶⁷⁸⁹·⁻"))

@@ -13,7 +13,8 @@ class Unit:
     """A unit: SI value = (number + offset) numerator / denominator.
 
     gauge : True for pressures relative to ambient pressure; absolute : True if the spelling states an absolute pressure
-    A pressure unit with neither is absolute where the pressure is absolute.
+    With a pressure unit that is neither, such as `bar`, the quantity decides if the value is absolute, gauge or a
+    difference.
     """
 
     dimension: str
@@ -24,11 +25,11 @@ class Unit:
     absolute: bool = False
 
     def si(self, number: Any) -> Any:
-        """SI value of a number or array in this unit; for a gauge unit a gauge pressure."""
+        """SI value of a number or array in this unit; in a gauge unit it remains a gauge pressure."""
         return (number + self.offset) * self.numerator / self.denominator
 
     def read(self, number: str) -> float:
-        """SI value of a decimal number, rounded once: "0.26" of mm is 0.00026."""
+        """SI value of the text of a decimal number in this unit, rounded only once: "0.26" in mm is 0.00026."""
         try:
             exact = (Decimal(number) + Decimal(repr(self.offset))) * Decimal(repr(self.numerator))
             return float(exact / Decimal(repr(self.denominator)))
@@ -36,15 +37,15 @@ class Unit:
             return math.inf if float(number) != 0 else 0.0
 
     def number(self, si: Any) -> Any:
-        """Number or array in this unit of the SI value `si`; for a gauge unit of a gauge pressure."""
+        """Number or array in this unit, from an SI value or array `si`; for a gauge unit, `si` is a gauge pressure."""
         return si * self.denominator / self.numerator - self.offset
 
 
 @dataclass(frozen=True)
 class Dimension:
-    """A dimension: words for messages, SI unit and example.
+    """A dimension: words for messages, SI unit and example of a value.
 
-    base : dimension whose spellings it uses, "" for its own; gauge : True if gauge units are allowed
+    base : dimension whose units it uses, "" if it has units of its own; gauge : True if gauge units are allowed
     """
 
     words: str

@@ -192,8 +192,8 @@ def test_probes_count_along_the_whole_pipe() -> None:
     ("change", "told"),
     [
         (("half", "at", "900 m"), "links.half.at: \"900 m\" is outside: main runs from 1000 m to 4000 m"),
-        (("half", "at", 1000), "links.half.at: 1000 is the end of main, place lake"),
-        (("half", "at", 4000), "links.half.at: 4000 is the end of main, place gate"),
+        (("half", "at", 1000), "links.half.at: 1000 is the end of main at lake; expected a chainage between its ends"),
+        (("half", "at", 4000), "links.half.at: 4000 is the end of main at gate; expected a chainage between its ends"),
         (("half", "at", "3 kg"), "is a mass; expected a length"),
         (("half", "on", "mian"), 'links.half.on: no pipe named "mian"; did you mean "main"?'),
         (("half", "on", None), "links.half: `at` is 1500.0, but `on` is missing"),

@@ -43,7 +43,7 @@ BAD_RECTANGLES = {
     'patches.b: overlaps "a" on the west side, about 0.625 to 0.875 m': dict(
         patches={"a": ("west", 0.5, 1.0), "b": "west"}
     ),
-    "patches.a: 0 to 1 m on the west side runs along a hole; free is 0 to 0.5 m": dict(
+    "patches.a: 0 to 1 m on the west side runs along a hole; expected a span within 0 to 0.5 m": dict(
         holes=[(0, 0.5, 0.25, 1)], patches={"a": ("west", 0.0, 1.0)}
     ),
     "patches.a: the holes remove the whole west side": dict(holes=[(0, 0, 0.5, 1)], patches={"a": "west"}),
@@ -99,7 +99,7 @@ BAD_FILES = {
     'groups.out: shares 1 faces with "in", the face from (0, 1) m to (0, 0) m': dict(
         **GRID, groups={"in": [0, 3], "out": [[3, 0], [0, 1]]}
     ),
-    "points: z runs from 0 to 0.2 m, beyond the middle in cell 1; expected a mesh in one plane, z = constant": dict(
+    "points: z runs from 0 to 0.2 m, above the middle of this range in cell 1; expected a mesh in one plane": dict(
         points=[(x, y, 0.2 * (x > 1)) for x, y in SQUARE], cells=TWO
     ),
     "z = constant; y is constant: turn the mesh": dict(points=[(x, 0, y) for x, y in SQUARE], cells=TWO),
@@ -193,6 +193,6 @@ def test_a_cell_that_names_no_point(tmp_path):
         "CELLS 1 4\n3 0 1 7\nCELL_TYPES 1\n5\n"
     )
     with pytest.raises(
-        MeshError, match="cells: number 0 refers to a point that the file does not contain; it contains 3"
+        MeshError, match="cells: number 0 refers to a point that is not in the file; the file has 3 points"
     ):
         read(tmp_path / "lost.vtk")

@@ -121,7 +121,7 @@ def test_placed_by_chainage_it_stands_off_the_pipe():
 
 @pytest.mark.parametrize(
     "wrong, said",
-    [({"burst_pressure": -1.0}, "out of range"), ({"burst_pressure": 2e4}, "would burst it; set it higher"),
+    [({"burst_pressure": -1.0}, "out of range"), ({"burst_pressure": 2e4}, "would burst the disc; raise this pressure"),
      ({"from": "nowhere"}, "nowhere"), ({"area": None}, "needs area or diameter")],
 )  # fmt: skip
 def test_what_is_wrong_with_a_disc_is_said(wrong, said):

@@ -56,7 +56,7 @@ FOUND = [
     (half(unit_speed=[-40, 60, 90]), "gives no torque at point 1, (-40, 0.52); expected unit_torque for such points"),
     (half(unit_flow=[-0.5, -0.4, -0.3], efficiency=None, unit_torque=[-9e3] * 3), "unit_flow: is nowhere 0.001 or"),
     (half(unit_speed=[-90, -60], unit_flow=[0.4, 0.5], efficiency=None, unit_torque=[1, 1]),
-     "unit_speed: is below 0.001 at the end of least angle"),
+     "unit_speed: is below 0.001 at the end of the curve with the least angle"),
     (half(unit_speed=[60, 20, -9], unit_flow=[0.4, -0.4, -0.5], efficiency=None, unit_torque=[1, -9e3, 9e3]),
      "passes from (20, -0.4) to (-9, -0.5) across reverse flow through a runner at rest"),
     (half(efficiency=None, unit_torque=[1, 9e3, 1]), "opening 0.5: torque at (60, 0.5) means an efficiency of 11.53"),

@@ -148,7 +148,7 @@ def test_laws_that_differ_beyond_what_changes_are_said_to():
     assert found.law_difference.probe == "pump.head" and found.law_difference.start == pytest.approx(
         shift / np.ptp(head["log"]), rel=0.02
     )
-    assert f": {found.law_difference.start:.3g} is there from the start" in found.rules[0]
+    assert f": the difference is already {found.law_difference.start:.3g} at the start" in found.rules[0]
 
 
 def test_strain_is_the_change_from_the_start_over_the_stiffness_of_the_pipe():

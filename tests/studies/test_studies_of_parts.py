@@ -182,7 +182,9 @@ def test_a_vessel_is_not_said_by_a_volume():
 
 def test_a_law_that_takes_long_is_not_tried_on_more_cells(monkeypatch):
     monkeypatch.setattr(model_hierarchy, "LEVEL_CPU_LIMIT", 0.0)
-    with pytest.raises(FvsolveError, match="the case itself does not run: not run: 1 cell was given up already"):
+    with pytest.raises(
+        FvsolveError, match="the case itself does not run: not run: the run with 1 cell was already given up"
+    ):
         model_hierarchy.ladder(case("relief-on-closed-main", links__main__cells=4, numerics__courant=0.001))
 
 

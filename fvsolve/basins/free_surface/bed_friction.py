@@ -20,7 +20,7 @@ TINY = 1e-300
 def cube_root(x):
     """x^(1/3) to round-off: first estimate x^(1/4) x^(1/16) x^(1/64), then Halley's iteration.
 
-    Unlike a power function, it vectorises.
+    Unlike loops with a power function, loops with it vectorise.
     """
     a = sqrt(sqrt(x))
     b = sqrt(sqrt(a))
@@ -47,11 +47,12 @@ def drag_per_flow(law, g, value, depth):
 
 @njit
 def add_friction(law, g, coefficient, depth0, dh, qx, qy, content_x, content_y, rate_x, rate_y):
-    """Add the friction -r q to the rates of n cells; r is the decay rate of the flow [1/s].
+    """Add the friction -r q to the rates of n cells; r is the decay rate of the flow [1/s], see `drag_per_flow`.
 
     law, coefficient : MANNING and n [s/m^(1/3)], or DARCY and f [-]; float64[n], or float64[1] for all cells
     depth0, dh : depth at rest and deviation from it [m]; qx, qy : unit flows [m2/s]
-    content_x, content_y : quantities q of rate_x, rate_y: unit flows, or unit flows times the stretching of cells
+    content_x, content_y : states q that have the rates rate_x, rate_y: unit flows, or, with moving walls, unit flows
+    times present over undeformed area
     """
     is_uniform = coefficient.size == 1
     for i in range(dh.size):
@@ -63,10 +64,10 @@ def add_friction(law, g, coefficient, depth0, dh, qx, qy, content_x, content_y, 
 
 @njit
 def add_capped_friction(law, g, coefficient, cap, depth0, dh, qx, qy, content_x, content_y, rate_x, rate_y):
-    """Add friction with a capped decay rate, r / (1 + r / cap); return the greatest rate 2 r of errors of a flow [1/s].
+    """Add friction with a capped decay rate of the flow, r / (1 + r / cap) [1/s]; return twice its greatest value.
 
-    The maximum over all cells prevents vectorisation, and then a power is faster than `cube_root`. Arguments: see
-    `add_friction`
+    An error of the flow decays at this rate, which limits explicit steps. The maximum over all cells prevents
+    vectorisation, and then a power is faster than `cube_root`. Other arguments as for `add_friction`
     """
     most, is_uniform = 0.0, coefficient.size == 1
     for i in range(dh.size):
@@ -89,9 +90,9 @@ def add_capped_friction(law, g, coefficient, cap, depth0, dh, qx, qy, content_x,
 def damp_flows(law, g, coefficient, h, depth0, dh, qx, qy, content_x, content_y, rate_x, rate_y, quick_x, quick_y):
     """Divide the rates of unit flows q, which include friction -r q, by 1 + h R, and write h R to quick_x and quick_y.
 
-    h is the time step and R = r + r'. Here r' is the decay rate of the flow Q that remains if the flow without
-    friction, q + h (rate + r q), is reduced implicitly by friction: Q (1 + h r') = q + h (rate + r q). R is the slope
-    of friction between q and Q, so the step ends at Q if all flows have one direction. Other arguments: see
+    h is the time step, and R = r + r'. Without friction, a step would lead to the flow q + h (rate + r q). Implicit
+    friction reduces it to the flow Q of the decay rate r', with Q (1 + h r') = q + h (rate + r q). R is the slope of
+    friction between q and Q, so the step ends at Q if all flows have one direction. Other arguments as for
     `add_friction`
     """
     is_uniform = coefficient.size == 1

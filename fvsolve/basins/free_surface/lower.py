@@ -40,11 +40,11 @@ SHORE_COURANT_FACTOR = 6.0  # and to sixths of cells under fifth order with a sh
 
 
 def depth_at_start(level: np.ndarray, bed: np.ndarray) -> np.ndarray:
-    """Mean depth of the water in cells whose bed is replaced by its mean : float64[n] [m].
+    """Depth of the water at the start in each cell, whose bed is replaced by its mean : float64[n] [m].
 
-    The mean of max(level - bed, 0). Where a bank in a cell separates water of uniform level, the depth is instead that
-    of this level over the mean bed, because the water then stays at rest. This correction decreases as the level
-    follows the bed. level, bed : `samples` of both in cells
+    It is the mean of max(level - bed, 0). If a bank in the cell separates water of a uniform level, it is instead the
+    height of this level above the mean bed, because the water then stays at rest. This correction is smaller, the more
+    the level varies with the bed. level, bed : `samples` of both in cells
     """
     deep = level - bed
     wet = deep > ROUNDING * (np.abs(level) + np.abs(bed))
@@ -125,7 +125,10 @@ class FreeSurfaceRows(BasinRows):
 
     @property
     def damped(self) -> bool:
-        """True if the rates of stages are divided by 1 + h R for friction; not if forces of the water move its body."""
+        """True if the rates of Runge-Kutta stages are divided by 1 + h R for bed friction, see `damp_flows`.
+
+        This is the case for SSP methods, unless forces move the body that carries the basin.
+        """
         method, on = METHODS.get(self.case.numerics.method), self.part.on
         is_moved_by_forces = on is not None and any(free_joints(on, self.case.nodes))
         return self.rubs and method is not None and in_euler_steps(method) and not is_moved_by_forces
@@ -138,7 +141,7 @@ class FreeSurfaceRows(BasinRows):
 
     @property
     def rate_cap(self) -> float:
-        """Cap of the decay rate of flows by friction [1/s]; infinite or NO_CAP without a cap."""
+        """Cap of the decay rate of flows by friction [1/s]; without a cap inf, or NO_CAP with the method `auto`."""
         if self.has_rate_cap:
             return RATE_CAP
         return NO_CAP if self.case.numerics.method == AUTO else math.inf

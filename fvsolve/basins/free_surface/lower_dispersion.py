@@ -26,7 +26,7 @@ LEAST_AT_START, LEAST_IN_RUN = (
 
 
 class SurfaceWaves(NamedTuple):
-    """Properties of the waves of a basin.
+    """Properties of the waves on the free surface of a basin, see `surface_waves`.
 
     speed_error : fraction by which real waves are slower than in shallow-water theory; k : wavenumber [1/m]
     depth : mean depth of wet cells [m]
@@ -41,9 +41,10 @@ NO_WAVES = SurfaceWaves(0.0, math.nan, math.nan)
 
 
 def surface_waves(basin, y: np.ndarray, seen: float = LEAST_AT_START) -> SurfaceWaves:
-    """Waves of a basin at deviations y from rest : float64[quantities, n].
+    """Properties of the waves of a basin at deviations y of its cells from rest.
 
-    `NO_WAVES` if the root mean square of the surface is below `seen` times the mean depth.
+    They are `NO_WAVES` if the root mean square of the surface is not above `seen` times the mean depth.
+    y : float64[quantities, n]
     """
     depth, area = basin.depth + y[0], basin.mesh.area
     wet = depth > 0.0
@@ -61,12 +62,12 @@ def surface_waves(basin, y: np.ndarray, seen: float = LEAST_AT_START) -> Surface
 
 
 def waves_in_run(basin, y: np.ndarray) -> SurfaceWaves:
-    """Waves of a basin at deviations y during a run, with the larger threshold LEAST_IN_RUN."""
+    """Properties of the waves of a basin at deviations y in a run: `surface_waves` with the threshold LEAST_IN_RUN."""
     return surface_waves(basin, y, LEAST_IN_RUN)
 
 
 def is_even(basin) -> bool:
-    """True if the cells are a grid of equal rectangles."""
+    """True if the mesh is a full rectangle of equal rectangular cells."""
     grid = basin.mesh.grid
     return basin.is_grid and all(np.ptp(np.diff(lines)) < 1e-9 * (lines[-1] - lines[0]) for lines in (grid.x, grid.y))
 
@@ -112,18 +113,18 @@ def notice(basin, waves: tuple[float, float, float], when: str = "") -> Notice:
 
 
 def notices(basin, y: np.ndarray) -> list[Notice]:
-    """List of the notice that waves at deviations y are too short for shallow-water theory; empty if they are not."""
+    """List with the notice that waves at deviations y are too short for shallow-water theory; empty if they are not."""
     state = surface_waves(basin, y)
     return [notice(basin, state)] if state.speed_error > NOTICE_ERROR else []
 
 
 def watches(basin, y: np.ndarray) -> list[ErrorWatch]:
-    """List of the check for too short waves during a run; empty if there is already a notice at deviations y."""
+    """List with a check (`ErrorWatch`) of a run for waves that are too short; empty if `notices` has one at y."""
     return [] if notices(basin, y) else [ErrorWatch(basin, waves_in_run, notice, NOTICE_ERROR)]
 
 
 def body_notices(basin) -> list[Notice]:
-    """List of the notice that water in a basin on a body is too deep for shallow-water theory; empty if it is not."""
+    """List with the notice that water in a basin on a body is too deep for shallow-water theory; empty if it is not."""
     mode = slowest(basin.part, basin.mesh) if basin.part.on else None
     if mode is None or mode.excess <= 100.0 * NOTICE_ERROR:
         return []

@@ -17,7 +17,7 @@ REPEAT_FACTOR = 1.2  # factor on the error at the start above which a run gives 
 
 
 def slow_film_error(basin, y: np.ndarray) -> tuple[float, float, float]:
-    """Error of the deepest film that is too slow at deviations y, as three numbers.
+    """Error of the deepest film that is too slow at deviations y, as three numbers; (0, nan, nan) without such a film.
 
     They are 1 - speed / correct speed, depth [m], and fall of the bed to the next cell [m]. Both sides of a face use
     the higher bed. So the force on a film of depth h above a fall d > h is g h^2 / 2 instead of g h d, and its speed is
@@ -36,7 +36,7 @@ def slow_film_error(basin, y: np.ndarray) -> tuple[float, float, float]:
 
 
 def fast_film_error(basin, y: np.ndarray) -> tuple[float, float, float]:
-    """Mean error of films that are too fast at deviations y, as three numbers.
+    """Mean error of films that are too fast at deviations y, as three numbers; (0, nan, nan) without flow.
 
     They are speed / correct speed - 1, depth [m], and decay rate of the flow by friction [1/s], all averaged with the
     flow as weight. If friction at the rate r = C u balances a slope and is capped as r / (1 + r / RATE_CAP), then u^2
@@ -57,8 +57,8 @@ def slow_film_notice(basin, error: tuple[float, float, float], when: str = "") -
     """Notice that films are too slow. error : result of `slow_film_error`; when : text of the time"""
     deep, fall = (basin.case.amount(value, "length", 3) for value in error[1:])
     text = (
-        f"{basin.name}: films down a slope{when}: under upwind {deep} of water, where the bed falls by {fall} from "
-        f'cell to cell, runs {100.0 * error[0]:.2g} % too slowly; use scheme = "muscl", or cells so small that '
+        f"{basin.name}: films down a slope{when}: with upwind, {deep} of water flows {100.0 * error[0]:.2g} % too "
+        f'slowly where the bed falls by {fall} from cell to cell; use scheme = "muscl", or cells so small that '
         "the bed falls by less than the depth"
     )
     return Notice("film", f"nodes.{basin.name}", text, "scheme", error[0], NOTICE_ERROR)
@@ -76,7 +76,7 @@ def fast_film_notice(basin, error: tuple[float, float, float], when: str = "") -
 
 
 def watches(basin, y: np.ndarray) -> list[ErrorWatch]:
-    """Checks during a run for films with a greater error than at the deviations y at its start."""
+    """Checks (`ErrorWatch`) of a run for films with errors above those at its start, where the deviations are y."""
     return [
         ErrorWatch(basin, look, notice, max(NOTICE_ERROR, REPEAT_FACTOR * look(basin, y)[0]))
         for look, notice in film_checks(basin)
@@ -89,6 +89,6 @@ def notices(basin, y: np.ndarray) -> list[Notice]:
 
 
 def film_checks(basin) -> list[tuple]:
-    """Checks for films that apply to a basin, as pairs (function for the error, function for its notice)."""
+    """(function for the error, function for its notice) of each check for films that applies to a basin."""
     pairs = [(slow_film_error, slow_film_notice)] if basin.scheme == "upwind" else []
     return [*pairs, (fast_film_error, fast_film_notice)] if basin.has_rate_cap else pairs

@@ -10,9 +10,10 @@ from fvsolve.errors import Notice
 class ErrorWatch:
     """Greatest error of one kind in a basin during a run.
 
-    by(basin, y) : function for the error and two related values; notice(basin, values, when) : function for its notice
-    least : error up to which there is no notice
-    greatest : float64[4]  time [s], error and both related values of the greatest error; nan before any error
+    by(basin, y) : function for the error and two related values at deviations y
+    notice(basin, values, when) : function for the notice of these three values; when : text of the time
+    least : error up to which no notice is given
+    greatest : float64[4]  time [s], error and both related values at the greatest error; nan before any error
     """
 
     def __init__(self, basin, by, notice, least: float) -> None:
@@ -25,7 +26,7 @@ class ErrorWatch:
             self.greatest[:] = t, *error
 
     def notices(self) -> list[Notice]:
-        """Notice of the greatest error in a list; empty if it is not above `least`."""
+        """List with the notice of the greatest error; empty if this error is not above `least`."""
         t, *error = self.greatest.tolist()
         if not error[0] > self.least:
             return []

@@ -28,7 +28,7 @@ OWN_CODE = physics_code(__package__)
 
 @njit
 def through_faces(begin, stop, kx, ky, flow_x, flow_y):
-    """Convert flows per width [m2/s] to flows through the faces [m3/s] of rows `begin` to `stop` of a grid, in place.
+    """Convert flows per width [m2/s] to flows through faces [m3/s] of rows `begin` to `stop` - 1 of a grid, in place.
 
     kx, ky : 1 / widths of columns, 1 / heights of rows [1/m]
     flow_x, flow_y : flows through the faces normal to x and to y
@@ -46,7 +46,10 @@ def through_faces(begin, stop, kx, ky, flow_x, flow_y):
 
 @njit
 def add_bed_friction(tables, b, a, z, y, rates, out):
-    """Add bed friction to the rates of cells `a` to `z` of basin b; capped friction also limits the time step."""
+    """Add bed friction to the rates of cells `a` to `z` - 1 of basin b; capped friction also limits the time step.
+
+    rates : rates of the three states of all cells of the basin
+    """
     basin = tables.basins[b]
     n, o, seen, roughness = (
         basin["n"],
@@ -70,7 +73,10 @@ def add_bed_friction(tables, b, a, z, y, rates, out):
 
 @njit
 def damp_stages(h, y, rates, quick, handle):
-    """Divide the rates of a stage in all basins that need it by 1 + h R for friction; see `bed_friction.damp_flows`."""
+    """Divide the rates of a stage by 1 + h R for bed friction, in all basins for which it is needed.
+
+    quick : values h R of the states; for R see `bed_friction.damp_flows`
+    """
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
@@ -88,16 +94,20 @@ def damp_stages(h, y, rates, quick, handle):
 
 @njit
 def finish_water(tables, b, rate, out):
-    """Write the flows of basin b through open patches, and its rate [1/s], which limits the time step, to `out`."""
+    """Write the flows of basin b through open patches to `out`, and raise out[RATE], which limits the step.
+
+    rate : greatest rate of the cells [1/s]
+    """
     put_open_flows(tables, b, tables.settings[0]["rho"], out)
     out[RATE] = max(out[RATE], tables.basins[b]["unsplit"] * rate)
 
 
 @njit
 def finish_block(tables, b, row, block_stop, first, last, y, rates, out):
-    """Add bed friction to the rates of columns `first` to `last` of rows `row` to `block_stop`.
+    """Add bed friction to the rates of a block: columns `first` to `last` - 1 of rows `row` to `block_stop` - 1.
 
     Then form the state at the end of the step in these cells, or check that it is finite, as `tables.sums` requests.
+    b : number of the basin; rates : as for `add_bed_friction`
     """
     basin, sums, nx = tables.basins[b], tables.sums, tables.basins[b]["nx"]
     if basin["friction"] != NO_DRAG:
@@ -115,9 +125,11 @@ def finish_block(tables, b, row, block_stop, first, last, y, rates, out):
 
 @njit
 def by_blocks(tables, b, g, kx, ky, reflect, plan, dh, qx, qy, through, work, y, rates, out):
-    """Compute `surface_grid.grid_rates` and friction block by block, and return the greatest rate [1/s].
+    """Write the rates of `surface_grid.grid_rates` and friction block by block, and return the greatest rate [1/s].
 
     The sums of Runge-Kutta stages requested in `tables.sums` are formed in the same pass.
+    b : number of the basin; y : states of the model; rates : as for `add_bed_friction`
+    Other arguments as for `surface_grid.grid_rates`
     """
     basin, empty, most = tables.basins[b], tables.work[:0], 0.0
     nx, ny, n, begin, stop = basin["nx"], basin["ny"], basin["n"], tables.bands[2 * b], tables.bands[2 * b + 1]
@@ -145,7 +157,7 @@ def by_blocks(tables, b, g, kx, ky, reflect, plan, dh, qx, qy, through, work, y,
 
 @njit
 def on_grid(tables, b, y, dydt, out, moves):
-    """Write the rates of the cells of basin b, a grid. moves : None, or as in `surface_grid.grid_rates`
+    """Write the rates of the cells of basin b, whose mesh is a grid. moves : None, or as in `surface_grid.grid_rates`
 
     If walls move, the states are depths and flows times the area of a cell over its undeformed area.
     """
@@ -181,7 +193,7 @@ def on_grid(tables, b, y, dydt, out, moves):
 
 @njit
 def rates_on_grids(t, y, dydt, out, handle):
-    """Write the rates of all basins of water on grids without moving walls."""
+    """Write the rates of all basins of water that have a grid and no moving walls."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
@@ -191,8 +203,9 @@ def rates_on_grids(t, y, dydt, out, handle):
 
 @njit
 def on_mesh(tables, b, y, dydt, out, moves):
-    """Write the rates of the cells of basin b, a mesh. moves : None, or as in `surface_mesh.shallow_rates`
+    """Write the rates of the cells of basin b, whose mesh is not a grid.
 
+    moves : None, or as in `surface_mesh.shallow_rates`
     If walls move, the states are depths and flows times the area of a cell over its undeformed area.
     """
     st, plane, work, integers = tables.settings[0], tables.plane, tables.work, tables.integers
@@ -235,7 +248,7 @@ def on_mesh(tables, b, y, dydt, out, moves):
 
 @njit
 def rates_on_meshes(t, y, dydt, out, handle):
-    """Write the rates of all basins of water on meshes of any cells without moving walls."""
+    """Write the rates of all basins of water that have a mesh other than a grid and no moving walls."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]

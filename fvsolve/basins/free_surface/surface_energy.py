@@ -27,7 +27,7 @@ def velocity_factor(depth):
 
 @njit
 def add_power(t, y, dydt, out, handle, power):
-    """Write losses at patches, power of friction and rate of storage [W] of all basins of water to `power`."""
+    """Write losses at patches, power of friction and rate of storage of all basins of water to `power` [W]."""
     tables = open_tables(handle)
     patches, layout = tables.patches, tables.layout[0]
     for b in range(tables.basins.size):
@@ -45,7 +45,7 @@ def add_power(t, y, dydt, out, handle, power):
 def water_power(st, basin, plane, y, dydt, rows):
     """Write the power of friction to rows[2] and the rate of storage to rows[3] of a basin [W].
 
-    Friction is capped as in the rates of the cells.
+    rows : entries of the basin in `power`, see `basin_energy`. Friction is capped as in the rates of the cells.
     """
     n, o = basin["n"], basin["y"]
     depths, surface = plane[basin["plan"] :], plane[basin["plan"] + n :]
@@ -68,7 +68,7 @@ def water_power(st, basin, plane, y, dydt, rows):
 def drag_power(st, basin, depth, flow, square):
     """Power dissipated by bed friction per area [W/m2].
 
-    depth [m]; flow : unit flow [m2/s]; square : square of the velocity [m2/s2]
+    depth : depth of the water [m]; flow : unit flow [m2/s]; square : square of the velocity [m2/s2]
     """
     if basin["friction"] == NO_DRAG:
         return 0.0
@@ -78,7 +78,10 @@ def drag_power(st, basin, depth, flow, square):
 
 @njit
 def patch_loss(tables, patch, flow, y):
-    """Power lost where `flow` [kg/s] enters the cells at a patch, or leaves them if negative [W]."""
+    """Power lost [W] where the mass flow `flow` passes a patch.
+
+    flow : [kg/s], positive into the cells at the patch, negative out of them
+    """
     st, basin, plane, integers = (
         tables.settings[0],
         tables.basins[patch["basin"]],
@@ -109,7 +112,7 @@ def patch_loss(tables, patch, flow, y):
 
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
-    """Write the stored energy [J] of all basins of water to `stored`, relative to that at rest."""
+    """Write the stored energy of all basins of water, relative to that at rest, to `stored` [J]."""
     tables = open_tables(handle)
     st, basins, plane = tables.settings[0], tables.basins, tables.plane
     weight = st["rho"] * st["gravity"]

@@ -1,8 +1,8 @@
 """Fifth-order values of shallow water at faces, where the water is deep enough.
 
 Depth h, surface e and unit flows are reconstructed from cell means; velocities are unit flows over depth. The integral
-of h de/dx over a cell is exact for cubics: the product of the parabolas through both face values and the mean, plus
-the products of third differences with second differences.
+of h de/dx over a cell is exact for cubics: that of the parabolas through both face values and the mean, plus the
+products of third differences with second differences.
 """
 
 from math import sqrt
@@ -36,7 +36,7 @@ def put_smooth_flags(p, q, r, s, t, deep):
 
 @njit
 def put_fifth(scheme, p, q, r, s, t, deep, low, high):
-    """Write the values at the face before (low) and after (high) each cell r where `deep` is 1.
+    """Write fifth-order values at the face before (`low`) and the face after (`high`) each cell r where `deep` is 1.
 
     p, q, r, s, t : averages of five consecutive cells; scheme : WENO5 or LINEAR
     """
@@ -54,9 +54,9 @@ def put_fifth(scheme, p, q, r, s, t, deep, low, high):
 
 @njit
 def put_velocities(g, deep, side):
-    """Convert unit flows at faces to velocities where `deep` is 1, and write wave speeds, in place.
+    """Convert unit flows at faces to velocities where `deep` is 1, and write wave speeds at all faces, in place.
 
-    side : rows of depth, surface, unit flows and wave speed of the faces, at the distance STRIDE
+    side : rows of depth, surface, unit flows and wave speed at the faces, each STRIDE after the row before
     """
     for i in range(deep.size):
         depth = max(side[i], 0.0)
@@ -67,10 +67,10 @@ def put_velocities(g, deep, side):
 
 @njit
 def put_push(h, deep, hl, hr, el, er, ph, qh, sh, th, pe, qe, re, se, te, push):
-    """Write the integrals of h de/dx over the cells where `deep` is 1 [m2].
+    """Write the integrals of h de/dx (depth h, surface e) over the cells where `deep` is 1 to `push` [m2].
 
     h, re : mean depth and surface of a cell; hl, hr, el, er : depth and surface at the faces before and after it
-    ph, qh, sh, th, pe, qe, se, te : means of depth and surface in the two cells on either side
+    ph, qh, sh, th : mean depths two cells before, one before, one after and two after; pe, qe, se, te : surfaces there
     """
     for i in range(push.size):
         h2, e2 = 3.0 * ((hl[i] + hr[i]) - 2.0 * h[i]), 3.0 * ((el[i] + er[i]) - 2.0 * re[i])
@@ -83,8 +83,9 @@ def put_push(h, deep, hl, hr, el, er, ph, qh, sh, th, pe, qe, re, se, te, push):
 def put_smooth(g, scheme, p, q, r, s, t, sides, deep):
     """Replace the limited values at both faces of a row of cells by fifth-order values where the water is deep enough.
 
+    This is decided by `put_smooth_flags`. Wave speeds at the faces of all cells are written too.
     p, q, r, s, t : blocks of the cells two and one before, of the cells, and one and two after; see `surface_rows`
-    sides : values at both faces; deep : work array, 1 where the values are replaced
+    sides : values at both faces; deep : work array, 1 where the values are replaced; scheme : WENO5 or LINEAR
     """
     low, high = sides, sides[HIGH:]
     put_smooth_flags(p, q, r, s, t, deep)

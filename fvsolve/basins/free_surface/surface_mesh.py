@@ -45,7 +45,8 @@ ROWS = 14
 def put_primitives(g, depth0, surface0, dh, qx, qy, h, e, u, v, c):
     """Write depth h, surface e, velocities u, v and wave speed c of cells.
 
-    depth0, surface0 : depth and surface at rest [m]; dh, qx, qy : deviation of depth [m], unit flows [m2/s]
+    g : gravity [m/s2]; depth0, surface0 : depth and surface at rest [m]
+    dh, qx, qy : deviation of depth from rest [m], unit flows [m2/s]
     """
     for i in range(dh.size):
         depth = max(depth0[i] + dh[i], 0.0)
@@ -60,8 +61,9 @@ def put_mirror_velocities(edges, ring, nx, ny, number, reflect, u, v, shown_u, s
     """Write mirrored velocities beyond boundary sides, from which gradients in cells are computed.
 
     At a side that moves outward at the speed w, the normal velocity u becomes 2 w - u.
-    edges : boundary sides; nx, ny : outward normals; number : numbers of the boundary faces; reflect : 1 for walls, 0
-    for open faces; u, v : velocities of cells; shown_u, shown_v : velocities beyond; moves : as in `shallow_rates`
+    edges, number : boundary sides, and numbers of their boundary faces; ring : see `cell_sides`
+    nx, ny : outward normals; reflect : 1 for walls, 0 for open faces, empty for walls only
+    u, v : velocities of cells; shown_u, shown_v : velocities beyond; moves : as in `shallow_rates`
     """
     for q in range(edges.size):
         i = ring_place(edges[q], ring)
@@ -77,7 +79,7 @@ def put_mirror_velocities(edges, ring, nx, ny, number, reflect, u, v, shown_u, s
 def put_mirror_sides(edges, nx, ny, number, reflect, ul, vl, w, moves):
     """Write mirrored velocities beyond boundary sides to `w`, from the velocities ul, vl at the sides inside.
 
-    Other arguments: see `put_mirror_velocities`
+    w : scratch, see `add_side_fluxes`; other arguments as for `put_mirror_velocities`
     """
     for q in range(edges.size):
         i = edges[q] % BLOCK
@@ -93,8 +95,9 @@ def put_mirror_sides(edges, nx, ny, number, reflect, ul, vl, w, moves):
 def add_side_fluxes(g, h0, e0, c0, hl, el, ul, vl, geo, w, speeds):
     """Subtract the outflow through one side of each cell of a block (HLLC flux) from the rates in `w`.
 
-    h0, e0, c0 : depth, surface and wave speed of the cells; hl, el, ul, vl : depth, surface and velocities at the side
-    from inside; `w` contains the values from beyond; geo : geometry of the side
+    g : gravity [m/s2]; h0, e0, c0 : depth, surface and wave speed of the cells; hl, el, ul, vl : depth, surface and
+    velocities at the side
+    from inside; `w` contains the values from beyond; geo : measures of the side, see `cell_sides`
     speeds : None, or speeds of moving sides along their outward normals [m/s]; the flux is then relative to the side
     """
     half = 0.5 * g
@@ -126,7 +129,11 @@ def add_side_fluxes(g, h0, e0, c0, hl, el, ul, vl, geo, w, speeds):
 
 @njit
 def close_walls(g, edges, number, reflect, rest, h0, geo, w, thrust):
-    """Set the mass flow through walls to zero; write the thrust on them minus the thrust of the depth at rest."""
+    """Set the mass flow through walls to zero; write the thrust on boundary sides minus that of the depth at rest.
+
+    rest : depths at rest; thrust : of all boundary faces, as in `shallow_rates`
+    g, h0, geo, w : as for `add_side_fluxes`; edges, number, reflect : as for `put_mirror_velocities`
+    """
     for q in range(edges.size):
         i = edges[q] % BLOCK
         thrust[number[q]] = w[_PUSH + i] + 0.5 * g * ((h0[i] - rest[i]) * (h0[i] + rest[i]))
@@ -144,30 +151,37 @@ def clear(w):
 
 @njit
 def put_shores(h, shore):
-    """Write the allowed deviation of the surface at the sides from that in the cell: 0 in dry cells, else HUGE."""
+    """Write how far the surface at the sides of a cell may differ from that in the cell: 0 in dry cells, else HUGE.
+
+    h : depths of a block of cells; shore : the allowed differences
+    """
     for i in range(BLOCK):
         shore[i] = HUGE if h[i] > 0.0 else 0.0
 
 
 @njit
 def put_max_rate(w, top):
-    """Update the greatest rates that limit the step: half the sum of wave speeds over sides, or the outflow [1/s]."""
+    """Raise `top` to the rates of a block of cells that limit the step [1/s], for each place in a block.
+
+    Such a rate is half the sum of wave speeds over sides, or the outflow over the volume, see `shallow_rates`.
+    """
     for i in range(BLOCK):
         top[i] = max(top[i], max(0.5 * w[_FAST + i], w[_OUTFLOW + i]))
 
 
 @njit
 def put_rates(w, rate_h, rate_x, rate_y):
-    """Copy the rates of a block of cells from `w` to their arrays."""
+    """Copy the rates of a block of cells from the scratch `w` to rate_h, rate_x, rate_y."""
     for i in range(rate_h.size):
         rate_h[i], rate_x[i], rate_y[i] = w[_RH + i], w[_RX + i], w[_RY + i]
 
 
 @njit
 def put_flow(where, w, length, flow):
-    """Write the flows through the faces whose normals point outwards from the cells of a block [m3/s].
+    """Write the flows [m3/s] through one side of each cell of a block, for faces whose normals point out of the cells.
 
-    where : face of each side, negative where the normal points inwards; length : lengths of faces [m]
+    w : scratch with the flows per length; length : lengths of faces [m]
+    where : face of each side, negative where the normal points inwards
     """
     for i in range(BLOCK):
         if where[i] >= 0:
@@ -176,7 +190,7 @@ def put_flow(where, w, length, flow):
 
 @njit
 def work_size(integers):
-    """Length of the work array of `shallow_rates`. integers : as there"""
+    """Length of the work array of `shallow_rates`. integers : mesh, as there"""
     return 21 * integers[4] * BLOCK + 2 * integers[3] + ROWS * BLOCK
 
 
@@ -187,11 +201,11 @@ def shallow_rates(
 ):  # fmt: skip
     """Write the rates of all cells of a mesh; return the greatest rate that limits the time step [1/s].
 
-    It is the greatest of sum L (|u| + c) / (2 A) over the sides of a cell (length L, area A of the cell, normal
-    velocity u, wave speed c), and of the outflow from a cell over its volume. Explicit Euler steps up to 1 / (2 rate)
-    leave no depth below zero.
-    scheme : UPWIND or MUSCL; wide_by : factor on the range of the neighbours that limits values at sides, 1 for no
-    excess
+    It is the greatest of two values over all cells: the sum of L (|u| + c) / (2 A) over the sides of the cell (length
+    L, area A of the cell, normal velocity u, wave speed c), and the outflow from the cell over its volume. Explicit
+    Euler steps up to 1 / (2 rate) leave no depth below zero.
+    g : gravity normal to the basin [m/s2]; scheme : UPWIND or MUSCL
+    wide_by : factor on the range of the neighbours that limits values at sides; with 1 they stay within that range
     floats, integers : geometry and neighbours, see `basins.cell_sides`; n cells, f faces, b boundary faces
     reflect : float64[b]  1 for walls, 0 for open faces, empty if all are walls
     plan : float64[PLANS, n]  depth at rest and surface at rest above the level [m]

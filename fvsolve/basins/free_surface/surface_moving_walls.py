@@ -1,4 +1,4 @@
-"""Water between moving walls: rates of cells, and its energy as areas change."""
+"""Water with a free surface between moving walls: rates of cells, and its energy as areas change."""
 
 from fvsolve.basins import moving_meshes
 from fvsolve.basins.basin_energy import basin_first_row, rest_potential
@@ -10,13 +10,13 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit(forceinline=True)
 def is_moving(basin):
-    """True for water between moving walls."""
+    """True for a basin of water with a free surface and moving walls."""
     return basin["kind"] == OWN_CODE and basin["walls"] > 0
 
 
 @njit
 def rates_on_moving_grids(t, y, dydt, out, handle):
-    """Write the rates of all basins of water between moving walls on grids."""
+    """Write the rates of all basins of water that have a grid and moving walls."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if is_moving(tables.basins[b]) and tables.basins[b]["nx"] > 0:
@@ -25,7 +25,7 @@ def rates_on_moving_grids(t, y, dydt, out, handle):
 
 @njit
 def rates_on_moving_meshes(t, y, dydt, out, handle):
-    """Write the rates of all basins of water between moving walls on meshes of any cells."""
+    """Write the rates of all basins of water that have a mesh other than a grid and moving walls."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if is_moving(tables.basins[b]) and tables.basins[b]["nx"] == 0:
@@ -34,7 +34,7 @@ def rates_on_moving_meshes(t, y, dydt, out, handle):
 
 @njit
 def add_power(t, y, dydt, out, handle, power):
-    """Subtract the part of the rate of storage due to changing areas A, rho g h^2 / 2 dA/dt [W], from `power`."""
+    """Correct the rate of storage in `power` for changing cell areas A: subtract rho g h^2 / 2 dA/dt [W] of cells."""
     tables = open_tables(handle)
     st, plane = tables.settings[0], tables.plane
     for b in range(tables.basins.size):
@@ -47,7 +47,7 @@ def add_power(t, y, dydt, out, handle, power):
 
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
-    """Add the energy of the water at rest [J] on the area that cells have gained by motion of walls to `stored`."""
+    """Add the energy of water at rest [J] on the area that cells have gained by the motion of walls to `stored`."""
     tables = open_tables(handle)
     st, plane, first = tables.settings[0], tables.plane, stored.size - tables.basins.size
     weight = st["rho"] * st["gravity"]

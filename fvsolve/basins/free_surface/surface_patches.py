@@ -31,8 +31,8 @@ def water_at_patch(tables, patch, y):
     """(rise of the surface [m], depth [m], volume [m3], sum of area times weight squared [m4]) of the cells at a patch.
 
     Rise and depth are means with the weight area times `outflow_weight`, so that a dry bank does not count; the volume
-    is the sum of these weights. The rise is from the surface at rest (of a dry patch, from its lowest bed); in a basin
-    on a body it is from the level at rest.
+    is the sum of these weights. The rise counts from the surface at rest, or from the lowest bed if the patch is dry at
+    rest. In a basin on a body it counts from the level at rest.
     """
     basin, plane = tables.basins[patch["basin"]], tables.plane
     n, plan, low, lowest = basin["n"], basin["plan"], inf, 0.0
@@ -60,6 +60,7 @@ def bottom_pressure_at_patch(plane, basin, patch, rise, depth):
 
     The water is at rest in the frame of the basin, so its surface is an equipotential, and its height over any position
     follows from the potential phi of gravity and inertial forces. A dry position has no pressure.
+    rise, depth : results of `water_at_patch`
     """
     at, (fx, fy, xx, xy, yy) = patch["sizes"] + 2, potential_coefficients(plane, basin["frame"], 1.0)
     x, y, z, profile = plane[at], plane[at + 1], plane[at + 2], plane[at + 3]
@@ -69,7 +70,7 @@ def bottom_pressure_at_patch(plane, basin, patch, rise, depth):
 
 @njit
 def patch_pressures(t, y, dydt, out, handle):
-    """Write pressure, its slope and available fraction of outflow at every patch to the node of the patch in `out`.
+    """Write pressure, its slope and available fraction of outflow at every patch of water to its node in `out`.
 
     The pressure is the deviation from the steady start [Pa]; the slope is per mass in the cells next to the patch
     [Pa/kg].
@@ -97,7 +98,7 @@ def patch_pressures(t, y, dydt, out, handle):
 
 @njit
 def patch_flows(t, y, dydt, out, handle):
-    """Add the mass and momentum of the flows through patches to the rates of the cells next to them."""
+    """Add the mass and momentum of flows through patches of water to the rates of the cells next to them."""
     tables = open_tables(handle)
     for k in range(tables.patches.size):
         patch = tables.patches[k]
@@ -111,8 +112,9 @@ def patch_flows(t, y, dydt, out, handle):
 def add_patch_flow(tables, patch, demand, y, dydt, out):
     """Add the flow through a patch to the rates of its cells; in thin water the outflow may be smaller than the demand.
 
-    demand : inflow that the links of the patch demand [kg/s], negative for outflow
-    The missing part of an outflow is written to `out` as a supply from outside.
+    demand : mass flow into the basin that the links of the patch require [kg/s], negative for outflow
+    The missing part of an outflow is written to `out` as a supply from outside. During outflow out[RATE], which limits
+    the step, is raised too.
     """
     st, layout, integers, plane = tables.settings[0], tables.layout[0], tables.integers, tables.plane
     basin, rho = tables.basins[patch["basin"]], st["rho"]
@@ -157,9 +159,9 @@ def add_patch_flow(tables, patch, demand, y, dydt, out):
 
 @njit
 def limit_inflow_rate(t, y, dydt, out, handle):
-    """Limit the time step by the waves that valves may start in the basin, also over a dry bed.
+    """Raise out[RATE], which limits the step, for waves that valves may start at patches of water, also over a dry bed.
 
-    Their speed is sqrt(drop / rho), with the pressure drop across the valve.
+    Their speed is taken as sqrt(drop / rho), with the pressure drop across the valve.
     """
     tables = open_tables(handle)
     st, valves, patches = tables.settings[0], tables.valves, tables.patches

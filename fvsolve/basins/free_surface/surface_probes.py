@@ -13,7 +13,10 @@ DEPTH = FIRST_OWN
 
 @njit
 def observe_water(t, y, out, handle, values):
-    """Write the values of the probes in cells of water: `scale` * depth + `offset` [m], or velocities [m/s]."""
+    """Write the values of probes in cells of water: `scale` times depth plus `offset` [m], or velocities [m/s].
+
+    `scale` and `offset` are columns of the table of probes.
+    """
     tables = open_tables(handle)
     for k in range(tables.probes.size):
         probe = tables.probes[k]
@@ -25,7 +28,7 @@ def observe_water(t, y, out, handle, values):
 
 @njit
 def read_water(tables, probe, y):
-    """Sums over the cells of a probe, with its weights: depth [m], and velocities along x and y [m/s].
+    """(depth [m], velocity along x, velocity along y [m/s]) at a probe: weighted sums over its cells.
 
     Velocities fade to zero in thin water.
     """

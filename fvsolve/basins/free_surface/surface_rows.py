@@ -26,10 +26,11 @@ FIELDS, SIDES, FLUXES = 7, 11, 4  # rows of a block
 
 @inline
 def put_cells(g, depth0, surface0, dh, qx, qy, kx, ky, factors, cells, top):
-    """Write depth, surface, velocities and wave speed of a row of cells, and update `top`.
+    """Write depth, surface, velocities and wave speed of a row of cells to `cells`, and update `top`.
 
     Velocity is q / h, replaced by 2 h q / (h^2 + THIN^2) at depths h below THIN.
-    depth0, surface0 : depth and surface at rest [m]; dh, qx, qy : deviation of depth [m], unit flows [m2/s]
+    g : gravity [m/s2]; depth0, surface0 : depth and surface at rest [m]
+    dh, qx, qy : deviation of depth from rest [m], unit flows [m2/s]
     kx, ky : 1 / widths of the columns, 1 / height of the row [1/m]
     factors : None, or (wide, narrow) of stretching cells, see `basins.cell_stretching`; dh, qx and qy then refer to
     undeformed areas
@@ -53,7 +54,7 @@ def put_cells(g, depth0, surface0, dh, qx, qy, kx, ky, factors, cells, top):
 
 @njit
 def put_flows(qx, qy, factors, cells):
-    """Write the unit flows of a row of cells [m2/s]. qx, qy, factors : as in `put_cells`"""
+    """Write the unit flows of a row of cells [m2/s] to `cells`. qx, qy, factors : as in `put_cells`"""
     for i in range(qx.size):
         per = 1.0 if factors is None else factors[1][i]
         cells[i + FLOW_EAST], cells[i + FLOW_NORTH] = qx[i] * per, qy[i] * per
@@ -63,7 +64,7 @@ def put_flows(qx, qy, factors, cells):
 def put_ghost_end(fields, reach, wall, cells, first, step, cell_count):
     """Write `reach` ghost cells beyond cell `first` of a row, in direction `step` (1 or -1).
 
-    fields : number of quantities; wall : 1 for mirror images, 0 for copies of cell `first`
+    fields : number of quantities in the block `cells`; wall : 1 for mirror images, 0 for copies of cell `first`
     cell_count : number of cells that can be mirrored
     """
     for f in range(fields):
@@ -78,7 +79,7 @@ def put_ghost_end(fields, reach, wall, cells, first, step, cell_count):
 def correct_ghost_end(fields, reach, speed, cells, first, step):
     """Correct ghost cells beyond cell `first` for a wall that moves along the row at `speed`: u becomes u + 2 speed.
 
-    u is the velocity along the row after reflection at a wall at rest.
+    u is the velocity along the row after reflection at a wall at rest. Other arguments as for `put_ghost_end`
     """
     for k in range(reach):
         at = first + step * (k + 1)
@@ -89,7 +90,10 @@ def correct_ghost_end(fields, reach, speed, cells, first, step):
 
 @njit
 def correct_ghost_row(n, fields, speed, cells):
-    """Correct n cells of a ghost row for a wall that moves across the row at `speed`: v becomes v + 2 speed."""
+    """Correct n cells of a ghost row for a wall that moves across the row at `speed`: v becomes v + 2 speed.
+
+    v is the velocity across the row after reflection at a wall at rest. fields : number of quantities in `cells`
+    """
     for i in range(n):
         cells[i + NORTH] += 2.0 * speed
         if fields * STRIDE > FLOW_NORTH:
@@ -98,9 +102,10 @@ def correct_ghost_row(n, fields, speed, cells):
 
 @njit
 def put_ghost_row(n, fields, walls, last, mirror, cells):
-    """Write a row of n ghost cells beyond the grid, from its last row and from the row to be mirrored.
+    """Write a row of n ghost cells beyond the grid to `cells`.
 
-    walls : float64[n]  1 for mirror images, 0 for copies of the last row; empty for walls
+    last : outermost row of the grid; mirror : row to be mirrored; fields : number of quantities
+    walls : float64[n]  1 for mirror images of `mirror`, 0 for copies of `last`; empty for walls only
     """
     for f in range(fields):
         at = f * STRIDE
@@ -116,7 +121,7 @@ def put_ghost_row(n, fields, walls, last, mirror, cells):
 
 @inline
 def put_side(i, hl, el, ul, vl, hr, er, ur, vr, push, sides):
-    """Write the values at both faces of cell i, and depth times the rise of its surface (push) [m2].
+    """Write the values at both faces of cell i, and depth times the rise of the surface across the cell (push) [m2].
 
     hl, el, ul, vl : depth, surface and velocities at the face before; hr, er, ur, vr : at the face after
     """
@@ -127,7 +132,7 @@ def put_side(i, hl, el, ul, vl, hr, er, ur, vr, push, sides):
 
 @inline
 def put_sloped(limiter, n, before, here, after, sides):
-    """Write the values at both faces of n cells with limited slopes; see `put_limited`."""
+    """Write the values at both faces of n cells with slopes by a limiter function; arguments as for `put_limited`."""
     for i in range(n):
         h, e, u, v = here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH]
         a, b = half_slopes(limiter, h - before[i], after[i] - h, e - before[i + SURFACE], after[i + SURFACE] - e)
@@ -139,7 +144,7 @@ def put_sloped(limiter, n, before, here, after, sides):
 
 @njit
 def put_limited(scheme, limiter, n, before, here, after, sides):
-    """Write the values at both faces of n cells: the cell values under UPWIND, else with limited slopes.
+    """Write the values at both faces of n cells to `sides`: cell values under UPWIND, else with limited slopes.
 
     before, here, after : values of the cells and of their neighbours before and after
     """
@@ -153,9 +158,9 @@ def put_limited(scheme, limiter, n, before, here, after, sides):
 
 @inline
 def put_fluxes(g, n, normal, along, left, right, l, r, f, moves):
-    """Write the fluxes through a row of n faces to f (HLLC); tangential momentum is carried with the mass.
+    """Write the HLLC fluxes through a row of n faces to f; tangential momentum is carried with the mass.
 
-    normal, along : EAST and NORTH, or the reverse
+    g : gravity [m/s2]; normal, along : EAST and NORTH, or the reverse
     left, right : values on either side; l, r : cells whose velocities and wave speeds bound the wave speeds at the face
     moves : None, or speeds of moving faces [m/s]; the flux is then relative to the face
     """
@@ -185,6 +190,7 @@ def put_fluxes(g, n, normal, along, left, right, l, r, f, moves):
 def put_rates(g, kx, ky, push_x, push_y, x, south, north, wide, dh, dx, dy):
     """Write the rates of a row of cells: inflow minus outflow, and the force of pressure and bed.
 
+    g : gravity [m/s2]; kx, ky : 1 / widths of the cells, 1 / height of the row [1/m]
     x, south, north : fluxes through the faces along the row, and through the faces before and after the row
     push_x, push_y : depth times rise of the surface across the cells [m2]; dh, dx, dy : rates of depth and unit flows
     wide : None, or area over undeformed area of cells, if rates refer to the undeformed area

@@ -1,4 +1,4 @@
-"""Pressure waves of a liquid on a rectangular grid of cells, density law `linear`.
+"""Pressure waves of a liquid on a rectangular grid of cells, under the density law `linear`.
 
 r_t + div m = 0, m_t + c^2 grad r = 0: deviation of density r [kg/m3], whose pressure is c^2 r, wave speed c [m/s], and
 mass-flow densities m [kg/(m2 s)]. Along each direction the waves (c r + m) / 2 and (c r - m) / 2 are reconstructed
@@ -38,14 +38,17 @@ def value_upwind5(a, b, c, d, e):
 
 @inline
 def faces_limited(limiter, b, c, d, f):
-    """Write to f the values at the faces between cells c and d, with limited slopes (MUSCL)."""
+    """Write to f the values at the faces between cells c and d, from cell c with a limited slope (MUSCL).
+
+    b, c, d : averages of three consecutive cells
+    """
     for i in range(f.size):
         f[i] = c[i] + 0.5 * slope(limiter, c[i] - b[i], d[i] - c[i])
 
 
 @njit
 def faces(scheme, limiter, small, a, b, c, d, e, f):
-    """Write to f the values at the faces between cells c and d, upwind from c.
+    """Write to f the values at the faces between cells c and d, from the side of c (upwind).
 
     a, b, c, d, e : averages of five consecutive cells; small : see `value_weno5`
     """
@@ -64,7 +67,7 @@ def faces(scheme, limiter, small, a, b, c, d, e, f):
 
 @njit
 def scheme_for(scheme, n, first, second):
-    """Scheme for a row of n cells between two sides of given kinds.
+    """Scheme for a row of n cells between two sides of the kinds `first` and `second`, see `side_kind`.
 
     It is MUSCL for fewer than five cells, except between walls or under `UPWIND`.
     """
@@ -95,14 +98,15 @@ def mirrored_cell(j, n):
 
 @njit
 def is_reversed(j, n):
-    """True if the image at index j is reversed, so that the forward and the backward wave change places."""
+    """True if the image of `mirrored_cell` at index j is reversed, so that forward and backward wave change places."""
     return j % (2 * n) >= n
 
 
 @inline
 def mirror(n, forward, backward):
-    """Fill the three ghost cells beyond both ends of a row of n cells between walls: each wave mirrors the opposite.
+    """Fill the three ghost cells beyond both ends of a row of n cells between walls.
 
+    They are mirror images of the cells, with forward and backward wave exchanged.
     forward, backward : float64[n + 6]  waves; the cells are at [3 : n + 3]
     """
     for k in range(GHOSTS):
@@ -114,14 +118,14 @@ def mirror(n, forward, backward):
 def close_side(kind, scheme, limiter, small, reflect, n, entering, leaving, first, step, spare):
     """Fill the three ghost cells of both waves beyond a side of a row of n cells that is not a wall.
 
-    On MIRRORS they are mirror images times the reflection coefficient. On OPEN sides the outgoing wave is extrapolated
-    by a polynomial. The incoming wave is extrapolated with its value at the side as an additional datum, as at the ends
-    of pipes. Kinds are those of whole sides: mixed on one side, `upwind5` would grow by 1e-4 per cell travel time.
+    At MIRRORS they are mirror images times the reflection coefficient. At OPEN sides the outgoing wave is extrapolated
+    by a polynomial; so is the incoming wave, with its value at the side as an additional datum, as at the ends of
+    pipes. All faces of a side have one kind: with different kinds on one side, solutions of `upwind5` would grow by
+    1e-4 per cell travel time.
 
-    kind : MIRRORS or OPEN; reflect : reflection coefficient of the side
-    entering, leaving : incoming and outgoing wave; the cell next to the side is at `first`, further cells follow by
-    `step`
-    spare : work array
+    kind : MIRRORS or OPEN; reflect : reflection coefficient of the side; small : see `value_weno5`
+    entering, leaving : incoming and outgoing wave; spare : work array
+    first : index of the cell next to the side; step : 1 or -1, from each cell to the next
     """
     incoming, outgoing, ghosts = (
         spare[:CLOSURE_CELLS],
@@ -155,9 +159,10 @@ def close_side(kind, scheme, limiter, small, reflect, n, entering, leaving, firs
 
 @njit
 def close_row(kind, scheme, limiter, small, reflect, n, entering, leaving, first, step, spare):
-    """Fill the three rows of ghost cells beyond the southern or northern side of a grid of n rows, in the ring of rows.
+    """Fill the three rows of ghost cells beyond the southern or northern side of a grid of n rows, in the ring buffer.
 
-    first : row next to the side; step : 1 or -1, direction into the grid; other arguments as in `close_side`
+    reflect : reflection coefficient of the side in each column; first : row next to the side
+    step : 1 or -1, direction into the grid; other arguments as in `close_side`
     """
     incoming, outgoing, rest = spare[:SIDE_VALUES], spare[SIDE_VALUES : 2 * SIDE_VALUES], spare[2 * SIDE_VALUES :]
     wide = reflect.size
@@ -200,7 +205,8 @@ def put_waves(half, r, m, forward, backward):
 def put_row_rates(c, k, forward, backward, rate_r, rate_m, rate_t):
     """Write the rates of a row of cells from the waves at the faces along it; cell i is between faces i and i + 1.
 
-    k : 1 / widths of the cells [1/m]; rate_r, rate_m, rate_t : rates of density, and of flows along and across the row
+    c : wave speed [m/s]; k : 1 / widths of the cells [1/m]
+    rate_r, rate_m, rate_t : rates of density, and of flows along and across the row
     """
     f, b = forward[1:], backward[1:]
     for i in range(rate_r.size):
@@ -213,7 +219,9 @@ def put_row_rates(c, k, forward, backward, rate_r, rate_m, rate_t):
 def add_column_rates(c, k, f0, b0, f1, b1, rate_r, rate_m):
     """Add to the rates of a row of cells the fluxes through the rows of faces before and after it.
 
-    k : 1 / height of the row [1/m]; f0, b0, f1, b1 : forward and backward waves before and after the row
+    c : wave speed [m/s]; k : 1 / height of the row [1/m]
+    f0, b0 : forward and backward waves at the faces before the row; f1, b1 : at the faces after it
+    rate_r, rate_m : rates of density and of the flow across the row
     """
     ck = c * k
     for i in range(rate_r.size):
@@ -234,13 +242,13 @@ def max_spacing_rate(kx, ky):
 
 @njit
 def first_row_read(begin, ny):
-    """First row of cells read for the faces of a band of rows that begins at row `begin` of ny."""
+    """First row of cells that is read for the faces of a band that begins at row `begin` of ny."""
     return max(min(begin - GHOSTS, ny - CLOSURE_CELLS), 0)
 
 
 @njit
 def row_needed(j, ny):
-    """Number of rows of cells that must be read before the faces between rows j - 1 and j are computed."""
+    """Number of rows of cells, from row 0, that must be read before the faces between rows j - 1 and j are computed."""
     return min(max(j + GHOSTS, CLOSURE_CELLS), ny)
 
 
@@ -252,9 +260,10 @@ def work_size(nx, ny):
 
 @njit
 def put_moving_row(c, ny, j, up, down, along, moves):
-    """Convert the waves `up` and `down` at the moving faces before row j to mass and momentum fluxes.
+    """Convert the waves `up` and `down` at the moving faces between rows j - 1 and j to mass and momentum fluxes.
 
-    On walls it also writes the pressures. along : flow densities along the faces; moves : as in `grid_rates`
+    At the sides of the grid the pressures on the faces are written to `moves` too. along : flow densities along the
+    faces; moves : as in `grid_rates`
     """
     nx, count = up.size, moves[2].size // 2
     if j == 0 or j == ny:
@@ -271,20 +280,23 @@ def grid_rates(
     c, small, scheme, limiter, nx, ny, begin, stop, kx, ky, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y,
     moves,
 ):  # fmt: skip
-    """Write the rates of the cells of rows `begin` to `stop`; return the greatest c (kx + ky) of all cells [1/s].
+    """Write the rates of the cells of rows `begin` to `stop` - 1; return the greatest c (kx + ky) of all cells [1/s].
 
-    Rows are counted over the whole grid; up to three rows beyond the band are read too.
+    Rows are counted over the whole grid; up to three rows beyond the band are read too, and more next to open sides.
     c : wave speed [m/s]; small : square of a negligible flow density [kg2/(m4 s2)]
-    kx, ky : float64[nx], float64[ny]  1/width of columns, 1/height of rows [1/m]
-    reflect : float64[2 (nx + ny)]  reflection coefficients of the faces of the sides west, east, south, north;
-        1 for walls, empty if all are walls
+    scheme : UPWIND, MUSCL, LINEAR (upwind5) or WENO5; limiter : of MUSCL
+    nx, ny : numbers of columns and rows
+    kx, ky : float64[nx], float64[ny]  1 / widths of columns, 1 / heights of rows [1/m]
+    reflect : float64[2 (nx + ny)]  reflection coefficients of the faces of the sides west, east, south, north; 1 for
+    walls, empty if all are walls
     r, mx, my : float64[nx ny]  deviation of density [kg/m3], mass-flow densities along x and y [kg/(m2 s)]
     through : float64[2 (nx + ny)]  inward flows through boundary faces [kg/(m s)], in the order of `reflect`, or empty
     work : float64[work_size(nx, ny)]
     rate_r, rate_x, rate_y : float64[nx ny]  rates of r, mx, my
     moves : None without moving walls, else a tuple of
-        speeds of the grid lines x = constant and y = constant [m/s], float64[nx + 1] and float64[ny + 1], empty if at
-        rest array for pressures on boundary faces and energy losses there, as in `liquid_mesh.liquid_rates`
+        speeds of the grid lines x = constant [m/s], float64[nx + 1], empty if at rest
+        speeds of the grid lines y = constant [m/s], float64[ny + 1], empty if at rest
+        array for pressures on boundary faces and energy losses there, as in `liquid_mesh.liquid_rates`
         density at rest [kg/m3]
         `wide` : area over undeformed area of columns or rows, see `basins.cell_stretching`
     """
@@ -318,7 +330,7 @@ def grid_rates(
 
 @njit
 def side_kinds_of(reflect, nx, ny):
-    """Kinds (WALLS, MIRRORS or OPEN) of the western, eastern, southern and northern side."""
+    """Kinds (WALLS, MIRRORS or OPEN) of the western, eastern, southern and northern side, see `side_kind`."""
     south, north = reflect[2 * ny : 2 * ny + nx], reflect[2 * ny + nx :]
     return side_kind(reflect[:ny]), side_kind(reflect[ny : 2 * ny]), side_kind(south), side_kind(north)
 
@@ -328,9 +340,10 @@ def row_rates(
     c, small, scheme, limiter, nx, ny, begin, stop, row, until, kx, ky, reflect, side_kinds, r, mx, my, through, work,
     rate_r, rate_x, rate_y, moves,
 ):  # fmt: skip
-    """Write the rates of rows `row` to `until` of the band `begin` to `stop`; calls follow in order from `begin` on.
+    """Write the rates of rows `row` to `until` - 1 of a band; calls must follow in the order of rows, without gaps.
 
-    The rates of row `until` may be incomplete until the next call.
+    begin, stop : first row of the band, and first row after it
+    Rates of rows from `until` on may be written incompletely; the next call completes them.
     side_kinds : see `side_kinds_of`; other arguments as in `grid_rates`
     """
     wide, f = nx + 2 * GHOSTS, nx + 1

@@ -3,10 +3,10 @@
 r_t + div m = 0, m_t + div(m m / rho) + grad p = 0: deviation of density r = rho - rho0 [kg/m3] and mass-flow densities
 m [kg/(m2 s)]. Law `log` is p = rho0 c0^2 ln(rho / rho0), c = c0 sqrt(rho0 / rho), with density rho0 and wave speed c0
 at rest. With w = 2 (c0 - c) and velocity u, u - w is constant along dx/dt = u - c and u + w along dx/dt = u + c
-(Riemann invariants). The waves (w + u) / 2 and (w - u) / 2 are reconstructed upwind. The state that both give at a
-face solves the Riemann problem with two simple waves (Osher and Solomon 1982), for subsonic flow. The velocity along a
-face is reconstructed from the upwind side of the flow. Fifth order is that of the waves: products of averages are of
-second order, with an error proportional to the Mach number. Sides and the ring of rows: see `grid_linear`.
+(Riemann invariants). The waves (w + u) / 2 and (w - u) / 2 are reconstructed upwind. The state that both give at a face
+solves the Riemann problem with two simple waves (Osher and Solomon 1982), for subsonic flow. The velocity along a face
+is reconstructed from the upwind side of the flow. Fifth order is that of the waves: products of averages are of second
+order, with an error proportional to the Mach number. Sides and the ring buffer of rows: see `grid_linear`.
 
 Under `table`, p, c and w = integral of c / rho d rho are read from a table (see `riemann_invariants`). A table of None
 is known at compile time, so that each law compiles and runs only its own code.
@@ -67,7 +67,7 @@ def put_primitives(c0, rho, table, kx, ky, r, mx, my, w, u, v, top):
     """Write the invariant w and both velocities u, v of a row of cells [m/s], and update `top`.
 
     top : float64[nx]  greatest (|u| + c) kx + (|v| + c) ky so far in each column [1/s]
-    c0, rho, table, kx, ky : as in `grid_rates`, with ky of this row
+    r, mx, my : states of the row; c0, rho, table, kx, ky : as in `grid_rates`, with ky of this row
     """
     if table is not None:
         for i in range(w.size):
@@ -94,7 +94,7 @@ def put_primitives(c0, rho, table, kx, ky, r, mx, my, w, u, v, top):
 def subtract_potential(c0, rho, table, phi, w):
     """Subtract the effect of a potential phi [J/kg] from the invariants w of a row of cells.
 
-    In a liquid at rest they are uniform afterwards.
+    In a liquid at rest the invariants are uniform afterwards. c0, rho, table : as in `grid_rates`
     """
     for i in range(w.size):
         w[i] = invariant_at_potential(c0, rho, table, w[i], -phi[i])
@@ -102,16 +102,17 @@ def subtract_potential(c0, rho, table, phi, w):
 
 @njit(forceinline=True)
 def log1p_small(q):
-    """ln(1 + q) by its series to q^9 / 9, for small q such as the change of a potential within a cell over c^2."""
+    """ln(1 + q) by its series to -q^8 / 8, for small q such as the change of a potential within a cell over c^2."""
     high = 1.0 / 5.0 - q * (1.0 / 6.0 - q * (1.0 / 7.0 - q * (1.0 / 8.0)))
     return q * (1.0 - q * (1.0 / 2.0 - q * (1.0 / 3.0 - q * (1.0 / 4.0 - q * high))))
 
 
 @njit(forceinline=True)
 def stiffness(c0, rho, table, r):
-    """(1 / c^2, rho c^2) of a cell with deviation of density r.
+    """(1 / c^2, density times c^2) of a cell with the deviation of density r and the wave speed c.
 
-    In a liquid at rest, pressure falls by about rho c^2 ln(1 + phi / c^2) where a potential rises by phi.
+    In a liquid at rest, pressure falls by about density times c^2 ln(1 + phi / c^2) where a potential rises by phi.
+    c0, rho, table : as in `grid_rates`
     """
     if table is None:
         bulk = rho * c0 * c0
@@ -124,8 +125,8 @@ def stiffness(c0, rho, table, r):
 def balance_row(c0, rho, table, k, step, r, phi, low, high, rate):
     """Subtract from the momentum rates of a row of cells the pressures at both faces that would keep the cells at rest.
 
+    c0, rho, table : as in `grid_rates`; k : 1 / spacing of the cells [1/m], read at every `step`-th place
     r : deviations of density; phi, low, high : potential [J/kg] of the cells and of the faces before and after them
-    k : 1 / spacing of the cells, read at every `step`-th place
     """
     for i in range(rate.size):
         per, bulk = stiffness(c0, rho, table, r[i])
@@ -134,7 +135,7 @@ def balance_row(c0, rho, table, k, step, r, phi, low, high, rate):
 
 @inline
 def faces_upwind_limited(limiter, forward, backward, b, c, d, e, f):
-    """Write to f the values at faces with limited slopes from the upwind side; see `faces_upwind`."""
+    """Write the values at faces as `faces_upwind` does, with limited slopes by a limiter function."""
     for i in range(f.size):
         on, jump = forward[i] > backward[i], d[i] - c[i]
         rise = c[i] - b[i] if on else e[i] - d[i]
@@ -146,7 +147,8 @@ def faces_upwind_limited(limiter, forward, backward, b, c, d, e, f):
 def faces_upwind(scheme, limiter, small, forward, backward, a, b, c, d, e, g, f):
     """Write to f the values at faces between cells c and d, reconstructed from the upwind side of the flow.
 
-    The velocity is the forward minus the backward wave at a face. a, b, c, d, e, g : averages of six consecutive cells
+    forward, backward : waves at the faces, whose difference is the velocity; small : see `value_weno5`
+    a, b, c, d, e, g : averages of six consecutive cells
     """
     if scheme == UPWIND:
         for i in range(f.size):
@@ -173,6 +175,7 @@ def put_fluxes(c0, rho, table, forward, backward, along, speeds, step, phi):
     and along the face
     speeds : None, or speeds of moving faces, read at every `step`-th place; the flux is then relative to the face
     phi : None, or the potential at the faces [J/kg], whose effect was subtracted from the waves and is added again
+    c0, rho, table : as in `grid_rates`
     """
     if table is not None:
         for i in range(forward.size):
@@ -199,10 +202,10 @@ def put_fluxes(c0, rho, table, forward, backward, along, speeds, step, phi):
 
 @inline
 def relative_waves(speeds, step, forward, seen):
-    """Write to `seen` the forward waves minus the speeds of moving faces.
+    """Write the forward waves minus the speeds of moving faces to `seen`.
 
-    Their difference from the backward waves is then the velocity relative to the face, which defines the upwind side.
-    speeds : read at every `step`-th place
+    Their difference from the backward waves is the velocity relative to the face, which defines the upwind side.
+    speeds : speeds of the faces [m/s], read at every `step`-th place
     """
     for i in range(seen.size):
         seen[i] = forward[i] - speeds[step * i]
@@ -227,6 +230,7 @@ def add_column_rates(k, m0, p0, t0, m1, p1, t1, rate_r, rate_m, rate_t):
     """Add to the rates of a row of cells the fluxes through the rows of faces before (0) and after it (1).
 
     k : 1 / height of the row [1/m]; m, p, t : fluxes of mass and of momentum normal to and along the faces
+    rate_r, rate_m, rate_t : rates of density, and of flows across and along the row
     """
     for i in range(rate_r.size):
         rate_r[i] += k * (m0[i] - m1[i])
@@ -245,13 +249,13 @@ def grid_rates(
     c0, rho, table, small, scheme, limiter, nx, ny, begin, stop, kx, ky, reflect, r, mx, my, through, work, rate_r,
     rate_x, rate_y, moves, phi,
 ):  # fmt: skip
-    """Write the rates of the cells of rows `begin` to `stop`; return the greatest (|u| + c) kx + (|v| + c) ky [1/s].
+    """Write the rates of cells of rows `begin` to `stop` - 1; return the greatest (|u| + c) kx + (|v| + c) ky [1/s].
 
     c0, rho : wave speed [m/s] and density [kg/m3] at rest
-    table : table of `riemann_invariants`, or None for law `log`; small : square of a negligible velocity [m2/s2]
+    table : table of `riemann_invariants`, or None for the law `log`; small : square of a negligible velocity [m2/s2]
     work : float64[work_size(nx, ny)], longer by nx + 1 if lines move
     phi : None, or the potential [J/kg] of cells, of faces between columns and of faces between rows, three arrays
-    Other arguments are those of `grid_linear.grid_rates`
+    Other arguments as for `grid_linear.grid_rates`
     """
     wide, f, size = nx + 2 * GHOSTS, nx + 1, RING * nx
     up, down, aside, work = work[:size], work[size : 2 * size], work[2 * size : 3 * size], work[3 * size :]

@@ -1,4 +1,4 @@
-"""Rates of the cells of a liquid under laws linear and log."""
+"""Rates of the cells of a liquid under the density laws `linear` and `log`."""
 
 from fvsolve.basins.basin_patches import needs_rates, put_open_flows
 from fvsolve.basins.cell_stretching import deviations_of
@@ -24,28 +24,29 @@ OWN_CODE = physics_code(__package__)
 
 @njit(forceinline=True)
 def on_grid(basin):
-    """True for a basin of liquid on a rectangular grid, without moving walls and not on a body."""
+    """True for a basin of liquid that has a rectangular grid and no moving walls, and that is not on a body."""
     return basin["kind"] == OWN_CODE and basin["nx"] > 0 and basin["walls"] == 0 and basin["frame"] < 0
 
 
 @njit(forceinline=True)
 def on_mesh(basin):
-    """True for a basin of liquid on a mesh other than a rectangular grid, without moving walls and not on a body."""
+    """True for a basin of liquid that has a mesh other than a grid and no moving walls, and that is not on a body."""
     return basin["kind"] == OWN_CODE and basin["nx"] == 0 and basin["walls"] == 0 and basin["frame"] < 0
 
 
 @njit(forceinline=True)
 def states_of(tables, basin, y):
-    """States of the cells of a basin: deviations of density [kg/m3], mass-flow densities along x and y [kg/(m2 s)]."""
+    """(deviations of density [kg/m3], mass-flow densities along x, along y [kg/(m2 s)]) of the cells of a basin."""
     n, o, seen = basin["n"], basin["y"], deviations_of(basin, tables.seen, y)
     return seen[o : o + n], seen[o + n : o + 2 * n], seen[o + 2 * n : o + 3 * n]
 
 
 @njit(forceinline=True)
 def rates_of(tables, basin, dydt):
-    """Arrays for the rates of the three states of cells; work arrays, read by no other function, if `dydt` is empty.
+    """Arrays to which the rates of the three states of cells are written.
 
-    If walls move, the states are masses and momenta per undeformed area, see `basins.cell_stretching`.
+    If `dydt` is empty, they are work arrays, which no other function reads. If walls move, the states are masses and
+    momenta per undeformed area, see `basins.cell_stretching`.
     """
     n, (to, first) = basin["n"], (dydt, basin["y"]) if dydt.size > 0 else (tables.work, basin["boundary_rates"])
     return to[first : first + n], to[first + n : first + 2 * n], to[first + 2 * n : first + 3 * n]
@@ -53,7 +54,7 @@ def rates_of(tables, basin, dydt):
 
 @njit(forceinline=True)
 def boundary_arrays(tables, basin):
-    """Three arrays of a basin: reflection coefficients of its boundary faces, flows through them, and work array."""
+    """(reflection coefficients of boundary faces, flows through them, work array) of a basin: three arrays."""
     plane, work, outer, through = tables.plane, tables.work, basin["outer_given"], basin["through"]
     reflect = plane[basin["reflect"] : basin["reflect"] + outer]
     return reflect, work[through : through + outer], work[basin["work"] :]
@@ -61,16 +62,16 @@ def boundary_arrays(tables, basin):
 
 @njit(forceinline=True)
 def spacing_of(plane, basin):
-    """1 / widths of the columns and 1 / heights of the rows of a grid [1/m], two arrays."""
+    """(1 / widths of the columns, 1 / heights of the rows) of a grid [1/m]: two arrays."""
     k, nx, ny = basin["spacing"], basin["nx"], basin["ny"]
     return plane[k : k + nx], plane[k + nx : k + nx + ny]
 
 
 @njit
 def finish_liquid(tables, b, rate, out):
-    """Write the flows of basin b through open patches to `out`, and raise the greatest rate [1/s] there to `rate`.
+    """Write the flows of basin b through open patches to `out`, and raise out[RATE], which limits the step, to `rate`.
 
-    The greatest rate limits the time step.
+    rate : greatest rate of the cells [1/s]
     """
     put_open_flows(tables, b, tables.basins[b]["thickness"], out)
     out[RATE] = max(out[RATE], rate)
@@ -78,10 +79,11 @@ def finish_liquid(tables, b, rate, out):
 
 @njit
 def by_blocks(tables, b, kx, ky, reflect, r, mx, my, through, work, y, rate_r, rate_x, rate_y):
-    """Compute `grid_linear.grid_rates` block of rows by block of rows, and return its result.
+    """Write the rates of `grid_linear.grid_rates` in blocks of rows, and return its result.
 
     The sums of Runge-Kutta stages requested in `tables.sums` are formed in the same pass, while the rows are in the
     cache.
+    b : number of the basin; y : states of the model; other arguments as for `grid_linear.grid_rates`
     """
     basin, sums, nx, ny = tables.basins[b], tables.sums, tables.basins[b]["nx"], tables.basins[b]["ny"]
     begin, stop = tables.bands[2 * b], tables.bands[2 * b + 1]
@@ -108,9 +110,9 @@ def by_blocks(tables, b, kx, ky, reflect, r, mx, my, through, work, y, rate_r, r
 
 @njit
 def linear_grid_rates(tables, b, y, dydt, out, moves, raised):
-    """Write the rates of basin b, a grid, under law linear.
+    """Write the rates of basin b, whose mesh is a grid, under the density law `linear`.
 
-    moves : as in `grid_linear.grid_rates`; raised : None, or deviations of density to use instead of the state y
+    moves : as in `grid_linear.grid_rates`; raised : None, or deviations of density to use instead of those in y
     """
     basin = tables.basins[b]
     kx, ky = spacing_of(tables.plane, basin)
@@ -132,7 +134,7 @@ def linear_grid_rates(tables, b, y, dydt, out, moves, raised):
 
 @njit
 def waves_on_grids(t, y, dydt, out, handle):
-    """Write the rates of all liquids on grids, without moving walls and not on a body, under law linear."""
+    """Write the rates of all liquids for which `on_grid` is True, under the density law `linear`."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_grid(tables.basins[b]) and needs_rates(tables.basins[b], dydt):
@@ -141,9 +143,10 @@ def waves_on_grids(t, y, dydt, out, handle):
 
 @njit
 def nonlinear_grid_rates(tables, b, table, y, dydt, out, moves, phi):
-    """Write the rates of basin b, a grid, with the full momentum flux.
+    """Write the rates of basin b, whose mesh is a grid, with the full momentum flux.
 
-    table : table of `riemann_invariants`, or None for law log; moves, phi : as in `grid_nonlinear.grid_rates`
+    table : table of `riemann_invariants`, or None for the density law `log`
+    moves, phi : as in `grid_nonlinear.grid_rates`
     """
     basin = tables.basins[b]
     kx, ky = spacing_of(tables.plane, basin)
@@ -159,7 +162,7 @@ def nonlinear_grid_rates(tables, b, table, y, dydt, out, moves, phi):
 
 @njit
 def rates_on_grids(t, y, dydt, out, handle):
-    """Write the rates of all liquids on grids, without moving walls and not on a body, under law log."""
+    """Write the rates of all liquids for which `on_grid` is True, under the density law `log`."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_grid(tables.basins[b]) and needs_rates(tables.basins[b], dydt):
@@ -170,8 +173,8 @@ def rates_on_grids(t, y, dydt, out, handle):
 def mesh_rates(tables, b, table, y, dydt, out, moves, raised, phi):
     """Write the rates of basin b on a mesh of any cells.
 
-    table : table of `riemann_invariants`, or None for laws linear and log; moves, phi : as in `liquid_rates`
-    raised : None, or deviations of density to use instead of the state y
+    table : table of `riemann_invariants`, or None for the density laws `linear` and `log`
+    moves, phi : as in `liquid_rates`; raised : None, or deviations of density to use instead of those in y
     """
     basin = tables.basins[b]
     (r, mx, my), (rate_r, rate_x, rate_y) = states_of(tables, basin, y), rates_of(tables, basin, dydt)
@@ -188,7 +191,7 @@ def mesh_rates(tables, b, table, y, dydt, out, moves, raised, phi):
 
 @njit
 def rates_on_meshes(t, y, dydt, out, handle):
-    """Write the rates of all liquids on meshes, without moving walls and not on a body, under laws linear and log."""
+    """Write the rates of all liquids for which `on_mesh` is True, under the density laws `linear` and `log`."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_mesh(tables.basins[b]) and needs_rates(tables.basins[b], dydt):

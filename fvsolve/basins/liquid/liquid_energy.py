@@ -1,7 +1,7 @@
-"""Power and stored energy of a liquid under the linear law.
+"""Power and stored energy of a liquid under the density law `linear`.
 
 The stored energy per volume is P r / rho + a^2 r^2 / (2 rho) + |m|^2 / (2 rho): piezometric pressure P at rest [Pa],
-density rho, its deviation r [kg/m3], wave speed a [m/s], mass-flow density m [kg/(m2 s)]. For the rows of the array
+density rho, its deviation r [kg/m3], wave speed a [m/s], mass-flow density m [kg/(m2 s)]. For the entries of the array
 `power` see `basin_energy`.
 """
 
@@ -15,7 +15,7 @@ OWN_CODE = physics_code(__package__)
 
 @njit
 def add_power(t, y, dydt, out, handle, power):
-    """Write the rate of change of the stored energy [W] of every liquid to its rows of `power`."""
+    """Write the rate of change of the stored energy of every liquid to `power` [W]."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if tables.basins[b]["kind"] == OWN_CODE:
@@ -25,7 +25,10 @@ def add_power(t, y, dydt, out, handle, power):
 
 @njit
 def liquid_power(st, basin, plane, y, dydt, rows):
-    """Write the rate of change of the stored energy of a liquid [W] to rows[3]."""
+    """Write the rate of change of the stored energy of a liquid [W] to rows[3].
+
+    rows : entries of the basin in `power`, see `basin_energy`
+    """
     n, o, rest, area = basin["n"], basin["y"], rest_potential(st, basin), plane[basin["drawn"] :]
     rate, square = 0.0, basin["speed"] * basin["speed"]
     for i in range(n):
@@ -36,7 +39,7 @@ def liquid_power(st, basin, plane, y, dydt, rows):
 
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
-    """Write the stored energy of every liquid above that at rest [J] to `stored`."""
+    """Write the stored energy of every liquid, relative to that at rest, to `stored` [J]."""
     tables = open_tables(handle)
     st, basins = tables.settings[0], tables.basins
     for b in range(basins.size):

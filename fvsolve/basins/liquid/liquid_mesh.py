@@ -45,7 +45,8 @@ ROWS = 16
 def put_primitives(law, c0, rho, table, r, mx, my, w, u, v, c):
     """Write the invariant w, both velocities u, v and the wave speed c of a block of cells [m/s].
 
-    Under law linear u, v are the mass-flow densities and w is c r [kg/(m2 s)].
+    Under the density law `linear`, u, v are the mass-flow densities and w is c r [kg/(m2 s)].
+    law, c0, rho, table, r, mx, my : as in `liquid_rates`, of the block
     """
     if table is not None:
         for i in range(r.size):
@@ -70,8 +71,10 @@ def put_ghosts(law, c0, rho, table, edges, ring, nx, ny, number, reflect, w, u, 
     """Write the values beyond boundary sides, from which gradients in cells are computed.
 
     They are mirror images at reflection coefficients 1 and -1, and the values of the cell at 0 (open).
-    edges : boundary sides; nx, ny : outward normals; number : numbers of the boundary faces; reflect : their reflection
-    coefficients; w, u, v : values of cells; shown_w, shown_u, shown_v : values beyond; moves : as in `liquid_rates`
+    edges, number : boundary sides, and numbers of their boundary faces; ring : see `cell_sides`
+    nx, ny : outward normals; reflect : reflection coefficients of all boundary faces; w, u, v : values of cells, see
+    `put_primitives`
+    shown_w, shown_u, shown_v : values beyond; law, c0, rho, table, moves : as in `liquid_rates`
     """
     for q in range(edges.size):
         i = ring_place(edges[q], ring)
@@ -91,8 +94,9 @@ def put_ghosts(law, c0, rho, table, edges, ring, nx, ny, number, reflect, w, u, 
 def put_reflections(law, c0, rho, table, edges, nx, ny, number, reflect, wl, ul, vl, w, moves):
     """Write the values beyond boundary sides to `w`: w - u there is the reflection coefficient times w + u inside.
 
-    A moving wall reflects waves so that the normal velocity at the wall is the speed of the wall.
-    wl, ul, vl : values at the sides from inside; other arguments as in `put_ghosts`
+    u is the outward velocity. A moving wall reflects waves so that the normal velocity at the wall is the speed of the
+    wall.
+    wl, ul, vl : values at the sides from inside; w : scratch of the block; other arguments as in `put_ghosts`
     """
     for q in range(edges.size):
         i = edges[q] % BLOCK
@@ -106,9 +110,10 @@ def put_reflections(law, c0, rho, table, edges, nx, ny, number, reflect, wl, ul,
 
 @njit
 def add_side_linear(c0, wl, ul, vl, geo, w):
-    """Subtract the outflow through one side of each cell of a block from the rates in `w`, under law linear.
+    """Subtract the outflow through one side of each cell of a block from the rates in `w`, density law `linear`.
 
-    wl, ul, vl : values at the side from inside; `w` contains the values from beyond; geo : geometry of the side
+    c0 : wave speed [m/s]; wl, ul, vl : values at the side from inside, see `put_primitives`
+    w : scratch, which contains the values from beyond; geo : first group of measures of the side, see `cell_sides`
     """
     for i in range(BLOCK):
         nx, ny, reach = geo[_NX + i], geo[_NY + i], geo[_REACH + i]
@@ -124,10 +129,12 @@ def add_side_linear(c0, wl, ul, vl, geo, w):
 
 @njit
 def add_side_linear_moving(c0, rho, wl, ul, vl, geo, w, speeds):
-    """Subtract the outflow through one moving side of each cell, flux - speed * quantity, under law linear.
+    """Subtract the outflow through one moving side of each cell, flux - speed * quantity, density law `linear`.
 
-    Tangential momentum has no flux under this law, so only the sweep of the side transfers it between cells.
-    speeds : speeds of the sides along their outward normals [m/s]; other arguments as in `add_side_linear`
+    Tangential momentum has no flux under this law, so only the sweep of the side transfers it between cells. The
+    pressure at the side and speed (c^2 r^2 - |m|^2) there, see `liquid_rates`, are written to `w` too.
+    rho : density at rest [kg/m3]; speeds : speeds of the sides along their outward normals [m/s]
+    Other arguments as in `add_side_linear`
     """
     for i in range(BLOCK):
         nx, ny, reach, speed = geo[_NX + i], geo[_NY + i], geo[_REACH + i], speeds[i]
@@ -153,7 +160,7 @@ def add_side_nonlinear(c0, rho, table, u0, v0, c, wl, ul, vl, geo, w, speeds, ph
     u0, v0, c : velocities and wave speed of the cells, for the limit of the time step
     speeds : speeds of moving sides along their outward normals [m/s], or None
     phi : None, or the potential at the sides [J/kg], whose effect was subtracted from the waves and is added again
-    Other arguments as in `add_side_linear`
+    rho : density at rest [kg/m3]; table : as in `liquid_rates`; other arguments as in `add_side_linear`
     """
     bulk, per = rho * c0 * c0, 0.5 / c0
     for i in range(BLOCK):
@@ -187,7 +194,10 @@ def add_side_nonlinear(c0, rho, table, u0, v0, c, wl, ul, vl, geo, w, speeds, ph
 
 @njit
 def put_stiffness(c0, rho, table, r, phi, w):
-    """Write 1 / c^2, rho c^2 and the potential phi [J/kg] of a block of cells to `w`, for `balance_side`."""
+    """Write 1 / c^2, density times c^2 and the potential phi [J/kg] of a block of cells to the scratch `w`.
+
+    The function `balance_side` reads them. Other arguments as for `grid_nonlinear.stiffness`
+    """
     for i in range(r.size):
         w[_PER + i], w[_BULK + i] = stiffness(c0, rho, table, r[i])
         w[_PHI + i] = phi[i]
@@ -195,9 +205,9 @@ def put_stiffness(c0, rho, table, r, phi, w):
 
 @njit
 def balance_side(phi, geo, w):
-    """Subtract from the rates of a block of cells the pressures that would keep them at rest, at one side of each cell.
+    """Subtract the pressures that would keep cells at rest, at one side of each cell of a block, from the rates in `w`.
 
-    phi : potential at the sides [J/kg]
+    phi : potential at the sides [J/kg]; geo : as in `add_side_linear`; w : with the values of `put_stiffness`
     """
     for i in range(BLOCK):
         push = geo[_REACH + i] * w[_BULK + i] * log1p_small(w[_PER + i] * (phi[i] - w[_PHI + i]))
@@ -207,9 +217,10 @@ def balance_side(phi, geo, w):
 
 @njit
 def close_walls(edges, number, reflect, geo, w, thrust):
-    """Cancel the mass flow through walls; write the pressure on boundary sides and the energy lost there by motion.
+    """Set the mass flow through walls to zero; write pressures on boundary sides and the energy lost there by motion.
 
     thrust : pressures of all boundary faces, then losses, as in `liquid_rates`
+    edges, number, reflect : as in `put_ghosts`; geo, w : as in `add_side_linear`
     """
     count = thrust.size // 2
     for q in range(edges.size):
@@ -229,8 +240,10 @@ def clear(w):
 
 @njit
 def put_rates(w, rate_r, rate_x, rate_y):
-    """Copy the rates of a block of cells from its work array `w` to the arrays of the basin, and update the greatest
-    sum of wave speed over cell size in both directions [1/s], which limits the time step."""
+    """Copy the rates of a block of cells from the scratch `w` to rate_r, rate_x, rate_y.
+
+    The greatest sum of wave speeds over the sides, which limits the time step [1/s], is updated in `w`.
+    """
     for i in range(BLOCK):
         w[_TOP + i] = max(w[_TOP + i], w[_FAST + i])
     for i in range(rate_r.size):
@@ -239,7 +252,7 @@ def put_rates(w, rate_r, rate_x, rate_y):
 
 @njit
 def work_size(integers):
-    """Length of the work array of `liquid_rates`. integers : as there"""
+    """Length of the work array of `liquid_rates`. integers : mesh, as there"""
     return 16 * integers[4] * BLOCK + 3 * integers[3] + ROWS * BLOCK
 
 
@@ -253,9 +266,8 @@ def liquid_rates(
     The sum [1/s] limits the time step: length L of a side, area A of the cell, velocity u normal to the side, wave
     speed c.
     law : LAW_LINEAR or LAW_LOG; c0, rho : wave speed [m/s] and density [kg/m3] at rest
-    table : table of `riemann_invariants` in place of a law, or None
-    scheme : UPWIND or MUSCL; wide_by : factor on the range of the neighbours that limits values at sides, 1 for no
-    excess
+    table : table of `riemann_invariants` in place of a law, or None; scheme : UPWIND or MUSCL
+    wide_by : factor on the range of the neighbours that limits values at sides; with 1 they stay within that range
     floats, integers : geometry and neighbours, see `basins.cell_sides`; n cells, b boundary faces
     reflect : float64[b]  reflection coefficients, -1 to 1, empty for walls
     r : float64[n]  deviation of density [kg/m3]; mx, my : mass-flow densities [kg/(m2 s)]
@@ -264,8 +276,8 @@ def liquid_rates(
     rate_r, rate_x, rate_y : float64[n]  rates of r, mx, my
     moves : None without moving walls, else a tuple of
         speeds of sides along their outward normals [m/s], see `moving_meshes`
-        float64[2 b]  pressures on boundary faces above that at rest [Pa], then under law linear
-            speed (c^2 r^2 - |m|^2) there [kg^2/(m3 s3)], which over 2 rho is the energy lost
+        float64[2 b]  pressures on boundary faces above that at rest [Pa], then, under the density law `linear`, speed
+            (c^2 r^2 - |m|^2) there [kg^2/(m3 s3)]; divided by 2 rho, this is the power lost per area
         `wide` : areas of cells over undeformed areas, see `basins.cell_stretching`
     phi : None, or under laws with the full momentum flux the potential [J/kg] of cells (padded to blocks) and of sides
     """

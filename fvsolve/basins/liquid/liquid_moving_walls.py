@@ -10,32 +10,32 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit(forceinline=True)
 def is_moving(basin):
-    """True for a liquid between moving walls."""
+    """True for a basin of liquid with moving walls."""
     return basin["kind"] == OWN_CODE and basin["walls"] > 0
 
 
 @njit(forceinline=True)
 def on_grid(basin):
-    """True for a basin of liquid between moving walls on a rectangular grid."""
+    """True for a basin of liquid that has a rectangular grid and moving walls."""
     return is_moving(basin) and basin["nx"] > 0
 
 
 @njit(forceinline=True)
 def on_mesh(basin):
-    """True for a basin of liquid between moving walls on a mesh other than a rectangular grid."""
+    """True for a basin of liquid that has a mesh other than a grid and moving walls."""
     return is_moving(basin) and basin["nx"] == 0
 
 
 @njit(forceinline=True)
 def line_motion(tables, basin):
-    """Motion of the grid lines of a basin: the tuple `moves` of `grid_linear.grid_rates`."""
+    """Motion of the grid lines of a basin, as the tuple `moves` of `grid_linear.grid_rates`."""
     along, across, thrust, wide, _ = moving_walls.grid_motion(tables, basin)
     return along, across, thrust, basin["density"], wide
 
 
 @njit
 def waves_on_moving_grids(t, y, dydt, out, handle):
-    """Write the rates of all liquids between moving walls on grids, under law linear."""
+    """Write the rates of all liquids between moving walls on rectangular grids, under the density law `linear`."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_grid(tables.basins[b]):
@@ -44,7 +44,7 @@ def waves_on_moving_grids(t, y, dydt, out, handle):
 
 @njit
 def rates_on_moving_grids(t, y, dydt, out, handle):
-    """Write the rates of all liquids between moving walls on grids, under law log."""
+    """Write the rates of all liquids between moving walls on rectangular grids, under the density law `log`."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_grid(tables.basins[b]):
@@ -53,7 +53,7 @@ def rates_on_moving_grids(t, y, dydt, out, handle):
 
 @njit
 def table_on_moving_grids(t, y, dydt, out, handle):
-    """Write the rates of all liquids between moving walls on grids, under law table."""
+    """Write the rates of all liquids between moving walls on rectangular grids, under the density law `table`."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_grid(tables.basins[b]):
@@ -63,7 +63,7 @@ def table_on_moving_grids(t, y, dydt, out, handle):
 
 @njit
 def rates_on_moving_meshes(t, y, dydt, out, handle):
-    """Write the rates of all liquids between moving walls on meshes of any cells, under laws linear and log."""
+    """Write the rates of liquids between moving walls on meshes other than grids, density laws `linear` and `log`."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_mesh(tables.basins[b]):
@@ -72,7 +72,7 @@ def rates_on_moving_meshes(t, y, dydt, out, handle):
 
 @njit
 def table_on_moving_meshes(t, y, dydt, out, handle):
-    """Write the rates of all liquids between moving walls on meshes of any cells, under law table."""
+    """Write the rates of liquids between moving walls on meshes other than grids, under the density law `table`."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_mesh(tables.basins[b]):
@@ -82,9 +82,10 @@ def table_on_moving_meshes(t, y, dydt, out, handle):
 
 @njit
 def displaced_potential(tables, wall):
-    """Gravitational energy of the volume swept by a wall, per distance moved along its axis [N], positive outward.
+    """Gravitational energy of the volume that a wall adds to its basin, per travel of the wall along its axis [N].
 
-    It is rho g z times the area of the wall, with the elevation z above the datum.
+    It is rho g z times the area of the wall, with the elevation z above energy datum; negative if the axis points
+    inward.
     """
     basin, length = tables.basins[wall["basin"]], 0.0
     for m in range(wall["count"]):
@@ -94,9 +95,9 @@ def displaced_potential(tables, wall):
 
 @njit
 def add_power(t, y, dydt, out, handle, power):
-    """Correct the rate of change of the stored energy [W] in `power` for moving walls.
+    """Correct the rate of change of the stored energy in `power` [W] for moving walls.
 
-    In a smaller area the same mass has a higher density and energy; walls also displace potential energy.
+    In a smaller area the same mass has a higher density and energy. Moving walls also change the potential energy.
     """
     tables = open_tables(handle)
     st, plane = tables.settings[0], tables.plane

@@ -1,10 +1,10 @@
 """Rates of a liquid in a basin on a body, in the accelerated frame of the basin.
 
-phi is the potential of gravity and inertial forces in that frame [J/kg] (`basin_frames`). Under law linear, p + rho phi
-is reconstructed instead of the pressure p, so the rates are those of a liquid without acceleration. With the full
-momentum flux, the invariants are reduced by phi. At faces phi is added again, and the pressures that would keep a cell
-at rest are subtracted from the forces on it. Beyond an open side the liquid rests in the same axes, with its pressure
-at rest at their origin.
+phi is the potential of gravity and inertial forces in that frame [J/kg] (`basin_frames`). Under the density law
+`linear`, p + rho phi is reconstructed instead of the pressure p, so the rates are those of a liquid without
+acceleration. With the full momentum flux, the invariants are reduced by phi. At faces phi is added again, and the
+pressures that would keep a cell at rest are subtracted from the forces on it. Beyond an open side the liquid rests in
+the same axes, with its pressure at rest at their origin.
 """
 
 from fvsolve.basins.basin_frames import (
@@ -38,7 +38,8 @@ def on_mesh(basin):
 def equivalent_densities(tables, basin, y):
     """Write deviations of density plus rho phi / c^2 to `tables.work`, and return their offset there.
 
-    rho phi / c^2 is the deviation of density whose pressure is rho phi.
+    phi is the potential of the frame of the basin, and rho phi / c^2 the deviation of density whose pressure is rho
+    phi.
     """
     at, n, o = int(tables.plane[basin["frame"] + POTENTIALS]), basin["n"], basin["y"]
     per = basin["density"] / (basin["speed"] * basin["speed"])
@@ -48,7 +49,7 @@ def equivalent_densities(tables, basin, y):
 
 @njit
 def grid_potentials(tables, basin):
-    """Potential phi [J/kg] of cells, of faces between columns and of faces between rows: three views of `work`."""
+    """Potential phi of the frame [J/kg] at cells, faces between columns and faces between rows: three arrays."""
     plane, at, nx, ny = tables.plane, int(tables.plane[basin["frame"] + CELL_POSITIONS]), basin["nx"], basin["ny"]
     x, y, lines = plane[at : at + nx], plane[at + nx : at + nx + ny], at + nx + ny
     across, along = plane[lines : lines + nx + 1], plane[lines + nx + 1 : lines + nx + ny + 2]
@@ -63,7 +64,7 @@ def grid_potentials(tables, basin):
 
 @njit
 def mesh_potentials(tables, basin):
-    """Potential phi [J/kg] of the cells and of the sides of cells of a mesh: two views of `tables.work`."""
+    """Potential phi of the frame [J/kg] at cells and at the sides of cells of a mesh: two views of `tables.work`."""
     plane, at, n = tables.plane, int(tables.plane[basin["frame"] + CELL_POSITIONS]), basin["n"]
     integers = tables.integers[basin["links"] :]
     side_count, work = blocks(integers) * integers[0] * BLOCK, tables.work[int(plane[basin["frame"] + POTENTIALS]) :]
@@ -76,7 +77,7 @@ def mesh_potentials(tables, basin):
 
 @njit
 def waves_on_accelerated_grids(t, y, dydt, out, handle):
-    """Write the rates of all liquids on bodies and on grids, under law linear."""
+    """Write the rates of all liquids in basins on bodies with rectangular grids, under the density law `linear`."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_grid(tables.basins[b]):
@@ -86,7 +87,7 @@ def waves_on_accelerated_grids(t, y, dydt, out, handle):
 
 @njit
 def rates_on_accelerated_grids(t, y, dydt, out, handle):
-    """Write the rates of all liquids on bodies and on grids, under law log."""
+    """Write the rates of all liquids in basins on bodies with rectangular grids, under the density law `log`."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_grid(tables.basins[b]):
@@ -95,7 +96,7 @@ def rates_on_accelerated_grids(t, y, dydt, out, handle):
 
 @njit
 def table_on_accelerated_grids(t, y, dydt, out, handle):
-    """Write the rates of all liquids on bodies and on grids, under law table."""
+    """Write the rates of all liquids in basins on bodies with rectangular grids, under the density law `table`."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
@@ -107,7 +108,7 @@ def table_on_accelerated_grids(t, y, dydt, out, handle):
 
 @njit
 def rates_on_accelerated_meshes(t, y, dydt, out, handle):
-    """Write the rates of all liquids on bodies and on meshes of any cells, under laws linear and log."""
+    """Write the rates of liquids in basins on bodies with meshes other than grids, density laws `linear` and `log`."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
@@ -120,7 +121,7 @@ def rates_on_accelerated_meshes(t, y, dydt, out, handle):
 
 @njit
 def table_on_accelerated_meshes(t, y, dydt, out, handle):
-    """Write the rates of all liquids on bodies and on meshes of any cells, under law table."""
+    """Write the rates of liquids in basins on bodies with meshes other than grids, under the density law `table`."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]

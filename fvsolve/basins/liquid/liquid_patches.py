@@ -15,7 +15,7 @@ OWN_CODE = physics_code(__package__)
 
 @njit
 def mean_deviation(tables, patch, y):
-    """Area-weighted mean of the deviation of density in the cells next to a patch [kg/m3]."""
+    """Mean of the deviation of density in the cells next to a patch, weighted by area [kg/m3]."""
     basin, total = tables.basins[patch["basin"]], 0.0
     for m in range(patch["count"]):
         i = tables.integers[patch["first"] + m]
@@ -25,10 +25,10 @@ def mean_deviation(tables, patch, y):
 
 @njit
 def patch_pressures(t, y, dydt, out, handle):
-    """Write the pressure at every patch and its slope to the node of the patch in `out`, under laws linear and log.
+    """Write the pressure at every patch of a liquid and its slope to the node of the patch in `out`.
 
     The pressure is the deviation from the steady start [Pa]; the slope is per mass in the cells next to the patch
-    [Pa/kg].
+    [Pa/kg]. This holds for the density laws `linear` and `log`.
     """
     tables = open_tables(handle)
     layout = tables.layout[0]
@@ -53,7 +53,7 @@ def patch_pressures(t, y, dydt, out, handle):
 
 @njit
 def patch_flows(t, y, dydt, out, handle):
-    """Add the mass and momentum of the flows through patches to the rates of the cells next to them."""
+    """Add the mass and momentum of flows through patches of liquids to the rates of the cells next to them."""
     tables = open_tables(handle)
     for k in range(tables.patches.size if dydt.size > 0 else 0):
         patch = tables.patches[k]

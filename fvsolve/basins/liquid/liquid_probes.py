@@ -14,9 +14,10 @@ PRESSURE = FIRST_OWN
 
 @njit
 def observe_liquid(t, y, out, handle, values):
-    """Write the values of the probes in cells of liquids: pressures [Pa] or velocities [m/s].
+    """Write the values of probes in cells of liquids: pressures [Pa] or velocities [m/s].
 
     A pressure is `scale` times the first result of `read_liquid` plus `offset`.
+    `scale` and `offset` are columns of the table of probes.
     """
     tables = open_tables(handle)
     for k in range(tables.probes.size):
@@ -29,10 +30,9 @@ def observe_liquid(t, y, out, handle, values):
 
 @njit
 def read_liquid(tables, probe, y):
-    """Sums over the cells of a probe, with its weights: deviation of density [kg/m3] and velocities u, v [m/s].
+    """(deviation of density [kg/m3], velocity along x, along y [m/s]) at a probe: weighted sums over its cells.
 
-    Under law log the first is not the deviation of density but pressure above that at rest over c0^2, which is
-    rho0 ln(rho / rho0).
+    Under the density law `log`, the first is instead rho0 ln(rho / rho0), the pressure above that at rest over c0^2.
     """
     basin, law, total, u, v = tables.basins[probe["index"]], tables.settings[0]["law"], 0.0, 0.0, 0.0
     n, o = basin["n"], basin["y"]

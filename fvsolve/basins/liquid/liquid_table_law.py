@@ -1,4 +1,4 @@
-"""Liquids under law `table`: rates, pressures at patches, probes."""
+"""Liquids under the density law `table`: rates, pressures at patches, probes."""
 
 from fvsolve.basins.basin_patches import needs_rates
 from fvsolve.basins.boundary_cells import patch_area
@@ -17,7 +17,7 @@ OWN_CODE = physics_code(__package__)
 
 @njit
 def rates_on_grids(t, y, dydt, out, handle):
-    """Write the rates of all liquids on grids, without moving walls and not on a body, under law table."""
+    """Write the rates of liquids for which `liquid_cell_rates.on_grid` is True, under the density law `table`."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
@@ -27,7 +27,7 @@ def rates_on_grids(t, y, dydt, out, handle):
 
 @njit
 def rates_on_meshes(t, y, dydt, out, handle):
-    """Write the rates of all liquids on meshes, without moving walls and not on a body, under law table."""
+    """Write the rates of liquids for which `liquid_cell_rates.on_mesh` is True, under the density law `table`."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
@@ -37,7 +37,7 @@ def rates_on_meshes(t, y, dydt, out, handle):
 
 @njit
 def patch_pressures(t, y, dydt, out, handle):
-    """Write the pressure at every patch and its slope to the node of the patch in `out`, under law table.
+    """Write the pressure at every patch of a liquid and its slope to the node in `out`, under the density law `table`.
 
     The pressure is the deviation from the steady start [Pa]; the slope is per mass in the cells next to the patch
     [Pa/kg].
@@ -59,7 +59,7 @@ def patch_pressures(t, y, dydt, out, handle):
 
 @njit
 def observe_pressures(t, y, out, handle, values):
-    """Write the values of the pressure probes in cells of liquids [Pa], under law table."""
+    """Write the values of pressure probes in cells of liquids [Pa], under the density law `table`."""
     tables = open_tables(handle)
     probes = tables.probes
     for k in range(probes.size):

@@ -30,8 +30,9 @@ SMALL = 1e-9  # negligible velocity over the wave speed
 class LiquidRows(BasinRows):
     """Rows of the tables of a model for a liquid with bulk modulus K and wave speed a.
 
-    States are deviation of density rho - rho0 [kg/m3] and mass flows per area along x and y [kg/(m2 s)]. Law linear:
-    p = a^2 (rho - rho0). Laws log, p = K ln(rho / rho0), and table have the full momentum flux.
+    States are deviation of density rho - rho0 [kg/m3] and mass flows per area along x and y [kg/(m2 s)]. Under the
+    density law `linear`, p = a^2 (rho - rho0). Under `log`, p = K ln(rho / rho0). The laws `log` and `table` have the
+    full momentum flux.
     """
 
     units = {"pressure": "Pa", "velocity": "m/s"}
@@ -69,7 +70,7 @@ class LiquidRows(BasinRows):
             )
 
     def rates(self) -> str:
-        """Compiled function that computes the rates of the cells, as `module: function`."""
+        """Name of the compiled function that computes the rates of the cells, as `module: function`."""
         shape = "grids" if self.is_grid else "meshes"
         if self.moves or self.part.on is not None:
             module, motion = ("liquid_moving_walls", "moving") if self.moves else ("liquid_on_body", "accelerated")
@@ -112,9 +113,9 @@ class LiquidRows(BasinRows):
             row["work"] = draft.to_work(liquid_mesh.work_size(self.integers))
 
     def lower_waves(self, draft, row) -> None:
-        """Append the table of Riemann invariants of the liquid to the arrays of the model (law table).
+        """Append the table of Riemann invariants of the liquid to the arrays of the model (density law `table`).
 
-        A fault is added if the wave speed is greater than the speed of sound: walls can only reduce it.
+        A fault is added if the wave speed is greater than the speed of sound, because walls can only reduce it.
         """
         if self.waves.speed > (1.0 + 1e-9) * self.waves.fluid_speed:
             speed, sound = (draft.case.amount(value, "velocity", 6) for value in (self.speed, self.waves.fluid_speed))
@@ -151,7 +152,7 @@ class LiquidRows(BasinRows):
     def pressure_at_start(self) -> np.ndarray:
         """Hydrostatic pressure of cells above the pressure at rest at the middle of the basin : float64[n] [Pa].
 
-        It holds on a body that does not accelerate: dp / rho = -d(phi) with the gravity potential phi.
+        It is that on a body without acceleration: dp / rho = -d(phi) with the gravity potential phi.
         """
         from fvsolve.basins.lower_frames import potential_at_start
 
@@ -172,7 +173,7 @@ class LiquidRows(BasinRows):
         return {"pressure": self.part.pressure + self.pressure(y[0]), "velocity": velocity}
 
     def speeds(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        moved = 0.0 if self.linear else 1.0  # law linear has no advection velocity
+        moved = 0.0 if self.linear else 1.0  # the law `linear` has no advection velocity
         return moved * self.fields(y)["velocity"], np.full(self.n, self.speed)
 
     def ranges(self) -> dict[str, tuple[float, float]]:

@@ -1,4 +1,4 @@
-"""Riemann invariants of a liquid under law `table`, as tables for compiled functions.
+"""Riemann invariants of a liquid under the density law `table`, as tables for compiled functions.
 
 The mass in a fixed volume changes by d ln rho = (1 / (rho a^2) + compliance) dp: speed of sound a of the fluid, and
 compliance of elastic walls as in pipes [1/Pa].
@@ -27,9 +27,9 @@ PANELS = 8  # panels of the integral per interval of the fluid
 class RiemannInvariants:
     """Invariant w = integral of c / rho d rho from rest at `pressure` [Pa], c^2 = dp / drho, and related quantities.
 
-    The range is that of the fluid's table, extended by its length at both ends with constant compressibility. It ends
-    where the compliance of walls gives ln(rho / rho at rest) = MAX_STRETCH, because even steps of density must resolve
-    the neighbourhood of rest.
+    The range of pressures is that of the fluid's table, extended by its length at both ends with constant
+    compressibility. It ends earlier where the compliance of walls alone gives abs(ln(rho / rho at rest)) = MAX_STRETCH,
+    because equal steps of density must resolve the neighbourhood of rest.
 
     wave_speed : wave speed at rest including walls [m/s], None for the speed of sound of the fluid
     density, speed : density [kg/m3] and wave speed [m/s] at rest; compliance : compliance of the walls [1/Pa]
@@ -67,7 +67,7 @@ class RiemannInvariants:
         return self.density * np.expm1(self.stretch(p))
 
     def impedance(self, p):
-        """rho c at a pressure p [Pa] [kg/(m2 s)]."""
+        """Density times wave speed [kg/(m2 s)] at a pressure p [Pa]."""
         return np.sqrt(self.density * np.exp(self.stretch(p)) / (self.compressibility(p) + self.compliance))
 
     def pressure(self, deviation: np.ndarray) -> np.ndarray:
@@ -93,14 +93,14 @@ class RiemannInvariants:
         return CubicHermiteSpline(self.grid, w - w[self.grid == self.rest], 1.0 / self.impedance(self.grid))
 
     def pressure_of(self, w: np.ndarray) -> np.ndarray:
-        """Pressure [Pa] at the invariant w, by Newton iteration."""
+        """Pressure [Pa] at the invariant w [m/s], by Newton iteration."""
         p = np.interp(w, self.invariant(self.grid), self.grid)
         for _ in range(4):
             p = p - (self.invariant(p) - w) * self.impedance(p)
         return p
 
     def table(self) -> np.ndarray:
-        """Table that `basins.liquid.riemann_invariants` reads : float64[...]."""
+        """Table that `basins.liquid.riemann_invariants` reads : float64[:]."""
         per_r, first_r, r = self.places(self.deviation(np.array(self.ends)))
         per_w, first_w, w = self.places(self.invariant(np.array(self.ends)))
         p, q = self.pressure(r), self.pressure_of(w)
@@ -112,17 +112,22 @@ class RiemannInvariants:
         return np.concatenate([head, of_r.ravel(), np.hstack(of_w).ravel()])
 
     def places(self, ends) -> tuple[float, int, np.ndarray]:
-        """Multiples of an even step between two ends, as (1 / step, number of the first multiple, the multiples)."""
+        """(1 / step, number of the first multiple, multiples) of the step of a uniform grid between two ends.
+
+        The step is the distance of the ends over the number of intervals of the table; the multiples are the grid
+        points.
+        """
         step = (ends[1] - ends[0]) / max(REFINEMENT * self.interval_count, 3 * LEAST_INTERVALS)
         first = math.ceil(ends[0] / step)
         return 1.0 / step, first, step * np.arange(first, math.floor(ends[1] / step) + 1)
 
 
 def cubics(value: np.ndarray, slope: np.ndarray, first: int) -> np.ndarray:
-    """Coefficients of a cubic in s from 0 to 1 per interval, from values and slopes per interval at n points.
+    """Coefficients of a cubic in s from 0 to 1 for each interval between n points : float64[n - 1, 4], constant first.
 
-    The first and last interval are straight. first : number of the first point, counted from rest, where the value is 0
-    Returns float64[n - 1, 4], constant term first.
+    value : values at the points; slope : slopes there, as change per interval
+    In the first and the last interval the cubic is the tangent at the inner point.
+    first : number of the first point (0 or negative); point 0 is at rest, and its value is set to exactly 0
     """
     value[-first] = 0.0
     (f, g), (d, e) = ((both[:-1], both[1:]) for both in (value, slope))

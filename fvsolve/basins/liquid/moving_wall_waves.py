@@ -1,9 +1,10 @@
 """Waves of a liquid at moving walls, and fluxes through moving faces.
 
-A wall that moves outward at `speed` reflects waves so that the velocity at the wall is `speed`. Under law `linear` the
-mass flow is m = speed (rho + r), so that no mass passes. Waves are (c r + m) / 2 and (c r - m) / 2 under that law, and
-(w + u) / 2 and (w - u) / 2 if `full` (full momentum flux), see `grid_linear` and `grid_nonlinear`. c : wave speed
-[m/s]; rho : density at rest [kg/m3]; r : deviation of density
+A wall that moves outward at `speed` reflects waves so that the velocity at the wall is `speed`. Under the density law
+`linear` the mass flow is m = speed (rho + r), so that no mass passes. Waves are (c r + m) / 2 and (c r - m) / 2 under
+that law, and (w + u) / 2 and (w - u) / 2 if `full` (full momentum flux), see `grid_linear` and `grid_nonlinear`.
+
+c : wave speed [m/s]; rho : density at rest [kg/m3]; r : deviation of density
 """
 
 from fvsolve.jit import inline, njit
@@ -15,7 +16,9 @@ GHOSTS = 3  # number of ghost cells beyond a side
 def wall_flow(full, c, rho, speed, arriving):
     """Outward mass-flow density m (velocity u if `full`) at a wall that moves outward at `speed` [m/s].
 
-    arriving : c r + m (w + u if `full`) from inside, twice the outgoing wave
+    full : True with the full momentum flux, False under the density law `linear`
+    c, rho : wave speed [m/s] and density [kg/m3] at rest
+    arriving : c r + m (w + u if `full`) from inside, twice the outgoing wave; r : deviation of density; w : invariant
     """
     return speed if full else speed * (arriving + rho * c) / (c + speed)
 
@@ -25,7 +28,7 @@ def mirror_at_walls(full, c, rho, n, first, last, forward, backward):
     """Fill the three ghost cells beyond both ends of a row of n cells between moving walls.
 
     first, last : speeds of the walls before and after the row, along the row [m/s]
-    forward, backward : float64[n + 6]  waves; the cells are at [3 : n + 3]
+    forward, backward : float64[n + 6]  waves; the cells are at [3 : n + 3]; full, c, rho : as for `wall_flow`
     """
     for k in range(GHOSTS):
         low, high = 2 - k, n + 3 + k
@@ -39,7 +42,10 @@ def mirror_at_walls(full, c, rho, n, first, last, forward, backward):
 
 @njit
 def correct_mirror_row(full, c, rho, speed, entering, leaving, n):
-    """Correct the n waves of a mirrored row of ghost cells for a wall that moves outward at `speed` [m/s]."""
+    """Correct the n waves of a mirrored row of ghost cells for a wall that moves outward at `speed` [m/s].
+
+    entering, leaving : waves into and out of the grid in the mirrored row; full, c, rho : as for `wall_flow`
+    """
     for i in range(n):
         m = wall_flow(full, c, rho, speed, 2.0 * entering[i])
         entering[i], leaving[i] = entering[i] - m, leaving[i] + m
@@ -47,15 +53,19 @@ def correct_mirror_row(full, c, rho, speed, entering, leaving, n):
 
 @njit
 def reflect_at_wall(full, c, rho, speed, leaving, entering, n):
-    """Write the waves reflected at n faces of a wall that moves outward at `speed` [m/s] to `entering`."""
+    """Write the waves reflected at n faces of a wall that moves outward at `speed` [m/s] to `entering`.
+
+    leaving : waves that arrive at the wall; full, c, rho : as for `wall_flow`
+    """
     for i in range(n):
         entering[i] = leaving[i] - wall_flow(full, c, rho, speed, 2.0 * leaving[i])
 
 
 @njit
 def put_wall_pressure(c, speed, forward, backward, along, n, thrust, loss):
-    """Write the pressure on n faces of a moving wall under law `linear`, and the energy lost there.
+    """Write the pressures on n faces of a moving wall under the density law `linear`, and the energy lost there.
 
+    c : wave speed; speed : outward speed of the wall [m/s]; forward, backward : waves at the faces
     along : mass-flow densities along the wall; thrust, loss : see `moves` of `liquid_mesh.liquid_rates`
     """
     for i in range(n):
@@ -65,9 +75,10 @@ def put_wall_pressure(c, speed, forward, backward, along, n, thrust, loss):
 
 @njit
 def put_wall_flux(push, n, thrust, mass, along):
-    """Write the pressure on n faces of a wall with the full momentum flux, and set the other fluxes to 0.
+    """Write the pressures on n faces of a wall with the full momentum flux, and set the other fluxes to 0.
 
-    No mass passes a wall, so its momentum flux `push` is the pressure.
+    No mass passes a wall, so its momentum flux `push` is the pressure. thrust : the pressures
+    mass, along : fluxes of mass and of momentum along the wall
     """
     for i in range(n):
         thrust[i], mass[i], along[i] = push[i], 0.0, 0.0
@@ -75,8 +86,9 @@ def put_wall_flux(push, n, thrust, mass, along):
 
 @inline
 def put_moving_fluxes(c, rho, speeds, step, forward, backward):
-    """Convert waves at moving faces to fluxes of mass and momentum relative to the faces, under law `linear`.
+    """Convert waves at moving faces to fluxes of mass and momentum relative to the faces, density law `linear`.
 
+    c, rho : wave speed [m/s] and density [kg/m3] at rest
     forward, backward : waves; afterwards fluxes of mass and of momentum
     speeds : speeds of the faces [m/s], read at every `step`-th place
     """
@@ -88,11 +100,13 @@ def put_moving_fluxes(c, rho, speeds, step, forward, backward):
 
 @inline
 def put_row_rates(k, speeds, mass, push, along, rate_r, rate_m, rate_t):
-    """Write the rates of a row of cells from the fluxes at the moving faces along it, under law `linear`.
+    """Write the rates of a row of cells from the fluxes at the moving faces along it, density law `linear`.
 
     Cell i is between faces i and i + 1. The faces sweep over the momentum along them, so its flux is -speed times its
-    mean over both cells. k : 1 / widths [1/m]; mass, push : fluxes of mass and momentum; along : momentum along faces,
-    by cell
+    mean over both cells.
+    k : 1 / widths of the cells [1/m]; speeds : speeds of the faces [m/s]
+    mass, push : fluxes of mass and of momentum normal to the faces; along : momentum along the faces in each cell
+    rate_r, rate_m, rate_t : as for `grid_linear.put_row_rates`
     """
     m, p, last = mass[1:], push[1:], rate_r.size - 1
     for i in range(rate_r.size):
@@ -111,8 +125,9 @@ def put_row_rates(k, speeds, mass, push, along, rate_r, rate_m, rate_t):
 def add_column_rates(k, s0, s1, m0, p0, m1, p1, before, here, after, rate_r, rate_m, rate_t):
     """Add to the rates of a row of cells the fluxes through the rows of moving faces before (0) and after it (1).
 
-    k : 1 / height of the row [1/m]; s, m, p : speeds, mass and momentum fluxes of the faces
+    k : 1 / height of the row [1/m]; s, m, p : speeds of the faces, and fluxes of mass and normal momentum
     before, here, after : momentum along the faces in the row before, in this row and in the row after
+    rate_r, rate_m, rate_t : rates of density, and of flows across and along the row
     """
     for i in range(rate_r.size):
         rate_r[i] += k * (m0[i] - m1[i])

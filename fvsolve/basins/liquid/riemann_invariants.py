@@ -20,8 +20,8 @@ W_OF_R, OF_W = 0, 4  # places of both grids in it
 def locate(table, grid, x, size):
     """(offset in the table of the cubics of the interval that contains x, position s of x in that interval).
 
-    grid : place of the grid in the head of the table; size : number of coefficients per interval
-    NaN gives the first interval and s = NaN.
+    grid : W_OF_R if x is a deviation of density, OF_W if x is an invariant; size : number of coefficients per interval
+    For NaN the result is the first interval and s = NaN.
     """
     z, first, last = x * table[grid], table[grid + 1], table[grid + 2]
     k = z - first
@@ -33,7 +33,7 @@ def locate(table, grid, x, size):
 
 @njit(forceinline=True)
 def invariant(table, r):
-    """(w, dw/dr = c / rho) at a deviation r of density from rest."""
+    """(w [m/s], dw/dr = c / rho) at a deviation r of density from rest [kg/m3]; table : see `riemann_invariants`."""
     k, s = locate(table, W_OF_R, r, 4)
     b, c, d = table[k + 1], table[k + 2], table[k + 3]
     return table[k] + s * (b + s * (c + s * d)), table[W_OF_R] * (b + s * (2.0 * c + 3.0 * s * d))
@@ -41,7 +41,7 @@ def invariant(table, r):
 
 @njit(forceinline=True)
 def state(table, w):
-    """(deviation of density r [kg/m3], deviation of pressure p [Pa]) from rest at the invariant w."""
+    """(deviation of density r [kg/m3], deviation of pressure p [Pa]) from rest at the invariant w [m/s]."""
     k, s = locate(table, OF_W, w, 8)
     r = table[k] + s * (table[k + 1] + s * (table[k + 2] + s * table[k + 3]))
     return r, table[k + 4] + s * (table[k + 5] + s * (table[k + 6] + s * table[k + 7]))
@@ -49,7 +49,7 @@ def state(table, w):
 
 @njit(forceinline=True)
 def speed(table, rho, w):
-    """Wave speed c [m/s] at the invariant w. rho : density at rest"""
+    """Wave speed c [m/s] at the invariant w [m/s]. rho : density at rest [kg/m3]"""
     k, s = locate(table, OF_W, w, 8)
     b, c, d = table[k + 1], table[k + 2], table[k + 3]
     dense = rho + table[k] + s * (b + s * (c + s * d))
@@ -60,8 +60,9 @@ def speed(table, rho, w):
 def invariant_at_potential(c0, rho, table, w, phi):
     """Invariant of a liquid at rest where the potential is higher by phi [J/kg] than where the invariant is w.
 
-    It satisfies c dw = dp / rho = -d(phi). Law log (table None): exact, the new c^2 is the old c^2 plus phi. Law table:
-    midpoint rule, relative error (phi / c^2)^3.
+    It satisfies c dw = dp / rho = -d(phi). Under the density law `log` (table None) it is exact: the new c^2 is the old
+    c^2 plus phi. Under `table` it is that of the midpoint rule, with a relative error of (phi / c^2)^3.
+    c0, rho : wave speed [m/s] and density [kg/m3] at rest
     """
     if table is None:
         c = c0 - 0.5 * w
@@ -71,7 +72,7 @@ def invariant_at_potential(c0, rho, table, w, phi):
 
 @njit(forceinline=True)
 def pressure(table, rho, r):
-    """(deviation of pressure p [Pa], dp/dr = c^2) at a deviation r of density. rho : density at rest"""
+    """(deviation of pressure p [Pa], dp/dr = c^2) at a deviation r of density from rest. rho : density at rest"""
     w, slope = invariant(table, r)
     c = (rho + r) * slope
     return state(table, w)[1], c * c

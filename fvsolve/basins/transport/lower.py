@@ -64,10 +64,10 @@ class TransportRows(BasinRows):
             row["through"] = draft.to_plane(inward[self.ring()] if self.is_grid else inward)
 
     def unsplit(self, row, passing: list[str]) -> float:
-        """Factor on the rate of outflow of a cell that limits the time step.
+        """Factor on the greatest rate of outflow of a cell; the product is the rate that limits the time step.
 
-        With it explicit Euler steps of Courant number 1 keep scalars within their bounds.
-        passing : names of the patches with flow through them
+        Explicit Euler steps of Courant number 1 by this rate keep scalars within their bounds, except with upwind5,
+        which has no bounds. row : row of the table of basins; passing : names of the patches with flow through them
         """
         if row["scheme"] in (rec.UPWIND, rec.LINEAR):
             return 1.0
@@ -77,7 +77,7 @@ class TransportRows(BasinRows):
         return patch in self.passing
 
     def flows(self, draft) -> np.ndarray:
-        """Flow through every face of the mesh along its normal, per thickness [m2/s]."""
+        """Flow through every face of the mesh along its normal, per thickness : float64[f] [m2/s]."""
         given, mesh = self.part.velocity.given, self.mesh
         if self.part.velocity.form == "u, v":
             return velocity_flows(mesh, *(given[key].at(*np.ascontiguousarray(mesh.middle.T)) for key in "uv"))

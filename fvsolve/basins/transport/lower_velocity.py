@@ -25,34 +25,34 @@ ROUNDED_CROSSFLOW = (
 
 
 def constant(x, y, u, v):
-    """Uniform velocity; u, v [m/s]."""
+    """Stream function [m2/s] of the uniform velocity (u, v) [m/s]."""
     return u * y - v * x
 
 
 def rotation(x, y, centre, angular_velocity):
-    """Solid-body rotation, anticlockwise about centre [m]; angular_velocity [rad/s]."""
+    """Stream function [m2/s] of a solid-body rotation, anticlockwise about centre [m]; angular_velocity [rad/s]."""
     return -0.5 * angular_velocity * ((x - centre[0]) ** 2 + (y - centre[1]) ** 2)
 
 
 def swirl(x, y, speed=1.0, origin=(0.0, 0.0), size=1.0):
-    """Swirl of LeVeque (1996): psi = speed size / pi sin^2(pi x / size) sin^2(pi y / size); speed [m/s], size [m]."""
+    """Stream function [m2/s] of LeVeque's swirl (1996), speed size / pi sin^2(pi x / size) sin^2(pi y / size)."""
     x, y = np.pi * (x - origin[0]) / size, np.pi * (y - origin[1]) / size
     return speed * size / np.pi * np.sin(x) ** 2 * np.sin(y) ** 2
 
 
 def shear(x, y, rate, y0=0.0, u=0.0):
-    """Shear flow along x, u + rate (y - y0); rate [1/s], u [m/s]."""
+    """Stream function [m2/s] of a shear flow along x, velocity u + rate (y - y0); rate [1/s], u [m/s], y0 [m]."""
     return u * y + 0.5 * rate * (y - y0) ** 2
 
 
 def parabolic(x, y, speed, south, north):
-    """Parabolic flow along x between walls at y = south and y = north [m]; speed [m/s] is the mean velocity."""
+    """Stream function [m2/s] of a parabolic flow along x between walls at y = south and north; speed : mean u."""
     s = (y - south) / (north - south)
     return speed * (north - south) * s * s * (3.0 - 2.0 * s)
 
 
 def cellular(x, y, speed, width, height, origin=(0.0, 0.0)):
-    """Vortices of width by height [m], alternately anticlockwise (first) and clockwise; speed [m/s]: greatest u."""
+    """Stream function [m2/s] of vortices of width by height [m] with alternate senses; speed : greatest u [m/s]."""
     s = np.sin(np.pi * (x - origin[0]) / width) * np.sin(np.pi * (y - origin[1]) / height)
     return speed * height / np.pi * s
 
@@ -68,8 +68,8 @@ def face_flows(mesh: Mesh, velocity: Mapping) -> np.ndarray:
 
     velocity : {"expression": name, and its parameters}, {"stream": float64[p] stream function at the corners [m2/s]} or
     {"file": CSV file with columns x, y, u, v or x, y, psi, with units in the header or in SI, interpolated linearly}.
-    All but the flows from u and v are exactly free of divergence in every cell. Raises ValueError for an expression,
-    MeshError for a file.
+    All but the flows from u and v are exactly free of divergence in every cell. Raises ValueError or TypeError for a
+    wrong expression or stream function, MeshError for a wrong file.
     """
     kinds = {"expression": _by_name, "stream": _by_corners, "file": _by_file}
     given = [kind for kind in kinds if kind in velocity]
@@ -79,10 +79,11 @@ def face_flows(mesh: Mesh, velocity: Mapping) -> np.ndarray:
 
 
 def grid_flows(mesh: Mesh, flows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Flows through the faces of a rectangle, row by row: two arrays, eastward and northward.
+    """(eastward, northward) flows through the faces of a rectangle without holes, row by row.
 
-    eastward : float64[ny (nx + 1)]; northward : float64[(ny + 1) nx]. Raises ValueError for a mesh that is not a full
-    rectangle.
+    eastward : float64[ny (nx + 1)]; northward : float64[(ny + 1) nx]
+    flows : float64[f]  flows through the faces of the mesh along their normals
+    Raises ValueError for any other mesh.
     """
     grid = mesh.grid
     if grid is None or (grid.index < 0).any():
@@ -113,7 +114,10 @@ def _by_name(mesh: Mesh, expression: str, **parameters) -> np.ndarray:
 
 
 def _by_corners(mesh: Mesh, stream: np.ndarray) -> np.ndarray:
-    """Flows as differences of a stream function along faces, after rounding so that the differences are exact."""
+    """Flows through faces as differences of a stream function, rounded so that the differences are exact : float64[f].
+
+    stream : float64[p]  stream function at the corners [m2/s]
+    """
     stream = np.asarray(stream, float)
     if stream.shape != (len(mesh.points),):
         raise ValueError(f"stream has shape {stream.shape}; expected a value for each of {len(mesh.points)} corners")
@@ -126,7 +130,7 @@ def _by_corners(mesh: Mesh, stream: np.ndarray) -> np.ndarray:
 
 
 def constant_along_walls(mesh: Mesh, stream: np.ndarray) -> np.ndarray:
-    """Stream function made constant along parts of the outline where it varies by rounding errors only : float64[p]."""
+    """Stream function, made constant along boundary parts where it varies by rounding errors only : float64[p]."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -139,7 +143,7 @@ def constant_along_walls(mesh: Mesh, stream: np.ndarray) -> np.ndarray:
 
 
 def is_outer_loop(mesh: Mesh) -> np.ndarray:
-    """True for faces of the outer outline, False for outline faces around holes : bool[outline faces]."""
+    """True for boundary faces of the outer boundary, False for those around holes : bool[boundary faces]."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -152,7 +156,7 @@ def is_outer_loop(mesh: Mesh) -> np.ndarray:
 def velocity_flows(mesh: Mesh, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Flows through faces from velocities u, v at their middles : float64[f] [m2/s].
 
-    Flows across the outline that are rounding errors are set to zero.
+    Flows through the boundary that are rounding errors are set to zero.
     """
     normal = u * mesh.normal[:, 0] + v * mesh.normal[:, 1]
     still = np.abs(normal) <= ROUNDED_CROSSFLOW * np.hypot(u, v).max()
@@ -171,7 +175,7 @@ def _by_file(mesh: Mesh, file: str | Path) -> np.ndarray:
 
 
 def _columns(path: Path) -> dict[str, np.ndarray]:
-    """Columns of a CSV file of velocities or of a stream function : name -> float64[rows] in SI."""
+    """Columns of a CSV file of velocities or of a stream function : name -> float64[rows], in SI units."""
     try:
         rows = read_rows(path)
         if set(rows.names) not in map(set, COLUMNS) or len(rows.names) not in map(len, COLUMNS):

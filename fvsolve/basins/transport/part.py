@@ -18,11 +18,11 @@ from fvsolve.units import show
 
 @dataclass(frozen=True)
 class Velocity:
-    """A given velocity.
+    """Given velocity of a basin, as stated by the key `velocity`.
 
     form : "u, v", "stream", "expression" or "file"
-    given : {"u": formula, "v": formula}, {"stream": formula}, {"expression": name, and its parameters} or {"file":
-    path}
+    given : {"u": formula, "v": formula}, {"stream": formula}, {"expression": name, and its parameters}
+        or {"file": path}
     period : period of the factor cos(pi t / period) on the velocity [s], None for a constant velocity
     stated : the table as written in the case file
     """

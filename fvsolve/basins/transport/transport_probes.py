@@ -9,7 +9,7 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def observe_given_flows(t, y, out, handle, values):
-    """Write the values of the probes of inflow through patches by a given velocity [m3/s]."""
+    """Write the values of probes of the inflow through patches [m3/s], in basins with a given velocity."""
     tables = open_tables(handle)
     for k in range(tables.probes.size):
         if tables.probes[k]["kind"] == GIVEN_FLOW:

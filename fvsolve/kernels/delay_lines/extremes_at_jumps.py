@@ -2,7 +2,7 @@
 
 A jump is an instantaneous change of a wave; it passes a point between two recorded states. The value just before or
 after it is the smooth part at that time, by linear interpolation between both states, plus the jumps that have arrived
-by then. q : segment of a delay line; clock : result of `reading_data`; places : result of `offsets_of`.
+by then. q : stretch within a delay line; clock : result of `reading_data`; places : result of `offsets_of`.
 """
 
 from fvsolve.jit import njit
@@ -68,10 +68,11 @@ def store_smooth_values(t, y, state, handle):
 
 @njit
 def extremes_at_jump(t, time, y, state, handle):
-    """Update the extremes of probes and the first times below vapour pressure by the values beside a jump.
+    """Update the extremes of probes and the first times below vapour pressure by the values on a side of a jump.
 
+    Probes within pipes are left out, see `update_probe_extremes`.
     time : arrival time of the jump [s]; t : end of the step [s]
-    state : `out` at t with the jumps that have arrived so far
+    state : `out` at t, with the jumps that have arrived before this jump, or with this jump too
     """
     tables = open_tables(handle)
     past, spare, marks, pipes, nodes = tables.past, tables.spare, tables.marks, tables.pipes, tables.nodes
@@ -84,7 +85,7 @@ def extremes_at_jump(t, time, y, state, handle):
     for k in range(probes):
         probe = tables.probes[k]
         if (probe["kind"] == PIPE_PRESSURE or probe["kind"] == PIPE_FLOW) and probe["side"] == 0:
-            continue  # see `update_line_extremes`
+            continue  # see `update_probe_extremes`
         value = values[k] + share * (spare[first + k] - spare[third + k])
         update_extremes(tables.extremes, k, time, value)
         mark = probe["mark"]
@@ -101,8 +102,8 @@ def line_extremes_at_jumps(past, places, clock, line, q, x, sign, before, t):
     """Extremes of r + sign l on both sides of the jumps that pass a point of a delay line, without friction loss.
 
     Returns (least, time of the least, greatest, time of the greatest) [kg/s, s]; without a jump, least is INFINITE.
-    r, l : forward and backward wave; sign : 1 for pressure, -1 for flow; x : position as fraction of segment q
-    before, t : begin and end of the step [s]
+    r, l : forward and backward wave; sign : 1 for pressure, -1 for flow; x : position as fraction of stretch q
+    before, t : begin and end of the step [s]; places : result of `offsets_of`; clock : result of `reading_data`
     """
     least, t_least, greatest, t_greatest = INFINITE, t, -INFINITE, t
     queue, tau, s, same = int(past[JUMP_CAPACITY]), line["tau"], line["stretch"] + q, clock[4]
@@ -129,7 +130,11 @@ def line_extremes_at_jumps(past, places, clock, line, q, x, sign, before, t):
 
 @njit
 def envelope_where_jumps_cross(past, places, clock, tables, line, q, before, t):
-    """Update the pressure envelope at each point of segment q where two jumps cross between times `before` and t."""
+    """Update the pressure envelope at each point of stretch q where two jumps cross between times `before` and t.
+
+    All four combinations of values before and after both jumps are used. Other arguments as for
+    `line_extremes_at_jumps`.
+    """
     queue, tau, s, same, pipe = (
         int(past[JUMP_CAPACITY]),
         line["tau"],
@@ -168,7 +173,10 @@ def envelope_where_jumps_cross(past, places, clock, tables, line, q, before, t):
 
 @njit
 def update_line_extremes(past, places, tables, before, t):
-    """Update envelopes and extremes within delay lines by the values beside jumps that pass between `before` and t."""
+    """Update envelopes and extremes within delay lines by the values beside jumps that pass between `before` and t.
+
+    The first times below vapour pressure along the lines are updated too.
+    """
     clock = reading_data(past, int(past[COUNT]) - 1)
     for number in range(tables.delays.size):
         line, pipe = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]]
@@ -200,7 +208,7 @@ def update_line_extremes(past, places, tables, before, t):
 def mark_vapour(tables, number, j, t, value):
     """Record the first time at which the pressure at output point j of a pipe falls below vapour pressure.
 
-    number : number of the pipe; value : sum of both waves [kg/s]
+    number : number of the pipe; value : sum of both waves at the point [kg/s]; t : time of this value [s]
     """
     marks, cell = tables.marks, tables.pipes[number]["cell"] + j
     if value < tables.profile[cell] and marks[number] != marks[number]:

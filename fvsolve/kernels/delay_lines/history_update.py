@@ -40,6 +40,9 @@ from fvsolve.kernels.table_handle import open_tables
 def record_lines(t, y, out, handle, values):
     """After an accepted step, store the waves sent into delay lines, pass on arrived jumps, and update envelopes.
 
+    For the status ARRIVED in `out`, only admit the jumps that end a step at t. The status AMENDED on return means that
+    y or the waves have changed, so the state must be evaluated and recorded again. Otherwise out[ARRIVES] receives the
+    time of the next jump that ends a step, t if it is now, or NEVER.
     values : probe values of the state y at t
     """
     tables = open_tables(handle)
@@ -72,7 +75,11 @@ def record_lines(t, y, out, handle, values):
 
 @njit
 def record_again(past, places, tables, t, y, out):
-    """Record a state at the time of the last entry again: after a kink or event, or after a correction of the state."""
+    """Record a state at the time of the last entry again: after a kink or event, or after a correction of the state.
+
+    After a correction the waves that nodes send replace those of the entry; otherwise changes are jumps
+    (`detect_jumps`). An earlier state is ignored.
+    """
     k = int(past[COUNT]) - 1
     last = time_of(past, k)
     if past[CORRECTED_TIME] == last:
@@ -85,7 +92,10 @@ def record_again(past, places, tables, t, y, out):
 
 @njit
 def record_step(past, places, tables, t, y, out, handle):
-    """Pass on the jumps that have arrived in an accepted step; then write the waves as a new entry."""
+    """Pass on the jumps that have arrived in an accepted step; then write the waves as a new entry.
+
+    Jumps at nodes correct the states y; then out[STATUS] becomes AMENDED. Extremes beside jumps are updated.
+    """
     before = time_of(past, int(past[COUNT]) - 1)
     write_joint_arrivals(past, places, tables, t)
     live = past[JUMPS_TRAVELLING] > 0.0
@@ -145,7 +155,7 @@ def update_line_envelopes(t, places, tables):
 
 @njit
 def write_ends(past, places, tables, entry, out):
-    """Write the waves that nodes send into delay lines again into an existing entry."""
+    """Write the waves that nodes send into delay lines, which are in `out`, again into entry number `entry`."""
     for i in range(tables.delays.size):
         line, at = tables.delays[i], tables.layout[0]["ends"] + 4 * tables.delays[i]["pipe"]
         write_entry(past, places, line, 0, entry, 0, out[at])
@@ -154,7 +164,7 @@ def write_ends(past, places, tables, entry, out):
 
 @njit
 def remove_all_arrived_jumps(past, places, delays, before):
-    """Remove the jumps that have arrived and that no later reading needs from the lists of all delay lines.
+    """Remove the jumps that have been passed on and that no later reading needs from the lists of all delay lines.
 
     before : time of the last entry [s]
     """

@@ -19,7 +19,7 @@ NAN = float("nan")
 
 @njit(forceinline=True)
 def change_times(past, tables, t, time, sent):
-    """Times for which a change within a step acts, and for which the weights of the method count it [s].
+    """(time for which a change within a step acts, time for which the weights of the method count it) [s].
 
     Stages before the change do not include it. Stages after it include it as if it had always been there. No stage
     includes a jump that was sent since the last entry.
@@ -39,6 +39,7 @@ def change_times(past, tables, t, time, sent):
 def missing_time(times, rate):
     """Time that the weights of the step miss [s], reduced because a node with storage soon balances the inflow.
 
+    It is negative if the weights count the change for too long.
     times : result of `change_times`; rate : rate at which the node adopts the new pressure [1/s]
     Without the reduction, a jump at a node that fills within a step would be corrected by more than it brings.
     """
@@ -49,7 +50,7 @@ def missing_time(times, rate):
 
 @njit(forceinline=True)
 def stores_inflow(tables, i):
-    """True if node i has storage and stores its inflow now; a tank that is empty or spills does not."""
+    """True if node i has storage and stores its inflow now; patches, and tanks held at bottom or rim, do not."""
     node = tables.nodes[i]
     if node["kind"] == FIXED or node["kind"] == JUNCTION or node["kind"] == PATCH:
         return False
@@ -65,9 +66,11 @@ def filling_rate(tables, out, i, j):
 
 @njit(forceinline=True)
 def correct_store(past, tables, y, out, pipe, i, flow, times):
-    """Add the mass of a flow from a delay line, which began within the step, to node i; subtract it from the line.
+    """Add to node i the mass that the step missed of a flow out of a delay line; subtract it from the line.
 
-    Nodes without storage are left unchanged. flow [kg/s]; times : result of `change_times`
+    The flow [kg/s] began within the step. Without `stores_inflow` nothing is changed. A change marks the step as
+    corrected (past[CORRECTED_TIME] = NaN). pipe : row of the line's pipe
+    out : values of the right-hand side after the jump; times : result of `change_times`
     """
     if flow != 0.0 and stores_inflow(tables, i):
         mass = flow * missing_time(times, filling_rate(tables, out, i, i))
@@ -78,9 +81,10 @@ def correct_store(past, tables, y, out, pipe, i, flow, times):
 
 @njit
 def correct_columns(past, tables, y, i, change, times):
-    """Add the mass flow that a pressure jump within the step, `change` [Pa] at node i, has given to rigid columns.
+    """Add to the flow of each rigid column at node i what the step missed of the effect of a pressure jump there.
 
-    times : result of `change_times`
+    change : jump of the pressure within the step [Pa]; times : result of `change_times`. A change marks the step as
+    corrected (past[CORRECTED_TIME] = NaN).
     """
     columns = tables.columns
     for k in range(columns.size):
@@ -96,9 +100,9 @@ def correct_columns(past, tables, y, i, change, times):
 def correct_behind_valves(past, tables, y, spare, out, times):
     """Correct nodes with storage behind valves, and rigid columns, for a jump at nodes that are solved with valves.
 
-    The mass added to these nodes is subtracted from the delay lines that feed them.
-
-    spare, out : state before and after the jump; times : result of `change_times`
+    The mass added to these nodes is subtracted from all delay lines whose outflow into junctions the jump has changed,
+    in proportion to the change.
+    spare, out : values of the right-hand side before and after the jump; times : result of `change_times`
     """
     layout, valves, nodes = tables.layout[0], tables.valves, tables.nodes
     pressure, given, fed = layout["pressure"], 0.0, 0.0

@@ -1,8 +1,9 @@
-"""Jumps in delay lines: detection, storage, passage through friction and through the joints between segments.
+"""Jumps in delay lines: detection, storage, passage through friction and through the joints between stretches.
 
-A jump is an instantaneous change of a wave by a schedule, a valve or an event. A jump below `numerics.delay_tolerance`
-joins the smooth part of the wave. Friction in the middle of a segment reflects the difference of the friction losses
-with and without the jump. s, q : segment, counted over all lines, or within its line; wave : 0 forward, 1 backward.
+A jump is an instantaneous change of a wave by a schedule, a valve or an event. A jump below the size of `least_jump`
+joins the smooth part of the wave. Friction in the middle of a stretch reflects the difference of the friction losses
+with and without the jump. s, q : stretch, counted over all lines, or within its line; wave : 0 forward, 1 backward.
+pipe, line : row of the pipe and of its delay line; places : result of `offsets_of`.
 """
 
 from fvsolve.jit import njit
@@ -55,16 +56,19 @@ def has_short_lines(tables):
 
 @njit(forceinline=True)
 def least_jump(past, tables, pipe):
-    """Size below which a jump joins the smooth part [kg/s]: a fraction of the greatest jump or greatest wave so far."""
+    """Size up to which a jump joins the smooth part of a wave of a pipe [kg/s].
+
+    A quarter of `numerics.delay_tolerance` times the greatest jump or wave so far, and at least rounding.
+    """
     least = tables.settings[0]["jumps"] * max(past[GREATEST_JUMP], past[GREATEST_WAVE])
     return max(least, NOISE * 0.5e5) * pipe["admittance"]
 
 
 @njit
 def store_jump(past, places, s, wave, t, size, pipe):
-    """Store a jump of a wave that enters segment s at t; where the list is full, record the size that did not fit.
+    """Store a jump of a wave that enters stretch s at t; if the list is full, record the greatest size without storage.
 
-    size : change of the wave [kg/s]
+    s : stretch counted over all lines; wave : 0 forward, 1 backward; size : change of the wave [kg/s]
     """
     if not insert_jump(past, places, jump_head(places, s, wave), t, size):
         past[GREATEST_UNSTORED_JUMP] = max(past[GREATEST_UNSTORED_JUMP], abs(size) / pipe["admittance"])
@@ -72,14 +76,20 @@ def store_jump(past, places, s, wave, t, size, pipe):
 
 @njit
 def store_large_jump(past, places, tables, s, wave, t, size, pipe):
-    """Store a jump of a wave that enters segment s at t, unless it is small: then it joins the smooth part."""
+    """Store a jump of a wave that enters stretch s at t, unless it is small (`least_jump`): it joins the smooth part.
+
+    Arguments as for `store_jump`.
+    """
     if abs(size) > least_jump(past, tables, pipe):
         store_jump(past, places, s, wave, t, size, pipe)
 
 
 @njit(forceinline=True)
 def first_waiting_jump(past, places, s, wave):
-    """Offset in `past` of the first jump of a wave of segment s that has not been passed on at its end; -1 for none."""
+    """Offset in `past` of the time of the first jump of a wave that has not left stretch s; -1 for none.
+
+    Its size is `past[JUMP_CAPACITY]` places further. s : stretch counted over all lines; wave : 0 forward, 1 backward
+    """
     at, queue = jump_head(places, s, wave), int(past[JUMP_CAPACITY])
     if not past[at + ARRIVED_COUNT] < past[at + JUMP_COUNT]:
         return -1
@@ -88,9 +98,9 @@ def first_waiting_jump(past, places, s, wave):
 
 @njit
 def reflected_part(past, places, tables, line, pipe, q, wave, size, t):
-    """Part of a jump that friction in the middle of segment q reflects [kg/s]; the jump is not yet passed on.
+    """Part of a jump that friction in the middle of stretch q reflects [kg/s]; the jump is not yet passed on.
 
-    size : change of the wave by the jump [kg/s]; t : arrival time at the end of the segment [s]
+    size : change of the wave by the jump [kg/s]; t : end of the step in which it reaches the end of the stretch [s]
     """
     if not has_friction(pipe):
         return 0.0
@@ -107,7 +117,10 @@ def reflected_part(past, places, tables, line, pipe, q, wave, size, t):
 
 @njit
 def pass_jumps_at_joints(past, places, tables, t):
-    """Pass all jumps that leave inner segments of delay lines by t on to the next segments, with their reflections."""
+    """Pass all jumps that leave inner stretches of delay lines by t on to the next stretches, with their reflections.
+
+    Inner stretches are neither the first nor the last of their line. Small jumps join the smooth part (`least_jump`).
+    """
     queue = int(past[JUMP_CAPACITY])
     for number in range(tables.delays.size):
         line, pipe = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]]
@@ -127,7 +140,10 @@ def pass_jumps_at_joints(past, places, tables, t):
 
 @njit
 def write_joint_arrivals(past, places, tables, t):
-    """Write the waves that arrive at t at the joints between segments and at the ends of delay lines into `past`."""
+    """Write the waves that arrive at t at both ends of every stretch, and its friction loss, into `past`.
+
+    See `write_arrivals`; at the ends of lines see `write_all_arrivals`.
+    """
     write_all_arrivals(past, tables, t)
     clock = reading_data(past, newest_before(past, t))
     for i in range(tables.delays.size):
@@ -138,9 +154,10 @@ def write_joint_arrivals(past, places, tables, t):
 
 @njit
 def complete_short_arrivals(past, places, tables, t):
-    """Complete the arriving waves of delay lines shorter than a step by the part that arrives at once.
+    """Write the arriving waves of delay lines shorter than a step, with the part of sent waves that arrives at once.
 
-    Before, they hold for zero pressure deviations at both ends. t : time of the last entry, whose waves give this part
+    They replace the waves by `write_arrivals`, which hold for zero pressure deviations at both ends. The part is that
+    of the waves in the last entry. t : time of that entry
     """
     newest = int(past[COUNT]) - 1
     clock = reading_data(past, newest)
@@ -161,7 +178,10 @@ def complete_short_arrivals(past, places, tables, t):
 
 @njit(forceinline=True)
 def last_sent_wave(past, places, line, q, side, k):
-    """Wave sent into segment q of a delay line by entry k, with its jumps [kg/s]; side : 0 forward, 1 backward wave."""
+    """Wave sent into stretch q of a delay line at entry k: its smooth part and all jumps so far [kg/s].
+
+    side : 0 forward, 1 backward wave
+    """
     ring, mask = ring_of(places, line, q)
     jumps = jump_head(places, line["stretch"] + q, side)
     return past[ring + 2 * (k & mask) + side] + jumps_until(past, places, jumps, INFINITE)
@@ -169,7 +189,10 @@ def last_sent_wave(past, places, line, q, side, k):
 
 @njit
 def waves_differ(past, places, tables, k, out):
-    """True if the waves that nodes send now differ from those of entry k by more than rounding."""
+    """True if the waves that nodes send now differ from those of entry k by more than rounding, or are NaN.
+
+    out : values of the right-hand side now
+    """
     for i in range(tables.delays.size):
         line = tables.delays[i]
         pipe, at = tables.pipes[line["pipe"]], tables.layout[0]["ends"] + 4 * line["pipe"]
@@ -184,7 +207,9 @@ def waves_differ(past, places, tables, k, out):
 def detect_jumps(past, places, tables, t, y, out, short):
     """Compare the waves that nodes send now with the last entry; store large differences as jumps, others in the entry.
 
-    short : True if nodes joined by lines shorter than a step are solved again; then the state is corrected
+    t : time of the last entry; out : values of the right-hand side now
+    short : True to solve nodes again, with the waves of that entry in lines shorter than a step. A jump then sets
+        out[STATUS] to AMENDED, because the state must be evaluated again.
     """
     k, ends, state = int(past[COUNT]) - 1, tables.layout[0]["ends"], out
     if short:

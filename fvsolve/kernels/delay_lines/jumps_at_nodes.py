@@ -1,11 +1,15 @@
 """Jumps of delay lines at nodes: each at its own time, in order of arrival, with the values on both sides of it.
 
-At a junction of pipes only, the pressure is the sum of the arriving waves over the admittance Y, so a jump is reflected
-and passed on at once. At a valve the nodes are solved again with the jump. So a jump passes linear elements exactly,
-and nonlinear elements by the secant over the jump. The tables `sharp` serve this purpose: there, lines shorter than a
-step are treated like longer lines, so that a jump needs its travel time in them too. At nodes with instantaneous
-devices a step ends when a jump arrives. The state just before is recorded, then the jump is admitted and events act
-(`admit_jumps`). q : segment within its line; wave : 0 forward, 1 backward; side : 0 end at `from`, 1 end at `to`.
+At a junction of pipes only, the pressure is twice the sum of the arriving waves over the sum of the admittances, so a
+jump is reflected and passed on at once. At a valve the nodes are solved again with the jump. So a jump passes linear
+elements exactly, and nonlinear elements by the secant over the jump. The tables `sharp` serve this purpose: there,
+lines shorter than a step are treated like longer lines, so that a jump needs its travel time in them too. At nodes with
+instantaneous devices a step ends when a large jump arrives (`ends_step`). The state just before is recorded, then the
+jump is admitted (`admit_jumps`) and events act.
+
+q : stretch within its line; wave : 0 forward, 1 backward; side : 0 end at `from`, 1 end at `to`; line, pipe : row of a
+delay line and of its pipe; places : result of `offsets_of`; state : values of the right-hand side at the end of the
+step, with the jumps that have arrived so far.
 """
 
 from fvsolve.jit import njit
@@ -59,7 +63,7 @@ CROWDED_COUNT = 1e6  # jumps travelling at one time; with so many, only a jump a
 def solved_alone(tables, i):
     """True if node i is solved without other nodes.
 
-    Then its pressure is given, or is the sum of the arriving waves over the admittance of its pipes.
+    Its pressure is then given by a state or schedule, or follows from arriving waves, known flows and its admittance.
     """
     node = tables.nodes[i]
     return node["kind"] != JUNCTION or node["solve"] == ALONE
@@ -67,17 +71,18 @@ def solved_alone(tables, i):
 
 @njit(forceinline=True)
 def end_stretch(line, side):
-    """Segment at an end of a delay line, counted over all lines; side : 0 `from`, 1 `to`."""
+    """Stretch at an end of a delay line, counted over all lines; side : 0 `from`, 1 `to`."""
     return line["stretch"] + (line["stretches"] - 1 if side == 1 else 0)
 
 
 @njit(forceinline=True)
 def ends_step(past, tables, line, pipe, q, wave, size):
-    """True if a step ends when a jump of segment q, or the part that friction reflects, arrives.
+    """True if a step ends when a jump of stretch q, or the part of it that friction reflects, leaves the stretch.
 
-    It does so at nodes with instantaneous devices. After a small jump the device acts at the end of the step. The
-    least size of such a jump never decreases in a run: otherwise a jump to be passed on within a step would stay in the
-    list.
+    It does so if it arrives at a node with an instantaneous device and is large; after a small jump the device acts at
+    the end of the step. The least size of such a jump never decreases in a run: otherwise a jump to be passed on within
+    a step would stay in the list.
+    q : stretch within the line; wave : 0 forward, 1 backward; size : change of the wave [kg/s]
     """
     acts = line["acts"]
     if acts == 0:
@@ -93,7 +98,7 @@ def ends_step(past, tables, line, pipe, q, wave, size):
 
 @njit
 def next_arrival(past, places, tables, t):
-    """Arrival time of the next jump after t that ends a step [s]; INFINITE for none."""
+    """Arrival time of the next jump after t that ends a step (`ends_step`) [s]; INFINITE for none."""
     first_time, queue, after = INFINITE, int(past[JUMP_CAPACITY]), t + time_tolerance(past)
     for number in range(tables.delays.size):
         line, pipe = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]]
@@ -114,7 +119,11 @@ def next_arrival(past, places, tables, t):
 
 @njit
 def admit_jumps(past, places, tables, t):
-    """Let all jumps that end a step at t arrive; `detect_jumps` then computes the changes at nodes."""
+    """Let the jumps that end a step at t arrive; `detect_jumps` then computes the changes at nodes.
+
+    Their parts that stay in the line, transmitted or reflected, enter the neighbouring stretches. past[NEXT_ARRIVAL]
+    receives the time of the following such jump.
+    """
     queue = int(past[JUMP_CAPACITY])
     for number in range(tables.delays.size):
         line, pipe = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]]
@@ -138,9 +147,10 @@ def admit_jumps(past, places, tables, t):
 
 @njit
 def earliest_jump(past, places, tables, t):
-    """Jump that arrives first at an end of a delay line by t: (line, segment within the line, wave, offset in `past`).
+    """Jump that is the first to leave a first or last stretch of a delay line by t.
 
-    line is -1 without a jump. Jumps that end a step are left out.
+    Returns (line, stretch within the line, wave, offset of its time in `past`); the line is -1 without a jump. Jumps
+    that end a step (`ends_step`) are left out.
     """
     best, result = t + time_tolerance(past), (-1, 0, 0, -1)
     for number in range(tables.delays.size):
@@ -157,8 +167,10 @@ def earliest_jump(past, places, tables, t):
 
 @njit
 def pass_jumps_at_ends(past, places, own, t, y, out, handle):
-    """Pass on the jumps that arrive at the ends of delay lines up to t, in order; return True if there is a jump.
+    """Pass on the jumps that leave first and last stretches of delay lines up to t, in order; return True for any jump.
 
+    Extremes are updated by the values beside each jump. Masses of storing nodes and lines and flows of columns in y are
+    corrected (`jump_correction`). Jumps that end a step are left out.
     own : tables of the run, in which short lines couple their ends at once
     """
     number, q, wave, place = earliest_jump(past, places, own, t)
@@ -198,9 +210,10 @@ def pass_jumps_at_ends(past, places, own, t, y, out, handle):
 
 @njit
 def leave_stretch(past, places, tables, y, state, number, q, wave, time, size, times):
-    """Pass a jump on from segment q of a delay line, in the direction of a wave; False if nodes must be solved for it.
+    """Pass a jump on from stretch q of a delay line, in the direction of a wave; False if nodes must be solved for it.
 
-    number : number of the line; size : change of the wave [kg/s]; times : result of `change_times`
+    At an end of the line it is added to the arriving wave in `past`; a node that is solved alone then responds, see
+    `enter_plain_node`, which defines the other arguments. wave : 0 forward, 1 backward
     """
     line, pipe = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]]
     onward, side = q + 1 if wave == 0 else q - 1, 1 if wave == 0 else 0
@@ -218,9 +231,11 @@ def leave_stretch(past, places, tables, y, state, number, q, wave, time, size, t
 
 @njit
 def enter_plain_node(past, places, tables, y, state, number, side, time, size, times):
-    """Let a jump arrive at an end of a delay line, at a node that is solved alone.
+    """Let a jump arrive at an end of a delay line, at a node that is solved alone: the node sends jumps at once.
 
-    number : number of the line; size : change of the wave [kg/s]; times : result of `change_times`
+    y : states, corrected; state : values of the right-hand side at the end of the step, updated
+    number : number of the line; side : 0 end at `from`, 1 at `to`; size : change of the wave [kg/s]
+    time : arrival time [s]; times : result of `change_times`
     """
     line, pipe, layout = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]], tables.layout[0]
     i = pipe["to_node"] if side == 1 else pipe["from_node"]
@@ -245,9 +260,10 @@ def enter_plain_node(past, places, tables, y, state, number, side, time, size, t
 
 @njit
 def solve_nodes_again(past, places, tables, t, y, state, sharp, time, times):
-    """Solve the nodes with the waves that arrive now; store the changes of the waves they send as jumps.
+    """Solve the nodes with the waves that arrive now; store large changes of the waves that they send as jumps.
 
-    time : arrival time of the jump [s]; times : result of `change_times`
+    y : states, corrected; state : values of the right-hand side before the jump, replaced by the solution
+    sharp : handle, see the module; time : arrival time of the jump [s]; times : result of `change_times`
     """
     layout, size = tables.layout[0], state.size
     solved = tables.spare[size : 2 * size]

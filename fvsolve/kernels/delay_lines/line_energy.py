@@ -1,15 +1,15 @@
 """Stored energy, friction power and rate of storage of delay lines, from the waves sent into them.
 
-A segment of travel time tau contains the waves sent into it at ages u of 0 .. tau: the forward wave R at the distance
-u c from its beginning, the backward wave L at u c from its end; c is the wave speed. Beyond the middle of the segment
+A stretch of travel time tau contains the waves sent into it at ages u of 0 .. tau: the forward wave R at the distance
+u c from its beginning, the backward wave L at u c from its end; c is the wave speed. Beyond the middle of the stretch
 the forward wave is smaller by delta, the friction loss there, and the backward wave is larger by delta.
 
-In units of 1 / (rho A) per length, with density rho and area A, the segment stores
-R^2 + L^2 + (q0 + M0) R + (q0 - M0) L above the initial steady state. M0 is its mass flow, q0 = Y P0 its total pressure
-P0 times the admittance Y; q0 falls along the line by drag0 per travel time. The power that enters at the ends is stored
-or taken. Taken are (drag(M) - drag0) M times the length of the segment, with the flow M in its middle, and drag0 times
-the integral of M. The power taken is that of friction, drag(M) M times the length, and the error of the midpoint rule
-for falling q0.
+In units of 1 / (rho A) per length, with density rho and area A, the stretch stores
+R^2 + L^2 + (q0 + M0) R + (q0 - M0) L above the initial steady state. M0 is its mass flow, q0 = Y P0 its potential P0 =
+p - p_ambient + rho g z times the admittance Y; q0 falls along the line by drag0 times the travel time. The power that
+enters at the ends is stored or taken. Taken are (drag(M) - drag0) M times the length of the stretch, with the flow M in
+its middle, and drag0 times the integral of M. The power taken is that of friction, drag(M) M times the length, and the
+error of the midpoint rule for falling q0.
 
 A line shorter than a step h stores the fraction 1 - beta of the waves sent in h, beta = 1 - tau / h. It takes
 beta (1 - beta) c (s - s_h)^2 of each wave s; s_h is the wave sent h before.
@@ -45,7 +45,10 @@ GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 
 @njit
 def sent_waves(t, out, tables, number, q, at):
-    """Both waves sent into segment q of delay line `number` at a time `at` <= t: (forward, backward) [kg/s]."""
+    """Both waves sent into stretch q of delay line `number` at a time `at` <= t: (forward, backward) [kg/s].
+
+    `at` may lie in the step that ends at t, see `sent_wave`. out : values of the right-hand side at t
+    """
     past, newest = tables.past, int(tables.past[COUNT]) - 1
     if newest >= 0 and (at <= time_of(past, newest) or t <= time_of(past, newest)):
         return read_waves(past, offsets_of(past), reading_data(past, newest), tables.delays[number], q, at)
@@ -54,7 +57,10 @@ def sent_waves(t, out, tables, number, q, at):
 
 @njit
 def kink_before(past, places, line, q, t, least):
-    """Latest time before t at which a wave sent into segment q may have a kink or jump [s]; at least `least`."""
+    """Latest time before t at which a wave sent into stretch q may have a kink or jump [s]; at least `least`.
+
+    Kinks may be at entries. places : result of `offsets_of`; line : row of the delay line
+    """
     latest, queue, before = least, int(past[JUMP_CAPACITY]), t - time_tolerance(past)
     k, x = find_interval(past, int(past[COUNT]) - 1, before)
     k += x == 1.0
@@ -72,9 +78,11 @@ def kink_before(past, places, line, q, t, least):
 
 @njit
 def stretch_integrals(t, out, tables, number, q):
-    """Integrals over segment q of R - L [kg m/s], and of the energy of forward and of backward wave times rho A.
+    """Integrals over stretch q of delay line `number` at t: (of R - L [kg m/s], of energies of R, of L [kg2 m/s2]).
 
-    R, L : forward and backward wave [kg/s]; rho A : density times area of the pipe [kg/m]
+    The energies, above the initial steady state, are multiplied by rho A, see the module. In a line shorter than a step
+    h the integrals are 1 - beta times those of the waves sent in h, beta = 1 - tau / h; the first is so twice.
+    R, L : forward and backward wave [kg/s]; rho A : density times area [kg/m]; out : values of the right-hand side at t
     """
     past, line, st = tables.past, tables.delays[number], tables.settings[0]
     pipe, places, hold, share = tables.pipes[line["pipe"]], offsets_of(past), line["hold"], 1.0 - line["now"]
@@ -102,9 +110,9 @@ def stretch_integrals(t, out, tables, number, q):
 
 @njit
 def line_energy(t, out, tables, number, rows):
-    """Change of the energy stored in a delay line since the start [J], as sum of two parts.
+    """Write the change of the energy stored in delay line `number` since the start [J], in two parts.
 
-    rows[0] : part of the forward wave; rows[1] : part of the backward wave
+    rows[0] : receives the part of the forward wave; rows[1] : that of the backward wave
     """
     line, rows[0], rows[1] = tables.delays[number], 0.0, 0.0
     per = 1.0 / (tables.settings[0]["rho"] * tables.pipes[line["pipe"]]["area"])

@@ -1,9 +1,9 @@
 """Forward and backward waves at any point of a delay line, for probes, output along the line and envelopes.
 
-At a fraction x of a segment of travel time tau, from its `from` end, the forward wave is
+At a fraction x of a stretch of travel time tau, from its `from` end, the forward wave is
 r(t, x) = sent(t - x tau) - x delta, and the backward wave is l(t, x) = sent(t - (1 - x) tau) + (1 - x) delta. delta is
-the friction loss in the middle of the segment, at the time when the wave at x passes the middle. At both ends the
-formulas give the arriving waves.
+the friction loss in the middle of the stretch at an earlier time: for x >= 1/2 when the forward wave at x passed the
+middle, for x < 1/2 when the backward wave at x passed it. At both ends the formulas give the arriving waves.
 """
 
 from fvsolve.jit import njit
@@ -33,9 +33,10 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def sent_wave(t, out, tables, number, q, wave, at):
-    """Wave sent into segment q of delay line `number` at a time `at` <= t [kg/s].
+    """Wave sent into stretch q of delay line `number` at a time `at` <= t, with its jumps [kg/s].
 
-    `at` may lie in the step that ends at t. wave : 0 forward, 1 backward
+    `at` may lie in the step that ends at t; there a wave from a node is linear up to its value in `out` at t. The
+    result is 0 before the first entry. wave : 0 forward, 1 backward
     """
     past, line = tables.past, tables.delays[number]
     newest = int(past[COUNT]) - 1
@@ -60,7 +61,10 @@ def sent_wave(t, out, tables, number, q, wave, at):
 
 @njit
 def waves_at(t, out, tables, number, share):
-    """Forward and backward wave [kg/s] of delay line `number` at a fraction `share` of its length from `from`."""
+    """(forward, backward) wave [kg/s] at t of delay line `number` at a fraction `share` of its length from `from`.
+
+    out : values of the right-hand side at t
+    """
     line = tables.delays[number]
     pipe, stretches = tables.pipes[line["pipe"]], line["stretches"]
     q = min(int(share * stretches), stretches - 1)
@@ -76,7 +80,10 @@ def waves_at(t, out, tables, number, share):
 
 @njit
 def waves_along_line(t, out, tables, number, r, l):
-    """Write both waves [kg/s] at the centres of r.size equal parts of a line."""
+    """Write forward and backward wave [kg/s] at the centres of r.size equal parts of line `number` to r and l.
+
+    out : values of the right-hand side at t
+    """
     n = r.size
     for j in range(n):
         r[j], l[j] = waves_at(t, out, tables, number, (j + 0.5) / n)
@@ -84,9 +91,10 @@ def waves_along_line(t, out, tables, number, r, l):
 
 @njit
 def sent_wave_linear(past, places, clock, ring, mask, jumps, wave, t):
-    """Wave sent into a segment at t [kg/s], by linear interpolation between entries, with its jumps.
+    """Wave sent into a stretch at t [kg/s], by linear interpolation between entries, with its jumps.
 
-    ring, mask : result of `ring_of`; clock : result of `reading_data`; jumps : offset of the head of its jumps
+    ring, mask : result of `ring_of`; places : result of `offsets_of`; clock : result of `reading_data`
+    jumps : offset of the head of its jumps; wave : 0 forward, 1 backward
     """
     last, latest, often, even = clock[0], clock[1], clock[2], clock[3]
     place = (t - latest) * often
@@ -105,7 +113,8 @@ def sent_wave_linear(past, places, clock, ring, mask, jumps, wave, t):
 def waves_at_linear(t, past, places, clock, line, share):
     """Both waves as in `waves_at` at the time t of the last entry, by linear interpolation; used for envelopes.
 
-    The friction loss is that of the waves that arrive at the ends of the segment at t.
+    The friction loss is that of the waves that arrive at the ends of the stretch at t. line : row of the delay line;
+    places : result of `offsets_of`; clock : result of `reading_data`
     """
     stretches, tau = line["stretches"], line["tau"]
     q = min(int(share * stretches), stretches - 1)
@@ -128,13 +137,13 @@ def waves_at_linear(t, past, places, clock, line, share):
 
 @njit
 def waves_along_line_number(t, out, handle, number, r, l):
-    """Write both waves [kg/s] at the centres of r.size equal parts of delay line `number`."""
+    """Write forward and backward wave [kg/s] at the centres of r.size equal parts of delay line `number` to r and l."""
     waves_along_line(t, out, open_tables(handle), number, r, l)
 
 
 @njit
 def observe_lines(t, y, out, handle, values):
-    """Write the values of probes within delay lines."""
+    """Write the values of the pressure and flow probes within delay lines, between their ends, to `values`."""
     tables = open_tables(handle)
     probes = tables.probes
     for k in range(probes.size):

@@ -1,8 +1,8 @@
 """Delay lines in the right-hand side, under the linear density law.
 
-A line consists of segments of travel time tau. The forward wave r and the backward wave l travel unchanged to the
-middle of a segment. There friction subtracts delta = tau / 2 (drag(M) - drag0) from the forward wave and adds it to the
-backward wave; drag is the rate of mass flow by friction [kg/s2], drag0 its value in the initial steady state. M is the
+A line consists of stretches of travel time tau. The forward wave r and the backward wave l travel unchanged to the
+middle of a stretch. There friction subtracts delta = tau / 2 (drag(M) - drag0) from the forward wave and adds it to the
+backward wave; drag is the friction term of dM/dt [kg/s2], drag0 its value in the initial steady state. M is the
 mass flow in the middle, M + delta = M0 + r - l, with M0 in the initial steady state and the waves sent tau ago
 (midpoint rule along the path; passive, as friction is).
 
@@ -35,12 +35,15 @@ from fvsolve.kernels.table_handle import open_tables
 
 FLOW_TOLERANCE = 1e-6  # relative error of the flow at which Newton stops
 SLOPE_ERROR = 0.2  # relative error of the slope where the friction factor depends on the flow
-MAX_ITERATIONS = 60  # iterations
+MAX_ITERATIONS = 60  # of Newton's method
 
 
 @njit(forceinline=True)
 def drag_and_slope(pipe, flow):
-    """(drag [kg/s2], d drag / d flow [1/s]); the slope ignores that the friction factor depends on the flow."""
+    """(drag [kg/s2], d drag / d flow [1/s]) of a pipe at a mass flow [kg/s].
+
+    The slope is exact for Hazen-Williams; otherwise it ignores that the friction factor may depend on the flow.
+    """
     size = abs(flow)
     if pipe["friction"] == FRICTION_HAZEN:
         loss, rough, p = pipe["loss"], pipe["rough"], power_of_square(size * size)  # same rounding as in `drag`
@@ -51,15 +54,16 @@ def drag_and_slope(pipe, flow):
 
 @njit(forceinline=True)
 def has_friction(pipe):
-    """True if friction changes the waves of a pipe."""
+    """True if friction, or the initial drag of the pipe, changes its waves."""
     return not (pipe["friction"] == FRICTION_NONE and pipe["drag"] == 0.0)
 
 
 @njit(forceinline=True)
 def friction_loss(pipe, line, r, l):
-    """Friction loss in the middle of a segment, where waves r and l meet [kg/s], by Newton's method.
+    """Lumped friction loss in the middle of a stretch, where waves r and l meet [kg/s], by Newton's method.
 
-    It is subtracted from r and added to l. The equation is monotone in the flow.
+    delta = tau / 2 (drag(M) - drag0), M = M0 + r - l - delta; the equation is monotone in M. The loss delta is
+    subtracted from r and added to l. M0, drag0 : flow and drag of the initial steady state; line : row of the line
     """
     if not has_friction(pipe):
         return 0.0
@@ -78,10 +82,11 @@ def friction_loss(pipe, line, r, l):
 
 @njit(forceinline=True)
 def write_arrivals(past, places, clock, line, pipe, q, t):
-    """Write both waves that arrive at t at the ends of segment q of a delay line, and its friction loss, into `past`.
+    """Write both waves that arrive at t at the ends of stretch q of a delay line, and its friction loss, into `past`.
 
     Three numbers [kg/s]: the backward wave at its beginning, the forward wave at its end, the loss. In a line shorter
     than a step both waves hold for zero pressure deviation p' at its ends. Jumps travel through it as through any line.
+    places : result of `offsets_of`; clock : result of `reading_data`; line, pipe : rows of the line and of its pipe
     """
     ring, mask = ring_of(places, line, q)
     k, w = stencil(past, clock, t - line["hold"])
@@ -102,7 +107,7 @@ def write_arrivals(past, places, clock, line, pipe, q, t):
 
 @njit
 def write_all_arrivals(past, tables, t):
-    """Write the waves that arrive at the ends of all delay lines at t into `past`.
+    """Write the waves that arrive at t in first and last stretches of delay lines into `past`, see `write_arrivals`.
 
     Nodes are solved several times at one time; the waves are read only once.
     """
@@ -121,7 +126,10 @@ def write_all_arrivals(past, tables, t):
 
 @njit
 def outgoing_line_waves(t, y, dydt, out, handle):
-    """Write the waves that leave delay lines into out[ends], and add their mass flow into nodes to out[net] [kg/s]."""
+    """Write the waves that leave delay lines into out[ends] [kg/s], and add twice each wave to out[net] of its node.
+
+    Twice the wave is the mass flow into the node at zero pressure deviation p'.
+    """
     tables = open_tables(handle)
     past, layout, lines = tables.past, tables.layout[0], tables.delays
     started, place, ends, net = past[COUNT] > 0.0, offsets_of(past)[0], layout["ends"], layout["net"]
@@ -143,7 +151,8 @@ def incoming_line_waves(t, y, dydt, out, handle):
     """Write the waves that nodes send into delay lines, Y p' minus the arriving waves; write d/dt of the mass in lines.
 
     Y : admittance of the pipe [kg/s per Pa]; p' : deviation of the node pressure from the initial steady state [Pa]
-    In lines shorter than a step the arriving waves depend on p'. d/dt of the mass [kg/s] is the inflow at both ends.
+    In lines shorter than a step the arriving waves depend on p', which is added to them in out[ends] first. d/dt of the
+    mass [kg/s] is the inflow at both ends; it is not written if `dydt` is empty.
     """
     tables = open_tables(handle)
     layout, lines = tables.layout[0], tables.delays
@@ -169,7 +178,8 @@ def incoming_line_waves(t, y, dydt, out, handle):
 def solve_line_clusters(t, y, dydt, out, handle):
     """Solve for the pressures of nodes that are joined by lines shorter than a step and by no valve.
 
-    p' of each group of such nodes is the inverse of their admittance matrix times the arriving flows.
+    p' of each group of such nodes is the inverse of their admittance matrix times the arriving flows. These include the
+    flow through short lines from nodes of known pressure.
     """
     tables = open_tables(handle)
     layout, integers, work = tables.layout[0], tables.integers, tables.scratch

@@ -9,17 +9,17 @@ The array `past` contains in this order:
 
     header        HEADER_SIZE numbers
     times         of entries [s]
-    arrivals      backward wave at the beginning, forward wave at the end and friction loss of each segment [kg/s]
-    heads         of the lists of jumps, one for each wave of each segment: sum of the jumps removed from the list,
-                  index of the first jump, number of jumps, number of these that have arrived
+    arrivals      backward wave at the beginning, forward wave at the end and friction loss of each stretch [kg/s]
+    heads         of the lists of jumps, one for each wave of each stretch: sum of the jumps removed from the list,
+                  index of the first jump, number of jumps, number of these that have been passed on at its end
     jumps         lists of times, sizes and running sums of the jumps
-    rings         entries (u forward, u backward) of each segment, as many as its travel time needs
+    rings         entries (u forward, u backward) of each stretch, as many as its travel time needs
 
 So a step through a large network touches little memory: the ends of rings, and heads.
 
-Arguments: q : segment within its line; s : segment counted over all lines; wave : 0 forward, 1 backward; at : offset
+Arguments: q : stretch within its line; s : stretch counted over all lines; wave : 0 forward, 1 backward; at : offset
 of a head in `past`; queue : capacity of a list of jumps; places : result of `offsets_of`; clock : result of
-`reading_data`.
+`reading_data`; line : row of a delay line.
 """
 
 from fvsolve.jit import njit
@@ -40,8 +40,8 @@ GREATEST_JUMP, GREATEST_UNSTORED_JUMP, JUMPS_TRAVELLING = (
     11,
 )  # greatest jump [Pa], greatest jump that did not fit [Pa], number of jumps now
 ARRIVALS_TIME, ARRIVALS_COUNT = 12, 13  # time and number of entries for which the stored arrivals hold
-CORRECTED_TIME = 14  # time of the last corrected state [s]
-NEXT_ARRIVAL = 15  # arrival of the next jump at a node that acts at once [s]; before this time no reading includes it
+CORRECTED_TIME = 14  # time of a corrected state until it is recorded again [s]; NaN before its entry; else -INFINITE
+NEXT_ARRIVAL = 15  # arrival of the next jump that ends a step [s]; until it is admitted, no reading includes it
 ONLY_PASSED_JUMPS = 16  # 1 while readings include only jumps that have been passed on
 MOST_JUMPS_TRAVELLING = 18  # greatest number of jumps travelling at one time
 GREATEST_WAVE = 17  # greatest wave so far, deviation from the initial steady state [Pa]
@@ -66,13 +66,16 @@ GREATEST_STEP_RATIO = (
 
 @njit(forceinline=True)
 def time_of(past, k):
-    """Time of entry k [s]."""
+    """Time of entry k of the wave history `past` [s]."""
     return past[HEADER_SIZE + (k & (int(past[CAPACITY]) - 1))]
 
 
 @njit(forceinline=True)
 def offsets_of(past):
-    """Offsets of arrivals, heads, jumps and rings in `past`, and the factor by which rings have been lengthened."""
+    """Offsets of arrivals, heads, jumps and rings in `past`, and the factor by which rings have been lengthened.
+
+    These parts of the array are defined in the module docstring.
+    """
     stretches, arrivals = int(past[STRETCHES]), HEADER_SIZE + int(past[CAPACITY])
     heads = arrivals + ARRIVALS_SIZE * stretches
     jumps = heads + 2 * HEAD_SIZE * stretches
@@ -81,20 +84,29 @@ def offsets_of(past):
 
 @njit(forceinline=True)
 def ring_of(places, line, q):
-    """(offset in `past` of the entries of segment q of a line, bit mask that wraps entry numbers)."""
+    """(offset in `past` of the entries of stretch q of a line, bit mask that wraps entry numbers).
+
+    places : result of `offsets_of`
+    """
     length = places[4] * line["ring_size"]
     return places[3] + 2 * (places[4] * line["ring"] + q * length) + RING_GAP * (line["stretch"] + q), length - 1
 
 
 @njit(forceinline=True)
 def jump_head(places, s, wave):
-    """Offset in `past` of the head of the list of jumps of a wave of segment s."""
+    """Offset in `past` of the head of the list of jumps of a wave of stretch s; a head has HEAD_SIZE numbers.
+
+    s : stretch counted over all lines; wave : 0 forward, 1 backward; places : result of `offsets_of`
+    """
     return places[1] + HEAD_SIZE * (2 * s + wave)
 
 
 @njit(forceinline=True)
 def jump_list(places, queue, at):
-    """Offset in `past` of the times of the jumps of the head at `at`; their sizes and running sums follow."""
+    """Offset in `past` of the times of the jumps of the head at `at`; their sizes and running sums follow.
+
+    queue : capacity of the list, which each of the three parts takes up; places : result of `offsets_of`
+    """
     return places[2] + 3 * queue * ((at - places[1]) // HEAD_SIZE)
 
 
@@ -106,7 +118,7 @@ def time_tolerance(past):
 
 @njit(forceinline=True)
 def newest_before(past, t):
-    """Number of the newest entry before t; a step that ends at t may read up to this entry."""
+    """Number of the newest entry before t, at least the first of the run; a step that ends at t may read up to it."""
     k = int(past[COUNT]) - 1
     while k > PROFILE_ENTRIES and time_of(past, k) >= t - time_tolerance(past):
         k -= 1
@@ -144,7 +156,8 @@ def lagrange_three(x):
 def find_interval(past, newest, t):
     """(entry k, fraction of the way to entry k + 1) at time t, up to the entry `newest`.
 
-    Before the first entry of the run, k is the entry of the initial steady state.
+    From the time of `newest` on the result is (newest - 1, 1). Before the first entry, or all stored ones, it is
+    (PROFILE_ENTRIES - 1, 0), an entry of the initial steady state.
     """
     low, high = max(PROFILE_ENTRIES, int(past[COUNT]) - int(past[CAPACITY]) + PROFILE_ENTRIES), newest
     if t >= time_of(past, high):
@@ -162,7 +175,11 @@ def find_interval(past, newest, t):
 
 @njit
 def lagrange_unequal(past, newest, t):
-    """(entry before t, six weights) for unequal steps: cubic through four entries, or linear if steps differ much."""
+    """(entry k at or before t, weights of entries k - 2 .. k + 3) for unequal steps.
+
+    Cubic through four entries; linear if steps differ much, and in the first and the newest interval. The weights are 0
+    before the first entry.
+    """
     low, x = find_interval(past, newest, t)
     line = (0.0, 0.0, 1.0 - x, x, 0.0, 0.0)
     if low < PROFILE_ENTRIES:
@@ -183,9 +200,10 @@ def lagrange_unequal(past, newest, t):
 
 @njit(forceinline=True)
 def reading_data(past, newest):
-    """Data for readings: newest entry, its time [s], 1 / step [1/s], number of equal steps, tolerance of times [s].
+    """Data for readings: (newest entry, its time [s], 1 / step [1/s], number of equal steps, tolerance of times [s]).
 
-    The result does not depend on whether an entry after `newest` exists already.
+    newest : number of the last or the last but one entry. Except for the tolerance, the result does not depend on
+    whether an entry after `newest` exists already. The number counts the last steps of this length up to `newest`.
     """
     step, even = past[LAST_STEP], past[EQUAL_STEPS]
     if newest != int(past[COUNT]) - 1:
@@ -195,7 +213,10 @@ def reading_data(past, newest):
 
 @njit(forceinline=True)
 def stencil(past, clock, t):
-    """(entry k, weights of entries k - 2 .. k + 3) for the smooth part at t, up to the newest entry of `clock`."""
+    """(entry k, weights of entries k - 2 .. k + 3) for the smooth part at t, up to the newest entry of `clock`.
+
+    clock : result of `reading_data`. After that entry its value is kept.
+    """
     newest, latest, per_step, even = clock[0], clock[1], clock[2], clock[3]
     place = (t - latest) * per_step
     if place <= -even:
@@ -215,9 +236,9 @@ def stencil(past, clock, t):
 
 @njit(forceinline=True)
 def interpolate_waves(past, at, mask, k, w):
-    """Smooth parts of both waves of a segment by the weights w of entries k - 2 .. k + 3: (forward, backward) [kg/s].
+    """Smooth parts of both waves of a stretch by the weights w of entries k - 2 .. k + 3: (forward, backward) [kg/s].
 
-    at, mask : result of `ring_of`
+    at, mask : result of `ring_of`; k, w : result of `stencil`
     """
     a, b, c = at + 2 * ((k - 2) & mask), at + 2 * ((k - 1) & mask), at + 2 * (k & mask)
     d, e, f = at + 2 * ((k + 1) & mask), at + 2 * ((k + 2) & mask), at + 2 * ((k + 3) & mask)
@@ -229,15 +250,16 @@ def interpolate_waves(past, at, mask, k, w):
 
 @njit(forceinline=True)
 def wrap_index(i, queue):
-    """Index i wrapped to the capacity `queue` of a list of jumps."""
+    """Index i < 2 queue, wrapped to the capacity `queue` of a list of jumps."""
     return i if i < queue else i - queue
 
 
 @njit
 def first_after(past, queue, times, first, count, t):
-    """Index in a list of jumps of the first jump that was sent after t; the length of the list if there is none.
+    """Number of the jumps of a list that were sent up to t; the first jump sent after t has this position in it.
 
-    times : offset of the list in `past`; first, count : index of the first jump, number of jumps
+    Positions count from the oldest jump of the list. times : offset of the list in `past`; queue : its capacity
+    first, count : index of the oldest jump, number of jumps
     """
     low, high = 0, count
     while low < high:
@@ -251,7 +273,10 @@ def first_after(past, queue, times, first, count, t):
 
 @njit(forceinline=True)
 def sum_of_first(past, places, at, count):
-    """Sum of the jumps removed from the list of a wave and of the first `count` jumps in it [kg/s]."""
+    """Sum of the jumps removed from the list of a wave and of the first `count` jumps in it [kg/s].
+
+    at : offset of the head of the list; places : result of `offsets_of`
+    """
     if count == 0:
         return past[at + REMOVED_SUM]
     queue = int(past[JUMP_CAPACITY])
@@ -260,7 +285,7 @@ def sum_of_first(past, places, at, count):
 
 @njit
 def sum_listed_jumps(past, places, at, t):
-    """Sum of the jumps of a wave sent up to t [kg/s], where its list is not empty."""
+    """Sum of the jumps of a wave sent up to t, with those removed from its list [kg/s]; the list must not be empty."""
     count, queue, first = int(past[at + JUMP_COUNT]), int(past[JUMP_CAPACITY]), int(past[at + FIRST_JUMP])
     times = jump_list(places, queue, at)
     if past[times + wrap_index(first + count - 1, queue)] <= t:
@@ -270,19 +295,26 @@ def sum_listed_jumps(past, places, at, t):
 
 @njit(forceinline=True)
 def jumps_until(past, places, at, t):
-    """Sum of the jumps of a wave sent up to t [kg/s]; at : offset of the head of its list."""
+    """Sum of the jumps of a wave sent up to t, with those removed from its list [kg/s]; at : offset of its head."""
     return sum_listed_jumps(past, places, at, t) if past[at + JUMP_COUNT] > 0.0 else past[at + REMOVED_SUM]
 
 
 @njit(forceinline=True)
 def passed_jumps(past, places, at):
-    """Sum of the jumps of a wave that have been passed on at the end of their segment [kg/s]."""
+    """Sum of the jumps of a wave that have been passed on at the end of their stretch [kg/s].
+
+    Jumps removed from the list are included. at : offset of the head of the list
+    """
     return sum_of_first(past, places, at, int(past[at + ARRIVED_COUNT]))
 
 
 @njit(forceinline=True)
 def arrived_until(past, places, clock, at, t, tau):
-    """Sum of the jumps of a wave that have arrived by t, after a travel time tau [kg/s]; at : offset of their head."""
+    """Sum of the jumps of a wave that have arrived by t, after a travel time tau [kg/s]; at : offset of their head.
+
+    Jumps that arrive from past[NEXT_ARRIVAL] on are left out, because they end a step and are admitted later. While
+    past[ONLY_PASSED_JUMPS] is 1, the result is `passed_jumps`. clock : result of `reading_data`
+    """
     if past[ONLY_PASSED_JUMPS] > 0.0:
         return passed_jumps(past, places, at)
     return jumps_until(past, places, at, min(t + clock[4], past[NEXT_ARRIVAL] - clock[4]) - tau)
@@ -290,7 +322,10 @@ def arrived_until(past, places, clock, at, t, tau):
 
 @njit(forceinline=True)
 def read_waves(past, places, clock, line, q, t):
-    """Both waves sent into segment q of a delay line at t: (forward, backward) [kg/s]."""
+    """Both waves sent into stretch q of a delay line at t, with their jumps: (forward, backward) [kg/s].
+
+    places : result of `offsets_of`; clock : result of `reading_data`
+    """
     at, mask = ring_of(places, line, q)
     k, w = stencil(past, clock, t)
     r, l = interpolate_waves(past, at, mask, k, w)
@@ -300,9 +335,11 @@ def read_waves(past, places, clock, line, q, t):
 
 @njit
 def insert_jump(past, places, at, t, size):
-    """Insert a jump of a wave into its list; return False where the list is full, then the jump joins the smooth part.
+    """Insert a jump of a wave into its list, sorted by time; return False if the list is full.
 
-    t : time at which the jump was sent [s]; size [kg/s]
+    The size is added to a jump of equal time that is listed and has not been passed on. A jump that is not listed
+    becomes part of the smooth part, see `write_entry`.
+    t : time at which the jump was sent [s]; size [kg/s]; at : offset of the head of the list
     """
     queue, first, count = int(past[JUMP_CAPACITY]), int(past[at + FIRST_JUMP]), int(past[at + JUMP_COUNT])
     i, times = count, jump_list(places, queue, at)
@@ -329,7 +366,7 @@ def insert_jump(past, places, at, t, size):
 
 @njit
 def update_running_sums(past, places, at, begin):
-    """Update the running sums of the jumps of a wave from jump number `begin` of its list on."""
+    """Update the running sums of the jumps of a wave from position `begin` of its list on; at : offset of its head."""
     queue, first = int(past[JUMP_CAPACITY]), int(past[at + FIRST_JUMP])
     total, times = sum_of_first(past, places, at, begin), jump_list(places, queue, at)
     for j in range(begin, int(past[at + JUMP_COUNT])):
@@ -340,7 +377,10 @@ def update_running_sums(past, places, at, begin):
 
 @njit
 def remove_arrived_jumps(past, places, at, t):
-    """Remove the jumps that have arrived and were sent before t from the list of a wave."""
+    """Remove the jumps that have been passed on and were sent before t from the list of a wave.
+
+    They are added to its sum of removed jumps. at : offset of the head of the list
+    """
     queue = int(past[JUMP_CAPACITY])
     times = jump_list(places, queue, at)
     while past[at + ARRIVED_COUNT] > 0.0 and past[times + int(past[at + FIRST_JUMP])] < t:
@@ -353,7 +393,7 @@ def remove_arrived_jumps(past, places, at, t):
 
 @njit
 def begin_entry(past, t):
-    """Begin an entry at t; return its number."""
+    """Begin an entry at t: write its time and the lengths of the last steps to `past`; return its number."""
     mask, k = int(past[CAPACITY]) - 1, int(past[COUNT])
     if k == 0:
         past[COUNT], past[EQUAL_STEPS], past[LAST_STEP] = PROFILE_ENTRIES + 1.0, 1e18, 1e-300
@@ -375,7 +415,10 @@ def begin_entry(past, t):
 
 @njit(forceinline=True)
 def write_entry(past, places, line, q, k, wave, value):
-    """Store the smooth part of a wave of segment q as entry k; value : whole wave, smooth part and jumps [kg/s]."""
+    """Store the smooth part of a wave of stretch q as entry k: `value` minus all its jumps so far [kg/s].
+
+    value : whole wave [kg/s]; wave : 0 forward, 1 backward; places : result of `offsets_of`
+    """
     at, mask = ring_of(places, line, q)
     jumps = jumps_until(past, places, jump_head(places, line["stretch"] + q, wave), INFINITE)
     past[at + 2 * (k & mask) + wave] = value - jumps

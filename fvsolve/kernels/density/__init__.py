@@ -1,7 +1,8 @@
-"""Density laws log, table and mixture: density, enthalpy, mass per length, pressure force and wave speed of a pipe.
+"""Density laws `log`, `table`, `mixture`: density, enthalpy, mass per length, pressure force, wave speed of a pipe.
 
 Each function calls the function of the same name of the law that the model uses (`dispatch_law`); each law has its own
-file. The law `linear` is not among them: its kernels use pressures as states and are 20 times as fast.
+file. The law `linear` is not among them: its kernels need no density, because the sum of both waves is proportional to
+the pressure change, and are 20 times as fast.
 
 Arguments common to these functions: `st`, record of settings; `floats`, numbers of the model; `pipe`, record of a pipe.
 """
@@ -13,8 +14,9 @@ from fvsolve.kernels.dtypes import LAW_LOG, LAW_MIXTURE, LAW_TABLE
 
 @inline
 def dispatch_law(of_log, of_table, of_mixture, of_unknown, st, floats, *arguments):
-    """Call the function of the law that a model uses; for an unknown code the result is NaN.
+    """Call the function of the law that a model uses, with (st, floats, *arguments); for an unknown code give NaN.
 
+    of_log, of_table, of_mixture, of_unknown : functions for each law
     Functions are passed as module attributes: numba would store the address of a bare name, and a function with an
     address of this kind is not cached.
     """
@@ -105,7 +107,7 @@ def mass_of_pressure(st, floats, pipe, p):
 
 @njit
 def wall_area(st, floats, pipe, p):
-    """Area of a pipe at the pressure p [m2]."""
+    """Area of a pipe with elastic wall at the pressure p [m2]."""
     return dispatch_law(
         log_law.wall_area, table_law.wall_area, mixture_law.wall_area, unknown_law.not_a_number, st, floats, pipe, p
     )
@@ -139,8 +141,9 @@ def impedance(st, floats, pipe, p):
 
 @njit
 def velocity_change(st, floats, pipe, p_from, p_to):
-    """Decrease of the velocity in a simple wave from pressure p_from to p_to: integral of dp / (rho c) [m/s].
+    """Riemann integral of a pipe: integral of dp / (rho c) from pressure p_from to p_to [m/s], negative if p falls.
 
+    A forward simple wave increases the velocity by it, a backward simple wave reduces the velocity by it.
     rho : density, c : wave speed
     """
     functions = (

@@ -1,6 +1,6 @@
 """Mass, area and wave speed of a pipe with elastic wall, d ln(area) = compliance dp, from its density.
 
-value, slope : ln(rho / rho_ref) and d ln rho / dp [1/Pa] at the pressure, by any density law
+Used by the density laws `log` and `table`. value, slope : ln(rho / rho_ref) and d ln rho / dp [1/Pa] at the pressure
 """
 
 from math import exp, expm1, sqrt
@@ -60,7 +60,7 @@ def impedance(st, pipe, value, slope):
 def gauss_integral(half, middle, low, high):
     """Integral of 1 / (rho c) over a pressure interval [m/s], from rho c at three Gauss points.
 
-    half : half of the width of the interval [Pa]
+    half : half of the width of the interval, negative for a fall of pressure [Pa]
     middle, low, high : rho c (density times wave speed) at the three points [kg/m2/s]
     """
     total = 8.0 / middle

@@ -79,7 +79,7 @@ def impedance(st, floats, pipe, p):
 
 @njit
 def velocity_change(st, floats, pipe, p_from, p_to):
-    """Integral of dp / (rho c) from p_from to p_to [m/s] by three Gauss points; rho : density, c : wave speed."""
+    """Integral of dp / (rho c) in a pipe from p_from to p_to [m/s] by three Gauss points; rho c as in `impedance`."""
     middle, half = 0.5 * (p_from + p_to), 0.5 * (p_to - p_from)
     low, high = middle - elastic_wall.GAUSS_POINT * half, middle + elastic_wall.GAUSS_POINT * half
     here, there = impedance(st, floats, pipe, low), impedance(st, floats, pipe, high)

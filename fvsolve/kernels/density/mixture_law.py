@@ -4,7 +4,7 @@ x = p - floor > 0 is the pressure of the gas; the floor is the vapour pressure o
 of liquid at the reference pressure. beta is the bulk modulus of the liquid, `gas` the amount of gas, `saturation` the
 gas pressure at which all gas is dissolved:
 
-    rho_ref / rho = 1 - (p - p_ref) / beta + gas (x^-k - x^(1-k) / saturation),   k = 1 / (gas exponent),
+    rho_ref / rho = 1 - (p - p_ref) / beta + gas (x^-k - x^(1-k) / saturation),   k = 1 / (gas exponent)
 
 There is free gas while x < saturation (it dissolves by Henry's law; an infinite saturation means no dissolution). The
 area is linear in pressure, A = A_ref (1 + compliance (p - p_ref)). So with k = 1 the pressure of a given mass is the
@@ -19,7 +19,10 @@ from fvsolve.kernels.density.no_inline import law_njit, prevent_inlining
 
 @law_njit
 def free_gas(st, x):
-    """Volume of free gas over volume of liquid [-], and its decrease with pressure [1/Pa], at a gas pressure x [Pa]."""
+    """(volume of free gas over volume of liquid [-], its decrease with pressure [1/Pa]) at a gas pressure x [Pa].
+
+    The volume of liquid is that at the reference pressure.
+    """
     if x >= st["saturation"]:
         return 0.0, 0.0
     k, share = st["gas_power"], x / st["saturation"]
@@ -37,7 +40,7 @@ def relative_volume(st, p):
 
 @law_njit
 def gas_integral(st, x):
-    """Integral of the relative volume of free gas over the gas pressure up to x [Pa], apart from a constant."""
+    """Integral of the volume of free gas by `free_gas` over the gas pressure up to x, apart from a constant [Pa]."""
     k, at, s = st["gas_power"], min(x, st["saturation"]), st["saturation"]
     if k == 1.0:
         return st["gas"] * (log(at) - at / s)
@@ -70,7 +73,7 @@ def enthalpy(st, floats, p):
 def pressure_of_enthalpy(st, floats, h):
     """Pressure p [Pa] at which the specific enthalpy is h [J/kg], by Newton.
 
-    Newton on p, or on the logarithm of the gas pressure where a step would pass the floor pressure.
+    Newton on p, or on the logarithm of the gas pressure where a step would reduce it to a fifth or less.
     """
     prevent_inlining()
     floor, beta = st["floor"], st["beta"]
@@ -89,9 +92,9 @@ def pressure_of_enthalpy(st, floats, h):
 
 @inline
 def gas_root(st, compliance, share, slope, rest):
-    """Gas pressure x [Pa] with share (1 - dp / beta + slope / x + rest) = 1 + compliance dp, dp = p - p_ref.
+    """Gas pressure x [Pa] with share (1 - dp / beta + slope / x + rest) = 1 + compliance dp, dp = x + floor - p_ref.
 
-    It is the positive root of a quadratic, for a relative volume of gas slope / x + rest.
+    It is the positive root of a quadratic, for a relative volume of gas slope / x + rest; at least 0 for slope = 0.
     share : mass over that of liquid at the reference state; compliance : of the wall [1/Pa]; beta : bulk modulus
     """
     low = st["reference"] - st["floor"]
@@ -103,8 +106,9 @@ def gas_root(st, compliance, share, slope, rest):
 
 @law_njit
 def pressure_of_mass_ratio(st, compliance, share):
-    """Pressure [Pa] of a pipe that contains `share` times rho_ref A_ref [-]; compliance 0 for a vessel [1/Pa].
+    """Pressure [Pa] of a pipe whose mass per length is `share` [-] times rho_ref A_ref; or of a vessel.
 
+    compliance : relative area change of the wall per pressure [1/Pa], 0 for a vessel
     If the gas is not isothermal, its tangent in 1 / x replaces it, x : gas pressure, and the root is iterated until it
     is constant. This converges because the volume of gas is concave in 1 / x.
     """
@@ -150,7 +154,7 @@ def area_ratio(st, compliance, p):
 
 @inline
 def wall_area(st, floats, pipe, p):
-    """Area of a pipe at the pressure p [m2]."""
+    """Area of a pipe at the pressure p [m2], linear in p."""
     return pipe["area"] * area_ratio(st, pipe["compliance"], p)
 
 
@@ -196,9 +200,9 @@ GAUSS_WEIGHTS = (0.3626837833783620, 0.3137066458778873, 0.2223810344533745, 0.1
 
 @law_njit
 def velocity_change_panel(st, floats, pipe, p_from, p_to):
-    """Integral of dp / (rho c) [m/s] between two pressures whose gas pressures differ by a factor of two at most.
+    """Integral of dp / (rho c) in a pipe from p_from to p_to [m/s] by eight Gauss points; rho c as in `impedance`.
 
-    Eight Gauss points; rho : density, c : wave speed.
+    It is accurate if the gas pressures differ by a factor of two at most, or without free gas between them.
     """
     middle, half, total = 0.5 * (p_from + p_to), 0.5 * (p_to - p_from), 0.0
     for i in range(4):
@@ -210,9 +214,10 @@ def velocity_change_panel(st, floats, pipe, p_from, p_to):
 
 @law_njit
 def velocity_change(st, floats, pipe, p_from, p_to):
-    """Integral of dp / (rho c) from p_from to p_to [m/s] in panels; rho : density, c : wave speed.
+    """Integral of dp / (rho c) in a pipe from p_from to p_to [m/s] in panels; rho c as in `impedance`.
 
-    The gas pressure at most doubles in a panel, and a panel ends where all gas is dissolved.
+    With free gas the gas pressure at most doubles in a panel, and a panel ends where all gas is dissolved. A single
+    panel covers the pressures above.
     """
     prevent_inlining()
     low, high = min(p_from, p_to), max(p_from, p_to)

@@ -21,7 +21,7 @@ else:
 
 
 def law_njit(function):
-    """Compile by `njit` a function that only functions of this folder call: without wrappers for Python and C.
+    """Compile by `njit` a function that only compiled functions call: without wrappers for Python and C.
 
     `forceinline` is set explicitly: numba otherwise takes it from the first caller that compiles the function, and
     `prevent_inlining` forbids it.

@@ -6,7 +6,10 @@ from fvsolve.kernels.density import density, enthalpy, mass_of_pressure, pressur
 
 @inline
 def rise_at(profile, pipe, x):
-    """Rise [m] of a pipe from its `from` end over a distance x [m] along it."""
+    """Rise [m] of a pipe from its `from` end over a distance x [m] along it, linear between faces and cell centres.
+
+    profile : data of the initial steady state of all pipes
+    """
     if pipe["rise"] < 0:
         return pipe["slope"] * x
     share = x / (0.5 * pipe["dx"])
@@ -17,8 +20,9 @@ def rise_at(profile, pipe, x):
 
 @njit
 def add_slope_force(st, profile, pipe, r, l, dr, dl):
-    """Add the weight along a pipe of variable slope, - m' g dz/dx [kg/s2], to d/dt of both waves of its cells.
+    """Add the weight along a pipe with an elevation profile, - m' g dz/dx [kg/s2], to d/dt of the waves of its cells.
 
+    Half is added to the rate of the forward wave, and half is subtracted from that of the backward wave.
     m' : change of the mass per length since the initial steady state [kg/m]; z : elevation
     r, l, dr, dl : float64[cells]  forward and backward wave [kg/s] and their rates
     """
@@ -31,7 +35,7 @@ def add_slope_force(st, profile, pipe, r, l, dr, dl):
 
 @njit
 def mass_of_bernoulli(st, floats, pipe, bernoulli, flow):
-    """Mass per length m [kg/m] at which h(p) + v^2 / 2 is `bernoulli` [J/kg]; the subsonic solution.
+    """Mass per length m [kg/m] in a pipe at which h(p) + v^2 / 2 is `bernoulli` [J/kg]; the subsonic solution.
 
     h : specific enthalpy; v = flow / m : velocity, with the mass flow [kg/s]
     """
@@ -53,6 +57,7 @@ def profile_along(st, floats, profile, pipe, start, z, flow, faces, centers):
 
     By the classical Runge-Kutta method over half cells.
     h : specific enthalpy, v : velocity, m : mass per length, m_ref : its reference value
+    drag : drag of the initial steady state in the row of the pipe, constant along it
     start : h + v^2/2 + g z at the `from` end [J/kg]; z : elevation there [m]; flow : mass flow [kg/s]
     faces, centers : receive the mass per length at faces and cell centres [kg/m]
     Returns h + v^2/2 + g z at the `to` end [J/kg].

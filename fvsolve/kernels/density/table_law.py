@@ -1,6 +1,6 @@
 """Density law `table`: ln(rho / rho_ref) and enthalpy by cubic Hermite polynomials over pressure.
 
-ln(rho / rho_ref) is linear beyond both ends of the table.
+Beyond both ends of the table ln(rho / rho_ref) is linear in pressure, and the enthalpy is its exact integral.
 """
 
 from math import exp, expm1, log
@@ -128,7 +128,7 @@ def impedance(st, floats, pipe, p):
 
 @njit
 def velocity_change(st, floats, pipe, p_from, p_to):
-    """Integral of dp / (rho c) from p_from to p_to [m/s] by three Gauss points; rho : density, c : wave speed."""
+    """Integral of dp / (rho c) in a pipe from p_from to p_to [m/s] by three Gauss points; rho c as in `impedance`."""
     middle, half = 0.5 * (p_from + p_to), 0.5 * (p_to - p_from)
     low, high = middle - elastic_wall.GAUSS_POINT * half, middle + elastic_wall.GAUSS_POINT * half
     here, there = impedance(st, floats, pipe, low), impedance(st, floats, pipe, high)

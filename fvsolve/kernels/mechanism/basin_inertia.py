@@ -44,6 +44,7 @@ __all__ = [
 def add_basin_inertia(out, tables):
     """Add the inertia of the water in all basins on bodies, J' N J for each basin, to the mass matrix in `scratch`.
 
+    Basins on bodies that no degree of freedom moves are left out.
     J : coefficients of 1, x, y in the normal acceleration of the bed, a column for each degree of freedom
     N : matrix of the moments of mass of 1, x, y
     """
@@ -69,6 +70,7 @@ def add_basin_inertia(out, tables):
 def normal_accelerations(out, work, tank, s):
     """Normal velocity of the bed of a basin per unit rate of one degree of freedom, as coefficients of 1, x and y.
 
+    They are also those of the normal acceleration per unit acceleration of that degree of freedom.
     tank : offset of the numbers of the basin in `out`
     s : offset in `work` of the angular velocity and the velocity at o per unit rate of that degree of freedom
     """

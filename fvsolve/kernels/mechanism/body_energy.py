@@ -1,6 +1,6 @@
 """Power and stored energy of bodies and of their joints.
 
-`power` has three entries for each body [W], before those of devices and basins: rate of the stored energy, power
+`power` has three entries for each body [W], see `energy_rows.py` for their place: rate of the stored energy, power
 dissipated by the damping of the joint, power supplied by a driven joint. `stored` has one entry for each body [J], the
 change since the start of kinetic energy + m g z + k s^2 / 2. m : mass, z : height of the centre of mass, k : stiffness
 of the joint, s : its coordinate.
@@ -40,7 +40,7 @@ def body_energy_rate(body, out, here, gravity):
 
 @njit
 def joint_spring_energy(body, y):
-    """(energy stored in the spring of the joint since the start [J], its rate [W])."""
+    """(change of the energy of the spring of a joint since the start [J], its rate [W]), for a joint with one axis."""
     s, far = body["start"][0], y[body["y"]]
     return (
         body["stiffness"] * far * (s + 0.5 * far),
@@ -50,7 +50,7 @@ def joint_spring_energy(body, y):
 
 @njit
 def joint_drive_power(t, y, out, tables, i):
-    """Power supplied by a driven joint [W]."""
+    """Power that the drive of the joint of body i supplies [W]: load of the joint along its axis times its rate."""
     body = tables.bodies[i]
     rate = joint_coordinate(body, t, y, tables)[1]
     x, y0, z = rotate(out, body_row(tables, i) + ATTITUDE, body["axis"], 0)
@@ -62,7 +62,7 @@ def joint_drive_power(t, y, out, tables, i):
 
 @njit
 def joint_damping_power(body, y):
-    """Power dissipated by the damping of a joint [W]."""
+    """Power dissipated by the damping of a joint [W], at a free body of its rotation only."""
     total, first = 0.0, 3 if body["joint"] == FREE else 0
     for k in range(first, body["freedoms"]):
         rate = body["speed"][k] + y[body["rate"] + k]

@@ -32,7 +32,7 @@ def body_row(tables, i):
 
 @njit
 def nearest_free_body(tables, i):
-    """First body with degrees of freedom on the way from body i, itself included, to the root of its tree; or -1."""
+    """First body with degrees of freedom on the way from body i, itself included, to the root of its tree; else -1."""
     while i >= 0 and tables.bodies[i]["freedoms"] == 0:
         i = tables.bodies[i]["parent"]
     return i
@@ -64,7 +64,7 @@ def cross(a, i, x, y, z):
 def freedom_velocity(work, s, x, y, z):
     """Velocity of a point of a body per unit rate of one degree of freedom.
 
-    (x, y, z) : position of the point from the reference point o of the module
+    (x, y, z) : position of the point from the reference point o (module docstring)
     s : offset in `work` of the angular velocity and the velocity at o per unit rate of that degree of freedom
     """
     u, v, w = cross(work, s, x, y, z)
@@ -73,7 +73,7 @@ def freedom_velocity(work, s, x, y, z):
 
 @njit(forceinline=True)
 def rotate(out, r, v, k):
-    """Transform the vector v[k:k+3] from axes of a body to axes of the world; rotation matrix by rows at out[r]."""
+    """Transform the vector v[k:k+3] from axes of a body to axes of the world; out[r] : its rotation matrix, by rows."""
     x, y, z = v[k], v[k + 1], v[k + 2]
     return dot(out, r, x, y, z), dot(out, r + 3, x, y, z), dot(out, r + 6, x, y, z)
 

@@ -84,9 +84,10 @@ def acceleration_at(out, here, at, x, y, z):
 
 @njit
 def joint_load(out, tables, i):
-    """Force [N] and torque [N m] of the joint of body i on that body, six numbers; the torque is about its origin.
+    """Force [N] and torque [N m] of the joint of body i on that body, six numbers in axes of the world.
 
-    They follow from the equations of Newton and Euler (68) of body i and of all bodies that it carries.
+    The torque is about the origin of the body. Both follow from the equations of Newton and Euler (68) of body i and of
+    all bodies that it carries, with the loads of the water in basins on them.
     """
     bodies, first = tables.bodies, body_row(tables, i)
     fx = fy = fz = tx = ty = tz = 0.0
@@ -128,7 +129,7 @@ def roll_pitch_yaw(out, r):
 
     Roll is computed from R_z(-yaw) R. So the angles give R also near a pitch of 90 degrees, where the entries of R that
     give roll and yaw vanish. There only the sum or difference of roll and yaw is defined: yaw is set to 0, as in
-    `fvsolve.rotations`.
+    `fvsolve.attitude`.
     """
     level = hypot(out[r], out[r + 3])  # cos(pitch)
     yaw = atan2(out[r + 3], out[r]) if level > LEAST_COSINE else 0.0
@@ -169,7 +170,10 @@ def euler_parameters(body, y, out, here):
 
 @njit
 def body_value(t, y, out, tables, i, number):
-    """Value of a quantity of body i; number : index of the quantity in `BODY_QUANTITIES`."""
+    """Value of a quantity of body i in SI; number : index of the quantity in `BODY_QUANTITIES`.
+
+    Angle or travel and rate of a joint without a single axis are 0. Angular momentum is about the origin of the world.
+    """
     body, here = tables.bodies[i], body_row(tables, i)
     if number < 3:
         return out[here + POSITION + number]
@@ -200,11 +204,11 @@ def body_value(t, y, out, tables, i, number):
 
 @njit
 def point_value(out, tables, k, number):
-    """Value of a quantity of point k; number : index of the quantity in `POINT_QUANTITIES`.
+    """Value of a quantity of point k in SI; number : index of the quantity in `POINT_QUANTITIES`.
 
-    The parts of the acceleration are the terms of (65), relative to the axes of the parent of the body that contains
-    the point. With the acceleration of the origin of the parent they add up to the acceleration of the point. If that
-    body is joined to the world, its own axes take the place of those of a parent.
+    Accelerations of a point of the world are 0. The parts of the acceleration are the terms of (65), relative to the
+    axes of the parent of the body that contains the point. With the acceleration of the origin of the parent they add
+    up to the acceleration of the point. If that body is joined to the world, its own axes replace those of a parent.
     """
     moved = point_at(out, tables, k, POSITION)
     if number < 6:
@@ -250,7 +254,7 @@ def surface_value(y, tables, probe):
 
 @njit
 def observe_bodies(t, y, out, handle, values):
-    """Write the values of the probes of bodies, of their points, and of the water surfaces of sloshing models."""
+    """Write the values of the probes of bodies, their points, and water surfaces of sloshing models to `values`."""
     tables = open_tables(handle)
     probes = tables.probes
     for k in range(probes.size):

@@ -3,9 +3,9 @@
 Imported only for cases that have bushings. The force opposes the gap rho, the position of `to` minus that of `from`,
 and its rate. The torque opposes the deviation of attitudes R~ = R R_d' (equation (56) of docs/course.md) and the
 relative angular velocity. R is the attitude of the body of `to` in axes of the body of `from`, and R_d is R at the
-start. With the Euler parameters eta and eps of R~, the torque is proportional to 2 eta eps, the vector of the skew part
-of R~; eps . eps = (3 - trace R~) / 4. The force acts on both bodies at the point `to`, so its power is force times
-d(rho)/dt.
+attitudes that the case states; an equilibrium start may deviate from it. With the Euler parameters eta and eps of R~,
+the torque is proportional to 2 eta eps, the vector of the skew part of R~; eps . eps = (3 - trace R~) / 4. The force
+acts on both bodies at the point `to`, so its power is force times d(rho)/dt.
 """
 
 from math import sqrt
@@ -58,10 +58,10 @@ def gap_of(out, tables, bushing):
 
 @njit
 def deviation(out, tables, bushing, r, c):
-    """Entry (r, c) of the deviation of attitudes R_to R_d' R_from' of a bushing since the start, in axes of the world.
+    """Entry (r, c) of the deviation of attitudes R_to R_d' R_from' of a bushing, in axes of the world.
 
     R_to, R_from : attitudes of both bodies
-    R_d : attitude of the body of `to` in axes of the body of `from` at the start
+    R_d : attitude of the body of `to` in axes of the body of `from` that the case states, without torque
     """
     i, j = tables.points[bushing["from_point"]]["body"], tables.points[bushing["to_point"]]["body"]
     total = 0.0
@@ -77,10 +77,10 @@ def deviation(out, tables, bushing, r, c):
 
 @njit
 def rotation_deviation(out, tables, bushing):
-    """Rotation of the body of `to` relative to that of `from` since the start, seven numbers in axes of the world.
+    """Rotation of the body of `to` relative to that of `from`, from R_d of `deviation`, as seven numbers.
 
-    They are 2 eta eps (3 numbers), the relative angular velocity [rad/s] (3 numbers), and eps . eps, with the Euler
-    parameters (eta, eps) of the rotation.
+    They are, in axes of the world, 2 eta eps (3 numbers), the relative angular velocity [rad/s] (3 numbers), and
+    eps . eps, with the Euler parameters (eta, eps) of the rotation.
     """
     x = 0.5 * (deviation(out, tables, bushing, 2, 1) - deviation(out, tables, bushing, 1, 2))
     y = 0.5 * (deviation(out, tables, bushing, 0, 2) - deviation(out, tables, bushing, 2, 0))
@@ -120,7 +120,10 @@ def add_bushing_loads(t, y, dydt, out, handle):
 
 @njit
 def bushing_rate_limit(t, y, dydt, out, handle):
-    """Raise out[RATE], the rate that limits steps [1/s], to the bound for bushings (`mass_matrix.body_rate_limit`)."""
+    """Raise out[RATE], the rate that limits steps [1/s], to the bound of `mass_matrix.body_rate_limit` for bushings.
+
+    The factored mass matrix must be in `scratch`.
+    """
     tables = open_tables(handle)
     bushings, work, n = tables.bushings, tables.scratch, tables.freedoms.size
     stiffness, damping = 0.0, 0.0

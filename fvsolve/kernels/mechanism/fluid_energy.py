@@ -48,13 +48,13 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit(forceinline=True)
 def height_on_body(out, here, r):
-    """Height in the world of a point r in axes of a body [m]."""
+    """Height in the world of a point r in axes of a body [m]; here : offset of the body in `out`."""
     return out[here + POSITION + 2] + dot(out, here + ATTITUDE + 6, r[0], r[1], r[2])
 
 
 @njit(forceinline=True)
 def speed_squared_at(motion, r):
-    """Square of the speed in the world of a point r in axes of a body [m2/s2]."""
+    """Square of the speed in the world of a point r in axes of a body [m2/s2]; motion : after `set_body_motion`."""
     u, v, w = cross(motion, BODY_SPIN, r[0], r[1], r[2])
     u, v, w = u + motion[BODY_VELOCITY], v + motion[BODY_VELOCITY + 1], w + motion[BODY_VELOCITY + 2]
     return u * u + v * v + w * w
@@ -127,7 +127,7 @@ def path_energy_rate(tables, out, here, path, change, flow, rate):
 def extra_head(y, out, tables, here, i):
     """Energy per mass that the motion of the body adds to flow from node i into a link [J/kg].
 
-    For a tank, the energy at its surface also replaces the energy at the pressure of its bottom.
+    For a tank, the energy at its surface, above datum, also replaces the energy at the pressure of its bottom.
     """
     st, node, motion = tables.settings[0], tables.nodes[i], tables.scratch
     r = as_tuple(tables.moving_segments[node["moving_segment"]]["start"])
@@ -150,7 +150,11 @@ def extra_head(y, out, tables, here, i):
 
 @njit
 def add_node_power(y, dydt, out, tables, i, power):
-    """Add to `power` the supplied power and the rate of energy of node i that are due to the motion of its body [W]."""
+    """Add to `power` the supplied power or the rate of energy of node i that is due to the motion of its body [W].
+
+    The supplied power is that of a junction or reservoir; the rate is that of a tank or chamber. For a tank the rate
+    replaces the entry, with heights from the datum.
+    """
     node, st, motion = tables.nodes[i], tables.settings[0], tables.scratch
     here = body_row(tables, tables.moving_segments[node["moving_segment"]]["body"])
     segment = node_segment(y, tables, i)
@@ -168,7 +172,10 @@ def add_node_power(y, dydt, out, tables, i, power):
 
 @njit
 def add_node_stored(y, out, tables, i, stored):
-    """Add to `stored` the energy of the fluid at node i that is due to the motion of its body [J]."""
+    """Add to `stored` the energy of the fluid at node i that is due to the motion of its body [J].
+
+    For a tank it replaces the entry, with heights from the datum.
+    """
     node = tables.nodes[i]
     here, z = body_row(tables, tables.moving_segments[node["moving_segment"]]["body"]), node["elevation"]
     if node["kind"] == TANK:
@@ -244,7 +251,7 @@ def column_extra_energy(y, out, tables, k, here):
 
 @njit
 def add_power(t, y, dydt, out, handle, power):
-    """Add the power due to the motion of bodies to the entries of nodes, pipes and rigid columns in `power`."""
+    """Add the power due to the motion of bodies to the entries of nodes, pipes and rigid columns in `power` [W]."""
     tables = open_tables(handle)
     nodes, pipes, columns, segments, motion = (
         tables.nodes,
@@ -287,7 +294,10 @@ def add_power(t, y, dydt, out, handle, power):
 
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
-    """Add the energy due to the motion of bodies to the entries of nodes, pipes and rigid columns in `stored`."""
+    """Add the energy due to the motion of bodies to the entries of nodes, pipes and rigid columns in `stored` [J].
+
+    The energy is counted from a body at rest in its position at the start, for tanks and columns from the datum.
+    """
     tables = open_tables(handle)
     nodes, pipes, columns, segments = tables.nodes, tables.pipes, tables.columns, tables.moving_segments
     for i in range(nodes.size):

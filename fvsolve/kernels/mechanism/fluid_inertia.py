@@ -3,7 +3,8 @@
 First all fluid counts as fixed to its body. Then the inertia of its sliding along the flow path (C, Z) is subtracted; C
 and Z are the integrals of dr and r x dr along the path. For a rigid column of density rho, area A and length L this
 inertia is rho (A / L) c c' with c = (C, Z), taken from surface to surface. For each cell of a pipe, the mass of the
-cell over the square of its length replaces rho A / L.
+cell over the square of its length replaces rho A / L. M contains the products over degrees of freedom, see
+`mass_matrix`.
 """
 
 from fvsolve.jit import njit
@@ -71,7 +72,8 @@ def path_component(out, work, here, s, flow_path):
 def subtract_sliding_inertia(out, tables, i, flow_path, slides):
     """Subtract the inertia of fluid that slides along a flow path on body i from the mass matrix M in `scratch`.
 
-    flow_path : integrals of dr and r x dr along the path; slides : mass of the fluid over its length squared [kg/m2]
+    flow_path : integrals of dr and r x dr along the path; slides : mass of the fluid over its length squared [kg/m2],
+        for a path of unit length times the square of the distance between the ends [kg]
     """
     work, n, here = tables.scratch, tables.freedoms.size, body_row(tables, i)
     path, count = freedom_path(tables, nearest_free_body(tables, i))

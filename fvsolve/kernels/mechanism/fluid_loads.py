@@ -37,7 +37,7 @@ ZERO_FLOW_PATH = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 @njit(forceinline=True)
 def to_world(out, here, x, y, z):
-    """Vector (x, y, z) in axes of a body, transformed to axes of the world."""
+    """Vector (x, y, z) in axes of a body, transformed to axes of the world; here : offset of the body in `out`."""
     return rotate(out, here + ATTITUDE, (x, y, z), 0)
 
 
@@ -75,6 +75,7 @@ def segment_load(motion, r, t, m, d):
     """Force and torque of a segment of fluid on its body; r, t : start and direction of the segment.
 
     m, d : integrals of 1, s and s^2 over the mass of the segment, s : distance from r; and their rates
+    motion : `scratch` after `set_body_motion`
     """
     sx, sy, sz = m[0] * r[0] + m[1] * t[0], m[0] * r[1] + m[1] * t[1], m[0] * r[2] + m[1] * t[2]
     gx, gy, gz = as_tuple(motion[BODY_GRAVITY : BODY_GRAVITY + 3])
@@ -97,7 +98,7 @@ def flow_load(motion, path, change, flow, rate):
     """Force and torque of a mass flow along a flow path on its body.
 
     path, change : integrals of dr and r x dr along the path, and their rates
-    flow, rate : mass flow [kg/s] and its derivative [kg/s2]
+    flow, rate : mass flow [kg/s] and its derivative [kg/s2]; motion : `scratch` after `set_body_motion`
     """
     cx, cy, cz = cross(motion, BODY_SPIN, path[0], path[1], path[2])
     zx, zy, zz = cross(motion, BODY_SPIN, path[3], path[4], path[5])
@@ -127,7 +128,10 @@ def level_rate(dydt, tables, i):
 
 @njit(forceinline=True)
 def tank_path(tables, i, high):
-    """Integrals of dr and r x dr along the flow path from the bottom of the tank at node i to the height `high` [m]."""
+    """Integrals of dr and r x dr along the flow path from the bottom of the tank at node i to the height `high` [m].
+
+    A negative `high` gives the opposite path, down from the height -high to the bottom.
+    """
     r = tables.moving_segments[tables.nodes[i]["moving_segment"]]["start"]
     return 0.0, 0.0, high, r[1] * high, -r[0] * high, 0.0
 
@@ -143,7 +147,7 @@ def tank_paths(tables, i, j, a, b):
 
 @njit(forceinline=True)
 def vertical_moments(mass, high):
-    """Integrals of 1, s, s^2 over a mass [kg] that is distributed evenly over the height `high`; s : height [m]."""
+    """Integrals of 1, s, s^2 over a mass [kg] that is distributed evenly over s = 0 .. `high` [m]."""
     return mass, 0.5 * mass * high, mass * high * high / 3.0
 
 
@@ -159,7 +163,7 @@ def node_segment(y, tables, i):
 
 @njit
 def node_segment_rates(y, dydt, out, tables, i):
-    """Rates of the mass moments of the fluid at node i, from its inflow [kg/s, kg m/s, kg m2/s].
+    """Rates of the three mass moments of the fluid at node i, from its inflow [kg/s, kg m/s, kg m2/s].
 
     In a tank the inflow counts at the surface. A node without volume has the rate -supply, because supplied fluid
     leaves it into the network.
@@ -175,7 +179,10 @@ def node_segment_rates(y, dydt, out, tables, i):
 
 @njit
 def node_load(y, dydt, out, tables, i):
-    """Force and torque of the fluid at a node, and of the fluid that leaves the network there."""
+    """Force and torque of the fluid at node i, and of the fluid that leaves the network there, on its body.
+
+    `set_body_motion` must have written the motion of the body to `scratch`.
+    """
     r, t, m = node_segment(y, tables, i)
     return segment_load(tables.scratch, r, t, m, node_segment_rates(y, dydt, out, tables, i))
 
@@ -233,7 +240,7 @@ def straight_path(r, t):
 
 @njit
 def pipe_end(y, tables, k, right, share):
-    """Node of the tank at an end of pipe k, -1 if there is no tank; and mass flow of the cell at that end [kg/s].
+    """(node of the tank at an end of pipe k, -1 without a tank; mass flow of the cell at that end [kg/s]).
 
     right : 1 for the end at `to`, 0 at `from`
     y : states with share = 1; or rates of states with share = 0, then the flow is a rate [kg/s2]
@@ -246,7 +253,10 @@ def pipe_end(y, tables, k, right, share):
 
 @njit
 def pipe_load(y, dydt, tables, k):
-    """Force and torque of the fluid in pipe k, and of the flow between its ends and the surfaces of tanks."""
+    """Force and torque of the fluid in pipe k, and of the flow between its ends and the surfaces of tanks, on its body.
+
+    `set_body_motion` must have written the motion of the body to `scratch`.
+    """
     motion, (r, t, length) = tables.scratch, pipe_segment(tables, k)
     m, flow = pipe_moments(tables, y, k, length, 1.0)
     d, rate = pipe_moments(tables, dydt, k, length, 0.0)
@@ -313,7 +323,10 @@ def segment_length(segment):
 
 @njit
 def column_load(y, dydt, tables, k):
-    """Force and torque of the fluid in rigid column k, and of the flow between its ends and the surfaces of tanks."""
+    """Force and torque of the fluid in rigid column k, and of the flow between its ends and surfaces of tanks.
+
+    They act on its body, whose motion `set_body_motion` must have written to `scratch`.
+    """
     column, motion = tables.columns[k], tables.scratch
     i, j = column["from_node"], column["to_node"]
     faster = tank_paths(tables, i, j, level_rate(dydt, tables, i), level_rate(dydt, tables, j))
@@ -336,7 +349,10 @@ def is_fluid_node(kind):
 
 @njit
 def add_load(out, here, load, sign):
-    """Add a load in axes of a body to its sums FORCE and TORQUE (sign +1), or subtract it (sign -1)."""
+    """Add a load in axes of a body to its sums FORCE and TORQUE (sign +1), or subtract it (sign -1).
+
+    load : force [N], torque about the origin [N m]; here : offset of the body in `out`
+    """
     x, y, z = to_world(out, here, sign * load[0], sign * load[1], sign * load[2])
     add_force(out, here, 0.0, 0.0, 0.0, x, y, z)
     x, y, z = to_world(out, here, sign * load[3], sign * load[4], sign * load[5])
@@ -374,6 +390,9 @@ def add_all_fluid_loads(y, dydt, out, tables, least, sign, wide, spin):
 
 @njit
 def add_fluid_loads(t, y, dydt, out, handle):
-    """Add the fluid loads for q'' = 0 (zero joint accelerations) to all bodies with `loads_body` of at least 1."""
+    """Add the fluid loads for q'' = 0 (zero joint accelerations) to the bodies, unless `dydt` is empty.
+
+    The loads of moving segments with `loads_body` 0 are left out.
+    """
     if dydt.size > 0:
         add_all_fluid_loads(y, dydt, out, open_tables(handle), MOVED_BY_FORCES, 1.0, BIAS, SPIN_BIAS)

@@ -1,4 +1,4 @@
-"""Force elements between points of bodies: directions, elongations and their rates, application of forces."""
+"""Force elements between points of bodies: directions, changes of length and their rates, application of forces."""
 
 from math import sqrt
 
@@ -41,7 +41,7 @@ def point_at(out, tables, k, base):
 
 @njit
 def spin_of(out, tables, k):
-    """Angular velocity of the body of point k [rad/s]; 0 for the world."""
+    """Angular velocity of the body of point k [rad/s], in axes of the world; 0 for the world or k < 0."""
     if k < 0 or tables.points[k]["body"] < 0:
         return 0.0, 0.0, 0.0
     here = body_row(tables, tables.points[k]["body"]) + SPIN
@@ -50,7 +50,7 @@ def spin_of(out, tables, k):
 
 @njit(forceinline=True)
 def root_of(tables, k):
-    """Body that is the root of the tree to which point k belongs; -1 for the world."""
+    """Body that is the root of the tree to which point k belongs; -1 for the world or k < 0."""
     if k < 0 or tables.points[k]["body"] < 0:
         return -1
     return tables.bodies[tables.points[k]["body"]]["root"]
@@ -58,7 +58,12 @@ def root_of(tables, k):
 
 @njit
 def update_elements(out, tables):
-    """Write unit direction, elongation since the start [m] and its rate [m/s] of all force elements to `out`."""
+    """Write unit direction, change of length since the start [m] and its rate [m/s] of all force elements to `out`.
+
+    The direction is from point `from` to point `to`, the length their distance. For elements that act TOWARD a fixed
+    direction or ABOUT an axis, the change of length is 0. The rate is then the velocity of `to` relative to `from` in
+    that direction, or the relative angular velocity about the axis [rad/s].
+    """
     layout, lines = tables.layout[0], tables.lines
     for k in range(lines.size):
         line, at, to = lines[k], layout["along"] + 3 * k, layout["travel"] + 2 * lines[k]["push"]
@@ -86,7 +91,7 @@ def update_elements(out, tables):
 
 @njit(forceinline=True)
 def add_element_end_force(out, tables, k, acts, x, y, z):
-    """Add a force (x, y, z) [N], or for `acts` ABOUT a torque [N m], at point k to the body of that point."""
+    """Add a force (x, y, z) [N], or for `acts` ABOUT a torque [N m], at point k to FORCE and TORQUE of its body."""
     if k >= 0 and tables.points[k]["body"] >= 0:
         here = body_row(tables, tables.points[k]["body"])
         if acts == ABOUT:

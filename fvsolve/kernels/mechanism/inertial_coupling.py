@@ -35,7 +35,7 @@ from fvsolve.kernels.table_handle import open_tables
 def path_acceleration(out, tables, segment, path):
     """Acceleration of a body integrated along a flow path on it, C . a + Z . e [m2/s2].
 
-    C, Z : integrals of dr and r x dr along the path
+    path : (C, Z), integrals of dr and r x dr along the path; segment : row of the fluid in `moving_segments`
     a, e : acceleration of the origin and angular acceleration, minus their values for zero joint accelerations
     """
     here = body_row(tables, tables.moving_segments[segment]["body"])
@@ -47,7 +47,10 @@ def path_acceleration(out, tables, segment, path):
 
 @njit
 def accelerate_pipe_flow(y, dydt, out, tables, k):
-    """Add the inertial force of the acceleration of the body to the rates of the waves in all cells of pipe k."""
+    """Add the inertial force of the acceleration of the body to the rates of the waves in all cells of pipe k.
+
+    The force of the acceleration for zero joint accelerations is left out.
+    """
     pipe, (r, t, length) = tables.pipes[k], pipe_segment(tables, k)
     n, o = pipe["cells"], pipe["y"]
     push = 0.5 * length / n / pipe["dx"] * path_acceleration(out, tables, pipe["moving_segment"], straight_path(r, t))
@@ -60,10 +63,11 @@ def accelerate_pipe_flow(y, dydt, out, tables, k):
 
 @njit
 def accelerate_network_flow(t, y, dydt, out, handle):
-    """Add the inertial forces of the accelerations of bodies to rates of flow.
+    """Add the inertial forces of the accelerations of bodies to rates of flow in pipes and rigid columns.
 
     The forces for zero joint accelerations are left out, because these rates contain them. Where a joint load is an
-    output (`loads_body` = 2), the fluid loads are computed again with the new rates.
+    output (`loads_body` = 2), the fluid loads on bodies in `out` are replaced by those with the new rates and with the
+    accelerations of bodies. Nothing is done if `dydt` is empty or there are no degrees of freedom.
     """
     tables = open_tables(handle)
     pipes, columns, segments = tables.pipes, tables.columns, tables.moving_segments
@@ -88,7 +92,8 @@ def accelerate_network_flow(t, y, dydt, out, handle):
 def pipe_rate_limit(t, y, dydt, out, handle):
     """Raise out[RATE], the rate that limits steps [1/s], for bodies that are damped by waves in their pipes.
 
-    The damping is rho A c at both ends of a pipe; rho : density, A : area, c : wave speed.
+    The damping is rho A c at both ends of a pipe; rho : density, A : area, c : wave speed. The factored mass matrix
+    must be in `scratch`.
     """
     tables = open_tables(handle)
     work, n, damping = tables.scratch, tables.freedoms.size, 0.0

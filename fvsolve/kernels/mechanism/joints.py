@@ -46,7 +46,7 @@ def joint_coordinate(body, t, y, tables):
 
 @njit(forceinline=True)
 def multiply_matrices(a, i, b, j, c, k):
-    """Write C = A B of 3 x 3 matrices stored by rows at a[i], b[j] and c[k]."""
+    """Write the product A B of 3 x 3 matrices at a[i] and b[j] to c[k]; all are stored by rows."""
     for row in range(i, i + 9, 3):
         x, y, z = a[row], a[row + 1], a[row + 2]
         c[k] = x * b[j] + y * b[j + 3] + z * b[j + 6]
@@ -79,7 +79,7 @@ def rotation_of_parameters(q, k, h, a, b, c):
 
 @njit(forceinline=True)
 def joint_parameters(body, first, y):
-    """Euler parameters (eta, eps) of a joint; first : index of eta among the coordinates of the joint."""
+    """Euler parameters (eta, eps) of a joint, not normalised; first : index of eta among the joint's coordinates."""
     at, e = body["y"] + first, body["start"]
     return e[first] + y[at], e[first + 1] + y[at + 1], e[first + 2] + y[at + 2], e[first + 3] + y[at + 3]
 
@@ -93,9 +93,9 @@ def joint_velocities(body, first, y):
 
 @njit
 def set_free_body(body, y, own):
-    """Write attitude, position, velocity and bias acceleration of a free body; `body_layout` defines these data.
+    """Write attitude, position of the origin, and velocity and bias acceleration at o of a free body to `own`.
 
-    The reference point o is its centre of mass.
+    `body_layout` defines these data; the reference point o is the centre of mass. own : data of the body in `out`
     """
     rotation_of_parameters(own, ATTITUDE, *joint_parameters(body, 3, y))
     cx, cy, cz = rotate(own, ATTITUDE, body["centre"], 0)
@@ -112,7 +112,10 @@ def set_free_body(body, y, own):
 
 @njit
 def set_joint_frame(body, out, tables, own):
-    """Set position and motion of a body to those of its parent at the joint; write the joint axes to scratch[9:18]."""
+    """Set position and motion of a body to those of its parent, or of the world, at the joint.
+
+    The rotation matrix of the joint axes is written to scratch[9:18]. own : data of the body in `out`
+    """
     work = tables.scratch
     if body["parent"] < 0:
         for k in range(9):
@@ -135,7 +138,10 @@ def set_joint_frame(body, out, tables, own):
 
 @njit
 def set_revolute(body, t, y, tables, own):
-    """Rotate a body by its revolute joint; add the joint velocity and, for a driven joint, its acceleration."""
+    """Rotate a body by its revolute joint; add the joint velocity and, for a driven joint, its acceleration.
+
+    scratch[9:18] : axes of the joint, see `set_joint_frame`; own : data of the body in `out`
+    """
     angle, rate, change = joint_coordinate(body, t, y, tables)
     rotation_about_axis(tables.scratch, 0, angle, body["axis"])
     multiply_matrices(tables.scratch, 9, tables.scratch, 0, own, ATTITUDE)
@@ -147,7 +153,10 @@ def set_revolute(body, t, y, tables, own):
 
 @njit
 def set_prismatic(body, t, y, tables, own):
-    """Move a body by its prismatic joint; add the joint velocity and, for a driven joint, its acceleration."""
+    """Move a body by its prismatic joint; add the joint velocity and, for a driven joint, its acceleration.
+
+    scratch[9:18] : axes of the joint, see `set_joint_frame`; own : data of the body in `out`
+    """
     travel, rate, change = joint_coordinate(body, t, y, tables)
     copy_joint_axes(tables, own)
     a, b, c = rotate(own, ATTITUDE, body["axis"], 0)
@@ -161,7 +170,7 @@ def set_prismatic(body, t, y, tables, own):
 
 @njit
 def copy_joint_axes(tables, own):
-    """Copy the joint axes to the attitude of the body."""
+    """Set the attitude of a body to the axes of its joint, in scratch[9:18]; for joints that do not rotate the body."""
     for k in range(9):
         own[ATTITUDE + k] = tables.scratch[9 + k]
 
@@ -170,7 +179,7 @@ def copy_joint_axes(tables, own):
 def add_joint_velocity(own, wx, wy, wz, vx, vy, vz):
     """Add the joint velocity S q' = (w, v) to the velocity V of a body, and V x S q' to its bias acceleration.
 
-    (w, v) : angular velocity and velocity at the reference point o, in axes of the world
+    (w, v) : angular velocity and velocity at the reference point o, in axes of the world; own : data of the body
     """
     for k, w, v in ((0, wx, vx), (1, wy, vy), (2, wz, vz)):
         own[SPIN + k] += w
@@ -185,7 +194,7 @@ def add_joint_velocity(own, wx, wy, wz, vx, vy, vz):
 
 @njit
 def set_jointed_body(body, t, y, out, tables, own):
-    """Write attitude, position and motion of a body from those of its parent."""
+    """Write attitude, position, and motion at o, of a body that is not free from those of its parent to `own`."""
     set_joint_frame(body, out, tables, own)
     if body["joint"] == REVOLUTE:
         set_revolute(body, t, y, tables, own)
@@ -220,7 +229,7 @@ def add_drive_acceleration(own, x, y, z, turns):
 def origin_acceleration(out, here, wide, spin):
     """Acceleration of the origin of a body: a + alpha x r + w x v.
 
-    a : acceleration at the reference point o, at index `wide`; r : origin minus o
+    a : spatial acceleration at the reference point o, at index `wide` of `out`; r : origin minus o
     alpha : angular acceleration, at offset `spin` in the data of the body; here : offset of these data in `out`
     w, v : angular velocity, and velocity of the origin
     """
@@ -232,7 +241,10 @@ def origin_acceleration(out, here, wide, spin):
 
 @njit
 def centre_of(body, out, here):
-    """(position of the centre of mass from the origin, its velocity), in axes of the world: 6 numbers."""
+    """Position of the centre of mass of a body from its origin, and its velocity, in axes of the world: 6 numbers.
+
+    here : offset of the body in `out`
+    """
     x, y, z = rotate(out, here + ATTITUDE, body["centre"], 0)
     u, v, w = cross(out, here + SPIN, x, y, z)
     s = here + VELOCITY
@@ -241,7 +253,10 @@ def centre_of(body, out, here):
 
 @njit
 def kinematics(t, y, dydt, out, handle):
-    """Write attitude, position, motion and weight of all bodies, and the states of force elements, from (t, y)."""
+    """Write attitude, position and motion of all bodies, and direction and length of force elements, from (t, y).
+
+    The sums FORCE and TORQUE of each body are set to its weight. See `body_layout` and `update_elements`.
+    """
     tables = open_tables(handle)
     bodies, gravity = tables.bodies, tables.settings[0]["gravity"]
     for i in range(bodies.size):

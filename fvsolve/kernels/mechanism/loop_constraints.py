@@ -68,9 +68,10 @@ def pin_direction(out, tables, pin, r):
 
 @njit
 def relative_motion(out, tables, pin):
-    """Position of `to` minus that of `from` [m], and velocity and acceleration of `to` in axes of the body of `from`.
+    """Position of `to` minus that of `from` [m], and velocity and acceleration of `to` relative to the body of `from`.
 
-    Returns 9 numbers, as components in axes of the world; (65) of docs/course.md.
+    Returns 9 numbers, as components in axes of the world; (65) of docs/course.md. The accelerations of both bodies in
+    `out` are used.
     """
     i, j = body_of(tables, pin["from_point"]), body_of(tables, pin["to_point"])
     x, y, z, u, v, w = point_at(out, tables, pin["to_point"], POSITION)
@@ -143,9 +144,9 @@ def fill_constraint_rows(out, tables):
 
 @njit
 def multipliers(tables, rows):
-    """Solve Z' Z lambda = right-hand sides for the pin forces lambda in place, by the Cholesky factors Z' Z = C C'.
+    """Solve Z' Z lambda = right-hand sides for the pin forces lambda, by the Cholesky factors Z' Z = C C'.
 
-    rows : number of constrained directions
+    lambda replaces the right-hand sides in `scratch`, see the module. rows : number of constrained directions
     """
     work, n, z = tables.scratch, tables.freedoms.size, constraint_offset(tables) + rows * tables.freedoms.size
     h, last = z + rows * n, z + rows * n + rows * rows
@@ -169,7 +170,10 @@ def multipliers(tables, rows):
 
 @njit
 def start_gaps(t, y, dydt, out, handle):
-    """Write the gap of each constrained direction [m] in place of the pin forces in `out`, for `model.mechanism`."""
+    """Write n . rho of each constrained direction n [m] in place of the pin forces in `out`, for the start of a model.
+
+    It is the whole displacement, not its change since the start.
+    """
     tables = open_tables(handle)
     pins, at = tables.pins, tables.layout[0]["pin"]
     for k in range(pins.size):
@@ -191,7 +195,10 @@ def add_start_pin_forces(t, y, dydt, out, handle):
 
 @njit
 def solve_pinned_accelerations(t, y, dydt, out, handle):
-    """Solve for the accelerations of all bodies with pin forces; write them and the rates of the states."""
+    """Solve for the accelerations of all bodies with pin forces; write both and the rates of the joint states.
+
+    The pin forces [N] are also added to the loads of bodies. out[RATE] is raised by `body_rate_limit` and to `pull`.
+    """
     tables = open_tables(handle)
     pins, work, n, at = tables.pins, tables.scratch, tables.freedoms.size, tables.layout[0]["pin"]
     add_start_pin_forces(t, y, dydt, out, handle)
@@ -225,7 +232,7 @@ def solve_pinned_accelerations(t, y, dydt, out, handle):
 
 @njit
 def observe_pins(t, y, out, handle, values):
-    """Write probe values of pins: magnitude of gap [m] or force [N]."""
+    """Write probe values of pins: magnitude of gap [m] or force [N], in the constrained directions."""
     tables = open_tables(handle)
     probes, pins = tables.probes, tables.pins
     for k in range(probes.size):

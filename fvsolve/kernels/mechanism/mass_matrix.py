@@ -8,7 +8,7 @@ the root; the factor L of M = L'L has no further entries.
 
 Layout of `scratch`, with n degrees of freedom: S (6 n numbers); forces, later accelerations (n); a work column (n); M.
 Then for each body ten numbers of inertia about o (mass, mass times centre, xx yy zz xy xz yz), and for each body six of
-torque and force.
+torque and force, later of acceleration.
 """
 
 from math import sqrt
@@ -56,7 +56,8 @@ def scratch_offsets(tables):
 def joint_columns(body, own, s):
     """Write the angular velocity and the velocity at o per unit rate of each degree of freedom of a joint to s.
 
-    They are the columns S of the joint. o : reference point, see `body_layout`; own : data of the body in `out`
+    They are the columns S of the joint, six numbers each. own : data of the body in `out`
+    o : reference point, see `body_layout`
     """
     kind, x, y, z = body["joint"], own[ARM], own[ARM + 1], own[ARM + 2]
     first = 0
@@ -137,10 +138,10 @@ def spatial_momentum(inertia, wx, wy, wz, vx, vy, vz):
 
 @inline
 def bias_load(own, inertia, load):
-    """Write the torque about o and the force that a joint must supply for zero joint accelerations, six numbers.
+    """Write torque about o and force that a body needs besides its applied loads for q'' = 0, six numbers, to `load`.
 
-    They are I A + V x* I V - applied loads on the body. I : inertia; V, A : spatial velocity, and acceleration for q''
-    = 0 x* : spatial cross product of motion and force (Featherstone 2008); o : reference point, see `body_layout`
+    They are I A + V x* I V - applied loads on the body. I : inertia; V : spatial velocity; A : spatial acceleration for
+    q'' = 0; x* : spatial cross product of motion and force (Featherstone 2008); o : reference point, see `body_layout`
     """
     w, v, a, c = SPIN, VELOCITY_AT_O, SPIN_BIAS, BIAS_AT_O
     lx, ly, lz, px, py, pz = spatial_momentum(inertia, own[w], own[w + 1], own[w + 2], own[v], own[v + 1], own[v + 2])
@@ -156,9 +157,10 @@ def bias_load(own, inertia, load):
 
 @njit
 def fill_mass_matrix(y, out, tables):
-    """Write joint columns S, mass matrix M and the forces of all degrees of freedom to `scratch`.
+    """Write joint columns S, mass matrix M and the forces of all degrees of freedom to `scratch`, see the module.
 
-    The forces are minus those that are stored as rounding of the equilibrium at the start.
+    The forces contain the loads of all bodies, bias, and springs and dampers of joints. Those that are rounding of the
+    equilibrium at the start are subtracted. M contains the fluid in basins and networks on bodies.
     """
     bodies, freedoms, work, paths = tables.bodies, tables.freedoms, tables.scratch, tables.integers
     n = freedoms.size
@@ -222,7 +224,7 @@ def factor_mass_matrix(tables):
 
 @njit
 def solve_factor(tables, at):
-    """Solve L' z = b in place, b at scratch[at], with the mass matrix M = L'L factored; |z|^2 = b' M^-1 b."""
+    """Solve L' z = b in place, b at scratch[at], with the factored mass matrix M = L'L; |z|^2 = b' M^-1 b."""
     freedoms, work, paths, n = tables.freedoms, tables.scratch, tables.integers, tables.freedoms.size
     b = work[at : at + n]
     for j in range(n - 1, -1, -1):
@@ -249,7 +251,10 @@ def solve_mass_matrix(tables, at):
 
 @njit
 def spread_accelerations(out, tables):
-    """Write the accelerations of all bodies, from those of the degrees of freedom, from the root to the leaves."""
+    """Write ACCELERATION and SPIN_RATE of all bodies to `out`, from the accelerations of the degrees of freedom.
+
+    Those are in `scratch` after the columns S; the torques and forces of bodies in `scratch` are overwritten.
+    """
     bodies, work, n = tables.bodies, tables.scratch, tables.freedoms.size
     loads = scratch_offsets(tables)[1]
     for i in range(bodies.size):
@@ -274,7 +279,7 @@ def spread_accelerations(out, tables):
 
 @njit
 def coordinate_rates(body, y, dydt):
-    """Write d/dt of the coordinates of a joint: velocities, and rates of Euler parameters ((44) of docs/course.md).
+    """Write d/dt of the coordinates of a joint to `dydt`: velocities, and rates of Euler parameters.
 
     The rates of Euler parameters follow from the angular velocity in axes of the body.
     """
@@ -296,7 +301,7 @@ def coordinate_rates(body, y, dydt):
 def add_point_force(out, tables, point, acts, x, y, z, at):
     """Add the generalised forces of a force (x, y, z) at a point of a body to the vector at scratch[at].
 
-    For `acts` ABOUT, (x, y, z) is a torque.
+    For `acts` ABOUT, (x, y, z) is a torque. Nothing is added for a point of the world, or point < 0.
     """
     if point < 0 or tables.points[point]["body"] < 0:
         return
@@ -331,6 +336,7 @@ def add_body_wrench(tables, i, tx, ty, tz, fx, fy, fz, at):
     """Add the generalised forces of a load on body i, per degree of freedom, to the vector at scratch[at].
 
     (tx, ty, tz), (fx, fy, fz) : torque about the reference point o, and force, in axes of the world
+    Nothing is added if no degree of freedom moves the body, or for the world (i < 0).
     """
     work, i = tables.scratch, nearest_free_body(tables, i)
     if i < 0:
@@ -358,10 +364,11 @@ def mobility(tables, at):
 
 @njit
 def body_rate_limit(out, tables):
-    """Upper bound of the rates of bodies [1/s], at least the greatest angular velocity: c / 2 + sqrt(c^2 / 4 + k).
+    """Upper bound of the rates of bodies [1/s], c / 2 + sqrt(c^2 / 4 + k), at least the greatest angular velocity.
 
-    k, c : sums over springs and dampers of stiffness and damping, each times b' M^-1 b; b : direction of the force
-    The trace of M^-1 K exceeds its greatest eigenvalue; K : stiffness matrix.
+    It is at least out[RATE] too. k, c : sums over springs and dampers, also of joints, of stiffness and damping, each
+    times b' M^-1 b; M : factored mass matrix, b : direction of the force. The trace of M^-1 K is at least its greatest
+    eigenvalue; K : stiffness matrix.
     """
     rate, freedoms, work, lines = out[RATE], tables.freedoms, tables.scratch, tables.lines
     stiffness, damping, n, at = 0.0, 0.0, freedoms.size, 7 * freedoms.size
@@ -399,7 +406,7 @@ def start_mass_matrix(t, y, dydt, out, handle):
 
 @njit
 def state_rates(y, dydt, tables):
-    """Write the rates of the states of joints from the accelerations of degrees of freedom, unless dydt is empty."""
+    """Write the rates of all states of joints to `dydt`, with accelerations from `scratch`, unless it is empty."""
     bodies, work, n = tables.bodies, tables.scratch, tables.freedoms.size
     if dydt.size == 0:
         return
@@ -413,7 +420,10 @@ def state_rates(y, dydt, tables):
 
 @njit
 def solve_accelerations(t, y, dydt, out, handle):
-    """Solve for the accelerations of all bodies under their forces; write them and the rates of the states."""
+    """Solve for the accelerations of all bodies under their forces; write them and the rates of the joint states.
+
+    out[RATE] is raised by `body_rate_limit`. The factored mass matrix stays in `scratch`.
+    """
     tables = open_tables(handle)
     fill_mass_matrix(y, out, tables)
     factor_mass_matrix(tables)

@@ -7,7 +7,7 @@ body it is
 
 a_o : acceleration of the origin of the body; W, W' : its angular velocity and angular acceleration. This is Lagrange's
 equation ((70) of docs/course.md) for fluid that slides along a given path. Coriolis forces are perpendicular to the
-path. The initial steady state already balances the drive at the start.
+path. The initial steady state already balances the part of gravity at the start.
 """
 
 from fvsolve.jit import njit
@@ -38,9 +38,9 @@ THIN_LAYER = 1e-6  # thickness of a layer added at the surface to test if fluid 
 
 @njit
 def set_body_motion(tables, out, i, wide, spin):
-    """Write g - a_o, W, W' and the velocity of the origin of body i, in its own axes, to `scratch`.
+    """Write g - a_o, W, W' and the velocity of the origin of body i, in its own axes, to scratch[:12].
 
-    a_o : acceleration of its origin; W, W' : its angular velocity and acceleration
+    g : acceleration of gravity; a_o : acceleration of its origin; W, W' : its angular velocity and acceleration
     wide, spin : offsets of a_o and W' in the data of the body in `out`
     """
     here, motion = body_row(tables, i), tables.scratch
@@ -54,7 +54,10 @@ def set_body_motion(tables, out, i, wide, spin):
 
 @njit
 def speed_squared(motion, x, y, z):
-    """Square of the speed of rotation at r = (x, y, z), |W x r|^2 [m2/s2]; W : angular velocity of the body."""
+    """Square of the speed of rotation at r = (x, y, z), |W x r|^2 [m2/s2]; W : angular velocity of the body.
+
+    motion : `scratch` after `set_body_motion`
+    """
     u, v, w = cross(motion, BODY_SPIN, x, y, z)
     return u * u + v * v + w * w
 
@@ -75,7 +78,7 @@ def segment_drive(motion, r1, r2, wx, wy, wz):
 def set_segment_drives(t, y, dydt, out, handle):
     """Write the work of gravity and inertial forces per mass along each moving segment of fluid to `out` [J/kg].
 
-    The value at the start is subtracted.
+    The values are for q'' = 0 (zero joint accelerations), minus those of gravity at the start.
     """
     tables = open_tables(handle)
     segments, at, last = tables.moving_segments, tables.layout[0]["moving_segment"], -1
@@ -92,7 +95,12 @@ def set_segment_drives(t, y, dydt, out, handle):
 
 @njit
 def bottom_pressure_per_density(tables, out, segment, level):
-    """Pressure over density at the bottom of a tank on a body [J/kg]; level : depth along the z axis of the body."""
+    """Integral of dp / density from the surface to the bottom of a tank on a body [J/kg].
+
+    At constant density it is the gauge pressure at the bottom over density. It is for zero joint accelerations.
+    segment : row of the tank in `moving_segments`; level : depth along the z axis of the body [m]
+    `scratch` is overwritten by `set_body_motion`.
+    """
     set_body_motion(tables, out, segment["body"], BIAS, SPIN_BIAS)
     motion, r = tables.scratch, segment["start"]
     x, y, z = r[0], r[1], r[2]
@@ -105,10 +113,10 @@ def bottom_pressure_per_density(tables, out, segment, level):
 
 @njit
 def moving_tank_pressures(t, y, dydt, out, handle):
-    """Write the pressures at the bottoms of tanks on bodies, as deviations from the initial steady state; linear law.
+    """Write the pressures at the bottoms of tanks on bodies, as deviations from the initial steady state.
 
-    p' = rho (bottom pressure over density - its value in the initial steady state). A tank whose fluid has no weight
-    would lose the fluid: it ends the run.
+    For the density law `linear`: p' = rho (bottom pressure over density - its value under gravity at the start). A tank
+    whose fluid has no weight would lose the fluid: it ends the run (`mark_weightless`).
     """
     tables = open_tables(handle)
     nodes, rho = tables.nodes, tables.settings[0]["rho"]
@@ -139,10 +147,10 @@ def mark_weightless(tables, out, i, segment, level):
 
 @njit
 def moving_column_rates(t, y, dydt, out, handle):
-    """Write the rates of the mass flow in rigid columns [kg/s2] on moving bodies and elsewhere, without friction.
+    """Write the rates of the mass flow in all rigid columns [kg/s2], on bodies or not, without friction, to `dydt`.
 
-    The rate is area / length times the driving pressure: pressure difference of the ends, plus density times the change
-    of the drive since the start, plus the constant `offset` of the column.
+    The rate is area / length times the driving pressure: deviation of the pressure difference of the ends, plus density
+    times the drive in out[moving_segment], plus the constant `offset` of the column.
     """
     tables = open_tables(handle)
     columns, p, at = tables.columns, tables.layout[0]["pressure"], tables.layout[0]["moving_segment"]
@@ -156,9 +164,11 @@ def moving_column_rates(t, y, dydt, out, handle):
 
 @njit
 def add_cell_drives(t, y, dydt, out, handle):
-    """Add the drive of the cells of pipes to the rates of their waves; linear density law.
+    """Add the drive of the cells of pipes on bodies to the rates of their waves, under the density law `linear`.
 
-    It changes dM/dt by A rho / dx times the drive. M : mass flow, A : area, rho : density, dx : length of a cell
+    Nothing is done if `dydt` is empty. The drive, in out[moving_segment], is the work of gravity and inertial forces
+    along a cell per mass [J/kg], see `set_segment_drives`. It changes dM/dt by A rho / dx times the drive.
+    M : mass flow, A : area, rho : density, dx : length of a cell
     """
     tables = open_tables(handle)
     pipes, rho, at = tables.pipes, tables.settings[0]["rho"], tables.layout[0]["moving_segment"]

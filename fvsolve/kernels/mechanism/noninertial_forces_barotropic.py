@@ -1,4 +1,4 @@
-"""Inertial and gravity forces on fluid of moving bodies under the density laws log, table and mixture."""
+"""Inertial and gravity forces on fluid of moving bodies under the density laws `log`, `table` and `mixture`."""
 
 from fvsolve.jit import njit
 from fvsolve.kernels.density import enthalpy, pressure_of_enthalpy
@@ -12,7 +12,8 @@ from fvsolve.kernels.tank_levels import tank_level
 def moving_tank_pressures_barotropic(t, y, dydt, out, handle):
     """Write the pressures at the bottoms of tanks on bodies, as deviations from the initial steady state.
 
-    The pressure p follows from the enthalpy, h(p) = h(ambient pressure) + bottom pressure over density [J/kg].
+    The pressure p follows from the enthalpy, h(p) = h(ambient pressure) + `bottom_pressure_per_density`. A tank whose
+    fluid has no weight ends the run (`mark_weightless`).
     """
     tables = open_tables(handle)
     st, nodes, floats = tables.settings[0], tables.nodes, tables.floats
@@ -31,7 +32,7 @@ def moving_tank_pressures_barotropic(t, y, dydt, out, handle):
 
 @njit
 def add_cell_drives_barotropic(t, y, dydt, out, handle):
-    """Add the drive of the cells of pipes to the rates of their waves.
+    """Add the drive of the cells of pipes on bodies to the rates of their waves, as `add_cell_drives`.
 
     It changes dM/dt by m / dx times the drive. M : mass flow, m : mass per length, dx : length of a cell
     """

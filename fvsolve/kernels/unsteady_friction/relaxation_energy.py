@@ -3,8 +3,8 @@
 An exponential term of gain g [1/s] and rate n [1/s] has a state z that follows the mass flow M [kg/s]. It stores g z^2
 / (2 n) and dissipates g (M - z)^2, both divided by rho A (density times area) and per length. The sum of dissipation
 and rate of storage is M times the drag of the term, divided by rho A. The entries of a pipe are those of
-`linear_energy.py`: friction and rate of stored energy in `power`, kinetic energy in `stored`. Under the laws log and
-table M is rho A times the velocity, at the reference density.
+`linear_energy.py`: friction and rate of stored energy in `power`, kinetic energy in `stored`. Under the density laws
+`log`, `table` and `mixture` M is rho A times the velocity, with the reference values of density and area.
 """
 
 from fvsolve.jit import njit
@@ -19,8 +19,8 @@ from fvsolve.kernels.unsteady_friction.relaxation_terms_barotropic import veloci
 def input_flow(y, pipe, tables, change):
     """Write the flow that the states of unsteady friction follow in each cell to `change` [kg/s].
 
-    It is the change of the mass flow since the initial steady state; under the laws log and table the change of
-    velocity times reference mass per length.
+    It is the change of the mass flow since the initial steady state; under the density laws `log`, `table` and
+    `mixture` the change of velocity times the reference mass per length.
     """
     st, n, o = tables.settings[0], pipe["cells"], pipe["y"]
     r, l = y[o : o + n], y[o + n : o + 2 * n]
@@ -32,7 +32,10 @@ def input_flow(y, pipe, tables, change):
 
 @njit(forceinline=True)
 def profile_input(st, profile, pipe, i):
-    """Initial steady value, in cell i, of the flow that the states of unsteady friction follow [kg/s]."""
+    """Initial steady value, in cell i, of the flow that the states of unsteady friction follow [kg/s].
+
+    It is the mass flow; under other density laws than `linear` the velocity times the reference mass per length.
+    """
     if st["law"] == LAW_LINEAR:
         return pipe["flow"]
     return pipe["flow"] * (st["rho"] * pipe["area"] / profile[pipe["center"] + i])

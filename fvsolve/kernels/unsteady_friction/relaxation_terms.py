@@ -3,9 +3,9 @@
 The weighting function of the flow history is W(tau) = sum of m_k exp(-n_k tau), tau = nu t / R^2, with kinematic
 viscosity nu and pipe radius R. In addition to the quasi-steady drag (Zielke 1968) the wall exerts the drag sum over k
 of (4 nu / R^2) m_k (M - z_k) per length, M : mass flow. Each state z_k follows the flow, dz_k/dt = (n_k nu / R^2) (M -
-z_k). The equations are linear in cell averages, so they are exact for them. Each term stores (4 nu / R^2) m_k z_k^2 /
-(2 n_k nu / R^2) and dissipates (4 nu / R^2) m_k (M - z_k)^2, both divided by rho A (density times area): the friction
-is passive where no m_k is negative.
+z_k). The equations are linear in cell averages, so they are exact for them. Per length each term stores (4 nu / R^2)
+m_k z_k^2 / (2 n_k nu / R^2) and dissipates (4 nu / R^2) m_k (M - z_k)^2, both divided by rho A (density times area):
+the friction is passive where no m_k is negative.
 """
 
 from fvsolve.jit import njit
@@ -28,8 +28,9 @@ def relaxation_rate(gain, rate, flow, z, dz, pull):
 def relaxation_rates(pipe, floats, flow, y, dydt, pull):
     """Write the rates of all exponential terms of unsteady friction in a pipe to `dydt`, and their drag to `pull`.
 
-    flow : float64[cells]  change of the mass flow since the start [kg/s]
-    pull : float64[cells]  drag per length [kg/s2]
+    flow : float64[cells]  change since the start of the flow that the states follow [kg/s]: under the density law
+        `linear` the mass flow, otherwise the result of `relaxation_terms_barotropic.velocity_change`
+    pull : float64[cells]  receives the change of the drag per length [kg/s2]
     """
     n, at = flow.size, pipe["memory"]
     for i in range(n):
@@ -63,7 +64,7 @@ def wave_difference(r, l, flow):
 def add_unsteady_friction(t, y, dydt, out, handle):
     """Add the unsteady friction of all pipes to the rates of their waves, and write the rates of its states.
 
-    Linear density law; nothing is done if `dydt` is empty.
+    For the density law `linear`; nothing is done if `dydt` is empty.
     """
     tables = open_tables(handle)
     pipes, floats, scratch = tables.pipes, tables.floats, tables.scratch

@@ -1,4 +1,4 @@
-"""Unsteady friction under the density laws log and table.
+"""Unsteady friction under the density laws `log`, `table` and `mixture`.
 
 The states of the exponential terms follow u = (rho A)_ref M / m, the velocity M / m times the reference mass per
 length, with mass flow M and mass per length m. Then velocity times drag is a rate of storage plus a dissipation.
@@ -12,10 +12,10 @@ from fvsolve.kernels.unsteady_friction.relaxation_terms import relaxation_rates,
 
 @njit
 def velocity_change(pipe, profile, reference, r, l, change):
-    """Write the change of reference M / m since the initial steady state to `change` [kg/s].
+    """Write the change of `reference` times M / m since the initial steady state to `change` [kg/s].
 
-    Cell averages by two Gauss points.
-    reference : reference mass per length [kg/m]; M : mass flow, m : mass per length
+    The values are cell averages by two Gauss points; M : mass flow, m : mass per length
+    reference : mass per length at the reference state [kg/m]; profile : values of the initial steady state
     r, l : float64[cells]  forward and backward wave [kg/s]
     """
     n, c, flow = r.size, pipe["speed"], pipe["flow"]
@@ -33,7 +33,7 @@ def velocity_change(pipe, profile, reference, r, l, change):
 def add_unsteady_friction_barotropic(t, y, dydt, out, handle):
     """Add the unsteady friction of all pipes to the rates of their waves, and write the rates of its states.
 
-    Laws log, table and mixture; nothing is done if `dydt` is empty.
+    For the density laws `log`, `table` and `mixture`; nothing is done if `dydt` is empty.
     """
     tables = open_tables(handle)
     pipes, floats, scratch = tables.pipes, tables.floats, tables.scratch

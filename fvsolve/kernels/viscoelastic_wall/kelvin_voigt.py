@@ -4,9 +4,10 @@ An element of compliance J [1/Pa] and time constant tau [s] has the strain eps, 
 hoop stress is sigma = c D p / (2 e), with restraint factor c, diameter D and wall thickness e. The bore grows by 2 eps
 A (Covas et al. 2005), A : area. Let w = r + l, the sum of both waves, which is the pressure times A / a with wave speed
 a, and u = 2 rho a eps A / G with G = c D K J / e and K = rho a^2. Then du/dt = (w - u) / tau. The mass flow into the
-bore, G du/dt, is subtracted in equal halves from the rates of both waves. All values are changes since the initial
-steady state, whose pressure is in equilibrium with its strain. An element stores G u^2 / 2 and dissipates G (w - u)^2 /
-tau, both divided by rho A: the wall is passive, for no J is negative.
+additional bore per length is G du/dt / a; so G du/dt is subtracted in equal halves from the rates of both waves. All
+values are changes since the initial steady state, whose pressure is in equilibrium with its strain. Per length an
+element stores G u^2 / 2 and dissipates G (w - u)^2 / tau, both divided by rho A: the wall is passive, for no J is
+negative.
 """
 
 from fvsolve.jit import njit
@@ -23,9 +24,11 @@ def wave_sum(r, l, w):
 
 @njit
 def wall_rates(pipe, floats, w, y, dydt, taken):
-    """Write the rates of the wall elements of a pipe; subtract half the mass flow into them from the rate of each wave.
+    """Write the rates of the wall elements of a pipe; subtract half of the storage in them from the rate of each wave.
 
-    w : float64[cells]  sum of both waves [kg/s]; taken : float64[cells]  work array
+    The storage is the sum of gain (w - u) over the elements [kg/s2], u : state of an element, gain [1/s].
+    w : float64[cells]  pressure change times area over wave speed [kg/s]; under the linear law the sum of both waves
+    taken : float64[cells]  work array
     """
     n, o, at = w.size, pipe["y"], pipe["strain"]
     for i in range(n):
@@ -43,7 +46,7 @@ def wall_rates(pipe, floats, w, y, dydt, taken):
 def add_wall_creep(t, y, dydt, out, handle):
     """Subtract the wall creep of all pipes from the rates of both waves, and write the rates of the wall elements.
 
-    Linear density law; nothing is done if `dydt` is empty.
+    For the density law `linear`; nothing is done if `dydt` is empty.
     """
     tables = open_tables(handle)
     pipes, floats, scratch = tables.pipes, tables.floats, tables.scratch

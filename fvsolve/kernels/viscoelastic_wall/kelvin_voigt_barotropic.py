@@ -1,6 +1,6 @@
-"""Creep of viscoelastic pipe walls under the density laws log, table and mixture.
+"""Creep of viscoelastic pipe walls under the density laws `log`, `table` and `mixture`.
 
-The Kelvin-Voigt elements follow w = (A / a) (p - p0), with area A, pressure p, initial steady pressure p0 and the wave
+The Kelvin-Voigt elements follow w = (A / a) (p - p0), with pressure p, initial steady pressure p0, and area A and wave
 speed a at the reference state; under the linear law w is the sum of both waves. The additional volume of the bore holds
 liquid of the reference density. Its mass is subtracted from the mass of the same cell only.
 """
@@ -17,7 +17,7 @@ from fvsolve.kernels.viscoelastic_wall.kelvin_voigt import wall_rates
 def wall_pressure(st, floats, profile, pipe, r, l, w):
     """Write w = (A / a) (p - p0) [kg/s] to w, averaged over each cell by two Gauss points.
 
-    A : area, a : wave speed, p, p0 : present and initial steady pressure
+    A, a : reference area and wave speed; p, p0 : present and initial steady pressure; profile : initial steady values
     r, l : float64[cells]  forward and backward wave [kg/s]
     """
     n, c, least = r.size, pipe["speed"], DRY * st["rho"] * pipe["area"]
@@ -34,7 +34,7 @@ def wall_pressure(st, floats, profile, pipe, r, l, w):
 def add_wall_creep_barotropic(t, y, dydt, out, handle):
     """Subtract the wall creep of all pipes from the rates of both waves, and write the rates of the wall elements.
 
-    Laws log, table and mixture; nothing is done if `dydt` is empty.
+    For the density laws `log`, `table` and `mixture`; nothing is done if `dydt` is empty.
     """
     tables = open_tables(handle)
     pipes, floats, scratch = tables.pipes, tables.floats, tables.scratch

@@ -2,10 +2,10 @@
 
 A wall element of gain g and rate n [1/s] has a state u that follows w, the pressure change times area over wave speed
 [kg/s]. It stores g u^2 / (2 n) and dissipates g (w - u)^2, both divided by rho A (density times area) and per length.
-The sum of dissipation and rate of storage is w times the mass flow g (w - u) into the element, divided by rho A. The
-work against the initial steady potential P = p - p_ambient + rho g z is stored too, with the reference density. The
-entries of a pipe are those of `linear_energy.py`: creep and rate of stored energy in `power`, elastic energy in
-`stored`.
+The sum of dissipation and rate of storage is w g (w - u) / (rho A); g (w - u) is the mass flow into the element per
+length, times the wave speed. The work against the initial steady potential P = p - p_ambient + rho g z is stored too,
+with the reference density. The entries of a pipe are those of `linear_energy.py`: creep and rate of stored energy in
+`power`, elastic energy in `stored`.
 """
 
 from fvsolve.jit import njit
@@ -25,7 +25,7 @@ from fvsolve.kernels.viscoelastic_wall.kelvin_voigt import wave_sum
 
 @njit
 def creep_power(st, floats, pipe, w, y, dydt):
-    """(dissipation, rate of stored energy) of all wall elements of a pipe [W], without work against initial pressure.
+    """(dissipation, rate of stored energy) of all wall elements of a pipe [W], without `work_against_profile`.
 
     w : float64[cells]  pressure change times area over wave speed [kg/s]
     """
@@ -46,10 +46,7 @@ def creep_power(st, floats, pipe, w, y, dydt):
 
 @njit
 def creep_energy(st, floats, pipe, y):
-    """Change since the start of the energy stored in all wall elements of a pipe [J], without work against P.
-
-    P : initial steady potential, p - p_ambient + rho g z
-    """
+    """Change of the energy in all wall elements of a pipe since the start [J], without `work_against_profile`."""
     n, width, sum_ = pipe["cells"], polynomial_width(st, pipe["cells"]), 0.0
     for k in range(pipe["elements"]):
         at = pipe["strain"] + k * n
@@ -62,10 +59,10 @@ def creep_energy(st, floats, pipe, y):
 
 @njit(forceinline=True)
 def bore_growth(st, floats, pipe, i, g, y):
-    """Sum over all wall elements of g u / n at a Gauss point of cell i [kg/s]; of rates, its time derivative.
+    """Sum over all wall elements of gain times state over rate, at Gauss point g of cell i [kg/s].
 
-    g, n, u : gain, rate and state of an element. Multiplied by dx / speed the sum is the mass of reference density in
-        the additional volume of the bore.
+    Multiplied by dx / speed it is the mass of reference density in the additional volume of the bore of a cell. With
+    rates of states in place of y the result is its time derivative.
     """
     n, width, sum_ = pipe["cells"], polynomial_width(st, pipe["cells"]), 0.0
     for k in range(pipe["elements"]):

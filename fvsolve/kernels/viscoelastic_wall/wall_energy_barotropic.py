@@ -1,4 +1,4 @@
-"""Power and stored energy of viscoelastic walls under the density laws log, table and mixture.
+"""Power and stored energy of viscoelastic walls under the density laws `log`, `table` and `mixture`.
 
 Mass that leaves a cell carries h(p) - h(p_ambient) + g z - v^2 / 2 [J/kg], with specific enthalpy h, elevation z and
 velocity v. In the additional volume of the bore it is liquid of the reference density and carries P / rho, P = p -
@@ -19,7 +19,7 @@ from fvsolve.kernels.viscoelastic_wall.wall_energy import bore_growth, creep_ene
 
 @njit(forceinline=True)
 def gravity_potential(st, profile, pipe, z, i, g):
-    """Gravity potential [J/kg] at Gauss point g of cell i; z : elevation of the pipe's `from` end above datum [m]."""
+    """Gravity potential [J/kg] at Gauss point g of cell i of a pipe; z : elevation of its `from` end over datum [m]."""
     return st["gravity"] * (z + rise_at(profile, pipe, (i + 0.5 + GAUSS_POINTS[g]) * pipe["dx"]))
 
 
@@ -27,7 +27,8 @@ def gravity_potential(st, profile, pipe, z, i, g):
 def profile_pressure(st, floats, profile, pipe, z, i, g):
     """Initial steady potential P = p - p_ambient + rho g z [Pa] at Gauss point g of cell i of a pipe.
 
-    z : as argument, elevation of the `from` end of the pipe above datum [m]
+    In this formula z is the elevation of the point; the argument z is that of the `from` end of the pipe, both above
+    datum [m].
     """
     p = pressure_of_mass(st, floats, pipe, profile_mass(profile, pipe, i, g))
     return p - st["ambient"] + st["rho"] * gravity_potential(st, profile, pipe, z, i, g)
@@ -37,7 +38,7 @@ def profile_pressure(st, floats, profile, pipe, z, i, g):
 def work_against_profile_barotropic(st, floats, profile, pipe, z, y):
     """Energy stored in wall elements as work against initial steady potential P [J], or its rate [W] if y are rates.
 
-    P = p - p_ambient + rho g z; z : as argument, elevation of the `from` end of the pipe above datum [m]
+    P : see `profile_pressure`; z : elevation of the `from` end of the pipe above datum [m]
     """
     sum_ = 0.0
     for i in range(pipe["cells"]):
@@ -75,7 +76,7 @@ def density_law_power(st, floats, profile, pipe, z, w, y, dydt):
 def add_power_barotropic(t, y, dydt, out, handle, power):
     """Add the power of viscoelastic walls to the entries of their pipes in `power` [W].
 
-    These are dissipation, rate of stored energy, and residual of the density law.
+    Added are dissipation, rate of stored energy, and the residual of the density law (`density_law_power`).
     """
     tables = open_tables(handle)
     st, pipes, nodes, at = tables.settings[0], tables.pipes, tables.nodes, NODE * tables.nodes.size

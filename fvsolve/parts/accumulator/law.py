@@ -1,11 +1,11 @@
 """Gas and fluid in an accumulator, with p V^n constant in the gas.
 
-p and V are pressure and volume of the gas, p0 and V0 their values at the start, n the polytropic exponent. The state
-of the node is y, the mass of fluid that has flowed in since the start [kg]. Under the density law `linear`, with the
-density rho, V = V0 - y / rho and p - p0 = p0 ((V / V0)^-n - 1). Under the laws `log` and `table`, Newton's method
-solves rho(p) (total volume - V) = mass of the fluid for ln(V / V0).
-A bladder expands until it fills the vessel. Below that pressure, only the fluid in the neck takes up pressure; it is as
-stiff as a small chamber.
+p and V are pressure and volume of the gas, p0 and V0 their values at the start, n the polytropic exponent.
+The state of the node is y, the mass of fluid that has flowed in since the start [kg].
+Under the density law `linear`, with the density rho, V = V0 - y / rho and p - p0 = p0 ((V / V0)^-n - 1).
+Under other laws, Newton's method solves rho(p) (total volume - V) = mass of the fluid for ln(V / V0).
+A bladder expands until it fills the vessel. At lower pressures only the fluid in the neck is compressed; its stiffness
+is that of a small chamber.
 """
 
 from math import exp, expm1, log, log1p
@@ -32,10 +32,12 @@ pressure at that inflow minus the pressure at the start [Pa]."""
 
 @njit
 def gas_state(st, floats, node, at, y):
-    """Gas volume, pressure and stiffness of an accumulator after an inflow y since the start [kg].
+    """(ln(V / V0), pressure change [Pa], stiffness [Pa/kg]) after an inflow y since the start [kg].
 
-    Returns ln(V / V0), V the gas volume and V0 its value at the start; the pressure of the node minus that at the start
-    [Pa]; and the stiffness dp/dm, pressure rise per mass of fluid [Pa/kg]. floats[at:] : numbers of the accumulator
+    V : gas volume, V0 : gas volume at the start
+    pressure change : pressure of the node minus that at the start; stiffness : dp/dm, rise of pressure per mass of
+    fluid
+    st : settings of the model; node : row of the node; floats[at:] : parameters of the accumulator
     """
     n, neck, above_empty = floats[at + EXPONENT], floats[at + NECK_STIFFNESS], y - floats[at + EMPTY_MASS]
     if st["law"] != LAW_LINEAR:
@@ -55,7 +57,10 @@ def gas_state(st, floats, node, at, y):
 
 @njit
 def full_bladder_gas(floats, node, at):
-    """ln(V / V0) of the gas when its bladder fills the vessel; 0 if the bladder fills it at the start."""
+    """ln(V / V0) when the gas fills the vessel with its bladder; 0 if it does so at the start.
+
+    V, V0, arguments : as for `gas_state`
+    """
     if floats[at + EMPTY_MASS] > 0.0:
         return 0.0
     return -log1p(floats[at + EMPTY_PRESSURE] / node["pressure"]) / floats[at + EXPONENT]
@@ -63,7 +68,7 @@ def full_bladder_gas(floats, node, at):
 
 @njit
 def gas_state_dense(st, floats, node, at, y):
-    """`gas_state` under the density laws `log` and `table`."""
+    """Results of `gas_state` under density laws other than `linear`."""
     n, gas, total, neck = (
         floats[at + EXPONENT],
         floats[at + GAS_VOLUME],
@@ -96,7 +101,7 @@ def gas_state_dense(st, floats, node, at, y):
 
 @njit
 def set(t, y, out, tables, device):
-    """Write the pressure of the node minus that at the start [Pa], and its stiffness dp/dm [Pa/kg], into `out`."""
+    """Write to `out` the pressure of the node minus that at the start [Pa], and the stiffness dp/dm [Pa/kg]."""
     i, layout = device["node"], tables.layout[0]
     node = tables.nodes[i]
     st, floats = tables.settings[0], tables.floats
@@ -107,14 +112,14 @@ def set(t, y, out, tables, device):
 
 @njit
 def events(t, y, out, tables, device, g):
-    """Write the event functions g: mass of fluid left until the bladder or vessel is empty [kg], then its negative."""
+    """Write to g the mass of fluid that is left until the gas fills the vessel [kg], then its negative."""
     left = y[tables.nodes[device["node"]]["y"]] - tables.floats[device["data"] + EMPTY_MASS]
     g[device["event"]], g[device["event"] + 1] = left, -left
 
 
 @njit
 def value(t, y, out, tables, device, quantity):
-    """Gas volume [m3] (quantity 0) or gas pressure [Pa] (quantity 1)."""
+    """Gas volume [m3] for quantity 0, gas pressure [Pa] for quantity 1."""
     node = tables.nodes[device["node"]]
     st, floats = tables.settings[0], tables.floats
     at, inflow = device["data"], y[node["y"]]
@@ -128,10 +133,10 @@ def value(t, y, out, tables, device, quantity):
 
 @njit
 def gas_energy(p, gas, n, ambient, u):
-    """Energy that a gas takes up as its volume changes from `gas` to exp(u) `gas` with p V^n constant [J].
+    """Energy [J] that a gas takes up as its volume changes from `gas` [m3] to exp(u) `gas`, with p V^n constant.
 
-    It is minus the integral of (pressure - ambient) dV. p : pressure at volume `gas` [Pa]
-    ambient : ambient pressure [Pa]
+    It is minus the integral of (pressure - ambient) dV.
+    p : pressure at the volume `gas` [Pa]; n : polytropic exponent; ambient : ambient pressure [Pa]
     """
     work = -p * gas * u if n == 1.0 else p * gas * expm1((1.0 - n) * u) / (n - 1.0)
     return work + ambient * gas * expm1(u)
@@ -139,7 +144,7 @@ def gas_energy(p, gas, n, ambient, u):
 
 @njit
 def accumulator_energy(st, floats, node, at, y):
-    """Stored energy of an accumulator after an inflow y since the start [kg], minus that at the start [J]."""
+    """Stored energy of an accumulator minus that at the start [J]; arguments as for `gas_state`."""
     n, gas, empty, p0 = floats[at + EXPONENT], floats[at + GAS_VOLUME], floats[at + EMPTY_MASS], node["pressure"]
     neck = floats[at + NECK_STIFFNESS] if st["law"] == LAW_LINEAR else 0.0
     first = p0 + floats[at + EMPTY_PRESSURE] if floats[at + NECK_STIFFNESS] > 0.0 and empty > 0.0 else p0
@@ -159,12 +164,12 @@ def accumulator_energy(st, floats, node, at, y):
 
 @njit
 def stored(y, tables, device):
-    """Stored energy of the accumulator, minus that at the start [J]."""
+    """Stored energy of the accumulator minus that at the start [J]."""
     node = tables.nodes[device["node"]]
     return accumulator_energy(tables.settings[0], tables.floats, node, device["data"], y[node["y"]])
 
 
 @njit
 def power(t, y, dydt, out, tables, device):
-    """Power supplied from outside (0), rate of the stored energy, and power dissipated (0) [W]."""
+    """(power supplied from outside, which is 0, rate of the stored energy, dissipated power, which is 0) [W]."""
     return 0.0, vessel_power(dydt, out, tables, device), 0.0

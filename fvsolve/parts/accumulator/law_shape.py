@@ -22,7 +22,7 @@ LEAST_SURFACE = 1e-6  # of the mean surface: least slope dV/dz in the search for
 
 @njit
 def segment(d):
-    """Area S(d) of the unit circle below depth d, from 0 to pi."""
+    """Area S(d) of the part of the unit circle that is filled to the depth d, from 0 (d <= 0) to pi (d >= 2)."""
     if d <= 0.0:
         return 0.0
     if d >= 2.0:
@@ -33,7 +33,7 @@ def segment(d):
 
 @njit
 def segment_integral(d):
-    """T(d), the integral of the wetted area S of the unit circle over its depth from 0 to d."""
+    """Integral T(d) of the area S (see `segment`) from depth 0 to d."""
     if d <= 0.0:
         return 0.0
     if d >= 2.0:
@@ -44,7 +44,7 @@ def segment_integral(d):
 
 @njit
 def segment_double_integral(d):
-    """U(d), the integral of T (see `segment_integral`) from 0 to d."""
+    """Integral U(d) of T (see `segment_integral`) from depth 0 to d."""
     if d <= 0.0:
         return 0.0
     if d >= 2.0:
@@ -55,7 +55,11 @@ def segment_double_integral(d):
 
 @njit
 def cylinder_depths(floats, at, z):
-    """Depths at the lower and upper end of an inclined cylinder at level z, in radii, and the tangent of its slope."""
+    """(depth at the lower end, depth at the upper end, tangent of the slope) of an inclined cylinder filled to level z.
+
+    Depths are in radii, relative to the lowest points of the ends; the upper depth may be negative.
+    z : level above the lowest point [m]; floats[at:] : parameters of the shape, see `shape_numbers`
+    """
     radius, length, slope = floats[at + FIRST_SIZE], floats[at + SECOND_SIZE], floats[at + THIRD_SIZE]
     tangent = sin(slope) / cos(slope)
     d = z / (radius * cos(slope))
@@ -64,7 +68,10 @@ def cylinder_depths(floats, at, z):
 
 @njit
 def volume_below(floats, at, z):
-    """Volume of a vessel below level z above its bottom [m3]; z must lie within the vessel."""
+    """Volume of a vessel [m3] from its bottom to level z [m] above it; z must be within the vessel.
+
+    floats[at:] : parameters of the shape, see `shape_numbers`
+    """
     kind, first = int(floats[at + KIND]), floats[at + FIRST_SIZE]
     if kind == PRISM:
         return first * z
@@ -85,7 +92,7 @@ def volume_below(floats, at, z):
 
 @njit
 def surface_at(floats, at, z):
-    """Area of the free surface of a vessel at level z above its bottom [m2]."""
+    """Area of the free surface of a vessel [m2] at level z [m] above its bottom; arguments as for `volume_below`."""
     kind, first = int(floats[at + KIND]), floats[at + FIRST_SIZE]
     if kind == PRISM:
         return first
@@ -105,7 +112,7 @@ def surface_at(floats, at, z):
 
 @njit
 def moment_below(floats, at, z):
-    """Integral of z dV in a vessel from its bottom to level z [m4]."""
+    """Integral of z dV in a vessel [m4] from its bottom to level z [m] above it; arguments as for `volume_below`."""
     kind, first = int(floats[at + KIND]), floats[at + FIRST_SIZE]
     if kind == PRISM:
         return 0.5 * first * z * z
@@ -122,7 +129,10 @@ def moment_below(floats, at, z):
 
 @njit
 def level_at(floats, at, volume):
-    """Level [m] above the bottom below which a vessel contains a volume [m3]; bounded Newton for cylinders."""
+    """Level [m] above the bottom to which a fluid of a given volume [m3] fills a vessel.
+
+    For cylinders it is found by Newton's method with bounds. floats, at : as for `volume_below`
+    """
     kind = int(floats[at + KIND])
     if volume <= 0.0:
         return 0.0

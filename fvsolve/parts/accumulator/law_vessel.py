@@ -1,11 +1,12 @@
 """Gas and fluid in a vessel with a shape, in which the fluid has a level.
 
-The numbers of the vessel are those of `law`, followed from index `SHAPED` on by those below. The gas follows
-p V^n = p0 V0^n (1 + a)^n, with its pressure p and volume V, their values p0 and V0 at the start, the exponent n, and
-the gas `a` that a compressor has added, relative to the gas at the start. Under the density law `linear` the pressure
-of the node is that of the gas plus rho g (bottom + level). Under the other laws the fluid inside has one density
-rho(q), with q = p + rho g (level - z) the pressure at its centroid, z above the bottom; h(q) + g (bottom + z) equals
-the enthalpy of the node, h the specific enthalpy. All these values then follow from one energy of gas and fluid.
+The numbers of the vessel are those in the module `law`, then from index `SHAPED` on those that are listed below.
+The gas follows p V^n = p0 V0^n (1 + a)^n, with its pressure p and volume V, their values p0 and V0 at the start, the
+exponent n, and the gas `a` that a compressor has added, relative to the gas at the start.
+Under the density law `linear` the pressure of the node is that of the gas plus rho g (bottom + level).
+Under other laws the fluid inside has one density rho(q). q = p + rho g (level - z) is the pressure at its centroid, at
+the height z above the bottom. h(q) + g (bottom + z) equals the enthalpy of the node, h the specific enthalpy.
+All these values then follow from one energy of gas and fluid.
 """
 
 from math import exp, expm1, log, log1p
@@ -28,16 +29,17 @@ LEAST_SURFACE = 1e-3  # of the mean surface: lower bound in the stiffness, for a
 
 @njit
 def compressor_gas(y, device):
-    """Gas `a` that the compressor has added, relative to the gas at the start [-]."""
+    """Gas `a` that the compressor has added, relative to the gas at the start [-]; 0 without a compressor."""
     return y[device["y"]] if device["states"] > 0 else 0.0
 
 
 @njit
 def vessel_state(st, floats, node, at, y, a):
-    """Gas and fluid of a vessel after an inflow y since the start [kg] and added gas `a` [-].
+    """(ln(V / V0), change of the gas pressure [Pa], volume [m3] and level [m] of the fluid) of a vessel.
 
-    Returns ln(V / V0) of the gas, V its volume and V0 its volume at the start; the gas pressure minus that at the start
-    [Pa]; the volume [m3] and the level [m] of the fluid.
+    V : gas volume, V0 : gas volume at the start; the pressure change is relative to the start
+    y : inflow since the start [kg]; a : gas that a compressor has added, relative to the gas at the start [-]
+    st : settings of the model; node : row of the node; floats[at:] : parameters of the vessel
     """
     gas, total, n, first = (
         floats[at + GAS_VOLUME],
@@ -56,9 +58,10 @@ def vessel_state(st, floats, node, at, y, a):
 
 @njit
 def vessel_state_dense(st, floats, node, at, y, a):
-    """ln(V / V0) of the gas and volume of the fluid [m3] under the density laws `log` and `table`.
+    """(ln(V / V0), volume of the fluid [m3]) under density laws other than `linear`; arguments as for `vessel_state`.
 
-    Newton's method solves rho(q) times fluid volume = mass of the fluid; q is the pressure at the centroid.
+    V : gas volume, V0 : gas volume at the start. Newton's method solves rho(q) times fluid volume = mass of the fluid,
+    with the density rho at the pressure q at the centroid of the fluid.
     """
     gas, total, n, first = (
         floats[at + GAS_VOLUME],
@@ -86,9 +89,10 @@ def vessel_state_dense(st, floats, node, at, y, a):
 
 @njit
 def centroid_pressure_rise(st, floats, at, mass, volume):
-    """Pressure at the centroid of a fluid minus that at its surface [Pa], and its derivative by the volume [Pa/m3].
+    """(pressure at the centroid of a fluid minus that at its surface [Pa], its derivative by the volume [Pa/m3]).
 
-    The rise is rho g times the depth of the centroid, with rho = mass [kg] / volume [m3].
+    The first is rho g times the depth of the centroid, with rho = mass [kg] / volume [m3] of the fluid.
+    st, floats, at : as for `vessel_state`
     """
     if volume <= 0.0 or mass <= 0.0:
         return 0.0, 0.0
@@ -100,7 +104,10 @@ def centroid_pressure_rise(st, floats, at, mass, volume):
 
 @njit
 def surface_area(floats, at, level):
-    """Area of the free surface at a level [m2], at least the fraction `LEAST_SURFACE` of the mean area."""
+    """Area of the free surface at a level [m2], at least `LEAST_SURFACE` times the mean area of the vessel.
+
+    floats, at : as for `vessel_state`
+    """
     return max(
         surface_at(floats, at + SHAPE, level),
         LEAST_SURFACE * floats[at + TOTAL_VOLUME] / floats[at + SHAPE + FULL_LEVEL],
@@ -109,10 +116,7 @@ def surface_area(floats, at, level):
 
 @njit
 def pressure_and_stiffness(st, floats, node, at, y, a):
-    """Pressure of the node minus that at the start [Pa], and stiffness dp/dm [Pa/kg].
-
-    y : inflow since the start [kg]; a : added gas relative to the gas at the start [-]
-    """
+    """(pressure of the node minus that at the start [Pa], stiffness dp/dm [Pa/kg]); arguments as for `vessel_state`."""
     n, gas = floats[at + EXPONENT], floats[at + GAS_VOLUME]
     u, change, volume, level = vessel_state(st, floats, node, at, y, a)
     p, gas_stiffness = floats[at + GAS_PRESSURE] + change, n / (gas * exp(u))
@@ -131,9 +135,9 @@ def pressure_and_stiffness(st, floats, node, at, y, a):
 
 @njit
 def centroid_state(st, floats, node, at, y, p, volume, level):
-    """Pressure of the fluid at its centroid [Pa], and height of the centroid above the bottom [m].
+    """(pressure of the fluid at its centroid [Pa], height of the centroid above the bottom [m]).
 
-    p : gas pressure [Pa]; volume, level : those of the fluid [m3], [m]
+    p : gas pressure [Pa]; volume, level : of the fluid [m3], [m]; other arguments as for `vessel_state`
     """
     z = moment_below(floats, at + SHAPE, level) / volume if volume > 0.0 else 0.0
     return p + centroid_pressure_rise(st, floats, at, node["mass"] + y, volume)[0], z
@@ -141,16 +145,17 @@ def centroid_state(st, floats, node, at, y, p, volume, level):
 
 @njit
 def node_pressure(st, floats, at, q, z):
-    """Pressure of the node [Pa] under the density laws `log` and `table`.
+    """Pressure of the node [Pa] under density laws other than `linear`.
 
     q : pressure of the fluid at its centroid [Pa]; z : height of the centroid above the bottom [m]
+    st, floats, at : as for `vessel_state`
     """
     return pressure_of_enthalpy(st, floats, enthalpy(st, floats, q) + st["gravity"] * (floats[at + BOTTOM] + z))
 
 
 @njit
 def set(t, y, out, tables, device):
-    """Write the pressure of the node minus that at the start [Pa], and its stiffness dp/dm [Pa/kg], into `out`."""
+    """Write to `out` the pressure of the node minus that at the start [Pa], and the stiffness dp/dm [Pa/kg]."""
     i, layout, at = device["node"], tables.layout[0], device["data"]
     node, st = tables.nodes[i], tables.settings[0]
     a = compressor_gas(y, device)
@@ -161,23 +166,24 @@ def set(t, y, out, tables, device):
 
 @njit
 def compressor_rate(tables, device):
-    """Rate at which the running compressor adds gas, relative to the gas at the start [1/s]; 0 while it is off."""
+    """Rate [1/s] at which the compressor adds gas, relative to the gas at the start; 0 while it is off."""
     runs = device["states"] > 0 and tables.armed[device["event"] + 2] > 0.0
     return tables.floats[device["data"] + COMPRESSOR_RATE] if runs else 0.0
 
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    """Write the rate of the gas added by the compressor into `dydt`."""
+    """Write to `dydt` the rate of the gas that the compressor adds."""
     if dydt.size > 0 and device["states"] > 0:
         dydt[device["y"]] = compressor_rate(tables, device)
 
 
 @njit
 def events(t, y, out, tables, device, g):
-    """Write the event functions g: mass of fluid left until the vessel is empty [kg], then its negative.
+    """Write to g the mass of fluid that is left until the vessel is empty [kg], then its negative.
 
-    With a compressor, the level left until it starts or stops [m] and its negative follow.
+    With a compressor, the level at which it next starts or stops minus the present level [m] follows, then its
+    negative.
     """
     node, st, floats, at = tables.nodes[device["node"]], tables.settings[0], tables.floats, device["data"]
     left, flag = y[node["y"]] - floats[at + EMPTY_MASS], device["event"]
@@ -191,7 +197,7 @@ def events(t, y, out, tables, device, g):
 
 @njit
 def value(t, y, out, tables, device, quantity):
-    """Gas volume [m3] (quantity 0), gas pressure [Pa] (1) or level [m] (2)."""
+    """Gas volume [m3] for quantity 0, gas pressure [Pa] for quantity 1, level [m] for quantity 2."""
     node, st, floats, at = tables.nodes[device["node"]], tables.settings[0], tables.floats, device["data"]
     u, change, _, level = vessel_state(st, floats, node, at, y[node["y"]], compressor_gas(y, device))
     return (
@@ -205,10 +211,10 @@ def value(t, y, out, tables, device, quantity):
 
 @njit
 def compressed_gas_energy(p, gas, n, ambient, a):
-    """Energy above ambient that added gas brings at constant volume [J].
+    """Work [J] that a compressor needs to take gas at ambient pressure and add it to a gas at constant volume.
 
-    p, gas : pressure [Pa] and volume [m3] before; a : added gas relative to the gas present; n : polytropic exponent;
-    ambient : ambient pressure [Pa]
+    p, gas : pressure [Pa] and volume [m3] of the gas before; a : added gas relative to the gas present before
+    n : polytropic exponent of the compression; ambient : ambient pressure [Pa]
     """
     r = 1.0 + a
     if n == 1.0:
@@ -219,9 +225,9 @@ def compressed_gas_energy(p, gas, n, ambient, a):
 
 @njit
 def compression_energy_rate(p, gas, n, ambient, a):
-    """Derivative of the energy of the added gas by its relative amount `a` [J]; p : pressure [Pa] with `a` added.
+    """Work of the compressor per relative amount of added gas [J], the derivative of `compressed_gas_energy` by `a`.
 
-    It is the work of compression from ambient pressure with p V^n constant.
+    p : pressure [Pa] after the amount `a` has been added; other arguments as for `compressed_gas_energy`
     """
     if n == 1.0:
         return p * gas * log(p / ambient) / (1.0 + a)
@@ -230,7 +236,7 @@ def compression_energy_rate(p, gas, n, ambient, a):
 
 @njit
 def stored_energy_change(st, floats, node, at, y, a):
-    """Stored energy after an inflow y [kg] and added gas `a` [-], minus that at the start [J]."""
+    """Stored energy of a vessel minus that at the start [J]; arguments as for `vessel_state`."""
     n, gas, total, first = (
         floats[at + EXPONENT],
         floats[at + GAS_VOLUME],
@@ -257,7 +263,7 @@ def stored_energy_change(st, floats, node, at, y, a):
 
 @njit
 def stored(y, tables, device):
-    """Stored energy of the vessel, minus that at the start [J]."""
+    """Stored energy of the vessel minus that at the start [J]."""
     node = tables.nodes[device["node"]]
     return stored_energy_change(
         tables.settings[0], tables.floats, node, device["data"], y[node["y"]], compressor_gas(y, device)
@@ -266,7 +272,7 @@ def stored(y, tables, device):
 
 @njit
 def power(t, y, dydt, out, tables, device):
-    """Power supplied by the compressor, rate of the stored energy, and power dissipated (0) [W]."""
+    """(power supplied by the compressor, rate of the stored energy, dissipated power, which is 0) [W]."""
     supplied, rate = 0.0, compressor_rate(tables, device)
     if rate > 0.0:
         st, floats, at = tables.settings[0], tables.floats, device["data"]

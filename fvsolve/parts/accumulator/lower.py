@@ -1,4 +1,4 @@
-"""Rows and initial states of accumulators and air vessels in the tables of a model."""
+"""Accumulators and air vessels in the tables of a model, and their states at the start."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ NECK_SHARE = 0.01  # volume of the neck of a bladder accumulator over its volume
 
 
 class AccumulatorRows(Device, kind="accumulator"):
-    """Model table rows of accumulators: vessels whose node has the pressure of the gas."""
+    """Conversion to table rows of accumulators: vessels, whose node has the pressure of the gas."""
 
     law = law
     vessel = True
@@ -73,19 +73,26 @@ class AccumulatorRows(Device, kind="accumulator"):
         return []
 
     def change(self, model, row, y: float) -> float:
-        """Pressure of the node minus that at the start [Pa] after an inflow y [kg]."""
+        """Pressure of the node minus that at the start [Pa], after an inflow y since the start [kg].
+
+        row : row of the accumulator in the table of devices
+        """
         st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
         return law.gas_state(st, floats, node, int(row["data"]), y)[1]
 
     def energy(self, model, row, y: float) -> float:
-        """Stored energy after an inflow y since the start [kg], minus that at the start [J]."""
+        """Stored energy minus that at the start [J], after an inflow y since the start [kg].
+
+        row : row of the accumulator in the table of devices
+        """
         st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
         return law.accumulator_energy(st, floats, node, int(row["data"]), y)
 
     def above(self, model, part, row) -> float:
-        """Stored energy at the start minus that of the state that can release no more [J].
+        """Energy [J] that the accumulator can release from its state at the start.
 
-        In that state the energy head is 0, or no fluid is left.
+        It is the stored energy at the start minus the least stored energy. At the latter, the energy per mass of the
+        fluid at the node (`energy_head`) is 0, or no fluid is left.
         """
         from fvsolve.kernels.barotropic_energy import energy_head
 
@@ -107,7 +114,7 @@ class AccumulatorRows(Device, kind="accumulator"):
 
 
 class ShapedRows(AccumulatorRows, kind=""):
-    """Model table rows of air vessels with a shape; the weight of the fluid acts on the node."""
+    """Conversion to table rows of air vessels with a shape; the weight of their fluid acts on the node."""
 
     quantities = (*AccumulatorRows.quantities, "level")
 
@@ -166,7 +173,7 @@ class ShapedRows(AccumulatorRows, kind=""):
 
 
 class CompressorRows(ShapedRows, kind=""):
-    """Model table rows of air vessels with a compressor, which limits the level."""
+    """Conversion to table rows of air vessels with a compressor, which limits the level."""
 
     states = ("gas",)
     events = (*ShapedRows.events, "compressor starts", "compressor stops")
@@ -175,7 +182,7 @@ class CompressorRows(ShapedRows, kind=""):
         return [0.1]
 
     def energy_rows(self, model, part, row, y, out):
-        """Rows of a matrix L, as state index -> factor: |L dy|^2 is the energy [J] of a small deviation dy.
+        """Rows of the energy matrix L, each state index -> factor: |L dy|^2 is the energy [J] of a small deviation dy.
 
         With added gas a, inflow y, density rho, gas pressure p and volume V, exponent n and free surface S, the energy
         is n p V / 2 (da / (1 + a) + dy / (rho V))^2 of the gas and g / (2 rho S) dy^2 of the weight of the fluid.

@@ -13,7 +13,7 @@ SLOPE_TOLERANCE = 1e-6  # axis rise over radius below which a cylinder counts as
 
 
 class VesselStart:
-    """Gas and fluid of a vessel with a shape at the start.
+    """Gas and fluid of a vessel with a shape, at the start.
 
     gas, fluid_volume : volumes of gas and fluid [m3]; level : level of the fluid above the bottom [m]
     centroid : height of the centroid of the fluid above the bottom [m]
@@ -32,7 +32,7 @@ class VesselStart:
         self.centroid = below / self.fluid_volume if self.fluid_volume > 0.0 else 0.0
 
     def gas_pressure(self, p: float) -> tuple[float, float]:
-        """Pressure of the gas [Pa] and mass of the fluid [kg] at a pressure p of the node [Pa]."""
+        """(pressure of the gas [Pa], mass of the fluid [kg]) at a pressure p of the node [Pa]."""
         if self.law.linear:
             rho = self.law.rho
             return p - rho * self.gravity * (self.bottom + self.level), rho * self.fluid_volume
@@ -52,7 +52,11 @@ class VesselStart:
 
 
 def shape_numbers(part) -> list[float]:
-    """Numbers of the shape of a vessel in the order of `law_shape`: kind, level when full, three sizes or a table."""
+    """Parameters of the shape of a vessel: kind, level when full [m], three sizes, and for a table of areas its values.
+
+    The sizes are the area [m2] of a prism; or radius [m], length [m] and slope [rad] of a cylinder; or the number of
+    levels, after which levels [m], areas [m2] and volumes [m3] follow.
+    """
     top = height_of(part)
     if part.diameter is None:
         if not hasattr(part.area, "level") or len(part.area.level) == 1:

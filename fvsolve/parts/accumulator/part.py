@@ -120,7 +120,7 @@ class Accumulator(Node, kind="accumulator"):
             faults += [((key,), text) for key in shapes]
         if "slope" in given and shapes == ["area"]:
             faults.append(
-                (("slope",), "applies only with `diameter`; `area` gives the surface at all levels; remove it")
+                (("slope",), "applies only with `diameter`; `area` gives the surface at all levels; remove this key")
             )
         return faults
 

@@ -34,7 +34,7 @@ def length_of(vessel: Any) -> float:
 
 
 def height_of(vessel: Any) -> float:
-    """Level above the bottom at which a vessel with a shape is full [m]."""
+    """Level above the bottom [m] at which a vessel with a shape is full."""
     if vessel.diameter is not None:
         slope = UPRIGHT if vessel.slope is None else vessel.slope
         across = vessel.diameter * math.cos(slope) if slope < UPRIGHT else 0.0

@@ -37,9 +37,9 @@ EQUALISATION_TIME = 0.02  # shortest time constant in which the air left after s
 
 @njit
 def orifice_flow(r):
-    """Dimensionless mass flow of air from pressure p0 to r p0, over Cd A p0 / sqrt(R T).
+    """Mass flow of air through an orifice from pressure p0 to r p0, over Cd A p0 / sqrt(R T) [-].
 
-    Isentropic flow through an orifice, choked below CRITICAL_RATIO. r : pressure ratio, at most 1
+    The flow is isentropic, and choked below CRITICAL_RATIO. r : pressure ratio, at most 1
     """
     x, power = 1.0 - max(r, CRITICAL_RATIO), (KAPPA - 1.0) / KAPPA
     factor = -expm1(power * log1p(-x)) / x if x > 0.0 else power
@@ -49,9 +49,10 @@ def orifice_flow(r):
 
 @njit
 def air_state(st, floats, node, at, y_fluid, y_air):
-    """Pressure of the air above ambient [Pa], its volume [m3] and its mass [kg].
+    """(gauge pressure [Pa], volume [m3], mass [kg]) of the air in the chamber.
 
     y_fluid, y_air : mass of fluid and of air that have entered the chamber since the start [kg]
+    st : settings of the model; node : row of the node; floats[at:] : parameters of the air valve
     """
     volume, start_mass = floats[at + VOLUME], floats[at + AIR_MASS]
     filled = y_fluid / (node["density"] * volume)
@@ -61,13 +62,13 @@ def air_state(st, floats, node, at, y_fluid, y_air):
 
 @njit
 def has_throttled_outlet(floats, at):
-    """True if the valve has a small bore for throttled air outflow."""
+    """True if the valve has a small bore for throttled outflow of air; floats[at:] : parameters of the air valve"""
     return floats[at + SWITCH_PRESSURE] > 0.0 or floats[at + SWITCH_FLOW] > 0.0
 
 
 @njit
 def outlet_area(tables, device):
-    """Cd A for air outflow in the present mode of the valve [m2]."""
+    """Product Cd A [m2] of discharge coefficient and bore area for outflow of air, in the present mode of the valve."""
     floats, at = tables.floats, device["data"]
     if has_throttled_outlet(floats, at) and tables.armed[device["event"] + 2] > 0.0:
         return floats[at + THROTTLED_AREA]
@@ -76,9 +77,10 @@ def outlet_area(tables, device):
 
 @njit
 def air_inflow(st, floats, at, gauge, outlet):
-    """Mass flow of air into the chamber [kg/s], and the greatest slope of this flow over relative pressure [kg/s].
+    """(mass flow of air into the chamber [kg/s], its greatest slope over the relative pressure [kg/s]).
 
-    gauge : pressure of the air above ambient [Pa]; outlet : Cd A for air outflow [m2]
+    gauge : gauge pressure of the air in the chamber [Pa]; outlet : result of `outlet_area` [m2]
+    st : settings of the model; floats[at:] : parameters of the air valve
     """
     p, root = st["ambient"] + gauge, sqrt(floats[at + RT])
     if gauge < 0.0:
@@ -95,9 +97,10 @@ def air_inflow(st, floats, at, gauge, outlet):
 
 @njit
 def set(t, y, out, tables, device):
-    """Write pressure and stiffness of the chamber and the conductance of the connection into `out`.
+    """Write to `out` the pressure and the stiffness of the chamber, and the conductance between chamber and node.
 
-    Pressure minus ambient [Pa]; stiffness dp/dm [Pa/kg]; conductance [kg2/s2/Pa], 0 while the valve is shut.
+    The pressure is relative to ambient [Pa], the stiffness is dp/dm [Pa/kg]. The conductance [kg2/s2/Pa] is 0 while the
+    valve is shut.
     """
     st, floats, layout, i = tables.settings[0], tables.floats, tables.layout[0], device["node"]
     node, k = tables.nodes[i], device["valve"]
@@ -114,7 +117,7 @@ def set(t, y, out, tables, device):
 
 @njit
 def air_rate(y, tables, device):
-    """Rate of the air mass in the chamber [kg/s], its rate limit [1/s], and R T ln(p / p_ambient) of the air [J/kg]."""
+    """(rate of the air mass in the chamber [kg/s], its rate limit [1/s], R T ln(p / p_ambient) of the air [J/kg])."""
     st, floats, at = tables.settings[0], tables.floats, device["data"]
     node = tables.nodes[device["node"]]
     gauge, volume, mass = air_state(st, floats, node, at, y[node["y"]], y[device["y"]])
@@ -128,7 +131,7 @@ def air_rate(y, tables, device):
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    """Write the rate of the air mass in the chamber into `dydt`, and raise out[RATE] to its rate limit."""
+    """Write the rate of the air mass in the chamber to `dydt`, and raise out[RATE] to the rate limit of the valve."""
     flow, rate, _ = air_rate(y, tables, device)
     out[RATE] = max(out[RATE], rate, fluid_rate_limit(out, tables, device))
     if dydt.size > 0:
@@ -137,7 +140,10 @@ def move(t, y, dydt, out, tables, device):
 
 @njit
 def fluid_rate_limit(out, tables, device):
-    """Rate of the fluid in the open chamber [1/s]: stiffness times the flow slopes of all parts that join the node."""
+    """Rate of the fluid in the open chamber [1/s]; 0 while the valve is shut.
+
+    It is the stiffness of the chamber times the sum of d flow / d pressure of all other parts at the node.
+    """
     layout, nodes, valves, own = tables.layout[0], tables.nodes, tables.valves, device["valve"]
     place = valves[own]["from_node"]
     if tables.armed[device["event"]] <= 0.0:
@@ -153,9 +159,10 @@ def fluid_rate_limit(out, tables, device):
 
 @njit
 def events(t, y, out, tables, device, g):
-    """Write the event functions g, each followed by its negative.
+    """Write the event functions to g, each followed by its negative.
 
-    If shut, the pressure left until the valve opens [Pa]; if open, minus the mass of fluid left until it shuts [kg].
+    The first is the pressure left until the valve opens [Pa], while it is shut. While it is open, it is minus the mass
+    of fluid that must still flow in until it shuts [kg].
     With a throttled outlet, the margin until throttling begins or ends follows.
     """
     st, floats, at = tables.settings[0], tables.floats, device["event"]
@@ -179,10 +186,11 @@ def events(t, y, out, tables, device, g):
 
 @njit
 def throttling_margin(out, tables, device, gauge):
-    """Margin until throttling begins: pressure [Pa], or with SWITCH_FLOW the greater of two margins.
+    """Margin until throttling begins: a pressure [Pa], or with SWITCH_FLOW the greater of two margins.
 
-    These are of the fluid flow [kg/s] and of the air pressure above PRESSURE_MARGIN [Pa]. At ambient pressure itself
-    the wide bore is in use again, so a margin of zero there would switch both ways.
+    These are SWITCH_FLOW minus the flow of fluid [kg/s], and PRESSURE_MARGIN minus the gauge pressure of the air [Pa].
+    Throttling ends at ambient pressure; because of PRESSURE_MARGIN it does not begin again there.
+    gauge : gauge pressure of the air [Pa]
     """
     floats, at = tables.floats, device["data"]
     if floats[at + SWITCH_PRESSURE] > 0.0:
@@ -192,7 +200,7 @@ def throttling_margin(out, tables, device, gauge):
 
 @njit
 def value(t, y, out, tables, device, quantity):
-    """Volume [m3] (quantity 0), mass [kg] (1) or pressure [Pa] (2) of the air in the chamber."""
+    """Volume [m3] (quantity 0), mass [kg] (quantity 1) or pressure [Pa] (quantity 2) of the air in the chamber."""
     st, floats = tables.settings[0], tables.floats
     node = tables.nodes[device["node"]]
     gauge, volume, mass = air_state(st, floats, node, device["data"], y[node["y"]], y[device["y"]])
@@ -201,9 +209,10 @@ def value(t, y, out, tables, device, quantity):
 
 @njit
 def air_energy(st, floats, node, at, y_fluid, y_air):
-    """Stored energy of the air and of the height of the fluid in the chamber, 0 at the start [J].
+    """Energy of the air, and of the height of the fluid, in the chamber, minus that at the start [J].
 
     The energy of the air is m R T (ln(p / p_ambient) - 1) + p_ambient V; m, p and V are its mass, pressure and volume.
+    Arguments as for `air_state`.
     """
     gauge, volume, mass = air_state(st, floats, node, at, y_fluid, y_air)
     energy = mass * floats[at + RT] * log1p(gauge / st["ambient"]) - gauge * volume
@@ -212,13 +221,13 @@ def air_energy(st, floats, node, at, y_fluid, y_air):
 
 @njit
 def stored(y, tables, device):
-    """Stored energy of the chamber, minus that at the start [J]."""
+    """Stored energy of the chamber minus that at the start [J]."""
     node = tables.nodes[device["node"]]
     return air_energy(tables.settings[0], tables.floats, node, device["data"], y[node["y"]], y[device["y"]])
 
 
 @njit
 def power(t, y, dydt, out, tables, device):
-    """Power supplied (0), rate of the stored energy, and power that the air dissipates in the orifice [W]."""
+    """(power supplied, which is 0, rate of the stored energy, power that the air dissipates in the orifice) [W]."""
     potential = air_rate(y, tables, device)[2] * dydt[device["y"]]
     return 0.0, vessel_power(dydt, out, tables, device) + potential, -potential

@@ -1,4 +1,4 @@
-"""Rows and initial states of air valves in the tables of a model."""
+"""Air valves in the tables of a model, and their states at the start."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ GAS_CONSTANT = 287.05  # of air [J/kg/K]
 
 
 class AirValveRows(Device, kind="air-valve"):
-    """Model table rows of the chambers of air valves, which are shut at the start."""
+    """Conversion to table rows of the chambers of air valves; all valves are shut at the start."""
 
     law = law
     vessel = events_only = True
@@ -68,7 +68,7 @@ class AirValveRows(Device, kind="air-valve"):
         return [f"air valve {name}: {below} below ambient, so it opens"]
 
     def energy_rows(self, model, part, row, y, out):
-        """Row of a matrix L, as state index -> factor: |L dy|^2 is the energy [J] of a small deviation dy.
+        """Row of the energy matrix L, state index -> factor: |L dy|^2 is the energy [J] of a small deviation dy.
 
         The energy is R T / (2 m) (dm + m / (V rho) dy)^2 of air and fluid in the chamber, with air mass m, air volume
         V, fluid density rho, and deviations dm and dy of air and fluid mass.
@@ -81,7 +81,10 @@ class AirValveRows(Device, kind="air-valve"):
 
 
 class ThrottledAirValveRows(AirValveRows, kind=""):
-    """Model table rows of air valves that release air through a small bore from `switch` or `switch_velocity` on."""
+    """Conversion to table rows of air valves with a small bore, through which air leaves from `switch` on.
+
+    `switch_velocity` may replace `switch`.
+    """
 
     events = (*AirValveRows.events, "throttles", "stops throttling")
 

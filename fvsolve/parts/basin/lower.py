@@ -1,4 +1,4 @@
-"""Rows of the patches of basins, which are nodes in the tables of a model."""
+"""Patches of basins, which are nodes in the tables of a model."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from fvsolve.model.lowering import Lowering
 
 
 class PatchRows(Lowering, kind="patch"):
-    """Model table rows of nodes whose pressure is that of the basin cells behind a patch."""
+    """Conversion to table rows of patches of basins: nodes with the pressure of the cells behind the patch."""
 
     ledger_name = "dry patch"
 
@@ -32,7 +32,7 @@ class PatchRows(Lowering, kind="patch"):
             self.probe_flow(draft, name, row)
 
     def probe_flow(self, draft, name, row) -> None:
-        """Fill the row of a probe of the flow through a patch into the basin."""
+        """Fill the row of a probe for the flow through a patch into the basin."""
         row["index"], row["kind"], row["scale"] = draft.node_index[name], rec.PATCH_FLOW, 1.0 / draft.fluid.density
         if not draft.case.nodes[draft.case.places[name].basin].physics_type.joined:
             row["index"], row["kind"] = draft.patch_table["node"].tolist().index(row["index"]), rec.GIVEN_FLOW

@@ -40,7 +40,7 @@ VELOCITY_FIELDS = {"u": "velocity", "v": "velocity", "speed": "velocity"}  # fie
 
 
 class Patch(Table):
-    """A section of the boundary of a basin: a node `BASIN.PATCH` for links, or other than a fixed wall."""
+    """A section of the boundary of a basin: a node `BASIN.PATCH` for links, an open boundary, or a moving wall."""
 
     side: Annotated[
         str | None,
@@ -169,16 +169,16 @@ class MovingWall(PatchNode):
 class Physics(Table):
     """Base of the declarations of equations of basins: name in the file, keys, capabilities.
 
-    A key without a default must be given. A key that several declarations have must be declared equally in all. The
-    module `lower.py` beside the declaration fills the rows of tables.
-    states : quantities of cells -> their units, the first is the stored quantity; fields : quantities that can be
-    probed at a point -> dimension; starts : table with the keys of `start`
+    A key without a default must be given. A key that several declarations have must be declared equally in all.
+    The module `lower.py` beside the declaration fills the rows of tables.
+    states : quantity of cells -> its unit, the stored quantity first
+    fields : quantity that can be probed at a point -> its dimension; starts : table with the keys of `start`
     laws : supported density laws, all if empty; description : text for messages about unsupported laws
     joined : True if links may join its patches (False where the velocity is given); moves : True if walls may move
     on_bodies : True if the basin may be on a body; links_on_bodies : True if links may then join its patches
     has_modes : True if `sloshing` may be other than "cells"; carries : True if the basin carries scalars
     allows_impedance : True if a boundary may have an impedance
-    has_shocks : True if waves steepen into lasting shocks, and smooth flow in the plane has at most second order
+    has_shocks : True if waves steepen into lasting shocks; schemes then have at most second order in smooth plane flow
     """
 
     kinds: ClassVar[dict[str, type[Physics]]] = {}
@@ -228,19 +228,20 @@ class Physics(Table):
     def rest(
         cls, basin: Basin, mean: Callable[[Any], np.ndarray], cells: np.ndarray, area: np.ndarray
     ) -> dict[str, Any]:
-        """State of a patch at rest, by name: "elevation" [m], "depth" of water [m], "pressure" [Pa].
+        """State of a patch at rest: "elevation" [m], "depth" of water [m] and "pressure" [Pa] -> value.
 
-        Depth and pressure are means over the cells behind the patch; None if not defined. mean : function from a
-        formula to its means over all cells; cells : numbers of the cells behind the patch; area : areas of all cells
-        [m2]
+        Depth and pressure are means over the cells behind the patch; None for a quantity that the equations do not
+        have.
+        mean : function from a formula to its means over all cells
+        cells : numbers of the cells behind the patch; area : areas of all cells [m2]
         """
         return {"elevation": basin.elevation, "depth": None, "pressure": None}
 
     @classmethod
     def formulas(cls, basin: Basin, mesh: Any) -> Iterator[tuple[tuple[str, ...], Any, np.ndarray | None]]:
-        """Formulas given in the keys of this set of basin equations.
+        """Yield the fields over the plane that the keys of these equations contain.
 
-        Yields (keys, formula, points of evaluation or None for cell means).
+        Each is (keys, formula, points), with the points at which it is evaluated, or None for means over the cells.
         """
         for key in cls.model_fields:
             if isinstance(shape := getattr(basin, key), SpatialField):
@@ -248,7 +249,7 @@ class Physics(Table):
 
     @classmethod
     def own_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
-        """Faults of keys that belong to other equations, and of keys that these equations need."""
+        """Faults of keys that belong to other equations, and of missing keys that these equations need."""
         faults = cls.key_faults(given)
         for key in given:
             owners = [name for name, kind in Physics.kinds.items() if key in kind.model_fields]
@@ -300,7 +301,9 @@ class Basin(PlaceOnBody, kind="basin"):
         ),
     ] = None
 
-    attitude: Annotated[Attitude | None, Nested(Attitude, "attitude of its axes relative to those of its body")] = None
+    attitude: Annotated[Attitude | None, Nested(Attitude, "attitude of the basin axes relative to the body axes")] = (
+        None
+    )
     sloshing: Annotated[
         str, Choice("sloshing", SLOSHING_MODELS, "model of the water on a body: frozen (rigid), linear modes, or cells")
     ] = "cells"
@@ -346,7 +349,7 @@ class Basin(PlaceOnBody, kind="basin"):
 
     @property
     def lumped(self) -> bool:
-        """True if masses on the body represent the water of the basin, without cells."""
+        """True if masses on the body represent the water of the basin, which then has no cells."""
         return self.on is not None and self.sloshing != "cells"
 
     def inner(self, name: str) -> tuple[dict[str, Node], dict[str, Any]]:

@@ -14,7 +14,7 @@ MOMENT_TOLERANCE = 1e-6  # share of the largest moment: tolerance of the triangl
 
 
 class NamedPoints(Value):
-    """A table of points, name -> [x, y, z]."""
+    """Value of a case file for a table of points, name -> [x, y, z]."""
 
     takes = "`{ NAME = [x, y, z] }`"
 
@@ -46,7 +46,10 @@ class NamedPoints(Value):
 
 
 class Inertia(Value):
-    """Inertia of a body: three moments about axes through its centre of mass, or the whole symmetric matrix."""
+    """Value of a case file for the inertia of a body.
+
+    It is three moments about axes through the centre of mass, or the whole symmetric matrix.
+    """
 
     about = "inertia about the centre of mass in the axes of the body: moments about x, y, z, or 3 x 3 [kg m2]"
     takes = "[kg m2, kg m2, kg m2], or three such rows"
@@ -76,14 +79,15 @@ class Inertia(Value):
 
 
 def principal_moments(rows: tuple) -> np.ndarray:
-    """Principal moments of an inertia matrix [kg m2], ascending.
+    """Principal moments of an inertia matrix [kg m2], ascending : float64[3].
 
     Raises ValueError if the matrix is not symmetric or a moment is negative.
     """
     matrix = np.array(rows)
     if np.abs(matrix - matrix.T).max() > MOMENT_TOLERANCE * np.abs(matrix).max():
         raise ValueError(
-            f"{show(rows)} is not symmetric; expected moments on the diagonal, and minus the products of inertia"
+            f"{show(rows)} is not symmetric; expected moments on the diagonal, and minus the products of inertia "
+            "elsewhere"
         )
     moments = np.linalg.eigvalsh(matrix)
     if moments[0] < -MOMENT_TOLERANCE * moments[2]:

@@ -50,7 +50,7 @@ def vector_quantities(name: str, dimension: str) -> dict[str, str]:
 
 
 class JointQuantity(Value):
-    """A number whose unit depends on the kind of joint, or three such numbers along the axes of the body."""
+    """Value of a case file: a number whose unit depends on the kind of joint, or three numbers along the body axes."""
 
     changes = PROFILE
 
@@ -163,7 +163,7 @@ class Joint(Table):
         driven = [key for key in ("angle", "travel") if isinstance(given.get(key), dict)]
         for key in ("rate", "damping", "stiffness") if driven else ():
             if key in given:
-                faults.append(((key,), f"has no effect, because {driven[0]} is driven by a schedule; remove it"))
+                faults.append(((key,), f"has no effect, because {driven[0]} is driven by a schedule; remove this key"))
         if faults:
             raise ValueFault(faults)
         return result
@@ -184,7 +184,7 @@ class Joint(Table):
 
     @property
     def unit_axis(self) -> np.ndarray:
-        """Unit vector along the axis of the joint : float64[3]."""
+        """Unit vector along the axis of the joint, zeros for a joint without axis : float64[3]."""
         axis = np.array(self.axis or (0.0, 0.0, 0.0))
         return axis / (np.linalg.norm(axis) or 1.0)
 
@@ -236,7 +236,7 @@ class Body(Node, kind="body"):
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
         faults = super().key_faults(given)
-        where = "has no effect: `joint.at`, `angle` or `travel` sets the position of a body; remove it"
+        where = "has no effect: `joint.at`, `angle` or `travel` sets the position of a body; remove this key"
         return faults + [((key,), where) for key in ("elevation", "position") if key in given]
 
     def inertia_matrix(self) -> np.ndarray:

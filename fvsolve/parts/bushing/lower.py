@@ -8,7 +8,7 @@ from fvsolve.model.lowering import Lowering
 
 
 class BushingRows(Lowering, kind="bushing"):
-    """Model table rows of bushings: three forces and three torques between two bodies."""
+    """Conversion to table rows of bushings: three forces and three torques between two bodies."""
 
     table = "bushing"
 

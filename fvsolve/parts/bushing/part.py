@@ -10,13 +10,13 @@ from fvsolve.parts.value import VALUE, Quantity, nonnegative
 
 
 class Bushing(TwoPort, kind="bushing"):
-    """Spring and damper in all directions between two points, which also turn the second body to its initial attitude.
+    """Spring and damper in all directions between two points; it also turns the second body to its initial attitude.
 
     gap : vector from point `from` to point `to`; w : relative angular velocity; (eta, eps) : Euler parameters of the
-    deviation from the initial relative attitude (docs/course.md, 56). In the axes of `from`, the force
-    -stiffness gap - damping d(gap)/dt and the torque -2 rotational_stiffness eta eps - rotational_damping w (57) act on
-    both bodies at point `to`. Ports: from, to; velocity and force. Stored energy: stiffness gap^2 / 2 +
-    2 rotational_stiffness eps^2 [J]. Dissipated power: damping (d(gap)/dt)^2 + rotational_damping w^2 [W].
+    deviation from the initial relative attitude (docs/course.md, 56). In the axes of `from`, the force -stiffness gap -
+    damping d(gap)/dt and the torque -2 rotational_stiffness eta eps - rotational_damping w (57) act on both bodies at
+    point `to`. Ports: from, to; velocity and force. Stored energy: stiffness gap^2 / 2 + 2 rotational_stiffness eps^2
+    [J]. Dissipated power: damping (d(gap)/dt)^2 + rotational_damping w^2 [W].
     """
 
     joins: ClassVar[dict[str, str]] = {"from": "spatial", "to": "spatial"}

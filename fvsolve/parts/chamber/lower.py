@@ -1,4 +1,4 @@
-"""Rows of closed volumes in the tables of a model: chambers, and the chambers of cylinders."""
+"""Closed volumes in the tables of a model: chambers, and the chambers of cylinders."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def joins_masses(case, cylinder) -> bool:
 
 
 class ChamberRows(Lowering, kind="chamber"):
-    """Model table rows of nodes whose pressure follows from the mass of the fluid in them."""
+    """Conversion to table rows of chambers: nodes whose pressure follows from the mass of the fluid in them."""
 
     def place(self, draft, name, node, row) -> None:
         moving, air = name in draft.owned, draft.fluid.air

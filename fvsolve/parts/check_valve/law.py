@@ -15,7 +15,7 @@ PRESSURE_MARGIN = 1.0  # excess over the cracking pressure at which it opens, so
 
 @njit
 def set(t, y, out, tables, device):
-    """Write the conductance of the valve [kg2/s2/Pa] into `out`, 0 while it is shut."""
+    """Write to `out` the conductance of the valve [kg2/s2/Pa], 0 while it is shut."""
     k, shut = device["valve"], tables.armed[device["event"]] > 0.0
     out[tables.layout[0]["conductance"] + k] = 0.0 if shut else tables.valves[k]["conductance"]
 
@@ -29,9 +29,9 @@ def joins_junction(tables, device):
 
 @njit
 def events(t, y, out, tables, device, g):
-    """Write the event function g and its negative.
+    """Write an event function and its negative to g.
 
-    g is the flow while the valve is open [kg/s], and the drop minus the opening pressure while it is shut [Pa].
+    It is the flow while the valve is open [kg/s], and the drop minus the opening pressure while it is shut [Pa].
     """
     k, at = device["valve"], device["event"]
     margin = out[tables.layout[0]["valve"] + k]

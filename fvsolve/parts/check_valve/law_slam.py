@@ -22,9 +22,9 @@ SMALLEST = 1e-300
 
 @njit
 def valve_mode(y, tables, device):
-    """Mode of the valve by its flags: REVERSED, SHUT or OPEN.
+    """Mode of the valve by its flags: REVERSED (the flow has reversed, the valve is open), SHUT or OPEN.
 
-    Without a set flag it is REVERSED if a slam velocity is stored, otherwise UNKNOWN.
+    If no flag is set, it is REVERSED if the states contain a slam velocity, otherwise UNKNOWN.
     """
     for mode in range(BEYOND_CURVE):
         if tables.armed[device["event"] + mode] > 0.0:
@@ -34,23 +34,27 @@ def valve_mode(y, tables, device):
 
 @njit
 def set(t, y, out, tables, device):
-    """Write the conductance of the valve [kg2/s2/Pa] into `out`, 0 while it is shut."""
+    """Write to `out` the conductance of the valve [kg2/s2/Pa], 0 while it is shut."""
     k, shut = device["valve"], tables.armed[device["event"] + SHUT] > 0.0
     out[tables.layout[0]["conductance"] + k] = 0.0 if shut else tables.valves[k]["conductance"]
 
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    """Write zero rates into `dydt`: the states of the valve change by events only."""
+    """Write zero rates to `dydt`: the states of the valve change by events only."""
     if dydt.size > 0:
         dydt[device["y"]] = dydt[device["y"] + 1] = 0.0
 
 
 @njit
 def events(t, y, out, tables, device, g):
-    """Write the event functions g of the modes REVERSED, SHUT and OPEN, and of a deceleration beyond the curve [m/s2].
+    """Write four event functions to g: of the modes REVERSED, SHUT and OPEN, and of the range of the curve.
 
-    Margins are velocities until the flow reverses or the valve shuts [m/s], and a drop until the valve opens [Pa].
+    The function of the present mode is minus the margin left in this mode; that of a mode that may follow is the
+    margin.
+    The margin is the velocity left until the flow reverses or the valve shuts [m/s], or the drop left until it opens
+    [Pa].
+    The last function is the last deceleration of the curve minus that at the reversal [m/s2].
     """
     k, at, data, o, present = (
         device["valve"],
@@ -81,7 +85,10 @@ def events(t, y, out, tables, device, g):
 
 @njit
 def set_mode_events(g, at, mode, later, margin):
-    """Write the event functions of a mode that lasts while `margin` is positive, and of its next mode `later`."""
+    """Write to g the event functions of a mode, -`margin`, and of the mode `later` that follows it, `margin`.
+
+    The mode lasts while the margin is positive. at : index of the first event function of the valve
+    """
     margin = -SMALLEST if margin == 0.0 else margin
     g[at + mode], g[at + later] = -margin, margin
 

@@ -1,4 +1,4 @@
-"""Rows and initial states of check valves in the tables of a model."""
+"""Check valves in the tables of a model, and their states at the start."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SMALL_FLOW = 1e-9  # share of the flow scale below which a reversed flow is roun
 
 
 class CheckDisc(LiftedValve, kind=""):
-    """Model table rows of check valves whose disc moves with a delay."""
+    """Conversion to table rows of check valves whose disc moves with a delay."""
 
     mode = CHECK
 
@@ -37,7 +37,7 @@ class CheckDisc(LiftedValve, kind=""):
         return newton
 
     def add_start_notices(self, start, name, x):
-        """Add a notice if the disc and other valves join a rigid column: it then does not control the column."""
+        """Add a notice if the disc and other valves join the same rigid column: it then cannot control the column."""
         valve, nodes = start.valves[start.draft.valve_names.index(name)], start.nodes
         if any(
             nodes["gates"][valve[end]] >= 0 and nodes["gate_count"][valve[end]] > 1 for end in ("from_node", "to_node")
@@ -51,19 +51,19 @@ class CheckDisc(LiftedValve, kind=""):
 
 
 class InertialCheckDisc(CheckDisc, kind=""):
-    """Model table rows of check valves whose disc has inertia."""
+    """Conversion to table rows of check valves whose disc has inertia."""
 
     states = ("opening", "speed")
 
 
 class LaggedCheckDisc(CheckDisc, kind=""):
-    """Model table rows of check valves whose disc has a first-order lag without inertia."""
+    """Conversion to table rows of check valves whose disc has a first-order lag, without inertia."""
 
     states = ("opening",)
 
 
 class CheckValveRows(Device, kind="check-valve"):
-    """Model table rows of check valves that are open or shut.
+    """Conversion to table rows of check valves that are either open or shut.
 
     In the steady state no open valve has reverse flow, and no shut valve has a drop that opens it.
     """
@@ -99,7 +99,7 @@ class CheckValveRows(Device, kind="check-valve"):
 
 
 class SlamCurveRows(CheckValveRows, kind=""):
-    """Model table rows of check valves that shut at the reverse velocity of their manufacturer's curve."""
+    """Conversion to table rows of check valves that shut at the reverse velocity of their manufacturer's curve."""
 
     law = law_slam
     states = ("slam_velocity", "deceleration")
@@ -124,7 +124,7 @@ class SlamCurveRows(CheckValveRows, kind=""):
         return run_data.model.valve_names[row["valve"]]
 
     def deceleration(self, run_data, row, t: float, y) -> float:
-        """Deceleration of the flow at a state, by a backward difference along the solution [m/s2]."""
+        """Deceleration [m/s2] of the flow in the bore at a state, by a backward difference in time; at least 0."""
         model, k = run_data.model, int(run_data.model.layout["valve"] + row["valve"])
         dydt, now, before = np.zeros(y.size), model.new_out(), model.new_out()
         model.functions.rhs(t, y, dydt, now, run_data.handle)

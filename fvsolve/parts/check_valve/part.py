@@ -25,7 +25,7 @@ from fvsolve.parts.valve.part import Sized
 
 @dataclass(frozen=True)
 class SlamCurve:
-    """Reverse velocity at which a valve shuts, over the deceleration of the flow; linear between entries.
+    """Reverse velocity at which a check valve shuts, over the deceleration of the flow; linear between entries.
 
     rate : deceleration, ascending [m/s2]; reverse_velocity : velocity in the bore [m/s]
     """
@@ -34,12 +34,12 @@ class SlamCurve:
     reverse_velocity: tuple[float, ...]
 
     def table(self) -> dict[str, list[float]]:
-        """Table as in a case file, key -> list."""
+        """Curve as a table of a case file: key -> list."""
         return {"rate": [*self.rate], "reverse_velocity": [*self.reverse_velocity]}
 
 
 class SlamCurveTable(Value):
-    """A manufacturer's curve of slam velocities in a case file."""
+    """Value of a case file for a manufacturer's curve of slam velocities."""
 
     about = "manufacturer's curve of the reverse velocity at which the valve shuts, over the deceleration of the flow"
     takes = "`{ rate = [...], reverse_velocity = [...] }`, m/s2 and m/s"
@@ -99,7 +99,7 @@ class CheckValve(Disc, Sized, TwoPort, kind="check-valve"):
 
     @property
     def bore_area(self) -> float:
-        """Area to which the velocities of the key `deceleration` refer [m2]."""
+        """Area of the bore [m2], to which the velocities of the key `deceleration` refer."""
         return self.area if self.area is not None else math.pi / 4.0 * self.diameter**2
 
     @classmethod

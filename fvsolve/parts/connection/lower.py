@@ -1,4 +1,4 @@
-"""Rows of the connections of vessels in the tables of a model."""
+"""Connections of vessels in the tables of a model."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from fvsolve.parts.schedule import constant
 
 
 class ConnectionRows(Restriction, kind="connection"):
-    """Model table rows of throats with a loss coefficient for each flow direction."""
+    """Conversion to table rows of the throats of vessels: restrictions with a loss coefficient for each direction."""
 
     def restriction(self, draft, name, link, row) -> None:
         row["schedule"], row["back"] = draft.schedules.add(constant(1.0)), link.outflow_ratio

@@ -39,7 +39,7 @@ class Connection(Table):
 
 
 class ConnectionTable(Value):
-    """The table of a connection in a case file."""
+    """Value of a case file for a connection."""
 
     about = "throat with a loss coefficient for each flow direction; joined without loss if left out"
     takes = "[connection](#connection)"
@@ -69,7 +69,7 @@ class Throat(TwoPort):
     laminar_reynolds: float | None = None
 
     def flow_area(self) -> float:
-        """Throat area over the square root of the coefficient `loss_in` [m2]."""
+        """Area of the throat [m2], divided by the square root of the loss coefficient `loss_in`."""
         return self.throat_area / math.sqrt(self.size.loss_in)
 
     @property
@@ -79,14 +79,15 @@ class Throat(TwoPort):
 
     @property
     def outflow_ratio(self) -> float:
-        """Conductance for flow out of the vessel over the conductance for flow into it [-]."""
+        """Ratio of conductances [-]: for flow out of the vessel over that for flow into it."""
         return self.size.loss_in / self.size.loss_out
 
 
 def with_connection(name: str, vessel: Any, place: Any) -> tuple[dict[str, Any], dict[str, Throat]]:
-    """Places and links, by name, that represent a vessel.
+    """(places, links) that represent a vessel, each by name.
 
-    Without a connection the vessel alone; else `place` at `name`, the throat, and the vessel behind it.
+    A vessel without connection is the only place. Otherwise they are as from `behind_throat`.
+    place : node to which other links join, if there is a connection
     """
     if vessel.connection is None:
         return {name: vessel}, {}
@@ -94,7 +95,10 @@ def with_connection(name: str, vessel: Any, place: Any) -> tuple[dict[str, Any],
 
 
 def behind_throat(name: str, inside: Any, place: Any, size: Connection) -> tuple[dict[str, Any], dict[str, Throat]]:
-    """Places and links, by name, of a vessel `inside` behind a throat of `size`, whose node is `place` at `name`."""
+    """(places, links) of a vessel behind a throat, each by name: the node `place`, the vessel `inside`, and the throat.
+
+    name : name of the node `place`; size : areas and losses of the throat
+    """
     ends = {"from": name, "to": f"{name}.inside"}
     throat = Throat.model_construct(**ends, size=size, diameter=size.diameter, area=size.area)
     return {name: place, f"{name}.inside": inside}, {f"{name}.connection": throat}

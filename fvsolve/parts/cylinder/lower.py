@@ -1,4 +1,4 @@
-"""Rows of cylinders in the tables of a model; their chambers are separate nodes."""
+"""Cylinders in the tables of a model; their chambers are separate nodes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from fvsolve.model.mass_tables import PushLowering, join_ports
 
 
 class CylinderRows(PushLowering, kind="cylinder"):
-    """Model table rows of cylinders: a piston between two chambers, and between two masses or two points."""
+    """Conversion to table rows of cylinders: a piston between two chambers, and between two masses or two points."""
 
     table = "piston"
 

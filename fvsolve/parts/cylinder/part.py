@@ -62,14 +62,16 @@ class Cylinder(Link, kind="cylinder"):
         float | None,
         Quantity(
             "pressure",
-            about="pressure of chamber A at the start [Pa]; by its links, or by the load of a shut chamber if left out",
+            about="pressure of chamber A at the start [Pa]; that of its links, or the supporting pressure of a shut "
+            "chamber if left out",
         ),
     ] = None
     initial_pressure_B: Annotated[
         float | None,
         Quantity(
             "pressure",
-            about="pressure of chamber B at the start [Pa]; by its links, or by the load of a shut chamber if left out",
+            about="pressure of chamber B at the start [Pa]; that of its links, or the supporting pressure of a shut "
+            "chamber if left out",
         ),
     ] = None
     leakage: Annotated[
@@ -106,14 +108,14 @@ class Cylinder(Link, kind="cylinder"):
             yield ("rod_diameter",), "leaves no area at B; expected a diameter below `piston_diameter`"
 
     def areas(self) -> tuple[float, float]:
-        """Areas of the piston at A and at B [m2]."""
+        """(area at A [m2], area at B [m2]) of the piston."""
         bore = self.area_A if self.area_A is not None else math.pi / 4.0 * self.piston_diameter**2
         if self.area_B is not None:
             return bore, self.area_B
         return bore, math.pi / 4.0 * (self.piston_diameter**2 - self.rod_diameter**2)
 
     def chambers(self, x: float) -> dict[str, Chamber]:
-        """Chambers A and B, by name, with the piston at position x [m]."""
+        """Chambers "A" and "B" -> `Chamber` with the volume that it has at the piston position x [m]."""
         a, b = self.areas()
         volumes = {"A": self.dead_volume_A + a * x, "B": self.dead_volume_B + b * (self.stroke - x)}
         given = {"A": self.initial_pressure_A, "B": self.initial_pressure_B}

@@ -6,7 +6,7 @@ from fvsolve.model.mass_tables import PushLowering, join_ports
 
 
 class DamperRows(PushLowering, kind="damper"):
-    """Model table rows of dampers: a force proportional to the relative velocity of two bodies."""
+    """Conversion to table rows of dampers: a force proportional to the relative velocity of two bodies."""
 
     ledger_name = "dissipated"
     table, rank = "brace", 1

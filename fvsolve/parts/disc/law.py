@@ -29,13 +29,13 @@ SLAM_TIME = 1e-9  # time over T or 1 / w before the seat at which a closing disc
 
 @njit
 def disc_lift(y, tables, device):
-    """Lift x of the disc; it may exceed 0 to 1 by rounding."""
+    """Lift x of the disc [-], between 0 and 1 except for rounding."""
     return tables.floats[device["data"] + LIFT] + y[device["y"]]
 
 
 @njit
 def set(t, y, out, tables, device):
-    """Write the conductance G x^2 of the restriction into `out`, G the conductance at full opening and x the lift."""
+    """Write to `out` the conductance G x^2 of the restriction [kg2/s2/Pa]; G : conductance at full opening, x : lift"""
     k, x = device["valve"], min(max(disc_lift(y, tables, device), 0.0), 1.0)
     out[tables.layout[0]["conductance"] + k] = tables.valves[k]["conductance"] * x * x
 
@@ -53,6 +53,7 @@ def disc_drive_at(y, tables, device, before, drop):
     """Target lift minus lift of the disc [-] at given pressures.
 
     before : upstream pressure minus that at the start [Pa]; drop : pressure drop across the disc [Pa]
+    y : state vector; device : row of the disc in the table of devices
     """
     floats, data = tables.floats, device["data"]
     lifting = before if device["mode"] == RELIEF else drop - floats[data + LIFTING_PRESSURE]
@@ -61,10 +62,10 @@ def disc_drive_at(y, tables, device, before, drop):
 
 @njit
 def lead(t, y, tables, device, before, behind, drop, ahead):
-    """Rate of the lift dx/dt [1/s] at given pressures, and its derivative by the drop [1/Pa/s].
+    """(rate of the lift dx/dt [1/s], its derivative by the drop [1/s/Pa]) of the disc at given pressures.
 
     before, behind : pressures at the ends minus those at the start [Pa]; drop : drop across the valve [Pa]
-    ahead : True if the drop changes by the upstream pressure
+    ahead : True if the upstream pressure causes the change of the drop, False if the downstream pressure does
     """
     floats, armed, at, data = tables.floats, tables.armed, device["event"], device["data"]
     if armed[at] > 0.0 or armed[at + 2] > 0.0:
@@ -78,17 +79,17 @@ def lead(t, y, tables, device, before, behind, drop, ahead):
 
 @njit
 def lift_rate_slope(tables, device):
-    """Derivative of the rate of the lift dx/dt by the lifting pressure [1/Pa/s]; 0 for a disc with inertia."""
+    """Derivative [1/s/Pa] of the rate of the lift dx/dt by the lifting pressure; 0 for a disc with inertia."""
     floats, data = tables.floats, device["data"]
     return 1.0 / (floats[data + TIME_CONSTANT] * floats[data + SPAN]) if device["states"] == 1 else 0.0
 
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    """Write the rates of lift and speed into `dydt`, 0 at a stop, and raise out[RATE] to the rate limit of the disc.
+    """Write the rates of lift and speed of the disc to `dydt`, 0 at a stop, and raise out[RATE] to its rate limit.
 
-    While the disc closes on a column, -x'/x (x the lift) goes into out[CLOSING]: a column that flows back slams the
-    disc, x ~ (time left)^(1/3), and a time step must not pass that instant.
+    While the disc closes on a rigid column, out[CLOSING] is raised to -x'/x, with the lift x. A column that flows back
+    slams the disc, with x ~ (time left)^(1/3), and a time step must not pass that instant.
     """
     floats, armed, at, o = tables.floats, tables.armed, device["event"], device["y"]
     drive, stopped = disc_drive(y, out, tables, device), armed[at] > 0.0 or armed[at + 2] > 0.0
@@ -110,9 +111,9 @@ def move(t, y, dydt, out, tables, device):
 
 @njit
 def disc_rate_limit(y, out, tables, device, own):
-    """Rate limit of the disc with the nodes at its ends [1/s]; own : rate of the disc alone [1/s].
+    """Rate limit [1/s] of the disc together with the nodes at its ends; own : rate of the disc alone [1/s]
 
-    Where a column sets the flow, the derivative of the drop dP by the lift x is -2 dP / x.
+    Where a rigid column sets the flow, the derivative of the drop dP by the lift x is -2 dP / x.
     """
     k, speed, nodes = device["valve"], own / tables.floats[device["data"] + SPAN], tables.nodes
     before, behind = tables.valves[k]["from_node"], tables.valves[k]["to_node"]
@@ -128,9 +129,10 @@ def disc_rate_limit(y, out, tables, device, own):
 
 @njit
 def events(t, y, out, tables, device, g):
-    """Write the event functions g, each with its negative.
+    """Write three event functions to g, each followed by its negative.
 
-    They are the distances to the stop, to the seat, and to the lift at which the valve stops to control a column.
+    They are the distances of the lift from the stop and from the seat, and from the lift at which the disc stops
+    controlling a rigid column, or begins to.
     """
     armed, at, o = tables.armed, device["event"], device["y"]
     x, drive = disc_lift(y, tables, device), disc_drive(y, out, tables, device)

@@ -1,4 +1,4 @@
-"""Valves with a disc that pressure lifts: rows in the tables of a model, and states in the steady start."""
+"""Valves with a disc that pressure lifts, in the tables of a model, and their states at the steady start."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ STOP_EVENTS = ("is fully open", "leaves full opening", "is shut", "leaves its se
 
 
 class LiftedValve(Device, kind=""):
-    """Model table rows of valves that are shut, fully open, or partly lifted by pressure.
+    """Conversion to table rows of valves that a pressure lifts; they are shut, fully open, or partly lifted.
 
     A disc with a delay has its lift as a state.
     """
@@ -28,7 +28,7 @@ class LiftedValve(Device, kind=""):
     remedy = "give it a greater overpressure"
 
     def numbers(self, draft, name, part) -> list[float]:
-        """Numbers of the disc in the order of `law`: lift, target and lifting pressure at the start, then its keys."""
+        """Parameters of the disc in the order of `law`: lift, target, lifting pressure at the start, then its keys."""
         frequency = part.natural_frequency or 0.0
         return [0.0, 0.0, 0.0, part.overpressure, part.time_constant or 0.0, 2.0 * math.pi * frequency,
                 part.damping_ratio or 0.0]  # fmt: skip
@@ -48,7 +48,7 @@ class LiftedValve(Device, kind=""):
         return start.draft.devices[start.valves[k]["device"]][1]
 
     def lifting_pressure(self, start, k: int) -> float:
-        """Lifting pressure of valve k minus its opening pressure in the present steady solution [Pa]."""
+        """Lifting pressure of valve k minus its opening pressure [Pa], in the present iteration of the steady start."""
         raise NotImplementedError
 
     def edge(self, start, k):
@@ -60,10 +60,13 @@ class LiftedValve(Device, kind=""):
         return Edge(i, j, self.row(start, k), 0.0, sensed_node=i)
 
     def follow(self, start, k) -> None:
-        """Do nothing: `begin` sets the drop."""
+        """Do nothing: the function `begin` sets the drop of valve k."""
 
     def flow_at(self, start, k: int, drop: float, lift: float) -> tuple[float, float, float]:
-        """Mass flow of valve k [kg/s] and its derivatives by the drop [kg/s/Pa] and by the lift [kg/s]."""
+        """(mass flow [kg/s], its derivative by the drop [kg/s/Pa], its derivative by the lift [kg/s]) of valve k.
+
+        drop : drop across the valve [Pa]; lift : lift of the disc [-], a negative lift counts as 0
+        """
         g = float(start.valves[k]["conductance"]) * start.factor.get(k, 1.0)
         transition = transition_of(start.valves[k], g)
         full, x = flow_at_drop(g, transition, drop), max(lift, 0.0)
@@ -82,9 +85,10 @@ class LiftedValve(Device, kind=""):
         return after != before
 
     def next_mode(self, x: float, back: bool, now: str) -> str:
-        """Mode of the valve in the next steady solution: "shut", LIFTING or OPEN.
+        """Mode of a valve in the next iteration of the steady start: "shut", LIFTING or OPEN.
 
-        x : lift by the pressures, not limited; back : True if the flow is reversed; now : present mode
+        x : lift that follows from the pressures, not limited to 0 to 1
+        back : True if the flow is reversed; now : present mode
         """
         if now == "shut":
             return LIFTING if x > SMALL_LIFT else now
@@ -111,8 +115,11 @@ class LiftedValve(Device, kind=""):
         )
 
     def store_lift(self, start, row, x: float, target: float) -> None:
-        """Store the lift x and the target lift at the start in the numbers of the device."""
+        """Store the lift x and the target lift at the start in the parameters of the disc.
+
+        row : row of the disc in the table of devices
+        """
         start.draft.tables.floats[row["data"] : row["data"] + 2] = x, target
 
     def add_start_notices(self, start, name: str, x: float) -> None:
-        """Add notices about a valve with the lift x at the start to the draft."""
+        """Add notices about a valve to the draft of the model, if its kind has any; x : lift at the start"""

@@ -11,7 +11,7 @@ DROPS = UsualRange(20.0, 1e8, "millimetres of water to the springs of test rigs"
 
 
 class Disc(Table):
-    """A disc on a spring at lift x, between its seat at 0 and its stop at 1, which tends to a target set by pressures.
+    """A disc on a spring; its lift x, from 0 on the seat to 1 at the stop, tends to a target that pressures set.
 
     time_constant dx/dt = target - x, or x'' = w^2 (target - x) - 2 damping_ratio w x' with w = 2 pi natural_frequency.
     """
@@ -43,7 +43,7 @@ class Disc(Table):
 
     @property
     def has_dynamics(self) -> bool:
-        """True if the lift is a state."""
+        """True if the disc moves with a delay, so that its lift is a state."""
         return self.time_constant is not None or self.natural_frequency is not None
 
     @classmethod

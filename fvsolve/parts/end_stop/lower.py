@@ -8,7 +8,7 @@ NO_STOP = 1e300  # distance to a stop that does not exist
 
 
 class EndStopRows(PushLowering, kind="end-stop"):
-    """Model table rows of end stops: a spring and a damper that act while two bodies are in contact."""
+    """Conversion to table rows of end stops: a spring and a damper that act while two bodies are in contact."""
 
     table = "stop"
 

@@ -11,7 +11,7 @@ from fvsolve.model.mass_tables import PushLowering, join_ports
 
 
 class ForceRows(PushLowering, kind="force"):
-    """Model table rows of forces given by a schedule."""
+    """Conversion to table rows of external forces, which follow a schedule."""
 
     ledger_name = "supplied"
     table, rank = "brace", 2
@@ -27,5 +27,5 @@ class ForceRows(PushLowering, kind="force"):
 
 
 def brace_of(model, name: str):
-    """Row of a link in the table of braces."""
+    """Row of the link `name` in the table of braces (springs, dampers, forces)."""
     return model.tables.braces[[link for link, _, _ in rows_in(model.case, "brace")].index(name)]

@@ -34,7 +34,7 @@ class Force(Coupling, kind="force"):
 
     @property
     def ports(self) -> dict[str, str]:
-        """Places that the ports join, port name -> place."""
+        """Places that the ports join: port name -> place."""
         return {"to": self.to} if self.from_ is None else super().ports
 
     def faults(self, name: str, around: CaseContext) -> Faults:
@@ -48,7 +48,7 @@ class Force(Coupling, kind="force"):
         if not around.spatial(self.to) and self.direction is not None:
             yield (
                 ("direction",),
-                f"{self.to} moves along a single axis, which gives the direction of the force; remove it",
+                f"{self.to} moves along a single axis, which gives the direction of the force; remove this key",
             )
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:

@@ -4,4 +4,4 @@ from fvsolve.model.mass_tables import AxisLowering
 
 
 class FrameRows(AxisLowering, kind="frame"):
-    """Model table rows of frames: fixed bodies on the axis."""
+    """Conversion to table rows of frames: fixed bodies on the axis."""

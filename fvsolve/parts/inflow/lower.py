@@ -8,7 +8,7 @@ from fvsolve.model.lowering import Lowering
 
 
 class InflowRows(Lowering, kind="inflow"):
-    """Model table rows of inflows: junctions with a negative demand."""
+    """Conversion to table rows of inflows: junctions with a negative demand."""
 
     ledger_name = "inflow"
 

@@ -8,7 +8,7 @@ from fvsolve.model.lowering import Lowering
 
 
 class JunctionRows(Lowering, kind="junction"):
-    """Model table rows of junctions, at which the flows add up to the demand."""
+    """Conversion to table rows of junctions, at which the flows add up to the demand."""
 
     ledger_name = "demand"
 

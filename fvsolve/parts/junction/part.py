@@ -57,7 +57,8 @@ class Junction(PlaceOnBody, kind="junction"):
         least = around.ambient if self.minimum_pressure is None else self.minimum_pressure
         if self.required_pressure is None:
             if self.minimum_pressure is not None:
-                yield ("minimum_pressure",), "has no effect without `required_pressure`; give both keys, or remove it"
+                text = "has no effect without `required_pressure`; give both keys, or remove this key"
+                yield ("minimum_pressure",), text
             return
         if self.required_pressure <= least:
             text = f"{self.required_pressure:g} Pa is not above the pressure of no flow, {least:g} Pa"

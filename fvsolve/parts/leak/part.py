@@ -38,7 +38,7 @@ class Leak(Link, kind="leak"):
 
     @property
     def ports(self) -> dict[str, str]:
-        """Places that the ports join, port name -> place."""
+        """Places that the ports join: port name -> place."""
         return {"from": self.from_}
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Link]]:

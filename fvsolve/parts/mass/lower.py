@@ -4,4 +4,4 @@ from fvsolve.model.mass_tables import AxisLowering
 
 
 class MassRows(AxisLowering, kind="mass"):
-    """Model table rows of masses: bodies on an axis, moved by forces."""
+    """Conversion to table rows of masses: bodies on an axis, moved by forces."""

@@ -4,4 +4,4 @@ from fvsolve.parts.valve.lower import ValveRows
 
 
 class OrificeRows(ValveRows, kind="orifice"):
-    """Model table rows of orifices, which are those of valves."""
+    """Conversion to table rows of orifices: the same rows as those of valves."""

@@ -23,7 +23,10 @@ NO_LIMIT = 1e300  # value of `most` without a limit
 
 @njit(forceinline=True)
 def rule_of(tables, k):
-    """Rule of restriction k until its next event: FREE, SHUT, PART or FULL."""
+    """Rule of restriction k until its next event: SHUT (no flow), PART or FULL (part of its demand or all), or FREE.
+
+    Under FREE the drop alone determines the flow.
+    """
     armed, at = tables.armed, tables.valves[k]["event"]
     if armed[at] > 0.0:
         return SHUT
@@ -32,7 +35,11 @@ def rule_of(tables, k):
 
 @njit(forceinline=True)
 def drop_under_rule(floats, at, drop, rule):
-    """Drop above `least` in the power law [Pa], and the limit `most` of the relative flow, under a rule."""
+    """(drop above `least` in the power law [Pa], limit `most` of the relative flow [-]) of an outlet under a rule.
+
+    floats[at:] : parameters of the outlet: exponent, least, span and most; drop : drop across the outlet [Pa]
+    rule : SHUT, PART, FULL or FREE, see `rule_of`
+    """
     above, most = drop - floats[at + 1], floats[at + 3]
     if rule == PART:
         return above, NO_LIMIT
@@ -41,9 +48,9 @@ def drop_under_rule(floats, at, drop, rule):
 
 @njit
 def emitter_flow(floats, at, g, drop, rule):
-    """Mass flow of an outlet at a drop [kg/s]; 0 below the drop at which flow begins.
+    """Mass flow of an outlet [kg/s] at a drop [Pa]; 0 below the drop at which flow begins.
 
-    g : conductance now, (flow at x = 1)^2 / span [kg2/s2/Pa]; drop [Pa]; rule : FREE, SHUT, PART or FULL
+    g : present conductance, (flow at nominal drop)^2 / span [kg2/s2/Pa]; floats, at, rule : as for `drop_under_rule`
     """
     n, span = floats[at], floats[at + 2]
     above, most = drop_under_rule(floats, at, drop, rule)
@@ -58,7 +65,7 @@ def emitter_flow(floats, at, g, drop, rule):
 
 @njit
 def emitter_slope(floats, at, g, drop, rule):
-    """Derivative of the mass flow of an outlet by its drop [kg/s/Pa]."""
+    """Derivative of the mass flow of an outlet by its drop [kg/s/Pa]; arguments as for `emitter_flow`."""
     n, span = floats[at], floats[at + 2]
     above, most = drop_under_rule(floats, at, drop, rule)
     if above <= 0.0 or g <= 0.0:
@@ -75,7 +82,7 @@ def emitter_slope(floats, at, g, drop, rule):
 
 @njit
 def cubic_root(n, share):
-    """Root s in [0, 1] of s^2 ((3 - n) + (n - 2) s) = share, by bounded Newton."""
+    """Root s in [0, 1] of s^2 ((3 - n) + (n - 2) s) = share, by Newton's method with bounds."""
     low, high, s = 0.0, 1.0, sqrt(share)
     for _ in range(60):
         residual = s * s * ((3.0 - n) + (n - 2.0) * s) - share
@@ -94,7 +101,10 @@ def cubic_root(n, share):
 
 @njit
 def emitter_drop(floats, at, g, flow, rule):
-    """Drop at which an outlet carries a mass flow [Pa]; for no flow, the drop at which flow begins."""
+    """Drop [Pa] at which an outlet has the mass flow `flow` [kg/s]; the drop at which flow begins, if `flow` is 0.
+
+    Other arguments as for `emitter_flow`.
+    """
     n, span = floats[at], floats[at + 2]
     if flow <= 0.0 or g <= 0.0:
         return floats[at + 1]
@@ -106,12 +116,13 @@ def emitter_drop(floats, at, g, flow, rule):
 
 @njit
 def emitter_step(floats, at, g, m, drop, rule):
-    """a [kg/s] and s [kg/s/Pa] of the next Newton step of an outlet, dM = a + s d(drop).
+    """(a [kg/s], s [kg/s/Pa]) of the next Newton step dM = a + s d(drop) of an outlet.
 
-    m : mass flow M before the step [kg/s]; drop : drop across the outlet [Pa]
-    s is the slope of the chord between the present flow and the flow at the drop; for n = 1/2 it is Newton's slope in
-    M^2. The flow rises with the drop, and the flow that the network leaves for the outlet falls, so the root lies
-    between both. Every chord lies within the previous one, so Newton cannot cycle at a kink.
+    m : mass flow M before the step [kg/s]; other arguments as for `emitter_flow`
+    s is the slope of the chord between the present flow and the flow at the drop; for the exponent 1/2 it is Newton's
+    slope in M^2.
+    The flow rises with the drop, and the flow that the network leaves for the outlet falls, so the root lies between
+    both. Every chord lies within the previous one, so Newton cannot cycle at a kink.
     """
     target, own_drop = emitter_flow(floats, at, g, drop, rule), emitter_drop(floats, at, g, m, rule)
     if rule == SHUT:
@@ -123,9 +134,9 @@ def emitter_step(floats, at, g, m, drop, rule):
 
 @njit
 def bends(tables, k, drop, g):
-    """Write the event functions g [Pa], each with its negative, at a drop of restriction k.
+    """Write the event functions of restriction k [Pa] to g, each followed by its negative; drop : present drop [Pa]
 
-    They are margins until the outlet shuts or opens, and until it supplies its full demand or less.
+    They are the margins until the outlet shuts or opens, and until it supplies its full demand or less.
     """
     valve, floats, armed = tables.valves[k], tables.floats, tables.armed
     at, event = valve["data"], valve["event"]
@@ -140,14 +151,14 @@ def bends(tables, k, drop, g):
 
 @njit
 def step(out, tables, k, g, m, drop, denser, wide):
-    """a, s of the Newton step `emitter_step` of restriction k under its present rule.
+    """(a, s) of `emitter_step` for restriction k under its present rule; arguments as for `restriction_step`.
 
-    The volume flow follows the drop: g grows with the square of the relative density `denser`.
+    The volume flow follows the drop: the conductance g grows with the square of the relative density `denser`.
     """
     return emitter_step(tables.floats, tables.valves[k]["data"], g * denser * denser, m, drop, rule_of(tables, k))
 
 
 @njit
 def slope(out, tables, k, g, drop):
-    """Derivative of the mass flow of restriction k by its drop [kg/s/Pa]."""
+    """Derivative [kg/s/Pa] of the mass flow of restriction k by its drop; g : conductance [kg2/s2/Pa], drop : [Pa]"""
     return emitter_slope(tables.floats, tables.valves[k]["data"], g, drop, rule_of(tables, k))

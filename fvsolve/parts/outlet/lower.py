@@ -1,4 +1,4 @@
-"""Rows of outlets to ambient, and of valves that open to ambient, in the tables of a model."""
+"""Outlets to ambient, and valves that open to ambient, in the tables of a model."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SPAN = 1e5  # default drop at which an outlet has its nominal flow [Pa]
 
 
 class OutsideRows(Lowering, kind="outside"):
-    """Model table rows of nodes at ambient pressure."""
+    """Conversion to table rows of nodes at ambient pressure."""
 
     ledger_name = "outside"
 
@@ -28,7 +28,7 @@ class OutsideRows(Lowering, kind="outside"):
 
 
 class OutletRows(Restriction, kind="outlet"):
-    """Model table rows of outlets: links whose flow is a power of the drop."""
+    """Conversion to table rows of outlets: links whose flow is a power of the drop."""
 
     law = law
     events = ("",) * law.EVENT_COUNT
@@ -41,11 +41,11 @@ class OutletRows(Restriction, kind="outlet"):
         return [link.exponent, self.least(draft, link), self.span(draft, link), link.most]
 
     def least(self, draft, link) -> float:
-        """Drop from which flow begins [Pa]."""
+        """Drop [Pa] at which the flow of an outlet begins."""
         return 0.0 if link.least is None else link.least - draft.case.ambient_pressure
 
     def span(self, draft, link) -> float:
-        """Drop at the nominal flow minus the drop from which flow begins [Pa]."""
+        """Drop at the nominal flow of an outlet minus the drop at which its flow begins [Pa]."""
         return SPAN if link.upper is None else link.upper - draft.case.ambient_pressure - self.least(draft, link)
 
     def inputs(self, model, name, part):
@@ -53,15 +53,16 @@ class OutletRows(Restriction, kind="outlet"):
 
 
 class RelievingRows(Device, kind=""):
-    """Model table rows of valves that are shut at the start and open to another node or to ambient.
+    """Conversion to table rows of valves that are shut at the start and may open to another node or to ambient.
 
-    mode : number of values and flags of an outlet of exponent 1/2 that precede those of the valve
+    mode : count of the parameters, and of the event flags, of an outlet that precede those of the valve; 0 for a valve
+    between two nodes
     """
 
     quantities = ("opening",)
 
     def own_numbers(self, draft, name, part) -> list[float]:
-        """Numbers of the valve without those of an outlet."""
+        """Parameters that the law of the valve reads (see `numbers`), without those of an outlet that precede them."""
         raise NotImplementedError
 
     def numbers(self, draft, name, part) -> list[float]:
@@ -74,4 +75,4 @@ class RelievingRows(Device, kind=""):
         return new
 
     def follow(self, start, k) -> None:
-        """Do nothing: a shut valve carries no flow."""
+        """Do nothing: a shut valve has no flow at the start."""

@@ -25,9 +25,10 @@ class Outside(Node):
 class Outlet(TwoPort):
     """Link from a place to ambient, q = opening / full flow min(most, ((p - least) / (upper - least))^exponent).
 
-    q is the volume flow, p the pressure at the place; there is no backflow. flow : flow at p = upper and opening = full
-    [m3/s]; least : pressure from which flow begins [Pa], ambient if None; upper : [Pa], 1 bar above least if None
-    most : limit of the power of pressure [-]
+    q is the volume flow, p the pressure at the place; there is no backflow.
+    flow : flow at p = upper and opening = full [m3/s]; opening : schedule
+    least : pressure from which flow begins [Pa], ambient pressure if None
+    upper : pressure of the nominal flow [Pa], 1 bar above least if None; most : limit of the power of pressure [-]
     """
 
     kind: ClassVar[str] = "outlet"
@@ -42,7 +43,10 @@ class Outlet(TwoPort):
 
 
 def outlet_to_ambient(name: str, place: str, **law: Any) -> tuple[dict[str, Node], dict[str, Outlet]]:
-    """Places and links, by name, of an outlet `name` at a place: a node at ambient pressure and the outlet."""
+    """(places, links), each by name, of an outlet `name` at a place: a node at ambient pressure, and the outlet.
+
+    law : fields of `Outlet`
+    """
     outlet = Outlet.model_construct(**{"from": place}, to=f"{name}.outside", **law)
     return {f"{name}.outside": Outside.model_construct(level_of=place)}, {name: outlet}
 
@@ -59,12 +63,12 @@ class Relieving(Sized, Link):
 
     @property
     def ports(self) -> dict[str, str]:
-        """Places that the ports join, port name -> place."""
+        """Places that the ports join: port name -> place."""
         return {"from": self.from_} | ({} if self.to is None else {"to": self.to})
 
     @property
     def outward(self) -> bool:
-        """True if the valve opens to ambient."""
+        """True if the valve or disc opens to ambient."""
         return self.to is None or self.to.endswith(".outside")
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Link]]:

@@ -8,7 +8,7 @@ from fvsolve.model.lowering import Lowering
 
 
 class PinRows(Lowering, kind="pin"):
-    """Model table rows of pins: loop constraints between two points."""
+    """Conversion to table rows of pins: loop constraints between two points."""
 
     table = "pin"
 

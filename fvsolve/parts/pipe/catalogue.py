@@ -19,7 +19,7 @@ WALL_KEYS = ("youngs_modulus", "poisson_ratio")
 
 
 def from_catalogue(given: dict[str, Any]) -> dict[str, Any]:
-    """Table of a pipe, completed with the values of its material and class. Raises ValueFault with the faults."""
+    """Table of a pipe, completed with the data of its material and class; raises ValueFault with all faults."""
     name = given.get("material")
     material = materials().get(name) if isinstance(name, str) else None
     if material is None and "class" not in given and "lining" not in given:
@@ -44,7 +44,10 @@ def from_catalogue(given: dict[str, Any]) -> dict[str, Any]:
 
 
 def with_substitutes(given: dict[str, Any]) -> dict[str, Any]:
-    """Table with placeholder bore, wall and roughness for a wrong name, so that reading finds the other faults."""
+    """Table of a pipe with placeholders for the bore, wall and roughness that follow from its material and class.
+
+    It is used for wrong names, so that reading finds the other faults.
+    """
     table = {**given}
     if not {"class", "nominal"}.isdisjoint(given):
         table["diameter"] = 1.0
@@ -57,7 +60,10 @@ def with_substitutes(given: dict[str, Any]) -> dict[str, Any]:
 
 
 def _add_class(table: dict[str, Any], sources: list[str], material: str | None) -> None:
-    """Add bore, wall and allowable pressure of a class; a class that names a schedule becomes the key `schedule`."""
+    """Add bore, wall and allowable pressure of the class of a pipe; replace a class that is a schedule by `schedule`.
+
+    sources : list to which the source of the data is appended; material : name of the material, or None
+    """
     name, nominal = table["class"], table.get("nominal")
     if (schedule := SCHEDULE.fullmatch(name.strip())) is not None:
         del table["class"]
@@ -92,7 +98,10 @@ def _add_schedule(table: dict[str, Any], material: Material | None) -> None:
 
 
 def _size(table: dict[str, Any], bore: float, thickness: float) -> None:
-    """Add the bore inside the lining, and the wall thickness if the wave speed follows from the wall."""
+    """Add the bore inside the lining, and the wall thickness if the wave speed follows from the wall.
+
+    bore, thickness : of the pipe without lining [m]
+    """
     try:
         lining = parse(table["lining"]["thickness"], "length")
     except (KeyError, TypeError, ValueError):  # no lining, or reported where the key is read
@@ -104,7 +113,10 @@ def _size(table: dict[str, Any], bore: float, thickness: float) -> None:
 
 
 def _add_wall(table: dict[str, Any], sources: list[str], material: Material) -> None:
-    """Add Young's modulus and Poisson's ratio of the material to a wall without them."""
+    """Add Young's modulus and Poisson's ratio of the material to the wall of a pipe, if they are not given.
+
+    sources : list to which the sources of these values are appended
+    """
     wall = table.get("wall", {})
     if "wave_speed" in table or not isinstance(wall, dict):
         return
@@ -120,7 +132,10 @@ def _add_wall(table: dict[str, Any], sources: list[str], material: Material) -> 
 
 
 def _add_roughness(table: dict[str, Any], sources: list[str], material: Material) -> None:
-    """Add the roughness of the material to an unlined pipe whose friction model needs a roughness and has none."""
+    """Add the roughness of the material to an unlined pipe, if its friction model needs a roughness and none is given.
+
+    sources : list to which the source of the value is appended
+    """
     friction = table.get("friction")
     if not isinstance(friction, dict) or "lining" in table or any(key in friction for key in DARCY):
         return

@@ -21,13 +21,13 @@ class Creep:
     time: tuple[float, ...]
 
     def table(self) -> dict[str, list[float]]:
-        """Table as in a case file."""
+        """Elements as a table of a case file: key -> list."""
         return {"compliance": list(self.compliance), "time": list(self.time)}
 
 
 @dataclass(frozen=True)
 class PositiveList(Value):
-    """A list of numbers above 0, a number for each element."""
+    """Value of a case file: a list of numbers above 0, one for each Kelvin-Voigt element."""
 
     dimension: str
     changes: str = VALUE
@@ -48,7 +48,7 @@ CREEP_KEYS = {"compliance": (PositiveList("compliance"), NEEDED), "time": (Posit
 
 
 class Elements(Value):
-    """Table of Kelvin-Voigt elements with equal numbers of compliances and times, all above 0."""
+    """Value of a case file for Kelvin-Voigt elements: equal numbers of compliances and times, all above 0."""
 
     about = "Kelvin-Voigt elements of a viscoelastic wall"
     takes = "`{ compliance, time }`, lists of 1/Pa and s"

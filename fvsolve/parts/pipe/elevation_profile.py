@@ -40,15 +40,15 @@ class Profile:
         return self.chainage - self.chainage[0]
 
     def at(self, distance: Any) -> Any:
-        """Elevation at distances from the first point [m]."""
+        """Elevation [m] at given distances from the first point [m]."""
         return np.interp(distance, self.distance, self.elevation)
 
     def plan_at(self, distance: np.ndarray) -> np.ndarray:
-        """Plan coordinates x and y at m distances from the first point [m] : float64[m, 2]."""
+        """Plan coordinates x and y [m] at given distances from the first point [m] : float64[distances, 2]."""
         return np.column_stack([np.interp(distance, self.distance, axis) for axis in self.plan.T])
 
     def part(self, begin: float, end: float) -> Profile:
-        """Profile between two distances from the first point [m], with unchanged chainages."""
+        """Part of the profile between two distances from the first point [m]; its chainages are unchanged."""
         d = self.distance
         inside = (d > begin) & (d < end)
         cut = np.concatenate([[begin], d[inside], [end]])
@@ -57,7 +57,7 @@ class Profile:
         return Profile(chainage, elevation, table, None if self.plan is None else self.plan_at(cut))
 
     def table(self) -> dict[str, Any]:
-        """Table as in a case file."""
+        """Profile as a table of a case file."""
         return self.given
 
     def __eq__(self, other: object) -> bool:
@@ -67,10 +67,13 @@ class Profile:
 
 
 class ProfileValue(Value):
-    """Points of a pipe axis: chainage and elevation, or x, y and z, as lists or columns of a CSV file."""
+    """Value of a case file for the points of a pipe axis: chainage and elevation, or x, y and z.
+
+    They are lists, or columns of a CSV file.
+    """
 
     about = "elevation along the axis, linear between points; straight between its ends if left out"
-    takes = "`{ chainage, elevation }` or `{ x, y, z }`, lists of m, or `{ file }` with such columns"
+    takes = "`{ chainage, elevation }` or `{ x, y, z }`, lists in m, or `{ file }` with these columns"
 
     def read(self, given: Any, setting: ReadContext) -> Profile:
         if isinstance(given, Profile):
@@ -107,7 +110,10 @@ def check_slope(profile: Profile) -> None:
 
 
 def from_lists(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """Columns by key [m], read from lists of equal length, and the table of the case file in SI."""
+    """(columns, table): arrays of the points by key [m], read from lists of equal length, and the same lists in SI.
+
+    setting : context for reading. Raises ValueFault with all faults.
+    """
     keys = columns_among(list(given), "keys")
     columns, faults = {}, [((key,), f"unknown key; expected {' and '.join(keys)}") for key in given if key not in keys]
     for key in keys:
@@ -130,7 +136,10 @@ def from_lists(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, n
 
 
 def from_file(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """Columns by key [m], read from a CSV file by its header, and the table of the case file."""
+    """(columns, table): arrays of the points by key [m], read from a CSV file by its header, and the table { file }.
+
+    setting : context for reading. Raises ValueFault with the fault.
+    """
     unknown = [((key,), "unknown key; expected only file") for key in given if key != "file"]
     if unknown:
         raise ValueFault(unknown)
@@ -153,7 +162,10 @@ def from_file(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, np
 
 
 def columns_among(names: list[str], source: str) -> tuple[str, ...]:
-    """Names of the columns: chainage and elevation, or x, y and z. Raises ValueError if neither set is complete."""
+    """Names of the columns of a profile that are among `names`: chainage and elevation, or x, y and z.
+
+    Raises ValueError if neither set is complete; source : noun for the message
+    """
     for keys in COLUMN_SETS:
         if set(keys) <= set(names):
             return keys

@@ -16,7 +16,7 @@ from fvsolve.schemes import end_rate_factor
 
 
 class PipeRows(Lowering, kind="pipe"):
-    """Model table rows of pipes: cells with a forward and a backward wave, or a delay line."""
+    """Conversion to table rows of pipes: cells with a forward and a backward wave, or a delay line."""
 
     table = "pipe"
 
@@ -56,7 +56,7 @@ class PipeRows(Lowering, kind="pipe"):
         )  # fmt: skip
 
     def force(self, draft, name, row) -> None:
-        """Fill the row of a probe of the force on a pipe."""
+        """Fill the row of a probe for the force on a pipe; report a fault for a delay line or a pipe on a body."""
         row["kind"] = rec.PIPE_FORCE
         pipe = draft.pipe_table[row["index"]]
         if pipe["delay"] >= 0:

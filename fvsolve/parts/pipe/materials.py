@@ -66,7 +66,10 @@ WITHOUT_SOURCE = ("PVC-O", "PEX", "hydraulic-hose")  # pipe materials without a 
 
 @dataclass(frozen=True)
 class Figure:
-    """Number of a material in SI: least and greatest value of its sources, and the value used."""
+    """Property of a material, such as its density, in SI: least and greatest value in its sources, and the value used.
+
+    key : name of the property; sources : keys of `SOURCES`
+    """
 
     key: str
     least: float
@@ -79,7 +82,10 @@ class Figure:
         return self.greatest if self.key == "youngs_modulus" else 0.5 * (self.least + self.greatest)
 
     def span(self, between: str) -> str:
-        """Text of the least and greatest value in the unit of the table; one number if they are equal."""
+        """Text of the least and greatest value in the unit of the catalogue; between : text between both
+
+        It is a single number if both are equal.
+        """
         low, high = (f"{x / SI[self.key]:.4g}" for x in (self.least, self.greatest))
         return low if low == high else f"{low}{between}{high}"
 
@@ -95,7 +101,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Material:
-    """Material with its numbers: key of a property -> number."""
+    """Material of the catalogue; figures : key of a property -> its values (`Figure`)."""
 
     name: str
     figures: dict[str, Figure] = field(default_factory=dict)
@@ -108,7 +114,7 @@ class Material:
 
 @functools.cache
 def materials() -> dict[str, Material]:
-    """Catalogue of materials by name."""
+    """Catalogue of materials: name -> material."""
     catalogue: dict[str, Material] = {}
     for line in TABLE.strip().splitlines():
         name, short, least, greatest, *rest = line.split(maxsplit=4)

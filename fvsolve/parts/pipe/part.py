@@ -139,9 +139,9 @@ class Pipe(Conduit, kind="pipe"):
 
     @classmethod
     def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
-        """Table with names of catalogue entries and sizes replaced by numbers.
+        """Table in which numbers replace names of catalogue entries and nominal sizes.
 
-        Raises ValueFault for an unknown name.
+        Raises ValueFault for unknown names.
         """
         faults, values = [], given
         if not CATALOGUE.isdisjoint(given):
@@ -166,7 +166,11 @@ class Pipe(Conduit, kind="pipe"):
         yield from self.profile_faults(around)
 
     def profile_faults(self, around: CaseContext) -> Faults:
-        """Faults of the elevation profile: its length or end elevations differ from those of pipe and nodes."""
+        """Faults of the elevation profile of a pipe.
+
+        Its length must agree with that of the pipe, its end elevations with those of the nodes, and no end may be on a
+        body.
+        """
         if self.profile is None:
             return
         if abs(self.profile.length - self.length) > LENGTH_TOLERANCE * self.length:
@@ -198,7 +202,7 @@ class Pipe(Conduit, kind="pipe"):
 
 
 def add_profile_length(given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
-    """Table with the length of the profile added if none is given. Raises ValueFault with the faults of the profile."""
+    """Table with the length of the profile added, if no length is given; raises ValueFault for a faulty profile."""
     if "profile" not in given:
         return given
     try:

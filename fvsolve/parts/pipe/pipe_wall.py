@@ -47,9 +47,9 @@ class Lining(Table):
 
 
 class MaterialName(Value):
-    """Name of a material of the catalogue."""
+    """Value of a case file for the name of a material of the catalogue."""
 
-    about = "material of the wall: sets modulus, Poisson's ratio and roughness, if a source is known"
+    about = "material of the wall: gives Young's modulus, Poisson's ratio and roughness, where the catalogue has them"
     changes = BY_CELLS
 
     @property
@@ -80,7 +80,7 @@ class MaterialName(Value):
 
 
 class WallOrRigid(Value):
-    """Wall of a pipe: the text "rigid", or the table of an elastic wall."""
+    """Value of a case file for the wall of a pipe: the text "rigid", or the table of an elastic wall."""
 
     about = 'wall, elastic or rigid; "rigid" if left out'
     takes = '`"rigid"`, or `{ youngs_modulus, thickness, poisson_ratio, creep }`, Pa and m'
@@ -103,7 +103,7 @@ class WallOrRigid(Value):
 
 
 class Restraint(Value):
-    """Axial restraint of a pipe: a word, or the factor c of the wall compliance."""
+    """Value of a case file for the axial restraint of a pipe: a word, or the factor c of the wall compliance."""
 
     about = "axial restraint; 1 (thin wall between expansion joints) if left out"
     takes = "`joints`, `upstream`, `anchored`, or a number, above 0"
@@ -123,11 +123,13 @@ class Restraint(Value):
 
 
 def restraint_factor(restraint: str | float | None, bore: float, wall: Wall) -> float:
-    """Factor c of the relative growth of the bore area A with pressure, dA / A = c D / (E e) dp; 1 without restraint.
+    """Factor c of the growth of the bore area A with pressure, dA / A = c D / (E e) dp; 1 without a restraint.
 
     D : bore, E : Young's modulus, e : thickness, nu : Poisson's ratio of the wall
-    Thin walls (D/e >= 25): 1 with expansion joints, 1 - nu/2 anchored upstream only, 1 - nu^2 anchored throughout.
-    Thick walls (Lame): that factor times D / (D + e), plus 2 (e/D) (1 + nu); Wylie and Streeter 1993.
+    For a thin wall (D/e >= 25) it is 1 with expansion joints, 1 - nu/2 anchored upstream only, 1 - nu^2 anchored
+    throughout.
+    For a thick wall (Lame) it is the factor of the thin wall times D / (D + e), plus 2 (e/D) (1 + nu); Wylie and
+    Streeter 1993.
     """
     if restraint is None:
         return 1.0
@@ -147,9 +149,9 @@ def needs_poisson(restraint: str | float | None, bore: float, wall: Wall) -> boo
 
 
 def creep_elements(pipe: Any) -> tuple[tuple[float, float], ...]:
-    """(final relative growth of the bore area per pressure, time constant) of each creep element of a pipe wall.
+    """(final relative growth of the bore area per pressure [1/Pa], time constant [s]) of each creep element of a wall.
 
-    The growth is dA / (A dp) [1/Pa] of the bore area A, the time constant is in s.
+    The growth is dA / (A dp), with the bore area A.
     """
     wall = pipe.wall
     if not isinstance(wall, Wall) or wall.creep is None:
@@ -161,7 +163,7 @@ def creep_elements(pipe: Any) -> tuple[tuple[float, float], ...]:
 
 
 def elastic_compliance(pipe: Any) -> float:
-    """Elastic relative growth of the bore area of a pipe per pressure, dA / (A dp) [1/Pa]; 0 for a stiff wall."""
+    """Elastic growth of the bore area A of a pipe with pressure, dA / (A dp) [1/Pa]; 0 for a rigid wall."""
     wall = pipe.wall
     if not isinstance(wall, Wall):
         return 0.0
@@ -174,12 +176,12 @@ def elastic_compliance(pipe: Any) -> float:
 
 
 def wall_faults(pipe: Any) -> Iterator[tuple[tuple[Any, ...], str]]:
-    """Faults (keys, text) of a wall with respect to restraint and lining."""
+    """Faults (keys, text) of a pipe wall: no Poisson's ratio for its restraint, or creep together with a lining."""
     wall = pipe.wall
     if not isinstance(wall, Wall):
         return
     if wall.poisson_ratio is None and needs_poisson(pipe.restraint, pipe.diameter, wall):
-        reason = f"the catalogue has none of {pipe.material}" if pipe.material else "none is given"
+        reason = f"the catalogue has no value for {pipe.material}" if pipe.material else "none is given"
         text = f"{show(pipe.restraint)} needs Poisson's ratio of the wall, and {reason}; give wall.poisson_ratio"
         yield ("restraint",), text
     if wall.creep is not None and pipe.lining is not None:

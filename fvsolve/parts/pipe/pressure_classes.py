@@ -51,7 +51,7 @@ PRESSURES = (25, 30, 40, 50, 64, 100)
 
 
 class ClassSize(NamedTuple):
-    """Data of a class at a nominal size: bore and wall [m], allowable gauge pressure [Pa] if known, source."""
+    """Data of a class at a nominal size: bore and wall thickness [m], allowable gauge pressure [Pa] or None, source."""
 
     diameter: float
     thickness: float
@@ -60,7 +60,7 @@ class ClassSize(NamedTuple):
 
 
 class UnknownSize(ValueError):
-    """Nominal size that a class does not have."""
+    """Error for a nominal size that a class does not have."""
 
 
 @functools.cache
@@ -91,7 +91,7 @@ def class_size(name: str, nominal: str, material: str | None) -> ClassSize:
 
 
 def unknown_class(name: str) -> str | None:
-    """Fault text of a name that is not a class of any material; None for a known class."""
+    """Text of the fault if a name is not a class of any material; None for a known class."""
     text = name.strip().upper().replace(" ", "")
     if IRON.fullmatch(text) or PLASTIC.fullmatch(text) or SCHEDULE.fullmatch(name.strip()):
         return None

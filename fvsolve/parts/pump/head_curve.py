@@ -33,8 +33,8 @@ ROUNDING = 1e-6  # allowed difference of first and last value of a Suter table, 
 class CurvePoints:
     """Head, efficiency or power of a pump over its flow.
 
-    flow : flows of the points [m3/s]; value : their values; quantity : key of the values, such as "head"
-    coefficients : coefficients of a polynomial of the flow, in place of points
+    flow : flows of the points [m3/s]; value : values at the points; quantity : key of the values, such as "head"
+    coefficients : coefficients of a polynomial of the flow, instead of points
     """
 
     flow: tuple[float, ...] = ()
@@ -43,7 +43,7 @@ class CurvePoints:
     coefficients: tuple[float, ...] = ()
 
     def table(self) -> dict[str, list[float]]:
-        """Table as in a case file."""
+        """Curve as a table of a case file: key -> list."""
         if self.coefficients:
             return {"coefficients": list(self.coefficients)}
         return {"flow": list(self.flow), self.quantity: list(self.value)}
@@ -54,7 +54,8 @@ def points(
 ) -> CurvePoints:
     """Read a table { flow, WORD } with points over the flow.
 
-    word : key of the values; dimension, range : those of the values; faults_of : function that yields further faults
+    word : key of the values; dimension, range : dimension and valid range of the values
+    faults_of : function of (table, flows, values) that returns further faults
     Raises ValueFault if flows do not rise, lengths differ, or `faults_of` finds faults.
     """
     lists = read_keys(given, keys_of(word, dimension, range), setting)
@@ -76,7 +77,7 @@ def keys_of(word: str, dimension: str, range=nonnegative) -> dict[str, tuple[Val
 
 
 class HeadCurve(Value):
-    """Head curve in a case file: points { flow, head }, or { coefficients } of head [m] over powers of flow [m3/s]."""
+    """Value of a case file for a head curve: points { flow, head }, or the coefficients of a polynomial of the flow."""
 
     about = "head [m] over flow [m3/s] at relative speed 1: points, or coefficients of powers of the flow"
     takes = "`{ flow = [...], head = [...] }`, or `{ coefficients = [...] }`"
@@ -96,7 +97,7 @@ class HeadCurve(Value):
         return points(given, "head", "head", setting, nonnegative, self.faults_of)
 
     def faults_of(self, given: dict[str, Any], flow: tuple[float, ...], head: tuple[float, ...]) -> list:
-        """Faults of a single point without positive flow and head, and of heads that do not fall as the flow rises."""
+        """Faults of a single point without positive flow and head, or of heads that do not fall as the flow rises."""
         faults = []
         if len(flow) == 1 and not (flow[0] > 0 and head[0] > 0):
             faults.append(
@@ -109,7 +110,7 @@ class HeadCurve(Value):
         return faults
 
     def check_polynomial(self, coefficients: tuple[float, ...]) -> None:
-        """Raise ValueFault if the head of a polynomial never falls to zero, or rises before it is zero."""
+        """Raise ValueFault if the head of a polynomial never falls to zero, or rises at a lower flow."""
         end = zero_head_flow(coefficients)
         if coefficients[0] <= 0.0 or end is None:
             raise ValueFault([(("coefficients",), "the head must start above 0 and fall to 0 at some flow; for example "
@@ -132,14 +133,14 @@ class HeadCurve(Value):
 
 
 def zero_head_flow(coefficients: tuple[float, ...]) -> float | None:
-    """Least positive root of a polynomial of the flow [m3/s], where the head is 0; None if there is no root."""
+    """Least positive flow [m3/s] at which a polynomial of the flow has the head 0; None for no such flow."""
     roots = np.polynomial.polynomial.polyroots(np.trim_zeros(coefficients, "b")) if any(coefficients) else []
     real = [float(root.real) for root in roots if abs(root.imag) <= 1e-12 * abs(root) and root.real > 0.0]
     return min(real, default=None)
 
 
 class Efficiency(Value):
-    """Efficiency of a pump in a case file: a number, or points { flow, efficiency }."""
+    """Value of a case file for the efficiency of a pump: a number, or points { flow, efficiency }."""
 
     about = "efficiency, hydraulic power over shaft power: at the rated point, or over flow; 0.75 if left out"
     takes = "-, or `{ flow = [...], efficiency = [...] }`"
@@ -161,7 +162,7 @@ class Efficiency(Value):
 
 
 class ShaftPower(Value):
-    """Shaft power of a pump in a case file: points { flow, power }."""
+    """Value of a case file for the shaft power of a pump: points { flow, power }."""
 
     about = "power at the shaft [W] over flow, at relative speed 1, instead of `efficiency`"
     takes = "`{ flow = [...], power = [...] }`"
@@ -182,10 +183,11 @@ class ShaftPower(Value):
 
 @dataclass(frozen=True)
 class SuterTable:
-    """Four-quadrant characteristic of a pump with head H = rated_head (n^2 + v^2) WH(x).
+    """Four-quadrant characteristic of a pump: head = rated_head (n^2 + v^2) WH(x), with relative speed n and flow v.
 
-    The torque is rated torque (n^2 + v^2) WB(x), with x = pi + atan2(v, n) at equal intervals from 0 to 2 pi,
-    v = flow / rated_flow and n = speed / rated speed. head, torque : values of the functions WH and WB
+    The torque is rated torque (n^2 + v^2) WB(x), with x = pi + atan2(v, n), v = flow / rated_flow and n = speed / rated
+    speed.
+    head, torque : values of the functions WH and WB at equal intervals of x from 0 to 2 pi
     """
 
     rated_flow: float
@@ -194,13 +196,13 @@ class SuterTable:
     torque: tuple[float, ...]
 
     def table(self) -> dict[str, Any]:
-        """Table as in a case file."""
+        """Suter table as a table of a case file."""
         table = {field.name: getattr(self, field.name) for field in fields(self)}
         return {name: list(value) if isinstance(value, tuple) else value for name, value in table.items()}
 
 
 class Suter(Value):
-    """Suter table of a pump in a case file: a published table, or its values of WH and WB."""
+    """Value of a case file for a Suter table of a pump: a published table, or its values of WH and WB."""
 
     about = "four-quadrant characteristic: WH and WB at equal intervals of x = pi + atan2(flow / rated, speed / rated)"
     takes = "`{ rated_flow, rated_head, table }`, or `{ rated_flow, rated_head, head = [...], torque = [...] }`"
@@ -237,7 +239,8 @@ class Suter(Value):
                 faults.append(
                     (
                         (key,),
-                        f"ends at {series[-1]:g} and begins at {series[0]:g}; x = 2 pi is x = 0 again",
+                        f"ends at {series[-1]:g} and begins at {series[0]:g}; expected equal values, because "
+                        "x = 2 pi is x = 0 again",
                     )
                 )
         if faults:

@@ -65,7 +65,7 @@ def tripped(t, tables, device):
 
 @njit
 def pump_speed(t, y, tables, device):
-    """Speed of the shaft over its rated speed at time t [-]."""
+    """Speed of the shaft at time t, relative to its rated speed [-]."""
     floats, at = tables.floats, device["data"]
     mode = floats[at + MODE]
     if mode == HELD_SPEED or (mode == TRIPPING and not tripped(t, tables, device)):
@@ -75,7 +75,7 @@ def pump_speed(t, y, tables, device):
 
 @njit
 def set(t, y, out, tables, device):
-    """Write relative speed and conductance of the pump into `out`; 0 conductance behind a shut check valve."""
+    """Write to `out` the relative speed of the pump and its conductance, 0 while its check valve is shut."""
     layout, k, floats = tables.layout[0], device["valve"], tables.floats
     shut = floats[device["data"] + CHECK] > 0.0 and tables.armed[device["event"]] > 0.0
     out[layout["drive"] + k] = pump_speed(t, y, tables, device)
@@ -84,7 +84,7 @@ def set(t, y, out, tables, device):
 
 @njit
 def pump_point(out, tables, device):
-    """Relative speed [-], flow [m3/s] and fluid density [kg/m3] of a pump, after the nodes are solved."""
+    """(relative speed [-], flow [m3/s], density [kg/m3] of the fluid) of a pump, after the nodes are solved."""
     layout, k = tables.layout[0], device["valve"]
     rho, _ = head_drop(tables, out, k)
     return out[layout["drive"] + k], out[layout["valve"] + k] / rho, rho
@@ -92,7 +92,7 @@ def pump_point(out, tables, device):
 
 @njit
 def pump_torque(out, tables, device):
-    """Torque of the fluid on the shaft, positive against the rotation [N m]."""
+    """Torque of the fluid on the shaft [N m], positive against the rotation."""
     n, q, rho = pump_point(out, tables, device)
     curve, dense = tables.valves[device["valve"]]["data"], rho / tables.settings[0]["rho"]
     return fluid_torque(tables.floats, device["data"], curve, n, q, dense)
@@ -100,10 +100,10 @@ def pump_torque(out, tables, device):
 
 @njit
 def fluid_torque(floats, at, curve, n, q, dense):
-    """Torque of the fluid [N m], positive against the rotation.
+    """Torque of the fluid on the shaft [N m], positive against the rotation.
 
-    at, curve : index of the numbers of the pump and of its head curve; n : relative speed; q : flow [m3/s]
-    dense : density of the fluid over that of the case
+    at, curve : indices of the parameters of the pump and of its head curve in `floats`
+    n : relative speed; q : flow [m3/s]; dense : density of the fluid over reference density
     """
     table = at + OWN_NUMBERS + 2 * int(floats[at + TORQUE_COUNT])
     if floats[curve + LAW] == SUTER:
@@ -121,7 +121,7 @@ def fluid_torque(floats, at, curve, n, q, dense):
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    """Write the rate of the relative speed of a free shaft into `dydt`, and raise out[RATE] to its rate limit."""
+    """Write the rate of the relative speed of a free shaft to `dydt`, and raise out[RATE] to its rate limit."""
     floats, at = tables.floats, device["data"]
     mode = floats[at + MODE]
     if mode == HELD_SPEED:
@@ -142,7 +142,7 @@ def move(t, y, dydt, out, tables, device):
 
 @njit
 def given_torque(t, tables, device, change):
-    """Sum of the given torques on the shaft [N m]; if `change` is True, minus their sum at the start."""
+    """Sum of the torques on the shaft that the case gives [N m]; if `change` is True, minus their sum at the start."""
     floats, total = tables.floats, 0.0
     for k in range(int(floats[device["data"] + TORQUE_COUNT])):
         own = device["data"] + OWN_NUMBERS + 2 * k
@@ -152,7 +152,7 @@ def given_torque(t, tables, device, change):
 
 @njit
 def shaft_rate(out, tables, device, torque):
-    """Upper bound of the rate at which the fluid brakes a free shaft [1/s]; torque : torque of the fluid [N m]"""
+    """Upper bound of the rate [1/s] at which the fluid brakes a free shaft; torque : torque of the fluid [N m]"""
     floats, at, curve = tables.floats, device["data"], tables.valves[device["valve"]]["data"]
     n, q, _ = pump_point(out, tables, device)
     if floats[curve + LAW] == SUTER or floats[curve + JOIN] > 0.0:
@@ -165,7 +165,10 @@ def shaft_rate(out, tables, device, torque):
 
 @njit
 def power(t, y, dydt, out, tables, device):
-    """Power supplied to the shaft, rate of its kinetic energy, and power that the fluid takes from it [W]."""
+    """(power supplied to the shaft, rate of its kinetic energy, power that the fluid takes from it) [W].
+
+    All are 0 if the shaft power is unknown.
+    """
     floats, at = tables.floats, device["data"]
     if floats[at + HAS_SHAFT_POWER] == 0.0:
         return 0.0, 0.0, 0.0
@@ -180,7 +183,7 @@ def power(t, y, dydt, out, tables, device):
 
 @njit
 def stored(y, tables, device):
-    """Kinetic energy of a free shaft, minus that at the time from which it runs free [J]."""
+    """Kinetic energy of a free shaft minus that at the moment at which it becomes free [J]; 0 for a given speed."""
     floats, at = tables.floats, device["data"]
     if floats[at + MODE] == HELD_SPEED:
         return 0.0
@@ -190,19 +193,19 @@ def stored(y, tables, device):
 
 @njit
 def reversal_margin(valve):
-    """Reverse mass flow below which the check valve stays open [kg/s].
+    """Reverse mass flow [kg/s] up to which the check valve of a pump stays open; valve : row of the pump
 
-    The margin keeps a check valve without flow, next to a shut valve, open.
+    A check valve without flow, next to a shut valve, thus stays open.
     """
     return FLOW_ROUNDING * sqrt(BAR * valve["conductance"])
 
 
 @njit
 def events(t, y, out, tables, device, g):
-    """Write the event function g of the check valve, and its negative.
+    """Write the event function of the check valve and its negative to g.
 
-    g is the flow above the margin of reversal if the check valve is open [kg/s], and the drop that opens it if shut
-    [Pa].
+    It is the flow plus the margin of reversal while the valve is open [kg/s], and the drop minus that at which the
+    valve opens while it is shut [Pa].
     """
     layout, k, at = tables.layout[0], device["valve"], device["event"]
     valve, floats = tables.valves[k], tables.floats
@@ -219,7 +222,7 @@ def events(t, y, out, tables, device, g):
 
 @njit
 def value(t, y, out, tables, device, quantity):
-    """Value of a quantity: 0 head [m], 1 relative speed, 2 torque of the fluid [N m], 3 power at the shaft [W]."""
+    """Head [m] (quantity 0), relative speed (1), torque of the fluid [N m] (2), or power at the shaft [W] (3)."""
     floats = tables.floats
     n, q, _ = pump_point(out, tables, device)
     if quantity == 0:
@@ -232,10 +235,11 @@ def value(t, y, out, tables, device, quantity):
 
 @njit
 def outside(out, tables, device):
-    """1 if the pump works outside its head curve, at reverse flow or beyond the last flow; 0 within the curve.
+    """1 if the pump works outside its head curve, at reverse flow or beyond the last flow; 0 on its curve.
 
-    0 for a pump with only a Suter table. TEMPORARY with a joined table, and while the pump runs down with a check
-    valve: slower than at the start, with a forward flow that was within the curve at the initial speed.
+    It is always 0 for a pump with only a Suter table.
+    Outside the curve it is TEMPORARY instead of 1 if a Suter table is joined to the curve, or while a pump with a check
+    valve runs down. It then is slower than at the start, and its forward flow is within the curve at the initial speed.
     """
     floats, curve = tables.floats, tables.valves[device["valve"]]["data"]
     if floats[curve + LAW] == SUTER:
@@ -256,20 +260,29 @@ def outside(out, tables, device):
 
 @njit
 def step(out, tables, k, g, m, drop, denser, wide):
-    """a [kg/s] and s [kg/s/Pa] of the Newton step `curve_step`, from the drop of heads at the upstream density."""
+    """(a [kg/s], s [kg/s/Pa]) of `curve_step` for pump k; arguments as for `restriction_step`.
+
+    The drop of head, times rho g with the upstream density, replaces `drop`.
+    """
     rho, fall = head_drop(tables, out, k)
     return pump_step(tables, out, k, rho, g, m, fall)
 
 
 @njit
 def slope(out, tables, k, g, drop):
-    """Derivative of the mass flow of restriction k by its drop [kg/s/Pa]; 0 with a shut check valve."""
+    """Derivative [kg/s/Pa] of the mass flow of pump k by its drop; 0 while its check valve is shut.
+
+    g : conductance [kg2/s2/Pa]; drop : [Pa]
+    """
     m = out[tables.layout[0]["valve"] + k]
     return pump_step(tables, out, k, tables.settings[0]["rho"], g, m, drop)[1] if g > 0.0 else 0.0
 
 
 @njit
 def pump_step(tables, out, k, rho, g, m, drop):
-    """`curve_step` of a pump at its present speed, for fluid of density rho [kg/m3]."""
+    """(a, s) of `curve_step` for pump k at its present speed, with fluid of density rho [kg/m3].
+
+    g, m, drop : as for `curve_step`
+    """
     at, speed = tables.valves[k]["data"], out[tables.layout[0]["drive"] + k]
     return curve_step(tables.floats, at, speed, rho, rho * tables.settings[0]["gravity"], g, m, drop)

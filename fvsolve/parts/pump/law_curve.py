@@ -1,13 +1,14 @@
 """Head curves of pumps at any speed.
 
-H = n^2 f(q / n), with head H, flow q and relative speed n (affinity). Between two flows `first` and `last` [m3/s] at
-n = 1, f is a - b q^c, linear between points, or a polynomial. It continues with equal slope: below `first` as a line,
-beyond `last` as a parabola a' - b' q^2, which also holds for a pump at rest. Reverse flow adds b' q^2. Where `first` is
-above 0 (a curve that is flat at no flow), the line ends at the reverse flow -`first`.
-With a Suter table, H = (n^2 + v^2) WH(pi + atan2(v, n)) [rated heads], v the flow over the rated flow.
+H = n^2 f(q / n), with head H, flow q and relative speed n (affinity).
+Between two flows `first` and `last` [m3/s] at rated speed, f is a - b q^c, linear between points, or a polynomial.
+It continues with equal slope: below `first` as a line, beyond `last` as a parabola a' - b' q^2, which also holds for a
+pump at rest. Reverse flow adds b' q^2. Where `first` is above 0 (a curve that is flat at no flow), the line ends at the
+reverse flow -`first`.
+With a Suter table, H = (n^2 + v^2) WH(pi + atan2(v, n)) times the rated head, v the flow over the rated flow.
 A Suter table may be joined to a curve in place of line and parabolas. It holds outside of 0 <= q <= n `last`, n > 0.
-There WH is corrected so that it agrees with both ends of the curve; the corrections fade to zero at standstill,
-x = pi / 2 (already in the values of the table) and x = 3 pi / 2, with x = pi + atan2(v, n).
+There WH is corrected so that it agrees with both ends of the curve. With x = pi + atan2(v, n), the corrections fade to
+zero at standstill: at x = pi/2 (already in the values of the table) and at x = 3 pi/2.
 """
 
 from math import atan2, pi, sqrt
@@ -28,7 +29,7 @@ RATED_HEAD, RATED_FLOW, VALUES, EDGE, CORRECTION = 0, 1, 2, 3, 4
 
 @njit
 def piecewise(floats, at, count, x):
-    """Value at x of a piecewise linear function, and its slope; floats[at:] : `count` abscissas, then `count` values"""
+    """(value, slope) of a piecewise linear function at x; floats[at:] : `count` abscissas, then `count` values"""
     k = 1
     while k < count - 1 and x > floats[at + k]:
         k += 1
@@ -38,7 +39,10 @@ def piecewise(floats, at, count, x):
 
 @njit
 def base_head(floats, at, x):
-    """Head [m] at rated speed and a flow x [m3/s] between `first` and `last`, and its slope over the flow [s/m2]."""
+    """(head [m], its slope over the flow [s/m2]) of a curve at rated speed and flow x [m3/s].
+
+    floats[at:] : parameters of the curve; x : between its first and last flow
+    """
     own, count = at + OWN, int(floats[at + COUNT])
     if floats[at + LAW] == POWER:
         part = floats[own + 1] * x ** floats[own + 2]
@@ -54,9 +58,10 @@ def base_head(floats, at, x):
 
 @njit
 def suter_value(floats, at, count, speed, flow):
-    """Suter function times (speed^2 + flow^2), and its derivative by the flow.
+    """(w, dw/d(flow)) with w = W (speed^2 + flow^2), where W is a Suter function, such as WH or WB.
 
-    floats[at:] : `count` values of the function from x = 0 to 2 pi; speed, flow : relative to rated values
+    floats[at:] : `count` values of W at equal intervals of x = pi + atan2(flow, speed) from 0 to 2 pi
+    speed, flow : relative to rated values
     """
     square, place = speed * speed + flow * flow, (pi + atan2(flow, speed)) / (2.0 * pi) * (count - 1)
     k = min(int(place), count - 2)
@@ -67,15 +72,20 @@ def suter_value(floats, at, count, speed, flow):
 
 @njit
 def is_off_curve(floats, at, speed, flow):
-    """True if a pump with a joined Suter table works outside its head curve."""
+    """True if a pump with a joined Suter table works outside its head curve.
+
+    floats[at:] : parameters of the curve; speed : relative speed; flow : [m3/s]
+    """
     return floats[at + JOIN] > 0.0 and not (speed > 0.0 and 0.0 <= flow <= speed * floats[at + LAST])
 
 
 @njit
 def joined_value(floats, join, correction_at, speed, flow):
-    """`suter_value` of a joined table with its correction.
+    """Results of `suter_value` for a joined table with its correction at the last flow of the curve.
 
-    join : index of the numbers of the joined table; correction_at : index of a correction, followed by the table
+    join : index of the parameters of the joined table in `floats`
+    correction_at : index of the correction, after which the values of the table follow
+    speed, flow : relative to rated values
     """
     value, slope = suter_value(floats, correction_at + 1, int(floats[join + VALUES]), speed, flow)
     angle, edge, fade, steep = atan2(flow, speed), floats[join + EDGE], 0.0, 0.0
@@ -87,7 +97,10 @@ def joined_value(floats, join, correction_at, speed, flow):
 
 @njit
 def curve_head(floats, at, speed, flow):
-    """Head [m] of the curve at index `at`, and its slope over flow [s/m2], at a relative speed and a flow [m3/s]."""
+    """(head [m], its slope over the flow [s/m2]) of a pump at a relative speed and a flow [m3/s].
+
+    floats[at:] : parameters of its head curve
+    """
     if is_off_curve(floats, at, speed, flow):
         join = at + int(floats[at + JOIN])
         head, rated = floats[join + RATED_HEAD], floats[join + RATED_FLOW]
@@ -112,7 +125,10 @@ def curve_head(floats, at, speed, flow):
 
 @njit
 def curve_flow(floats, at, speed, head, flow):
-    """Flow [m3/s] at which the curve has a head [m], by safeguarded Newton from the start value `flow`."""
+    """Flow [m3/s] at which a pump has a head [m] at a relative speed, by Newton's method with bounds.
+
+    floats[at:] : parameters of its head curve; flow : start value [m3/s]
+    """
     low, high, scale = -1e300, 1e300, floats[at + SCALE]
     for _ in range(200):
         value, slope = curve_head(floats, at, speed, flow)
@@ -135,11 +151,13 @@ def curve_flow(floats, at, speed, head, flow):
 
 @njit
 def curve_step(floats, at, speed, rho, weight, g, m, drop):
-    """a [kg/s] and s [kg/s/Pa] of the next Newton step of a pump, dM = a + s d(drop), M the mass flow.
+    """(a [kg/s], s [kg/s/Pa]) of the next Newton step dM = a + s d(drop) of a pump, M the mass flow.
 
-    In place of the slope it takes the chord of the curve between the present flow m [kg/s] and the flow at the drop
-    [Pa]. The chord is at least as steep as that of a restriction of conductance g. rho, weight : density and rho g of
-    the fluid
+    The chord of the curve between the present flow and the flow at the drop replaces the slope. It is at least as steep
+    as that of a restriction of conductance g.
+    floats[at:] : parameters of the head curve; speed : relative speed
+    rho, weight : density [kg/m3] and rho g [N/m3] of the fluid
+    g : conductance [kg2/s2/Pa]; m : present mass flow [kg/s]; drop : drop across the pump [Pa]
     """
     head, slope = curve_head(floats, at, speed, m / rho)
     residual = drop + weight * head

@@ -1,4 +1,4 @@
-"""Rows of pumps in the tables of a model, and their initial steady state."""
+"""Pumps in the tables of a model, and their initial steady state."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SMALL_SPECIFIC_SPEED, LARGE_SPECIFIC_SPEED = 20.0, 320.0  # range of specific sp
 
 
 class PumpRows(ShaftLowering, Device, kind="pump"):
-    """Model table rows of pumps: restrictions with a head curve.
+    """Conversion to table rows of pumps: restrictions with a head curve.
 
     In the steady state no flow passes the check valve of a pump backward.
     """
@@ -66,7 +66,7 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
         return 0.5 * inertia(part, weight_of(model)) * (part.rated_speed * speed) ** 2 if row["y"] >= 0 else 0.0
 
     def passing_notice(self, model, name, part, time) -> Notice:
-        """Notice of a pump that left its head curve at a time [s] in a way that its law allows."""
+        """Notice that a pump was outside its head curve in a way that its law allows, first at `time` [s]."""
         moment = model.case.amount(time, "time", 6)
         rated = rated_point(part, weight_of(model))
         if (table := joined_table(part, *rated)) is None:
@@ -75,8 +75,9 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
             return Notice("range", f"links.{name}", text, "curve")
         speed = specific_speed(part, *rated)
         source = table.words if SMALL_SPECIFIC_SPEED <= speed <= LARGE_SPECIFIC_SPEED else f"{table.words}, the nearest"
-        text = (f"{name}: it leaves its curve at {moment}; outside of it head and torque are those of the Suter "
-                f"table {source}, joined to it, by its specific speed of {speed:.4g} (rpm, m3/s, m); "
+        text = (f"{name}: the pump leaves its curve at {moment}; outside the curve, head and torque follow the "
+                f"Suter table {source}, joined to the curve and chosen by the specific speed of the pump, "
+                f"{speed:.4g} (rpm, m3/s, m); "
                 "for a pump of several stages or inlets give the key `suter`")  # fmt: skip
         return Notice("range", f"links.{name}", text, "curve_extrapolation", speed)
 
@@ -102,10 +103,10 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
         return Edge(i, j, newton, float(first), drives=True)
 
     def follow(self, start, k) -> None:
-        """Do nothing: `begin` sets the drop."""
+        """Do nothing: the function `begin` sets the drop of pump k."""
 
     def lift(self, start, row, flow: float) -> float:
-        """Pressure rise of a pump at a mass flow [kg/s] in the steady state [Pa]."""
+        """Pressure rise [Pa] of a pump at a mass flow [kg/s] in the steady start; row : its row in the valve table"""
         floats, rho = start.draft.tables.floats, start.density_at(int(row["from_node"]))
         at, speed = int(row["data"]), float(row["drive"])
         return float(rho * start.case.gravity * curves.curve_head(floats, at, speed, float(flow) / rho)[0])
@@ -153,6 +154,6 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
 
 
 def weight_of(model) -> float:
-    """rho g of the fluid of a model [N/m3]."""
+    """Specific weight rho g [N/m3] of the fluid of a model."""
     settings = model.tables.settings[0]
     return float(settings["rho"] * settings["gravity"])

@@ -15,7 +15,7 @@ HIGHEST, LOWEST = 1000.0, 0.1  # range of heads of the curve of a constant-power
 
 
 def curve_numbers(part, weight: float) -> list[float]:
-    """Numbers of the head curve of a pump, in the order stated in `law_curve`; weight = rho g [N/m3]."""
+    """Parameters of the head curve of a pump, in the order that `law_curve` states; weight : rho g [N/m3]"""
     if part.suter is not None:
         entry = part.suter
         return [
@@ -43,7 +43,10 @@ def curve_numbers(part, weight: float) -> list[float]:
 
 
 def base_law(part, weight: float) -> tuple[int, int, float, float, list[float]]:
-    """Law, count of numbers, first and last flow [m3/s], and numbers of a head curve that is not a Suter table."""
+    """(law, count, first flow [m3/s], last flow [m3/s], parameters) of a head curve that is not a Suter table.
+
+    law : POWER, POINTS or POLYNOMIAL of `law_curve`; count : number of points or coefficients; weight : rho g [N/m3]
+    """
     if part.power is not None:
         product = part.power / weight
         return curves.POWER, 3, product / HIGHEST, product / LOWEST, [0.0, -product, -1.0]
@@ -60,10 +63,11 @@ def base_law(part, weight: float) -> tuple[int, int, float, float, list[float]]:
 
 
 def power_law(curve: CurvePoints) -> tuple[float, float, float] | None:
-    """Coefficients a, b, c of H = a - b q^c, with head H and flow q, by the formula of EPANET (Rossman 2020).
+    """(a, b, c) of the head curve H = a - b q^c, with head H [m] and flow q [m3/s], as in EPANET (Rossman 2020).
 
-    Through one point (4/3 of its head at no flow, zero head at twice its flow), or through three points from q = 0 on.
-    None for other curves, which are straight lines between their points.
+    It passes through one point (with 4/3 of its head at no flow, and zero head at twice its flow), or through three
+    points, of which the first has no flow.
+    None for other points, between which the curve is linear.
     """
     if len(curve.flow) == 1:
         return 4.0 / 3.0 * curve.value[0], curve.value[0] / 3.0 / curve.flow[0] ** 2, 2.0
@@ -75,9 +79,10 @@ def power_law(curve: CurvePoints) -> tuple[float, float, float] | None:
 
 
 def rated_point(part, weight: float) -> tuple[float, float]:
-    """Flow [m3/s] and head [m] at the rated point of a pump.
+    """(flow [m3/s], head [m]) at the rated point of a pump; weight : rho g [N/m3]
 
-    It is the single point of the curve, the middle of three points, or the point with the greatest flow times head.
+    It is the single point of the curve, the middle of three points, or the point with the greatest flow times head. A
+    Suter table states its rated point.
     """
     if part.suter is not None:
         return part.suter.rated_flow, part.suter.rated_head

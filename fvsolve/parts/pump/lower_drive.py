@@ -10,7 +10,7 @@ ROUNDING_SHARE = 1e-12  # sum of the torques on a shaft regarded as rounding, ov
 
 
 class ShaftLowering:
-    """Base of the table rows of restrictions with a shaft; small : size of a small deviation of the speed state"""
+    """Base of the conversion to table rows of pumps and turbines; small : size of a small deviation of the speed"""
 
     small = 1.0
 
@@ -21,18 +21,24 @@ class ShaftLowering:
         return [self.small for _ in self.states_of(draft, name, part)]
 
     def drive_numbers(self, draft, name, part) -> dict[int, float]:
-        """Numbers of the drive by index, without inertia and rated speed; write the speed schedule to its row."""
+        """Parameters of the drive, without inertia and rated speed: their index in `law` -> value.
+
+        Also write the speed schedule to the row of the part in the table of devices.
+        """
         torques = torques_on(draft.case, name)
         mode = law.TORQUE_DRIVEN if torques else law.HELD_SPEED if part.trip is None else law.TRIPPING
         draft.device_table["schedule"][draft.device_names.index(name)] = draft.schedules.add(part.speed)
         return {law.MODE: mode, law.TRIP: self.trip(draft, name, part), law.TORQUE_COUNT: len(torques)}
 
     def torque_schedules(self, draft, name) -> list[float]:
-        """Index of the schedule and value at the start (0, set later) of each given torque, in pairs."""
+        """Index of the schedule and value at the start of each given torque on the shaft, in pairs.
+
+        The values are 0 here and are set in `set_free_shaft`.
+        """
         return [x for torque in torques_on(draft.case, name) for x in (draft.schedules.add(torque.torque), 0.0)]
 
     def trip(self, draft, name, part) -> int:
-        """Index of a schedule that is 0 before and 1 after the trip, -1 without a trip.
+        """Index of a schedule that is 0 before the trip and 1 from then on; -1 without a trip.
 
         The speed has a kink at the trip, not a jump.
         """
@@ -47,16 +53,20 @@ class ShaftLowering:
         return index
 
     def speed_at(self, start, k: int) -> float:
-        """Speed of restriction k at the start, from its schedule `speed`."""
+        """Speed of restriction k at the start, by its schedule: relative for a pump, [rad/s] for a turbine."""
         row = start.draft.device_table[start.valves[k]["device"]]
         return start.schedule_value(row["schedule"])
 
     def fluid_torque(self, start, row, valve) -> float:
-        """Torque of the fluid on the shaft at the start, positive against the rotation [N m]."""
+        """Torque of the fluid on the shaft at the start [N m], positive against the rotation."""
         raise NotImplementedError
 
     def set_free_shaft(self, start, part, row, valve) -> list[str]:
-        """Store the initial speed of a free shaft and its unbalanced torque; return texts about its acceleration."""
+        """Store the speed at which a shaft becomes free; return texts about its acceleration at the start.
+
+        It is the speed at the trip or, for a shaft that given torques drive, at the start. For such a shaft the given
+        torques, the torque of the fluid and the unbalanced torque at the start are stored too.
+        """
         draft, floats, at = start.draft, start.draft.tables.floats, int(row["data"])
         name = draft.valve_names[row["valve"]]
         if floats[at + law.MODE] == law.TRIPPING:
@@ -83,5 +93,8 @@ def torques_on(case, name: str) -> list:
 
 
 def numbers_of(by_index: dict[int, float], given: list[float], own: list[float]) -> list[float]:
-    """Numbers of a shaft in the order of `law`: those by index, the given torques, the numbers of the part."""
+    """Parameters of a shaft in the order of `law`, as a list of numbers.
+
+    by_index : index in `law` -> parameter of the drive; given : pairs for the given torques; own : shaft power
+    """
     return [float(by_index.get(k, 0.0)) for k in range(law.OWN_NUMBERS)] + given + own

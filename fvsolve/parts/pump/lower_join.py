@@ -13,9 +13,9 @@ ROUNDING = 1e-9  # angle regarded as zero [rad]
 
 
 def joined_numbers(part, flow: float, head: float, numbers: list[float]) -> list[float]:
-    """Numbers of the Suter table joined to a head curve, in the order of `law_curve`; empty without a table.
+    """Parameters of the Suter table joined to a head curve, in the order of `law_curve`; empty without such a table.
 
-    flow, head : rated point [m3/s], [m]; numbers : those of the head curve
+    flow, head : rated point [m3/s], [m]; numbers : parameters of the head curve
     """
     if (table := joined_table(part, flow, head)) is None:
         return []
@@ -27,10 +27,11 @@ def joined_numbers(part, flow: float, head: float, numbers: list[float]) -> list
 
 
 def fit_to_curve(values, shut_off: float, last: float, edge: float) -> tuple[float, np.ndarray]:
-    """Fit a Suter table to a curve: correction at the last flow, and values of the table corrected for no flow.
+    """(correction of a Suter table at the last flow of a curve, values of the table corrected at no flow).
 
-    shut_off, last : values of the curve at no flow and at the last flow, over the rated value; edge : angle atan2(v, n)
-    of the last flow. The correction for no flow fades to zero at standstill.
+    values : values of WH or WB; edge : angle atan2(v, n) of the last flow [rad]
+    shut_off, last : head or power of the curve at no flow and at the last flow, over the rated value
+    The correction at no flow fades to zero at standstill.
     """
     values = np.array(values)
     at = np.linspace(-math.pi, math.pi, len(values))
@@ -40,9 +41,10 @@ def fit_to_curve(values, shut_off: float, last: float, edge: float) -> tuple[flo
 
 
 def monotone_head(values: np.ndarray) -> np.ndarray:
-    """Values of WH, raised so that the head never falls as the flow through a turning pump reverses.
+    """Values of WH, raised so that the head never falls as the flow through a turning pump becomes more negative.
 
-    Otherwise two flows have one head. Condition on W = WH between two values: d/d(angle) of W / cos^2 is below 0.
+    Otherwise two flows would have the same head. The condition on W = WH between two values is that the derivative of W
+    / cos^2(angle) by the angle is negative.
     """
     values, at = values.copy(), np.linspace(-math.pi, math.pi, len(values))
     width = at[1] - at[0]
@@ -54,12 +56,15 @@ def monotone_head(values: np.ndarray) -> np.ndarray:
 
 
 def joined_table(part, flow: float, head: float) -> Quadrants | None:
-    """Suter table for the specific speed of a pump with `curve` and `rated_speed`; None if it has no joined table."""
+    """Suter table for the specific speed of a pump; None if no table is joined to its head curve.
+
+    flow, head : rated point [m3/s], [m]
+    """
     if part.curve is None or part.rated_speed is None or part.curve_extrapolation == "parabola":
         return None
     return quadrants(specific_speed(part, flow, head))
 
 
 def specific_speed(part, flow: float, head: float) -> float:
-    """Specific speed at the rated point, in rpm (m3/s)^(1/2) / m^(3/4); flow [m3/s], head [m]"""
+    """Specific speed of a pump at its rated point [rpm (m3/s)^(1/2) / m^(3/4)]; flow : [m3/s], head : [m]"""
     return part.rated_speed * 30.0 / math.pi * math.sqrt(flow) / head**0.75

@@ -1,4 +1,4 @@
-"""Notices about a pump at the start: direction, inertia, power and rated flow."""
+"""Notices about a pump at the start: direction, inertia, power and rated flow. Lists of notices are often empty."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ UNITS = (("l/s", 1e-3), ("m3/h", 1.0 / 3600.0), ("l/min", 1e-3 / 60.0))
 
 
 def reversed_pump(start, name: str, part, valve) -> list[Notice]:
-    """Notice of a pump that runs at the start and delivers to a lower head, or to the lowest water level."""
+    """Notice if a pump that runs at the start delivers to a lower head, or to the lowest water level; as a list."""
     i, j = int(valve["from_node"]), int(valve["to_node"])
     heads = start.nodes["pressure"] / start.weight + start.nodes["elevation"]
     fixed = np.isin(start.nodes["kind"], (rec.FIXED, rec.TANK))
@@ -39,17 +39,17 @@ def reversed_pump(start, name: str, part, valve) -> list[Notice]:
 
 
 def estimated_inertia(draft, name: str, part) -> list[Notice]:
-    """Notice of the estimated inertia of a pump that trips without given inertia."""
+    """Notice of the estimated inertia if a pump trips and its inertia is not given; as a list."""
     if part.trip is None or part.inertia is not None:
         return []
     value = inertia(part, draft.fluid.density * draft.case.gravity)
-    text = (f"{name}: its inertia is estimated at {value:.4g} kg m2, impeller, water and motor, by power and speed; "
-            "the surge depends on it; give the key `inertia` from the manufacturer")  # fmt: skip
+    text = (f"{name}: its inertia is estimated from power and speed: {value:.4g} kg m2 for impeller, water and motor; "
+            "the surge depends on this value; give the key `inertia` from the manufacturer")  # fmt: skip
     return [Notice("range", f"links.{name}", text, "inertia", value)]
 
 
 def rated_point_notes(draft, name: str, part) -> list[Notice]:
-    """Notices of inertia and shaft power that are inconsistent with the rated point."""
+    """Notices if the inertia or the shaft power of a pump is implausible for its rated point; as a list."""
     weight = draft.fluid.density * draft.case.gravity
     if weight == 0.0:
         return []
@@ -68,7 +68,7 @@ def rated_point_notes(draft, name: str, part) -> list[Notice]:
 
 
 def unusual_inertia(case, name: str, given: float, power: float, speed: float) -> list[Notice]:
-    """Notice of an inertia [kg m2] far from the usual value at a power [W] and speed [rad/s]."""
+    """Notice if an inertia [kg m2] is far from the usual value at a power [W] and speed [rad/s]; as a list."""
     usual = usual_inertia(power, speed)
     if usual / INERTIA_RATIO <= given <= usual * INERTIA_RATIO:
         return []
@@ -79,7 +79,7 @@ def unusual_inertia(case, name: str, given: float, power: float, speed: float) -
 
 
 def unusual_flow(draft, name: str, part) -> list[Notice]:
-    """Notice of a rated flow that is too fast or too slow in every adjacent pipe.
+    """Notice if the rated flow of a pump is too fast or too slow in all adjacent pipes; as a list.
 
     Pumping stations have 1 to 4 m/s (Sanks, Pumping Station Design).
     """

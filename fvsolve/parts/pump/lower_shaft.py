@@ -17,10 +17,10 @@ SAMPLE_COUNT = 65  # number of points of a power by a Suter table over the angle
 
 
 def shaft_points(part, weight: float) -> list[float]:
-    """Numbers of the shaft power at relative speed 1: count of points, flows [m3/s], powers [W].
+    """Parameters of the shaft power of a pump at relative speed 1: count of points, flows [m3/s], powers [W].
 
-    For a Suter table: rated torque, values of WB. Where a table is joined to the curve, its rated torque, the
-    correction of WB at the last flow and the values of WB follow the points.
+    For a Suter table they are the rated torque [N m] and the values of WB. For a table that is joined to the head
+    curve, its rated torque, its correction of WB at the last flow and its values of WB follow the points.
     """
     flow, head = rated_point(part, weight)
     rated = weight * flow * head / rated_efficiency(part)
@@ -42,10 +42,10 @@ def shaft_points(part, weight: float) -> list[float]:
 
 
 def table_power(table, numbers, flow: float, head: float, last: float) -> tuple[np.ndarray, np.ndarray]:
-    """Flows [m3/s] and shaft powers over the rated power of a head curve, by the values WB of a Suter table.
+    """(flows [m3/s], shaft powers over the rated power) of a head curve, by the values WB of a Suter table.
 
-    The power is nowhere below that at the rated efficiency. numbers : those of the curve; flow, head : rated point
-    last : last flow of the curve [m3/s]
+    The power is nowhere below that at the rated efficiency.
+    numbers : parameters of the head curve; flow, head : rated point [m3/s], [m]; last : last flow of the curve [m3/s]
     """
     flows = flow * np.tan(np.linspace(0.0, math.atan2(last, flow), SAMPLE_COUNT)[:-1])
     flows = np.unique([*flows, *np.linspace(0.0, last, SAMPLE_COUNT), *([flow] if last > flow else [])])
@@ -61,9 +61,9 @@ def rated_efficiency(part) -> float:
 
 
 def shaft_power(part, weight: float, flow: float, rated: float) -> tuple[Sequence[float], Sequence[float]]:
-    """Flows [m3/s] and powers at the shaft [W] at relative speed 1, at least two of each.
+    """(flows [m3/s], powers at the shaft [W]) of a pump at relative speed 1, at least two of each.
 
-    flow, rated : flow [m3/s] and shaft power [W] at the rated point
+    flow, rated : flow [m3/s] and shaft power [W] at the rated point; weight : rho g [N/m3]
     """
     if part.power is not None and part.shaft_power is None:
         return (0.0, flow), (part.power / rated_efficiency(part),) * 2
@@ -79,9 +79,10 @@ def shaft_power(part, weight: float, flow: float, rated: float) -> tuple[Sequenc
 
 
 def by_efficiency(part, weight: float) -> tuple[list[float], list[float]]:
-    """Flows [m3/s] and shaft powers rho g q H / eta [W] at the points of an efficiency curve.
+    """(flows [m3/s], shaft powers rho g q H / eta [W]) at the points of the efficiency curve of a pump.
 
-    q : flow, H : head, eta : efficiency; at no flow, the power is H times the ratio of power to head at the next point
+    q : flow, H : head, eta : efficiency; weight : rho g [N/m3]
+    At no flow, the power is H times the ratio of power to head at the next point.
     """
     numbers = np.array(curve_numbers(part, weight))
     points = [(q, e) for q, e in zip(part.efficiency.flow, part.efficiency.value, strict=True) if q > 0.0 and e > 0.0]
@@ -92,14 +93,17 @@ def by_efficiency(part, weight: float) -> tuple[list[float], list[float]]:
 
 
 def inertia(part, weight: float) -> float | None:
-    """Inertia of all rotating masses [kg m2]: as given, or estimated from power and speed for a pump that trips."""
+    """Inertia of all rotating masses [kg m2], as given; if not given, None, or for a pump that trips an estimate.
+
+    The estimate follows from power and speed; weight : rho g [N/m3]
+    """
     if part.inertia is not None or part.trip is None:
         return part.inertia
     return usual_inertia(rated_power(part, weight), part.rated_speed)
 
 
 def rated_power(part, weight: float) -> float:
-    """Shaft power at the rated point [W]."""
+    """Shaft power of a pump at its rated point [W]; weight : rho g [N/m3]"""
     flow, head = rated_point(part, weight)
     if part.shaft_power is not None:
         return float(np.interp(flow, *shaft_power(part, weight, flow, 0.0)))
@@ -107,12 +111,12 @@ def rated_power(part, weight: float) -> float:
 
 
 def usual_inertia(power: float, speed: float) -> float:
-    """Usual inertia of impeller, its water and motor [kg m2], from shaft power [W] and speed [rad/s].
+    """Usual inertia of impeller, its water and motor [kg m2], from rated shaft power [W] and rated speed [rad/s].
 
-    0.03768 (P / N^3)^0.9556 + 0.0043 (P / N)^1.48, P the power at the shaft at the rated point [kW], N its speed in
-    1000 rpm. Regressions that go back to Thorley (Fluid Transients in Pipeline Systems, 1991), read as an open program
-    has both (`calculate_inertia`) and as Neutrium prints the former ("Estimation of pump moment of inertia":
-    1.5e7 (P / N^3)^0.9556 with N in rpm, 0.1 % less).
+    It is 0.03768 (P / N^3)^0.9556 + 0.0043 (P / N)^1.48, with the power P [kW] and the speed N in 1000 rpm.
+    These regressions go back to Thorley (Fluid Transients in Pipeline Systems, 1991). An open program has both
+    (`calculate_inertia`). Neutrium prints the former in "Estimation of pump moment of inertia", as 1.5e7 (P/N^3)^0.9556
+    with N in rpm, 0.1 % less.
     """
     power, speed = power / 1000.0, speed * 30.0 / math.pi / 1000.0
     return 0.03768 * (power / speed**3) ** 0.9556 + 0.0043 * (power / speed) ** 1.48

@@ -146,9 +146,9 @@ SUTER_TABLES = {
 
 
 def quadrants(speed: float) -> Quadrants:
-    """Suter table for a specific speed (rpm, m3/s, m), interpolated between tables over its logarithm.
+    """Suter table for a specific speed [rpm, m3/s, m], interpolated between published tables over its logarithm.
 
-    Out of range it is the nearest table.
+    Outside their range it is the nearest table.
     """
     names, logs = list(SPEEDS), [math.log(value) for value in SPEEDS.values()]
     place = min(max(math.log(speed), logs[0]), logs[-1])

@@ -27,13 +27,16 @@ PRESSURE_MARGIN = 1e-3  # drop below which it stays shut against reverse flow [P
 
 @njit
 def regulator_opening(y, tables, device):
-    """Opening x of the valve; it may exceed 0 to 1 by rounding."""
+    """Opening x of the valve [-], between 0 and 1 except for rounding."""
     return tables.floats[device["data"] + OPENING] + y[device["y"]]
 
 
 @njit
 def set(t, y, out, tables, device):
-    """Write the conductance G x^2 of the valve into `out`; 0 while it is shut against reverse flow."""
+    """Write to `out` the conductance G x^2 of the valve [kg2/s2/Pa], 0 while it is shut against reverse flow.
+
+    G : conductance at full opening, x : opening
+    """
     k, x = device["valve"], min(max(regulator_opening(y, tables, device), 0.0), 1.0)
     back = tables.armed[device["event"]] > 0.0
     out[tables.layout[0]["conductance"] + k] = 0.0 if back else tables.valves[k]["conductance"] * x * x
@@ -41,10 +44,11 @@ def set(t, y, out, tables, device):
 
 @njit
 def lead(t, y, tables, device, before, behind, drop, ahead):
-    """Rate of the opening dx/dt [1/s] of a pressure-controlled valve, and its derivative by the drop [1/Pa/s].
+    """(rate of the opening dx/dt [1/s], its derivative by the drop [1/s/Pa]) of a pressure-controlled valve.
 
     before, behind : pressures at the ends minus those at the start [Pa]; drop : drop across the valve [Pa]
-    ahead : True if the drop changes by the upstream pressure; the derivative is 0 if the valve senses the other end
+    ahead : True if the upstream pressure causes the change of the drop, False if the downstream pressure does; the
+    derivative is 0 if the valve senses the other pressure
     """
     floats, armed, at, data = tables.floats, tables.armed, device["event"], device["data"]
     if armed[at + 2] > 0.0 or armed[at + 4] > 0.0:
@@ -57,15 +61,15 @@ def lead(t, y, tables, device, before, behind, drop, ahead):
 
 @njit
 def stroke(tables, device):
-    """Product of band and time constant, so that dx/dt = error / stroke."""
+    """Product of proportional band and time constant, so that dx/dt = error / stroke for the opening x."""
     return tables.floats[device["data"] + BAND] * tables.floats[device["data"] + TIME]
 
 
 @njit
 def regulator_error(t, out, tables, device):
-    """Control error over the band [-], positive if the valve must open.
+    """Control error over the proportional band [-], positive if the valve must open.
 
-    It is set value minus sensed value, or sensed minus set value for a pressure-sustaining valve.
+    The error is the set value minus the sensed value, with the opposite sign for a pressure-sustaining valve.
     """
     layout, floats, data = tables.layout[0], tables.floats, device["data"]
     valve = tables.valves[device["valve"]]
@@ -81,7 +85,7 @@ def regulator_error(t, out, tables, device):
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    """Write the rate of the opening into `dydt`, 0 at a stop, and raise out[RATE] to the rate limit."""
+    """Write the rate of the opening to `dydt`, 0 at a stop, and raise out[RATE] to the rate limit of the valve."""
     out[RATE] = max(out[RATE], regulator_rate(y, out, tables, device))
     if dydt.size == 0:
         return
@@ -92,9 +96,9 @@ def move(t, y, dydt, out, tables, device):
 
 @njit
 def regulator_rate(y, out, tables, device):
-    """Rate of the control loop [1/s].
+    """Rate of the control loop of the valve [1/s].
 
-    Where a column sets the flow, the derivative of the drop dP by the opening x is -2 dP / x.
+    Where a rigid column sets the flow, the derivative of the drop dP by the opening x is -2 dP / x.
     """
     k, speed = device["valve"], 1.0 / stroke(tables, device)
     drop = abs(head_drop(tables, out, k)[1])
@@ -108,10 +112,11 @@ def regulator_rate(y, out, tables, device):
 
 @njit
 def events(t, y, out, tables, device, g):
-    """Write the event functions g, each with its negative.
+    """Write four event functions to g, each followed by its negative.
 
-    They are the flow [kg/s], or if shut the drop above the opening margin [Pa]; the distance to full opening; the
-    distance to the seat; and the distance to the opening at which control of a column begins or ends.
+    They are the flow [kg/s], or while the valve is shut against reverse flow the drop minus a margin [Pa]; the distance
+    of the opening from full opening; its distance from the seat; and its distance from the opening at which the valve
+    stops controlling a rigid column, or begins to.
     """
     layout, armed = tables.layout[0], tables.armed
     at, x, error = device["event"], regulator_opening(y, tables, device), regulator_error(t, out, tables, device)

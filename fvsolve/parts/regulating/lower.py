@@ -1,4 +1,4 @@
-"""Rows of control valves in the tables of a model, and their state in the steady solution."""
+"""Control valves in the tables of a model, and their states at the steady start."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ OPEN, ACTIVE = "open", "active"  # as EPANET calls them; in `start.shut`, closed
 
 
 class SteadyValve(NamedTuple):
-    """State of a control valve in a steady solution.
+    """State of a control valve in an iteration of the steady start.
 
     start : steady problem; k : row of the valve; p_from, p_to : potentials at its ends [Pa]; flow : mass flow [kg/s]
-    target : set potential [Pa], or set flow [kg/s]; loss : drop at full opening at this flow [Pa]
+    target : set value as a potential [Pa], or as a mass flow [kg/s]; loss : drop at full opening at this flow [Pa]
     """
 
     start: object
@@ -38,7 +38,7 @@ class SteadyValve(NamedTuple):
 
 
 class Regulator(Device, kind=""):
-    """Model table rows of control valves; their opening is a state.
+    """Conversion to table rows of control valves; their opening is a state.
 
     In the steady state a valve is active (it keeps the sensed quantity at its set value), open or shut.
     """
@@ -62,7 +62,7 @@ class Regulator(Device, kind=""):
         return [0.0, 0.0, 0.0, band, part.time_constant]
 
     def check_set_pressure(self, draft, name, part) -> None:
-        """Report a fault if no source of the case can supply the set pressure."""
+        """Report a fault if no source of the case can supply the set pressure of a valve."""
         nodes, case = draft.case.nodes.values(), draft.case
         if any(node.kind not in ("reservoir", "tank", "junction") for node in nodes) or "pump" in kinds_of(case):
             return  # pressure comes from elsewhere too
@@ -86,12 +86,12 @@ class Regulator(Device, kind=""):
         return [0.1]
 
     def set_value(self, start, k: int) -> float:
-        """Set value at the start: pressure [Pa] or mass flow [kg/s]."""
+        """Set value of valve k at the start: pressure [Pa] or mass flow [kg/s]."""
         row = start.draft.device_table[start.valves[k]["device"]]
         return start.schedule_value(row["schedule"])
 
     def target(self, start, k: int) -> float:
-        """Set value of valve k at the start: pressure as potential [Pa], or mass flow [kg/s]."""
+        """Set value of valve k at the start, as a potential [Pa] for a set pressure, or as a mass flow [kg/s]."""
         if not self.end:
             return self.set_value(start, k)
         return start.law.potential_of(self.set_value(start, k), float(start.nodes["elevation"][self.sensed(start, k)]))
@@ -100,7 +100,7 @@ class Regulator(Device, kind=""):
         return int(start.valves[k][f"{self.end}_node"])
 
     def is_controllable(self, start, k: int) -> bool:
-        """True if the flow through the valve can change the sensed quantity."""
+        """True if valve k can change the quantity that it senses: the flow, or a pressure that is not fixed."""
         return not self.end or bool(np.isnan(start.fixed_potentials[self.sensed(start, k)]))
 
     def steady_mode(self, start, k: int) -> str:
@@ -132,7 +132,10 @@ class Regulator(Device, kind=""):
         return after != before
 
     def next_mode(self, here: SteadyValve, now: str) -> str:
-        """Mode in the next steady solution, "shut", ACTIVE or OPEN, by the rules of EPANET; now : present mode"""
+        """Mode in the next iteration of the steady start, "shut", ACTIVE or OPEN, by the rules of EPANET.
+
+        here : state of the valve; now : present mode
+        """
         raise NotImplementedError
 
     def begin(self, start, part, row) -> list[str]:
@@ -152,7 +155,7 @@ class Regulator(Device, kind=""):
         return []
 
     def error(self, start, k: int) -> float:
-        """Control error at the start, positive if the valve must open, in [Pa] or [kg/s]."""
+        """Control error of valve k at the start [Pa] or [kg/s], positive if the valve must open."""
         given = self.set_value(start, k)
         if not self.end:
             return given - float(start.valves[k]["flow"])
@@ -167,9 +170,10 @@ class Regulator(Device, kind=""):
 
 
 class PressureReducingRows(Regulator, kind="pressure-reducing"):
-    """Model table rows of pressure-reducing valves, which limit the pressure at `to`.
+    """Conversion to table rows of pressure-reducing valves, which limit the pressure at `to`.
 
-    Open if this pressure is too low even at full opening; shut if other sources keep it higher.
+    In the steady state a valve is open if this pressure is too low even at full opening, and shut if other sources keep
+    it higher.
     """
 
     mode, end, verb = law.REDUCING, "to", "reduce"
@@ -186,9 +190,10 @@ class PressureReducingRows(Regulator, kind="pressure-reducing"):
 
 
 class PressureSustainingRows(Regulator, kind="pressure-sustaining"):
-    """Model table rows of pressure-sustaining valves, which keep up the pressure at `from`.
+    """Conversion to table rows of pressure-sustaining valves, which keep up the pressure at `from`.
 
-    Open if this pressure is too high even at full opening; shut if it is lower than the set value.
+    In the steady state a valve is open if this pressure is too high even at full opening, and shut if it is lower than
+    the set value.
     """
 
     mode, end, verb = law.SUSTAINING, "from", "open"
@@ -205,7 +210,10 @@ class PressureSustainingRows(Regulator, kind="pressure-sustaining"):
 
 
 class FlowControlRows(Regulator, kind="flow-control"):
-    """Model table rows of flow-control valves, which limit the flow; open if full opening passes less."""
+    """Conversion to table rows of flow-control valves, which limit the flow.
+
+    In the steady state a valve is open if its flow at full opening is below the set value.
+    """
 
     mode, key = law.FLOW_CONTROL, "set_flow"
 
@@ -224,7 +232,10 @@ def kinds_of(case) -> set[str]:
 
 
 def head_of(case, weight: float, name: str) -> tuple[float, str]:
-    """Greatest head that a place can supply [m], and its name."""
+    """(greatest head that the node `name` can supply [m], name); weight : rho g [N/m3]
+
+    The head of a junction is infinite if it has an inflow, otherwise minus infinity.
+    """
     node, z = case.nodes[name], case.elevation(name) or 0.0
     if node.kind == "tank":
         return z + max(node.level, node.height or 0.0), name

@@ -17,7 +17,7 @@ RELUCTANCE = 1e-10  # margin of lift at events, so that rounding does not open t
 
 @njit
 def set(t, y, out, tables, device):
-    """Write the conductance G at full opening into `out`; 0 if the valve is shut."""
+    """Write to `out` the conductance of the valve at full opening [kg2/s2/Pa], 0 if it is shut."""
     k, shut = device["valve"], tables.armed[device["event"]] > 0.0
     out[tables.layout[0]["conductance"] + k] = 0.0 if shut else tables.valves[k]["conductance"]
 
@@ -30,11 +30,11 @@ def value(t, y, out, tables, device, quantity):
 
 @njit
 def events(t, y, out, tables, device, g):
-    """Write the event functions g, each with its negative: lift above the seat, and lift below full opening.
+    """Write two event functions to g, each followed by its negative: lift above the seat, lift below full opening.
 
-    If the valve is shut, the first is the lift above the opening margin. Between shut and fully open it always becomes
-    partly open first: after a jump, a direct change to the opposite stop might not be consistent with the law of that
-    stop.
+    While the valve is shut, the first is the lift above a small margin.
+    Between shut and fully open the valve always becomes partly open first. After a jump, a direct change to the
+    opposite stop might contradict the law of that stop.
     """
     armed, at, x = tables.armed, device["event"], pressure_lift(tables, out, device["valve"])
     left, missing = x, 1.0 - x
@@ -48,9 +48,10 @@ def events(t, y, out, tables, device, g):
 
 @njit
 def step(out, tables, k, g, m, drop, denser, wide):
-    """a [kg/s] and s [kg/s/Pa] of the next Newton step, dM = a + s d(drop), M the mass flow.
+    """(a [kg/s], s [kg/s/Pa]) of the next Newton step dM = a + s d(drop) of valve k, M the mass flow.
 
-    The square-root law holds unless the valve is partly open; then see `lifting_step`.
+    A shut or fully open valve has the square-root law; for a partly open valve see `lifting_step`.
+    Arguments as for `restriction_step`.
     """
     if not is_lifted(tables, k):
         return root_step(tables, k, g, m, drop, denser)
@@ -61,7 +62,10 @@ def step(out, tables, k, g, m, drop, denser, wide):
 
 @njit
 def slope(out, tables, k, g, drop):
-    """Derivative of the mass flow by the drop [kg/s/Pa], including the change of lift."""
+    """Derivative [kg/s/Pa] of the mass flow of valve k by its drop, including the change of lift.
+
+    g : conductance at full opening [kg2/s2/Pa]; drop : [Pa]
+    """
     if not is_lifted(tables, k):
         return root_slope(tables, k, g, drop)
     transition = transition_of(tables.valves[k], g)
@@ -71,14 +75,17 @@ def slope(out, tables, k, g, drop):
 
 @njit
 def lift(out, tables, k, g, drop, denser, wide):
-    """Derivative of the mass flow by the upstream pressure through the lift [kg/s/Pa]."""
+    """Derivative [kg/s/Pa] of the mass flow of valve k by the upstream pressure through its lift, at constant drop.
+
+    Arguments as for `restriction_step`.
+    """
     dense = g * denser
     return lifting_slope(tables, out, k, flow_at_drop(dense, transition_of(tables.valves[k], dense), drop), wide)
 
 
 @njit
 def pressure_lift(tables, out, k):
-    """Lift x of valve k, linear in the upstream pressure and not limited to 0 to 1."""
+    """Lift x of valve k [-], linear in the upstream pressure and not limited to 0 to 1."""
     floats, valve = tables.floats, tables.valves[k]
     change = out[tables.layout[0]["pressure"] + valve["from_node"]]
     return floats[valve["data"]] + change / floats[valve["data"] + 1]
@@ -86,16 +93,17 @@ def pressure_lift(tables, out, k):
 
 @njit
 def lift_rise(tables, k):
-    """Derivative of the lift by the upstream pressure [1/Pa]."""
+    """Derivative of the lift of valve k by the upstream pressure [1/Pa]."""
     return 1.0 / tables.floats[tables.valves[k]["data"] + 1]
 
 
 @njit
 def lift_of(tables, out, k, full, wide):
-    """Lift of valve k in the node equations; full : flow at full opening [kg/s]
+    """Lift of valve k in the equations of the nodes [-]; full : flow at full opening [kg/s]
 
     Reverse flow raises the pressure that lifts the disc. The lift is then limited to 0 to 1, and two solutions may
-    exist; the greater lift is stable. Newton reaches it from above: it starts with all valves of this kind `wide` open.
+    exist, of which that with the greater lift is stable. Newton's method reaches it from above: it starts with `wide`
+    True, and the valve then counts as fully open.
     """
     x = pressure_lift(tables, out, k)
     if full >= 0.0:
@@ -105,9 +113,11 @@ def lift_of(tables, out, k, full, wide):
 
 @njit
 def lifting_step(tables, out, k, full, g, m, wide):
-    """a [kg/s] and s [kg/s/Pa] of the Newton step of a partly open valve, dM = a + s d(drop), at the flow m [kg/s].
+    """(a [kg/s], s [kg/s/Pa]) of the next Newton step dM = a + s d(drop) of a partly open valve k, M the mass flow.
 
-    full : flow at full opening [kg/s]; s is the chord as in `valve_step`, for reverse flow the slope
+    full : flow at full opening [kg/s]; g : conductance at full opening [kg2/s2/Pa]; m : present flow [kg/s]
+    wide : True if the valve counts as fully open at reverse flow
+    s is the slope of the chord as in `valve_step`, or for reverse flow that of the tangent.
     """
     x, transition = lift_of(tables, out, k, full, wide), transition_of(tables.valves[k], g)
     if x <= 0.0:
@@ -121,7 +131,7 @@ def lifting_step(tables, out, k, full, g, m, wide):
 
 @njit
 def lifting_slope(tables, out, k, full, wide):
-    """Derivative of the flow of a partly open valve by the upstream pressure through the lift [kg/s/Pa].
+    """Derivative [kg/s/Pa] of the flow of a partly open valve k by the upstream pressure, through the lift.
 
     It is negative for reverse flow. full : flow at full opening [kg/s]; wide : True if the valve counts as fully open
     """

@@ -1,4 +1,4 @@
-"""Rows of relief valves in the tables of a model, without or with disc dynamics."""
+"""Relief valves in the tables of a model, without or with disc dynamics."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fvsolve.parts.relief_valve import law
 
 
 class ReliefDisc(LiftedValve, kind=""):
-    """Model table rows of relief valves with disc dynamics."""
+    """Conversion to table rows of relief valves with disc dynamics."""
 
     mode = RELIEF
 
@@ -38,19 +38,19 @@ class ReliefDisc(LiftedValve, kind=""):
 
 
 class ReliefSwing(ReliefDisc, kind=""):
-    """Model table rows of relief valves with an oscillating disc (mass, spring, damper)."""
+    """Conversion to table rows of relief valves with an oscillating disc (mass, spring, damper)."""
 
     states = ("opening", "speed")
 
 
 class ReliefLag(ReliefDisc, kind=""):
-    """Model table rows of relief valves with a disc of first-order lag."""
+    """Conversion to table rows of relief valves whose disc has a first-order lag."""
 
     states = ("opening",)
 
 
 class Relief(ReliefDisc, kind="relief-valve"):
-    """Model table rows of relief valves whose lift follows the pressure at once."""
+    """Conversion to table rows of relief valves whose lift follows the pressure at once."""
 
     law, controlling_event = law, -1
     events = ("is shut", "opens", "is fully open", "leaves full opening")

@@ -8,7 +8,7 @@ from fvsolve.model.lowering import Lowering
 
 
 class ReservoirRows(Lowering, kind="reservoir"):
-    """Model table rows of reservoirs, whose pressure or head follows a schedule."""
+    """Conversion to table rows of reservoirs, whose pressure or head follows a schedule."""
 
     ledger_name = "reservoir"
 

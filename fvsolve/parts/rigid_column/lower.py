@@ -9,7 +9,7 @@ from fvsolve.model.lowering import Lowering
 
 
 class RigidColumnRows(Lowering, kind="rigid-column"):
-    """Model table rows of rigid columns, each with its flow as state."""
+    """Conversion to table rows of rigid columns, each with its flow as state."""
 
     table = "column"
 

@@ -10,7 +10,7 @@ from fvsolve.units import show
 
 
 class Way(Value):
-    """Value of a case file: a list of points in space."""
+    """Value of a case file for a list of points in space."""
 
     takes = "list of [x, y, z], m"
 

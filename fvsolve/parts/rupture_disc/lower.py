@@ -1,4 +1,4 @@
-"""Rows of rupture discs in the tables of a model; discs are intact at the start."""
+"""Rupture discs in the tables of a model; discs are intact at the start."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fvsolve.parts.rupture_disc import law, law_outside
 
 
 class RuptureDiscRows(RelievingRows, kind="rupture-disc"):
-    """Model table rows of rupture discs between two nodes."""
+    """Conversion to table rows of rupture discs between two nodes."""
 
     law, events_only = law, True
     events = ("bursts",)
@@ -25,13 +25,13 @@ class RuptureDiscRows(RelievingRows, kind="rupture-disc"):
         drop, name = start.valve_drive(k)[0], start.draft.valve_names[k]
         if drop >= part.burst_pressure:
             across = start.case.amount(drop, "pressure", 6, span=True)
-            text = f"{across} across the disc at the start would burst it; set it higher or remove the disc"
+            text = f"a drop of {across} at the start would burst the disc; raise this pressure or remove the disc"
             start.draft.fault(f"links.{name}.burst_pressure", text)
         return []
 
 
 class DiscToAmbient(RuptureDiscRows, kind=""):
-    """Model table rows of rupture discs to ambient."""
+    """Conversion to table rows of rupture discs that open to ambient."""
 
     law, mode = law_outside, EVENT_COUNT
     events = ("",) * EVENT_COUNT + ("bursts",)

@@ -13,9 +13,9 @@ FLOWS = {  # flow into the link at a port: weights of its four edges
 
 
 class SpoolValveRows(Restriction, kind="spool-valve"):
-    """Model table rows of spool valves, four rows for each valve.
+    """Conversion to table rows of spool valves: four rows for each valve, one for each metering edge.
 
-    The two edges that open on one side of position zero share an opening schedule.
+    The two edges that open on the same side of position zero have one opening schedule.
     """
 
     rows, rank = len(EDGES), 1

@@ -6,7 +6,7 @@ from fvsolve.model.mass_tables import PushLowering, join_ports
 
 
 class SpringRows(PushLowering, kind="spring"):
-    """Model table rows of springs: a force that depends on the distance of two bodies."""
+    """Conversion to table rows of springs: a force that depends on the distance of two bodies."""
 
     ledger_name = "stored"
     table, rank = "brace", 0

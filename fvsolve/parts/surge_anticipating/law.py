@@ -3,9 +3,11 @@
 Flags, with at = event + mode: armed[at] to armed[at + 3] for the stages SHUT, OPENING, OPEN and CLOSING; if all are 0,
 the states give the stage. armed[at + 4]: opened by high pressure; armed[at + 5]: the pressure has exceeded low_set
 since the valve shut, so that a pressure below low_set opens it; armed[at + 6]: after the trip. Flags change on accepted
-states only. The states are the opening and the time spent fully open; their rates are constant in a stage, so that
-every method integrates them to rounding. For a valve to ambient, `mode` is the number of values and flags of an outlet
-that precede those of the valve.
+states only.
+The states are the opening and the time spent fully open; their rates are constant in a stage, so that every method
+integrates them to rounding.
+For a valve to ambient, `mode` is the count of the parameters, and of the event flags, of an outlet that precede those
+of the valve.
 """
 
 from fvsolve.jit import njit
@@ -32,14 +34,14 @@ def valve_stage(y, tables, device):
 
 @njit
 def set(t, y, out, tables, device):
-    """Write the conductance G x^2 of the valve into `out`, G the conductance at full opening and x the opening."""
+    """Write to `out` the conductance G x^2 of the valve [kg2/s2/Pa]; G : conductance at full opening, x : opening"""
     k, x = device["valve"], min(max(y[device["y"]], 0.0), 1.0)
     out[tables.layout[0]["conductance"] + k] = tables.valves[k]["conductance"] * x * x
 
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    """Write the rates of the opening and of the time spent fully open into `dydt`."""
+    """Write the rates of the opening and of the time spent fully open to `dydt`."""
     if dydt.size == 0:
         return
     floats, at, o, stage = tables.floats, device["data"] + device["mode"], device["y"], valve_stage(y, tables, device)
@@ -50,7 +52,10 @@ def move(t, y, dydt, out, tables, device):
 
 @njit
 def pilot_margins(t, y, out, tables, device):
-    """Margins until the valve opens by low pressure [Pa], high pressure [Pa] and trip [s]; sensed pressure [Pa]."""
+    """(low [Pa], high [Pa], trip [s], pressure [Pa]): margins until the valve opens, and the sensed pressure.
+
+    low, high, trip : until it opens by low pressure, by high pressure and at the trip
+    """
     floats, armed, layout = tables.floats, tables.armed, tables.layout[0]
     at, flags = device["data"] + device["mode"], device["event"] + device["mode"]
     i = int(floats[at + PLACE])
@@ -64,7 +69,12 @@ def pilot_margins(t, y, out, tables, device):
 
 @njit
 def events(t, y, out, tables, device, g):
-    """Write the event functions g: margins until the next stage, and of the flags of high pressure, arming and trip."""
+    """Write seven event functions to g: of the four stages, of opening by high pressure, of arming, and of the trip.
+
+    The function of the present stage is minus the margin left in this stage; that of a stage that may follow is the
+    margin.
+    Arming : since the valve shut, the pressure has exceeded the low setting, so that a lower pressure opens it
+    """
     floats, armed, o = tables.floats, tables.armed, device["y"]
     at, flags, stage = device["data"] + device["mode"], device["event"] + device["mode"], valve_stage(y, tables, device)
     low, high, trip, p = pilot_margins(t, y, out, tables, device)
@@ -94,7 +104,10 @@ def events(t, y, out, tables, device, g):
 
 @njit
 def set_stage_event(g, flags, stage, next_stage, margin):
-    """Write g of the present stage, which lasts while the margin is positive, and of the next stage."""
+    """Write to g -`margin` for the present stage, which lasts while the margin is positive, and `margin` for the next.
+
+    flags : index of the event function of the first stage
+    """
     margin = -LEAST if margin == 0.0 else margin
     g[flags + stage], g[flags + next_stage] = -margin, margin
 

@@ -1,4 +1,4 @@
-"""Rows of surge-anticipating valves in the tables of a model; the valves are shut at the start."""
+"""Surge-anticipating valves in the tables of a model; the valves are shut at the start."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fvsolve.parts.surge_anticipating import law, law_outside
 
 
 class SurgeAnticipatingRows(RelievingRows, kind="surge-anticipating"):
-    """Model table rows of surge-anticipating valves between two nodes."""
+    """Conversion to table rows of surge-anticipating valves between two nodes."""
 
     law = law
     states = ("opening", "held")
@@ -59,7 +59,7 @@ class SurgeAnticipatingRows(RelievingRows, kind="surge-anticipating"):
 
 
 class AnticipatingToAmbient(SurgeAnticipatingRows, kind=""):
-    """Model table rows of surge-anticipating valves to ambient."""
+    """Conversion to table rows of surge-anticipating valves that open to ambient."""
 
     law, mode = law_outside, EVENT_COUNT
     events = ("",) * EVENT_COUNT + SurgeAnticipatingRows.events

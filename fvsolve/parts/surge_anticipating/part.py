@@ -13,7 +13,7 @@ from fvsolve.units import show
 
 
 class SurgeAnticipating(Relieving, kind="surge-anticipating"):
-    """Valve that a pressure below `low_set`, or `trip`, opens for the time `hold`, and that then shuts.
+    """Valve that opens at a pressure below `low_set`, or at `trip`, stays open for the time `hold`, and then shuts.
 
     A pressure above `high_set` opens it while the pressure lasts. q = x Cd A sqrt(2 |dp| / rho) sign(dp), with flow q
     and drop dp; the opening x moves at the constant rates 1 / opening_time and 1 / closing_time. Without `to` the valve

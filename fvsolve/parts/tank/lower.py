@@ -1,4 +1,4 @@
-"""Rows of open tanks in the tables of a model."""
+"""Open tanks in the tables of a model."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fvsolve.model.lowering import Lowering
 
 
 class TankRows(Lowering, kind="tank"):
-    """Model table rows of tanks: nodes with the hydrostatic pressure at the bottom of their water."""
+    """Conversion to table rows of tanks: nodes with the hydrostatic pressure at the bottom of their water."""
 
     ledger_name = "over the rim"
 
@@ -52,9 +52,9 @@ class TankRows(Lowering, kind="tank"):
 
 
 def tank_volume(level, area, volume, z: float) -> float:
-    """Volume below level z above the bottom of a tank [m3].
+    """Volume [m3] of a tank from its bottom to level z [m] above it.
 
-    level, area, volume : levels [m], areas [m2] and volumes below the levels [m3]; the area is linear between levels
+    level, area, volume : levels [m], areas [m2] there and volumes below them [m3]; the area is linear between levels
     and constant above the last level
     """
     if z >= level[-1]:

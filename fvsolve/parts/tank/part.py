@@ -48,7 +48,7 @@ class AreaTable:
         return hash((self.level.tobytes(), self.area.tobytes()))
 
     def table(self) -> dict[str, list[float]]:
-        """Table as in a case file."""
+        """Area table as a table of a case file: key -> list."""
         return {"level": self.level.tolist(), "area": self.area.tolist()}
 
 

@@ -1,4 +1,4 @@
-"""Rows of torques on shafts and bodies in the tables of a model."""
+"""Torques on shafts and bodies in the tables of a model."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fvsolve.parts.pump.lower_drive import torques_on
 
 
 class TorqueRows(Lowering, kind="torque"):
-    """Torques on shafts; they have no rows, because the pump or turbine of the shaft holds their numbers."""
+    """Conversion of torques on shafts; they have no rows, because the pump or turbine contains their parameters."""
 
     def of(self, part):
         return self if part.axis is None else BODY_TORQUES
@@ -27,7 +27,7 @@ class TorqueRows(Lowering, kind="torque"):
 
 
 class BodyTorqueRows(PushLowering):
-    """Model table rows of torques about an axis of a body, given by a schedule."""
+    """Conversion to table rows of torques about an axis of a body, which follow a schedule."""
 
     ledger_name = "supplied"
     table, rank = "brace", 3

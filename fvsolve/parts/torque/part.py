@@ -42,7 +42,7 @@ class Torque(Link, kind="torque"):
 
     @property
     def ports(self) -> dict[str, str]:
-        """Places that the ports join, port name -> place."""
+        """Places that the ports join: port name -> place."""
         return {"to": self.to} if self.from_ is None else {"from": self.from_, "to": self.to}
 
     def faults(self, name: str, around: CaseContext) -> Faults:

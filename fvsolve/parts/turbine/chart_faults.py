@@ -11,7 +11,7 @@ SPEED, FLOW, EFFICIENCY, TORQUE = "unit_speed", "unit_flow", "efficiency", "unit
 
 
 def faults_of_shut(curve) -> list[tuple[str, str]]:
-    """Faults of the curve of opening 0, with shut vanes: (key or "", text)."""
+    """Faults (key, text) of the curve of opening 0, at which the vanes are shut; the key is "" for the whole curve."""
     if not len(curve.speed) == len(curve.flow) == len(curve.value) == 1 or curve.quantity != TORQUE:
         return [("", f"vanes at opening 0 are shut; expected no curve, or a single point with a {TORQUE}")]
     faults = [(FLOW, f"{curve.flow[0]:g} is a flow through shut vanes; expected 0")] * (curve.flow[0] != 0.0)
@@ -23,7 +23,7 @@ def faults_of_shut(curve) -> list[tuple[str, str]]:
 
 
 def faults_of_curve(curve) -> list[tuple[str, str]]:
-    """Faults of the points of a curve of an opening above 0: (key or "", text)."""
+    """Faults (key, text) of the curve of an opening above 0; the key is "" for the whole curve."""
     if not len(curve.speed) == len(curve.flow) == len(curve.value):
         counts = f"{len(curve.speed)} of {SPEED}, {len(curve.flow)} of {FLOW}, {len(curve.value)} of {curve.quantity}"
         return [("", f"{counts}; expected equal numbers")]
@@ -41,7 +41,7 @@ def faults_of_curve(curve) -> list[tuple[str, str]]:
             )
         )
     if not any(q >= LEAST for _, q in points):
-        faults.append((FLOW, f"is nowhere {LEAST:g} or more; flow that drives the turbine is positive"))
+        faults.append((FLOW, f"is nowhere {LEAST:g} or more; expected a positive flow, which drives the turbine"))
     if (dead := next((p for p in points if p[0] == 0.0 and p[1] <= 0.0), None)) is not None:
         faults.append(
             ("", f"{point_text(dead)} is not a valid point: no head drives reverse flow through a runner at rest")
@@ -50,9 +50,10 @@ def faults_of_curve(curve) -> list[tuple[str, str]]:
 
 
 def angle_faults(points: list[tuple[float, float]]) -> list[tuple[str, str]]:
-    """Fault of points (unit speed, unit flow) whose angle about the origin does not rise or fall throughout.
+    """Fault (key, text), in a list, if the angle of the points about the origin does not always rise or always fall.
 
-    Also the fault of points that cross reverse flow at rest.
+    There is also a fault if they cross reverse flow at rest, or if the end with the least angle has no forward speed.
+    points : (unit speed, unit flow) of each point
     """
     way = 0.0
     for k, ((n, q), (m, r)) in enumerate(pairwise(points)):
@@ -74,14 +75,15 @@ def angle_faults(points: list[tuple[float, float]]) -> list[tuple[str, str]]:
                 (
                     "",
                     f"passes from {point_text((n, q))} to {point_text((m, r))} across reverse flow through a runner at "
-                    "rest, which no head drives",
+                    "rest; no head drives such a flow",
                 )
             ]
     if not (points[0] if way > 0.0 else points[-1])[0] >= LEAST:
-        return [(SPEED, f"is below {LEAST:g} at the end of least angle; a turbine drives at forward speed")]
+        end = f"the end of the curve with the least angle, atan2({FLOW}, {SPEED})"
+        return [(SPEED, f"is below {LEAST:g} at {end}; expected a forward speed, at which a turbine drives")]
     return []
 
 
 def point_text(point: tuple[float, float]) -> str:
-    """Text of a point (unit speed, unit flow)."""
+    """Text of a point (unit speed, unit flow), such as "(60, 0.5)"."""
     return f"({point[0]:g}, {point[1]:g})"

@@ -32,7 +32,7 @@ class OpeningCurve(NamedTuple):
     quantity: str
 
     def table(self) -> dict[str, Any]:
-        """Table as in a case file."""
+        """Curve as a table of a case file."""
         return {
             "opening": self.opening,
             SPEED: list(self.speed),
@@ -41,7 +41,7 @@ class OpeningCurve(NamedTuple):
         }
 
     def torques(self, weight: float) -> list[float]:
-        """Unit torque T11 at the points [N/m3]; weight = rho g [N/m3]."""
+        """Unit torque T11 [N/m3] at the points; weight : rho g [N/m3]"""
         if self.quantity == TORQUE:
             return list(self.value)
         points = zip(self.speed, self.flow, self.value, strict=True)
@@ -51,8 +51,9 @@ class OpeningCurve(NamedTuple):
 class HillChart(NamedTuple):
     """Hill chart of a turbine.
 
-    curves : by ascending opening above 0; shut_point : (n11, T11) of the braking torque with shut vanes, or None
-    given : value as in the case file
+    curves : curves of the openings above 0, in ascending order
+    shut_point : (n11, T11), unit speed and braking unit torque with shut vanes, or None; given : value as in the case
+    file
     """
 
     curves: tuple[OpeningCurve, ...]
@@ -60,12 +61,12 @@ class HillChart(NamedTuple):
     given: Any
 
     def table(self) -> Any:
-        """Value as in a case file."""
+        """Value of the chart as in a case file."""
         return self.given
 
 
 class HillChartValue(Value):
-    """Value of a case file for a hill chart: curves of openings, inline or as columns of a CSV file."""
+    """Value of a case file for a hill chart: curves of openings, as tables or as columns of a CSV file."""
 
     about = (
         "for each opening, points of n11 = N D / sqrt(H) [rpm m^(1/2)], Q11 = Q / (D^2 sqrt(H)) [m^(1/2)/s] and "
@@ -114,7 +115,10 @@ class HillChartValue(Value):
 
 
 def from_file(given: dict[str, Any], setting: ReadContext) -> HillChart:
-    """Hill chart from CSV columns opening, unit_speed, unit_flow and efficiency or unit_torque, points in order."""
+    """Hill chart from a CSV file with the columns opening, unit_speed, unit_flow, and efficiency or unit_torque.
+
+    The points of each opening are in order along its curve. given : table { file } of the case file
+    """
     unknown = [((key,), "unknown key; expected only file") for key in given if key != "file"]
     if unknown or not isinstance(given["file"], str):
         raise ValueFault(unknown or [(("file",), f"{show(given['file'])} is not a file name in quotes")])
@@ -140,9 +144,9 @@ def from_file(given: dict[str, Any], setting: ReadContext) -> HillChart:
 
 
 def columns_of(rows) -> tuple[list, str]:
-    """Columns of a hill chart by their headers, and the key of the last column.
+    """(columns, key of the last column) of the CSV file of a hill chart; rows : rows of the file
 
-    The columns are opening, n11, Q11 and efficiency or T11.
+    The columns are opening, n11, Q11, and efficiency or T11.
     """
     words = [word for word in (EFFICIENCY, TORQUE) if word in rows.names]
     if len(words) != 1:
@@ -159,10 +163,10 @@ def columns_of(rows) -> tuple[list, str]:
 
 
 def chart_of(curves: dict, places: dict, faults: list, source: Any, file: str = "") -> HillChart:
-    """Build a hill chart of curves. Raises ValueFault with all faults.
+    """Hill chart that consists of curves. Raises ValueFault with all faults.
 
-    curves : curve of each index or opening; places : key path of each curve for messages; faults : faults found before
-    source : value as in the case file; file : prefix of messages about a CSV file
+    curves : index or opening -> curve; places : index or opening -> key path of the curve, for messages
+    faults : faults found before; source : value as in the case file; file : prefix of messages about a CSV file
     """
     seen: dict[float, Any] = {}
     for k, curve in curves.items():

@@ -33,7 +33,7 @@ SHUT_SHARE = 1e-12  # square of an opening regarded as zero
 
 @njit
 def set(t, y, out, tables, device):
-    """Write the speed and the conductance at the vane opening into `out`."""
+    """Write to `out` the speed of the turbine [rad/s] and its conductance at the vane opening [kg2/s2/Pa]."""
     layout, k = tables.layout[0], device["valve"]
     out[layout["drive"] + k] = pump_speed(t, y, tables, device)
     g = valve_conductance(tables, k, t)
@@ -42,13 +42,13 @@ def set(t, y, out, tables, device):
 
 @njit
 def vane_opening(tables, k, g):
-    """Opening of the vanes of turbine k at its conductance g, 0 to 1."""
+    """Opening of the vanes of turbine k, 0 to 1; g : its conductance [kg2/s2/Pa]"""
     return sqrt(g / tables.valves[k]["conductance"])
 
 
 @njit
 def operating_point(out, tables, device):
-    """Opening, speed [rad/s], flow [m3/s] and relative density of a turbine, after the nodes are solved."""
+    """(opening, speed [rad/s], flow [m3/s], density over reference density) of a turbine, after nodes are solved."""
     layout, k = tables.layout[0], device["valve"]
     rho, _ = head_drop(tables, out, k)
     opening = vane_opening(tables, k, out[layout["conductance"] + k])
@@ -57,7 +57,7 @@ def operating_point(out, tables, device):
 
 @njit
 def turbine_torque(out, tables, device):
-    """Torque of the water on the shaft, positive in forward rotation [N m]."""
+    """Torque of the water on the shaft [N m], positive in forward rotation."""
     opening, omega, q, density_ratio = operating_point(out, tables, device)
     return density_ratio * chart_torque(tables.floats, tables.valves[device["valve"]]["data"], opening, omega, q)
 
@@ -71,7 +71,7 @@ def generator_holds_speed(t, tables, device):
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    """Write the rate of the speed of a free shaft into `dydt`, and raise out[RATE] to its rate limit."""
+    """Write the rate of the speed of a free shaft to `dydt`, and raise out[RATE] to its rate limit."""
     floats, at = tables.floats, device["data"]
     if floats[at + MODE] == HELD_SPEED:
         return
@@ -90,7 +90,7 @@ def move(t, y, dydt, out, tables, device):
 
 @njit
 def shaft_rate(out, tables, device):
-    """Rate at which the water brakes a free shaft [1/s]."""
+    """Rate [1/s] at which the water brakes a free shaft."""
     floats = tables.floats
     opening, omega, q, density_ratio = operating_point(out, tables, device)
     if opening <= 0.0:
@@ -101,7 +101,7 @@ def shaft_rate(out, tables, device):
 
 @njit
 def power(t, y, dydt, out, tables, device):
-    """Power supplied to the shaft, rate of its kinetic energy, and minus the power that it takes from the water [W]."""
+    """(power supplied to the shaft, rate of its kinetic energy, minus the power that it takes from the water) [W]."""
     floats, at = tables.floats, device["data"]
     omega = out[tables.layout[0]["drive"] + device["valve"]]
     taken = -turbine_torque(out, tables, device) * omega
@@ -113,7 +113,7 @@ def power(t, y, dydt, out, tables, device):
 
 @njit
 def value(t, y, out, tables, device, quantity):
-    """Value of a quantity: 0 head [m], 1 speed [rad/s], 2 torque [N m], 3 power at the shaft [W], 4 opening."""
+    """Head [m] (quantity 0), speed [rad/s] (1), torque [N m] (2), power at the shaft [W] (3), or opening (4)."""
     st, k = tables.settings[0], device["valve"]
     opening, omega, q, _ = operating_point(out, tables, device)
     if quantity == 0:
@@ -139,7 +139,7 @@ def outside(out, tables, device):
 
 @njit
 def stiffness(tables, k):
-    """Decrease of the drop across turbine k per mass flow, caused by the adjacent pipes [Pa s/kg]."""
+    """Decrease of the drop across turbine k per increase of its mass flow [Pa s/kg], caused by the adjacent pipes."""
     nodes, total = tables.nodes, 0.0
     for i in (tables.valves[k]["from_node"], tables.valves[k]["to_node"]):
         if nodes[i]["kind"] == JUNCTION and nodes[i]["admittance"] > 0.0:
@@ -149,21 +149,30 @@ def stiffness(tables, k):
 
 @njit
 def step(out, tables, k, g, m, drop, denser, wide):
-    """a [kg/s] and s [kg/s/Pa] of the Newton step `chart_step`, from the drop of heads at the upstream density."""
+    """(a [kg/s], s [kg/s/Pa]) of `chart_step` for turbine k; arguments as for `restriction_step`.
+
+    The drop of head, times rho g with the upstream density, replaces `drop`.
+    """
     rho, fall = head_drop(tables, out, k)
     return turbine_step(tables, out, k, rho, g, m, fall)
 
 
 @njit
 def slope(out, tables, k, g, drop):
-    """Derivative of the mass flow of turbine k by its drop [kg/s/Pa]; 0 with shut vanes."""
+    """Derivative [kg/s/Pa] of the mass flow of turbine k by its drop; 0 with shut vanes.
+
+    g : conductance [kg2/s2/Pa]; drop : [Pa]
+    """
     m = out[tables.layout[0]["valve"] + k]
     return turbine_step(tables, out, k, tables.settings[0]["rho"], g, m, drop)[1] if g > 0.0 else 0.0
 
 
 @njit
 def turbine_step(tables, out, k, rho, g, m, drop):
-    """`chart_step` of a turbine at its present speed, for fluid of density rho [kg/m3]."""
+    """(a, s) of `chart_step` for turbine k at its present speed, with fluid of density rho [kg/m3].
+
+    g, m, drop : as for `chart_step`
+    """
     weight, omega = rho * tables.settings[0]["gravity"], out[tables.layout[0]["drive"] + k]
     opening, stiff = vane_opening(tables, k, g), stiffness(tables, k)
     return chart_step(tables.floats, tables.valves[k]["data"], opening, omega, rho, weight, stiff, g, m, drop, m / rho)

@@ -24,9 +24,10 @@ CURVES, RAYS, SPEED, FLOW, SHUT_VANES, OWN = 0, 1, 2, 3, 4, 5
 
 @njit
 def torque_between_rays(share_1, share_2, root_1, root_2, torque_1, torque_2):
-    """T, torque over head, between two rays: linear along the line between their points at a head of 1 m.
+    """Torque over head T at a point between two rays; at a head of 1 m it is linear on the line between their points.
 
-    share_1, share_2 : shares of the ray directions in the direction of the point; root, torque : S and T on both rays
+    share_1, share_2 : shares of the directions of the rays in the direction of the point
+    root_1, root_2, torque_1, torque_2 : root of head and torque over head on both rays
     """
     weight_1, weight_2 = share_1 * max(root_1, LEAST_ROOT), share_2 * max(root_2, LEAST_ROOT)
     return (weight_1 * torque_1 + weight_2 * torque_2) / (weight_1 + weight_2)
@@ -34,9 +35,11 @@ def torque_between_rays(share_1, share_2, root_1, root_2, torque_1, torque_2):
 
 @njit
 def opening_share(floats, at, opening):
-    """Curve at or below an opening; share of the next curve in the interpolation; and a factor of flow and torque.
+    """(curve, share, factor) of an opening, for the interpolation between the curves of a chart.
 
-    The factor is the opening over the least opening of the chart, 1 if the opening is above the least.
+    curve : number of the curve at or below the opening; share : weight of the next curve
+    factor : factor of flow and torque: the opening over the least opening of the chart, or 1 if the opening is above it
+    floats[at:] : parameters of the chart
     """
     count = int(floats[at + CURVES])
     if opening <= floats[at + OWN]:
@@ -50,7 +53,7 @@ def opening_share(floats, at, opening):
 
 @njit
 def interpolate_curves(floats, first, stride, k, share):
-    """Value of curve k at index `first + k stride`, interpolated to the next curve by `share`."""
+    """Value of curve k, floats[first + k stride], interpolated to the value of the next curve by the weight `share`."""
     value = floats[first + k * stride]
     if share > 0.0:
         value += share * (floats[first + (k + 1) * stride] - value)
@@ -59,14 +62,17 @@ def interpolate_curves(floats, first, stride, k, share):
 
 @njit
 def capacity(floats, at, opening):
-    """Flow at u = 1 and a head of 1 m, over the flow scale of the chart [-]."""
+    """Capacity at an opening [-]: greatest flow of its curve at a head of 1 m, over the flow scale of the chart.
+
+    floats[at:] : parameters of the chart
+    """
     k, share, least = opening_share(floats, at, opening)
     return least * interpolate_curves(floats, at + OWN + int(floats[at + CURVES]), 1, k, share)
 
 
 @njit
 def ray_below(floats, first, count, angle):
-    """Index of the last of `count` ascending angles, from index `first` on, that is at or below `angle`."""
+    """Number of the last ray whose angle is at or below `angle`; floats[first:] : `count` ascending angles [rad]"""
     low, high = 0, count - 1
     while high - low > 1:
         middle = (low + high) // 2
@@ -79,14 +85,21 @@ def ray_below(floats, first, count, angle):
 
 @njit
 def operating_angle(n, u):
-    """Angle of the point (n, u) about the origin, from -pi / 2 to 3 pi / 2 [rad]."""
+    """Angle of the point (n, u) about the origin [rad], from -pi / 2 to 3 pi / 2.
+
+    n : relative speed; u : relative flow
+    """
     angle = atan2(u, n)
     return angle + 2.0 * pi if angle < -0.5 * pi else angle
 
 
 @njit
 def chart_at(floats, at, opening, omega, flow):
-    """Root of head, its slopes over omega and flow, torque [N m] and its slope over omega, at an opening above 0."""
+    """(root of head, its derivatives by omega and by flow, torque [N m], its derivative by omega) of a turbine.
+
+    The head is root |root| [m]. floats[at:] : parameters of the hill chart
+    opening : above 0; omega : angular velocity [rad/s]; flow : [m3/s]
+    """
     curves, rays = int(floats[at + CURVES]), int(floats[at + RAYS])
     k, share, least = opening_share(floats, at, opening)
     flow_scale = floats[at + FLOW] * least * interpolate_curves(floats, at + OWN + curves, 1, k, share)
@@ -123,7 +136,10 @@ def chart_at(floats, at, opening, omega, flow):
 
 @njit
 def chart_torque(floats, at, opening, omega, flow):
-    """Torque on the shaft, positive in forward rotation [N m]; with shut vanes, the drag of the water."""
+    """Torque of the water on the shaft [N m], positive in forward rotation; with shut vanes, the drag of the water.
+
+    Arguments as for `chart_at`, but the opening may be 0.
+    """
     if opening <= 0.0:
         return floats[at + SHUT_VANES] * abs(omega) * omega
     return chart_at(floats, at, opening, omega, flow)[3]
@@ -131,14 +147,17 @@ def chart_torque(floats, at, opening, omega, flow):
 
 @njit
 def chart_head(floats, at, opening, omega, flow):
-    """Head that the turbine takes [m] and its slope over flow [s/m2], at an opening above 0."""
+    """(head that the turbine takes [m], its slope over the flow [s/m2]); arguments as for `chart_at`."""
     root, _, by_flow, _, _ = chart_at(floats, at, opening, omega, flow)
     return root * abs(root), 2.0 * abs(root) * by_flow
 
 
 @njit
 def is_outside(floats, at, opening, omega, flow):
-    """True if the angle of the operating point is outside the given points of the chart."""
+    """True if the operating point is outside the angles of the given points of the chart; False with shut vanes.
+
+    Arguments as for `chart_at`, but the opening may be 0.
+    """
     curves = int(floats[at + CURVES])
     if opening <= 0.0:
         return False
@@ -154,16 +173,20 @@ def is_outside(floats, at, opening, omega, flow):
 
 @njit
 def flow_bound(floats, at, opening, weight, drop):
-    """Upper bound of the flow at a pressure drop and a usual speed [m3/s]."""
+    """Upper bound of the flow [m3/s] at a pressure drop [Pa] and a usual speed.
+
+    floats[at:] : parameters of the chart; weight : rho g [N/m3]
+    """
     return floats[at + FLOW] * capacity(floats, at, opening) * (1.0 + sqrt(abs(drop) / weight))
 
 
 @njit
 def chart_flow(floats, at, opening, omega, weight, stiff, drop, start, flow):
-    """Flow [m3/s] at which weight H + stiff (flow - start) = drop [Pa], by safeguarded Newton steps from `flow`.
+    """Flow [m3/s] at which weight H + stiff (flow - start) = drop [Pa], by Newton's method with bounds.
 
-    H : head that the turbine takes [m]; weight : rho g [N/m3]; stiff : decrease of the drop per flow, caused by the
-    adjacent pipes [Pa s/m3]; start : flow at the given drop [m3/s]
+    H : head that the turbine takes [m]; weight : rho g [N/m3]; start : flow at the given drop [m3/s]
+    stiff : decrease of the drop per flow, caused by the adjacent pipes [Pa s/m3]; flow : start value of the search
+    Other arguments as for `chart_at`.
     """
     low, high, scale = -1e300, 1e300, flow_bound(floats, at, opening, weight, drop)
     for _ in range(200):
@@ -190,12 +213,15 @@ def chart_flow(floats, at, opening, omega, weight, stiff, drop, start, flow):
 
 @njit
 def chart_step(floats, at, opening, omega, rho, weight, stiff, g, m, drop, first):
-    """a [kg/s] and s [kg/s/Pa] of the next Newton step of a turbine, dM = a + s d(drop), M the mass flow.
+    """(a [kg/s], s [kg/s/Pa]) of the next Newton step dM = a + s d(drop) of a turbine, M the mass flow.
 
     m : mass flow before the step [kg/s]; drop : drop across the turbine [Pa]
-    The slope is that of the chord between the present flow and the flow at which turbine and adjacent pipes agree. It
-    is negative where the head falls with rising flow.
+    rho, weight : density [kg/m3] and rho g [N/m3] of the fluid
+    stiff : decrease of the drop per mass flow, caused by the adjacent pipes [Pa s/kg]
     g : conductance, which sets the least slope; first : start of the search for the flow of agreement [m3/s]
+    s is the slope of the chord between the present flow and the flow at which turbine and adjacent pipes agree. It is
+    negative where the head falls with rising flow.
+    Other arguments as for `chart_at`.
     """
     q = m / rho
     head, slope = chart_head(floats, at, opening, omega, q)

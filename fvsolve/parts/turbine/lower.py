@@ -1,4 +1,4 @@
-"""Rows of turbines in the tables of a model, and their initial steady state."""
+"""Turbines in the tables of a model, and their initial steady state."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FLOW_TOLERANCE = 1e-6  # pressure difference regarded as zero, over the pressure
 
 
 class TurbineRows(ShaftLowering, Device, kind="turbine"):
-    """Model table rows of turbines: restrictions that follow their hill chart."""
+    """Conversion to table rows of turbines: restrictions that follow their hill chart."""
 
     law = law
     quantities = ("head", "speed", "torque", "power", "opening")
@@ -79,7 +79,7 @@ class TurbineRows(ShaftLowering, Device, kind="turbine"):
         return Edge(i, j, newton, float(first), drives=omega != 0.0)
 
     def follow(self, start, k) -> None:
-        """Do nothing: `begin` sets the drop."""
+        """Do nothing: the function `begin` sets the drop of turbine k."""
 
     def begin(self, start, part, row) -> list[str]:
         draft, valve, moving = start.draft, start.valves[int(row["valve"])], []
@@ -111,7 +111,7 @@ class TurbineRows(ShaftLowering, Device, kind="turbine"):
 
 
 def folded_curve_notice(start, name: str, part, valve) -> list[Notice]:
-    """Notice of a turbine with folded curves between two nodes that are not junctions."""
+    """Notice if a turbine with folded curves is between two nodes that are not junctions; as a list."""
     ends = (start.nodes["kind"][int(valve[key])] for key in ("from_node", "to_node"))
     if rec.JUNCTION in ends or not any(map(has_fold, part.hill_chart.curves)):
         return []
@@ -122,7 +122,10 @@ def folded_curve_notice(start, name: str, part, valve) -> list[Notice]:
 
 
 def unusual_inertia_notice(start, name: str, part, valve) -> list[Notice]:
-    """Notice of an inertia far from the usual value at the greatest power of the chart at the initial head."""
+    """Notice if the inertia of a turbine is far from the usual value for its power; as a list.
+
+    The power is the greatest of the hill chart at the initial head.
+    """
     speed, ends = float(np.max(np.abs(part.speed.value))), [int(valve["from_node"]), int(valve["to_node"])]
     if part.inertia is None or speed == 0.0 or start.weight == 0.0:
         return []
@@ -134,7 +137,7 @@ def unusual_inertia_notice(start, name: str, part, valve) -> list[Notice]:
 
 
 def has_fold(curve) -> bool:
-    """True if unit speed in forward rotation rises with the angle of the points somewhere on a curve."""
+    """True if the unit speed, where it is positive, rises somewhere with the angle of the points of a curve."""
     points = list(zip(curve.speed, curve.flow, strict=True))
     rising = points[0][0] * points[1][1] > points[0][1] * points[1][0]
     ahead = points if rising else points[::-1]

@@ -20,7 +20,7 @@ STANDING, BACKWARD = 0.5 * math.pi, math.pi  # angles of a runner at rest and in
 
 
 def chart_numbers(part, weight: float) -> list[float]:
-    """Numbers of a chart in the order stated in `law_chart`; weight = rho g [N/m3]."""
+    """Parameters of the hill chart of a turbine, in the order that `law_chart` states; weight : rho g [N/m3]"""
     chart, d = part.hill_chart, part.diameter
     speed = max(abs(n) for entry in chart.curves for n in entry.speed) * math.pi / 30.0 / d
     flow = max(q for entry in chart.curves for q in entry.flow) * d * d
@@ -42,12 +42,16 @@ def chart_numbers(part, weight: float) -> list[float]:
 
 
 def nodes_of(curve, part, speed: float, flow: float, torque_scale: float, weight: float):
-    """Values of a curve on its own rays from the origin.
+    """(capacity, angles, directions, roots, torques, range) of a curve: its values on its own rays from the origin.
 
-    Returns the capacity [-], angles [rad], directions (cosine, sine), roots of head, torques over head [N], and the
-    (least, greatest) given angle. The root of head on a ray is 1 over the distance of the curve from the origin.
-    Assumptions outside the given points: at standstill, the flow of the last point forward and the greatest flow of the
-    curve in reverse; no head at backward rotation without flow; zero forward flow at the distance of the first point.
+    capacity : greatest flow at 1 m over the flow scale [-]; angles : angles of the rays [rad]
+    directions : (cosine, sine) of each ray; roots : roots of head, 1 over the distance of the curve from the origin
+    torques : torque over head [N]; range : (least, greatest) angle of the given points [rad]
+    speed, flow : scales of speed [rad/s] and flow [m3/s] at 1 m; torque_scale : weight flow / speed
+    weight : rho g [N/m3]
+    Assumptions outside the given points: at standstill, forward flow is that of the last point, and reverse flow is the
+    greatest flow of the curve; no head at backward rotation without flow; zero forward flow at the distance of the
+    first point from the origin.
     """
     d = part.diameter
     capacity = max(curve.flow) * d * d / flow
@@ -67,10 +71,11 @@ def nodes_of(curve, part, speed: float, flow: float, torque_scale: float, weight
 
 
 def nodes_before(first, n: float, u: float, torque: float, torque_scale: float) -> list:
-    """(angle, root of head, torque over head) of rays below the first angle of a curve.
+    """(angle, root of head, torque over head) of each ray below the first angle of a curve, down to -pi / 2.
 
-    They reach down to reverse flow at standstill. first : these values on the ray of the first point
-    n, u, torque : speed, flow and torque over head of the first point
+    There the flow is reverse and the runner stands still. first : these values on the ray of the first point
+    n, u, torque : relative speed, relative flow and torque over head of the first point
+    torque_scale : as for `pump_nodes`
     """
     angle, root, _ = first
     nodes = []
@@ -82,10 +87,11 @@ def nodes_before(first, n: float, u: float, torque: float, torque_scale: float) 
 
 
 def nodes_behind(last, n: float, u: float, torque: float, torque_scale: float) -> list:
-    """(angle, root of head, torque over head) of rays above the last angle of a curve.
+    """(angle, root of head, torque over head) of each ray above the last angle of a curve, up to 3 pi / 2.
 
-    They reach up to reverse flow at standstill. last : these values on the ray of the last point
-    n, u, torque : speed, flow and torque over head of the last point
+    There the flow is reverse and the runner stands still. last : these values on the ray of the last point
+    n, u, torque : relative speed, relative flow and torque over head of the last point
+    torque_scale : as for `pump_nodes`
     """
     angle, root, _ = last
     nodes = []
@@ -97,10 +103,12 @@ def nodes_behind(last, n: float, u: float, torque: float, torque_scale: float) -
 
 
 def pump_nodes(angle: float, root: float, torque: float, torque_scale: float, direction: float) -> list:
-    """(angle, root of head, torque over head) of rays from a turning runner to reverse flow at standstill.
+    """(angle, root of head, torque over head) of each ray from a turning runner to reverse flow at standstill.
 
-    There the root is -1. direction : -1 for forward rotation, 1 for backward. The shaft power is PUMP_RATIO times the
-    hydraulic power, plus its excess at the first ray.
+    The root is -1 at standstill.
+    The shaft power is PUMP_RATIO times the hydraulic power, plus its surplus at the first ray.
+    angle, root, torque : these values on the first ray; direction : -1 for forward rotation, 1 for backward rotation
+    torque_scale : torque over head [N] at which shaft power is hydraulic power, at equal relative speed and flow
     """
     first_tilt = -angle if direction < 0.0 else angle
     count = max(2, math.ceil((STANDING - first_tilt) / SPACING))
@@ -119,13 +127,20 @@ def pump_nodes(angle: float, root: float, torque: float, torque_scale: float, di
 
 
 def root_on_line(first_tilt: float, root: float, tilt: float) -> float:
-    """Root of head at an angle below the speed axis, on the line from `root` at `first_tilt` to -1 at standstill."""
+    """Root of head on a ray in the quadrants of reverse flow, on the line from the first ray to -1 at standstill.
+
+    first_tilt, tilt : angles of the first ray and of this ray below the axis of speed [rad]; root : on the first ray
+    """
     share = math.cos(tilt) / math.cos(first_tilt)
     return share * root - (math.sin(tilt) - share * math.sin(first_tilt))
 
 
 def merge_angles(angles: np.ndarray) -> np.ndarray:
-    """Ascending angles of all rays over a full turn from reverse flow at standstill; close angles are merged [rad]."""
+    """Angles [rad] of the rays of all curves, ascending, with those closer than ANGLE_TOLERANCE merged.
+
+    They go from reverse flow at standstill (-pi / 2) over a full turn to 3 pi / 2, both included. The angle of a point
+    is atan2(u, n), with its relative flow u and relative speed n.
+    """
     inner = np.sort(angles[(angles > -STANDING + ANGLE_TOLERANCE) & (angles < 3.0 * STANDING - ANGLE_TOLERANCE)])
     distinct = inner[np.concatenate([[True], np.diff(inner) > ANGLE_TOLERANCE])]
     return np.concatenate([[-STANDING], distinct, [3.0 * STANDING]])
@@ -134,7 +149,11 @@ def merge_angles(angles: np.ndarray) -> np.ndarray:
 def curve_at_rays(
     ray_directions: np.ndarray, rays: np.ndarray, angles, directions, roots, torques
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Roots of head and torques over head of a curve on all rays, on straight lines between its own rays."""
+    """(roots of head, torques over head) of a curve on all rays; between its own rays the curve is a straight line.
+
+    ray_directions, rays : directions (cosine, sine) and angles [rad] of all rays
+    angles, directions, roots, torques : of the own rays of the curve, as from `nodes_of`
+    """
     i = np.clip(np.searchsorted(angles, rays) - 1, 0, len(angles) - 2)
     (a, b), (c, d), (x, y) = directions[i].T, directions[i + 1].T, ray_directions.T
     share_1, share_2 = (x * d - y * c) / (a * d - b * c), (a * y - b * x) / (a * d - b * c)

@@ -72,7 +72,7 @@ class Turbine(TwoPort, kind="turbine"):
 
 
 def excess_power_point(curve: OpeningCurve, weight: float) -> str | None:
-    """Text about the first point or line where the shaft power exceeds the hydraulic power; None without excess."""
+    """Text on the first point or line of a curve where shaft power exceeds hydraulic power; None for a valid curve."""
     points = list(zip(curve.speed, curve.flow, (t * pi / 30.0 for t in curve.torques(weight)), strict=True))
     for n, q, t in points:
         if t * n > weight * q + ROUNDING * weight * abs(q):

@@ -1,4 +1,4 @@
-"""Rows of valves and orifices in the tables of a model."""
+"""Valves and orifices in the tables of a model."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from fvsolve.model.lowering import Restriction
 
 
 class ValveRows(Restriction, kind="valve"):
-    """Model table rows of valves: a square-root law whose conductance follows a schedule of the opening."""
+    """Conversion to table rows of valves: a square-root law, whose conductance follows a schedule of the opening."""
 
     def restriction(self, draft, name, link, row) -> None:
         row["schedule"] = draft.schedules.add(link.opening)

@@ -35,7 +35,7 @@ WATER_15, WATER_60F = 1000.0, 999.016  # densities for which Kv and Cv are defin
 
 @dataclass(frozen=True, eq=False)
 class Characteristic:
-    """Relative flow area over stem opening, linear between entries.
+    """Relative flow area over the opening of the stem, linear between entries.
 
     opening : float64[n]  ascending from 0 to 1; flow_area : float64[n]  over the flow area at full opening, from 0
     """
@@ -50,7 +50,7 @@ class Characteristic:
         return hash((self.opening.tobytes(), self.flow_area.tobytes()))
 
     def table(self) -> dict[str, list[float]]:
-        """Table as in a case file."""
+        """Characteristic as a table of a case file: key -> list."""
         return {"opening": self.opening.tolist(), "flow_area": self.flow_area.tolist()}
 
 
@@ -153,10 +153,10 @@ class Sized(Table):
         return faults + [((), text)]
 
     def flow_area(self) -> float:
-        """Product Cd A of discharge coefficient and area at full opening [m2], such that q = Cd A sqrt(2 dp / rho).
+        """Product Cd A [m2] of discharge coefficient and area at full opening, such that q = Cd A sqrt(2 dp / rho).
 
-        A loss coefficient K gives A / sqrt(K); Kv gives Kv / 3600 / sqrt(2e5 / 1000); Cv likewise in gallons per minute
-        and psi at 60 degF.
+        A loss coefficient K gives A / sqrt(K). Kv gives Kv / 3600 / sqrt(2e5 / 1000); Cv is converted in the same way
+        from US gallons per minute and psi, with the density of water at 60 degF.
         """
         if self.Kv is not None:
             return self.Kv / 3600.0 / math.sqrt(2.0 * 1e5 / WATER_15)

@@ -15,8 +15,8 @@ LONGEST = Fraction(1 << 64)  # a larger radius counts as infinite
 def ssp_radius(method: Method) -> float:
     """SSP radius r of a method: if Euler steps up to h do not increase a norm, steps of the method up to r h do not.
 
-    It is the greatest r with (I + r K)^-1 1 >= 0 and r K (I + r K)^-1 >= 0 for K = [[A, 0], [b^T, 0]]; 0 if there is
-    none, inf if every r is possible.
+    It is the greatest r with (I + r K)^-1 e >= 0 and r K (I + r K)^-1 >= 0, for K = [[A, 0], [b^T, 0]] and the vector e
+    of ones. It is 0 if no r > 0 is possible, inf if every r is possible.
     """
     k = _used(method)
     if any(x < 0 for row in k for x in row) or not _fills_in(k):
@@ -38,7 +38,7 @@ def ssp_radius(method: Method) -> float:
 
 @functools.cache
 def in_euler_steps(method: Method) -> bool:
-    """True if a method is explicit, has SSP radius 1 and no error estimate, and its second stage is at the step's end.
+    """True if a method is explicit, has SSP radius 1 and no error estimate, and c_2 = 1 if it has more than one stage.
 
     Then every stage is a convex combination of Euler steps of the full length.
     """
@@ -67,7 +67,10 @@ def _fills_in(k: list[list]) -> bool:
 
 
 def _monotone(k: list[list], r: Fraction) -> bool:
-    """True if both conditions of `ssp_radius` hold at r: (I + r K)^-1 [1, r K] has no negative entry; exact."""
+    """True if both conditions of `ssp_radius` hold at r: no entry of (I + r K)^-1 [e, r K] is negative; exact.
+
+    k : matrix K
+    """
     n = len(k)
     rows = [[(i == j) + r * k[i][j] for j in range(n)] + [Fraction(1)] + [r * x for x in k[i]] for i in range(n)]
     for i in range(n):

@@ -19,7 +19,7 @@ class Facts:
     error_order : order of the embedded solution, 0 without an embedded solution
     digits : number of significant digits in the published coefficients, None if they are exact
     kind : explicit, diagonal (stages solved one by one), full (stages solved together) or linear (Rosenbrock)
-    angle : alpha of A(alpha) stability [degrees], None if no ray is stable
+    angle : alpha of A(alpha) stability [degrees], None if the negative real axis is not stable
     real_interval, imaginary_interval : lengths of the stable intervals of h lambda on the negative real and on the
     positive imaginary axis, inf if unbounded
     ssp_radius : greatest step in Euler steps in which a norm cannot grow, inf if unbounded

@@ -65,7 +65,7 @@ class StabilityFunction:
 def stability_function(method: str | Method) -> StabilityFunction:
     """Stability function R of a method in lowest terms, as a quotient of determinants.
 
-    It is equation (26) of docs/course.md; for an explicit method (16).
+    Its formula is equation (26) of docs/course.md, and equation (16) for an explicit method.
     """
     return _lowest(method_named(method))
 
@@ -85,7 +85,10 @@ def _lowest(method: Method) -> StabilityFunction:
 
 
 def by_determinants(a: Sequence[Sequence], b: Sequence) -> tuple[Polynomial, Polynomial]:
-    """Numerator det(I - s (A - 1 b^T)) and denominator det(I - s A) of R(s), equations (16), (26) of docs/course.md."""
+    """Numerator det(I - s (A - 1 b^T)) and denominator det(I - s A) of R(s), equations (16), (26) of docs/course.md.
+
+    a, b : A and b of the Butcher array; 1 is the vector of ones.
+    """
     return determinant([[x - y for x, y in zip(row, b, strict=True)] for row in a]), determinant(a)
 
 
@@ -102,7 +105,10 @@ def determinant(m: Sequence[Sequence]) -> Polynomial:
 
 
 def chopped(p: Polynomial, uncertainty: Polynomial) -> Polynomial:
-    """Polynomial p without the coefficients that do not exceed their uncertainty."""
+    """Polynomial p without the coefficients that do not exceed their uncertainty.
+
+    uncertainty : polynomial whose coefficients are bounds of the errors of the coefficients of p
+    """
     bounds = [*uncertainty.coefficients, *[Fraction(0)] * len(p.coefficients)]
     return Polynomial(x if abs(x) > bound else Fraction(0) for x, bound in zip(p.coefficients, bounds, strict=False))
 

@@ -29,7 +29,7 @@ def i_stable(r: StabilityFunction) -> bool:
 
 
 def a_stable(r: StabilityFunction) -> bool:
-    """True if |R(s)| <= 1 for all Re s <= 0: I-stable, and all poles in the right half plane (5.8)."""
+    """True if |R(s)| <= 1 for all Re s <= 0: I-stable, and all poles in the right half plane (docs/course.md, 5.8)."""
     return i_stable(r) and roots_right(r.denominator)
 
 
@@ -102,7 +102,7 @@ def _along(p: Polynomial, cosine: Fraction) -> Polynomial:
 
 
 def _square_doubt(r: StabilityFunction) -> Polynomial:
-    """Uncertainty of the coefficients of N^2 - D^2, as a polynomial, for the rounded coefficients of R = N / D."""
+    """Uncertainty of the coefficients of N^2 - D^2, as a polynomial, due to the rounded coefficients of R = N / D."""
     pairs = zip((r.numerator, r.denominator), r.doubts, strict=True)
     return sum((2 * Polynomial(map(abs, p.coefficients)) * uncertainty for p, uncertainty in pairs), Polynomial([]))
 

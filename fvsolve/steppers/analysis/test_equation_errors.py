@@ -14,8 +14,9 @@ from fvsolve.validation import COUNT_FROM_ZERO, NAME, NUMBER, POINT, POSITIVE, v
 
 @validated(method=NAME, lam=POINT, h=NUMBER, y=POINT)
 def local_error(method: str | Method, lam: complex, h: float, y: complex = 1.0) -> complex:
-    """Error R(h lambda) y - exp(h lambda) y of one step from y (5), (28), (29), of order h^(p+1).
+    """Error R(h lambda) y - exp(h lambda) y of one step from y, of order h^(p+1).
 
+    It is given by equations (5), (28), (29) of docs/course.md.
     R : stability function; p : order of the method; lam : lambda [1/s]; h : step [s]
     """
     r = analyse(method).stability_function
@@ -24,9 +25,9 @@ def local_error(method: str | Method, lam: complex, h: float, y: complex = 1.0) 
 
 @validated(method=NAME, lam=POINT, h=NUMBER, steps=COUNT_FROM_ZERO, y=POINT)
 def global_error(method: str | Method, lam: complex, h: float, steps: int, y: complex = 1.0) -> complex:
-    """Error R(h lambda)^n y - exp(n h lambda) y after n steps from y (6), of order h^p at a fixed time n h.
+    """Error R(h lambda)^n y - exp(n h lambda) y after n = `steps` steps from y, of order h^p at a fixed time n h.
 
-    It is the sum of the propagated local errors e_k: sum_k R^(n-1-k) e_k+1.
+    It is the sum of the propagated local errors e_k: sum_k R^(n-1-k) e_k+1 (docs/course.md, (6)).
     R : stability function; p : order of the method; lam : lambda [1/s]; h : step [s]
     """
     r = analyse(method).stability_function
@@ -38,7 +39,7 @@ def seen_frequency(method: str | Method, omega: float, h: float) -> float:
     """Frequency of the numerical solution [rad/s] for an oscillation with the frequency `omega` [rad/s].
 
     It is |arg R(i omega h)| / h with the stability function R and the step h [s]. It never exceeds pi / h: an A-stable
-    method aliases faster oscillations to slower oscillations (5.8).
+    method aliases faster oscillations to slower oscillations (docs/course.md, 5.8).
     """
     r = analyse(method).stability_function
     return float(abs(np.angle(r(1j * omega * h))) / h)

@@ -58,7 +58,7 @@ class Conditions:
     def residual(self, tree: Tree, b: Sequence):
         """Residual of the condition of a tree for the weights b; 0 if it holds to the precision of the coefficients.
 
-        If this precision is not sufficient to separate 1 / gamma from 0, the condition counts as not satisfied.
+        If the uncertainty of the left side is not below 1 / gamma, the condition counts as not satisfied.
         """
         left = sum((x * y for x, y in zip(b, self._phi(tree, False), strict=True) if x != 0), Fraction(0))
         residual = left - Fraction(1, density(tree))
@@ -74,7 +74,7 @@ class Conditions:
         return all(self.residual((nodes, i), b) == 0 for i in range(len(trees(nodes))))
 
     def order(self, b: Sequence) -> int:
-        """Order with the weights b: greatest p such that all conditions up to p nodes hold, at most 12.
+        """Order of a method with the weights b: greatest p such that all conditions up to p nodes hold, at most 12.
 
         The order is at most twice the number of stages (Butcher 1964).
         """
@@ -108,7 +108,10 @@ class Conditions:
 
 
 def short(x) -> Fraction:
-    """Fraction within 2^-257 of the exact number x, which is more accurate than any published coefficient."""
+    """Fraction within 2^-257 of the exact number x, or of the middle of its bounds if x is irrational.
+
+    This is more accurate than any published coefficient.
+    """
     if not isinstance(x, Fraction):
         x = sum(x.bracket()) / 2
     return Fraction(round(x * (1 << BITS)), 1 << BITS)

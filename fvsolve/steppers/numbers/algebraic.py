@@ -16,9 +16,9 @@ BITS = 160  # precision of the first bracket of a root: enough for most signs an
 
 
 class Field:
-    """Rational numbers extended by one root theta of a polynomial; multiple roots of the polynomial are made single.
+    """Field of the rational numbers and a root theta of a polynomial.
 
-    name : name of theta in texts; near : value near theta
+    name : name of theta in texts; near : value near theta. Multiple roots of the polynomial are made single.
     """
 
     def __init__(self, name: str, polynomial: Polynomial, near: float):
@@ -45,7 +45,7 @@ class Field:
 
 
 class SquareRoot(Field):
-    """Rational numbers extended by the square root of the integer d."""
+    """Field of the rational numbers and the square root of the integer d."""
 
     def __init__(self, d: int):
         self.name = f"sqrt({d})"
@@ -60,7 +60,10 @@ class SquareRoot(Field):
 
 
 class Algebraic:
-    """Irrational number of a `Field`, as coefficients of powers of theta; operations return fractions if rational."""
+    """Irrational number of a `Field`, as coefficients of powers of its root theta.
+
+    Operations return a fraction where the result is rational.
+    """
 
     __slots__ = ("field", "parts")
 
@@ -140,7 +143,7 @@ class Algebraic:
         return number(self.field, (s1 / r1.coefficients[0]).coefficients)
 
     def bracket(self) -> tuple[Fraction, Fraction]:
-        """Lower and upper bound of the number, by interval arithmetic with the bounds of theta."""
+        """(lower, upper) bound of the number, by interval arithmetic with the bounds of theta."""
         low = high = Fraction(0)
         for value in reversed(self.parts):
             ends = [low * self.field.low, low * self.field.high, high * self.field.low, high * self.field.high]
@@ -148,7 +151,7 @@ class Algebraic:
         return low, high
 
     def sign(self) -> int:
-        """Sign: -1, 0 or 1, exact."""
+        """Exact sign of the number: -1, 0 or 1."""
         low, high = self.bracket()
         if low <= 0 <= high and self._vanishes():
             return 0
@@ -186,7 +189,7 @@ class Algebraic:
         return hash((id(self.field), self.parts))
 
     def __float__(self) -> float:
-        """Nearest float."""
+        """Float nearest to the number."""
         low, high = self.bracket()
         bits = BITS
         while float(low) != float(high):
@@ -241,7 +244,10 @@ def _term(value: Fraction, symbol: str, sign: str) -> str:
 
 
 def _isolated(p: Polynomial, near: Fraction, name: str) -> tuple[Fraction, Fraction]:
-    """Interval around `near` that contains exactly one root of the polynomial p, where p changes its sign."""
+    """Interval around `near` that contains exactly one root of the polynomial p, where p changes its sign.
+
+    Raises ValueError if no such interval is found; name : name of the root in the message
+    """
     width = Fraction(1, 1 << 40)
     while width <= 1 << 20:
         low, high = near - width, near + width

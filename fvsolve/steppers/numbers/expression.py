@@ -30,7 +30,7 @@ def value_of(text: str, names: Mapping | None = None):
 
 
 def root(name: str, polynomial: str, near: float):
-    """Root of a polynomial in x that is nearest to `near`, as an exact number that is printed as `name`.
+    """Root nearest to `near` of a polynomial in x, as an exact number that is printed as `name`.
 
     polynomial : text such as "x^3-3x^2+3x/2-1/6"
     """
@@ -41,7 +41,7 @@ def root(name: str, polynomial: str, near: float):
 
 
 def digits(text: str) -> int:
-    """Greatest number of significant digits of a decimal in `text`; 0 without decimals."""
+    """Greatest number of significant digits of the decimals in `text`; 0 without decimals."""
     decimals = re.findall(r"\d*\.\d*", text)
     return max((len(decimal.replace(".", "").lstrip("0")) for decimal in decimals), default=0)
 

@@ -68,7 +68,7 @@ class Polynomial:
         return self * other
 
     def __truediv__(self, number) -> Polynomial:
-        """Divide by a number."""
+        """Polynomial divided by a number."""
         number = _as(number)
         if number.degree != 0:
             raise ZeroDivisionError("a polynomial can only be divided by a number other than 0")
@@ -103,7 +103,7 @@ class Polynomial:
         return Polynomial(k * x for k, x in enumerate(self.coefficients[1:], start=1))
 
     def gcd(self, other: Polynomial) -> Polynomial:
-        """Monic greatest common divisor."""
+        """Monic greatest common divisor of this and another polynomial."""
         a, b = self, other
         while b.coefficients:
             a, b = b, a % b

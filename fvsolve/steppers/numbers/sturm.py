@@ -98,7 +98,7 @@ def roots_right(p: Polynomial) -> bool:
 
 
 def _changes(polynomials: list[Polynomial], x, side: int) -> int:
-    """Number of sign changes along the Sturm chain at x, or at side * infinity."""
+    """Number of sign changes along a Sturm chain at x, or at side * infinity if x is None."""
     signs = [sign(q(x)) if x is not None else _far(q, side) for q in polynomials]
     signs = [s for s in signs if s != 0]
     return sum(a != b for a, b in zip(signs, signs[1:], strict=False))

@@ -14,7 +14,7 @@ SPLINE_DEGREE = 5  # degree of the spline through cumulative contents, for edges
 def basin_fields(basin, y: np.ndarray) -> dict[str, np.ndarray]:
     """Values in the cells of a basin, quantity -> float64[cells], from the state vector `y` of a model.
 
-    Quantities are deviations from the initial steady state; scalars are amounts in each cell.
+    Quantities of the flow are deviations from the initial steady state; scalars are amounts per area.
     """
     fields = dict(zip(basin.quantities, basin.deviations(y), strict=True))
     scalars = getattr(basin, "scalars", ())
@@ -22,7 +22,7 @@ def basin_fields(basin, y: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def variable_name(basin, quantity: str) -> str:
-    """Name of the variable for a quantity of a basin at the end of a run."""
+    """Name of the variable that is a quantity of a basin at the end of a run."""
     return f"{basin.name} at the end: {quantity}"
 
 
@@ -61,7 +61,8 @@ def coarse_contents(
 ) -> np.ndarray:
     """Integrals over the cells between the edges `coarse`, from integrals over the cells between the edges `fine`.
 
-    axis : axis of `fine_contents` along which the cells lie; degree : degree of the spline for edges that do not match
+    axis : axis of `fine_contents` along which the cells lie
+    degree : degree of the spline through cumulative integrals, used if the coarse edges are not among the fine edges
     """
     first = np.zeros_like(np.take(fine_contents, [0], axis=axis))
     cumulative = np.concatenate([first, np.cumsum(fine_contents, axis=axis)], axis=axis)

@@ -27,7 +27,7 @@ def pipes(case) -> dict[str, Pipe]:
 
 
 def pipes_with_cells(case) -> dict[str, Pipe]:
-    """Pipes that have cells, and so are not delay lines."""
+    """Pipes that have cells, and so are not delay lines, by name."""
     delayed = delay_lines(case)
     return {name: pipe for name, pipe in pipes(case).items() if name not in delayed}
 
@@ -38,13 +38,16 @@ def basins(case) -> dict[str, Basin]:
 
 
 def cell_counts(case) -> Counts:
-    """Numbers of cells that a study can refine: of pipes that are not delay lines, and of rectangular basins."""
+    """Numbers of cells that a study can refine: of pipes that are not delay lines, and of rectangular basins.
+
+    Returns dotted key, such as "links.main.cells" -> (cells,) of a pipe, or (cells along x, cells along y) of a basin.
+    """
     numbers: Counts = {f"links.{name}.cells": (pipe.cells,) for name, pipe in pipes_with_cells(case).items()}
     return numbers | {f"nodes.{name}.cells": basin.cells for name, basin in basins(case).items() if basin.cells}
 
 
 def basins_from_files(case) -> list[str]:
-    """Basins whose mesh is read from a file, so that it cannot be refined."""
+    """Names of the basins whose mesh is read from a file, so that it cannot be refined."""
     return [name for name, basin in basins(case).items() if basin.cells is None]
 
 
@@ -59,15 +62,18 @@ def scaled(cells_by_key: Counts, factor: float) -> Counts:
 
 
 def total_cells(case, cells_by_key: Counts) -> int:
-    """Total number of cells of a case with these numbers of cells, with basins whose mesh is a file."""
+    """Total number of cells of a case with these numbers of cells, including basins whose mesh comes from a file.
+
+    cells_by_key : as from `cell_counts`
+    """
     fixed = sum(case.meshes[name].area.size for name in basins_from_files(case))
     return fixed + sum(part_cells(case, key, numbers) for key, numbers in cells_by_key.items())
 
 
 def part_cells(case, key: str, numbers: tuple[int, ...]) -> int:
-    """Number of cells of the part with this key; holes of a rectangular basin have no cells.
+    """Number of cells of a pipe or basin; holes of a rectangular basin have no cells.
 
-    numbers : cells of the pipe, or along both sides of the basin
+    key : key of its cells, such as "links.main.cells"; numbers : cells of the pipe, or along both sides of the basin
     """
     table = key.split(".")[0]
     if table == "links":
@@ -83,7 +89,10 @@ def most_cells(cells_by_key: Counts) -> int:
 
 
 def cell_size(case, key: str, numbers: tuple[int, ...]) -> float:
-    """Cell size of the part with this key [m]; for a basin the greater of the mean cell sizes along its sides."""
+    """Cell size of a pipe [m], or the greater of the mean cell sizes along the sides of a basin [m].
+
+    key, numbers : as for `part_cells`
+    """
     table, name, _ = key.split(".")
     lengths = (case.links[name].length,) if table == "links" else case.nodes[name].size
     return max(length / n for length, n in zip(lengths, numbers, strict=True))
@@ -101,10 +110,10 @@ def is_valid(case, cells_by_key: Counts) -> bool:
 
 
 def greatest_wave_rate(case, cells_by_key: Mapping[str, tuple[int, ...]]) -> float:
-    """Number of cells that the fastest wave crosses per second [1/s].
+    """Greatest wave rate of a case with these numbers of cells: cells that a wave crosses per second [1/s].
 
-    The rate of basins is that at the start. Delay lines have a rate too: the number of cells of the slowest line over
-    the travel time of a wave along it.
+    The wave rate of basins is that at the start. With delay lines, their rate counts too: the cells of the slowest line
+    divided by the travel time of a wave along it. cells_by_key : as from `cell_counts`
     """
     rates = [case.wave_speed(name) * cells_by_key[f"links.{name}.cells"][0] / pipe.length
              for name, pipe in pipes_with_cells(case).items()]  # fmt: skip
@@ -117,7 +126,7 @@ def greatest_wave_rate(case, cells_by_key: Mapping[str, tuple[int, ...]]) -> flo
 
 
 def scheme_order(case) -> int:
-    """Order of the scheme in smooth flow, the least over all parts with cells."""
+    """Order of the scheme in smooth flow, the least of all parts with cells."""
     scheme = SCHEMES[case.numerics.scheme]
     return min(
         [
@@ -128,7 +137,7 @@ def scheme_order(case) -> int:
 
 
 def order_varies(case) -> bool:
-    """True if `scheme_order` is an upper bound only.
+    """True if `scheme_order` is only an upper bound.
 
     For free surfaces, a scheme above second order has its full order if waves travel along one axis only, otherwise
     second order.
@@ -138,7 +147,7 @@ def order_varies(case) -> bool:
 
 
 def has_initial_jump(case, coarse: Mapping, fine: Mapping) -> bool:
-    """True if a basin starts with a jump: the greatest difference between neighbouring cells stays on finer cells.
+    """True if a basin starts with a jump: differences between neighbouring cells hardly decrease on finer cells.
 
     coarse, fine : overrides that set the numbers of cells
     """
@@ -160,7 +169,7 @@ def initial_steps(model) -> list[float]:
 
 
 def refinable_counts(case) -> Counts:
-    """Numbers of cells that can be doubled. Raises FvsolveError if there are none."""
+    """Numbers of cells that can be doubled, as from `cell_counts`. Raises FvsolveError without such cells."""
     cells_by_key = cell_counts(case)
     if not cells_by_key:
         files = basins_from_files(case)

@@ -1,7 +1,8 @@
 """Work-precision study: error against CPU time and cell updates, over schemes, methods and resolutions.
 
-A setting is a scheme, a method and a resolution; a point is a setting with the results of its run. A curve has the
-points of one scheme and method, from coarse to fine.
+A setting is a scheme, a method and a resolution; a point is a setting with the results of its run. A curve consists of
+the points of one scheme and method, from coarse to fine. A target error is a trajectory error: the mean error over time
+of the worst probe, relative to its range.
 """
 
 from __future__ import annotations
@@ -59,10 +60,11 @@ WRONG_ERROR = 1.0  # errors above the range of the component are wrong results
 
 @dataclass(frozen=True)
 class TargetSetting:
-    """Setting whose run reaches a target error.
+    """Setting (scheme, method and resolution) whose run has at most the target error.
 
-    target : target error over the trajectory [-]; point : the setting and the results of its run
-    numerics : keys under [numerics], without that prefix -> value; others : all other keys, dotted -> value
+    target : target error, relative to the range of the worst probe [-]; point : the setting and the results of its run
+    numerics : overrides under `[numerics]`, key without "numerics." -> value; others : other overrides, dotted key ->
+    value
     """
 
     target: float
@@ -84,11 +86,11 @@ class Chart(Displayable):
     """Errors of a case against their cost, for several schemes, methods and resolutions.
 
     points : settings with the results of their runs; front : cheapest setting for each target error
-    reference, second : descriptions of the two references; floor : the difference between the two, see `Distance`;
-    smaller errors are not reliable
-    default : name of the curve of the default scheme and method; compile_seconds : time of compilation [s]
+    reference, second : descriptions of the two references
+    floor : difference between the two references, with the keys of `Distance`; smaller errors are not reliable
+    default : names of the default scheme and method, such as "weno5 rk4"; compile_seconds : time of compilation [s]
     reused : number of points from earlier studies; told : reasons of failed references
-    left_out : usual schemes that do not support the fluid; aim : setting for a target error, None without a target
+    left_out : default schemes that do not support the fluid; aim : setting for a target error, None without a target
     """
 
     case: str
@@ -110,21 +112,21 @@ class Chart(Displayable):
         return f"of {self.case!r}: {len(self.points)} points, {len(self.failed)} failed; default {self.default}"
 
     def table_columns(self) -> dict[str, list]:
-        """Columns of a table of all points : name in TABLE_COLUMNS -> values."""
+        """Columns of a table of all points, for a data frame : name in TABLE_COLUMNS -> list of values."""
         return ResultTable([Column(key) for key in TABLE_COLUMNS], self.rows).table_columns()
 
     @property
     def rows(self) -> list[dict]:
-        """All points as dicts of their results and of the fields of their settings."""
+        """All points as dicts, each with the fields of the setting and the results of its run."""
         return [vars(point.setting) | vars(point) for point in self.points]
 
     def curves(self) -> dict[str, list[Point]]:
-        """Name of scheme and method -> points of the curve, from coarse to fine."""
+        """Points of each scheme and method, from coarse to fine : name, such as "weno5 rk4" -> points."""
         return curves_by_name(self.points)
 
     @property
     def stands(self) -> Point | None:
-        """Point of the default setting: 100 cells or a tolerance of 1e-6, with default scheme and method; else None."""
+        """Point of the default scheme and method with 100 cells or a tolerance of 1e-6; None without such a point."""
         curve = self.curves().get(self.default, [])
         return next(
             (point for point in curve if DEFAULT_CELLS == point.setting.cells or point.setting.size == DEFAULT_RTOL),
@@ -137,7 +139,7 @@ class Chart(Displayable):
         return [point for point in self.points if not point.ok]
 
     def plain(self) -> dict:
-        """Return the chart as plain data, SI; `paste` is the setting for a target error as TOML for the case."""
+        """Return the chart as plain data, SI; `paste` is the setting for a target error, in TOML for the case file."""
         stands = None if self.stands is None else asdict(self.stands)
         return (
             asdict(self)
@@ -178,7 +180,8 @@ def chart(
     schemes, methods : names (default a selection)
     cells : numbers of cells of the pipe with the longest travel time of a wave, or along the longer side of a basin
     rtol, step : tolerances [-] and steps [s] of a case without cells; if all its pipes are delay lines, steps only
-    target : error over the trajectory, relative to the range; the cheapest setting that reaches it is found and run
+    target : mean error over time of the worst probe, relative to its range [-]; the cheapest setting with at most this
+    error is found and run
     out : folder in which finished points are stored and found again; progress : progress(done, total, next)
     jobs, dask : processes that make the runs, as in `sweep`; each takes longer if they share cache and memory
     Raises CaseError, FvsolveError.
@@ -190,14 +193,14 @@ def chart(
 
 
 def toml_value(value) -> str:
-    """Value of a text or number as it is written in TOML."""
+    """Text or number in the format of TOML."""
     return f'"{value}"' if isinstance(value, str) else repr(value)
 
 
 class _ChartStudy:
     """Work-precision study of a case: makes the runs, the reference and the chart.
 
-    points : cache of earlier points; queue : makes the runs
+    points : cache of results of earlier runs; queue : `RunQueue` that makes the runs
     """
 
     def __init__(self, case: Case, points: ResultCache, progress: Progress, queue: RunQueue) -> None:
@@ -239,7 +242,7 @@ class _ChartStudy:
 
     @cached_property
     def reference(self) -> Reference:
-        """Reference of all points, computed if some point is new, after the code of all curves is compiled."""
+        """Reference of all settings, computed at its first use, after compilation for all schemes and methods."""
         for setting in {entry.curve: entry for entry in reversed(self.all)}.values():
             self.progress(self.done, self.total, f"compiling {setting.name}")
             self.compiling += self.compile(setting)
@@ -249,14 +252,14 @@ class _ChartStudy:
             progress=lambda name: self.progress(self.done, self.total, f"reference {name}"), queue=self.queue,
         )  # fmt: skip
         if not moving_probes(reference.run, reference):
-            reason = "all probes are constant, so errors have no range. Try a probe that changes, or a longer run"
-            raise FvsolveError(f"{self.case.name}: {reason}")
+            reason = "all probes are constant, so errors relative to their ranges do not exist"
+            raise FvsolveError(f"{self.case.name}: {reason}. Try a probe that changes, or a longer run")
         return reference
 
     def finest_keys(self) -> dict | None:
         """Overrides with the finest cells under study, for the references; None if the case has no cells.
 
-        Delay lines get cells that a wave crosses in the same time as these cells.
+        Delay lines get cells that a wave crosses in the same time as the finest cells.
         """
         if not delay_lines(self.case):
             return None if self.finest is None else cell_keys(self.case, self.finest)
@@ -268,7 +271,10 @@ class _ChartStudy:
         return keys | cells_for_lines(self.case, self.case.links[main].length / self.case.wave_speed(main) / cells)
 
     def coarse_data(self) -> dict:
-        """Results of a coarse run as plain data; from the cache, a repeated study then has the same cells."""
+        """Results of a coarse run, the fields of `CoarseRun`, as plain data.
+
+        They are cached, so that a repeated study has the same numbers of cells.
+        """
         return asdict(run_coarse(self.case if main_part_name(self.case) else self.case_in_cells))
 
     def floor(self) -> dict:
@@ -284,7 +290,7 @@ class _ChartStudy:
         return floor
 
     def run_ahead(self) -> None:
-        """Run all new settings in other processes, and store their results."""
+        """Make the runs of all settings without cached results in other processes, and store their results."""
         if self.queue.in_process:
             return
         by_cost = sorted(self.all, key=lambda setting: (setting.cells or 0, -setting.size))
@@ -298,15 +304,18 @@ class _ChartStudy:
             self.points.get(self.case, self.cache_key(new[at]), lambda setting=new[at]: self.measure(setting))
 
     def cache_key(self, setting: MethodSetting) -> dict:
-        """Settings that identify a cached point of the case."""
+        """Values that identify the cached result of a setting."""
         return {"study": "chart", "keys": setting.keys, "judged by": self.finest}
 
     def point(self, setting: MethodSetting) -> Point:
-        """Result of a setting, from a run or the cache; not run if a cheaper setting of its curve was given up."""
+        """Setting with its result, from a run or the cache.
+
+        It is not run if a cheaper setting with the same scheme and method was given up because of its CPU time.
+        """
         self.progress(self.done, self.total, f"{setting.name}, {setting.fineness}")
         given_up = self.given_up
         if setting.curve in given_up:
-            data = empty_point(f"not run: {given_up[setting.curve]} was given up already")
+            data = empty_point(f"not run: the run with {given_up[setting.curve]} was already given up")
         else:
             data = self.points.get(self.case, self.cache_key(setting), lambda: self.measure(setting))
         self.done += 1
@@ -318,9 +327,9 @@ class _ChartStudy:
         return Point(setting, **values)
 
     def add_coarser(self, points: list[Point], target: float) -> list[Point]:
-        """Extend each curve by coarser points until the error of its coarsest point exceeds the target.
+        """Add coarser settings of each scheme and method until the error of the coarsest exceeds the target.
 
-        Returns all points, old and new.
+        Returns all points, old and new. points : settings with their results; target : trajectory error [-]
         """
         all_points = []
         for curve in curves_by_name(points).values():
@@ -335,14 +344,17 @@ class _ChartStudy:
         return all_points
 
     def compile(self, setting: MethodSetting) -> float:
-        """Wall time of a first run with a setting less that of a second [s], mostly compilation; 0 if it is refused."""
+        """Wall time of a first run with a setting minus that of a second [s], mostly of compilation.
+
+        The result is 0 if the case cannot have the setting.
+        """
         try:
             return compile_seconds(study_model(self.case, setting.keys))
         except CaseError:
             return 0.0
 
     def measure(self, setting: MethodSetting) -> dict:
-        """Data of a point: errors and cost of a run, or the reason why there are none."""
+        """Results of the run of a setting, as fields of `Point`: errors and cost, or the reason of a failure."""
         reference, run = self.reference, self.queue(self.case, RunRequest(best_run_of, setting.keys))
         if run.refused:
             return empty_point(run.reason)
@@ -354,7 +366,10 @@ class _ChartStudy:
         return {"ok": ok, "reason": reason, **errors, **cost, "steps": run.counts["steps"]}
 
     def reach_target(self, points: list[Point], target: float, floor: dict) -> TargetSetting:
-        """Cheapest setting for a target error, run and refined until its error is within the target."""
+        """Cheapest setting for a target error, run and refined until its error is within the target.
+
+        points : settings with their results; target : trajectory error [-]; floor : as from the method `floor`
+        """
         if not target >= floor["trajectory"]:
             raise FvsolveError(
                 f"a target of {target:g} is below the floor: the two references ({floor['reference']}; "
@@ -378,13 +393,13 @@ class _ChartStudy:
 
 
 def empty_point(reason: str) -> dict:
-    """Results of a point without a run: NaN or 0, and the reason."""
+    """Results of a setting that is not run, as fields of `Point`: NaN or 0, and the reason."""
     cost = {"seconds": math.nan, "rhs": 0, "updates": 0, "steps": 0}
     return {"ok": False, "reason": reason, **asdict(Distance()), **cost}
 
 
 def cost_grows(setting: MethodSetting) -> bool:
-    """True if finer settings of the curve certainly cost more.
+    """True if finer settings with the same scheme and method certainly cost more.
 
     False for adaptive implicit methods and `auto` without cells, which may be faster with a smaller tolerance.
     """
@@ -394,7 +409,7 @@ def cost_grows(setting: MethodSetting) -> bool:
 
 
 def _target_setting(target: float, point: Point, case: Case) -> TargetSetting:
-    """Setting of a point, with the path of the file for a method that is read from a file."""
+    """`TargetSetting` of a point; a method that is read from a file is given by the path of the file."""
     keys = point.setting.keys
     if "numerics.method" in keys:
         keys = keys | {"numerics.method": _method_in_file(keys["numerics.method"], case)}
@@ -417,10 +432,14 @@ def _method_in_file(method: str, case: Case) -> str:
 
 
 def _useless_text(case: Case, points: list[Point], floor: dict) -> str:
-    """Message for references that are not accurate enough for any point."""
+    """Message for the fault that all errors are below the difference between the two references.
+
+    floor : as from `_ChartStudy.floor`
+    """
     least = min(good_errors(points), default=math.nan)
     errors = f"all errors (least {least:.2g})" if math.isfinite(least) else "any useful error, and no run succeeded"
-    remedy = "a larger --step (if delay lines are exact, any step will do)" if delay_lines(case) else "a larger --rtol"
+    larger_step = "a larger --step (if delay lines are exact, any step is accurate)"
+    remedy = larger_step if delay_lines(case) else "a larger --rtol"
     remedy = (
         "fewer --cells (references have four times the cells of the finest run)" if main_part_name(case) else remedy
     )

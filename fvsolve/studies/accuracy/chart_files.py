@@ -34,7 +34,7 @@ def write_chart(chart: Chart, folder: Path, title: str = "", dpi: float | None =
 
 
 def write_chart_csv(chart: Chart, path: Path) -> None:
-    """Write one line per setting, failed settings included."""
+    """Write a CSV file with a row for each setting, including failed settings."""
     rows, floor = chart.rows, chart.floor["trajectory"]
     good = [row for row in rows if row["ok"]]
     errors = [max(row["trajectory"], floor) for row in good]

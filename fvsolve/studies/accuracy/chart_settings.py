@@ -41,14 +41,13 @@ CELL_TIME = 1e-8  # usual time of one call of the rates for one cell [s]
 
 @dataclass(frozen=True)
 class CoarseRun:
-    """Facts from a coarse run of a case with cells, which set the numbers of cells of the study.
+    """Results of a coarse run of a case with cells, from which the numbers of cells of a study are chosen.
 
     cells : number of cells; waves : number of steps at Courant number 0.9; steps : number of steps that the run took
-    works : work (cells times steps) of runs with MAX_CELLS cells, half as many, a quarter ...
-    compile_seconds : time of a first run less that of a second run [s]
-    dearness : time to evaluate the rates of one cell, as a multiple of CELL_TIME
-    sizes : (number of cells, work) of a basin, for numbers with which patches and holes end on grid lines; None if the
-    main part is a pipe
+    works : estimated work (cells times steps) of runs with MAX_CELLS cells, half as many, a quarter ...
+    compile_seconds : wall time of a first run minus that of a second run [s]
+    dearness : time to evaluate the rates of one cell, as a multiple of CELL_TIME, at least 1
+    sizes : (number of cells, work) of the main basin, as from `basin_sizes`; None if the main part is a pipe
     """
 
     cells: int
@@ -100,9 +99,10 @@ def run_coarse(case: Case) -> CoarseRun:
 
 
 def basin_sizes(case: Case) -> list[tuple[int, float]]:
-    """(number of cells along its longer side, work) of the main basin, for all possible numbers.
+    """(number of cells along its longer side, work) of the main basin, for all possible numbers of cells.
 
-    The numbers are that of the case, halved and doubled; work is cells times steps.
+    The numbers are that of the case, multiplied or divided by powers of 2, for which patches and holes end on grid
+    lines. Work is cells times steps. The main basin is that of `main_part_name`.
     """
     main_cells, sizes = basin_cells(case), []
     for n in (main_cells * 2**k // 2**LEVEL_COUNT for k in range(2 * LEVEL_COUNT)):
@@ -114,7 +114,7 @@ def basin_sizes(case: Case) -> list[tuple[int, float]]:
 
 
 def run_work(case: Case, cells: int) -> float:
-    """Cells times steps of a run at Courant number 1, with this number of cells in the main part."""
+    """Cells times steps of a run at Courant number 1, with `cells` cells in the main part (see `main_part_name`)."""
     changed = load(case, cell_keys(case, cells))
     cells_by_key = cell_counts(changed)
     return (
@@ -130,7 +130,7 @@ def default_scheme(case: Case) -> str:
 
 
 def default_curve(case: Case) -> str:
-    """Name of the curve of the default scheme and method."""
+    """Names of the default scheme and method of a case, such as "weno5 rk4"; without cells only the method."""
     if main_part_name(case):
         return f"{default_scheme(case)} {DEFAULT_METHOD}"
     return DEFAULT_METHOD if delay_lines(case) else DEFAULT_METHOD_RTOL
@@ -144,9 +144,10 @@ def unsupported_schemes(case: Case, schemes: Sequence[str] | None) -> list[str]:
 def chart_settings(
     case: Case, coarse_run: CoarseRun | None, schemes, methods, cells, rtol, step
 ) -> list[MethodSetting]:
-    """Settings of all curves, each curve from coarse to fine; the curve of the defaults is always included.
+    """Settings of a study: for each scheme and method its resolutions, from coarse to fine.
 
-    coarse_run : facts from a coarse run of a case with cells, None for other cases; other arguments as for `chart`
+    The default scheme and method are always included.
+    coarse_run : results of a coarse run of a case with cells, None for other cases; other arguments as for `chart`
     Raises FvsolveError for options that the case does not support.
     """
     if not main_part_name(case) and delay_lines(case):
@@ -180,9 +181,10 @@ def _lumped_settings(case: Case, schemes, methods, cells, rtol, step) -> list[Me
 
 
 def _delay_line_settings(case: Case, schemes, methods, cells, rtol, step) -> list[MethodSetting]:
-    """Settings of a case with delay lines alone, whose resolution is the step.
+    """Settings of a case in which all pipes are delay lines, so that the resolution is the step.
 
-    A tolerance is not used: the error estimate of a step does not include the interpolation between steps.
+    Arguments as for `chart`. A tolerance is not used: the error estimate of a step does not include the interpolation
+    between steps.
     """
     if schemes or cells or rtol:
         option = "scheme" if schemes else "cells" if cells else "rtol"
@@ -201,8 +203,9 @@ def _delay_line_settings(case: Case, schemes, methods, cells, rtol, step) -> lis
 def scheme_method_pairs(
     case: Case, schemes: Sequence[str] | None, methods: Sequence[str] | None, stiff: bool = False
 ) -> list[tuple[str, str]]:
-    """Pairs (scheme, method): all pairs of the given names, or a selection without methods; always the default pair.
+    """Pairs (scheme, method) of a study: all combinations of the given names, and the default pair.
 
+    If no schemes are given, all default schemes are combined. If no methods are given, the pairs are a selection.
     stiff : True if a time scale other than waves limits explicit steps
     """
     names = list(schemes or [name for name in DEFAULT_SCHEMES if name in case.schemes])

@@ -1,10 +1,10 @@
-"""Order of convergence fitted to errors, or the reason why there is none.
+"""Order of convergence fitted to errors, or the reason why no order is found.
 
 A row is a size (of cells, steps or a tolerance) with the error of the run. The floor is an error that finer rows do not
-reduce, such as rounding or the error of the reference. The fit is the least-squares slope of log error over log size in
-a window of successive rows. The window ends at the last row above the floor. It begins where the orders between rows
-come near the slope. Rows before the window are pre-asymptotic, rows after it are at the floor. If other rows remain,
-there is no order, and no number is given.
+reduce, such as rounding or the error of the reference. The window is a group of successive rows. The fit is the
+least-squares slope of log error over log size in the window. The window ends at the last row above the floor. It begins
+where the orders between rows come near the slope. Rows before the window are pre-asymptotic, rows after it are at the
+floor. If other rows remain, there is no order, and no number is given.
 """
 
 from __future__ import annotations
@@ -32,11 +32,12 @@ PRE_ASYMPTOTIC, FLOOR, OFF_LINE, FAILED = "pre-asymptotic", "floor", "off the li
 
 @dataclass(frozen=True)
 class Fit:
-    """Fitted order of convergence with its spread, or the reason why there is none.
+    """Fitted order of convergence with its spread, or the reason why no order is found.
 
     pairwise : order between each row and the next, NaN if an error is zero or unknown
-    order : slope of log error over log size in the window; NaN without an order
-    spread : greatest distance between `order` and the pairwise orders in the window, with their expected further drift
+    order : slope of log error over log size for the fitted rows; NaN without an order
+    spread : greatest distance from `order` of the pairwise orders of the fitted rows, also after their expected further
+    drift
     marks : for each row "", "pre-asymptotic", "floor", "off the line" or "failed"; rows with "" are fitted
     constant : factor C of error = C size^order; reason : "" if there is an order; note : remark on the order
     """
@@ -64,9 +65,9 @@ ERRORS = Kind(lambda value: is_array(value, "fiu", 1, 1, finite=False), "a row o
 def fit(sizes, errors, floor: float = 0.0) -> Fit:
     """Fit the order p of convergence, errors ~ C sizes^p with a constant C.
 
-    sizes : float64[n]  sizes of cells or steps, falling; errors : float64[n]  not negative, NaN if a run failed
+    sizes : float64[n]  decreasing sizes of cells or steps; errors : float64[n]  not negative, NaN if a run failed
     floor : error that is not reduced by refinement; errors below ten times the floor are not used
-    Raises FvsolveError for sizes that do not fall, for negative errors, and for a negative floor.
+    Raises FvsolveError for sizes that do not decrease, for negative errors, and for a negative floor.
     """
     h, e = np.asarray(sizes, dtype=float), np.asarray(errors, dtype=float)
     if floor < 0.0:
@@ -87,7 +88,10 @@ def fit(sizes, errors, floor: float = 0.0) -> Fit:
 
 
 class FitRows:
-    """Rows of a fit: sizes h, errors e, and marks as in `Fit`; `good` are the indices of rows without a mark."""
+    """Rows of a fit: sizes h, errors e, and marks as in `Fit`; `good` are the indices of rows without a mark.
+
+    floor : as for `fit`
+    """
 
     def __init__(self, h: np.ndarray, e: np.ndarray, floor: float) -> None:
         self.h, self.e, self.floor = h, e, floor
@@ -102,7 +106,7 @@ class FitRows:
     # fits ---------------------------------------------------------------------------------------------------
 
     def fit_all(self, strict: bool = True) -> Fit | None:
-        """Fit a window of the rows without a mark; None if there is no window.
+        """Fit the order in a window of the rows without a mark (see `find_window`); None if no window shows an order.
 
         strict : False if the last order between rows of the window may deviate from the orders before it
         """
@@ -110,9 +114,9 @@ class FitRows:
         return None if limits is None else self.fit_window(self.good, *limits)
 
     def fit_without_outlier(self) -> Fit | None:
-        """Fit a window without one row that lies far below the line of the other rows; None if no row does.
+        """Fit the order without one row, whose error lies far below the line of the others; None without such a row.
 
-        A row lies so low where an error changes sign.
+        An error lies so low where it changes sign.
         """
         best = None
         for i in range(1, len(self.good) - 1):
@@ -127,9 +131,9 @@ class FitRows:
         return best
 
     def fit_window(self, rows: np.ndarray, first: int, stop: int, note: str = "", outlier: int | None = None) -> Fit:
-        """Fit the window from first to stop - 1 of the row indices `rows`.
+        """`Fit` of the rows with the indices rows[first] to rows[stop - 1].
 
-        note : remark on a row that leaves the line behind the window; outlier : index of a row that lies off the line
+        note : remark on a later row that leaves the line of these rows; outlier : index of a row that lies off the line
         """
         marks = list(self.marks)
         for k, i in enumerate(rows):
@@ -154,7 +158,7 @@ class FitRows:
     # reasons ---------------------------------------------------------------------------------------------------
 
     def too_few_reason(self) -> str:
-        """Reason for no order with fewer than three rows without a mark."""
+        """Reason why there is no order, for fewer than three rows without a mark."""
         if not np.any(self.e > 0.0):
             return NO_ERROR
         if FLOOR in self.marks or OFF_LINE in self.marks:
@@ -164,7 +168,7 @@ class FitRows:
         return f"no order: {len(self.good)} rows. Expected at least {LEAST_ROWS}"
 
     def failure_reason(self) -> str:
-        """Reason why no window shows an order."""
+        """Reason why no successive rows show an order."""
         e, p = self.e[self.good], pair_orders(self.h[self.good], self.e[self.good])
         if np.any(e[1:] > ALLOWED_RISE * e[:-1]) and not e[-1] < e[0] / LEAST_REDUCTION:
             return "no order: the errors do not fall"
@@ -176,7 +180,7 @@ class FitRows:
         return f"no order: the last orders between rows differ ({last_orders}). Try more levels, or fewer"
 
     def drift_reason(self) -> str:
-        """Reason for no order if the spread is as large as the order, so that orders may drift to zero or double."""
+        """Reason why there is no order if the spread is as large as the order, which may drift to zero or double."""
         last_orders = ", ".join(f"{x:.2f}" for x in pair_orders(self.h[self.good], self.e[self.good])[-3:])
         rows = self.good.size
         return f"no order: orders between rows still drift ({last_orders}) after {rows} rows. Try {rows + 2} rows"
@@ -193,9 +197,11 @@ def pair_orders(h: np.ndarray, e: np.ndarray) -> np.ndarray:
 
 
 def remaining_drift(p: np.ndarray) -> float:
-    """Expected further drift of the orders p between rows, as a multiple of their last change.
+    """Expected further drift of the orders p between successive rows, as a multiple of their last change.
 
-    With ratio r < 1 of the last two changes it is the geometric series r / (1 - r), within the limits of DRIFT_STEPS.
+    With ratio r < 1 of the last two changes it is the sum of a geometric series, r / (1 - r), within the limits of
+    DRIFT_STEPS. It is the upper limit for r >= 1 or fewer than three orders, the lower limit for changes of opposite
+    sign.
     """
     least, greatest = DRIFT_STEPS
     if len(p) < LEAST_ROWS:
@@ -219,11 +225,11 @@ def order_tolerance(order: float) -> float:
 
 
 def find_window(h: np.ndarray, e: np.ndarray, strict: bool = True) -> tuple[int, int, str] | None:
-    """Find the last window of rows that shows one order: (first, stop, note), or None.
+    """Find the last successive rows (the window) that show one order: (first, stop, note), or None.
 
-    The window has the rows first to stop - 1 of the sizes h and errors e; note : remark on a row behind it.
-    strict : as in `FitRows.fit_all`
-    Errors behind the window must be flat, or a single row behind at least four rows may leave their line. Errors before
+    The window has the rows first to stop - 1 of the sizes h and errors e; note : remark on a row after it, or "".
+    strict : False if the last order between rows of the window may deviate from the orders before it
+    Errors after the window must be flat, or a single row after at least four rows may leave their line. Errors before
     the window must not rise by a factor of ALLOWED_RISE.
     """
     p = pair_orders(h, e)
@@ -241,14 +247,14 @@ def find_window(h: np.ndarray, e: np.ndarray, strict: bool = True) -> tuple[int,
 
 
 def is_line(h, e, first: int, stop: int) -> bool:
-    """True if log error over log size of the rows first to stop - 1 lies on a line, with errors that fall."""
+    """True if log error over log size of the rows first to stop - 1 lies on a line, and the errors decrease."""
     slope, _ = line_of(h[first:stop], e[first:stop])
     spread = np.max(np.abs(pair_orders(h[first:stop], e[first:stop]) - slope))
     return slope >= LEAST_ORDER and spread <= order_tolerance(slope)
 
 
 def last_deviates(p: np.ndarray) -> bool:
-    """True if the last of the orders p between rows deviates: its change is larger than the change before it."""
+    """True if the last of the orders p between rows changed by more than about twice the previous change."""
     if len(p) < LEAST_ROWS:
         return False
     before, last = np.abs(np.diff(p[-3:]))
@@ -256,7 +262,10 @@ def last_deviates(p: np.ndarray) -> bool:
 
 
 def may_be_floor(h, e, first: int, stop: int) -> bool:
-    """True if rows first to stop - 1 may be a floor: they are few or rough, and errors before them fall much faster."""
+    """True if the errors of rows first to stop - 1 may be a floor, which finer rows do not reduce.
+
+    They may be if they are few or do not lie close to a line, and the errors before them decrease much faster.
+    """
     slope, _ = line_of(h[first:stop], e[first:stop])
     before = np.max(pair_orders(h[: first + 1], e[: first + 1]), initial=0.0)
     return bool(before > STEEP_RATIO * slope + 0.3) and not (
@@ -272,7 +281,11 @@ def is_clear_line(h, e, first: int, stop: int) -> bool:
 
 
 def extend_window(h, e, p, first: int, stop: int) -> tuple[int, int]:
-    """(first, stop) of a window, extended by earlier rows on its line, without a last row that begins to leave it."""
+    """(first, stop) of a window, extended by earlier rows on its line, and without a last row that begins to leave it.
+
+    h, e : sizes and errors of all rows; p : orders between rows
+    first, stop : the window has the rows first to stop - 1
+    """
     while (
         first > 0
         and is_line(h, e, first - 1, stop)
@@ -289,7 +302,10 @@ def extend_window(h, e, p, first: int, stop: int) -> tuple[int, int]:
 
 
 def classify_tail(h, e, first: int, stop: int) -> str | None:
-    """Kind of the rows behind a window: "" for no rows or a floor, a note if one row leaves the line, else None."""
+    """Kind of the rows after the rows first to stop - 1, which lie on a line.
+
+    "" if there are no such rows or they are a floor, a note if a single row leaves the line, None otherwise.
+    """
     rest = e[stop:]
     if rest.size == 0:
         return ""

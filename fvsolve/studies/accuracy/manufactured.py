@@ -23,8 +23,8 @@ from fvsolve.studies.run_queue import RunQueue
 class ManufacturedStudy(OrderStudy):
     """Order study with an initial state, a source or an exact solution as functions along the pipes.
 
-    Functions are as in `order`. Without a source, runs differ from usual runs by their initial state only; with a
-    source they are integrated by `steppers.ode.integrate`.
+    initial, source, exact : functions as in `order`, or None. Without a source, runs differ from usual runs by their
+    initial state only; with a source they are integrated by `steppers.ode.integrate`.
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class ManufacturedStudy(OrderStudy):
         )
 
     def reference_of_function(self) -> Reference:
-        """Reference from the exact function; the pressure of a node is that at the end of its pipe."""
+        """Reference from the exact function; the pressure of a node is that at the pipe end that joins the node."""
         laws = {}
         for name, pipe in pipes(self.case).items():
             for node, x in ((pipe.from_, 0.0), (pipe.to, pipe.length)):
@@ -69,19 +69,19 @@ class ManufacturedStudy(OrderStudy):
         return reference_of_solution(solution, "function", "exact solution given as a function")
 
     def run(self, level) -> Outcome:
-        """Run of a level of refinement."""
+        """Outcome of the run of a refinement level."""
         return self.outcome(self.case, recording_keys(self.case, level.set))
 
     def outcome(self, case, keys) -> Outcome:
-        """Run of the case with changed keys, from the given start and with the given source."""
+        """Outcome of the case with changed keys, from the given initial state and with the given source."""
         model = study_model(case, keys)
         y = self.initial_state(model)
         return outcome(model, y=y) if self.source is None else RunWithSource(model, self.source).run(y)
 
     def initial_state(self, model) -> np.ndarray:
-        """Initial state vector: waves in both directions of the given start, averaged over cells [kg/s].
+        """Initial state vector: forward and backward waves of the given initial state, averaged over cells [kg/s].
 
-        They are deviations from the initial steady state; zero without a given start.
+        They are deviations from the initial steady state; zero if no initial state is given.
         """
         y = np.zeros(model.y_size)
         for k, pipe in enumerate(model.pipes if self.initial else []):
@@ -95,7 +95,7 @@ class ManufacturedStudy(OrderStudy):
 
 
 class UserFunction:
-    """Function of the user along pipes, function(pipe, x, t) or without t; returns two arrays.
+    """Function of the user along pipes, called as function(pipe, x, t) or function(pipe, x); returns two arrays.
 
     Raises FvsolveError if the function fails or returns unusable values.
     """
@@ -122,7 +122,10 @@ class UserFunction:
         return first, second
 
     def fault_for(self, pipe: str, problem: str) -> FvsolveError:
-        """Return the error of a pipe, and store it, because compiled steps that call the function cannot pass it on."""
+        """Return a FvsolveError on a problem of the function on a pipe.
+
+        The error is also stored, because compiled steps that call the function cannot pass it on.
+        """
         self.fault = FvsolveError(
             f'{self.name}(pipe, x{", t" if self.name != "initial" else ""}) on "{pipe}" {problem}'
         )
@@ -145,7 +148,10 @@ class RunWithSource:
             dydt[o + n : o + 2 * n] += 0.5 * (row["speed"] * mass - momentum)
 
     def run(self, y: np.ndarray) -> Outcome:
-        """Run from the initial state y to the end of the case; the outcome of a failed run gives the reason."""
+        """Run from the initial state y to the end of the case; the outcome of a failed run gives the reason.
+
+        Raises FvsolveError if the source function fails or returns unusable values.
+        """
         from fvsolve.steppers.ode import integrate
 
         model, numerics, every = self.model, self.model.case.numerics, self.model.case.output.every

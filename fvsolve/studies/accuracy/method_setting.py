@@ -17,8 +17,10 @@ IMPLICIT_RTOL = 1e-4  # rtol of implicit methods with cells: their steps follow 
 class MethodSetting:
     """Scheme, method and resolution of a run.
 
-    scheme : None without cells; control : "courant", "rtol" or "step"; size : its value [-] or [s]
-    cells : number of cells of the main part, None without cells; keys : dotted keys of the case -> values
+    scheme : None without cells; control : key "courant", "rtol" or "step" that sets the steps; size : its value, the
+    step in s
+    cells : number of cells of the main part (see `main_part_name`), None without cells; keys : overrides, dotted key ->
+    value
     """
 
     scheme: str | None
@@ -30,7 +32,7 @@ class MethodSetting:
 
     @property
     def curve(self) -> tuple:
-        """Scheme, method and step control, which all settings of a curve have in common."""
+        """(scheme, method, step control), which all settings of a curve in a work-precision chart have in common."""
         return self.scheme, self.method, "courant" if self.control == "courant" else self.control
 
     @property
@@ -47,7 +49,7 @@ class MethodSetting:
 def main_part_name(case: Case) -> str | None:
     """Name of the main part, whose number of cells is the resolution; None if the case has no cells.
 
-    It is the basin with most cells along a side, else the pipe with the longest travel time of a wave.
+    The main part is the basin with most cells along a side, else the pipe with the longest travel time of a wave.
     """
     sizes = {name: max(basin.cells) for name, basin in basins(case).items() if basin.cells}
     if sizes:
@@ -57,13 +59,13 @@ def main_part_name(case: Case) -> str | None:
 
 
 def basin_cells(case: Case) -> int | None:
-    """Number of cells along the side of the main basin with most cells; None if the main part is a pipe."""
+    """Greatest number of cells along a side of the main part (see `main_part_name`); None if it is not a basin."""
     basin = basins(case).get(main_part_name(case) or "")
     return None if basin is None else max(basin.cells)
 
 
 def cell_keys(case: Case, cells: int) -> dict:
-    """Overrides that give the main part this number of cells, and scale the cells of all other parts in proportion.
+    """Overrides that set the number of cells of the main part (see `main_part_name`), and scale those of other parts.
 
     They set `cells` of the pipes that state it in the case; for other pipes they set `numerics.cell_time`. With basins
     they set `cells` of all parts.
@@ -87,7 +89,7 @@ def cell_keys(case: Case, cells: int) -> dict:
 def cells_setting(case: Case, scheme: str, method: str, cells: int) -> MethodSetting:
     """Setting of a case with cells: Courant number 0.9, or 1 for upwind with Euler.
 
-    Methods with error control have a tolerance instead. cells : number of cells of the main part
+    Methods with error control have a tolerance instead. cells : number of cells of the main part (see `main_part_name`)
     """
     by_error = uses_error_control(method)
     control = "rtol" if by_error else "courant"

@@ -1,7 +1,7 @@
 """Errors and computing times of models of a case, from rigid columns to many cells, with every density law.
 
-A level of the hierarchy is a model of the case with a density law. The richest level, with most cells and the most
-complete law that runs, is the reference of all others.
+A level of the hierarchy is a model of the case with a density law. The level `richest` is the reference of all others.
+It has the most cells and the most complete density law that runs.
 """
 
 from __future__ import annotations
@@ -37,10 +37,11 @@ SCHEDULE_SAMPLES = 4001  # sample times of each schedule, to find its steepest s
 
 @dataclass(frozen=True)
 class ModelLevel:
-    """Level of the model hierarchy: a model of the case with its errors against the richest level, and its cost.
+    """Level of the model hierarchy: a model of the case with its cost, and errors against `Hierarchy.richest`.
 
     name : name of the level, such as "rigid column"; law : density law; states : number of states
-    errors : probe -> root mean square over time of the difference to the richest level, over the range of the probe [-]
+    errors : probe -> root mean square over time of the difference to the level `richest`, over the range of the probe
+    [-]
     error : greatest of these errors; None if the level was skipped or failed, with the `reason`
     greatest : greatest difference of any probe at any time, over its range [-]
     seconds : time of the steps, the best of three runs [s]; rhs : number of evaluations of the rates
@@ -64,11 +65,11 @@ class ModelLevel:
 
 @dataclass(frozen=True)
 class LawDifference:
-    """Difference between the results of the linear density law and of the richest law.
+    """Difference between the results of the linear and of the most complete density law of a model hierarchy.
 
-    probe : probe with the greatest difference; error : root mean square of its difference over time, over its range [-]
-    start : difference at the start of the run, over the range [-]; moves : range over the greatest value [-]
-    level : greatest pressure at the start, over the stiffness rho a^2 of the softest pipe [-]
+    probe : probe with the greatest difference; error : rms of its difference over time, over its range [-]
+    start : its difference at the start, over its range [-]; moves : its range over its greatest absolute value [-]
+    level : greatest pressure of a probe at the start, over the least effective bulk modulus rho a^2 of a pipe [-]
     swift : greatest velocity head rho v^2 / 2 of a pipe at the start [Pa], which the linear law neglects
     """
 
@@ -84,13 +85,16 @@ class LawDifference:
 class Hierarchy:
     """Levels of the model hierarchy of a case, with rules of thumb for the choice of a model.
 
-    rungs : all levels, simplest first; cheapest : fastest level with an error within `target`
-    richest : reference of all other levels, refined until the error from its cells is within `target`
+    rungs : all levels, simplest first; target : acceptable error [-]; cheapest : fastest level with an error within
+    `target`
+    richest : level that is the reference of all others, with the most cells and the most complete density law that
+    runs; its cells are refined until its own error is within `target`
     travel_time : greatest travel time of a wave along a pipe [s]
     change_time : range of the fastest schedule over its steepest slope [s]
-    strain : greatest change of pressure from the start, over the stiffness of the softest pipe or of the fluid [-]
-    law_difference : difference of the linear law from the richest law for equal cells, None if linear was not run
-    own_error : approximate error of the richest level from its cells [-]; None without cells or without a finer run
+    strain : greatest change of pressure from the start, over the least effective bulk modulus of a pipe, or over the
+    bulk modulus of the fluid without pipes [-]
+    law_difference : difference of the linear law from the law of `richest` for equal cells, None if linear was not run
+    own_error : approximate error of `richest` from its cells [-]; None without cells or without a finer run
     shallow_water : notes on shallow-water theory for tanks on bodies; case : the case, for units of texts
     """
 
@@ -108,7 +112,7 @@ class Hierarchy:
 
     @property
     def own_error_note(self) -> str:
-        """Note on the error of the richest level from its cells; empty if the case has no cells."""
+        """Note on the error of the level `richest` itself because of its cells; empty if the case has no cells."""
         if self.richest.name == "as it is":
             return ""
         if self.own_error is None:
@@ -131,24 +135,28 @@ class Hierarchy:
                 self.case.amount(seconds, "time", 3) for seconds in (self.travel_time, self.change_time)
             )
             rules.append(
-                f"a wave travels along a pipe for up to {crossing}, the fastest input changes in "
-                f"{change}, {ratio:.3g} times that: {kind}"
+                f"a wave travels along a pipe for up to {crossing}; the fastest input changes in "
+                f"{change}, {ratio:.3g} times as long: {kind}"
             )
         return [*rules, self.own_error_note] if self.own_error_note else rules
 
     def _law_rule(self, apart: LawDifference) -> str:
-        """Rule of thumb for the density law: its difference against dp/K (change of pressure over stiffness)."""
+        """Rule of thumb for the density law, in which its difference is compared with dp/K.
+
+        apart : difference of the linear law. dp is the greatest change of pressure, K the least effective bulk modulus.
+        """
         side = "within" if apart.error <= self.target else "above"
         text = f"linear differs from {self.richest.law} by {apart.error:.3g} of the range of {apart.probe}"
         text += f", {side} the target"
         if apart.error <= STRAIN_FACTOR * self.strain:
-            return f"dp/K = {self.strain:.2g}: the laws differ by about this part of a change of pressure; here {text}"
-        reason = f"it is {apart.start:.3g} at the start and grows from there"
+            return f"dp/K = {self.strain:.2g}: the laws differ by about this fraction of a pressure change; here {text}"
+        reason = f"the difference is {apart.start:.3g} at the start and grows"
         if apart.start >= 0.5 * apart.error:
             reason = (
-                f"{apart.start:.3g} is there from the start: at pressures of {apart.level:.2g} K the laws differ by "
+                f"the difference is already {apart.start:.3g} at the start: at pressures of {apart.level:.2g} times "
+                "the bulk modulus the laws differ by "
             )
-            reason += f"that part, and the range of {apart.probe} is only {apart.moves:.2g} of its value"
+            reason += f"this fraction, and the range of {apart.probe} is only {apart.moves:.2g} of its value"
         head = self.case.amount(apart.swift, "pressure", 3, span=True)
         reason += f"; linear neglects the velocity head, {head} at the start" if apart.swift > 0.0 else ""
         return f"{text}, more than dp/K = {self.strain:.2g}: {reason}"
@@ -166,14 +174,14 @@ class Hierarchy:
         return own | laws | levels | {"richest": vars(self.richest), "cheapest": vars(self.cheapest)}
 
 
-@validated(set=TABLE, target=NUMBER, progress=FUNCTION)
 def with_whole_pipes(case):
-    """Return the case; pipes that are divided by parts placed along them are replaced by their pieces."""
+    """Return the case; each pipe that placed parts or bends divide is replaced by its pieces."""
     from fvsolve.case import load
 
     return load(case.table()) if placed(add_bends(case.raw)) else case
 
 
+@validated(set=TABLE, target=NUMBER, progress=FUNCTION)
 def ladder(
     case,
     set: Mapping | None = None,
@@ -183,12 +191,12 @@ def ladder(
     """Run a case as rigid columns, lumped volumes, delay lines, few and many cells, with every possible density law.
 
     A case with water in tanks on bodies is run with frozen water, modes and cells, the same for all tanks.
-    set : key -> value; target : error relative to the range of a probe that is acceptable
+    set : key -> value for all runs; target : acceptable error, relative to the range of a probe
     progress : called as progress(done, total, next)
 
-    A level that does not suit the case is skipped, with a reason. The richest level has at least the cells of the case,
-    and the richest density law that runs. Errors are those of the probes that a level has. Raises FvsolveError if the
-    case itself does not run, or if all its probes are constant.
+    A level that does not suit the case is skipped, with a reason. The reference of all errors is the level with most
+    cells, at least those of the case, and with the most complete density law that runs. Errors are those of the probes
+    that a level has. Raises FvsolveError if the case itself does not run, or if all its probes are constant.
     """
     from fvsolve.case import load
 
@@ -198,7 +206,7 @@ def ladder(
     runs, given_up = [], {}  # given_up: law -> level with cells that was given up under it
     for at, (name, law) in enumerate(models):
         report(at, len(models), f"{name}, {law}")
-        reason = f"not run: {given_up[law]} was given up already" if law in given_up else ""
+        reason = f"not run: the run with {given_up[law]} was already given up" if law in given_up else ""
         runs.append(Outcome(reason, refused=True) if reason else _run_level(case, name, law))
         if runs[-1].reason.startswith(GIVEN_UP) and name.endswith(("cell", "cells")):
             given_up[law] = name
@@ -239,11 +247,12 @@ def refine_richest(
 ) -> tuple[list, float | None]:
     """Run levels with 2, 4, ... times the cells until the error of the last level is within `target`.
 
-    Returns ([(name, run) of each finer level], error of the last of these levels, or of `own_run` if there is none).
-    The error of a level is d / (1 - r), with its difference d to the next level and the ratio r of successive
-    differences (1/2 for the first). A level that only served to find this error is left out. If no finer level can be
-    run, the error is r times the error of the level before, None without any finer level.
     own_run : run with the cells of the case; law : density law; report : called with the name of each level
+
+    Returns ([(name, run) of each finer level], error of the last of these levels, or of `own_run` without them).
+    The error of a level is d / (1 - r), with its difference d to the next level and the ratio r of successive
+    differences (1/2 for the first). The next level only serves to compute this error and is left out. If no finer level
+    can be run, the error is r times the error of the level before, or None if no finer level was run at all.
     """
     runs, differences, ratio = [("full line", own_run)], [], 0.5
     for name in finer_levels(case, MAX_DOUBLINGS):
@@ -283,7 +292,10 @@ def possible_laws(case) -> list[str]:
 
 
 def _run_level(case, name: str, law: str) -> Outcome:
-    """Run of a level with a density law; a level that does not suit the case gives an outcome with the reason."""
+    """Outcome of a level with a density law; a level that does not suit the case gives an outcome with the reason.
+
+    name : name of the level as from `level_names`; law : density law
+    """
     try:
         return outcome(
             case, {**level_keys(case, name), "fluid.law": law}, best_of=BEST_OF, run=long_capped_level, budget=BRIEF_RUN
@@ -293,7 +305,7 @@ def _run_level(case, name: str, law: str) -> Outcome:
 
 
 def long_capped_level(model, state, sink, progress) -> CappedRun:
-    """Run that is stopped after LEVEL_CPU_LIMIT seconds of CPU time."""
+    """Run of a model that is stopped after LEVEL_CPU_LIMIT seconds of CPU time; arguments as for `solve.Run`."""
     run = CappedRun(model, state, sink, progress)
     run.max_seconds = LEVEL_CPU_LIMIT
     return run
@@ -303,7 +315,10 @@ def long_capped_level(model, state, sink, progress) -> CappedRun:
 
 
 def _level_of(name: str, law: str, run: Outcome, richest: Outcome) -> ModelLevel:
-    """Level from its run, with errors against the run of the richest level."""
+    """`ModelLevel` from the run of a level, with errors against the run `richest` of the reference level.
+
+    name : name of the level; law : density law
+    """
     if not run.ok:
         return ModelLevel(name, law, run.reason)
     gaps = moving_probes(run, reference_of_run(richest))
@@ -319,7 +334,7 @@ def _rms_error(gap: Deviation) -> float:
 
 
 def law_difference(linear: Outcome, richest: Outcome) -> LawDifference | None:
-    """Difference between a run with the linear density law and a run with the richest law.
+    """Difference between a run with the linear density law and a run `richest` with the most complete law.
 
     None if both are the same run, or if the linear run failed.
     """
@@ -340,9 +355,9 @@ def velocity_head(model) -> float:
 
 
 def shallow_water_notes(case, target: float) -> Iterator[str]:
-    """Notes for tanks on bodies: error of the frequency of the slowest sloshing mode in shallow-water theory, if known.
+    """Notes on tanks on bodies: error of the frequency of the slowest sloshing mode in shallow-water theory.
 
-    target : acceptable error [-]
+    There is a note for each tank for which this error is known. target : acceptable error [-]
     """
     share = 100.0 * target
     for name, basin in sloshing_basins(case).items():
@@ -364,7 +379,7 @@ def travel_time(model) -> float:
 
 
 def change_time(model) -> float:
-    """Time of the fastest change [s]: range of a schedule over its steepest slope, or run-down time of a pump.
+    """Time of the fastest change [s]: range of a schedule over its steepest slope, or run-down time of a tripped pump.
 
     0 if a schedule jumps, infinite if nothing changes.
     """
@@ -395,18 +410,21 @@ def time_before(t: float) -> float:
 
 
 def run_down_time(model, name: str, t: float) -> float:
-    """Time in which a tripped pump would stop under constant torque [s]."""
+    """Time in which the pump `name`, tripped at the time t, would stop under constant torque [s]."""
     rate = model.rhs(t, np.zeros(model.y_size))[model.state_names.index(f"{name}.speed")]
     return float(model.case.links[name].speed.value[0]) / abs(rate) if rate != 0.0 else math.inf
 
 
 def greatest_strain(run: Outcome) -> float:
-    """Greatest change of a pressure or head probe from the start, over the stiffness of the softest pipe [-]."""
+    """Greatest change of a pressure or head probe from the start, over the least effective bulk modulus of a pipe [-].
+
+    Without pipes the divisor is the bulk modulus of the fluid.
+    """
     return max((float(np.max(np.abs(p - p[0]))) for p in probe_pressures(run)), default=0.0) / least_stiffness(run)
 
 
 def probe_pressures(run: Outcome) -> list[np.ndarray]:
-    """Pressures over time of the probes of pressure and head [Pa], float64[rows] each; a head h as rho g h."""
+    """Pressures over time [Pa] of all pressure and head probes, float64[rows] each; a head h counts as rho g h."""
     weight = run.model.case.properties.density * run.model.case.gravity
     histories = []
     for k, probe in enumerate(run.model.case.probes, 1):
@@ -416,6 +434,6 @@ def probe_pressures(run: Outcome) -> list[np.ndarray]:
 
 
 def least_stiffness(run: Outcome) -> float:
-    """Stiffness of the softest pipe, fluid and wall, K = rho a^2 [Pa]; without pipes the bulk modulus of the fluid."""
+    """Least effective bulk modulus K = rho a^2 of a pipe [Pa]; without pipes the bulk modulus of the fluid."""
     fluid = run.model.case.properties
     return min((fluid.density * pipe.wave_speed**2 for pipe in run.model.pipes), default=fluid.bulk_modulus)

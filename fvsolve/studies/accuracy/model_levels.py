@@ -24,11 +24,11 @@ LUMPED_NUMERICS = {"numerics.method": "auto", "numerics.rtol": 1e-7}
 
 
 class NotApplicable(Exception):
-    """Raised, with the reason, if a case cannot be turned into a level."""
+    """Raised, with the reason, if a case cannot be turned into a model level."""
 
 
 def level_names(case) -> list[str]:
-    """Names of the levels of a case, simplest first."""
+    """Names of the model levels of a case, such as "rigid column", simplest first."""
     pipes = [link for link in case.links.values() if link.kind == "pipe"]
     if sloshing_basins(case):
         return list(SLOSHING)
@@ -50,9 +50,10 @@ def sloshing_basins(case) -> dict[str, Any]:
 
 
 def finer_levels(case, doublings: int) -> list[str]:
-    """Names of levels finer than the case itself, each with twice the cells of the level before.
+    """Names of model levels finer than the case itself, each with twice the cells of the level before.
 
-    The list is empty if the case has no pipes, or if a tank on a body does not state its cells.
+    doublings : number of levels. The list is empty if the case has no pipes, or if a tank on a body does not state its
+    cells.
     """
     refinable = any(link.kind == "pipe" for link in case.links.values())
     if basins := sloshing_basins(case):
@@ -61,7 +62,7 @@ def finer_levels(case, doublings: int) -> list[str]:
 
 
 def level_keys(case, level: str) -> dict[str, Any]:
-    """Overrides that turn a case into the level with this name. Raises NotApplicable if this is impossible."""
+    """Overrides that turn a case into the model level with this name. Raises NotApplicable if this is impossible."""
     if level in ("full line", "as it is"):
         return {}
     if sloshing_basins(case):
@@ -89,7 +90,10 @@ def level_keys(case, level: str) -> dict[str, Any]:
 
 
 def sloshing_keys(case, level: str) -> dict[str, Any]:
-    """Overrides for all tanks on bodies: frozen water, modes, or cells (as many as in the case, or a multiple)."""
+    """Overrides that turn a case with tanks on bodies into the model level with this name.
+
+    All tanks have frozen water, sloshing modes or cells. The cells are those of the case, or a multiple of them.
+    """
     basins, keys = sloshing_basins(case), {"expect": {}, "compare": {}, "routes": {}, "limits": {}}
     if level in ("frozen", "modes"):
         quantities = {"frozen": (), "modes": ("depth",)}[level]
@@ -153,8 +157,9 @@ def orifice_of(case, model, name: str) -> dict[str, Any]:
 def junction_chambers(case, pipes: dict) -> dict[str, Any]:
     """Overrides that turn junctions into chambers, each with half the volume of every adjacent pipe.
 
-    Volumes are multiplied by beta / (rho a^2), so that a chamber of stiffness beta is as elastic as fluid and pipe wall
-    (bulk modulus beta, density rho, wave speed a). Raises NotApplicable if a node cannot be a chamber.
+    Volumes are multiplied by beta / (rho a^2), so that the chambers, in which the bulk modulus of the fluid is beta,
+    are as elastic as fluid and pipe wall together (density rho, wave speed a). Raises NotApplicable if a node cannot be
+    a chamber.
     """
     volume_of: dict[str, float] = {}
     fluid = case.properties
@@ -171,7 +176,7 @@ def junction_chambers(case, pipes: dict) -> dict[str, Any]:
         if node.kind not in ("junction", "inflow", "chamber"):
             raise NotApplicable(f"a volume at {name} would replace the {node.kind}")
         if name not in case.nodes:
-            raise NotApplicable(f"{name} belongs to a cylinder, whose volume is its own only")
+            raise NotApplicable(f"{name} is a chamber of a cylinder, to which no other volume can be added")
         raw = case.raw["nodes"][name]
         if node.kind == "inflow" or (node.kind == "junction" and np.any(node.demand.value != 0.0)):
             raise NotApplicable(f"flow enters or leaves at {name}, which a volume cannot represent")

@@ -41,13 +41,14 @@ def order(
     exact: Callable | None = None, out: str | Path | ResultCache | None = None, progress: Progress | None = None,
     jobs: int = 1, dask: str | None = None,
 ) -> Order | list[Order]:  # fmt: skip
-    """Run a case over a refinement; returns errors and the order at which they fall.
+    """Run a case over a refinement; returns errors and the order with which they decrease.
 
     With several schemes or methods, the result is a list with an `Order` for each pair of scheme and method.
     case, set : as in `run`; refine, key, levels, cells : as in `studies.accuracy.refine.refinement_plan`
     schemes, methods : name or list of names that replace the scheme and method of the case
-    against : reference, "auto" (exact if the case names an exact solution, else finer; richardson with basins),
-    "exact", "finer" (two levels finer, by another scheme and method) or "richardson" (each row against the next)
+    against : reference, "auto", "exact", "finer" (two levels finer, by another scheme and method) or "richardson" (each
+    row against the next). "auto" is "exact" if the case names an exact solution, otherwise "richardson" with basins and
+    "finer" without.
     initial : initial(pipe, x) -> pressure [Pa], flow [m3/s] at the start, x float64[k] [m]
     source : source(pipe, x, t) -> mass [kg/s/m] and momentum [kg/s2] fed per length; both are averaged over cells
     exact : exact(pipe, x, t) -> pressure [Pa], flow [m3/s]; the reference, and the start if `initial` is left out
@@ -76,10 +77,10 @@ def order(
 
 
 def _order_of_pair(case, settings: Mapping, rows: tuple, against, given, points, progress, queue: RunQueue) -> Order:
-    """Order study of one scheme and method; most arguments as for `order`.
+    """Order study of one scheme and method; against and progress are as for `order`.
 
-    settings : overrides of the case; rows : (refine, key, levels, cells); given : (initial, source, exact), None if
-    absent; points : cache of earlier rows; queue : makes the runs
+    settings : overrides of the case; rows : (refine, key, levels, cells) as for `order`; given : (initial, source,
+    exact) as for `order`; points : cache of earlier rows; queue : makes the runs
     """
     from fvsolve.case import load
 
@@ -97,5 +98,5 @@ def _order_of_pair(case, settings: Mapping, rows: tuple, against, given, points,
     refuse_basins(case, "order by functions of pipes")
     if delayed := delay_lines(case):
         raise FvsolveError(f"functions along pipes need cells, but {listing(delayed)} would be delay lines. Set "
-                           'numerics.pipe_model = "finite-volume", and no `pipe_model` of a pipe')  # fmt: skip
+                           'numerics.pipe_model = "finite-volume", and remove `pipe_model` from all pipes')  # fmt: skip
     return ManufacturedStudy(case, refinement, against, *given).study(points, progress)

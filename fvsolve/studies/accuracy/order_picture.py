@@ -12,7 +12,10 @@ CELLS = "cell size [m]"  # measure that is printed in the units of the case; ste
 
 
 def order_picture(study):
-    """matplotlib Figure of errors against cell size or step: a panel for each variable, a line for each norm."""
+    """matplotlib Figure of errors against cell size or step: a panel for each variable, a line for each norm.
+
+    study : an `Order`
+    """
     from fvsolve.draw.convergence_picture import order_figure
 
     length_factor, length = study.shown.get("length", (1.0, "m")) if study.plan.measure == CELLS else (1.0, "")
@@ -29,13 +32,13 @@ def order_picture(study):
 
 
 def study_title(study) -> str:
-    """Title of an order study: scheme, method and description of the refinement."""
+    """Title of an `Order` study: scheme, method and description of the refinement."""
     scheme = f"{study.scheme}, " if study.rows[0].level.cells else ""
     return f"{scheme}{study.method}, {study.plan.words}"
 
 
 def variable_unit(variable: str, known: Mapping[str, str] = {}) -> str:  # noqa: B006
-    """SI unit of a variable: from `known` (variable -> unit) if it is there, else by the dimension of the quantity."""
+    """SI unit of a variable of an order study: from `known` (variable -> unit), otherwise from its dimension."""
     from fvsolve.units import DIMENSIONS
 
     return known[variable] if variable in known else DIMENSIONS[variable_dimension(variable)].si
@@ -53,7 +56,7 @@ def variable_dimension(variable: str) -> str:
 
 
 def error_scale(case, variable: str) -> tuple[float, str]:
-    """(factor from SI, unit) for errors of a variable, or for "length", in the units of `[output]`."""
+    """(factor from SI, unit) of errors of a variable in the units of `[output]`, or of lengths for "length"."""
     from fvsolve.output.unit_columns import column
 
     result = column("", variable if variable == "length" else variable_dimension(variable), case)

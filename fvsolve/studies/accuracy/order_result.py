@@ -12,7 +12,7 @@ from fvsolve.studies.accuracy.refine import Level, Plan
 
 @dataclass(frozen=True)
 class OrderRow:
-    """Row of an order study: a level of refinement with its errors and cost.
+    """Row of an order study: a refinement level with its errors and cost.
 
     errors : variable -> {"L1" | "L2" | "max": error [SI]}; seconds : time of the run [s]
     rhs : number of evaluations of the rates; reason : reason of a failed run, else empty
@@ -37,11 +37,11 @@ class OrderRow:
 class Order(Displayable):
     """Order study of one scheme and method.
 
-    rows : levels of refinement with errors, from coarse to fine; fits : variable -> {"L1" | "L2" | "max": Fit}
+    rows : refinement levels with errors, from coarse to fine; fits : variable -> {"L1" | "L2" | "max": Fit}
     kind : kind of the reference, "exact" | "finer" | "richardson" | "function"; words : description of the reference
     own_error : variable -> {"L1" | "L2" | "max": error of the reference itself [SI]}; notes : remarks on the numbers
     units : SI units of the variables of basins
-    shown : variable, or "length" -> (factor from SI, unit) of printed errors and sizes, SI if absent
+    shown : variable -> (factor from SI, unit) of its printed errors, and "length" for printed sizes; others are in SI
     """
 
     case: str

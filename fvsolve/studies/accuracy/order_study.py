@@ -42,7 +42,7 @@ ORDER_TOLERANCE = 0.06, 0.04  # a, b: greatest distance a + b order of an order 
 
 
 def timed_run(case, keys: Mapping) -> Outcome:
-    """Run a case with changed keys, the faster of two runs if they are brief."""
+    """Outcome of a case with changed keys: of the faster of two runs, or of a single run if it takes long."""
     return outcome(case, keys, best_of=BEST_OF, run=long_capped_run, budget=BRIEF_RUN)
 
 
@@ -74,7 +74,8 @@ class OrderStudy:
     def study(self, points: ResultCache | None, progress: Progress) -> Order:
         """Run and fit all rows, coarsest first; results in the cache `points` are reused.
 
-        With "auto", each row is compared with the next if a finer run fails, or is not more accurate than the rows.
+        With against = "auto", each row is compared with the next if a finer run fails, or is not more accurate than the
+        rows.
         """
         if self.against == "richardson":
             return self.richardson(progress)
@@ -87,7 +88,7 @@ class OrderStudy:
             return replace(result, notes=(f"no other reference can be used: {error}", *result.notes))
 
     def against_reference(self, points: ResultCache | None, progress: Progress) -> Order:
-        """Study against an exact solution or a finer run."""
+        """Study against an exact solution or a finer run; points, progress : as for `study`."""
         rows, levels = [], self.plan.levels
         total = len(levels) + 1
 
@@ -109,12 +110,15 @@ class OrderStudy:
         return self.fitted_order(rows, reference_data["kind"], reference_data["words"], own, sizes)
 
     def cache_key(self, name) -> dict:
-        """Settings that identify a cached result of the case; name : "reference" or the number of a row."""
+        """Values that identify a cached result of the case; name : "reference" or the number of a row."""
         return {"study": "order", "against": self.against, "way": self.plan.way, "what": name,
                 "levels": [level.set for level in self.plan.levels]}  # fmt: skip
 
     def reference_data(self, progress: Progress, total: int) -> dict:
-        """Kind, description and error of the reference, and sizes of all variables, as plain data."""
+        """Kind, description and error of the reference, and greatest absolute values of all variables, as plain data.
+
+        total : total number of runs, for `progress`
+        """
         progress(0, total, "reference")
         reference = self.reference
         return {"kind": reference.kind, "words": reference.words, "own": reference.own_error, "sizes": self.sizes()}
@@ -126,10 +130,10 @@ class OrderStudy:
         return self.find_reference(way, self.against != "finer", queue=self.queue)
 
     def find_reference(self, way: str, exact: bool, **options) -> Reference:
-        """Find a reference for the finest row: one kind of runs, with another scheme and method.
+        """Find a reference for the finest row, from one kind of runs, with another scheme and method.
 
-        way : "time" keeps the cells and the scheme; exact : True to use the exact solution of the case if it applies
-        options : further arguments of `find_reference`
+        way : "time" for a reference with the cells and scheme of the case; exact : True to use the exact solution of
+        the case if it applies; options : further arguments of `reference.find_reference`
         """
         method, last = METHODS.get(self.case.numerics.method), self.plan.levels[-1]
         delayed = way != "time" and delay_lines(self.case)
@@ -140,15 +144,15 @@ class OrderStudy:
         )  # fmt: skip
 
     def request(self, level: Level) -> RunRequest:
-        """Request for the run of a level of refinement."""
+        """`RunRequest` for the run of a refinement level."""
         return RunRequest(timed_run, recording_keys(self.case, level.set), self.stages)
 
     def run(self, level: Level) -> Outcome:
-        """Run of a level of refinement."""
+        """Outcome of the run of a refinement level."""
         return self.queue(self.case, self.request(level))
 
     def sizes(self) -> dict[str, float]:
-        """Greatest absolute value of each variable in the first row that runs [SI], the scale of rounding errors."""
+        """Greatest absolute value of each variable in the coarsest row that runs [SI], the scale of rounding errors."""
         for level in self.plan.levels:
             run = self.run(level)
             if run.ok:
@@ -156,7 +160,7 @@ class OrderStudy:
         raise FvsolveError(f"no row could be run: {run.reason}")
 
     def row(self, level: Level) -> OrderRow:
-        """Make the run of a level of refinement; returns its row with errors."""
+        """Make the run of a refinement level; returns its `OrderRow` with errors."""
         run = self.run(level)
         errors = error_norms(run, self.reference, self.probe_names) if run.ok else {}
         return row_of_run(level, run, errors)
@@ -164,8 +168,8 @@ class OrderStudy:
     def fitted_order(self, rows, kind: str, words: str, own: dict, sizes: dict) -> Order:
         """Fit an order for every variable and norm, and add notes.
 
-        kind, words : kind and description of the reference; own : variable -> norm -> error of the reference [SI]
-        sizes : variable -> greatest absolute value [SI]
+        rows : each an `OrderRow`; kind, words : kind and description of the reference
+        own : variable -> norm -> error of the reference [SI]; sizes : variable -> greatest absolute value [SI]
         """
         fits, doubtful, smooth_order = {}, [], self.smooth_order()
         for name in sizes:
@@ -194,7 +198,10 @@ class OrderStudy:
                      tuple(notes), units, scales)  # fmt: skip
 
     def refuse_reference(self, rows, fits, words: str) -> None:
-        """Raise FvsolveError if no error of any variable is reliable against the reference."""
+        """Raise FvsolveError if all errors of all variables are too close to the error of the reference.
+
+        fits : variable -> norm -> `Fit`; words : description of the reference
+        """
         uncertain = [
             mark == UNCERTAIN
             for name, norms in fits.items() for norm, fitted in norms.items()
@@ -225,7 +232,8 @@ class OrderStudy:
         """Expected order for each norm, NaN if it is not known.
 
         Jumps (s = 0) and kinks (s = 1) reduce the order p of smooth solutions to (s + 1) p / (p + 1) in L1,
-        (s + 1/2) p / (p + 1) in L2 and s p / (p + 1) in max.
+        (s + 1/2) p / (p + 1) in L2 and s p / (p + 1) in max. Bores, the jumps of a free surface, reduce it to 1 in L1,
+        1/2 in L2 and 0 in max.
         """
         p, breaks = self.smooth_order(), self.breaks
         if delay_lines(self.case):
@@ -258,9 +266,9 @@ class OrderStudy:
         ]
 
     def step_error_note(self, fits) -> list[str]:
-        """Note with a smaller step, tolerance or Courant number, if the time error may hide the order in space.
+        """Remark with a smaller step, tolerance or Courant number, if the time error may hide the order in space.
 
-        A list with one text, or empty; fits : variable -> norm -> fit
+        The result is a list with one text, or empty. fits : variable -> norm -> `Fit`
         """
         with_errors = [norms["L1"] for norms in fits.values() if norms["L1"].reason != NO_ERROR]
         hidden = any(FLOOR in fitted.marks or fitted.reason for fitted in with_errors)
@@ -311,7 +319,7 @@ class OrderStudy:
 
 
 def check_order(fitted: Fit, smooth_order: float) -> Fit:
-    """Return a fit, with a note if its order is far above `smooth_order`, that of scheme and method."""
+    """Return a fit, with a note if its order is far above `smooth_order`, the order of scheme and method together."""
     if fitted.reason or not fitted.order > smooth_order + EXCESS_ORDER:
         return fitted
     return replace(fitted, note=f"errors fall faster than the order {smooth_order:g} of scheme and method allows: the "
@@ -322,7 +330,7 @@ RICHARDSON = "Richardson: each row against the next, extrapolated"
 
 
 def check_three_differences(fitted: Fit, theory: float) -> Fit:
-    """Return a fit of differences; without an order if it has three rows only, and differs from the order `theory`."""
+    """Return a fit of differences; an order of only three rows is removed if it differs from the order `theory`."""
     tolerance = max(fitted.spread, ORDER_TOLERANCE[0] + ORDER_TOLERANCE[1] * theory)
     if fitted.reason or fitted.marks.count("") > LEAST_ROWS or not abs(fitted.order - theory) > tolerance:
         return fitted
@@ -332,7 +340,7 @@ def check_three_differences(fitted: Fit, theory: float) -> Fit:
 
 
 def mark_finest(fitted: Fit, rows) -> Fit:
-    """Return a fit with the mark "finest" instead of "failed" for rows that ran but have no finer row."""
+    """Return a fit in which rows that ran but have no finer row have the mark "finest" instead of "failed"."""
     pairs = zip(fitted.marks, rows, strict=True)
     return replace(
         fitted, marks=tuple(FINEST_ROW if mark == FAILED and not row.reason else mark for mark, row in pairs)
@@ -349,10 +357,10 @@ def is_certain(fitted: Fit, ratio: float) -> bool:
 
 
 def extrapolate(rows, fits) -> tuple[OrderRow, ...]:
-    """Rows with errors instead of differences to the next row, where the fitted order p is certain.
+    """Rows with errors instead of differences to the next row, where the fitted order p is certain (see `is_certain`).
 
     The error of a row is its difference d plus the error of the next row. After the last difference, the error of the
-    next row is d / (ratio^p - 1), with the ratio of the sizes of both rows.
+    next row is d / (ratio^p - 1), with the ratio of the sizes of both rows. fits : variable -> norm -> `Fit`
     """
     results: list[OrderRow] = []
     for k in range(len(rows) - 1, -1, -1):
@@ -368,19 +376,23 @@ def extrapolate(rows, fits) -> tuple[OrderRow, ...]:
 
 
 def difference_notes(rows, fits) -> list[str]:
-    """Note that names the variables and norms with differences instead of errors; a list with one text, or empty."""
+    """List with one note, or empty: variables and norms for which the table shows differences instead of errors.
+
+    The differences are those to the next row. The order of these variables and norms is not certain (see `is_certain`).
+    At most three variables are named. fits : variable -> norm -> `Fit`
+    """
     ratio = rows[0].level.size / rows[1].level.size
     names = [f"{name} ({', '.join(uncertain)})" for name, norms in fits.items()
              if (uncertain := [norm for norm, fitted in norms.items() if not is_certain(fitted, ratio)])]  # fmt: skip
     if not names:
         return []
     more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-    return [f"without a certain order nothing is extrapolated: for {', '.join(names[:3])}{more} the table shows "
-            "differences to the next row, and errors are larger"]  # fmt: skip
+    return [f"where the order is uncertain, nothing is extrapolated: for {', '.join(names[:3])}{more} the table "
+            "shows differences to the next row, and errors are larger"]  # fmt: skip
 
 
 def row_of_run(level: Level, run: Outcome, errors: dict) -> OrderRow:
-    """Row of an order study from its run and errors."""
+    """`OrderRow` of a refinement level, from its run and errors."""
     counts = run.counts
     updates = run.cell_updates if run.model is not None else 0
     return OrderRow(level, errors, run.seconds, counts.get("rhs", 0), updates, counts.get("steps", 0),
@@ -388,7 +400,7 @@ def row_of_run(level: Level, run: Outcome, errors: dict) -> OrderRow:
 
 
 def row_of_data(level: Level, data: Mapping) -> OrderRow:
-    """Row of an order study from plain data of the cache."""
+    """`OrderRow` of a refinement level, from plain data of the cache."""
     seconds = np.nan if data["seconds"] is None else data["seconds"]
     return OrderRow(level, error_numbers(data["errors"]), seconds, data["rhs"], data["cell_updates"], data["steps"],
                data["reason"])  # fmt: skip
@@ -400,7 +412,7 @@ def error_numbers(errors: Mapping) -> dict:
 
 
 def level_text(plan: Plan, level: Level) -> str:
-    """Text of the resolution of a level, such as "200 cells" or "step 0.001"."""
+    """Text of the resolution of a refinement level, such as "200 cells" or "step 0.001"."""
     if plan.way != "time" and level.cells:
         return f"{level.cells} cells"
     return f"{plan.measure.split(' ')[0]} {level.size:.4g}"

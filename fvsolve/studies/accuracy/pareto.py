@@ -32,7 +32,7 @@ class Crossing:
 
 
 def find_crossing(errors: Sequence[float], costs: Sequence[float], target: float) -> Crossing | None:
-    """Coarsest crossing of a curve, from which on all errors are at most `target`.
+    """Crossing of a curve with the target error, such that all finer points have errors of at most `target`.
 
     errors, costs : of the points of the curve, from coarse to fine. None if the error of the finest point exceeds the
     target.
@@ -67,7 +67,7 @@ def pareto_front(errors: Sequence[float], costs: Sequence[float]) -> list[int]:
 
 
 def target_powers(errors: Sequence[float], floor: float) -> list[float]:
-    """Target errors 1e-1, 1e-2, ... down to the least that some error reaches and that is not below `floor`."""
+    """Target errors 1e-1, 1e-2, ..., not below `floor` and not below the least of `errors`."""
     least = max(min((e for e in errors if math.isfinite(e)), default=math.inf), floor)
     powers, exponent = [], -1
     while 10.0**exponent >= least and exponent > -16:

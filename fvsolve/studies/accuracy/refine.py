@@ -40,11 +40,11 @@ LEAST_COURANT = 0.02  # smaller Courant numbers would take too long
 
 @dataclass(frozen=True)
 class Level:
-    """Level of a refinement.
+    """Refinement level: one resolution of a refinement.
 
-    set : dotted keys that it sets -> values
-    size : cell size [m], time step [s], travel time of a segment of a delay line [s], or tolerance [-]; falls from
-    level to level
+    set : overrides of the level, dotted key -> value
+    size : cell size [m], time step [s], travel time of a stretch of a delay line [s], or tolerance [-]; it decreases
+    from level to level
     cells : number of cells of all pipes and basins; step : fixed time step [s], NaN if steps follow a tolerance
     """
 
@@ -58,7 +58,8 @@ class Level:
 class Plan:
     """Refinement of a case.
 
-    way : "both" | "space" | "time"; measure : meaning and unit of the sizes; words : description of the refinement
+    way : "both" (space and time), "space" or "time"; measure : quantity that is the size of a level, with its unit
+    levels : refinement levels from coarse to fine; words : description of the refinement
     """
 
     way: str
@@ -89,9 +90,12 @@ def refinement_plan(
 ) -> Plan:
     """Plan of a refinement of a case; a row is the run of a level, coarsest first.
 
-    refine : "both" (sizes of cells, segments of delay lines, and steps halved from row to row; the default with cells
-    or delay lines), "space" (sizes of cells and segments halved, one step suitable for the finest row) or "time" (steps
-    halved, or rtol divided by ten if the case states it; the default for other cases)
+    refine : "both", "space" or "time"; default "both" with cells or delay lines, "time" for other cases
+
+    "both" : sizes of cells, stretches of delay lines, and steps are halved from row to row
+    "space" : sizes of cells and stretches are halved; all rows have one step, which suits the finest row
+    "time" : steps are halved, or rtol is divided by ten if the case states it
+
     key : key of the only resolution that is refined, such as "links.main.cells" (default all); levels : number of rows
     cells : cells of the coarsest row, along the pipe or side with most cells; other numbers change in proportion
     Raises FvsolveError for an unknown or impossible refinement, key, or number of levels or cells.
@@ -129,10 +133,11 @@ def refinement_plan(
 
 
 def delay_line_plan(case, way: str, levels: int) -> Plan:
-    """Plan with half the tolerance of delay lines from row to row, so with twice the number of segments.
+    """Plan in which the tolerance of delay lines is halved from row to row, so that they have twice as many stretches.
 
-    With way = "both" steps are halved too, and the size of a row is its step [s]. With "space" it is the travel time of
-    a segment [s], in the line with most segments in the last row.
+    With way = "both" steps are halved too, and the size of a row is its step (with error control its longest step) [s].
+    With "space" it is the travel time of a stretch [s], in the line with most stretches in the last row.
+    levels : number of rows
     """
     count, step = total_cells(case, cell_counts(case)), first_step(case) if case.numerics.rtol is None else math.nan
     rows = [stretch_keys(case, way, k) for k in range(levels)]
@@ -162,7 +167,10 @@ STRETCH_AND_STEP_WORDS = {
 
 
 def stretch_keys(case, way: str, k: int) -> dict:
-    """Overrides of row k: tolerance of delay lines divided by 2^k, and their cells times 2^k if cells set the step."""
+    """Overrides of row k: tolerance of delay lines divided by 2^k, and their cells times 2^k if cells set the step.
+
+    way : "both" (space and time) or "space"; with "space" the cells of delay lines stay
+    """
     keys = {"numerics.delay_tolerance": case.numerics.delay_tolerance / 2**k} if delay_lines(case) else {}
     if way == "both" and (case.numerics.rtol is not None or (cell_counts(case) and case.numerics.courant is not None)):
         keys |= {f"links.{name}.cells": pipes(case)[name].cells * 2**k for name in delay_lines(case)}
@@ -173,9 +181,9 @@ def stretch_keys(case, way: str, k: int) -> dict:
 
 
 def space_plan(case, way: str, key: str | None, levels: int, cells: int | None) -> Plan:
-    """Plan with twice the cells from row to row, of all pipes and basins, or of the part that `key` names.
+    """Plan in which the cells of all pipes and basins, or of the part that `key` names, are doubled from row to row.
 
-    Arguments as for `refinement_plan`; way : "both" or "space"
+    way : "both" (space and time) or "space"; other arguments as for `refinement_plan`
     """
     first = coarsest_counts(case, key, cells)
     refined = [name for name in first if key in (None, name)]
@@ -205,7 +213,7 @@ def space_plan(case, way: str, key: str | None, levels: int, cells: int | None) 
 
 
 def coarsest_counts(case, key: str | None, cells: int | None) -> Counts:
-    """Numbers of cells of the first row; key, cells : as for `refinement_plan`."""
+    """Numbers of cells of the first row, as from `cell_counts`; key, cells : as for `refinement_plan`."""
     own_counts = cell_counts(case)
     if cells is None:
         return own_counts
@@ -221,7 +229,7 @@ def space_courant(case, levels: int) -> float | None:
 
     With Courant number C, cell size dx and orders p in space and q in time, the time error is C^q dx^q and the space
     error dx^p. If p > q, their ratio grows by 2^(p - q) from row to row. The result is at most the Courant number of
-    the case, None if the case states none.
+    the case, None if the case states none. levels : number of rows
     """
     numerics = case.numerics
     if numerics.courant is None:
@@ -232,11 +240,11 @@ def space_courant(case, levels: int) -> float | None:
 
 
 def step_keys(case, cells: Counts, step_cells: Counts, k: int, courant: float | None) -> tuple[float, dict]:
-    """(time step [s], overrides that set it) of row k: by the Courant number, or from the step of the case.
+    """(time step [s], overrides that set it) of row k: by the Courant number, or from the step that the case states.
 
-    cells : numbers of cells of the row; step_cells : numbers of cells that set the step, the same object as `cells` if
-    the step is refined with the cells, so that the step of the case is halved k times
-    Under error control the step is NaN.
+    cells : numbers of cells of row k; step_cells : numbers of cells whose wave rate sets the step. If both are the same
+    object, the step is refined with the cells: a step that the case states is halved k times. Under error control the
+    step is NaN.
     """
     numerics = case.numerics
     if numerics.rtol is not None:
@@ -251,7 +259,7 @@ def step_keys(case, cells: Counts, step_cells: Counts, k: int, courant: float | 
 
 
 def stepping_words(case, way: str, courant: float | None) -> str:
-    """Text on the time steps of a refinement."""
+    """Text on the time steps of a refinement; way : "both" or "space"; courant : Courant number of the finest row."""
     numerics = case.numerics
     if numerics.rtol is not None:
         return f"steps by error, rtol = {numerics.rtol:g} in all rows"
@@ -267,7 +275,10 @@ def stepping_words(case, way: str, courant: float | None) -> str:
 
 
 def time_plan(case, key: str | None, levels: int) -> Plan:
-    """Plan with half the step from row to row, or a tenth of the tolerance, with constant cells."""
+    """Plan in which the step is halved from row to row, or the tolerance divided by ten, with constant cells.
+
+    key, levels : as for `refinement_plan`
+    """
     numerics, count = case.numerics, total_cells(case, cell_counts(case))
     by_error = key == "numerics.rtol" or (key is None and numerics.rtol is not None)
     if by_error:
@@ -290,7 +301,7 @@ def first_step(case) -> float:
     """Longest time step of a refinement in time [s].
 
     It is the step that the case states, otherwise the step for its Courant number, shortened to a whole fraction of the
-    output interval; without pipes and basins it is the output interval.
+    output interval. If the case states no step and has no pipes or basins, it is the output interval.
     """
     numerics, every = case.numerics, case.output.every
     if numerics.step is not None:

@@ -23,8 +23,9 @@ def affordable_plan(
     case, refine: str | None, key: str | None, levels: int | None, cells: int | None, against: str,
     points: ResultCache | None,
 ) -> Plan:  # fmt: skip
-    """Plan of a refinement; cells of the first row that are not given are chosen for a study of a minute or two.
+    """Plan of a refinement; if neither `cells` nor `key` is given, the study takes a minute or two.
 
+    For this the number of cells of the first row is reduced if necessary, unless only steps are refined.
     refine, key, levels, cells : as in `refinement_plan`; against : kind of the reference as in `order`
     points : result cache, which also stores the chosen number of cells
     """
@@ -54,8 +55,8 @@ def affordable_plan(
 def first_cells(case, rows: Plan, refine: str | None, levels: int | None, against: str) -> int:
     """Number of cells of the first row: that of the case, halved until the study takes at most `CPU_BUDGET`.
 
-    It is not halved if patches or holes of a basin would then not end between cells. rows : plan with the cells of the
-    case; other arguments as in `affordable_plan`
+    It is not halved if patches or holes of a basin would then not end between cells.
+    rows : plan with the cells of the case; other arguments as in `affordable_plan`
     """
     own_counts, exact = cell_counts(case), case.exact is not None or against != "auto" or bool(basins(case))
     cells, seconds = most_cells(own_counts), rhs_seconds(study_model(case)) / total_cells(case, own_counts)
@@ -68,10 +69,10 @@ def first_cells(case, rows: Plan, refine: str | None, levels: int | None, agains
 
 
 def cpu_time(case, rows: Plan, seconds: float, exact: bool) -> float:
-    """Estimated CPU time of all rows [s], and of a reference unless `exact`; 0 if steps follow a tolerance.
+    """Estimated CPU time of all rows [s], and of a finer reference unless `exact`; 0 if steps follow a tolerance.
 
     rows : plan of the refinement; exact : True if the study needs no finer run as reference
-    seconds : time of one call of the rates for one cell [s]
+    seconds : time of one call of the rates, divided by the number of cells [s]
     """
     numerics = case.numerics
     stages = method_named(automatic.first_method(numerics.method)).stages

@@ -35,7 +35,7 @@ class CappedRun(Run):
             raise GivenUp
 
     def segments(self) -> str:
-        """Run all segments and return the reason for the end."""
+        """Run to the end; returns the reason for the end, such as "finished", or "given up after ..." at the limit."""
         try:
             return super().segments()
         except GivenUp:
@@ -47,21 +47,21 @@ class GivenUp(Exception):
 
 
 def capped_run(model, state, sink, progress) -> Run:
-    """Run that is stopped after CPU_LIMIT seconds of CPU time."""
+    """Run of a model that is stopped after CPU_LIMIT seconds of CPU time; arguments as for `solve.Run`."""
     run = CappedRun(model, state, sink, progress)
     run.max_seconds = CPU_LIMIT
     return run
 
 
 def long_capped_run(model, state, sink, progress) -> Run:
-    """Run that is stopped after REFERENCE_CPU_LIMIT seconds of CPU time."""
+    """Run of a model that is stopped after REFERENCE_CPU_LIMIT seconds of CPU time; arguments as for `solve.Run`."""
     run = CappedRun(model, state, sink, progress)
     run.max_seconds = REFERENCE_CPU_LIMIT
     return run
 
 
 def probe_run(model, state, sink, progress) -> Run:
-    """Run that is stopped after about PROBE_STEPS steps."""
+    """Run of a model that is stopped after about PROBE_STEPS steps; arguments as for `solve.Run`."""
     run = CappedRun(model, state, sink, progress)
     run.max_steps = PROBE_STEPS
     return run
@@ -70,7 +70,8 @@ def probe_run(model, state, sink, progress) -> Run:
 def finished_run(model, run=None) -> Outcome:
     """Outcome of one run of a model. Raises KeyboardInterrupt if the user interrupted the run.
 
-    run : function that makes the run from (model, state, sink, progress), such as `capped_run`
+    run : function(model, state, sink, progress) that returns the `Run`, such as `capped_run` (default `solve.Run`
+    itself)
     """
     result = outcome(model, run=run)
     if result.reason.startswith("interrupted"):
@@ -79,9 +80,9 @@ def finished_run(model, run=None) -> Outcome:
 
 
 def best_run(model, most: int = MAX_RUNS, budget: float = REPEAT_TIME) -> Outcome:
-    """Outcome with the least CPU time among up to `most` runs.
+    """Outcome with the least CPU time among up to `most` runs of a model.
 
-    A run that stops early, or exceeds its limit, is not repeated.
+    A run that stops early, or exceeds its limit, is not repeated. budget : time of all repeated runs together [s]
     """
     began, fastest = perf_counter(), finished_run(model, capped_run)
     for _ in range(most - 1 if fastest.ok else 0):
@@ -92,7 +93,7 @@ def best_run(model, most: int = MAX_RUNS, budget: float = REPEAT_TIME) -> Outcom
 
 
 def best_run_of(case, keys) -> Outcome:
-    """Best run of a case with changed keys; a refused case also gives an outcome."""
+    """Outcome of `best_run` for a case with changed keys; a refused case gives an outcome with its reason."""
     try:
         return best_run(study_model(case, keys))
     except CaseError as error:
@@ -100,7 +101,7 @@ def best_run_of(case, keys) -> Outcome:
 
 
 def compile_seconds(model) -> float:
-    """Wall time of a first run less that of a second run [s].
+    """Wall time of a first run minus that of a second run [s].
 
     The difference is the time of compilation, or of loading compiled code.
     """

@@ -23,7 +23,7 @@ class Point:
     ok : True if the result is usable, otherwise `reason` explains why it is not
     trajectory, greatest, end, overshoot, worst : errors relative to ranges, see `Distance` in `studies/distance.py`
     seconds : CPU time of the steps, the least of several runs [s]; rhs : number of evaluations of the rates
-    updates : rhs times cells (or states, without cells); steps : number of steps
+    updates : number of cell updates, see `Outcome.cell_updates`; steps : number of steps
     """
 
     setting: MethodSetting
@@ -46,7 +46,8 @@ class FrontRow:
 
     name, fineness, seconds : curve with the least CPU time, its resolution as text, and the CPU time [s]
     by_updates, updates : curve with the least number of cell updates, and that number
-    default_* : values of the default curve. None or "" if no curve (or the default curve) reaches the target
+    default_fineness, default_seconds, default_updates : resolution, CPU time and cell updates of the default curve
+    If no curve reaches the target, numbers and names are None and the text is empty; likewise for the default curve.
     """
 
     target: float
@@ -61,7 +62,7 @@ class FrontRow:
 
 
 def curves_by_name(points: Sequence[Point]) -> dict[str, list[Point]]:
-    """Name of scheme and method -> points of this curve, in their order."""
+    """Points of each scheme and method, in their order : name, such as "weno5 rk4" -> points."""
     points_by_name: dict[str, list[Point]] = {}
     for point in points:
         points_by_name.setdefault(point.setting.name, []).append(point)
@@ -69,9 +70,9 @@ def curves_by_name(points: Sequence[Point]) -> dict[str, list[Point]]:
 
 
 def front_row(points: Sequence[Point], target: float, floor: float, default: str) -> FrontRow:
-    """Row of the front for a target error; default : name of the curve of the default scheme and method.
+    """Row of the front for a target error; default : name of the default scheme and method.
 
-    floor : smaller errors count as this error
+    target : trajectory error [-]; floor : smaller errors count as this error
     """
     by_time, by_work = (cheapest_curve(points, target, floor, cost) for cost in ("seconds", "updates"))
     name, best = by_time or (None, None)
@@ -91,9 +92,9 @@ def good_errors(points: Sequence[Point]) -> list[float]:
 
 
 def target_crossings(points: Sequence[Point], target: float, floor: float, cost: str) -> dict[str, Crossing]:
-    """Crossing of each curve with a target error, by name of the curve.
+    """Crossing of each curve (scheme and method) with a target error, by name of the curve.
 
-    cost : "seconds" or "updates"; errors below the floor count as the floor
+    target : trajectory error [-]; cost : "seconds" or "updates"; errors below the floor count as the floor
     """
     by_name = {}
     for name, curve in curves_by_name(points).items():
@@ -105,12 +106,15 @@ def target_crossings(points: Sequence[Point], target: float, floor: float, cost:
 
 
 def cheapest_curve(points: Sequence[Point], target: float, floor: float, cost: str) -> tuple[str, Crossing] | None:
-    """Name and crossing of the curve with the least cost at a target; None if no curve reaches the target."""
+    """Name and crossing of the curve with the least cost at a target error; None if no curve reaches the target.
+
+    Arguments as for `target_crossings`.
+    """
     return min(target_crossings(points, target, floor, cost).items(), key=lambda item: item[1].cost, default=None)
 
 
 def interpolated_setting(case: Case, coarse: MethodSetting, fine: MethodSetting, share: float) -> MethodSetting:
-    """Setting between two settings of a curve; share : position in logarithms, 0 at `coarse` and 1 at `fine`."""
+    """Setting between two settings of a curve; share : its position in logarithms, 0 at `coarse` and 1 at `fine`."""
     if coarse.cells is not None:
         return cells_setting(
             case, coarse.scheme, coarse.method, math.ceil(interpolate_log(coarse.cells, fine.cells, share))
@@ -128,7 +132,10 @@ def coarser_setting(case: Case, setting: MethodSetting) -> MethodSetting | None:
 
 
 def fineness_text(points, name: str | None, where: Crossing | None) -> str:
-    """Text of the resolution at a crossing, such as "200 cells" or "rtol 1e-06"; name : curve, where : crossing."""
+    """Text of the resolution at a crossing with a target error, such as "200 cells" or "rtol 1e-06".
+
+    name : name of the curve, None without a crossing; where : the crossing; points : points of all curves
+    """
     if name is None or where is None:
         return ""
     coarse, fine = (curves_by_name(points)[name][k].setting for k in (where.coarser, where.finer))

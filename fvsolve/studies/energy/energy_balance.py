@@ -23,12 +23,14 @@ IMPLIED_KINDS = ("valve", "pump", "damper", "pipe", "chamber", "tank")  # kinds 
 class Port:
     """Passivity at a port: the network may not return more energy than it had at the start and received elsewhere.
 
-    Condition (2): E0 + W + O >= 0 at any time, with the available energy E0 at the start, W the integral over time of
-    p q at the port (gauge pressure p, flow q into the network), and O the energy supplied by other ports. Heights are
-    measured from the port.
-    node : name of the port; work : least value of W [J], at `time` [s]; at_start : E0 [J]
-    margin : least value of E0 + W + O [J], at `t_margin` [s]; others : O at that time [J]
-    passive : True if the condition holds; course, bound : float64[k]  W and -(E0 + O) at the rows of the ledger [J]
+    Condition (2) of docs/course.md: E0 + W + O >= 0 at any time. E0 is the available energy at the start, W the
+    integral over time of p q at the port (gauge pressure p, flow q into the network), and O the energy supplied by
+    other ports. Heights are measured from the port.
+    node : name of the port; at_start : E0 [J]
+    work : least value of W [J], reached at `time` [s]
+    margin : least value of E0 + W + O [J], reached at `t_margin` [s]; others : O at that time [J]
+    passive : True if the condition holds
+    course, bound : float64[k]  W and -(E0 + O) [J] at the times `Energy.t`
     text : verdict as a sentence, in the units of `[output]`
     """
 
@@ -51,15 +53,18 @@ class Port:
 
 @dataclass(frozen=True)
 class Energy:
-    """Energy ledger of a run: energies since the start at ends of steps [J].
+    """Energy balance of a run: energies since the start of the run [J], at the ends of k steps.
 
-    t : float64[k] [s]; supplied, stored, dissipated : {"PART": float64[k]}, stored as change since the start
-    scheme, law : {"PART": float64[k]}  energy removed by the discretisation in space of a pipe, and by a law of a part
-    that conserves energy only approximately
+    reason : reason for the end of the run; ok : True if the run reached its end time
+    t : float64[k]  times at the ends of these steps [s]
+    supplied, stored, dissipated : {"PART" or "PART KIND": float64[k]}; stored energy is the change since the start
+    scheme : {"PART": float64[k]}  energy removed by the discretisation of a pipe or basin in space, or by a delay line
+    law : {"PART": float64[k]}  energy removed by a law of a part that conserves energy only approximately
     step : float64[k]  energy removed by the time steps; newton : float64[k]  energy of Newton residuals
     remainder : float64[k]  supplied - stored - dissipated, the sum of scheme, law, step and newton; positive if the
     numerical method dissipates energy, negative if it creates energy
     at_start : {"PART": available energy at the start [J]}; datum : elevation of zero height [m]
+    settings : scheme, method, step control and number of cells of the run; steps : number of steps
     marks : texts on events outside the validity of the model, with their times; port : passivity at a port, if checked
     """
 
@@ -98,12 +103,12 @@ class Energy:
 
     @property
     def relative(self) -> float:
-        """Magnitude of `numerical_remainder` at the end over `throughput` [-]; 0 without throughput."""
+        """Magnitude of `numerical_remainder` at the end of the run over `throughput` [-]; 0 without throughput."""
         return 0.0 if self.throughput == 0.0 else float(abs(self.numerical_remainder[-1]) / self.throughput)
 
     @property
     def newton_counts(self) -> bool:
-        """True if the energy of Newton residuals exceeds rounding at any row."""
+        """True if the energy of Newton residuals exceeds rounding errors at any time."""
         return bool(np.max(np.abs(self.newton)) > ROUNDING * self.throughput)
 
     @property
@@ -127,7 +132,7 @@ class Energy:
         return {name: values for name, values in causes.items() if values.any()} | {"remainder": self.remainder}
 
     def plain(self) -> dict:
-        """Plain values for JSON: the ledger at the end of the run."""
+        """Plain values for JSON: energies at the end of the run, verdict, settings, and passivity at the port."""
         lines = {json_name: {name: float(values[-1]) for name, values in getattr(self, kind).items()}
                  for kind, json_name in JSON_NAMES.items()}  # fmt: skip
         port = None if self.port is None else self.port.plain()
@@ -145,10 +150,10 @@ JSON_NAMES = {"supplied": "supplied", "stored": "stored", "dissipated": "dissipa
 
 @validated(set=TABLE, port=TEXT, progress=FUNCTION)
 def energy(case, set=None, port: str | None = None, progress=None) -> Energy:
-    """Run a case with changed keys and compute its energy ledger; `case` as for `run`, or a Model.
+    """Run a case with changed keys and compute its energy balance; `case` as for `run`, or a Model.
 
-    port : a reservoir, inflow or junction with a demand, at which condition (2) of passivity is checked
-    set : key -> value; progress : called as progress(t, seconds, steps)
+    port : a reservoir, inflow or junction, at which condition (2) of passivity is checked (see `Port`)
+    set : key -> value, ignored for a Model; progress : called as progress(t, seconds, steps)
     Raises CaseError for an invalid case, FvsolveError for an unknown port.
     """
     model = study_model(case, set) if not hasattr(case, "tables") else case
@@ -164,7 +169,7 @@ def energy(case, set=None, port: str | None = None, progress=None) -> Energy:
 
 
 def ledger(run: EnergyRun, summary, port: str | None) -> Energy:
-    """Energy ledger from the recorded totals of a run; summary : summary of the run; port : as in `energy`."""
+    """Energy balance of a finished run, from its recorded energies; summary : its `Summary`; port : as in `energy`."""
     accounts, totals, holdings = run.accounts, np.array(run.totals), np.array(run.holdings)
     lines = {
         kind: lines_by_name(accounts.accounts, kind, totals) for kind in ("supplied", "dissipated", "scheme", "law")
@@ -185,15 +190,17 @@ def ledger(run: EnergyRun, summary, port: str | None) -> Energy:
         - impact_losses.sum(axis=1) - stored_sum,
         totals[:, -1], supplied - stored_sum - dissipated, available_energy(run.model),
         float(run.model.tables.settings[0]["datum"]), settings | {"cells": run.model.cells}, summary.steps,
-        [f"{mark.text}: the ledger from {run.model.case.amount(mark.time, 'time', 6)} on is not to be trusted"
+        [f"{mark.text}: the energy balance from {run.model.case.amount(mark.time, 'time', 6)} on is not to be trusted"
          for mark in summary.marks],
         None if port is None else port_verdict(run, port),
     )  # fmt: skip
 
 
 def lines_by_name(accounts: list[Account], kind: str, columns: np.ndarray) -> dict[str, np.ndarray]:
-    """Ledger lines of a category that are not always zero: "PART", or "PART KIND" with several kinds -> energies [J].
+    """Energies [J] of the accounts of a category that are not always zero : "PART" or "PART KIND" -> float64[rows].
 
+    The kind is stated for dissipated energy, except for the kinds that the part implies (`IMPLIED_KINDS`), and for flow
+    over the rim. Energies of accounts with the same name are added.
     kind : category, such as "dissipated"; columns : float64[rows, accounts]  energies of all accounts [J]
     """
     lines = {}
@@ -248,7 +255,7 @@ def port_text(port: Port, case) -> str:
 
 
 def write_table(result: Energy, path: Path) -> None:
-    """Write energy.csv: time, then every ledger line [J], at ends of steps."""
+    """Write an energy balance to the file `path` as CSV: time [s], accounts and remainders [J], at ends of steps."""
     columns = {"t [s]": result.t}
     for kind in ("supplied", "stored", "dissipated", "scheme", "law"):
         columns |= {f"{kind} {name} [J]": values for name, values in getattr(result, kind).items()}

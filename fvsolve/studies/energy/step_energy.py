@@ -26,10 +26,10 @@ ACCEPTED_CODES = (
 
 
 class EnergyLoop(RunLoop):
-    """Loop that adds up the energy of every accepted step from stage powers, with the weights of the method."""
+    """Run loop that adds up the energies of all accounts over accepted steps, from the powers at their stages."""
 
     def watch(self, accounts: Accounts, on_step) -> None:
-        """Start the summation; on_step() is called after every accepted step."""
+        """Start to add up the energies of `accounts`; on_step() is called after every accepted step."""
         self.accounts, self.on_step = accounts, on_step
         self.total, self.carry = np.zeros((2, len(accounts.accounts) + 1))  # ledger lines, then the Newton residual
         self.supplied, self.rates, self.dissipated_lines = (
@@ -40,9 +40,9 @@ class EnergyLoop(RunLoop):
         self.controls[loop_indices.ALLOW_FUSED] = 0.0  # fused steps store no stages
 
     def run(self, budget: float) -> int:
-        """Run `RunLoop.run` one step at a time, and add the energy of each accepted step; budget : number of steps.
+        """Run `RunLoop.run` one step at a time, and add the energy of each accepted step.
 
-        Returns the status code of the loop.
+        budget : greatest number of steps. Returns the status code of the loop.
         """
         code, left, armed = super().run(0.0), budget, self.armed
         while code == loop_indices.BUDGET_SPENT and left > 0.0 and not automatic.is_change_due(self.stepper):
@@ -59,17 +59,17 @@ class EnergyLoop(RunLoop):
         return code
 
     def power(self, t: float, y: np.ndarray) -> np.ndarray:
-        """Power of every ledger line at the state (t, y) [W] : float64[lines]."""
+        """Power [W] of every energy account at the state (t, y) : float64[accounts]."""
         return self.accounts.power_at(t, y, self.dydt, self.out_work)
 
     def tableau(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Coefficients float64[s, s], weights float64[s] and times float64[s] of the s stages of a step."""
+        """(coefficients : float64[s, s], weights : float64[s], times : float64[s]) of the s stages of a step."""
         s = self.stepper.k.shape[0]
         a, (b, c) = (part.reshape(-1, s) for part in np.split(self.stepper.coefficients[: s * s + 2 * s], [s * s]))
         return a, b, c
 
     def step_energy(self, t: float, y: np.ndarray, first: np.ndarray, supply: np.ndarray) -> np.ndarray:
-        """Energy that the step from (t, y) adds to every ledger line, and last to the Newton residual [J].
+        """Energy [J] that the step from (t, y) adds to every account; the last entry is that of the Newton residual.
 
         first, supply : slope dy/dt and supplied powers [W] of the first stage, at (t, y)
         """
@@ -111,10 +111,10 @@ class EnergyLoop(RunLoop):
         self.controls[loop_indices.STEP_MAX] = min(self.longest, h * max(LEAST, grow))
 
     def jump_correction(self, t: float, y: np.ndarray) -> np.ndarray:
-        """Correction of the energies of the step from (t, y) for jumps of waves in delay lines within the step [J].
+        """Correction [J] of the energies of the step from (t, y) for jumps of waves in delay lines within the step.
 
-        The power at a stage is that before or after a jump, so that the weights place the jump at a wrong time.
-        Returns the correction for every ledger line, and last for the Newton residual.
+        The power at a stage is the power before or after a jump, so that the weights of the stages place the jump at a
+        wrong time. Returns the correction for every energy account; the last entry is that for the Newton residual.
         """
         past, total, h = self.run_data.past, np.zeros_like(self.total), self.t - t
         if not past.size or past[JUMPS_TRAVELLING] == 0.0:
@@ -133,11 +133,12 @@ class EnergyLoop(RunLoop):
         return total
 
     def stage(self, t: float, y: np.ndarray, slope: np.ndarray, supply: np.ndarray) -> np.ndarray:
-        """Power of every ledger line and of the Newton residual at a stage [W].
+        """Power [W] of every energy account at a stage; the last entry is that of the Newton residual.
 
+        t, y, slope, supply : time, state, slope dy/dt and supplied powers [W] of the stage
         Newton iterations of an implicit method end at a slope near to the rates f(t, y). Supplied and stored powers use
-        `slope` and `supply` of the stage, other lines use f. The difference between supplied power and rate of storage
-        that this causes is the power of the Newton residual.
+        `slope` and `supply` of the stage, other accounts use f. The difference between supplied power and rate of
+        storage that this causes is the power of the Newton residual.
         """
         power, values = self.power(t, y), self.out_work
         if self.stepper.method.explicit:
@@ -164,12 +165,13 @@ class EnergyLoop(RunLoop):
         return np.append(0.0, np.linalg.solve((np.eye(b.size - 1) - gamma * big_c[1:, 1:]).T, gamma * b[1:]))
 
     def linearly_implicit(self, t: float, y: np.ndarray, h: float, a, c, k) -> np.ndarray:
-        """Stage values w of the ledger lines in a Rosenbrock step from (t, y) : float64[s, lines] [W].
+        """Stage values w of the energy accounts in a Rosenbrock step from (t, y) : float64[s, accounts] [W].
 
-        The energies z of the lines, with dz/dt = P(t, y) and P the powers, are integrated like further states:
-        w_i = gamma (P(t + c_i h, U_i) + P_y h k_i + d_i h P_t + sum over j < i of C_ij w_j), with stage values
-        U_i = y + h sum a_ij k_j and stage slopes k_i. Derivatives P_y and P_t are differences; C, d, gamma : see
-        `rosenbrock_coefficients`.
+        The energies z of the accounts, with dz/dt = P(t, y) and P the powers, are integrated like further states:
+        w_i = gamma (P(t + c_i h, U_i) + P_y h k_i + d_i h P_t + sum over j < i of C_ij w_j),
+        with stage values U_i = y + h sum a_ij k_j and stage slopes k_i.
+        a, c : coefficients and times of `tableau`; C, d, gamma : see `rosenbrock_coefficients`
+        The derivatives P_y and P_t are computed by differences.
         """
         s, (big_c, late, gamma) = len(c), self.rosenbrock_coefficients()
         per, eps, slope = 1e-3 * h, 1e-3, 0.0
@@ -186,8 +188,9 @@ class EnergyLoop(RunLoop):
     def released_stops(self, t: float, y: np.ndarray, part: np.ndarray) -> np.ndarray:
         """Correct the energies `part` of the step from (t, y) for end stops whose contact opens within the step.
 
-        The stored energy changes by the exact difference between the ends of the step; the remainder is dissipated.
-        The rate of the stored energy has a kink where the contact force ends, which stage values do not resolve.
+        Returns `part`. The stored energy changes by the exact difference between the ends of the step; the remainder is
+        dissipated. The rate of the stored energy has a kink where the contact force ends, which stage values do not
+        resolve.
         """
         tables, lines = self.model.tables, self.accounts.stops
         if not lines:
@@ -229,7 +232,7 @@ def stop_compression(stop, x: float, speed: float) -> tuple[float, bool]:
 
 
 class EnergyRun(Run):
-    """Run that records an energy ledger: totals of all ledger lines at every step, and rows of a table."""
+    """Run that records the energies of all accounts after every step, and the rows of the table of energies."""
 
     loop_type = EnergyLoop
 
@@ -249,7 +252,7 @@ class EnergyRun(Run):
         return self.accounts.stored_at(self.loop.t, self.loop.now)
 
     def on_step(self) -> None:
-        """Record the totals of the step, and a row of the table if one is due."""
+        """Record the energies since the start after a step, and a row of the table if one is due."""
         self.step_times.append(self.loop.t)
         self.step_totals.append(self.loop.total.copy())
         if self.loop.t >= self.times[-1] + self.every or self.loop.t >= self.end:
@@ -262,7 +265,7 @@ class EnergyRun(Run):
         self.losses.append(self.impact_losses.copy())
 
     def stop_columns(self) -> None:
-        """Stop rigid columns that can no longer flow; add their kinetic energy to the impact losses (Carnot)."""
+        """Stop rigid columns that can no longer flow; add the kinetic energy lost to the impact losses (Carnot)."""
         before = self.flows()
         super().stop_columns()
         columns, rho = self.model.tables.columns, self.model.case.properties.density

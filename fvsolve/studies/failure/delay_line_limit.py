@@ -16,10 +16,11 @@ STEP_MARGIN = 4.0  # ratio of the limits of these steps to those of the map, up 
 
 
 class WaveGrowthLimit:
-    """Step limits of a case with delay lines, by growth of waves, for any method.
+    """Callable that returns the greatest step at which no wave grows in a case with delay lines, for a given method.
 
-    set : changed keys of the case; steps : steps of the failure map [s], around which the limit is searched
-    The case has a separate model for each step, which all methods use.
+    The waves are those between a storing node and the far end of a delay line, see `wave_growth`.
+    case, set : the case and its changed keys; steps : steps of the failure map [s], around which limits are searched
+    The model depends on the step but not on the method, so that all methods use the stored model of a step.
     """
 
     def __init__(self, case, set: dict, steps: list[float]) -> None:
@@ -28,13 +29,13 @@ class WaveGrowthLimit:
         self.models: dict[float, object] = {}
 
     def model(self, h: float):
-        """Model with delay lines divided into segments for steps of h [s]."""
+        """Model with delay lines divided into stretches for steps of h [s]."""
         if h not in self.models:
             self.models[h] = study_model(self.case, {**self.set, "numerics.step": h, "numerics.method": "euler"})
         return self.models[h]
 
     def grows(self, method: str, h: float) -> bool:
-        """True if waves grow 1000 times or more in a run with steps of h [s]."""
+        """True if waves between a storing node and a delay line grow 1000 times or more in a run of steps h [s]."""
         numerics = self.case.numerics
         return wave_growth(self.model(h), method_named(method), h, numerics.end - numerics.start)[0] >= VISIBLE_GROWTH
 

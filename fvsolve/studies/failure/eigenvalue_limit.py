@@ -16,8 +16,8 @@ def eigenvalues_of(case, set: dict) -> np.ndarray | None:
     """Eigenvalues of the linearised rates about the initial steady state, in one array [1/s].
 
     They are computed twice, with the schedules at their values at the start and at the end of the run. A limited scheme
-    has its weights in smooth flow, and waves that arrive from delay lines are constant. Returns None for more than 1200
-    states. set : changed keys of the case
+    has its weights in smooth flow (or is replaced by upwind, see `linear_scheme_for`), and waves that arrive from delay
+    lines are constant. Returns None for more than 1200 states. set : changed keys of the case
     """
     from fvsolve.studies.outcome import study_model
 
@@ -32,15 +32,16 @@ def eigenvalues_of(case, set: dict) -> np.ndarray | None:
 
 
 def linear_scheme_for(case, scheme: str) -> str:
-    """Linear scheme that replaces a limited scheme: equal in smooth flow or, if the case excludes it, `upwind`."""
+    """Linear scheme in place of a limited one: the one equal in smooth flow or, if the case excludes that, `upwind`."""
     return SCHEMES[scheme].twin if SCHEMES[scheme].twin in case.schemes else "upwind"
 
 
 def greatest_step(method: str, eigenvalues: np.ndarray, span: float) -> float:
     """Greatest step [s] up to which no mode grows 1000 times more than the exact solution in a run of `span` [s].
 
-    eigenvalues : complex128[n]  eigenvalues of the modes [1/s]. The search goes from 0.01 to 1000 over the modulus of
-    the fastest eigenvalue. Returns inf if no mode grows there, and 0 if a mode grows at the shortest step already.
+    eigenvalues : complex128[n]  eigenvalues of the modes [1/s]
+    Steps h are searched for which h times the greatest modulus of an eigenvalue is between 0.01 and 1000. Returns inf
+    if no mode grows at these steps, and 0 if a mode grows at the shortest of them.
     """
     from fvsolve.steppers import method_named, stability_function
 

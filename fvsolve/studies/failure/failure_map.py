@@ -154,8 +154,8 @@ def failure_map(
 class MapRuns:
     """Runs of one failure map, with their references, predicted limits and verdicts.
 
-    base : keys of all runs; column_set : columns of the map; points : cache of finished runs
-    collecting : True while missing runs are collected, so that no run is made
+    base : keys and values that all runs set; column_set : columns of the map; points : cache of finished runs
+    collecting : True while `missing_runs` lists the runs that are not in the cache; meanwhile no run is made
     """
 
     def __init__(
@@ -175,7 +175,7 @@ class MapRuns:
         return max(reference.uncertainty.trajectory for reference in self._references.values())
 
     def reference(self, k: int) -> Reference:
-        """Reference for column k; columns that differ in the step only have the same reference.
+        """Reference for column k; columns that differ only in the step share one reference.
 
         Raises FvsolveError if the reference is not accurate enough for the tolerance.
         """
@@ -198,7 +198,7 @@ class MapRuns:
     def limit(self, scheme: str, method: str, k: int) -> float | None:
         """Predicted greatest stable step [s] in column k: the lesser limit of eigenvalues and of waves in delay lines.
 
-        None if one of these limits is not known.
+        The result is None if one of these limits is not known.
         """
         at = scheme, k if self.columns.keys(k) else 0
         if at not in self._spectra:
@@ -215,9 +215,9 @@ class MapRuns:
         return self._limits[method, *at]
 
     def lines_limit(self, method: str, scheme: str, k: int) -> float | None:
-        """Predicted greatest step [s] up to which waves between storing nodes and delay lines do not grow.
+        """Predicted greatest step [s] in column k up to which waves between storing nodes and delay lines do not grow.
 
-        It is inf without delay lines, or without fixed steps.
+        It is inf without delay lines, or without fixed steps, and None where `WaveGrowthLimit` gives None.
         """
         set = {**self.base, **self.columns.keys(k), "numerics.scheme": scheme}
         steps = [keys["numerics.step"] for keys in self.columns.sets if "numerics.step" in keys]
@@ -228,7 +228,11 @@ class MapRuns:
         return self._delay_line_limits[k](method)
 
     def square(self, scheme: str, method: str, k: int) -> Square:
-        """Run of a scheme and a method in column k with its verdict; runs with shorter steps follow a great error."""
+        """Run of a scheme and a method in column k, with its verdict.
+
+        If only the error decides on the verdict and is above the tolerance, runs with half and with a quarter of the
+        step follow.
+        """
         trial = {**self.base, **self.columns.sets[k], "numerics.scheme": scheme, "numerics.method": method}
         step, waves = trial.get("numerics.step"), self.columns.wave_rate
         limit, errors = self.limit(scheme, method, k), []
@@ -249,7 +253,7 @@ class MapRuns:
     def run_ahead(self, places: Sequence[tuple[str, str, int]], report: Progress) -> None:
         """Make all runs in other processes: first with the steps of the columns, then the runs with shorter steps.
 
-        places : scheme, method and column of each square of the map
+        places : scheme, method and column of each square of the map; report : progress function of `failure_map`
         """
         while missing := self.missing_runs(places):
             missing.sort(key=lambda run: -run.trial.get("numerics.step", 0.0))  # the most expensive last
@@ -272,7 +276,7 @@ class MapRuns:
     def measure(self, trial: dict, k: int) -> Measures:
         """Measures of a run with the keys `trial` against the reference of column k, taken from the cache if possible.
 
-        Raises MissingRun for a new run while runs are collected.
+        Raises MissingRun for a run that is not in the cache while `missing_runs` collects such runs.
         """
         every = max(trial["output.every"], trial.get("numerics.step", 0.0))  # no rows between two steps
         reference, run = self.reference(k), {**trial, "output.every": every}
@@ -290,7 +294,9 @@ class MapRuns:
 class MissingRun(Exception):
     """Signal that a run is not in the cache.
 
-    trial : keys of the run as stored; keys : keys of the run with its output interval; column : column of its reference
+    trial : keys and values of the run, under which its result is stored
+    keys : the keys and values of `trial`, with an output interval of at least one step
+    column : number of the column whose reference the run is compared with
     """
 
     def __init__(self, trial: dict, keys: dict, column: int) -> None:
@@ -299,9 +305,9 @@ class MissingRun(Exception):
 
 
 def _shorter_steps(case, trial: dict, ratio: int) -> dict:
-    """Key and value for steps that are shorter by the factor `ratio`; a tolerance is divided by its square.
+    """Key and value that shorten the steps of a run by the factor `ratio`; a tolerance is divided by ratio^2.
 
-    trial : keys of the run with the original step
+    trial : keys and values of the run with the original step
     """
     numerics = case.numerics
     for name, factor in (("step", ratio), ("courant", ratio), ("rtol", ratio**2)):
@@ -320,7 +326,7 @@ def _is_explicit(method: str) -> bool:
 
 
 def _check_names(*given: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Schemes and methods without repetition. Raises FvsolveError for an unknown name."""
+    """Given schemes and given methods, both without repetition. Raises FvsolveError for an unknown name."""
     from fvsolve.case.sections import MethodNames
     from fvsolve.schemes import SCHEMES
 

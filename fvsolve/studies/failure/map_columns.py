@@ -43,7 +43,7 @@ class Columns:
         return {} if self.name == "step" else {self.name: self.values[k]}
 
     def stiff(self, k: int) -> bool:
-        """True if column k is stiff: its fastest rate exceeds 8 wave rates or, without pipes, 1e5 over the duration."""
+        """True if column k is stiff: its fastest rate exceeds 8 wave rates or, without cells, 1e5 / duration."""
         fastest, waves = self.rates[min(k, len(self.rates) - 1)]
         return fastest > STIFFNESS_RATIO * waves if waves else fastest * self.span > STIFF_STEPS
 
@@ -76,16 +76,17 @@ def map_columns(case, base: dict, courants, steps, key) -> Columns:
 
 
 def _step_control(courants, steps) -> dict:
-    """Key and value of the step control for all columns of a varied key; empty for the step control of the case."""
+    """Key and value that set the step in all columns of a varied key; empty if the case itself sets the step."""
     if courants is not None:
         return {"numerics.courant": courants[0]}
     return {} if steps is None else {"numerics.step": steps[0]}
 
 
 def _fastest_and_wave_rate(case, set: dict) -> tuple[float, float | None]:
-    """Fastest rate (modulus of an eigenvalue) and wave rate of a case [1/s]; None for a wave rate without cells.
+    """(fastest rate, wave rate) of a case [1/s], with delay lines replaced by cells.
 
-    With too many states for eigenvalues, the fastest rate is the wave rate.
+    The fastest rate is the greatest modulus of an eigenvalue; with too many states for eigenvalues it is the wave rate.
+    The wave rate is None without cells.
     """
     set = set | cells_for_delay_lines(case, set)
     model = study_model(case, set)
@@ -109,17 +110,19 @@ def cells_for_delay_lines(case, set: dict) -> dict:
 
 
 def _slowest_travel_time(case) -> float:
-    """Travel time of a wave along the slowest delay line [s]; 0 without delay lines."""
+    """Greatest travel time of a wave along a delay line of the case [s]; 0 without delay lines."""
     return max((case.links[name].length / case.wave_speed(name) for name in delay_lines(case)), default=0.0)
 
 
 def _default_steps(case, rates, waves: float | None) -> list[float]:
-    """Default steps of a failure map [s]: around Courant number 1 if waves have the fastest rate.
+    """Default steps of a failure map [s], in three cases.
 
-    Otherwise they go from 1.5 over the fastest rate (0.3 without pipes) to a tenth of the run or Courant number 1.5.
-    For delay lines alone they go from a hundredth of the slowest travel time, or 0.3 over the fastest rate of storing
-    parts if that is less, to this travel time.
-    rates : fastest rate and wave rate with delay lines as cells [1/s]; waves : wave rate of the cells, or None
+    If waves have the fastest rate, the steps are around Courant number 1. In a stiff case they go from 1.5 over the
+    fastest rate (0.3 without cells) to a tenth of the run or Courant number 1.5, whichever is less. With delay lines
+    and no cells they go from a hundredth of the greatest travel time, or 0.3 over the fastest rate of storing parts if
+    that is less, to a tenth of the run or that travel time, whichever is less.
+    rates : result of `_fastest_and_wave_rate`
+    waves : wave rate of the cells of the case itself [1/s], None without cells
     """
     fastest, span, travel = rates[0], case.numerics.end - case.numerics.start, _slowest_travel_time(case)
     if not waves and travel:
@@ -144,7 +147,7 @@ def _check_options(courants, steps, key) -> None:
         raise FvsolveError("--courant and --step are given; keep one")
     for option, values in (("--courant", courants), ("--step", steps)):
         if values is not None and not all(math.isfinite(value) and value > 0 for value in values):
-            raise FvsolveError(f"{option} must be positive numbers")
+            raise FvsolveError(f"{option}: expected positive numbers")
         if values is not None and len(values) == 0:
             raise FvsolveError(f"{option} is empty. Expected at least one number")
     if key is not None and len(courants or steps or [0]) > 1:

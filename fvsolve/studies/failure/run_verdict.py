@@ -17,7 +17,7 @@ STABLE, RINGING, COARSE, WRONG, BLOWN_UP, REFUSED, NOT_RUN = (
 )  # fmt: skip
 VERDICT_TEXTS = {
     STABLE: "error within the tolerance, and smooth",
-    RINGING: "finite, but it oscillates from step to step, or more than the reference and faster",
+    RINGING: "finite, but oscillates from step to step, or oscillates more and faster than the reference",
     COARSE: "error above the tolerance, but a shorter step helps",
     WRONG: "finite, error above the tolerance, and neither half nor a quarter of the step helps",
     BLOWN_UP: "not finite, or more than three ranges of a probe outside the values of the reference",
@@ -39,10 +39,12 @@ ERROR_RATIO = 0.75  # a shorter step helps if at most this fraction of the error
 class Measures:
     """Measures of a run against the reference, each for the worst probe, relative to the range of the probe.
 
-    reason : reason for the end of the run; refused : True if the run did not begin
+    reason : reason for the end of the run; ok : True if the run finished; refused : True if the run did not begin
     error : mean distance from the reference over time; nan if the run did not finish
-    farthest : greatest distance of a step outside the values of the reference; nan if the run did not finish
-    ringing, variation : see `ringing_amplitude` and `excess_variation`; seconds : elapsed time of the steps [s]
+    farthest : greatest distance of a value after a step from the range of values of the reference, 0 inside this range;
+    nan if the run did not finish
+    ringing, variation : see `ringing_amplitude` and `excess_variation`
+    steps : number of steps; seconds : elapsed time of the steps [s]
     """
 
     reason: str
@@ -105,8 +107,9 @@ def excess_variation(rows: np.ndarray, reference: np.ndarray, ranges: np.ndarray
     """Excess of the total variation TV of the worst probe over the reference, (TV - TV_ref) / max(TV_ref, range).
 
     TV is the sum of |changes| from row to row. A probe counts only if its swings follow each other in less than half
-    the time of the swings of the reference: a swing that a method amplifies or does not damp is no ringing. Each row is
-    first replaced by the median of itself and its neighbours, as a single outlier after a jump is no swing.
+    the time of the swings of the reference: a swing that a method amplifies or does not damp does not count as ringing.
+    Each row is first replaced by the median of itself and its neighbours, so that a single outlier after a jump does
+    not count as a swing.
     rows, reference : float64[k, probes]  values of the run and the reference; ranges : float64[probes]
     """
     smooth, smooth_reference = (_medians(values) / ranges for values in (rows, reference))
@@ -122,7 +125,7 @@ def excess_variation(rows: np.ndarray, reference: np.ndarray, ranges: np.ndarray
 
 
 def turn_interval(values: np.ndarray, height: float) -> float:
-    """Median number of rows between turning points of swings of at least `height`; inf for fewer than two points."""
+    """Median number of rows between turning points of swings of `height` or more; inf for fewer than two points."""
     turns, low, high, direction = [], 0, 0, 0
     for i, value in enumerate(values):
         low, high = (i if value < values[low] else low), (i if value > values[high] else high)

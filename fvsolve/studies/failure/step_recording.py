@@ -16,9 +16,10 @@ WINDOW_COUNT = 30  # in long runs the distance of windows is this fraction of th
 
 
 class RecordedRun(CappedRun):
-    """Run that records its probes after every step of a window; it takes the same steps as a usual run.
+    """Run that records its probes after every step; in a long run only in windows of nine or more successive steps.
 
-    windows : lists of float64[probes]  values of the probes after successive steps, in SI units
+    The steps are those of a run without recording.
+    windows : for each window a list of float64[probes], the values of the probes after successive steps, in SI units
     """
 
     def __init__(self, *arguments) -> None:
@@ -39,7 +40,7 @@ class RecordedRun(CappedRun):
 
 
 def run_recorded(case, set: Mapping | None = None) -> tuple[Outcome, list[np.ndarray]]:
-    """Outcome of a run with the changed keys `set`, and its recorded windows : float64[steps, probes] each, SI."""
+    """(outcome of a run with the changed keys `set`, recorded windows : list of float64[steps, probes] in SI units)."""
     runs: list[RecordedRun] = []
 
     def run(*arguments) -> RecordedRun:

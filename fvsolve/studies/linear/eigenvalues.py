@@ -74,7 +74,7 @@ def poles_of(a: Any, form: EnergyForm) -> Spectrum:
 
 
 def find_eigenvalues(e: Any) -> Spectrum:
-    """Eigenvalues of a matrix e : float64[n, n] or sparse; all for up to 1500 states, otherwise some by ARPACK in 10 s.
+    """Eigenvalues of a matrix e : float64[n, n] or sparse; all for up to 1500 states, else some, by ARPACK in 10 s.
 
     Raises FvsolveError if ARPACK finds no eigenvalue.
     """

@@ -31,7 +31,7 @@ def two_sided_differences(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Forward and backward difference quotients of f at x along `direction` : float64[steps, m] each.
 
-    base : float64[m]  f(x); steps : factors on `direction`
+    base : float64[m]  f(x); steps : factors on the vector `direction`, largest first
     """
     forward = [(f(x + h * direction) - base) / h for h in steps]
     return np.array(forward), np.array([(base - f(x - h * direction)) / h for h in steps])
@@ -42,9 +42,7 @@ def central_differences(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Central difference quotient of f at x along `direction`, and forward minus backward quotient.
 
-    Both are float64[steps, m].
-
-    base : float64[m]  f(x); steps : factors on `direction`
+    Both are float64[steps, m]; base, steps : as for `two_sided_differences`
     """
     forward, backward = two_sided_differences(f, x, direction, base, steps)
     return 0.5 * (forward + backward), forward - backward
@@ -53,10 +51,10 @@ def central_differences(
 def single_sided_differences(
     f: Function, x: np.ndarray, direction: np.ndarray, base: np.ndarray, steps: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """One-sided difference quotient of f at x along `direction`, in place of forward and backward ones: twice the same.
+    """One-sided difference quotient of f at x along `direction`, returned twice: as forward and as backward quotient.
 
     It is (-3 f(x) + 4 f(x + h) - f(x + 2 h)) / 2 h, second order in the step h : float64[steps, m].
-    base : float64[m]  f(x); steps : factors on `direction`
+    base, steps : as for `two_sided_differences`
     """
     slopes = [(4.0 * (f(x + h * direction) - base) - (f(x + 2.0 * h * direction) - base)) / (2.0 * h) for h in steps]
     return np.array(slopes), np.array(slopes)
@@ -65,12 +63,15 @@ def single_sided_differences(
 def longest_step_slopes(
     forward: np.ndarray, backward: np.ndarray, size: np.ndarray, steps: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Derivative, error and kink of each entry : float64[m] each, from the longest steps at which both sides agree.
+    """Derivative, error and kink of each entry of f : float64[m] each, from the longest steps with a clear result.
 
-    forward, backward : float64[steps, m]  difference quotients; size : float64[m]  size of each row, for its round-off
-    Error and kink are relative to the greatest quotient of the entry. A slope that falls with the step counts as zero.
-    The kink is the difference of both sides if each side is constant over longer steps; laws smooth such a kink over a
-    range below these steps.
+    forward, backward, steps : difference quotients and steps of `two_sided_differences`
+    size : float64[m]  size of each entry of f, from which the round-off of its quotients is estimated
+    The derivative is taken at the longest steps at which forward and backward quotients agree and change little with
+    the step. The error is the change with the step, relative to the quotient. If there are no such steps, the error is
+    relative to the greatest quotient, so that a quotient that falls to zero with the step counts as zero.
+    The kink is the difference of forward and backward quotients where it does not fall with the step, relative to the
+    greatest quotient; 0 if they agree at some step. Laws smooth such a kink over a range below these steps.
     """
     slopes, magnitude = 0.5 * (forward + backward), np.maximum(np.abs(forward), np.abs(backward))
     clear = magnitude[1:] > ROUNDING_SHARE * size / steps[1:, None]
@@ -114,9 +115,10 @@ def best_slopes(slopes: np.ndarray, size: np.ndarray, starts: np.ndarray) -> tup
 
 
 def side_differences(sides: np.ndarray, size: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    """Least difference of forward and backward quotients over all steps, for each column : float64[columns].
+    """Difference of forward and backward quotients of each column, relative to `size` : float64[columns].
 
-    It is relative to `size`; sides : float64[steps, p]  differences; size, starts : as in `best_slopes`
+    It is the greatest difference over the entries of a column, at the step where this is least.
+    sides : float64[steps, p]  forward minus backward quotients; size, starts : as in `best_slopes`
     """
     if sides.shape[1] == 0:
         return np.zeros(0)
@@ -126,12 +128,15 @@ def side_differences(sides: np.ndarray, size: np.ndarray, starts: np.ndarray) ->
 def hidden_kinks(
     sides: np.ndarray, size: np.ndarray, rounding: np.ndarray, starts: np.ndarray, steps: np.ndarray
 ) -> np.ndarray:
-    """True for each column with a kink: an entry whose sides differ equally over three steps, by over 1e-4 of its row.
+    """True for each column with a kink : bool[columns].
 
-    The difference of both sides of a smooth function falls with the step.
+    A column has a kink if the difference of forward and backward quotients of an entry is constant over three steps and
+    above 1e-4 of the size of its row. The difference of a smooth function falls with the step.
     sides : float64[steps, p]  forward minus backward quotients; starts : int64[columns]  first entry of each column
     size : float64[p]  size of the row of each entry over the longest step, which does not resolve the steep laminar
-    range of a valve at zero pressure drop; rounding : float64[p]  size of the row for its round-off
+    range of a valve at zero pressure drop
+    rounding : float64[p]  size of the row of each entry, from which its round-off is estimated
+    steps : float64[steps]  steps as fractions of the small deviations
     """
     if sides.shape[1] == 0:
         return np.zeros(0, dtype=bool)

@@ -56,8 +56,9 @@ class Linear:
     These are equations (9) and (10) of docs/course.md. at : operating point
     a : float64[n, n]  A, or a sparse scipy array if n > 1000; b : float64[n, inputs]  B; c : float64[outputs, n]  C
     d : float64[outputs, inputs]  D; input_values, output_values : values at the operating point
-    error : greatest errors "A", "C" and "BD" (of B and D) of an entry, the difference of two steps of the difference
-    quotients, relative to the sum of |entry| times small deviation over its row
+    error : {"A", "C" or "BD" : greatest error of an entry of A, of C, and of B and D}
+    The error of an entry is the difference of its difference quotients with two steps, relative to the sum of |entry|
+    times small deviation over its row.
     """
 
     at: OperatingPoint
@@ -129,8 +130,8 @@ def linearise(
     inputs : names such as "valve.opening", "lake.pressure"; outputs : probes; default: the probes of the case
     before : True to hold schedules at the values just before a kink or jump at this time
     scheme : linear scheme that replaces the scheme of the case; set : changed keys of the case
-    For an input at the end of its range differences are one-sided. Raises CaseError, and FvsolveError for an unknown
-    name, a state without a derivative (a limited scheme, a valve at a drop of zero, a kink), a case without states.
+    Differences are one-sided for an input at the end of its range. Raises CaseError, and FvsolveError for an unknown
+    name, a state without a derivative (a limited scheme, a valve at a drop of zero, a kink), and a case without states.
     """
     set = dict(set or {}) | ({} if scheme is None else {"numerics.scheme": scheme})
     point = operating_point(case, set, at, before, outputs or ())
@@ -192,7 +193,7 @@ def input_value(at: OperatingPoint, name: str, input_: Input) -> float:
 
 
 def input_width(at: OperatingPoint, input_: Input, value: float) -> float:
-    """Small change of an input for difference quotients, in SI units; value : value of the input there."""
+    """Small change of an input for difference quotients, in SI units; value : its value at the operating point."""
     usual = input_.sort.small / (input_.scale or 1e4) if input_.node >= 0 else input_.sort.small
     return usual if input_.sort.bounded or input_.sort is PRESSURE else max(usual, abs(value))
 
@@ -200,7 +201,8 @@ def input_width(at: OperatingPoint, input_: Input, value: float) -> float:
 def input_column(at, name, input_, value, size, outputs, steps) -> tuple[np.ndarray, float]:
     """Column of B, followed by the column of D, of an input : float64[n + outputs], and its error.
 
-    value : value of the input; size : float64[n]  size of each row of A; steps : factors on the small change
+    at : operating point; name, input_ : name and data of the input; value : its value at the operating point
+    size : float64[n]  size of each row of A; outputs : number of outputs; steps : factors on the small change
     Differences are one-sided if the value is at an end of the range of the input.
     """
     model = at.model

@@ -45,9 +45,10 @@ def operating_point(case, set=None, at: float | None = None, before: bool = Fals
     set : changed keys of the case; before : True to hold schedules at the values just before a kink or jump at this
     time, otherwise just after it
     probes : names of probes that are added before the probes of the case
-    Delay lines are replaced by cells. If the case gives no scheme and the default scheme is limited, the linear scheme
-    that it equals in smooth solutions replaces it; with basins `upwind`. Raises CaseError for a case or probe that
-    cannot be read, and FvsolveError for a case without states and for a run that does not reach `at`.
+    Delay lines are replaced by cells. If the case gives no scheme and the default scheme is limited, it is replaced by
+    the linear scheme that it equals in smooth solutions, or by `upwind` in a case with basins. Raises CaseError for a
+    case or probe that cannot be read, and FvsolveError for a case without states and for a run that does not reach
+    `at`.
     """
     from fvsolve.case import load
 
@@ -79,7 +80,7 @@ def operating_point(case, set=None, at: float | None = None, before: bool = Fals
 def frequency_limit_note(model, lines: list[str]) -> str:
     """Note with the frequency up to which cells in place of the delay lines `lines` are accurate.
 
-    Up to it the error of a wave at the end of a line, relative to an exact delay, is at most 0.01.
+    Up to this frequency, the error of a wave at the end of a line, relative to an exact delay, is at most 0.01.
     """
     theta = np.linspace(0.0, np.pi, 20001)[1:]
     error = np.abs(symbol(SCHEMES[model.case.numerics.scheme].weights, theta) + 1j * theta)
@@ -109,7 +110,8 @@ def with_held_schedules(model, t: float, before: bool = False):
     """Model with all schedules and all periodic velocities of basins held at their values at t [s].
 
     before : True for the values just before a kink or jump at t, otherwise just after it
-    Schedules that drive joints and walls continue with their rate of change at this time.
+    Schedules that drive joints and walls continue with their rate of change at this time. Kinks and jumps are removed.
+    In a model without a limited scheme, `without_slope_limits` is applied too.
     """
     tables = model.tables
     schedules, limit = tables.schedules.copy(), t if before else np.inf
@@ -129,7 +131,7 @@ def with_held_schedules(model, t: float, before: bool = False):
 
 
 def without_slope_limits(tables: rec.Tables) -> rec.Tables:
-    """Tables of a model in which pipes transport scalars without slopes in cells, and mixed values are not bounded.
+    """Tables of a model without slopes of scalars in pipe cells and without bounds of scalars.
 
     Limited slopes and bounds are kinks of the right-hand side, which has no derivative there.
     """
@@ -157,7 +159,8 @@ def with_held_velocities(model, tables: rec.Tables, t: float) -> rec.Tables:
 def with_weights(at: OperatingPoint, weights: tuple[float, ...], degree: int) -> OperatingPoint:
     """Operating point with another linear scheme.
 
-    weights : weights of the cells around a face in its value; degree : degree of the polynomials at pipe ends
+    weights : weights of the cells around a face in the value at the face; degree : degree of the polynomials at pipe
+    ends
     The stencil must not be wider than that of the scheme of `at`, whose Jacobian pattern is reused.
     """
     tables = at.model.tables._replace(settings=at.model.tables.settings.copy())
@@ -180,5 +183,5 @@ def has_limiter(model) -> bool:
 
 
 def basin_has_limiter(basin, scheme: str) -> bool:
-    """True if a basin limits its slopes under a scheme: all except `upwind`, and except `upwind5` on a grid."""
+    """True if a basin limits its slopes: with all schemes except `upwind`, and except `upwind5` on basin grids."""
     return scheme != "upwind" and not (scheme == "upwind5" and basin.is_grid)

@@ -46,15 +46,19 @@ def responses(at: OperatingPoint, y: np.ndarray, outputs: int) -> np.ndarray:
 
 
 def small_deviations(at: OperatingPoint) -> np.ndarray:
-    """Small deviation of each state for finite differences, the greater of its scale and its size : float64[n]."""
+    """Small deviation of each state for finite differences : float64[n].
+
+    It is the scale of the state or its absolute value, whichever is greater.
+    """
     return np.maximum(at.model.scale, np.abs(at.y))
 
 
 def state_matrix(at: OperatingPoint) -> tuple[Any, np.ndarray, float, np.ndarray]:
-    """Matrix A, size of each of its rows : float64[n], error, and steps of the differences.
+    """(A, size of each of its rows : float64[n], error, steps), where steps are the factors on the small deviations.
 
-    The size of row i is the sum over j of |A_ij| times the small deviation of state j. States whose columns have no row
-    in common (equal colours) are changed together. Raises FvsolveError for a state without a derivative.
+    The size of row i is the sum over j of |A_ij| times the small deviation of state j; the error is relative to it.
+    States whose columns have no row in common (equal colours) are changed together. Raises FvsolveError for a state
+    without a derivative.
     """
     from scipy.sparse import csc_array
 
@@ -85,7 +89,9 @@ def state_matrix(at: OperatingPoint) -> tuple[Any, np.ndarray, float, np.ndarray
 def matrix_entries(at: OperatingPoint, width, rows, columns, steps) -> tuple[np.ndarray, np.ndarray]:
     """Central difference quotients of matrix entries, and forward minus backward ones : float64[steps, entries] each.
 
-    They are changes of a rate per small deviation `width` of a state; rows, columns : int64[entries]  entries of A
+    They are changes of a rate per small deviation of a state.
+    width : float64[n]  small deviations; rows, columns : int64[entries]  rows and columns of the entries in A
+    steps : factors on the small deviations
     """
     structure, slopes, sides = at.model.structure, [], []
     base = responses(at, at.y, 0)
@@ -99,7 +105,11 @@ def matrix_entries(at: OperatingPoint, width, rows, columns, steps) -> tuple[np.
 
 
 def basin_states(model) -> np.ndarray:
-    """True for each state of a basin : bool[n]; upwind fluxes of water at rest have kinks of about 1e-4 of a row."""
+    """True for each state of a basin : bool[n].
+
+    Small kinks (see `hidden_kinks`) are accepted for these states, because upwind fluxes of water at rest have kinks of
+    about 1e-4 of a row.
+    """
     names = tuple(f"{basin.name}." for basin in model.basins)
     return np.array([name.startswith(names) for name in model.state_names]) if names else np.zeros(model.y_size, bool)
 
@@ -125,7 +135,11 @@ def refuse_state(model, j: int, cause: str) -> None:
 
 
 def check_directions(at: OperatingPoint, a, width: np.ndarray, size: np.ndarray, steps: np.ndarray) -> None:
-    """Check A along random directions of all states; raises FvsolveError if rates are not linear along them."""
+    """Check A along random directions of all states; raises FvsolveError if rates are not linear along them.
+
+    a : A; width : float64[n]  small deviations; size : float64[n]  sizes of the rows of A
+    steps : factors on the small deviations
+    """
     model, rng = at.model, np.random.default_rng(1)
     base = responses(at, at.y, 0)
     for _ in range(TRIAL_DIRECTIONS):
@@ -142,6 +156,7 @@ def check_directions(at: OperatingPoint, a, width: np.ndarray, size: np.ndarray,
 def output_matrix(at: OperatingPoint, outputs: int, steps: np.ndarray) -> tuple[np.ndarray, float]:
     """Matrix C : float64[outputs, n], and its error, by differences along each state on which an output depends.
 
+    outputs : number of outputs; steps : factors on the small deviations of states
     Raises FvsolveError for an output without a derivative, and if C is too large or takes too long.
     """
     n, width = at.model.y_size, small_deviations(at)
@@ -181,9 +196,9 @@ def too_large(n: int, outputs: int) -> FvsolveError:
 
 
 def visible_states(at: OperatingPoint, outputs: int, base: np.ndarray, width: np.ndarray) -> Iterator[int]:
-    """Numbers of the states that change an output; bisection leaves out ranges of states that change no output.
+    """Yield the numbers of the states that change an output, found by bisection of the range of states.
 
-    base : float64[outputs]  outputs at the state; width : float64[n]  small deviations
+    outputs : number of outputs; base : float64[outputs]  outputs at the state; width : float64[n]  small deviations
     """
     rng, n = np.random.default_rng(2), width.size
     direction = rng.uniform(0.5, 1.0, n) * rng.choice([-1.0, 1.0], n) * width * STEPS[0]

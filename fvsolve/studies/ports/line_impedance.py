@@ -51,7 +51,7 @@ class LineImpedance:
         return math.pi / self.time
 
     def slope(self, shift: float, low, high):
-        """Bound of |dH/ds| on the line Re s = shift [1/s], between the frequencies low and high [rad/s].
+        """Bound of |dH/ds| for Re s = shift [1/s], between the frequencies low and high [rad/s].
 
         It is the greatest 4 Z0 T u / |1 - g e|^2 there, with u = |g e| and e = exp(-2 s T).
         """
@@ -111,8 +111,8 @@ def sweep_positive_real(
     tolerance : difference of samples and lower bound, relative to |H|, below which an interval is not halved
     rightmost : real part of the rightmost poles [1/s], if known
     If H is analytic and bounded right of the line, Re H >= 0 on the line implies Re H >= 0 everywhere right of it.
-    Between two samples Re H is at least half of their sum minus slope times distance. Raises FvsolveError for an
-    invalid range or bound, and if H is not finite on the line.
+    Between two samples Re H_1 and Re H_2 at w_1 and w_2, Re H is at least (Re H_1 + Re H_2 - slope (w_2 - w_1)) / 2.
+    Raises FvsolveError for an invalid range or bound, and if H is not finite on the line.
     """
     if rightmost > shift:
         return SweepVerdict(False, f"a pole with Re s = {rightmost:.6g} 1/s, right of the line", math.nan, math.nan,
@@ -153,16 +153,17 @@ def _slopes(slope, w: np.ndarray, shift: float) -> np.ndarray:
     bounds = _value_per_point("the slope", values, (len(w) - 1,), float)
     if not np.all(np.isfinite(bounds) & (bounds >= 0.0)):
         raise FvsolveError(
-            f"the slope is not bounded on Re s = {shift:g} 1/s. If poles lie on it, use a shift to their right"
+            f"the slope is not bounded on the line Re s = {shift:g} 1/s. If poles lie on this line, use a greater shift"
         )
     return bounds
 
 
 @validated(line=instance_of(LineImpedance), shift=NOT_NEGATIVE, tolerance=POSITIVE)
 def line_positive_real(line: LineImpedance, shift: float | None = None, tolerance: float = 1e-6) -> SweepVerdict:
-    """Test if the impedance H of a line is positive real on the line Re s = shift [1/s], over a whole period.
+    """Test if the impedance H of a lossless pipe has Re H >= 0 along Re s = shift [1/s], over a whole period of H.
 
-    shift : default: 1e-3 / T with the travel time T. Without losses at the end of the line, Re H = 0 on the imaginary
+    line : impedance of the pipe
+    shift : default: 1e-3 / T with the travel time T. Without losses at the end of the pipe, Re H = 0 on the imaginary
     axis, with poles on it, and Re H > 0 right of it.
     tolerance : as for `sweep_positive_real`
     """

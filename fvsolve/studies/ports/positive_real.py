@@ -31,7 +31,11 @@ HIDDEN_POLES = {  # location of a cancelled pole -> text
 
 @dataclass(frozen=True)
 class RootPlace:
-    """Root of a polynomial in a text: estimate `near` in floats [1/s], and exact side, "right", "axis" or "left"."""
+    """Root of a polynomial, as stated in texts.
+
+    near : floating-point estimate [1/s]
+    side : exact location: "right" or "left" of the imaginary axis, or "axis" if the root is on it
+    """
 
     near: complex
     side: str
@@ -69,15 +73,15 @@ class Band:
 class Verdict(PlainData):
     """Result of `positive_real` for a transfer function H(s), with reasons.
 
-    positive_real : True if H is positive real by definition (4.1) of docs/course.md, with the pole at infinity
+    positive_real : True if H is positive real by definition (4.1) of docs/course.md, extended to a pole at infinity
     strictly : True if H(s - e) is positive real for some e > 0 (Khalil, Nonlinear Systems, definition 6.4)
     lossless : True if H is positive real with Re H(jw) = 0 at every w
     reason, reasons : texts with all faults, or with the proof
-    poles : poles of the reduced function; axis_poles : poles on the imaginary axis and at infinity, w >= 0
-    bands : intervals with Re H(jw) < 0, w >= 0; zeros : frequencies with Re H(jw) = 0 [rad/s], empty if it is zero
-    everywhere
+    poles : poles after common factors are removed; axis_poles : poles on the imaginary axis and at infinity, w >= 0
+    bands : intervals with Re H(jw) < 0, w >= 0
+    zeros : frequencies with Re H(jw) = 0 [rad/s], empty if it is zero everywhere
     hidden : poles that the numerator cancels; H does not show them, but a system may have them
-    numerator, denominator : coefficients of the reduced function, highest power first
+    numerator, denominator : coefficients without common factors, highest power first
     """
 
     positive_real: bool
@@ -177,9 +181,9 @@ def _origin(n: Polynomial, d: Polynomial, locations: RootLocations) -> list[Axis
 
 
 def _pair(n: Polynomial, d: Polynomial, x: Root, order: int) -> AxisPole:
-    """Pole of N / D at s = j sqrt(x), of the given order.
+    """Pole of n / d at s = j sqrt(x), of the given order.
 
-    With D = C(s^2) R(s), where C has the roots on the imaginary axis, the residue of a simple pole is N / (2 s C' R).
+    With d = C(s^2) R(s), where C has the roots on the imaginary axis, the residue of a simple pole is n / (2 s C' R).
     """
     name = f"the pole at w = {x.frequency:.12g} rad/s"
     if order > 1:
@@ -277,6 +281,8 @@ def _strictly(n: Polynomial, d: Polynomial, locations: RootLocations, even: Poly
     """True if all poles are left of the imaginary axis, Re H(jw) > 0 at every finite w, and Re H decays slowly enough.
 
     At infinity w^2 Re H must not tend to zero if H does, and otherwise Re H must not tend to zero.
+    n, d : numerator and denominator of H; locations : locations of the roots of d; even : polynomial E of `_real_part`
+    zeros : frequencies with Re H(jw) = 0 [rad/s]
     """
     bounded_decay = even.degree == (d.degree - 1 if n.degree < d.degree else d.degree)
     return locations.axis == 0 and not zeros and even.degree >= 0 and bounded_decay

@@ -96,7 +96,7 @@ def _pairs(p: Polynomial):
 
 
 def axis_factor(p: Polynomial) -> Polynomial:
-    """Polynomial c(x) whose roots x = w^2 > 0 are those of the roots jw of p on the imaginary axis.
+    """Polynomial c(x) whose positive roots x are the squares w^2 of the roots s = jw of p on the imaginary axis.
 
     It is the greatest common divisor of the even and odd part of p(jw).
     """
@@ -209,7 +209,7 @@ def count_roots(sequence: list[Polynomial], low: Fraction, high: Fraction) -> in
 
 
 def estimates(p: Polynomial) -> list[complex]:
-    """Estimates of all roots of p in floating point, rightmost first; used only in texts, never for decisions."""
+    """Estimates of all roots of p in floating point, rightmost first; only reported, never used for decisions."""
     if p.degree < 1:
         return []
     top = max(abs(x) for x in p.coefficients)

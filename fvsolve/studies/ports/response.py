@@ -58,7 +58,7 @@ class Response:
         return complex(values[0]) if np.ndim(s) == 0 else values
 
     def plain(self) -> dict:
-        """Plain values for JSON: complex numbers as [re, im]."""
+        """Values for JSON, arrays as numpy arrays: poles and residues as [re, im], H as `real` and `imaginary`."""
         poles = sorted(
             zip(self.transfer.poles, self.transfer.residues, strict=True), key=lambda p: (abs(p[0]), p[0].imag)
         )
@@ -109,7 +109,10 @@ def response(
 
 
 def _linear_system(case, port: str, at, before, scheme):
-    """State space (A, b, c, d) with the input and the output of a port, and `Linear` system from which it is made."""
+    """State space (A, b, c, d) with the input and the output of a port, and `Linear` system from which it is made.
+
+    port, at, before, scheme : as in `response`
+    """
     from fvsolve.studies.linear.linearise import linearise
 
     driven = case.places[port].driven
@@ -173,7 +176,11 @@ def _transfer(at, a, b, c, d, error: float) -> Transfer:
 
 
 def _frequency_table(verdict: StateVerdict, h: Transfer) -> np.ndarray:
-    """Frequencies of the response [rad/s]: logarithmic grid, poles off the imaginary axis, and worst points of dips."""
+    """Frequencies of the response [rad/s] : float64[k], in increasing order.
+
+    They are a logarithmic grid, the poles within it that are off the imaginary axis, and in each frequency band with Re
+    H < 0 the frequency of the least Re H / |H|.
+    """
     low, high = verdict.low, verdict.high
     grid = np.geomspace(low, high, int(POINTS_PER_DECADE * np.log10(high / low)) + 1)
     poles = np.abs(h.poles.imag[~np.isin(h.poles, verdict.axis)])

@@ -118,8 +118,8 @@ class StateVerdict(PlainData):
     margin : least Re H / |H|, the cosine of the phase, at the frequency `worst` [rad/s]; with poles on the imaginary
     axis it is extrapolated to the axis from the line Re s = `shift` [1/s]
     tolerance : values of Re H / |H| closer to zero are undecided; low, high : range of frequencies searched [rad/s]
-    dips : intervals of frequencies with Re H < 0; unstable : poles right of the imaginary axis [1/s]
-    axis : poles on the axis within their errors [1/s]; hidden : poles right of the axis that H does not show [1/s]
+    dips : intervals of frequencies with Re H < 0; axis : poles on the imaginary axis within their errors [1/s]
+    unstable : poles right of the axis that H shows [1/s]; hidden : poles right of the axis that H does not show [1/s]
     """
 
     positive_real: bool | None
@@ -144,7 +144,7 @@ class StateVerdict(PlainData):
 
     @property
     def answer(self) -> str:
-        """Text "yes", "no" or "undecided within" the tolerance."""
+        """Text "yes" or "no", or "undecided within" followed by the tolerance."""
         return {True: "yes", False: "no", None: f"undecided within {self.tolerance:.0e}"}[self.positive_real]
 
 
@@ -187,11 +187,13 @@ def state_positive_real(h: Transfer, tolerance: float = TOLERANCE) -> StateVerdi
 
 
 def _margin(h, near, shift, w, raw, doubt, within) -> tuple[float, float]:
-    """Least Re H / |H|, reduced by its error, and its frequency [rad/s], away from poles on the imaginary axis.
+    """Least Re H / |H|, moved towards zero by its error, and its frequency [rad/s].
 
-    near : True for poles on the imaginary axis; shift : real part of the line of the samples [1/s], from which the
-    value is extrapolated to the axis; w : frequencies; raw, doubt : result of `Transfer.angle` there
-    within : True for frequencies in the searched range
+    Frequencies near poles on the imaginary axis are left out.
+    h : transfer function H; near : True for each pole on the imaginary axis
+    shift : real part of the line of the samples [1/s], from which the value is extrapolated to the axis
+    w : frequencies of the samples [rad/s]; raw, doubt : result of `Transfer.angle` there
+    within : True for each frequency in the searched range
     """
     angle = _certain_part(raw, doubt)
     if shift:
@@ -220,8 +222,8 @@ def frequencies(h: Transfer, near: np.ndarray, shift: float, slow: float, quick:
     """Frequencies to be tested, in increasing order : float64[k], and the range low, high that they cover [rad/s].
 
     They include all frequencies at which Re H can change sign, so that no interval with Re H < 0 is missed.
-    near : poles on the imaginary axis, around which frequencies are added, also below `low`; shift : see `_margin`
-    slow, quick : slowest and fastest rate of H [1/s]
+    near : poles on the imaginary axis; frequencies are added around them, also below `low`
+    shift : real part of the line on which Re H is tested [1/s]; slow, quick : slowest and fastest rate of H [1/s]
     """
     zeros = crossings(h.a - shift * np.eye(len(h.poles)), h.b, h.c, float(h.d))
     real = np.abs(zeros.imag[np.abs(zeros.real) <= 1e-6 * np.abs(zeros)])  # imaginary eigenvalues: changes of sign
@@ -240,7 +242,8 @@ def crossings(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: float) -> np.ndarr
     """Complex numbers that include all jw with Re H(jw) = 0 : complex128[k], not sorted; a, b, c, d : state space.
 
     They are eigenvalues of the Hamiltonian matrix. If D is zero, 1 / H without its part s / (C B), which grows to
-    infinity, is used in place of H, because Re 1/H has the sign of Re H.
+    infinity, is used in place of H, because Re 1/H has the sign of Re H. If C B is zero too, the result is empty:
+    then H is not positive real unless H = 0.
     """
     n = len(a)
     if n == 0:
@@ -261,7 +264,10 @@ def crossings(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: float) -> np.ndarr
 
 
 def _dips(h, shift, w, angle, tolerance) -> list[Dip]:
-    """Intervals of the frequencies w in which Re H / |H| (`angle`) is below -tolerance, with refined ends."""
+    """Intervals of the frequencies w in which Re H / |H| (`angle`) is below -tolerance, with refined ends.
+
+    h : transfer function H; shift : real part of the line of the samples [1/s]
+    """
     negative = angle < -tolerance
     edges = np.flatnonzero(np.diff(np.concatenate([[False], negative, [False]]).astype(int)))
     dips = []
@@ -274,7 +280,10 @@ def _dips(h, shift, w, angle, tolerance) -> list[Dip]:
 
 
 def _edge(h, shift, good: float, bad: float) -> float:
-    """Frequency [rad/s] at which Re H changes sign, by bisection between `good` (Re H >= 0) and `bad` (Re H < 0)."""
+    """Frequency [rad/s] at which Re H changes sign on the line Re s = shift, by bisection.
+
+    h : transfer function H; good, bad : frequencies with Re H >= 0 and with Re H < 0
+    """
     for _ in range(60):
         middle = 0.5 * (good + bad)
         if middle in (good, bad):

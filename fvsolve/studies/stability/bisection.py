@@ -12,7 +12,10 @@ STEP_RATIO = 1.3  # ratio of consecutive steps of the search upwards
 
 
 class StepLimit(NamedTuple):
-    """Greatest step [s] below which no step fails (inf: no failure found), and least step [s] found to fail."""
+    """Result of a search: greatest step found safe, `step` [s], and least step found to fail, `fails` [s].
+
+    Both are inf if no failure was found, and nan if nothing was computed; `step` is 0 or nan if no safe step was found.
+    """
 
     step: float
     fails: float
@@ -23,9 +26,9 @@ def bisect_limit(
 ) -> StepLimit:
     """Find the least step h [s] at which fails(h) is true, by a search upwards and bisection.
 
-    The search starts at `first` and multiplies by `rise`. Bisection ends at the relative width `fine`. If `first`
-    fails, it is halved down to 1e-9 of its value; if all these steps fail, the limit is 0. If no step up to `far`
-    fails, it is inf.
+    The search starts at `first` and multiplies the step by `rise`. Bisection ends at the relative width `fine`. If
+    `first` fails, it is halved down to 1e-9 of its value; if all these steps fail, the limit `StepLimit.step` is 0. If
+    no step up to `far` fails, the limit is inf.
     """
     low, high = 0.0, first
     if fails(high):

@@ -15,7 +15,8 @@ GROWTH_FLOOR = 1e-9  # of the greatest wave rate or eigenvalue: real parts below
 def bound_notes(row, side, system) -> list[str]:
     """Notes on a row of a stability study, as texts.
 
-    row : `StabilityRow`; side : `LinearSystem` of its scheme; system : object that computes growth, or None
+    row : `StabilityRow`; side : `LinearSystem` of its scheme
+    system : result of `growth_method`, which computes the growth of deviations; None for a limited scheme
     """
     texts = [*case_notes(row, side)]
     if row.limited:
@@ -37,7 +38,7 @@ def bound_notes(row, side, system) -> list[str]:
 
 
 def difference_reason(row, side) -> str:
-    """Reason for a difference between the limits of real runs and of the linear system."""
+    """Reason why the limits of real runs and of the linear system differ; row, side : as in `bound_notes`."""
     if not state_moves(side):
         return "the deviation does not stay linear"
     return (f"{row.steps} such steps take {row.steps * row.predicted:.3g} s, and meanwhile the state leaves the "
@@ -45,15 +46,18 @@ def difference_reason(row, side) -> str:
 
 
 def nonlinear_failure_notes(row) -> list[str]:
-    """Note on a run that fails although the linear system never fails."""
+    """Note on real runs that fail although the linear system never fails, as a list; empty if they do not fail.
+
+    row : `StabilityRow`
+    """
     if not np.isfinite(row.measured):
         return []
     return [f"this holds for the linear system; real runs fail from h = {row.measured:.5g} s on: in so long a "
-            "time they leave the linearised state, and nonlinear laws decide"]  # fmt: skip
+            "time they leave the linearised state, and nonlinear laws decide about the growth"]  # fmt: skip
 
 
 def case_notes(row, side) -> list[str]:
-    """Notes on the operating point and the case, which do not depend on the method."""
+    """Notes on the operating point and the case, which do not depend on the method; row, side : as in `bound_notes`."""
     texts = []
     growing = row.greatest_real > 0.0
     if growing and row.greatest_real > GROWTH_FLOOR * max(row.rate, np.abs(side.spectrum.values).max(initial=0.0)):
@@ -68,17 +72,17 @@ def case_notes(row, side) -> list[str]:
         texts.append("scalars in pipes are computed without slopes in cells, because their limiter has no derivative")
     if state_moves(side):
         texts.append("the state is not steady: deviations are measured from a run that starts at this state, with "
-                     "schedules held")  # fmt: skip
+                     "schedules held constant")  # fmt: skip
     return texts
 
 
 def state_moves(side) -> bool:
-    """True if the operating point is not steady."""
+    """True if the operating point of the `LinearSystem` `side` is not steady."""
     return bool(np.max(np.abs(side.at.rate) / side.at.model.scale) > 1e-9)
 
 
 def eigenvalue_notes(row, system) -> list[str]:
-    """Notes on the bound by eigenvalues, compared with the predicted limit."""
+    """Notes on the bound by eigenvalues, compared with the predicted limit; row, system : as in `bound_notes`."""
     if np.isinf(row.eigenvalues) or row.eigenvalues > (1.0 + AGREEMENT) * row.predicted:
         if np.isinf(row.eigenvalues):
             return ["eigenvalues allow every step, but deviations grow at some steps: the Jacobian J is not normal"]
@@ -87,7 +91,7 @@ def eigenvalue_notes(row, system) -> list[str]:
         except TooLarge:
             after = 0
         if after:
-            return [f"eigenvalues mislead: the Jacobian J is not normal, and 1 % below their limit growth exceeds "
+            return [f"eigenvalues are misleading: the Jacobian J is not normal; 1 % below their limit growth exceeds "
                     f"{row.threshold:g} after {after} steps"]  # fmt: skip
         return ["eigenvalues allow longer steps than the growth of deviations does: the Jacobian J is not normal"]
     if row.eigenvalues < (1.0 - AGREEMENT) * row.predicted:
@@ -97,7 +101,10 @@ def eigenvalue_notes(row, system) -> list[str]:
 
 
 def field_of_values_notes(row, side) -> list[str]:
-    """Notes on the bound by the field of values, which is too strict with pipe ends of high order."""
+    """Notes on the bound by the field of values, which is too strict with pipe ends of high order.
+
+    row, side : as in `bound_notes`
+    """
     if np.isnan(row.field_of_values) or row.field_of_values > (1.0 - AGREEMENT) * row.predicted:
         return []
     if row.field_of_values == 0.0:
@@ -115,9 +122,7 @@ def von_neumann_notes(row) -> list[str]:
     if np.isnan(row.von_neumann):
         return []
     if row.von_neumann > (1.0 + AGREEMENT) * row.predicted:
-        return [
-            "von Neumann's limit misleads: the step is limited by pipe ends, nodes or other parts, not by the interior"
-        ]
+        return ["von Neumann's limit is misleading: pipe ends, nodes or other parts limit the step, not the interior"]
     if row.von_neumann < (1.0 - AGREEMENT) * row.predicted:
         return ["von Neumann's limit holds for any number of steps and any wavelength; in this pipe and number of "
                 "steps growth remains below the threshold"]  # fmt: skip
@@ -126,13 +131,14 @@ def von_neumann_notes(row) -> list[str]:
 
 def limiter_notes(row, model) -> list[str]:
     """Notes on a limited scheme, whose weights are held constant in predictions."""
-    frozen = "its weights give the limits in this row"
+    frozen = "they give the limits in this row"
     if model.cavitates:
-        frozen = "its weights in pipes with cavities are only upwind"
+        frozen = "in pipes with cavities they are only those of upwind"
     elif model.basins:
-        frozen = "its weights in basins are only upwind"
-    texts = [f"{row.scheme} has no derivative at a constant state: its limit is measured; held constant, {frozen}"]
+        frozen = "in basins they are only those of upwind"
+    texts = [f"{row.scheme} has no derivative at a constant state, so its limit is measured; in predictions its "
+             f"weights are held constant: {frozen}"]  # fmt: skip
     if np.isfinite(row.longer):
-        texts.append(f"Euler with a limiter has no sharp limit: {row.courant(row.measured):.3g} in {row.steps} steps, "
-                     f"{row.courant(row.longer):.3g} in {10 * row.steps}")  # fmt: skip
+        texts.append(f"Euler with a limiter has no sharp limit: Courant number {row.courant(row.measured):.3g} in "
+                     f"{row.steps} steps, {row.courant(row.longer):.3g} in {10 * row.steps} steps")  # fmt: skip
     return texts

@@ -28,9 +28,9 @@ NO_LIMIT_NOTE = "no step up to twice the slowest line's travel time fails"
 
 
 class DelayLineLimits:
-    """Limit of the step of one case and method with delay lines, from the linear system for each step.
+    """Step limit of a case with delay lines for one scheme and method, predicted by a linear system for each step.
 
-    The delay lines are divided into segments for each step. steps : number of steps over which growth counts
+    The delay lines are divided into stretches for each step. steps : number of steps over which growth counts
     threshold : growth above which a step fails
     """
 
@@ -60,8 +60,10 @@ class DelayLineLimits:
             raise FvsolveError(f"numerics.scheme: {model.case.numerics.scheme} limits slopes. Expected a linear scheme "
                                "for stability with delay lines, such as scheme = \"upwind5\"")  # fmt: skip
         if model.y_size > MAX_STATES:
-            raise FvsolveError(f"the case has {model.y_size} states, with one for each delay line. Expected at most "
-                               f"{MAX_STATES} with delay lines: use fewer cells, or a part of the network")  # fmt: skip
+            raise FvsolveError(
+                f"the case has {model.y_size} states, where each delay line counts as one. Expected at most "
+                f"{MAX_STATES} with delay lines: use fewer cells, or a part of the network"
+            )
         return with_held_schedules(model, model.case.numerics.start)
 
     def system(self, h: float) -> DelayLineSystem:
@@ -77,7 +79,7 @@ class DelayLineLimits:
             return True
 
     def predicted(self) -> StepLimit:
-        """Greatest step below which no step fails, with its failing neighbour; nan for Rosenbrock methods."""
+        """Predicted limit of the step, below which no step is found to fail; nan for Rosenbrock methods."""
         if self.method.kind == "linear":
             return StepLimit(np.nan, np.nan)
         rough = bisect_limit(self.fails, self.first, self.far, RISE, FINE)
@@ -87,8 +89,9 @@ class DelayLineLimits:
         return least
 
     def delays_at_stores(self, rough: StepLimit) -> list[float]:
-        """Longest delays of the lines at storing nodes [s]; waves grow most with steps that divide one of these delays.
+        """Delays of the lines at storing nodes [s], longest first and four at most; empty if `rough` is 0 or infinite.
 
+        Waves grow most with steps that are the n-th part of one of these delays, with an integer n.
         rough : first estimate of the limit
         """
         at_stores = [line for _, i, _ in storing_nodes(self.base_model, 1.0) for line in lines_at(self.base_model, i)]
@@ -96,9 +99,10 @@ class DelayLineLimits:
         return sorted(delays, reverse=True)[:LINE_COUNT]
 
     def limit_at_parts(self, delay: float, fails: float) -> StepLimit:
-        """Least failing step among integer parts of the delay `delay` [s] of a line, where interpolation damps nothing.
+        """Limit of the step among the steps delay / n, with integers n, with which interpolation damps no wave.
 
-        fails : a failing step [s], below which the search starts
+        delay : delay of a line [s]; fails : a failing step [s], below which the search starts
+        The limit is inf if the greatest of these steps below `fails` does not fail.
         """
         low = int(np.ceil(delay / fails))
         if low < 1 or not self.fails(delay / low):
@@ -114,7 +118,7 @@ class DelayLineLimits:
 
 
 def delayed_row(case, scheme: str, method, steps: int, threshold: float) -> StabilityRow:
-    """Stability row of a scheme and method for a case with delay lines, about its start.
+    """Row of a stability study for a case with delay lines, with a scheme and a method, at the start of the case.
 
     It contains the limit from the linear system of a step and the limit of real runs.
     steps : number of steps over which growth counts; threshold : growth above which a step fails
@@ -123,8 +127,9 @@ def delayed_row(case, scheme: str, method, steps: int, threshold: float) -> Stab
     predicted, model = limits.predicted(), limits.base_model
     rate = float(max(model.wave_rates[model.tables.pipes["delay"] < 0], default=0.0))
     row = {
-        "scheme": scheme, "method": method.name, "when": "the start, delay lines as they are", "states": model.y_size,
-        "steps": steps, "threshold": threshold, "rate": rate, "predicted": predicted.step, "lines": True,
+        "scheme": scheme, "method": method.name, "when": "the start, delay lines not replaced by cells",
+        "states": model.y_size, "steps": steps, "threshold": threshold, "rate": rate, "predicted": predicted.step,
+        "lines": True,
     }  # fmt: skip
     if np.isnan(predicted.step):
         left_out["predicted"] = UNKNOWN_REASON

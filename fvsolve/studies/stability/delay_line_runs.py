@@ -51,9 +51,10 @@ class DelayLineRuns(RealRuns):
         return loop
 
     def limit(self, guess: float) -> StepLimit:
-        """Limit of real runs, searched close to the predicted limit `guess` [s]; without a prediction over all steps.
+        """Limit of real runs, searched close to the predicted limit `guess` [s].
 
-        The search stays close because steps that do not divide the delay of a line may be safe above the limit.
+        If `guess` is inf or nan, all steps are searched. Otherwise the search stays close because steps that do not
+        divide the delay of a line may be safe above the limit.
         """
         if not np.isfinite(guess):
             return bisect_limit(self.fails, self.first, self.far, STEP_RATIO if np.isnan(guess) else STEP_RATIO_UP)
@@ -66,7 +67,10 @@ class DelayLineRuns(RealRuns):
         )
 
     def growth(self, h: float) -> tuple[float, int]:
-        """Greatest growth of a deviation with steps of h [s], and number of steps; infinity if a run stops."""
+        """(greatest growth of a deviation with steps of h [s], number of steps after which it is reached).
+
+        The growth is infinite if a run stops.
+        """
         system = self.system(h)
         predicted = system.growth(self.steps, self.threshold)
         small = SMALL_WAVE * float(system.weight.max()) * greatest_wave(system)
@@ -95,7 +99,8 @@ def greatest_wave(system: DelayLineSystem) -> float:
 def write_history(past: np.ndarray, delays: np.ndarray, t: float, h: float, history: np.ndarray) -> None:
     """Write past waves into the wave history `past` of delay lines, at the times t - count h, ..., t - h.
 
-    history : float64[count, 2, segments]  deviations of both waves in each segment of a line, oldest first [kg/s]
+    history : float64[count, 2, stretches]  deviations of both waves in each stretch of a line, oldest first [kg/s]
+    delays : delay lines in the tables
     """
     count, places = history.shape[0], at.offsets_of(past)
     numbers = at.PROFILE_ENTRIES + np.arange(count)
@@ -107,7 +112,10 @@ def write_history(past: np.ndarray, delays: np.ndarray, t: float, h: float, hist
 
 
 def read_history(past: np.ndarray, system: DelayLineSystem) -> np.ndarray:
-    """Past waves of all segments of delay lines, without the last entry : float64[history_steps, 2, segments]."""
+    """Past waves of all stretches of delay lines, without the last entry : float64[history_steps, 2, stretches].
+
+    past : wave history of a run
+    """
     values = np.zeros((system.history_steps, 2, system.delays.size))
     numbers = int(past[at.COUNT]) - 1 - system.history_steps + np.arange(system.history_steps)
     for where, s, wave in ring_offsets(at.offsets_of(past), system.model.tables.delays, numbers):
@@ -116,9 +124,11 @@ def read_history(past: np.ndarray, system: DelayLineSystem) -> np.ndarray:
 
 
 def ring_offsets(places, delays: np.ndarray, numbers: np.ndarray):
-    """Offsets in the wave history, number of the segment and number of the wave, for each segment and wave.
+    """Yield (offsets in the wave history, number of the stretch, wave) for each stretch and wave of all delay lines.
 
-    places : offsets of the parts of the history; delays : delay lines in the tables; numbers : entries to find
+    The offsets are those of the entries with the given `numbers`; wave is 0 for the forward and 1 for the backward
+    wave.
+    places : result of `wave_history.offsets_of`; delays : delay lines in the tables
     """
     for row in delays:
         for q in range(row["stretches"]):

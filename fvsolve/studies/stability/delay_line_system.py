@@ -2,7 +2,7 @@
 
 Deviations from a state at rest follow x' = A x + B w, s = C x + D w: x are the states outside the lines, w the waves
 that arrive at the ends of lines, s the waves that nodes send into lines. An arriving wave was sent one delay earlier
-and is interpolated between steps by the polynomials of the lines; friction in the middle of each segment of a line
+and is interpolated between steps by the polynomials of the lines; friction in the middle of each stretch of a line
 reflects a part of it. A step computes x by the tableau of the method, with w at its stages, and stores s.
 """
 
@@ -33,7 +33,7 @@ class DelayedGrowth(NamedTuple):
     """Greatest growth `size` of a deviation, after `steps` steps.
 
     x, end : float64[n]  states at the start and the end
-    history, end_history : float64[history_steps, 2, segments]  past waves in the lines at the start and the end
+    history, end_history : float64[history_steps, 2, stretches]  past waves in the lines at the start and the end
     """
 
     size: float
@@ -47,9 +47,11 @@ class DelayedGrowth(NamedTuple):
 class DelayLineSystem:
     """Linear system of a model at its start, with delay lines divided for steps of h [s], for one method.
 
-    states : indices of the states outside the delay lines; a, b, c, d : matrices A, B, C, D
-    delays : delay of each segment of a line, in steps; first, last : first and last segment of each line
-    reflection : part of a wave that friction in a segment reflects
+    a, b, c, d : matrices of x' = A x + B w, s = C x + D w, with the states x outside the delay lines, the waves w that
+    arrive at the ends of lines, and the waves s that nodes send into lines
+    states : indices of x in the state vector
+    delays : delay of each stretch of a line, in steps; first, last : first and last stretch of each line
+    reflection : fraction of a wave that friction in a stretch reflects
     history_steps : number of past steps whose waves are read
     """
 
@@ -78,7 +80,11 @@ class DelayLineSystem:
 
     @cached_property
     def stages(self) -> tuple[np.ndarray, list[np.ndarray]]:
-        """Matrix of a step for the states x, and for each stage the matrix of the waves that arrive then."""
+        """(step matrix, matrices of arriving waves) of a step of the states x.
+
+        There is one matrix of arriving waves for each stage. The new states are the step matrix times x, plus the sum
+        over the stages of matrix times arriving waves.
+        """
         method, n, s = self.method, self.states.size, self.method.stages
         inverse = np.linalg.inv(np.eye(s * n) - self.h * np.kron(method.a, self.a)) if n else np.zeros((0, 0))
         weights = self.h * np.kron(method.b, np.eye(n)) @ inverse
@@ -88,7 +94,7 @@ class DelayLineSystem:
     def reading_weights(self, c: float) -> tuple[np.ndarray, np.ndarray]:
         """Interpolation of past waves at the time c h after the start t_n of a step: six entries and weights.
 
-        Returns int64[6, segments], numbers of the entries relative to step n, and float64[6, segments], their weights.
+        Returns (int64[6, stretches], numbers of the entries relative to step n; float64[6, stretches], their weights).
         """
         newest = -1 if c <= 0.0 else 0
         position = c - self.delays
@@ -106,9 +112,10 @@ class DelayLineSystem:
         return low.astype(int) + np.arange(-2, 4)[:, None], weights
 
     def arrivals(self, past: np.ndarray, n: int, reading: tuple[np.ndarray, np.ndarray]) -> tuple:
-        """Backward and forward waves that arrive at the ends of all segments : float64[segments, m] each.
+        """Backward and forward waves that arrive at the ends of all stretches : float64[stretches, m] each.
 
-        past : float64[entries, 2, segments, m]  past waves; n : entry of the start of the step
+        m : number of deviations
+        past : float64[entries, 2, stretches, m]  past waves; n : entry of the start of the step
         reading : result of `reading_weights`
         """
         entries, weights = reading
@@ -122,22 +129,22 @@ class DelayLineSystem:
     def node_arrivals(self, waves: tuple) -> np.ndarray:
         """Waves that arrive at nodes, at the ends `from` and `to` of each line in turn : float64[2 lines, m].
 
-        waves : result of `arrivals`
+        m : number of deviations; waves : result of `arrivals`
         """
         backward, forward = waves
         return np.stack([backward[self.first], forward[self.last]], axis=1).reshape(2 * self.first.size, -1)
 
     def store_entry(self, past: np.ndarray, n: int, x: np.ndarray, waves: tuple) -> None:
-        """Write the waves that nodes and segments send, with states x and arriving `waves`, as entry n of `past`."""
+        """Write the waves that nodes and stretches send, with states x and arriving `waves`, as entry n of `past`."""
         backward, forward = waves
         sent = (self.c @ x + self.d @ self.node_arrivals(waves)).reshape(self.first.size, 2, -1)
         past[n, 0, 1:], past[n, 1, :-1] = forward[:-1], backward[1:]  # joints
         past[n, 0, self.first], past[n, 1, self.last] = sent[:, 0], sent[:, 1]
 
     def size(self, x: np.ndarray, history: np.ndarray) -> np.ndarray:
-        """Root of the energy of m deviations : float64[m].
+        """Square root of the energy of states and waves of m deviations : float64[m].
 
-        x : float64[n, m]  states; history : float64[history_steps, 2, segments, m]  past waves
+        x : float64[n, m]  states; history : float64[history_steps, 2, stretches, m]  past waves
         """
         waves = self.weight[:, None, :, None] * history
         return np.sqrt(np.sum((self.energy_rows @ x) ** 2, axis=0) + np.sum(waves**2, axis=(0, 1, 2)))
@@ -145,8 +152,9 @@ class DelayLineSystem:
     def propagate(self, x: np.ndarray, history: np.ndarray, steps: int, threshold: float) -> tuple:
         """Take up to `steps` steps with m deviations; ends when the growth of a deviation exceeds the threshold.
 
-        Returns the greatest growth of each deviation : float64[m], the number of steps of the last increase, and states
-        and past waves at the end. x, history : states and past waves at the start, as in `size`
+        Returns (greatest growth of each deviation : float64[m], number of steps after which a growth last increased,
+        states at the end, past waves at the end).
+        x, history : states and past waves at the start, as in `size`
         """
         K, m = self.history_steps, x.shape[1]
         past = np.zeros((K + steps + 2, *history.shape[1:]))
@@ -168,9 +176,11 @@ class DelayLineSystem:
         return size, after, x, past[n + 1 : n + 1 + K]
 
     def starts(self) -> tuple[np.ndarray, np.ndarray]:
-        """Three random deviations: states and past waves, with equal waves, with opposite waves, and without waves.
+        """Three random deviations: states with equal waves, opposite waves alone, and states alone.
 
-        They do not depend on the direction in which a line is drawn.
+        Returns the states, float64[n, 3], and the past waves, float64[history_steps, 2, stretches, 3].
+        The backward wave is the forward wave mirrored about the middle of a line, for opposite waves with the other
+        sign. The direction in which a line is drawn changes at most the sign of opposite waves.
         """
         rng, rows = np.random.default_rng(7), self.model.tables.delays
         stored = rng.standard_normal((self.states.size, 1)) * self.model.scale[self.states][:, None]
@@ -184,7 +194,8 @@ class DelayLineSystem:
     def growth(self, steps: int, threshold: float) -> DelayedGrowth:
         """Greatest growth found within `steps` steps, a lower bound; nan for Rosenbrock methods (not modelled).
 
-        The first starts are random deviations; the next starts are their ends, close to the deviation that grows most.
+        The steps are taken twice: from the random deviations of `starts`, then from the deviations at the end of these
+        steps, which are close to the deviation that grows most. The search ends if a growth exceeds the threshold.
         """
         start = self.starts()
         for _ in range(GROWTH_ROUNDS):
@@ -201,7 +212,7 @@ class DelayLineSystem:
         return growth
 
     def dominant_part(self, grown: DelayedGrowth) -> tuple[str, float]:
-        """Part with the greatest share of the energy of a grown deviation, and this share."""
+        """(name of the part with the greatest share of the energy of a grown deviation, this share)."""
         waves = np.sum((self.weight[:, None] * grown.end_history) ** 2, axis=(0, 1))
         shares = dict.fromkeys(self.parts, 0.0)
         for part, root in zip(self.parts, self.energy_rows @ grown.end, strict=True):
@@ -214,9 +225,9 @@ class DelayLineSystem:
 
 
 def reflected_share(pipe, tau: float) -> float:
-    """Part of a wave that friction in the middle of a segment of a delay line reflects, at the initial flow.
+    """Fraction of a wave that friction in the middle of a stretch of a delay line reflects, at the initial flow.
 
-    tau : travel time of the segment [s]
+    tau : travel time of the stretch [s]
     """
     flow, width = float(pipe["flow"]), DERIVATIVE_STEP * float(pipe["admittance"]) * BAR_PRESSURE
     slope = (drag_and_slope(pipe, flow + width)[0] - drag_and_slope(pipe, flow - width)[0]) / (2.0 * width)
@@ -225,7 +236,7 @@ def reflected_share(pipe, tau: float) -> float:
 
 
 def local_matrices(model, states: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Matrices A, B, C, D of the module, at the start, by central differences; states : indices of the states x."""
+    """Matrices A, B, C, D of `DelayLineSystem` at the start, by central differences; states : indices of states x."""
     t, y, rows = float(model.case.numerics.start), model.start, model.tables.delays
     ends = int(model.layout["ends"]) + 4 * rows["pipe"][:, None] + np.array([0, 3])
     first = np.cumsum(rows["stretches"]) - rows["stretches"]

@@ -4,7 +4,7 @@ A limited scheme has no derivative at a constant state, since its weights depend
 Three kinds of limits are computed. The linear schemes that result from constant weights have exact limits. For slope
 limiters total variation cannot grow up to the Courant number r / (1 + phi / 2), with the greatest slope phi over the
 difference of neighbours (1 for minmod, 2 for other limiters) and the SSP radius r of the method (Harten 1983). Real
-runs from three starts give measured limits for increasing numbers of steps.
+runs from three initial states (`start_fields`) give measured limits for increasing numbers of steps.
 """
 
 from __future__ import annotations
@@ -41,8 +41,10 @@ class LimitedLimit(PlainData):
 
     frozen : exact limits with constant weights, by name of the resulting linear scheme
     monotone : Courant number up to which total variation cannot grow; None if unknown
-    measured : for each start, the least Courant number found to fail in steps[i] steps; None if none fails up to 20
-    least : least measured limit over the starts, for each number of steps
+    steps : numbers of steps of the runs
+    measured : name of the initial values (see `start_fields`) -> for each number of steps, the least Courant number
+    found to fail within these steps; None if none fails up to 20
+    least : least measured limit over the initial values, for each number of steps
     sharp : False if `least` falls by more than 5 % from the fewest to the most steps (exponential growth alone would
     change it less), None if no run failed
     """
@@ -60,7 +62,7 @@ class LimitedLimit(PlainData):
 
     @property
     def least(self) -> tuple[float | None, ...]:
-        """Least limit over the starts, for each number of steps."""
+        """Least measured limit over the initial values, for each number of steps; None if no run failed."""
         columns = zip(*self.measured.values(), strict=True)
         return tuple(min((x for x in column if x is not None), default=None) for column in columns)
 
@@ -147,7 +149,10 @@ def start_fields(cells: int) -> dict[str, np.ndarray]:
 
 
 def measured_courant(scheme: str, limiter: str | None, method: str, start: np.ndarray, steps: int) -> float | None:
-    """Least Courant number found at which the L2 norm of a real run grows 1000 times within `steps` steps."""
+    """Least Courant number found at which the L2 norm of a real run grows 1000 times within `steps` steps.
+
+    start : initial cell values. The result is None if no Courant number up to 20 is found.
+    """
     circle = PeriodicPipe(scheme, method, start.size, limiter or "minmod")
     smallest = monotone_limit(limiter or scheme, method) or SMALLEST
     return first_failure(lambda courant: _growth(circle, start, courant, steps), LIMIT_TOLERANCE, smallest, RATIO)

@@ -1,10 +1,10 @@
 """Courant limits of linear schemes on a periodic pipe: predicted for each wave, and measured by real runs.
 
-A Courant number nu fails if the L2 norm of some start grows more than 1000 times within n steps. On a periodic grid the
-matrix of a step is normal, so the greatest growth over all starts is exactly the greatest |R(nu z(theta_k))|^n over the
-waves k, with the phases theta_k = 2 pi k / cells, the stability function R of the method and the symbol z of the
-scheme. A run measures this growth from one impulse, all of whose waves have equal size, as the greatest
-|u_k(n)| / |u_k(0)| of the Fourier coefficients u_k.
+A Courant number nu fails if the L2 norm of some initial state grows more than 1000 times within n steps. On a periodic
+grid the matrix of a step is normal, so the greatest growth over all initial states is exactly the greatest |R(nu
+z(theta_k))|^n over the waves k, with the phases theta_k = 2 pi k / cells, the stability function R of the method and
+the symbol z of the scheme. A run measures this growth from one impulse, all of whose waves have equal size, as the
+greatest |u_k(n)| / |u_k(0)| of the Fourier coefficients u_k.
 """
 
 from __future__ import annotations
@@ -162,7 +162,7 @@ def check_size(cells: int, steps: int) -> None:
     if cells < 6:
         raise FvsolveError(f"cells = {cells}: expected 6 or more, the widest scheme uses 5 cells")
     if steps < 10:
-        raise FvsolveError(f"steps = {steps}: expected 10 or more, failure is growth over many steps")
+        raise FvsolveError(f"steps = {steps}: expected 10 or more, because failure is growth over many steps")
 
 
 def _tables(scheme: str, limiter: str, cells: int) -> tuple:

@@ -88,10 +88,11 @@ def checked_powers(steps: int, few: bool = False) -> list[int]:
 
 
 def matrix_powers(m: np.ndarray, steps: int, few: bool = False) -> Iterator[tuple[int, np.ndarray]]:
-    """Pairs (n, m^n) of powers of a matrix, for the numbers n of `checked_powers`; up to 64 states for all n.
+    """Yield pairs (n, m^n) of powers of a matrix m, for increasing n.
 
-    A power is the product of m and the power before, or of two lower powers. The first power that is not finite is the
-    last pair.
+    n takes the values of `checked_powers`; for a matrix of up to 64 states, unless `few` is True, it takes all values
+    up to `steps`. A power is the product of m and the power before, or of two lower powers. The first power that is not
+    finite is the last pair.
     """
     known, last, power = {1: m}, 1, m
     yield 1, m
@@ -122,7 +123,7 @@ def assembled_power(known: dict[int, np.ndarray], n: int) -> np.ndarray:
 
 
 def power_growth(m: np.ndarray, steps: int = STEPS) -> Growth:
-    """Greatest 2-norm of the powers m^n over the n <= steps of `matrix_powers`, and the deviation with this growth."""
+    """Greatest 2-norm of the powers m^n over the n <= steps of `matrix_powers`, with its deviation (see `Growth`)."""
     size, after, greatest = 1.0, 0, np.eye(m.shape[0])
     for n, power in matrix_powers(m, steps):
         if not np.all(np.isfinite(power)):
@@ -147,7 +148,7 @@ class DenseGrowth:
         self.size = float(np.linalg.norm(e, 2))
 
     def fails(self, h: float, few: bool = False) -> bool:
-        """True if a power of the matrix of a step of h [s] exceeds the threshold within the number of steps.
+        """True if the norm of a power of the matrix of a step of h [s] exceeds the threshold within `steps` powers.
 
         few : True to check only powers of two and the last power
         """
@@ -171,7 +172,7 @@ class DenseGrowth:
         return bisect(self.fails, low, high)
 
     def failing_after(self, h: float) -> int:
-        """Number of steps of h [s] after which growth first exceeds the threshold; 0 if it does not."""
+        """First number of steps of h [s] in `matrix_powers` after which growth exceeds the threshold; 0 for none."""
         with np.errstate(over="ignore", invalid="ignore"):
             failing = (
                 n for n, power in matrix_powers(self.matrix(h), self.steps) if norm_exceeds(power, self.threshold)

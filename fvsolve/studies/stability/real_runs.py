@@ -61,7 +61,7 @@ class RealRuns:
         self.latest = time.monotonic() + TIME_LIMIT
 
     def as_deviation(self, start: np.ndarray) -> np.ndarray:
-        """Deviation of all states for a start in coordinates of the energy norm : float64[n].
+        """Deviation of all states from a deviation `start` in coordinates of the energy norm : float64[n].
 
         It is scaled so that its greatest entry equals the small deviation of that state.
         """
@@ -99,11 +99,12 @@ class RealRuns:
         return loop
 
     def growth(self, h: float) -> tuple[float, int]:
-        """Greatest growth of a deviation with steps of h [s], and number of steps; infinity if a run stops.
+        """(greatest growth of a deviation with steps of h [s], number of steps after which it is reached).
 
-        If growth exceeds the threshold, a run with a larger start follows. If its growth agrees, the start has grown;
-        if not, round-off or Newton residuals have grown, whose size does not depend on the start. Then the larger start
-        is used, and the check is repeated.
+        The growth is infinite if a run stops. If the growth exceeds the threshold, the run is repeated with a larger
+        deviation at the start. If both growths agree, the deviation itself has grown. Otherwise round-off or Newton
+        residuals have grown, whose size does not depend on the start; then the larger deviation is used, and the check
+        is repeated.
         """
         size, after, base_at = 1.0, 0, self.base_states(h)
         for start, width in self.starts:
@@ -136,8 +137,9 @@ class RealRuns:
         return state
 
     def growth_of_start(self, start: np.ndarray, h: float, base_at: Callable) -> tuple[float, int]:
-        """Greatest growth of the deviation `start` with steps of h [s], and number of steps; ends above the threshold.
+        """(greatest growth of the deviation `start` with steps of h [s], number of steps after which it is reached).
 
+        The run ends when the growth exceeds the threshold. The growth is infinite if a run stops because of the step.
         base_at : result of `base_states`
         """
         size, after, run = 1.0, 0, self.loop(self.at.y + start, h)
@@ -156,9 +158,10 @@ class RealRuns:
         return size, after
 
     def state_end_time(self, h: float) -> float:
-        """Time [s] after which a run from the operating point itself stops, if it is equal for the steps h and h / 2.
+        """Time [s] after which a run from the operating point itself stops; inf if that time depends on the step.
 
-        Then the model ends there (such as a piston at the end of its cylinder), and no step has failed. Otherwise inf.
+        If runs with the steps h and h / 2 stop at the same time, the model ends there (such as a piston at the end of
+        its cylinder), and the step h has not failed.
         """
         ends = [self.break_time(self.loop(self.at.y, step), self.steps * h / step) for step in (h, 0.5 * h)]
         return min(ends) if abs(ends[0] - ends[1]) <= END_TOLERANCE * h else np.inf
@@ -221,10 +224,10 @@ def too_long(runs: RealRuns) -> str:
 
 
 def measured_limit_of(runs: RealRuns, guess: float, size: float) -> dict:
-    """Limit of real runs `measured` and longest tested step `measured_up_to` [s], as a dict.
+    """Dict with the limit of real runs, `measured` [s], and the longest tested step, `measured_up_to` [s].
 
     guess : predicted limit [s]; if it is infinite, runs with two long steps are made
-    size : norm of the Jacobian [1/s]
+    size : norm of the Jacobian [1/s]. The dict is empty if `guess` is 0, or if `guess` is infinite and `size` is 0.
     """
     if np.isfinite(guess) and guess > 0.0:
         limit = runs.limit(guess)

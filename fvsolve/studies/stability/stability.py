@@ -40,8 +40,8 @@ from fvsolve.studies.stability.vector_growth import TIME_LIMIT, VECTORS, TooLarg
 from fvsolve.validation import COUNT, FLAG, FUNCTION, NAMES, NUMBER, PATH, TABLE, TEXT, validated
 
 AUTO_NOTE = (
-    f"auto starts with {automatic.EXPLICIT}, for which its row holds; a run continues with {automatic.IMPLICIT} or "
-    f"{automatic.TIGHT_IMPLICIT} if that is cheaper, which is not in its row"
+    f"auto starts with {automatic.EXPLICIT}, and its row is that of {automatic.EXPLICIT}; a run continues with "
+    f"{automatic.IMPLICIT} or {automatic.TIGHT_IMPLICIT} if that is cheaper, but the row does not include these methods"
 )
 LIMITED_DEVIATION = 1e-3  # of the small deviation: start for limited schemes, above the round-off level of WENO
 LONGER_FACTOR = 10  # factor of the number of steps in longer runs of Euler with a limiter
@@ -51,7 +51,7 @@ LONGER_FACTOR = 10  # factor of the number of steps in longer runs of Euler with
 class Stability:
     """Result of a stability study: a row for each scheme and method, and notes.
 
-    systems : for each scheme a function of the scheme that makes its linear system on first use
+    systems : {scheme: function of the scheme that returns its `LinearSystem`, computed on first use}
     """
 
     case: str
@@ -156,6 +156,7 @@ def stability(
 def cached_rows(points: ResultCache, case, options: dict, pairs: list, pool: TaskPool, report: Progress) -> list[dict]:
     """Rows of all pairs (scheme, method); rows that are not in the cache are computed by `pool` and stored.
 
+    points : cache of rows; report : progress function
     options : settings of the study that are part of the key of a row
     """
     keys = [{"study": "stability", "scheme": scheme, "method": method, **options} for scheme, method in pairs]
@@ -222,7 +223,10 @@ class SchemeRows:
         return self.systems[scheme]
 
     def frozen_systems(self) -> Iterator[tuple[str, LinearSystem]]:
-        """Names and linear systems for the limited scheme with its weights held constant, at the same state."""
+        """Yield (name, linear system) for each linear scheme that the limited scheme becomes with constant weights.
+
+        All systems are linearised at the state of the limited scheme.
+        """
         at = self.at(self.scheme)
         if at.model.cavitates or at.model.basins:  # their only linear scheme is upwind
             yield "upwind", LinearSystem(replace(self.at("upwind"), y=at.y))
@@ -258,7 +262,10 @@ class SchemeRows:
         return StabilityRow(**row | {"notes": tuple(bound_notes(result, side, growth))})
 
     def bound_columns(self, side: LinearSystem, method) -> dict:
-        """Columns of a row that do not need powers of the step matrix: names, sizes, bounds of the step."""
+        """Columns of a row that do not need powers of the step matrix: names, sizes, bounds of the step.
+
+        side : linear system of the scheme
+        """
         model, left_out = side.at.model, {}
         values = side.spectrum
         row = {
@@ -327,7 +334,7 @@ def von_neumann_limit(scheme: str, method) -> float:
 
 
 def dominant_part(form: EnergyForm, end: np.ndarray) -> tuple[str, float]:
-    """Part with the greatest share of the energy of a deviation, and this share.
+    """(name of the part with the greatest share of the energy of a deviation, this share).
 
     end : float64[r]  deviation in coordinates of the energy norm, with norm 1
     """

@@ -53,12 +53,15 @@ class VectorGrowth:
         return self.failing_after(h) > 0
 
     def failing_after(self, h: float) -> int:
-        """Number of steps of h [s] after which growth first exceeds the threshold; 0 if it does not."""
+        """Number of steps of h [s] after which growth is found to exceed the threshold; 0 if it does not."""
         growth = self.growth(h, self.threshold)
         return growth.steps if growth.size > self.threshold else 0
 
     def growth(self, h: float, enough: float = np.inf) -> Growth:
-        """Greatest growth found with steps of h [s], and the deviation with this growth; ends above `enough`."""
+        """Greatest growth found with steps of h [s], and the deviation with this growth.
+
+        The search ends when the growth exceeds `enough`.
+        """
         forth, back = step_function(self.method, h, self.e), step_function(self.method, h, self.transpose)
         v, unit = self.start_block, self.start_block[:, 0] / np.linalg.norm(self.start_block[:, 0])
         best = Growth(1.0, 0, unit, unit)
@@ -78,9 +81,9 @@ class VectorGrowth:
         return best
 
     def propagate(self, step: Callable, v: np.ndarray, enough: float) -> tuple[float, int, np.ndarray]:
-        """Greatest norm of a block v of vectors over the steps, number of steps there, and block there.
+        """(greatest norm of a block v of vectors over the steps, number of steps when it is reached, block then).
 
-        step : function that multiplies a block by the step matrix; enough : norm above which it ends
+        step : function that multiplies a block by the step matrix; enough : norm above which the steps end
         """
         size, steps, block, done = 1.0, 0, v, 0
         with np.errstate(over="ignore", invalid="ignore"):
