@@ -255,6 +255,7 @@ def test_a_study_says_what_is_wrong_with_what_it_is_given():
         (studies.sweep, {"vary": {"nodes.pond.level": 3}}, "expected a table of lists"),
         (studies.failure_map, {"key": ["links.main.cells"]}, "expected a key and its values"),
         (studies.order, {"cells": 3, "refine": "time"}, "cells = 3: only steps are refined here"),
+        (studies.ladder, {"target": "0.01"}, 'target = "0.01"; expected a finite number'),
     ):
         with pytest.raises(FvsolveError, match=words):
             study(still(), **given)
