@@ -40,7 +40,10 @@ class Displayable:
 
     @validated(path=PATH)
     def plot(self, path=None):
-        """Plot of the result as a matplotlib Figure, also written to the file `path` if given."""
+        """Plot of the result as a matplotlib Figure, also written to the file `path` if given.
+
+        Raises FvsolveError if `path` is not a path or cannot be written.
+        """
         module, _, name = self.picture.partition(":")
         return save_if_path(getattr(import_module(module), name)(self), path)
 

@@ -37,7 +37,7 @@ class Notice:
 
     kind : "start", "mesh", "step-limit", "step-error", "growth", "ledger", "range", ...
     place : part or section, such as "nodes.a"; key : key of that part, or None
-    value, limit : compared numbers in SI units, or None; ok : False if the results of the run are wrong
+    value, limit : compared numbers in SI units, or None; ok : False if the results of the run are not reliable
     """
 
     kind: str
@@ -110,12 +110,15 @@ class RunError(FvsolveError):
 
 
 def visible(text: str) -> str:
-    """Text that is safe for terminals: invisible characters are replaced by escapes, except line ends and tabs."""
+    """Text that is safe for terminals: invisible characters except tabs and the line end "\\n" are replaced by escapes."""
     return INVISIBLE.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 
 def nearest(name: str, names: Iterable[str]) -> str | None:
-    """Valid name in `names` that is most similar to `name`; None if no name is similar."""
+    """Valid name in `names` that is most similar to `name`; None if no name is similar.
+
+    Names longer than `LONGEST_NAME` are not compared.
+    """
     if len(name) > LONGEST_NAME:
         return None
     names = [valid for valid in dict.fromkeys(names) if len(valid) <= LONGEST_NAME]
@@ -134,7 +137,10 @@ EXTRA_NAMES = 2  # names above the limit of a listing that are still listed
 
 
 def listing(names: Iterable[str], limit: int = 12) -> str:
-    """Text that lists names, sorted, without duplicates; of many names the first `limit` and their total number."""
+    """Text that lists names, sorted, without duplicates.
+
+    Of more than `limit` + `EXTRA_NAMES` names it lists the first `limit`, and states the number of all names.
+    """
     names = sorted({*names})
     if len(names) <= limit + EXTRA_NAMES:
         return ", ".join(names)

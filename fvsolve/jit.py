@@ -150,6 +150,7 @@ class Function:
     def declare(self, letters: str, kinds: Callable[[str], tuple]) -> DeclaredFunction:
         """Compile the function for a single signature; calls from Python then accept no other signature.
 
+        If it is declared already, the existing declaration is returned, whatever the arguments.
         letters : signature, see `kernels.calls`
         kinds : function that gives the numba types of the arguments for `letters`
         """
@@ -213,7 +214,8 @@ class Function:
     def _path(self, key: str) -> Path | None:
         """Path of the file for the machine code of a signature; None for a function whose code is not stored.
 
-        Closures, local functions and functions of sources that are not hashed are not stored.
+        Closures, local functions and functions of sources that are not hashed are not stored; nothing is stored where
+        `store.CAN_LINK` is False.
         key : text of the signature
         """
         if self.folder is None or "<" in self.__qualname__ or self.py_func.__closure__ or not store.CAN_LINK:
@@ -242,10 +244,11 @@ def code_of(compiled, wrappers: bool = True) -> Code:
 
 
 class DeclaredFunction:
-    """Compiled function of a single signature, for calls from Python and as an argument of compiled functions.
+    """Compiled function of a single signature, for calls from Python, and by address from compiled code.
 
-    `.address` is its address for C. Exceptions are lost in calls by address: these functions
-    report errors in their output.
+    `.address` is its address for C. Calls from Python raise TypeError for an array of another type, or one that is
+    read-only or not C-contiguous.
+    Exceptions are lost in calls by address: these functions report errors in their output.
     """
 
     def __init__(self, function: Any, letters: str, code: Code) -> None:
@@ -348,7 +351,10 @@ class Intrinsic:
 
 
 def is_cold() -> bool:
-    """True if the code folder contains no compiled functions of this version, so that they must be compiled first."""
+    """True if compilation is enabled and the code folder contains no functions that Python calls.
+
+    Then they must be compiled first.
+    """
     return COMPILING and not any(code_folder().glob(f"*{store.SUFFIX}"))
 
 
@@ -372,8 +378,10 @@ def other_caches() -> str:
 def compile_in_parallel(code: str, cached: str):
     """Context manager during which a second process runs the Python text `code`, to compile functions.
 
-    It halves the time of a cold start. cached : name of a function that the process compiles; if the store contains
-    this function, no process is started. Functions that the process does not compile are compiled by the caller.
+    It halves the time of a cold start. cached : name of a function that the process compiles. No process is started if
+    the store contains this function, on a single processor, or if compilation is disabled.
+    At its end the context waits for the process, for `COMPILE_TIMEOUT` at most, and then ends it. Functions that the
+    process does not compile are compiled by the caller.
     """
     if not COMPILING or (os.cpu_count() or 1) < 2 or any(code_folder().glob(f"{cached}-*{store.SUFFIX}")):
         yield

@@ -41,8 +41,8 @@ class Scheme:
     extra_cells : cells read at an end where a wave leaves, in addition to those of the polynomial there
     own_end_factors : factors, at least 1, on the rate of a pipe of 1, 2, 3, ... cells, because of its ends
     The rate is the number of cells that a wave crosses per second. A factor is at least 0.9 min(1, C) / c: C is the
-    Courant limit of ssp-rk3 on a long pipe, c its limit on the short pipe between an open and a shut end
-    (tests/step_limits/test_ends.py).
+    Courant limit of ssp-rk3 on a long pipe, c the lesser of its limits on the short pipe with two open ends, and with
+    an open and a shut end (tests/step_limits/test_ends.py).
     """
 
     name: str
@@ -68,14 +68,17 @@ class Scheme:
 
     @cached_property
     def degree(self) -> int:
-        """Highest degree of polynomials for which the scheme gives the exact value at a face from cell averages."""
+        """Highest degree of polynomials for which the scheme gives the exact value at a face from cell averages.
+
+        For a limited scheme it is the degree of the linear scheme `smooth`.
+        """
         degree = 0
         while self.exact(degree + 1):
             degree += 1
         return degree
 
     def exact(self, degree: int) -> bool:
-        """True if the scheme gives x^degree exactly at the face x = 1, from averages over the cells [k, k + 1]."""
+        """True if the scheme `smooth` gives x^degree exactly at the face x = 1, from averages over cells [k, k + 1]."""
         power = degree + 1
         averages = (Fraction((k + 1) ** power - k**power, power) for k in STENCIL)
         return sum(w * average for w, average in zip(self.smooth.weights, averages, strict=True)) == 1
@@ -165,9 +168,10 @@ class Limiter(NamedTuple):
     """Limiter of slopes; its code in `kernels.limiters` is its position in `LIMITERS`.
 
     tangents : (a, b) for each branch in which the limited slope is not zero but a d + b e; d and e are the differences
-    of values to the cells behind and ahead
-    overshoot : bound of the values at sides relative to those of neighbouring cells, for unstructured meshes with
-    least-squares slopes. It is 1 without overshoot; linear fields on distorted meshes need more than 1.
+    of values to the cells behind and ahead. The slope of van Leer's limiter is smooth: its branches are the tangents at
+    d = e, at d = 0 and at e = 0
+    overshoot : factor on the range of the neighbouring cells, which bounds the values at the sides of a cell of an
+    unstructured mesh. It is 1 without overshoot; linear fields on distorted meshes need more than 1.
     """
 
     tangents: tuple[tuple[Fraction, Fraction], ...]
@@ -177,6 +181,7 @@ class Limiter(NamedTuple):
     def branches(self) -> dict[str, Weights]:
         """Weights of the linear schemes that muscl equals, one for each branch of the limiter : name -> weights.
 
+        They include upwind, for a slope of zero. With van Leer's limiter, muscl approaches these schemes (`tangents`).
         The branches with twice the difference to a neighbour as slope are named "twice behind" and "twice ahead".
         """
         half = [(Fraction(), Fraction()), *((a / 2, b / 2) for a, b in self.tangents)]
@@ -201,6 +206,6 @@ LIMITERS = {
 def branches(scheme: str, limiter: str) -> dict[str, Weights]:
     """Weights of the linear schemes that a limited scheme equals, one for each of its branches : name -> weights.
 
-    For muscl the branches are those of the limiter.
+    For muscl the branches are those of the limiter; a linear scheme has none.
     """
     return LIMITERS[limiter].branches if scheme == "muscl" else dict(SCHEMES[scheme].branches)

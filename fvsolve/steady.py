@@ -24,8 +24,9 @@ class Edge:
     """Link from node i to node j in the steady problem, with its linear equation in each Newton step.
 
     The equation is alpha dM - beta d(drop) = gamma, for changes of the mass flow M [kg/s] and of the potential drop
-    [Pa].
-    row : function (flow, drop) -> (alpha, beta, gamma); None for a fixed flow, which is `flow`
+    [Pa], positive from i to j.
+    row : function (flow, drop) -> (alpha, beta, gamma); None for a fixed flow
+    flow : fixed mass flow, or first value of the iteration [kg/s]
     shut : True for a link without flow; potentials of nodes behind it may be estimated from its other side
     """
 
@@ -37,7 +38,7 @@ class Edge:
     drop: Callable[[float], float] | None = None  # potential drop [Pa] at a fixed flow
     sensed_node: int = (
         -1
-    )  # node whose potential is the third argument of `row`; its coefficient is then a fourth result
+    )  # node whose potential P is the third argument of `row`; with a fourth result c, alpha dM - beta d(drop) - c dP
     held_potential: tuple[int, float] | None = (
         None  # (node, potential [Pa] that the flow maintains there), in place of `row`
     )
@@ -48,7 +49,8 @@ class Edge:
 class SteadyState:
     """Solution of a steady problem: potentials of nodes [Pa] and mass flows of edges [kg/s].
 
-    converged : True if Newton's method converged; no_solution : nodes whose demand cannot be supplied
+    converged : True if Newton's method converged
+    no_solution : nodes of sets without known potential whose demands do not add up to zero
     split : True if the flows of a loop are not unique; then they are those of least norm
     """
 
@@ -56,14 +58,16 @@ class SteadyState:
     flow: np.ndarray
     converged: bool
     split: bool = False
-    no_solution: list[int] = field(default_factory=list)  # nodes whose demand cannot be supplied
+    no_solution: list[int] = field(default_factory=list)
 
 
 def solve_steady(held: np.ndarray, demand: np.ndarray, edges: list[Edge], scale: tuple[float, float]) -> SteadyState:
     """Solve for the flows of edges that balance the demands of nodes, and for the potentials of these nodes.
 
-    held : float64[n]  given potential [Pa], nan for nodes to be solved; demand : float64[n]  mass demand [kg/s]
+    held : float64[n]  given potential [Pa], nan for nodes to be solved
+    demand : float64[n]  mass flow out of each node [kg/s], ignored at nodes of given potential
     scale : typical pressure [Pa] and mass flow [kg/s]
+    A problem without solution raises no error, see `SteadyState`.
     """
     quiet = _quiet(held, demand, edges)
     edges = [replace(edge, row=None, flow=0.0, drop=_no_drop) if e in quiet else edge for e, edge in enumerate(edges)]
@@ -96,10 +100,10 @@ def _no_drop(flow: float) -> float:
 def _quiet(held, demand, edges) -> set[int]:
     """Indices of the edges in those parts of the network in which nothing drives a flow.
 
-    In such a part all given potentials agree to rounding, and all demands are zero. If it were solved, rounding of a
-    head
-    would drive a flow: by M |M| = G dP it is of the order of the square root of the rounding error (mass flow M,
-    conductance G, potential drop dP). held, demand, edges : as for `solve_steady`
+    Such a part has a given potential. All its given potentials agree to rounding, all demands are zero, no fixed flow
+    enters, and no edge drives a flow or maintains a potential. If it were solved, rounding of a head would drive a flow:
+    by M |M| = G dP it is of the order of the square root of the rounding error (mass flow M, conductance G, potential
+    drop dP). held, demand, edges : as for `solve_steady`
     """
     fed = {i for edge in edges if edge.row is None and edge.flow != 0.0 for i in (edge.i, edge.j)}
     quiet = set()
@@ -174,7 +178,7 @@ def _references(held, demand, edges, parts, free_sets):
 
 
 def _enters(edge, group, known) -> bool:
-    """True if an edge with a fixed flow and a known drop joins the set of nodes `group` to one in the set `known`."""
+    """True if an edge with a fixed flow and a known drop joins the sets of nodes `group` and `known`."""
     if edge.row is not None or edge.drop is None:
         return False
     return (edge.i in group and edge.j in known) or (edge.j in group and edge.i in known)
@@ -268,7 +272,7 @@ def _edge_row(values, columns, e, edge, result, scale) -> float:
 
 
 def _solve(places, values, right, size, result):
-    """Least-norm solution of the Newton system; sets `result.split` if the system is singular.
+    """Solution of the Newton system; of a singular system that of least norm, then `result.split` is set.
 
     places : index of each of the `values` in the matrix, row * size + column; right : right-hand side
     size : number of unknowns. The solution is NaN if a number in `values` or `right` is not finite.

@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 
 DIGEST = hashlib.sha256().digest_size
 SUFFIX = ".code"
-CAN_LINK = sys.platform != "win32"  # LLVM's linker can link numba's objects there
+CAN_LINK = sys.platform != "win32"  # on other systems LLVM's linker can link numba's objects
 # Environment variables of numba that do not change code; all others are part of the target.
 IGNORED_SETTINGS = re.compile(
     r"NUMBA_(CACHE|CHROME|COLOR|CUDA|DEBUG(?!INFO)|DEVELOPER|DUMP|DISABLE_(JIT|CUDA|PERF|TYPEINFER)|"
@@ -84,7 +84,7 @@ def numba_version() -> str:
 
 
 def numba_folder() -> Path | None:
-    """Folder in which numba is installed."""
+    """Folder in which numba is installed; None if it is not installed."""
     spec = importlib.util.find_spec("numba")
     return Path(spec.origin).parent if spec and spec.origin else None
 
@@ -168,6 +168,7 @@ def _warn(text: str) -> None:
 def _link(symbols: dict[str, str], needed: list[str], object_code: bytes, identity: str) -> Code:
     """Load object code into a library of its own, so that symbols of different functions do not conflict.
 
+    Raises RuntimeError if a symbol is missing.
     symbols : name of each entry point of the function; needed : names of symbols of numba and Python that it uses
     identity : text that identifies function and signature
     """

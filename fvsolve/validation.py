@@ -29,7 +29,10 @@ def is_number(value: Any) -> bool:
 
 
 def is_row(value: Any, holds: Callable[[Any], bool]) -> bool:
-    """True if the argument is a list or tuple whose items all pass the test `holds`; False for text."""
+    """True if the argument is a sequence, such as a list, whose items all pass the test `holds`.
+
+    Texts and numpy arrays do not count as sequences.
+    """
     return isinstance(value, Sequence) and not isinstance(value, (str, bytes)) and all(holds(item) for item in value)
 
 

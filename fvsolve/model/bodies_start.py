@@ -99,10 +99,12 @@ def start_pins(draft, at: StaticForces) -> np.ndarray:
     for name in dict.fromkeys(redundant_pins(rows, names)):
         text = "this pin is redundant: in some direction joints or other pins already prevent its opening"
         draft.fault(f"links.{name}", f"{text}. Give the key `axis` for a loop in a plane, else remove one pin")
-    slips = dict(zip(names, rows @ at.rates(), strict=True))
+    slips: dict[str, float] = {}
+    for name, slip in zip(names, rows @ at.rates(), strict=True):
+        slips[name] = float(np.hypot(slips.get(name, 0.0), slip))
     for name, slip in slips.items():
-        if abs(slip) > PIN_RATE_TOLERANCE:
-            rate = draft.case.amount(abs(slip), "velocity")
+        if slip > PIN_RATE_TOLERANCE:
+            rate = draft.case.amount(slip, "velocity")
             draft.fault(
                 f"links.{name}",
                 f"velocities at the start separate its two points at {rate}. Expected velocities that keep it closed",

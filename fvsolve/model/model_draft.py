@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Sequence
+from copy import copy as shallow_copy
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -139,8 +140,8 @@ class ModelDraft:
             value = getattr(self, name)
             if isinstance(value, np.ndarray):
                 value = tables.get(id(value), value)
-            elif isinstance(value, (list, dict)):
-                value = value.copy()
+            elif isinstance(value, (list, dict, array, StateNames)):
+                value = shallow_copy(value)
             setattr(copy, name, value)
         copy.case, copy.hydraulics = case, Hydraulics(case)
         copy.tables = rec.Tables(*(tables.get(id(table), table) for table in self.tables))

@@ -25,7 +25,7 @@ COSTLY_RATIO = 10.0  # steps shorter by this factor than those of other pieces o
 def too_few_cells(draft: Any) -> list[Notice]:
     """Notices of pipes with too few cells for waves of an event, or next to a check valve or accumulator.
 
-    If there is none of the second kind, also of a piece of a cut pipe with far shorter steps than other pieces.
+    Without a notice of the second kind, also of a piece of a cut pipe with far shorter steps than other pieces.
     """
     table = draft.pipe_table
     if not len(table):

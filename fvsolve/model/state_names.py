@@ -31,6 +31,12 @@ class StateNames(Sequence):
         self.firsts: list[int] = []
         self.count = 0
 
+    def __copy__(self) -> StateNames:
+        """Copy to which names can be added without effect on the original."""
+        names = StateNames()
+        names.parts, names.firsts, names.count = self.parts.copy(), self.firsts.copy(), self.count
+        return names
+
     def add(self, names: Sequence[str]) -> None:
         """Append names."""
         self.parts.append(names)

@@ -102,7 +102,7 @@ class SteadyStart:
     def solve(self) -> None:
         """Solve for the steady state in which the state of every device agrees with its pressures and flows.
 
-        Raises CaseError if there is none.
+        Raises CaseError if no such state is found.
         """
         random, devices = Random(0), list(zip(self.draft.devices, self.draft.device_table, strict=True))
         for turn in range(MAX_REVISIONS):

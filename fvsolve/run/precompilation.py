@@ -69,7 +69,7 @@ def warm(
 
 
 def _folder() -> Path:
-    """Folder of compiled code. Raises FvsolveError if there is none, or if the requested one cannot be used."""
+    """Folder of compiled code. Raises FvsolveError if nothing is compiled, or if the requested one cannot be used."""
     if not jit.COMPILING:
         raise FvsolveError("NUMBA_DISABLE_JIT is set, so nothing is compiled; expected it to be unset")
     requested, folder = os.environ.get("FVSOLVE_CACHE"), jit.cache_folder()

@@ -118,7 +118,8 @@ def calibrate(
     A sample of values within the ranges is run first. Minimisations start at the best points of the sample, because
     waves out of phase cause many local minima. Several series are weighted by the inverse of their standard deviations
     about the fit, in rounds that begin with equal weights (Aitken 1935).
-    Raises FvsolveError if the case has no measured series, and if every run of the sample fails.
+    Raises FvsolveError if `free` is empty, if the case has no measured series, and if every run of the sample fails;
+    CaseError for a fault of the case or of a range.
     """
     loaded = load(case, set)
     if not free:
@@ -148,8 +149,8 @@ class LeastSquaresFit:
     def solve(self, jobs: int, dask: str | None) -> Calibration:
         """Minimise from several start points; returns the best fit with standard deviations.
 
-        With several series, weights are computed and the best fit is repeated until the weights hardly change.
-        jobs, dask : processes for the sample, as in `sweep`
+        With several series, weights are computed and the best fit is repeated until the weights hardly change, at most
+        `MAX_ROUNDS` times. jobs, dask : processes for the sample, as in `sweep`
         """
         from scipy.optimize import least_squares
 
@@ -169,7 +170,8 @@ class LeastSquaresFit:
 
         The square of a deviation is the sum of squared differences divided by the degrees of freedom. These are the
         number of points of the series, minus the part of the trace of J (J' J)^-1 J' that belongs to the series. A
-        series with at most one degree of freedom has the common deviation of all series.
+        series with at most one degree of freedom has the common deviation of all series. The result is at least
+        `LEAST_SCATTER`.
         """
         differences = self.differences(answer.x)
         parts = np.split(answer.jac, np.cumsum([series.size for series in differences])[:-1])
@@ -189,6 +191,7 @@ class LeastSquaresFit:
         """Run the sample; returns its best points, at most `DESCENTS`, as starts x of minimisations.
 
         The best points have the least sums of squared differences. jobs, dask : processes, as in `sweep`
+        Raises FvsolveError if no run of the sample finishes.
         """
         costs, reason = np.full(len(self.points), np.inf), ""
         for k, answer in run_tasks(self.work, self.points, jobs, dask):
@@ -206,7 +209,7 @@ class LeastSquaresFit:
     def minimise(self, least_squares: Callable, x: np.ndarray) -> Any:
         """Minimise the sum of squared weighted differences from the start x; returns the result of `least_squares`.
 
-        Derivatives are finite differences over `SLOPE_STEP`.
+        Derivatives are those of `slope`. In a failed run all weighted differences are `FAILED_RESIDUAL`.
         """
         size = sum(series.size for series in self.differences(x))
 

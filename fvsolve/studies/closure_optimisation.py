@@ -29,7 +29,7 @@ class ValveSchedule:
     """Piecewise-linear schedule and the peak of its run.
 
     time, value : times [s] and values [SI] of all knots, including both ends; peak : peak in the unit `Optimum.unit`,
-    None if the run failed
+    None if the run failed or the peak is not known
     """
 
     time: list[float]
@@ -89,7 +89,7 @@ class ClosureSearch:
         return times.tolist(), (self.first + (self.last - self.first) * shares).tolist()
 
     def __call__(self, z: np.ndarray) -> float:
-        """Run the case with the schedule of z, see the class; returns its peak, infinite if the run fails."""
+        """Run the case with the schedule of z, see the class; returns its peak, infinite if it is None."""
         time, value = self.law(z)
         quiet = {"output.fields": 0, "output.lines": {}, "expect": peak_expectation(self.minimise)}
         result = run(load(self.case, {self.key: {"time": time, "value": value}, **quiet}))
@@ -118,7 +118,7 @@ def optimise(
 
     The result is monotonic, with the end values and the duration of the original schedule. Simplex searches (Nelder and
     Mead 1965) start from three schedules: linear, fast at first, and slow at first. Raises CaseError for an invalid
-    case or an unsuitable key, FvsolveError if no run has a finite peak.
+    case or an unsuitable argument, FvsolveError if no run has a finite peak.
     """
     from scipy.optimize import minimize
 

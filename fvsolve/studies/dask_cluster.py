@@ -12,7 +12,7 @@ from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.output.restart import program_versions
 from fvsolve.run.process_pool import compute
 
-TIMEOUT = 10.0  # timeout for a scheduler, and for its first worker [s]
+TIMEOUT = 10.0  # timeout for a scheduler, and for its first worker; interval of checks of the connection [s]
 CHUNKS_PER_THREAD = 2  # chunks per thread: one in work, one that waits on the worker
 MATCHING_PACKAGES = ("python", "distributed", "msgpack", "cloudpickle", "numpy")  # versions must be equal on both sides
 
@@ -21,7 +21,7 @@ class Cluster:
     """Workers of the Dask scheduler at an address such as "tcp://10.0.0.1:8786".
 
     work : callable that computes a task. Workers must have the same versions of fvsolve and its packages as this
-    process.
+    process. Raises FvsolveError as `connect` and `check_versions` do.
     """
 
     def __init__(self, work: Any, address: str) -> None:
@@ -114,7 +114,8 @@ def connect(address: str) -> Any:
 def check_versions(client: Any, address: str) -> None:
     """Wait for the first worker, then compare versions on the scheduler and all workers with those of this process.
 
-    Raises FvsolveError if no worker comes, or if versions differ; the message lists all differences.
+    Raises FvsolveError if no worker comes, or if versions differ; the message lists the differences. Versions of
+    programs (see `program_differences`) are compared only if those of `MATCHING_PACKAGES` are equal everywhere.
     """
     try:
         client.wait_for_workers(1, timeout=TIMEOUT)
@@ -139,7 +140,7 @@ def check_versions(client: Any, address: str) -> None:
 
 
 def program_differences(reported: Any) -> list[str]:
-    """Texts on programs whose version on a worker differs from that in this process.
+    """Texts on programs, except the target processor, whose version on a worker differs from that in this process.
 
     reported : program -> version on the worker, or the exception of the worker if fvsolve is missing there
     """

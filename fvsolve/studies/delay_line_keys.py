@@ -30,14 +30,15 @@ def delay_lines(case) -> list[str]:
 
 
 def slowest_line(case) -> str:
-    """Name of the delay line with the longest travel time of a wave; its key `cells` sets the time step."""
+    """Name of the delay line with the longest travel time; its key `cells` limits the step if the case states none."""
     return max(delay_lines(case), key=lambda name: case.links[name].length / case.wave_speed(name))
 
 
 def fixed_choices(case) -> dict[str, str]:
     """Overrides that replace `pipe_model = "auto"` by its present choice for each pipe.
 
-    With these overrides the changes of a study do not alter the choice. Empty if no pipe has "auto".
+    With these overrides the changes of a study do not alter the choice. Pipes with "auto" that cannot be delay lines
+    are left out.
     """
     from fvsolve.run import model_of
 

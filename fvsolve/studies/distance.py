@@ -19,16 +19,16 @@ from fvsolve.studies.outcome import Outcome
 
 END = {"nodes": "nodes at the end: ", "links": "links at the end: "}  # prefixes of quantities
 NORMS = ("L1", "L2", "max")
-CONSTANT = 1e-9  # a component whose range is below this fraction of its size counts as constant
+CONSTANT = 1e-9  # ranges below this fraction of the size of a component count as 0; in basins, below this value [SI]
 
 
 @dataclass(frozen=True)
 class Deviation:
-    """Error of a probe at k times, or of a quantity of a pipe or basin in k cells.
+    """Error of a probe at k times, of a quantity in k cells of pipes or a basin, or of k end values of parts.
 
-    error : float64[k]  run minus reference [SI]; weights : float64[k]  durations of the values, or lengths or areas of
-    cells
-    span : range of the probe or quantity in the reference [SI]; nan if it is constant
+    error : float64[k]  run minus reference [SI]; weights : float64[k]  durations of the values, lengths or areas of
+    cells, or 1
+    span : range of the probe or quantity in the reference [SI]; nan if it is constant or not known
     """
 
     error: np.ndarray
@@ -94,7 +94,7 @@ def error_norms(run: Outcome, truth, own: tuple[str, ...] | None = None) -> dict
     """Errors of a run against the `Reference` truth : {variable: {"L1" | "L2" | "max": error [SI]}}.
 
     Variables are pressure and flow in the cells of all pipes at the end, quantities of basins at the end, probes over
-    time, and end values of nodes and links.
+    time, and end values of nodes and links (see `end_probes`), as far as the reference has them.
     own : probes compared over time (default all); `recording_keys` adds probes that are needed only for end values
     """
     deviations, by_component = {}, field_deviations(run, truth)
@@ -117,7 +117,10 @@ def error_norms(run: Outcome, truth, own: tuple[str, ...] | None = None) -> dict
 
 
 def distance(run: Outcome, truth) -> Distance:
-    """Errors of a run against the `Reference` truth, relative to ranges; all nan if the run did not reach its end."""
+    """Errors of a run against the `Reference` truth, relative to ranges; all nan if the run did not reach its end.
+
+    Without probes that change, only the error `end` of cells is computed.
+    """
     if not run.ok:
         return Distance()
     with np.errstate(invalid="ignore", over="ignore"):
@@ -173,7 +176,8 @@ def field_deviations(run: Outcome, truth) -> dict[tuple, Deviation]:
 
     The range of a pressure in a pipe is that over the run; the range of its flow is this range times A / (rho a), with
     area A, density rho and wave speed a. The range of a quantity in a basin is that over the cells at the end; flows
-    along x and y both have the greater of their two ranges. truth : the `Reference`
+    along x and y both have the greater of their two ranges. All ranges are those of the `Reference` truth; ranges of
+    pipes are nan if it does not know them. Basins that it does not contain are left out.
     """
     model, deviations = run.model, {}
     reference_fields = truth.fields(model) if model.pipes or model.basins else {}
@@ -261,7 +265,7 @@ def cell_averages(fine: np.ndarray, cells: int) -> np.ndarray:
     """Averages over `cells` equal cells, from averages `fine` over another number of equal cells of the same pipe.
 
     The integral is conserved to rounding. If the old number is not a multiple of `cells`, the cumulative integral is
-    interpolated by a spline of degree 5.
+    interpolated by a spline of degree 5, or of degree n for n < 5 cells in `fine`.
     """
     n = fine.size
     if n % cells == 0:

@@ -7,12 +7,13 @@ maximum bounds the change of m by all finer resolutions. It is 2.15 times the la
 multiplied by |b| / |a|, at most by 2.
 
 The error bound follows from all local maxima m with their remainders, because a lower maximum may come to exceed the
-greatest. The ratio of the mean differences of whole signals shows how far they have converged. If it is small, half of
-this bound is enough. The bound is at least the larger of two terms: a fifth of the mean difference of all maxima, and
-the difference between the signals at the times of their greatest values, because a moving crest may still grow. Both
-terms are limited to 16 times the difference of the greatest value. The ratio r of the greatest value may be small by
-chance, so the bound is also at least 1.6 / 2.15 of its remainder with the ratio of whole signals. The constants were
-chosen so that the bound holds for random mains (benchmarks/peak_bands.py --random) and its median is least.
+greatest. Remainders at places other than that of the greatest value are multiplied by 0.6. The ratio of the mean
+differences of whole signals shows how far they have converged. If it is small, half of this bound is enough. The bound
+is at least the larger of two terms: a fifth of the mean difference of all maxima, and the difference between the
+signals at the times of their greatest values, because a moving crest may still grow. Both terms are limited to 16 times
+the difference of the greatest value. The ratio r of the greatest value may be small by chance, so the bound is also at
+least 1.6 / 2.15 of its remainder with the ratio of whole signals. The constants were chosen so that the bound holds for
+random mains (benchmarks/peak_bands.py --random) and its median is least.
 """
 
 from __future__ import annotations
@@ -80,7 +81,8 @@ def local_maxima(signals: Sequence[Signal]) -> tuple[np.ndarray, np.ndarray]:
     """Local maxima of a signal; signals : (times, values) of this signal at two or three increasing resolutions.
 
     Returns (times that separate the local maxima of the finest signal, greatest values between these times :
-    float64[maxima, 3]). The columns of the values are as from `three_values`.
+    float64[maxima, 3]). The columns of the values are as from `three_values`; values are not finite in rows where a
+    signal has no point between these times.
     """
     t, v = signals[-1]
     cuts = t[troughs(v, RISE * float(np.ptp(v)))]
@@ -145,7 +147,8 @@ def remainder_by_ratio(ratio: float, values: np.ndarray) -> float:
 def convergence_ratio(signals: Sequence[Signal]) -> float:
     """Mean difference between the two finest of three signals, divided by that between the two coarsest.
 
-    The result is `SLOW` for only two signals. signals : (times, values) at increasing resolutions
+    The result is `SLOW` for only two signals, and if the two coarsest are equal.
+    signals : (times, values) at increasing resolutions
     """
     if len(signals) < 3:
         return SLOW

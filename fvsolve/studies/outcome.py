@@ -51,7 +51,7 @@ class Outcome:
     lines: dict[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
 
     def __getstate__(self) -> dict:
-        """State for pickling, without the model: the other process builds it from the same case and keys."""
+        """State for pickling, without `run_data` and the model, which the other process builds from case and keys."""
         return vars(self) | {"model": None, "run_data": None}
 
     @property
@@ -97,12 +97,13 @@ def outcome(
     case, set: Mapping | None = None, y: np.ndarray | None = None, best_of: int = 1, run: Callable | None = None,
     budget: float = np.inf,
 ) -> Outcome:  # fmt: skip
-    """Run a case (or a model) with changed keys. A refused case gives an outcome with its reason.
+    """Run a case with changed keys, or a model, without `set`. A refused case gives an outcome with its reason.
 
-    y : float64[n]  initial state (default zero, no deviation from the initial steady state)
+    y : float64[n]  initial state (default `solve.initial_state`, zero except for a basin with a start of its own)
     best_of : number of runs, of which the fastest counts. Runs after the first contain no compilation; they are omitted
     if the first took more than `budget` [s].
     run : function(model, state, sink, progress) that returns the `Run` (default `solve.Run` itself)
+    Raises KeyboardInterrupt if the user interrupts a run.
     """
     try:
         model = study_model(case, set) if not hasattr(case, "tables") else case

@@ -22,7 +22,7 @@ class Work(Protocol):
     def __call__(self, task: Any) -> Any: ...
 
     def lost_result(self, task: Any) -> Any:
-        """Answer for a task that crashed its process repeatedly and so has no result."""
+        """Answer for a task that crashed its process repeatedly and so has no result; an exception may be raised."""
 
 
 class Workers(Protocol):
@@ -35,7 +35,7 @@ class Workers(Protocol):
     def next_result(self) -> tuple[int, list | None, float]:
         """Wait for the next finished chunk; returns (number of the chunk, answers of its tasks, computing time [s]).
 
-        The answers are None if the process crashed.
+        The answers are None if the process crashed. Raises the exception that a task raised.
         """
 
     def close(self) -> None: ...
@@ -51,7 +51,7 @@ class TaskPool:
     """Pool for tasks of one kind. The first task is computed in this process, which compiles the functions for all.
 
     jobs : number of local processes; dask : address of a scheduler, used instead of local processes.
-    Context manager: workers are closed on exit.
+    Context manager: workers are closed on exit. Raises FvsolveError for `jobs` below 1.
     """
 
     def __init__(self, work: Work, jobs: int = 1, dask: str | None = None) -> None:

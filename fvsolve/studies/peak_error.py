@@ -40,10 +40,11 @@ def peak_errors(result: Result, case: Any, progress: Callable[[str], None] | Non
     """Add errors of peaks, expectations and limit verdicts to the summary of a run, from further runs of its case.
 
     Returns the summary. Its entry `peaks` has for each probe the `unit`, and `minimum` and `maximum` as {value, error,
-    order, reason}. The `error` is None if the run at twice the resolution did not finish or a pipe is too short. The
-    `order` is None if no order can be determined. The `reason` is that of an unknown or wide error. Each expectation
-    and each bound of a limit at each place gets its `error`; a limit is open if a margin is smaller than its error. The
-    entry `resolution` describes the method.
+    order, reason}. The `error` is None if it is not known, for example if the run at twice the resolution did not
+    finish, or a pipe is too short. The `order` is None if no order can be determined. The `reason` is that of an
+    unknown or wide error, otherwise None. Each expectation and each bound of a limit at each place gets its `error`; a
+    limit that holds becomes open if an error is unknown or above its margin. The entry `resolution` describes the
+    method.
     progress : called with a text before each run
     """
     own = result if result.places is not None else run(case, set=NO_FIELDS, pictures=False)
@@ -72,9 +73,10 @@ def reason_texts(summary: dict[str, Any]) -> list[str]:
 
 
 def refined_runs(own: Result, case: Any, progress: Callable[[str], None] | None) -> dict[float, Result]:
-    """Run a case at half, one and twice the resolution, with rows dense enough to resolve every peak.
+    """Run a case at half, one and twice the resolution, with about as many rows of output as steps.
 
-    Returns {0.5 | 1.0 | 2.0: result}, without resolutions that the case cannot have.
+    At resolution 1 the number of rows is that of the steps, limited to `MIN_ROWS` to `MAX_ROWS`, or that of the case if
+    it is larger. Returns {0.5 | 1.0 | 2.0: result}, without resolutions that the case cannot have.
     own : result of the case itself; progress : called with a text before each run
     """
     named = [probe.text for probe in case.output.probes]
@@ -198,7 +200,7 @@ def limit_row(runs: dict[float, Result], limit: int, k: int, row: dict[str, Any]
     """Row of a limit with its error. A limit that holds becomes open if the error is unknown or above the margin.
 
     runs : results at all resolutions, as from `refined_runs`; limit, k : indices of the limit and of the row in these
-    results; row : dict with part, bound, margin and places
+    results; row : row of `run.verdicts.places`
     """
     sign, magnitude = SIGNS[row["bound"]], row["quantity"] in MAGNITUDES
     triple = values_of_runs(runs, lambda run: run.places[limit][k]["margin"], -1.0)
@@ -236,7 +238,7 @@ def expectation_error(runs: dict[float, Result], expect: Any, k: int, peak_rows:
 def values_of_runs(runs: dict[float, Result], of: Callable, sign: float = 1.0) -> tuple[float | None, ...]:
     """Values at half, one and twice the resolution, times `sign`; None for a missing or unfinished run.
 
-    of : function of a result that returns the value
+    of : function of a result that returns the value, or None
     """
     results = [of(runs[times]) if times in runs and runs[times].reason == "finished" else None for times in LEVELS]
     return tuple(None if value is None else sign * value for value in results)
@@ -245,7 +247,8 @@ def values_of_runs(runs: dict[float, Result], of: Callable, sign: float = 1.0) -
 def observed_order(triple: Sequence[float | None], separated: bool) -> float | None:
     """Observed order of three values, at most 2; None below order 1, or if the differences have opposite signs.
 
-    separated : True if column separation occurred, so that no order is assumed
+    It is also None if a value is missing, and if the first two are equal.
+    separated : True if column separation occurred; no order is then assumed, and the result is None
     """
     if separated or any(value is None or not math.isfinite(value) for value in triple):
         return None
@@ -256,9 +259,10 @@ def observed_order(triple: Sequence[float | None], separated: bool) -> float | N
 
 
 def between_rows(result: Result, probe: str, side: str) -> float:
-    """Height of a smooth peak above the highest row of a probe (or depth of a minimum below the lowest row).
+    """Greatest height of a smooth peak above the highest row of a probe (or depth of a minimum below the lowest row).
 
-    It is an eighth of the second difference of the three rows around this row. side : "minimum" or "maximum"
+    It is an eighth of the second difference of the three rows around this row, in the unit of the probe. It is 0 if the
+    row is the first or last, or beside a jump. side : "minimum" or "maximum"
     """
     t, v = result.t, result[probe]
     position = int(np.argmin(v) if side == "minimum" else np.argmax(v))

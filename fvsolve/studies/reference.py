@@ -79,10 +79,11 @@ class Reference:
     rows : rows(run) -> float64[k, probes]  reference values of the probes of a run at its rows; NaN if not known
     spans : pipe -> range of its pressure over the run [Pa], as far as known
     own_error : variable -> {"L1", "L2", "max"}  error of the reference [SI]
-    uncertainty : error of the reference relative to ranges. Both errors are at least the error from refinements, and
-    the difference to the second reference if there is one.
+    uncertainty : error of the reference relative to ranges, with that of extremes (`extremes_distance`) as `overshoot`.
+    Both errors are at least the error from refinements, and the difference to the second reference if there is one.
     second : description of the second reference; failures : reasons of reference runs that did not finish
-    run : the run that is the reference, or the most accurate run if the reference is an exact solution
+    run : the run that is the reference, or the most accurate run if the reference is an exact solution; None if no run
+    was made
     """
 
     kind: str
@@ -111,14 +112,15 @@ def find_reference(
 
     finest : overrides with the resolution of the finest run under study
     opinions : number of kinds of reference runs (default all); a second kind shows errors that the first kind hides
-    exclude_own : True if scheme and method of the case are under study, so that the reference must use others
+    exclude_own : True if scheme and method of the case are under study, so that references with others are preferred
     way : "both", or "time" if only the step is under study, so that the reference has the cells and scheme of the case
     lines : True if delay lines are under study, so that the reference has cells, with any scheme and method
     stiff : True if a time scale other than waves limits explicit steps
     exact : True to use the solution named in [exact] of the case, if it applies
     run : run(case, keys) -> `Outcome`; queue : `RunQueue` that makes the runs instead of `run`
     stages : overrides that turn the case of the queue into `case`, in order; progress : called with a text
-    Raises FvsolveError if too few runs reach the end: none, or only one if several are required.
+    Raises FvsolveError if too few references remain: none, or only one unless `opinions` is 1. An exact solution counts
+    if at least one kind of runs reaches the end.
     """
     from fvsolve.case import load
 
@@ -155,7 +157,7 @@ def find_reference(
 
 
 def submit_ahead(queue: RunQueue, stages: tuple[dict, ...], kinds: Sequence, report: Callable[[str], None]) -> Callable:
-    """Submit all runs of some kinds to a queue, coarse runs first; returns run(case, keys), which gives their outcomes.
+    """Compute all runs of some kinds ahead (see `RunQueue.run_ahead`); returns run(case, keys), which gives outcomes.
 
     kinds : kinds of reference runs as from `candidates`; stages : overrides that turn the case of the queue into that
     of the study, in order; report : called with the descriptions of the kinds
@@ -168,8 +170,9 @@ def submit_ahead(queue: RunQueue, stages: tuple[dict, ...], kinds: Sequence, rep
 
 
 def best_reference(references: Sequence[Reference], failures: tuple[str, ...] = ()) -> Reference:
-    """Reference with the least uncertainty, which is raised to its difference from the second best if that is larger.
+    """Reference with the least uncertainty of the trajectory error.
 
+    Its uncertainty and own error are raised to its difference from the second best reference where that is larger.
     failures : reasons of reference runs that did not finish
     """
     first, *later = sorted(references, key=_uncertainty)
@@ -200,7 +203,7 @@ def _uncertainty(reference: Reference) -> float:
 
 
 def exact_reference(case) -> Reference:
-    """Reference from the solution named in [exact] of a case."""
+    """Reference from the solution named in [exact] of a case. Raises FvsolveError if its values overflow."""
     from fvsolve.run import model_of
 
     model = model_of(case)
@@ -296,7 +299,8 @@ def candidates(case, judged: bool, way: str, stiff: bool, lines: bool = False) -
 def smaller_steps(case) -> tuple[str, list[dict]]:
     """Reference runs with smaller steps or tolerances: (description, overrides of three runs from coarse to fine).
 
-    Cells and scheme are those of the case; the method is another one, explicit or implicit like the method of the case.
+    Cells and scheme are those of the case; the method is another one, explicit or implicit like the method of the case
+    (implicit for `auto`).
     """
     numerics, cells = case.numerics, cell_counts(case)
     judged = METHODS.get(numerics.method)
@@ -331,7 +335,7 @@ def run_text(case, scheme: str, cells, method: str, control: str, size: float) -
 def _is_characteristic(case, keys: dict) -> bool:
     """True if waves cross exactly one cell in nearly every step (Courant number 1), without numerical diffusion.
 
-    keys : overrides of the case
+    The number of steps is that of a run (see `probe_run`). keys : overrides of the case
     """
     model = study_model(case, keys)
     if model.basins:
@@ -365,7 +369,10 @@ def reference_of_refinements(words: str, runs: Sequence[Outcome]) -> Reference:
 
 
 def reference_of_run(run: Outcome, words: str = "") -> Reference:
-    """Reference from a run, without an estimate of the error of the run; words : description."""
+    """Reference from a run, without an estimate of the error of the run; words : description.
+
+    Its function `rows` raises FvsolveError if the rows of both runs are at different times.
+    """
 
     def fields_of(model) -> dict:
         sums = wave_sums(run)

@@ -22,7 +22,8 @@ from fvsolve.validation import PATH, Kind
 class ResultCache:
     """Results of the points (runs) of a study, in `points.jsonl` of a folder; in memory without a folder.
 
-    The folder is locked until the cache is closed (context manager). Raises RunError if another study has the lock.
+    The folder is locked until the cache is closed (context manager). Raises RunError if another study has the lock, or
+    if the folder cannot be written.
     A result is reused only for the same case (as resolved, with its files), the same extra settings and the same
     versions and sources of fvsolve and its dependencies.
     """
@@ -75,7 +76,10 @@ class ResultCache:
         return self.lookup(case_key(case, extra))
 
     def lookup(self, key: str) -> dict | None:
-        """Stored result with the hash `key` (of a case and settings), or None."""
+        """Stored result with the hash `key` of a case and settings, or None.
+
+        A result of an earlier study is also counted as reused.
+        """
         known = self.results.get(key)
         if known is not None and key not in self.new_keys:
             self.reused_keys.add(key)
@@ -122,7 +126,7 @@ def package_hash() -> str:
 
 
 def digest_of(who: dict) -> str:
-    """Hash of the values `who`, the sources of fvsolve and plugins, and user-defined methods.
+    """Hash of the values `who`, the sources of fvsolve and plugins, and user-defined methods that `who` names.
 
     The result of a point of a study depends on these alone.
     """

@@ -36,6 +36,7 @@ def sample_points(case: Case, vary: Mapping[str, Sequence[Any]], sample: str, se
 
     vary : key -> (low, high); sample : kind and number of points, such as "sobol:64" or "lhs:100" (Latin hypercube)
     seed : equal seeds give equal points
+    Raises FvsolveError for an invalid `sample`, CaseError for invalid ranges.
     """
     kind, count = parse_sample(sample)
     low, high = (np.array(side) for side in zip(*key_ranges(case, vary).values(), strict=True))
@@ -70,7 +71,7 @@ def key_ranges(case: Case, vary: Mapping[str, Sequence[Any]]) -> dict[str, tuple
 
 
 def range_of(case: Case, key: str, given: Sequence[Any]) -> tuple[float, float]:
-    """Range of a key in SI : (low, high). Raises ValueError for an invalid range.
+    """Range of a key in SI : (low, high). Raises ValueError for an invalid range, FvsolveError for an unknown key.
 
     given : two values, each a number or a text with a unit
     """
@@ -89,7 +90,7 @@ def range_of(case: Case, key: str, given: Sequence[Any]) -> tuple[float, float]:
 def key_quantity(raw: dict[str, Any], key: str) -> Quantity | None:
     """Quantity (dimension and range) of the values of a key; None if the values are words or whole numbers.
 
-    raw : nested dicts of the case
+    raw : nested dicts of the case. Raises FvsolveError for an unknown key.
     """
     keys = split_key(key)
     value = declaration_of(raw, keys)

@@ -91,8 +91,8 @@ def read_scenarios(path: str | Path) -> Scenarios:
 def possible_paths(keys: tuple) -> Iterator[tuple]:
     """Paths in the TOML file under which an override may be written, to find its line; most specific first.
 
-    keys : (group, name of the event or protection, dotted key). The dotted key may be written as nested tables or as
-    one quoted key. The paths of the tables that contain it follow.
+    keys : (group, name of the event or protection, dotted key), or its first entries alone. The dotted key may be
+    written as nested tables or as one quoted key. The paths of the tables that contain it follow.
     """
     below = split_key(keys[2]) if len(keys) > 2 else ()
     for n in range(len(below), 0, -1):
@@ -117,9 +117,10 @@ def read_text(path: Path) -> tuple[dict[str, Any], dict[tuple, int]]:
 
 
 def case_path(case: Any, folder: Path, fault: AddFault) -> Path | None:
-    """Path of the case file of a study; adds a fault and returns None if there is no such file.
+    """Path of the case file of a study, or of a shipped case; adds a fault and returns None if there is no such file.
 
-    case : value of the key `case`; folder : folder of the study; fault : fault(keys, message) records a fault
+    case : value of the key `case`, which must be a text; folder : folder of the study
+    fault : fault(keys, message) records a fault
     """
     if not isinstance(case, str):
         missing = "case is missing. Expected the name of the case file of the study"
@@ -193,7 +194,7 @@ def all_conflicts(events: dict, protections: dict) -> Iterator[tuple[str, str, s
 def conflicting_keys(first: dict[str, Any], second: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """Pairs (key of `first`, key of `second`) that are equal or of which one contains the other.
 
-    Equal keys with equal values are no conflict.
+    Equal keys with equal values are left out.
     """
     for key in first:
         for other_key in second:
@@ -206,7 +207,8 @@ def run_faults(design: Scenarios, fault: AddFault) -> None:
     """Add the faults of all runs whose case is invalid, each at the override that causes it.
 
     If only some runs with an event (or protection) have a fault, the message names their protections (or events). Runs
-    with conflicting overrides are omitted. fault : fault(keys, message) records a fault
+    with conflicting overrides are omitted. Faults of the case itself are added at the key `case`.
+    fault : fault(keys, message) records a fault
     """
     try:
         base = load(design.case)

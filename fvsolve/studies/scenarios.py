@@ -59,7 +59,7 @@ class ScenarioResults:
         return all(row["ok"] for row in self.rows) and (bool(self.holds) or not self.limited)
 
     def plain(self) -> dict[str, Any]:
-        """Plain values as written to study.json."""
+        """Plain values for study.json, in which directories are then relative to the folder of the study."""
         design = self.design
         return plain({"title": design.title, "study": design.name, "case": str(design.case), "ok": self.ok,
                       "events": list(design.events), "protections": list(design.protections), "holds": self.holds,
@@ -79,7 +79,8 @@ def study(source, out: str | Path | None = None, jobs: int = 1, dask: str | None
     source : path of the study file, or its content; out : folder of the runs (default runs/NAME of the study)
     dask : address of a Dask scheduler; progress : called as progress(done, total, name of the run)
     Runs of the same study that exist are kept, and resumed if unfinished; `force` repeats all. Raises CaseError with
-    the faults of the file and of all runs, RunError if a directory holds a different run.
+    the faults of the file and of all runs, RunError if a directory holds a different run, or if a run crashes its
+    process repeatedly.
     """
     design = source if isinstance(source, Scenarios) else read_scenarios(source)
     folder = Path(out) if out is not None else Path("runs") / design.name
@@ -132,7 +133,10 @@ def row_name(row: dict[str, Any]) -> str:
 
 
 def write_study(results: ScenarioResults) -> None:
-    """Write study.json, and study.csv with a row for each run: value, margin and state of every limit."""
+    """Write study.json, and study.csv with a row for each run: value, margin, state, place and time of every limit.
+
+    Reports and pictures of earlier results in the folder are deleted.
+    """
     data = results.plain()
     for row in data["runs"]:
         row["directory"] = os.path.relpath(row["directory"], results.folder)

@@ -92,8 +92,9 @@ def sensitivity(
 
     case : as for `run`, or a function of a dict key -> number; vary : key -> (low, high)
     samples : base sample size N of Sobol (a power of two), which needs N (keys + 2) runs; Morris needs
-    N / 4 (keys + 1) more. Other arguments as for `sweep`, which makes the runs and reuses earlier ones.
-    Raises FvsolveError if a run does not have the outcome.
+    max(4, N / 4) (keys + 1) more. Other arguments as for `sweep`, which makes the runs and reuses earlier ones; a
+    function is called in this process, and only `samples` and `seed` apply to it.
+    Raises FvsolveError if a run does not have the outcome, if the outcome is constant, and if SALib is not installed.
     """
     if samples < MIN_SAMPLES:
         raise FvsolveError(f"samples = {samples} is too small. Expected {MIN_SAMPLES} or more, a power of two")
@@ -133,6 +134,7 @@ def sample_points(bounds: Mapping[str, tuple[float, float]], samples: int, seed:
     """Sample points of the Sobol and the Morris method : float64[points, keys] each.
 
     bounds : key -> (low, high); samples : base sample size of Sobol; seed : equal seeds give equal points
+    Raises FvsolveError if SALib is not installed.
     """
     _require_salib()
     from SALib.sample import morris, sobol

@@ -31,8 +31,8 @@ _VALUE = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*"
 class SizeRun:
     """Result of a run with one value of the key that a sizing varies.
 
-    value : value of the key in the unit of the search; ok : True if all limits hold
-    limit : name of the limit with the least margin
+    value : value of the key in the unit of the search; ok : True if the run is ok and all limits hold
+    limit : name of the limit with the least relative margin, "" if the case was refused
     margin : margin of that limit, minus its error if the error is known, relative to the limit [-]; None if not known
     reason : reason of the end of the run
     open : reason for which limits are undecided, or empty. Limits are undecided if a schedule continues after the end
@@ -89,7 +89,10 @@ def number_and_unit(given: Any) -> tuple[float, str]:
 
 
 def parse_range(low: Any, high: Any) -> tuple[float, float, str]:
-    """(low, high, unit) of a range in a common unit. Raises FvsolveError for different dimensions or low >= high."""
+    """(low, high, unit) of a range in a common unit, that of `high`.
+
+    Raises FvsolveError for unreadable values, different dimensions, or low >= high.
+    """
     try:
         (a, unit_a), (b, unit_b) = number_and_unit(low), number_and_unit(high)
     except ValueError as error:
@@ -110,7 +113,7 @@ class SizeSearch:
     """Search for the least or greatest value of a key at which all limits hold; all its runs are stored.
 
     unit : unit of the values; ties : dependent key -> formula of x, the value in SI
-    error : True to require margins larger than their errors, which are found by two more runs for each value
+    progress : called as progress(runs, text); error : as for `size`
     """
 
     def __init__(self, case: Case, key: str, unit: str, ties: Mapping[str, str], progress: Callable | None,
@@ -120,7 +123,7 @@ class SizeSearch:
         self.formulas = {tied: Arithmetic(text) for tied, text in ties.items()}
 
     def keys(self, value: float) -> dict[str, Any]:
-        """Overrides for a value of the key, and for the dependent keys by their formulas."""
+        """Overrides for a value of the key, and for dependent keys. Raises CaseError if a formula has no value."""
         unit = UNITS.get(self.unit)
         x = value if unit is None else float(unit.si(value)) + (self.case.ambient_pressure if unit.gauge else 0.0)
         overrides: dict[str, Any] = {self.key: f"{value!r} {self.unit}" if self.unit else value}
@@ -132,7 +135,10 @@ class SizeSearch:
         return overrides
 
     def __call__(self, value: float) -> SizeRun:
-        """Run the case with a value of the key; a value that was run before is not run again."""
+        """Run the case with a value of the key; a value that was run before is not run again.
+
+        If the case is refused, the first run raises CaseError; later runs return the reason in their `SizeRun`.
+        """
         earlier = next((entry for entry in self.runs if entry.value == value), None)
         if earlier is not None:
             return earlier
@@ -157,6 +163,7 @@ class SizeSearch:
         """Search between `low` and `high`; returns (value, bracket) as in `Size`, or (None, None) if no value is found.
 
         goal : "minimum" or "maximum"; rtol : relative width of the bracket at which the search ends
+        The bracket is not shortened after `MAX_RUNS` runs.
         """
         best, opposite = (low, high) if goal == "minimum" else (high, low)
         if self(best).ok:
@@ -224,7 +231,8 @@ def size_run(value: float, result: Any) -> SizeRun:
 def relative_margin(row: Mapping[str, Any], quantity: str) -> float:
     """Margin of a row of a limit verdict, minus its error, relative to the limit [-].
 
-    The divisor is at least the usual size of the quantity, such as an atmosphere for pressures and heads.
+    The divisor is at least the usual size of the quantity, such as 1 bar for pressures. The result is -inf if the
+    margin is not known.
     """
     if row["margin"] is None:
         return -math.inf
@@ -243,7 +251,8 @@ def size(
     low, high : numbers, or texts with a unit; goal : "minimum" or "maximum"; set : key -> value for all runs
     ties : dependent key -> formula of x, the value in SI; rtol : relative tolerance of the bracket
     progress : called as progress(runs, text)
-    error : True to require margins larger than their errors, which are found by two more runs for each value
+    error : True to require margins larger than their errors, which `peak_errors` finds by up to three more runs for
+    each value
     If limits fail at both ends, values near the one with the greatest margin are tried. Raises CaseError for an invalid
     case, a case without limits, and wrong arguments.
     """

@@ -40,10 +40,10 @@ class Sweep(Displayable):
     keys : the keys that vary; reused : number of rows from earlier sweeps
     rows : for each run a dict of the values of the keys and of the columns below
 
-    `ok` : True if the run reached its end without a warning of wrong numbers; `reason` : reason of its end
+    `ok` : True if the run reached its end without a warning of wrong numbers; `reason` : reason of its end or refusal
     `t [s]` : its last time; `marks` : text of the first mark, or empty; `warnings`, `fluid` : as in the summary
     `min(...)`, `max(...)`, their times, `final(...)` : of each probe in units of `[output]`, None if the run diverged
-    `expectations`, `verdicts` : True if all expectations hold, and if all limits hold
+    `expectations`, `verdicts` : True if all expectations hold, and if all limits hold; None if the case has none
     `steps`, `seconds` : number of steps, and their wall time [s]
     """
 
@@ -158,12 +158,13 @@ def sweep(
     `case` is a path, a dict shaped like the file or a `Case`; `set` are overrides of all runs. With `sample`,
     "sobol:64" or "lhs:100", `vary` has two values of each key, and that number of points between them is run; equal
     values of `seed` give equal points. `points` are the values of every run, or a CSV file of them, instead of `vary`.
-    With `out`, finished rows are saved in that folder at once, reused by later sweeps, and written to `sweep.csv` at
-    the end or at an interruption. A run that is refused or stops gives a row with its reason. With jobs above 1, other
-    processes import the main script again: put its code under `if __name__ == "__main__"`. `dask` is the address of a
-    scheduler whose workers are used instead.
-    Raises FvsolveError if no key varies, and if every run is refused for the same reason; CaseError if the case itself
-    has faults or a key is unknown.
+    With `out`, finished rows are saved in that folder at once, reused by later sweeps, and written to `sweep.csv` (with
+    pyarrow also to `sweep.parquet`) at the end or at an interruption. A run that is refused or stops gives a row with
+    its reason. With jobs above 1, other processes import the main script again: put its code under
+    `if __name__ == "__main__"`. `dask` is the address of a scheduler whose workers are used instead.
+    `progress` is called as progress(done, total, text).
+    Raises FvsolveError if no key varies, and if every run is refused for the same reason; CaseError if the case cannot
+    be read or a key is unknown, and with `sample` also for other faults of the case; RunError if `out` is in use.
     """
     if jobs < 1:
         raise FvsolveError(f"jobs = {jobs} is out of range. Expected 1 or more")
@@ -181,6 +182,7 @@ def planned_values(
     """Values of every run, key -> value, from points, a sample or a grid.
 
     source : case as for `load`; raw : its nested dicts; base : overrides of all runs; other arguments as for `sweep`
+    Raises FvsolveError if no key varies, and for unsuitable arguments.
     """
     if points is not None:
         if vary or sample:

@@ -75,8 +75,9 @@ class RowMaker:
 
 
 def row_of(model, summary, sink) -> dict[str, Any]:
-    """Row of a run: column -> value as in `summary.json`, None for values that are not finite.
+    """Row of a run: column -> value as in `summary.json`; see `Sweep` for the columns.
 
+    None replaces values that are not finite, and all values of probes if the run diverged.
     sink : `MemorySink` with the output of the run
     """
     row = {"ok": bool(summary.ok), "reason": summary.reason, "t [s]": plain(float(summary.t))}

@@ -20,7 +20,7 @@ MANY_STEPS = 20.0  # accumulated error of steps between jumps of delay lines, in
 SMOOTHED = (
     0.05  # effect of jumps below a quarter of numerics.delay_tolerance, smoothed over a step, relative to that key
 )
-MIN_CELLS = 4  # least number of cells for which half the resolution differs
+MIN_CELLS = 4  # cells recommended for a pipe, and for the travel time of a short pipe in its neighbour
 MAX_NAMES = 3  # greatest number of names in a text
 WIDE_ERROR = 0.05  # error relative to the span of a signal above which a reason is given
 SMALL_DIFFERENCE = 0.1  # differences below this fraction of an error are not its cause
@@ -60,7 +60,10 @@ def brief_pulses(case: Any) -> list[str]:
 
 
 def pulse_width(value: Any) -> float:
-    """Shortest time in which a scheduled value rises and falls, or falls and rises [s]; inf if it never does."""
+    """Shortest time in which a scheduled value rises and falls, or falls and rises [s]; inf if it never does.
+
+    It is also inf for a harmonic schedule, and for a value that is not a `Schedule`.
+    """
     if not isinstance(value, Schedule) or value.wave or len(value.time) < 3:
         return np.inf
     changes = np.flatnonzero(np.diff(value.value))
@@ -102,7 +105,8 @@ class Unresolved:
 def unknown_parts(case: Any) -> dict[Part, str]:
     """Parts with unknown errors of their peaks : (group, name) of a part -> reason.
 
-    With a short pulse in a schedule these are all parts, otherwise pipes that are too short, and their end nodes.
+    With a short pulse in a schedule (`brief_pulses`) these are all parts. Otherwise they are the pipes of `short_pipes`
+    and `single_cell_pipes`, and their end nodes.
     """
     reasons: dict[Part, str] = {}
     if pulses := brief_pulses(case):
@@ -156,7 +160,7 @@ def has_separation(runs: dict[float, Any]) -> bool:
 
 
 def coarse_pipes_at_devices(case: Any) -> list[str]:
-    """Texts on pipes with too few cells next to devices that respond to waves."""
+    """Texts, at most `MAX_NAMES`, on pipes with too few cells next to a check valve or accumulator."""
     pipes, devices = pipes_with_cells(case), answering_parts(case)
     texts = [
         f"{name} has {pipe.cells} cell{'' if pipe.cells == 1 else 's'} beside {listing(devices[name], MAX_NAMES)}; "

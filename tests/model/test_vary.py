@@ -125,6 +125,17 @@ def test_one_model_follows_from_another_that_was_varied_itself():
     assert said(twice) == said(once)
 
 
+def test_variants_of_one_model_with_unsteady_friction_do_not_share_its_states():
+    more = SMALL | {"links.main.friction": {"model": "unsteady", "roughness": "0.26 mm"}}
+    model = fvsolve.build(fvsolve.load("valve-closure", more))
+    before = said(model)
+    for area in (0.001, 0.0012):
+        for key in ("links.valve.area", "links.valve.laminar_reynolds"):
+            fresh = fvsolve.build(fvsolve.load("valve-closure", more | {key: area}))
+            assert said(fvsolve.vary(model, {key: area})) == said(fresh), (key, area)
+    assert said(model) == before
+
+
 def test_sizes_of_restrictions_are_written_into_the_tables_that_were_there(monkeypatch):
     """Of one alone or several, laminar or not; a stem or a kind of law that is other asks for tables of its own."""
     table = raw_case("valve-closure")

@@ -129,6 +129,12 @@ def test_a_loop_that_is_not_closed_is_told_by_how_much_and_one_held_twice_by_whi
     assert "links.loop: velocities at the start separate its two points at" in told(nodes, links)
 
 
+def test_a_pin_that_opens_across_its_axis_in_one_direction_alone_is_refused():
+    straight = {f"nodes.{name}.joint.angle": 0.0 for name in ("one", "two", "coupler")}
+    with pytest.raises(CaseError, match="links.loop: velocities at the start separate its two points at 1.5 m/s"):
+        fvsolve.build(fvsolve.load("four-bar", straight | {"nodes.coupler.joint.rate": 1.0}))
+
+
 def test_a_probe_that_a_joint_has_not_is_refused():
     found = told(arm(), probes=["arm.travel", "arm.bob.roll", "arm.bop.x"])
     assert 'arm is a body, which has no "travel"' in found and 'arm.bob is a point, which has no "roll"' in found

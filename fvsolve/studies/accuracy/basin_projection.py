@@ -1,6 +1,6 @@
 """Quantities in the cells of basins at the end of a run, averaged over the cells of coarser meshes.
 
-A variable has the name "BASIN at the end: QUANTITY". Its values are deviations from the initial steady state.
+A variable has the name "BASIN at the end: QUANTITY". Its values are those of `basin_fields`.
 """
 
 from __future__ import annotations

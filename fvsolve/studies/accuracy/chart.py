@@ -87,7 +87,8 @@ class Chart(Displayable):
 
     points : settings with the results of their runs; front : cheapest setting for each target error
     reference, second : descriptions of the two references
-    floor : difference between the two references, with the keys of `Distance`; smaller errors are not reliable
+    floor : uncertainty of the reference, at least its difference from the second, with the keys of `Distance`; smaller
+    errors are not reliable. It also has the descriptions `reference`, `second` and `told`.
     default : names of the default scheme and method, such as "weno5 rk4"; compile_seconds : time of compilation [s]
     reused : number of points from earlier studies; told : reasons of failed references
     left_out : default schemes that do not support the fluid; aim : setting for a target error, None without a target
@@ -178,7 +179,8 @@ def chart(
     """Run a case with all combinations of schemes, methods and cells (or tolerances); compare errors with their cost.
 
     schemes, methods : names (default a selection)
-    cells : numbers of cells of the pipe with the longest travel time of a wave, or along the longer side of a basin
+    cells : numbers of cells of the main part (`main_part_name`): of the pipe with the longest travel time, or along the
+    side of a basin with most cells
     rtol, step : tolerances [-] and steps [s] of a case without cells; if all its pipes are delay lines, steps only
     target : mean error over time of the worst probe, relative to its range [-]; the cheapest setting with at most this
     error is found and run
@@ -201,6 +203,7 @@ class _ChartStudy:
     """Work-precision study of a case: makes the runs, the reference and the chart.
 
     points : cache of results of earlier runs; queue : `RunQueue` that makes the runs
+    Raises FvsolveError if the mesh of a basin comes from a file.
     """
 
     def __init__(self, case: Case, points: ResultCache, progress: Progress, queue: RunQueue) -> None:
@@ -242,7 +245,10 @@ class _ChartStudy:
 
     @cached_property
     def reference(self) -> Reference:
-        """Reference of all settings, computed at its first use, after compilation for all schemes and methods."""
+        """Reference of all settings, computed at its first use, after compilation for all schemes and methods.
+
+        Raises FvsolveError if all probes are constant, and as `find_reference`.
+        """
         for setting in {entry.curve: entry for entry in reversed(self.all)}.values():
             self.progress(self.done, self.total, f"compiling {setting.name}")
             self.compiling += self.compile(setting)
@@ -257,9 +263,9 @@ class _ChartStudy:
         return reference
 
     def finest_keys(self) -> dict | None:
-        """Overrides with the finest cells under study, for the references; None if the case has no cells.
+        """Overrides with the finest cells under study, for the references; None without cells and delay lines.
 
-        Delay lines get cells that a wave crosses in the same time as the finest cells.
+        Delay lines get cells that a wave crosses in at most the time in which it crosses the finest cells.
         """
         if not delay_lines(self.case):
             return None if self.finest is None else cell_keys(self.case, self.finest)
@@ -278,7 +284,10 @@ class _ChartStudy:
         return asdict(run_coarse(self.case if main_part_name(self.case) else self.case_in_cells))
 
     def floor(self) -> dict:
-        """Descriptions of both references, and the difference between them, as plain data with keys of `Distance`."""
+        """Uncertainty of the reference (see `Reference`), as plain data with the keys of `Distance`.
+
+        It also has the descriptions `reference` and `second` of both references, and `told`, reasons of failed runs.
+        """
 
         def make() -> dict:
             reference = self.reference
@@ -310,7 +319,8 @@ class _ChartStudy:
     def point(self, setting: MethodSetting) -> Point:
         """Setting with its result, from a run or the cache.
 
-        It is not run if a cheaper setting with the same scheme and method was given up because of its CPU time.
+        It is not run if a cheaper setting with the same scheme and method was given up because of its CPU time. An
+        overshoot below that of the method `floor` is set to 0.
         """
         self.progress(self.done, self.total, f"{setting.name}, {setting.fineness}")
         given_up = self.given_up
@@ -327,7 +337,7 @@ class _ChartStudy:
         return Point(setting, **values)
 
     def add_coarser(self, points: list[Point], target: float) -> list[Point]:
-        """Add coarser settings of each scheme and method until the error of the coarsest exceeds the target.
+        """Add coarser settings of each scheme and method until the coarsest fails, or its error exceeds the target.
 
         Returns all points, old and new. points : settings with their results; target : trajectory error [-]
         """
@@ -369,6 +379,7 @@ class _ChartStudy:
         """Cheapest setting for a target error, run and refined until its error is within the target.
 
         points : settings with their results; target : trajectory error [-]; floor : as from the method `floor`
+        Raises FvsolveError if the target is below the floor, or if no setting reaches it.
         """
         if not target >= floor["trajectory"]:
             raise FvsolveError(

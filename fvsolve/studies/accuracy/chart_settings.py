@@ -43,8 +43,10 @@ CELL_TIME = 1e-8  # usual time of one call of the rates for one cell [s]
 class CoarseRun:
     """Results of a coarse run of a case with cells, from which the numbers of cells of a study are chosen.
 
-    cells : number of cells; waves : number of steps at Courant number 0.9; steps : number of steps that the run took
-    works : estimated work (cells times steps) of runs with MAX_CELLS cells, half as many, a quarter ...
+    cells : number of cells; waves : number of steps at Courant number 0.9
+    steps : number of steps of the run, extrapolated to its end if it was stopped
+    works : estimated work (cells times steps) of runs with MAX_CELLS cells, half as many, a quarter ...; empty if the
+    main part (`main_part_name`) is a basin
     compile_seconds : wall time of a first run minus that of a second run [s]
     dearness : time to evaluate the rates of one cell, as a multiple of CELL_TIME, at least 1
     sizes : (number of cells, work) of the main basin, as from `basin_sizes`; None if the main part is a pipe
@@ -65,7 +67,10 @@ class CoarseRun:
 
     @property
     def levels(self) -> list[int]:
-        """Numbers of cells of the study, at most five, each twice the previous; the finest run takes about a minute."""
+        """Numbers of cells of the study, at most five, from coarse to fine, for a pipe each twice the previous.
+
+        If possible, the work of the finest run, times `dearness`, is at most `MAX_WORK`.
+        """
         if self.sizes is not None:
             return [n for n, work in self.sizes if self.dearness * work <= MAX_WORK][-LEVEL_COUNT:] or [
                 self.sizes[0][0]
@@ -99,10 +104,10 @@ def run_coarse(case: Case) -> CoarseRun:
 
 
 def basin_sizes(case: Case) -> list[tuple[int, float]]:
-    """(number of cells along its longer side, work) of the main basin, for all possible numbers of cells.
+    """(greatest number of cells along a side, work) of the main basin, for all possible numbers of cells.
 
-    The numbers are that of the case, multiplied or divided by powers of 2, for which patches and holes end on grid
-    lines. Work is cells times steps. The main basin is that of `main_part_name`.
+    The numbers are that of the case, times powers of 2 from 1/32 to 16, for which patches and holes end on grid lines.
+    Work is cells times steps. The main basin is that of `main_part_name`.
     """
     main_cells, sizes = basin_cells(case), []
     for n in (main_cells * 2**k // 2**LEVEL_COUNT for k in range(2 * LEVEL_COUNT)):
@@ -147,7 +152,7 @@ def chart_settings(
     """Settings of a study: for each scheme and method its resolutions, from coarse to fine.
 
     The default scheme and method are always included.
-    coarse_run : results of a coarse run of a case with cells, None for other cases; other arguments as for `chart`
+    coarse_run : results of a coarse run, None for a case without pipes and basins; other arguments as for `chart`
     Raises FvsolveError for options that the case does not support.
     """
     if not main_part_name(case) and delay_lines(case):
@@ -205,7 +210,8 @@ def scheme_method_pairs(
 ) -> list[tuple[str, str]]:
     """Pairs (scheme, method) of a study: all combinations of the given names, and the default pair.
 
-    If no schemes are given, all default schemes are combined. If no methods are given, the pairs are a selection.
+    If no schemes are given, all default schemes that the case supports are combined. If no methods are given, the pairs
+    are a selection.
     stiff : True if a time scale other than waves limits explicit steps
     """
     names = list(schemes or [name for name in DEFAULT_SCHEMES if name in case.schemes])

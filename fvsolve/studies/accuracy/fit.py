@@ -4,7 +4,8 @@ A row is a size (of cells, steps or a tolerance) with the error of the run. The 
 reduce, such as rounding or the error of the reference. The window is a group of successive rows. The fit is the
 least-squares slope of log error over log size in the window. The window ends at the last row above the floor. It begins
 where the orders between rows come near the slope. Rows before the window are pre-asymptotic, rows after it are at the
-floor. If other rows remain, there is no order, and no number is given.
+floor. At most a single other row may remain: one whose error lies far below the line, or a last row that leaves it. It
+is marked "off the line". Otherwise no order is found.
 """
 
 from __future__ import annotations
@@ -67,7 +68,8 @@ def fit(sizes, errors, floor: float = 0.0) -> Fit:
 
     sizes : float64[n]  decreasing sizes of cells or steps; errors : float64[n]  not negative, NaN if a run failed
     floor : error that is not reduced by refinement; errors below ten times the floor are not used
-    Raises FvsolveError for sizes that do not decrease, for negative errors, and for a negative floor.
+    Raises FvsolveError for sizes that are not positive or do not decrease, for negative errors or another number of
+    errors than sizes, and for a negative floor.
     """
     h, e = np.asarray(sizes, dtype=float), np.asarray(errors, dtype=float)
     if floor < 0.0:

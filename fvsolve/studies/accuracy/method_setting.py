@@ -47,7 +47,7 @@ class MethodSetting:
 
 
 def main_part_name(case: Case) -> str | None:
-    """Name of the main part, whose number of cells is the resolution; None if the case has no cells.
+    """Name of the main part, whose number of cells is the resolution; None if the case has no cells that can change.
 
     The main part is the basin with most cells along a side, else the pipe with the longest travel time of a wave.
     """

@@ -42,9 +42,11 @@ class ModelLevel:
     name : name of the level, such as "rigid column"; law : density law; states : number of states
     errors : probe -> root mean square over time of the difference to the level `richest`, over the range of the probe
     [-]
-    error : greatest of these errors; None if the level was skipped or failed, with the `reason`
+    error : greatest of these errors; None if the level was skipped or failed, or has none of the probes, with the
+    `reason`
     greatest : greatest difference of any probe at any time, over its range [-]
-    seconds : time of the steps, the best of three runs [s]; rhs : number of evaluations of the rates
+    seconds : wall time of the steps [s], the best of three runs, or of a single run that takes long
+    rhs : number of evaluations of the rates
     """
 
     name: str
@@ -90,10 +92,11 @@ class Hierarchy:
     richest : level that is the reference of all others, with the most cells and the most complete density law that
     runs; its cells are refined until its own error is within `target`
     travel_time : greatest travel time of a wave along a pipe [s]
-    change_time : range of the fastest schedule over its steepest slope [s]
+    change_time : time of the fastest change of a schedule or a tripped pump [s], as from the function `change_time`
     strain : greatest change of pressure from the start, over the least effective bulk modulus of a pipe, or over the
     bulk modulus of the fluid without pipes [-]
-    law_difference : difference of the linear law from the law of `richest` for equal cells, None if linear was not run
+    law_difference : difference of the linear law from the law of `richest` for equal cells; None if `richest` has the
+    linear law, or if the linear run failed or was not made
     own_error : approximate error of `richest` from its cells [-]; None without cells or without a finer run
     shallow_water : notes on shallow-water theory for tanks on bodies; case : the case, for units of texts
     """
@@ -112,7 +115,7 @@ class Hierarchy:
 
     @property
     def own_error_note(self) -> str:
-        """Note on the error of the level `richest` itself because of its cells; empty if the case has no cells."""
+        """Note on the error of the level `richest` itself because of its cells; empty for "as it is"."""
         if self.richest.name == "as it is":
             return ""
         if self.own_error is None:
@@ -196,7 +199,8 @@ def ladder(
 
     A level that does not suit the case is skipped, with a reason. The reference of all errors is the level with most
     cells, at least those of the case, and with the most complete density law that runs. Errors are those of the probes
-    that a level has. Raises FvsolveError if the case itself does not run, or if all its probes are constant.
+    that a level has. Raises FvsolveError if the case itself does not run, if all its probes are constant, or if it has
+    basins with cells that are not tanks on bodies.
     """
     from fvsolve.case import load
 
@@ -274,7 +278,10 @@ def refine_richest(
 
 
 def possible_laws(case) -> list[str]:
-    """Names of the density laws that are possible for a case; only the law of the case if it contains no fluid."""
+    """Names of the density laws that are possible for a case; only the law of the case if it contains no fluid.
+
+    Laws with keys of their own are possible only if the case states them.
+    """
     from fvsolve.case import load
 
     if not case.places:

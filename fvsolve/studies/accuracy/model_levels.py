@@ -52,8 +52,8 @@ def sloshing_basins(case) -> dict[str, Any]:
 def finer_levels(case, doublings: int) -> list[str]:
     """Names of model levels finer than the case itself, each with twice the cells of the level before.
 
-    doublings : number of levels. The list is empty if the case has no pipes, or if a tank on a body does not state its
-    cells.
+    doublings : number of levels. The list is empty if the case has neither pipes nor tanks on bodies, or if a tank on a
+    body does not state its cells.
     """
     refinable = any(link.kind == "pipe" for link in case.links.values())
     if basins := sloshing_basins(case):
@@ -92,7 +92,8 @@ def level_keys(case, level: str) -> dict[str, Any]:
 def sloshing_keys(case, level: str) -> dict[str, Any]:
     """Overrides that turn a case with tanks on bodies into the model level with this name.
 
-    All tanks have frozen water, sloshing modes or cells. The cells are those of the case, or a multiple of them.
+    All tanks have frozen water, sloshing modes or cells. The cells are those of the case, or a multiple of them along
+    sides with more than `MIN_REFINED_CELLS` cells.
     """
     basins, keys = sloshing_basins(case), {"expect": {}, "compare": {}, "routes": {}, "limits": {}}
     if level in ("frozen", "modes"):
@@ -157,9 +158,10 @@ def orifice_of(case, model, name: str) -> dict[str, Any]:
 def junction_chambers(case, pipes: dict) -> dict[str, Any]:
     """Overrides that turn junctions into chambers, each with half the volume of every adjacent pipe.
 
-    Volumes are multiplied by beta / (rho a^2), so that the chambers, in which the bulk modulus of the fluid is beta,
-    are as elastic as fluid and pipe wall together (density rho, wave speed a). Raises NotApplicable if a node cannot be
-    a chamber.
+    Reservoirs, tanks and accumulators are kept. The volume of a chamber of the case is increased. Volumes of pipes are
+    multiplied by beta / (rho a^2), so that the chambers, in which the bulk modulus of the fluid is beta, are as elastic
+    as fluid and pipe wall together (density rho, wave speed a). Raises NotApplicable if a node cannot be
+    a chamber, or if no node becomes one.
     """
     volume_of: dict[str, float] = {}
     fluid = case.properties

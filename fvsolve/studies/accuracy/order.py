@@ -48,10 +48,11 @@ def order(
     schemes, methods : name or list of names that replace the scheme and method of the case
     against : reference, "auto", "exact", "finer" (two levels finer, by another scheme and method) or "richardson" (each
     row against the next). "auto" is "exact" if the case names an exact solution, otherwise "richardson" with basins and
-    "finer" without.
+    "finer" without; if a finer run fails or is too inaccurate, it is "richardson".
     initial : initial(pipe, x) -> pressure [Pa], flow [m3/s] at the start, x float64[k] [m]
-    source : source(pipe, x, t) -> mass [kg/s/m] and momentum [kg/s2] fed per length; both are averaged over cells
+    source : source(pipe, x, t) -> mass [kg/s/m] and momentum [kg/s2] fed per length and time
     exact : exact(pipe, x, t) -> pressure [Pa], flow [m3/s]; the reference, and the start if `initial` is left out
+    Fields of these functions are averaged over cells.
     out : folder in which finished rows are stored and found again; progress : progress(done, total, next)
     jobs, dask : processes that make the runs, as in `sweep`; functions of x and t need this process alone
     Raises CaseError, FvsolveError.

@@ -72,10 +72,10 @@ class OrderStudy:
         return breaks
 
     def study(self, points: ResultCache | None, progress: Progress) -> Order:
-        """Run and fit all rows, coarsest first; results in the cache `points` are reused.
+        """Run and fit all rows, coarsest first; rows against a reference are stored in the cache `points` and reused.
 
         With against = "auto", each row is compared with the next if a finer run fails, or is not more accurate than the
-        rows.
+        rows. Raises FvsolveError if no row runs, or if a reference that `against` or [exact] states cannot be used.
         """
         if self.against == "richardson":
             return self.richardson(progress)
@@ -152,7 +152,10 @@ class OrderStudy:
         return self.queue(self.case, self.request(level))
 
     def sizes(self) -> dict[str, float]:
-        """Greatest absolute value of each variable in the coarsest row that runs [SI], the scale of rounding errors."""
+        """Greatest absolute value of each variable in the coarsest row that runs [SI], the scale of rounding errors.
+
+        Raises FvsolveError if no row runs.
+        """
         for level in self.plan.levels:
             run = self.run(level)
             if run.ok:
@@ -166,7 +169,7 @@ class OrderStudy:
         return row_of_run(level, run, errors)
 
     def fitted_order(self, rows, kind: str, words: str, own: dict, sizes: dict) -> Order:
-        """Fit an order for every variable and norm, and add notes.
+        """Fit an order for every variable and norm, and add notes. Raises FvsolveError as `refuse_reference`.
 
         rows : each an `OrderRow`; kind, words : kind and description of the reference
         own : variable -> norm -> error of the reference [SI]; sizes : variable -> greatest absolute value [SI]

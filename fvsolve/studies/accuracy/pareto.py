@@ -14,10 +14,10 @@ from dataclasses import dataclass
 class Crossing:
     """Crossing of a curve of errors and costs with a target error.
 
-    cost : cost at the target, interpolated in logarithms between two points; the cost of the coarsest point if its
-    error is within the target
-    coarser, finer : indices of the two points around the target, equal if the crossing is at a point
-    share : position of the crossing between the points in logarithms, 0 at the coarser and 1 at the finer point
+    cost : cost at the target, interpolated in logarithms between two points, or that of the point of the crossing
+    coarser, finer : indices of the two points around the target. Both are the index of a single point if all errors are
+    within the target, or if the coarser error is infinite or the finer error is 0.
+    share : position of the crossing between the points in logarithms, 0 at the coarser, 1 at the finer or single point
     """
 
     cost: float

@@ -81,7 +81,7 @@ def resolutions(case) -> dict[str, str]:
 
 
 def pipes_by_cell_time(case) -> list[str]:
-    """Names of pipes that do not state their cells."""
+    """Names of pipes with cells whose number the case does not state."""
     return [name for name in pipes_with_cells(case) if "cells" not in raw_link(case.raw, name)]
 
 
@@ -90,14 +90,16 @@ def refinement_plan(
 ) -> Plan:
     """Plan of a refinement of a case; a row is the run of a level, coarsest first.
 
-    refine : "both", "space" or "time"; default "both" with cells or delay lines, "time" for other cases
+    refine : "both", "space" or "time"; default that of `key`, else "both" with cells or delay lines, "time" without
 
     "both" : sizes of cells, stretches of delay lines, and steps are halved from row to row
     "space" : sizes of cells and stretches are halved; all rows have one step, which suits the finest row
-    "time" : steps are halved, or rtol is divided by ten if the case states it
+    "time" : steps are halved, or rtol is divided by ten if the case or `key` states it
+    With "both" and "space", steps follow the tolerance in all rows if the case states rtol.
 
     key : key of the only resolution that is refined, such as "links.main.cells" (default all); levels : number of rows
-    cells : cells of the coarsest row, along the pipe or side with most cells; other numbers change in proportion
+    cells : cells of the coarsest row, of the part with the key `key`, else along the pipe or side with most cells, in
+    proportion to which other numbers change
     Raises FvsolveError for an unknown or impossible refinement, key, or number of levels or cells.
     """
     known = resolutions(case)
@@ -137,7 +139,7 @@ def delay_line_plan(case, way: str, levels: int) -> Plan:
 
     With way = "both" steps are halved too, and the size of a row is its step (with error control its longest step) [s].
     With "space" it is the travel time of a stretch [s], in the line with most stretches in the last row.
-    levels : number of rows
+    levels : number of rows. Raises FvsolveError if with "space" the stretches do not change.
     """
     count, step = total_cells(case, cell_counts(case)), first_step(case) if case.numerics.rtol is None else math.nan
     rows = [stretch_keys(case, way, k) for k in range(levels)]
@@ -184,6 +186,7 @@ def space_plan(case, way: str, key: str | None, levels: int, cells: int | None) 
     """Plan in which the cells of all pipes and basins, or of the part that `key` names, are doubled from row to row.
 
     way : "both" (space and time) or "space"; other arguments as for `refinement_plan`
+    Raises FvsolveError for more than `MAX_CELLS` cells in the finest row.
     """
     first = coarsest_counts(case, key, cells)
     refined = [name for name in first if key in (None, name)]
@@ -228,8 +231,8 @@ def space_courant(case, levels: int) -> float | None:
     """Courant number of the finest row, with a time error of about a hundredth of the space error there.
 
     With Courant number C, cell size dx and orders p in space and q in time, the time error is C^q dx^q and the space
-    error dx^p. If p > q, their ratio grows by 2^(p - q) from row to row. The result is at most the Courant number of
-    the case, None if the case states none. levels : number of rows
+    error dx^p. If p > q, their ratio grows by 2^(p - q) from row to row. The result is at least `LEAST_COURANT`, but at
+    most the Courant number of the case, and None if the case states none. levels : number of rows
     """
     numerics = case.numerics
     if numerics.courant is None:
@@ -277,7 +280,7 @@ def stepping_words(case, way: str, courant: float | None) -> str:
 def time_plan(case, key: str | None, levels: int) -> Plan:
     """Plan in which the step is halved from row to row, or the tolerance divided by ten, with constant cells.
 
-    key, levels : as for `refinement_plan`
+    key, levels : as for `refinement_plan`. Raises FvsolveError if the method does not permit it.
     """
     numerics, count = case.numerics, total_cells(case, cell_counts(case))
     by_error = key == "numerics.rtol" or (key is None and numerics.rtol is not None)
@@ -300,8 +303,9 @@ def time_plan(case, key: str | None, levels: int) -> Plan:
 def first_step(case) -> float:
     """Longest time step of a refinement in time [s].
 
-    It is the step that the case states, otherwise the step for its Courant number, shortened to a whole fraction of the
-    output interval. If the case states no step and has no pipes or basins, it is the output interval.
+    It is the step that the case states, otherwise the step for its Courant number (0.9 if none is stated). A step below
+    the output interval is shortened to a whole fraction of this interval. If the case states no step and has neither
+    pipes nor basins, the result is the output interval.
     """
     numerics, every = case.numerics, case.output.every
     if numerics.step is not None:

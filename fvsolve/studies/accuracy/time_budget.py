@@ -23,7 +23,7 @@ def affordable_plan(
     case, refine: str | None, key: str | None, levels: int | None, cells: int | None, against: str,
     points: ResultCache | None,
 ) -> Plan:  # fmt: skip
-    """Plan of a refinement; if neither `cells` nor `key` is given, the study takes a minute or two.
+    """Plan of a refinement; if neither `cells` nor `key` is given, the study is planned to end within minutes.
 
     For this the number of cells of the first row is reduced if necessary, unless only steps are refined.
     refine, key, levels, cells : as in `refinement_plan`; against : kind of the reference as in `order`
@@ -55,7 +55,7 @@ def affordable_plan(
 def first_cells(case, rows: Plan, refine: str | None, levels: int | None, against: str) -> int:
     """Number of cells of the first row: that of the case, halved until the study takes at most `CPU_BUDGET`.
 
-    It is not halved if patches or holes of a basin would then not end between cells.
+    It is not halved below `LEAST_CELLS`, nor if patches or holes of a basin would then not end between cells.
     rows : plan with the cells of the case; other arguments as in `affordable_plan`
     """
     own_counts, exact = cell_counts(case), case.exact is not None or against != "auto" or bool(basins(case))

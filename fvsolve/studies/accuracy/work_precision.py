@@ -123,7 +123,10 @@ def interpolated_setting(case: Case, coarse: MethodSetting, fine: MethodSetting,
 
 
 def coarser_setting(case: Case, setting: MethodSetting) -> MethodSetting | None:
-    """Next coarser setting of a curve: half the cells, ten times the tolerance, or twice the step; None at the end."""
+    """Next coarser setting of a curve: half the cells, ten times the tolerance, or twice the step.
+
+    None for a single cell, for tolerances above `GREATEST_RTOL`, and for steps above the duration of the run.
+    """
     if setting.cells is not None:
         return cells_setting(case, setting.scheme, setting.method, setting.cells // 2) if setting.cells > 1 else None
     size = float(f"{setting.size * (10.0 if setting.control == 'rtol' else 2.0):.6g}")

@@ -23,13 +23,14 @@ IMPLIED_KINDS = ("valve", "pump", "damper", "pipe", "chamber", "tank")  # kinds 
 class Port:
     """Passivity at a port: the network may not return more energy than it had at the start and received elsewhere.
 
-    Condition (2) of docs/course.md: E0 + W + O >= 0 at any time. E0 is the available energy at the start, W the
-    integral over time of p q at the port (gauge pressure p, flow q into the network), and O the energy supplied by
-    other ports. Heights are measured from the port.
+    Condition (2) of docs/course.md: E0 + W + O >= 0 at the end of every step. E0 is the available energy at the start,
+    W the energy supplied at the port, and O the energy supplied by other ports. Heights are measured from the port.
+    W is the integral over time of p q under the density law `linear`, with the gauge pressure p and the flow q into the
+    network. Under other density laws it is that of M (h - h_ambient), with the mass flow M and the enthalpy h.
     node : name of the port; at_start : E0 [J]
     work : least value of W [J], reached at `time` [s]
     margin : least value of E0 + W + O [J], reached at `t_margin` [s]; others : O at that time [J]
-    passive : True if the condition holds
+    passive : True if the condition holds up to rounding
     course, bound : float64[k]  W and -(E0 + O) [J] at the times `Energy.t`
     text : verdict as a sentence, in the units of `[output]`
     """
@@ -53,10 +54,10 @@ class Port:
 
 @dataclass(frozen=True)
 class Energy:
-    """Energy balance of a run: energies since the start of the run [J], at the ends of k steps.
+    """Energy balance of a run: energies since the start of the run [J], at k times.
 
     reason : reason for the end of the run; ok : True if the run reached its end time
-    t : float64[k]  times at the ends of these steps [s]
+    t : float64[k]  start of the run, then ends of steps, at least a thousandth of the run apart except the last [s]
     supplied, stored, dissipated : {"PART" or "PART KIND": float64[k]}; stored energy is the change since the start
     scheme : {"PART": float64[k]}  energy removed by the discretisation of a pipe or basin in space, or by a delay line
     law : {"PART": float64[k]}  energy removed by a law of a part that conserves energy only approximately
@@ -113,7 +114,7 @@ class Energy:
 
     @property
     def verdict(self) -> str:
-        """Effect of the numerical method on the energy, as text: dissipates, creates, or rounding only.
+        """Effect of the numerical method on the energy at the end of the run: dissipates, creates, or rounding only.
 
         Newton residuals do not count, because they are not a property of scheme and method.
         """
@@ -124,7 +125,7 @@ class Energy:
     def numerical(self) -> dict[str, np.ndarray]:
         """Remainder by cause, as float64[k] [J]: "scheme", "law", "step", "newton", and their sum "remainder".
 
-        Causes that are always zero are left out.
+        Causes that are always zero are left out, as is "newton" if it never exceeds rounding errors.
         """
         zeros = np.zeros(len(self.t))
         causes = {"scheme": sum(self.scheme.values(), zeros), "law": sum(self.law.values(), zeros), "step": self.step,
@@ -154,7 +155,8 @@ def energy(case, set=None, port: str | None = None, progress=None) -> Energy:
 
     port : a reservoir, inflow or junction, at which condition (2) of passivity is checked (see `Port`)
     set : key -> value, ignored for a Model; progress : called as progress(t, seconds, steps)
-    Raises CaseError for an invalid case, FvsolveError for an unknown port.
+    A run that fails or is interrupted gives the balance up to its end. Raises CaseError for an invalid case, and
+    FvsolveError for an unknown port and for a case whose energy is not computed (see `Accounts`).
     """
     model = study_model(case, set) if not hasattr(case, "tables") else case
     check_port(model.case, port)
@@ -213,7 +215,7 @@ def lines_by_name(accounts: list[Account], kind: str, columns: np.ndarray) -> di
 
 
 def check_port(case, port: str | None) -> None:
-    """Raise FvsolveError if `port` is not a node of the case at which fluid enters or leaves; None is accepted."""
+    """Raise FvsolveError if `port` is not a reservoir, inflow or junction of the case; None is accepted."""
     ports = [name for name, node in case.places.items() if node.driven is not None]
     if port is not None and port not in ports:
         hint = did_you_mean(port, ports) or f". Ports are {', '.join(ports)}"
@@ -255,7 +257,7 @@ def port_text(port: Port, case) -> str:
 
 
 def write_table(result: Energy, path: Path) -> None:
-    """Write an energy balance to the file `path` as CSV: time [s], accounts and remainders [J], at ends of steps."""
+    """Write an energy balance to the file `path` as CSV: accounts, remainders and W at the port [J] at times [s]."""
     columns = {"t [s]": result.t}
     for kind in ("supplied", "stored", "dissipated", "scheme", "law"):
         columns |= {f"{kind} {name} [J]": values for name, values in getattr(result, kind).items()}

@@ -38,10 +38,12 @@ def measure_pairs(
     `Energy`; least : least value over time of the remainder without Newton residuals [J]
     creates : True if `least` is below zero by more than rounding, or if the run failed; None if it was refused
     margin : least margin of the passivity at the port [J], see `Port`; None without a port
+    All entries except `reason` are None if the pair was refused.
 
     schemes, methods : names (default those of the case); progress : called as progress(done, total, next)
     points : `ResultCache` of earlier rows; watch : called as watch(t, seconds, steps) during every run
-    A pair that is refused or diverges gives a row with its reason. Raises FvsolveError for unknown names.
+    A pair that is refused or diverges gives a row with its reason. Raises FvsolveError for unknown names and for a case
+    whose energy is not computed (see `Accounts`), and KeyboardInterrupt if a run is interrupted.
     """
     check_port(case, port)
     points = points or ResultCache()

@@ -3,8 +3,8 @@
 A Runge-Kutta method has coefficients A, weights b (B = diag b) and stage slopes k_i; h is the step. A ledger adds the
 powers at the stages with the weights b. For the energy |y|^2 of the states y, it exceeds the energy after a step by h^2
 times the sum of m_ij <k_i, k_j>, with M = B A + A^T B - b b^T (Burrage and Butcher 1979). If M and b are non-negative,
-no passive network supplies more energy than it had, for any step. If M has a negative eigenvalue, some flow into a
-chamber creates energy.
+no passive network supplies more energy than it had, for any step. If M has a negative eigenvalue after stages at equal
+times are joined, some flow into a chamber creates energy.
 
 Without external flow, the solution of dy/dt = J y is multiplied by R(h J) in a step, with the stability function R. The
 energy must not grow: |R(-x)| <= 1 for a leaking chamber, |R(i y)| <= 1 for a column that oscillates in a tank, and norm
@@ -38,7 +38,7 @@ class MethodClaim:
     any_network : True if the method is passive for any network and any step
     leak : greatest h / tau up to which the energy of a leaking chamber does not grow; tau is its time constant
     resonator : greatest h omega up to which the energy of an undamped resonator of angular frequency omega does not
-    grow
+    grow. Both are inf without a limit, 0 if the energy grows at any step.
     chamber : least eigenvalue of the matrix M of `stage_matrix`, with stages at equal times joined (`stages_by_time`).
     If it is negative, some flow into a chamber creates energy in a step, in proportion to its magnitude, h^2 and the
     squared flows.
@@ -57,7 +57,7 @@ class SchemeClaim:
     """Effect of a scheme on the energy of a pipe closed at both ends, with exact integration in time.
 
     rate : greatest relative growth rate of the energy, per travel time of a wave through a cell [-]
-    gain : greatest ratio of the energy at any time to the energy at the start [-]
+    gain : greatest ratio of the energy at any sampled time to the energy at the start [-]
     passive : True if the energy never grows. All are None for a scheme with a limiter, which is not linear.
     """
 
@@ -244,8 +244,9 @@ def greatest_gain(b: np.ndarray) -> float:
 def courant_limit(scheme: str, method: str) -> float | None:
     """Courant number up to which no state of the closed pipe gains energy in a step; inf, 0 and None as for `Pair`.
 
-    If the scheme creates no energy, the limit of an A-stable method is inf. For other methods 120 Courant numbers from
-    LEAST (0.01) to MOST (8) are tested: the limit is inf if none of them creates energy, and 0 if the least one does.
+    If the scheme creates energy, the limit is 0; otherwise the limit of an A-stable method is inf. For other methods
+    120 Courant numbers from LEAST (0.01) to MOST (8) are tested: the limit is inf if none of them creates energy, and 0
+    if the least one does.
     """
     from fvsolve.steppers import analyse
 

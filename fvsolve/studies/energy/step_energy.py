@@ -59,11 +59,14 @@ class EnergyLoop(RunLoop):
         return code
 
     def power(self, t: float, y: np.ndarray) -> np.ndarray:
-        """Power [W] of every energy account at the state (t, y) : float64[accounts]."""
+        """Power [W] of every energy account at (t, y) : float64[accounts]; also writes `dydt` and `out_work`."""
         return self.accounts.power_at(t, y, self.dydt, self.out_work)
 
     def tableau(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(coefficients : float64[s, s], weights : float64[s], times : float64[s]) of the s stages of a step."""
+        """(coefficients : float64[s, s], weights : float64[s], times : float64[s]) of the s stages of a step.
+
+        Times are fractions of the step. The first stage is the start of the step, for implicit methods too.
+        """
         s = self.stepper.k.shape[0]
         a, (b, c) = (part.reshape(-1, s) for part in np.split(self.stepper.coefficients[: s * s + 2 * s], [s * s]))
         return a, b, c
@@ -71,7 +74,8 @@ class EnergyLoop(RunLoop):
     def step_energy(self, t: float, y: np.ndarray, first: np.ndarray, supply: np.ndarray) -> np.ndarray:
         """Energy [J] that the step from (t, y) adds to every account; the last entry is that of the Newton residual.
 
-        first, supply : slope dy/dt and supplied powers [W] of the first stage, at (t, y)
+        first, supply : slope dy/dt and ledger rates, such as the supply of a node [kg/s], of the first stage at (t, y)
+        The next step is limited by `limit_next`, except under Rosenbrock methods.
         """
         stepper, h = self.stepper, float(self.loop_state[loop_indices.LAST])
         (a, b, c), total = self.tableau(), np.zeros_like(self.total)
@@ -100,6 +104,7 @@ class EnergyLoop(RunLoop):
         """Limit the next step so that the quadrature error of the dissipated energy stays small.
 
         h : this step [s]; off : quadrature error in this step [J]; lost : dissipated energy so far [J]
+        The error is to stay below a thousandth of `lost`; the step grows by a factor of 8 at most.
         The error control of states does not cover this error: for states that are parabolas in time, a method of order
         two is exact, but the integral of the power is not.
         """
@@ -135,7 +140,7 @@ class EnergyLoop(RunLoop):
     def stage(self, t: float, y: np.ndarray, slope: np.ndarray, supply: np.ndarray) -> np.ndarray:
         """Power [W] of every energy account at a stage; the last entry is that of the Newton residual.
 
-        t, y, slope, supply : time, state, slope dy/dt and supplied powers [W] of the stage
+        t, y, slope, supply : time, state, slope dy/dt and ledger rates of the stage, such as supplies of nodes [kg/s]
         Newton iterations of an implicit method end at a slope near to the rates f(t, y). Supplied and stored powers use
         `slope` and `supply` of the stage, other accounts use f. The difference between supplied power and rate of
         storage that this causes is the power of the Newton residual.
@@ -169,7 +174,7 @@ class EnergyLoop(RunLoop):
 
         The energies z of the accounts, with dz/dt = P(t, y) and P the powers, are integrated like further states:
         w_i = gamma (P(t + c_i h, U_i) + P_y h k_i + d_i h P_t + sum over j < i of C_ij w_j),
-        with stage values U_i = y + h sum a_ij k_j and stage slopes k_i.
+        with stage values U_i = y + h sum a_ij k_j and stage slopes k_i; w_0 of the start of the step is zero.
         a, c : coefficients and times of `tableau`; C, d, gamma : see `rosenbrock_coefficients`
         The derivatives P_y and P_t are computed by differences.
         """
@@ -188,7 +193,7 @@ class EnergyLoop(RunLoop):
     def released_stops(self, t: float, y: np.ndarray, part: np.ndarray) -> np.ndarray:
         """Correct the energies `part` of the step from (t, y) for end stops whose contact opens within the step.
 
-        Returns `part`. The stored energy changes by the exact difference between the ends of the step; the remainder is
+        Returns `part`, which is changed. The stored energy changes by the exact difference between the ends of the step; the remainder is
         dissipated. The rate of the stored energy has a kink where the contact force ends, which stage values do not
         resolve.
         """
@@ -221,7 +226,7 @@ def stop_travels(model, t: float, y: np.ndarray) -> np.ndarray:
 
 
 def stop_compression(stop, x: float, speed: float) -> tuple[float, bool]:
-    """(compression of an end stop [m], True if the body leaves the stop faster than the stop can follow).
+    """(compression of an end stop [m], at least 0; True if the body moves away from it without a contact force).
 
     stop : row of the table of stops; x : travel of the body [m]; speed : its speed [m/s]
     """
@@ -265,7 +270,7 @@ class EnergyRun(Run):
         self.losses.append(self.impact_losses.copy())
 
     def stop_columns(self) -> None:
-        """Stop rigid columns that can no longer flow; add the kinetic energy lost to the impact losses (Carnot)."""
+        """Stop rigid columns that collide or can no longer flow; add the lost kinetic energy to the losses (Carnot)."""
         before = self.flows()
         super().stop_columns()
         columns, rho = self.model.tables.columns, self.model.case.properties.density
