@@ -44,7 +44,7 @@ def defect(matrix: Matrix) -> tuple[float, float]:
 
 
 def nearest(matrix: Matrix) -> Matrix:
-    """Rotation matrix nearest to a matrix in the Frobenius norm; the polar factor of a matrix of positive determinant."""
+    """Rotation matrix nearest to a matrix in the Frobenius norm; its polar factor if its determinant is positive."""
     u, _, v = np.linalg.svd(matrix)
     return u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
 

@@ -110,7 +110,7 @@ class RunError(FvsolveError):
 
 
 def visible(text: str) -> str:
-    """Text that is safe for terminals: invisible characters except tabs and the line end "\\n" are replaced by escapes."""
+    """Text that is safe for terminals: escapes replace invisible characters, except tabs and line ends "\\n"."""
     return INVISIBLE.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 

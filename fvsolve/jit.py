@@ -351,7 +351,7 @@ class Intrinsic:
 
 
 def is_cold() -> bool:
-    """True if compilation is enabled and the code folder contains no functions that Python calls.
+    """True if compilation is enabled and the store contains no functions of this version for this machine.
 
     Then they must be compiled first.
     """

@@ -181,7 +181,8 @@ class Limiter(NamedTuple):
     def branches(self) -> dict[str, Weights]:
         """Weights of the linear schemes that muscl equals, one for each branch of the limiter : name -> weights.
 
-        They include upwind, for a slope of zero. With van Leer's limiter, muscl approaches these schemes (`tangents`).
+        They include upwind, for a slope of zero. With van Leer's limiter muscl equals the others only at the points of
+        `tangents`.
         The branches with twice the difference to a neighbour as slope are named "twice behind" and "twice ahead".
         """
         half = [(Fraction(), Fraction()), *((a / 2, b / 2) for a, b in self.tangents)]

@@ -38,7 +38,7 @@ class Edge:
     drop: Callable[[float], float] | None = None  # potential drop [Pa] at a fixed flow
     sensed_node: int = (
         -1
-    )  # node whose potential P is the third argument of `row`; with a fourth result c, alpha dM - beta d(drop) - c dP
+    )  # node whose potential P is the third argument of `row`; its fourth result c adds -c dP to the equation
     held_potential: tuple[int, float] | None = (
         None  # (node, potential [Pa] that the flow maintains there), in place of `row`
     )
@@ -101,9 +101,10 @@ def _quiet(held, demand, edges) -> set[int]:
     """Indices of the edges in those parts of the network in which nothing drives a flow.
 
     Such a part has a given potential. All its given potentials agree to rounding, all demands are zero, no fixed flow
-    enters, and no edge drives a flow or maintains a potential. If it were solved, rounding of a head would drive a flow:
-    by M |M| = G dP it is of the order of the square root of the rounding error (mass flow M, conductance G, potential
-    drop dP). held, demand, edges : as for `solve_steady`
+    enters, and no edge drives a flow or maintains a potential.
+    If the part were solved, rounding of a head would drive a flow: by M |M| = G dP it is of the order of the square
+    root of the rounding error (mass flow M, conductance G, potential drop dP).
+    held, demand, edges : as for `solve_steady`
     """
     fed = {i for edge in edges if edge.row is None and edge.flow != 0.0 for i in (edge.i, edge.j)}
     quiet = set()

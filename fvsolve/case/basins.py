@@ -161,7 +161,7 @@ def place_kind(basin: Basin, patch: str) -> type[PatchNode]:
 
 
 def places(name: str, basin: Basin, mesh: Mesh, pose: Any = None) -> dict[str, PatchNode]:
-    """Nodes that links can join at the patches of a basin, by full name BASIN.PATCH, with the state of water at rest.
+    """Nodes at the patches of a basin, also at moving walls, by full name BASIN.PATCH, with their state at rest.
 
     pose : pose of the body that carries the basin; if None, elevation and depth are those of the upright basin
     """
@@ -178,7 +178,7 @@ def places(name: str, basin: Basin, mesh: Mesh, pose: Any = None) -> dict[str, P
 
 
 def places_on_bodies(nodes: dict[str, Any], meshes: dict[str, Mesh]) -> dict[str, PatchNode]:
-    """Nodes that links can join at the patches of basins on bodies, by full name BASIN.PATCH.
+    """Nodes at the patches of basins on bodies, by full name BASIN.PATCH.
 
     Elevation and depth are those of the upright basin, see `places`. Basins with faulty formulas are left out.
     """
@@ -201,7 +201,7 @@ def _patch_hint(basin: Basin, known: tuple[str, ...], name: str) -> str:
 def find_faults(
     nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: Any, times: tuple, all_nodes: Any
 ) -> Faults:
-    """Faults (key path, message) of basins: density law, patches, moving walls, formulas.
+    """Faults (key path, message) of basins: density law, body, patches, moving walls, formulas.
 
     meshes : meshes of basins by name; fluid : properties of the fluid, or None if it is faulty
     times : start and end of the run [s]; all_nodes : tables of all nodes, also of faulty nodes

@@ -74,9 +74,9 @@ def place_faults(name: str, node: PlaceOnBody, nodes: dict[str, Any], named: Any
 
 
 def overturned(nodes: dict[str, Any], poses: dict[str, Any]) -> Faults:
-    """Faults of tanks and basins that are tilted by 90 degrees or more, so that the water runs out.
+    """Faults of tanks and free-surface basins that are tilted by 90 degrees or more, so that the water runs out.
 
-    Tanks and basins on bodies that can move, or whose carriers can move, are not checked.
+    Frozen water is not checked, nor tanks and basins on bodies that can move, or whose carriers can move.
     poses : name of a body -> `Pose`
     """
     for name, node in nodes.items():
@@ -124,7 +124,7 @@ def nodes_with_water(
 ) -> dict[str, Any]:
     """Copy of `nodes` with the water of basins without cells as masses.
 
-    Bodies have the mass, centre of mass and inertia of the water that they carry; sloshing modes are additional bodies.
+    The water is added to the mass, centre of mass and inertia of its body; sloshing modes are additional bodies.
     lumped : basin -> mesh, of the basins without cells; density of the water [kg/m3]; gravity [m/s2]
     t : start time [s]
     """

@@ -69,9 +69,9 @@ class BodyQuantities:
 
 
 def bodies_of(nodes: dict[str, Any]) -> dict[str, Body]:
-    """Bodies by name, each after the body that carries it, otherwise in the order of the file.
+    """Bodies by name, sorted by the number of bodies that carry them, then in the order of the file.
 
-    Bodies in a loop, and bodies on a missing node or point, are left out.
+    Bodies in a loop, bodies on a missing node or point, and bodies that these carry are left out.
     """
     waiting, result = {name: node for name, node in nodes.items() if isinstance(node, Body)}, {}
     frames = [name for name, node in nodes.items() if node.kind == "frame"]
@@ -110,7 +110,7 @@ def joint_position(nodes: dict[str, Any], body: Body) -> np.ndarray:
 
 
 def poses(nodes: dict[str, Any], t: float) -> dict[str, Pose]:
-    """Poses of all bodies by name at the start time t [s]."""
+    """Poses of the bodies in `bodies_of`, by name and in their order, at the start time t [s]."""
     result: dict[str, Pose] = {}
     for name, body in bodies_of(nodes).items():
         up = result.get(carrier_of(body)[0], AT_REST)
@@ -159,7 +159,7 @@ def joint_rate(joint: Any, t: float) -> float:
 def body_point(nodes: dict[str, Any], place: str) -> tuple[str, np.ndarray] | None:
     """Name of the body, and position in its axes [m], of a place that a link joins : (name, float64[3]).
 
-    place : BODY.POINT, FRAME.POINT, or the name of a body (its origin) or of another node in space
+    place : BODY.POINT, FRAME.POINT, or the name of a body (its origin)
     The name is `WORLD` for a point of a frame. The result is None for any other place.
     """
     name, _, point = place.partition(".")

@@ -33,7 +33,7 @@ class Case(Displayable):
 
     properties : properties of the fluid at its reference state
     nodes, links : name -> part, in the order of the file
-    copies : name of a file in the text of `resolved()` -> path of this schedule or measurement file
+    copies : name of a file in the text of `resolved()` -> path of this file, such as a schedule or a mesh
     """
 
     name: str
@@ -81,7 +81,7 @@ class Case(Displayable):
 
     @property
     def files(self) -> list[Path]:
-        """Paths of the schedule and measurement files that the case used."""
+        """Paths of the files that the case used, such as schedules, measurements, meshes and tableaus."""
         return list(self.copies.values())
 
     @property
@@ -113,7 +113,7 @@ class Case(Displayable):
 
     @cached_property
     def places(self) -> dict[str, Node]:
-        """Hydraulic nodes, patches of basins and chambers of cylinders, by full name, with their state at the start."""
+        """Hydraulic nodes, also inside parts, patches of basins, chambers of cylinders, by full name, at the start."""
         result = {}
         for name, node in self.nodes.items():
             if name in self.meshes:
@@ -180,14 +180,15 @@ class Case(Displayable):
 
     @cached_property
     def elevations_stated(self) -> bool:
-        """True if the file states an elevation for at least one hydraulic node or chamber."""
+        """True if a hydraulic node, patch or chamber has an elevation, stated or from its body or a profile."""
         return any(place.elevation is not None for place in self.places.values())
 
     def elevation(self, name: str) -> float:
         """Elevation of a hydraulic node, patch or chamber above datum [m]; 0 if the case states no elevations.
 
-        A reservoir given by head may lack an elevation although other nodes have one. It then lies level with the
-        first node that a link joins to it, since only its head drives the flow.
+        A reservoir given by head may lack an elevation although other nodes have one. It then has that of the first
+        node with an elevation that a link joins to it, since only its head drives the flow. Raises FvsolveError for an
+        unknown name.
         """
         if (neighbour := getattr(self._known(name, self.places, "place of the fluid"), "level_of", None)) is not None:
             return self.elevation(neighbour)
@@ -207,7 +208,10 @@ class Case(Displayable):
         return {name: self.elevation(name) for name in self.places}
 
     def unit_of(self, dimension: str) -> str:
-        """Unit of a dimension in `[output]`, such as "bar" for "pressure"; the SI unit if `[output]` states none."""
+        """Unit of a dimension in `[output]`, such as "bar" for "pressure"; the SI unit if `[output]` states none.
+
+        A dimension that uses the units of another dimension (`base`) has the unit of that dimension if it has none.
+        """
         known, stated = units.DIMENSIONS[dimension], self.output.units
         return stated.get(dimension) or stated.get(known.base) or known.si
 
@@ -232,7 +236,7 @@ class Case(Displayable):
         """Wave speed of a pipe [m/s]: as stated, or sqrt(K / rho).
 
         1/K = 1/beta + c D / (E e), with bulk modulus beta and density rho of the fluid, diameter D, restraint factor
-        c, wall thickness e and modulus E.
+        c, wall thickness e and modulus E; a lining adds to E e. Raises FvsolveError if `name` is not that of a pipe.
         """
         link = self.links.get(name) if isinstance(name, str) else None
         if link is None or link.kind != "pipe":

@@ -33,7 +33,7 @@ PIECE_KEYS = (
     "to",
     "pieces",
     "bends",
-)  # keys of each piece
+)  # keys of a pipe that its pieces do not take over
 Report = Callable[[tuple, str], None]
 
 
@@ -207,9 +207,9 @@ def cut(
 ) -> CutTable:
     """Cut the pipes of a case at the parts placed on them.
 
-    table : nested dicts of the case as in the file
+    table : nested dicts of the case, with junctions at bends (`add_bends`) and defaults (`fill_pipes`)
     read_pipes : pipes without faults, as read; cells : number of cells of each of these pipes
-    faulty : (group, name) of parts with faulty keys `on` or `at`
+    faulty : (group, name) of parts with a fault from `faults`
     report : function that takes the key path and the message of a fault
     """
     result = CutTable({**table, "nodes": dict(table["nodes"]), "links": {}, "routes": dict(table.get("routes", {}))},
@@ -249,7 +249,7 @@ def cut(
 
 
 def add_unknown_pieces(result: CutTable, name: str, given: dict[str, Any], parts: list[Placed], report: Report) -> None:
-    """Add the pieces of a pipe with a faulty part to the table of `result`, with their connections as the only keys.
+    """Add the pieces of a pipe that cannot be cut to the table of `result`, with their connections as the only keys.
 
     name, given : name of the pipe and its keys in the file; parts : parts on it; report : as for `cut`
     """

@@ -25,7 +25,7 @@ Faults = Iterator[tuple[tuple, str]]
 def network(table: dict[str, Any]) -> Faults:
     """Faults (key path, message) of connections of a case: unknown names, unconnected nodes, wrong domains.
 
-    Separate networks are faults too, and networks in which no part sets a pressure.
+    Separate networks are faults too, networks in which no part sets a pressure, and junctions of rigid columns alone.
     table : nested dicts of the case as in the file
     """
     nodes, links = ({n: p for n, p in _dict(table.get(group)).items()} for group in ("nodes", "links"))
@@ -100,7 +100,7 @@ def parts(
     """Faults (key path, message) of elevations, of bodies, and of each part in the context of the other parts.
 
     ambient : ambient pressure [Pa]; gravity [m/s2]; fluid : properties of the fluid, or None if it is faulty
-    raw : case before its values were read, for messages; start : start time [s]
+    raw : case before its values were read, for messages, None only without `fluid`; start : start time [s]
     meshes, lumped : basin -> mesh, of basins with cells and of basins whose water is lumped masses
     """
     poses = bodies.poses(nodes, start)
@@ -305,9 +305,10 @@ def has_unknown_places(name: str, nodes: dict[str, Any], links: dict[str, Any]) 
 
 
 def _ports(link: dict[str, Any]) -> list[tuple[tuple, Any, str | None]]:
-    """List of (key path in the link, name that the port joins, required domain) of every port of a link.
+    """List of (key path in the link, name that the port joins, required domain) of the ports of a link.
 
-    For a link of unknown type the ports are `from` and `to`, with None as domain. link : its keys as in the file
+    Ports that may be left out and are not given are omitted; the name of a missing port is None. For a link of unknown
+    type the ports are `from` and `to`, with None as domain. link : its keys as in the file
     """
     kind = _kind("links", link)
     if kind is None:

@@ -58,7 +58,7 @@ def pipe_of_piece(table: Mapping[str, Any], name: str) -> str:
 
 
 def fill_pipes(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Copy of a case, as nested dicts, with the defaults written into every link and without the table `defaults`."""
+    """Copy of a case, as nested dicts, with the defaults written into every pipe and without the table `defaults`."""
     links = {
         name: with_defaults(table, link) if isinstance(link, dict) else link for name, link in table["links"].items()
     }

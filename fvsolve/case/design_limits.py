@@ -70,7 +70,7 @@ class DesignLimit:
     """Lower and upper bound [SI] of a quantity in some parts of a case (the extent), checked after every step.
 
     minimum, maximum : a number, "vacuum" (ambient pressure) or "vapor" (vapour pressure)
-    class_fraction : greatest gauge pressure over the allowable pressure of the class of each pipe [-]
+    class_fraction : greatest allowed gauge pressure over the allowable pressure of each pipe [-]
     """
 
     name: str

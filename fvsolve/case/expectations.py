@@ -51,7 +51,8 @@ class Expect:
 class Compare:
     """Measured series for comparison with a probe.
 
-    file, path : name as in the case, and path, of a CSV file; time, value : headers of its columns
+    file : name of the copy of the CSV file beside the resolved case, see `copy_name`; path : path of the CSV file
+    time, value : headers of its columns
     shift : time that is added to the measured times [s]
     t, v : float64[n]  measured times without shift [s], and values [SI, pressures absolute]
     """

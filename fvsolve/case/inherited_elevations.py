@@ -8,7 +8,7 @@ from typing import Any
 def inherit_elevations(nodes: dict[str, Any], links: dict[str, Any]) -> dict[str, Any]:
     """Nodes with missing elevations and positions filled in from the first pipe profile that begins or ends there.
 
-    The position is that of the first or last profile point, if the profile has x and y.
+    The position is that of the first or last profile point, if the profile has x and y. Nodes on bodies are unchanged.
     """
     result: dict[str, Any] = {}
     for link in links.values():

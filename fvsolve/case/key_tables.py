@@ -87,6 +87,8 @@ def model_of(name: str) -> type[Table]:
 def rows_of(name: str, model: type[Table]) -> list[tuple[str, ...]]:
     """Rows of the table of a part, one per key. Keys that are listed in the table of another part share one row.
 
+    Keys of all nodes, of places on bodies and of all links with two ports are left out, except in their own tables.
+
     name, model : name and class of the part
     """
     rows = [row("type", Text(), NEEDED)] if name in ("every node", "every link") else []

@@ -121,7 +121,7 @@ def shortest_cell_time(links: Mapping[str, Any], meshes: Mapping[str, Any], flui
 
 
 def _alternatives() -> list[tuple[str, ...]]:
-    """Groups of alternative keys in all types of tables; a table may have at most one key of a group."""
+    """Groups of alternative keys of numerics, friction and all parts; a table may have at most one key of a group."""
     return _alternatives_of((Numerics, Friction, *KINDS["nodes"].values(), *KINDS["links"].values()))
 
 
@@ -266,7 +266,7 @@ class _Reader:
     def exact(self, case: Case) -> Case:
         """Return the case if its `[exact]` is valid. If overrides make it invalid, return the case without it.
 
-        Raises CaseError if it is invalid without overrides.
+        Raises CaseError if it is invalid without overrides, or if an override sets a key of `[exact]`.
         """
         faults = list(exact.find_faults(case))
         settings = {keys[0] for keys in self.raw.overridden}
@@ -373,7 +373,10 @@ class _Reader:
             return None
 
     def valid_keys(self, name: str, model: Any) -> Any:
-        """Instance of `model` with the valid keys of the table `name` as its only keys, without checks of the table."""
+        """Instance of `model` with the valid keys of the table `name`, without checks of the table.
+
+        Other keys have their defaults; a required key without a valid value is missing.
+        """
         values = {}
         for key, value in model.values().items():
             with suppress(KeyError, TypeError, ValueError):
@@ -381,7 +384,7 @@ class _Reader:
         return model.model_construct(**values)
 
     def valid_times(self) -> Numerics | None:
-        """Numerics with the valid keys of a faulty `[numerics]`; None if `end` or a stated `start` is not valid."""
+        """Numerics with the valid keys of a faulty `[numerics]`; None without valid `end` or with invalid `start`."""
         given = self.raw.table.get("numerics")
         valid = self.valid_keys("numerics", Numerics) if isinstance(given, dict) else None
         times = {key for key in ("start", "end") if valid is not None and key in given}
@@ -477,7 +480,7 @@ class _Reader:
         return result
 
     def uncounted(self) -> list[str]:
-        """Names of faulty parts with unknown points or patches, and of pipes with an unknown number of pieces."""
+        """Names of faulty parts with unknown points, patches or chambers, and of pipes with unknown pieces."""
         nodes, links = self.group("nodes"), self.group("links")
         pipes = [name for name, link in links.items()
                 if chainage.is_pipe(link) and not isinstance(link.get("bends", []), list)]  # fmt: skip
@@ -508,8 +511,8 @@ class _Reader:
     def network_table(self, meshes: dict[str, Any]) -> dict[str, Any]:
         """Nested dicts of the case for the check of connections, in which basins have all patches of their meshes.
 
-        A basin with a faulty mesh file has the patches that links name. A node that cannot be read
-        is replaced by a junction.
+        A basin with a faulty mesh file has the patches that links name. A node that cannot be read is replaced by a
+        junction; links that cannot be read are left out, except pipes.
         """
         nodes, links = self.group("nodes"), self.group("links")
         patches = {name: basins.patch_names(mesh) for name, mesh in meshes.items()}

@@ -20,7 +20,7 @@ LENGTH_TOLERANCE = (
 
 
 def with_elevation(node: Node, poses: dict[str, Any]) -> Node:
-    """Copy of a node on a body with its elevation at the start; any other node is returned unchanged."""
+    """Copy of a node on a body with its elevation at the start; any other node, or a basin, is returned unchanged."""
     pose = poses.get(getattr(node, "on", None))
     if pose is None or isinstance(node, Basin):
         return node
@@ -57,7 +57,7 @@ def find_faults(nodes: dict[str, Any], links: dict[str, Any], patches: dict[str,
 def missing_reactions(nodes: dict[str, Any], links: dict[str, Any], free: bool = False) -> Faults:
     """Faults of parts whose flow acts on a body by a force that is not modelled.
 
-    free : True to check only bodies that move freely
+    free : True to check only bodies that move freely; pipes at tanks on these are then faults too
     """
 
     def on_body(name: str) -> bool:

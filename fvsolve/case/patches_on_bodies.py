@@ -31,7 +31,9 @@ def on_body(basin: Any, mesh: Any, patch: str, rest: dict[str, Any], pose: Any) 
 
 
 def depth_over(basin: Any, mesh: Any, place: np.ndarray, attitude: np.ndarray) -> float:
-    """Depth of water with a horizontal surface above a point of a tilted basin, at least 0 [m].
+    """Vertical depth of water with a horizontal surface above a point of a tilted basin, at least 0 [m].
+
+    It is 0 if the basin is tilted by 90 degrees or more.
 
     place : float64[3]  point in the axes of the basin [m]; attitude : float64[3, 3]  rotation matrix of the body
     """

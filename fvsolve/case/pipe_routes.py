@@ -18,8 +18,8 @@ class PipeNames(Value):
     """Value of a key that lists the names of consecutive pipes."""
 
     about = (
-        "names of consecutive pipes; each begins where the previous pipe ends, or is joined to it by links without "
-        "length"
+        "names of consecutive pipes; each begins where the previous pipe ends, or is joined to it by links other than "
+        "pipes"
     )
     takes = "list of names"
     changes = VALUE
@@ -83,7 +83,10 @@ def pipe_leg(pipe: str, links: dict[str, Any]) -> Leg:
 
 
 def expand_pieces(route: Route, pieces: dict[str, list[str]], links: dict[str, Any]) -> Route:
-    """Copy of a route in which cut pipes are replaced by their pieces, in the direction of the route."""
+    """Copy of a route in which cut pipes are replaced by their pieces, in the direction of the route.
+
+    If no directions connect all pipes, the pieces are in the directions of their pipes.
+    """
     cut = [name for name in route.pipes if name in pieces]
     options = []
     for turned in itertools.product((1, -1), repeat=len(cut)):
@@ -138,7 +141,7 @@ def find_faults(
         if k is not None:
             pairs = [(pipe, links[pipe]) for pipe in route.pipes[k - 1 : k + 1]]
             ends = " and ".join(f"{pipe} joins {item.from_} and {item.to}" for pipe, item in pairs)
-            text = f"{route.pipes[k]} does not join the previous pipe: {ends}, and no link without length lies between"
+            text = f"{route.pipes[k]} does not join the previous pipe: {ends}, and no links other than pipes join them"
             yield ("routes", name, "pipes", index_in_file(route, pieces, k)), text
 
 
@@ -155,7 +158,8 @@ def index_in_file(route: Route, pieces: dict[str, list[str]], k: int) -> int:
 def joined_places(links: dict[str, Any], named: dict[str, Any] = {}) -> dict[str, str]:  # noqa: B006
     """Names of nodes that links other than pipes join : name of a node -> common name of its group of joined nodes.
 
-    links : links by name; named : links as in the file, also faulty links, which are assumed to join their nodes
+    Links with other ports than `from` and `to` do not count. links : links by name
+    named : links as in the file, also faulty links, which are assumed to join their nodes
     """
     root: dict[str, str] = {}
 

@@ -144,7 +144,7 @@ def fraction_of(place: str, length: float | None, begin: float) -> float:
 def default_probes(kinds: Kinds) -> list[Probe]:
     """Default probes: main quantities of all nodes (such as pressure and level) and of all links (flow, force).
 
-    kinds : as for `read_probe`
+    Scalars are included for nodes with a pressure. kinds : as for `read_probe`
     """
     probes = []
     for part, quantities in (("nodes", DEFAULT_OF_NODES), ("links", DEFAULT_OF_LINKS)):

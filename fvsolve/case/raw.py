@@ -69,7 +69,7 @@ class Raw:
 
 
 def read_raw(source: Any) -> Raw:
-    """Read a case from a TOML file or a dict, without its values (see `Raw`). Raises CaseError."""
+    """Read a case from a TOML file or a dict, without interpretation of its values. Raises CaseError."""
     if isinstance(source, Mapping):
         return Raw(_copy(source))
     if not isinstance(source, (str, Path)):
@@ -99,10 +99,12 @@ def copy_paths(table: dict[str, Any], paths: list[tuple[str, ...]]) -> dict[str,
 
 
 def override(raw: Raw, settings: Mapping[str, Any], alternatives: list[tuple[str, ...]]) -> list[Fault]:
-    """Override values of a case before it is read (`Raw`); returns the faults of overrides that cannot be applied.
+    """Override values in the table of `raw`; returns the faults of overrides that cannot be applied.
 
+    The key paths are added to `raw.overridden`.
     settings : dotted key -> value; a text is parsed as TOML where possible
     alternatives : groups of keys of which a table may have at most one; an override removes the other keys of its group
+    that are not overridden too
     """
     faults = []
     groups = {group: raw.get((group,)) for group in ("nodes", "links")}
@@ -132,7 +134,8 @@ def override(raw: Raw, settings: Mapping[str, Any], alternatives: list[tuple[str
 def locate_faults(error: CaseError, case: Any) -> CaseError:
     """Copy of an error on the case `case`, with the file name and the source of each fault added.
 
-    The source is a line number of the file, or the mark that an override set the key.
+    The source is a line number of the file, or the mark that an override set the key. The error itself is returned if
+    the file cannot be read any more; for a case without a file only the name is added.
     """
     if case.path is None:
         return CaseError(error.faults, case.name)
@@ -206,7 +209,7 @@ def _bare_name(line_text: str) -> str:
 
 
 def _copy(value: Any, depth: int = 0) -> Any:
-    """Copy to plain dicts, lists and scalars; NumPy arrays and numbers become Python's own."""
+    """Copy to plain dicts, lists and scalars, from NumPy too. Raises CaseError if nested deeper than `DEEPEST`."""
     if depth > DEEPEST:
         raise CaseError([Fault("", "tables or lists nested too deep")])
     if isinstance(value, Mapping):
@@ -222,7 +225,7 @@ def _copy(value: Any, depth: int = 0) -> Any:
 
 @functools.lru_cache(maxsize=4096)
 def split_key(key: str) -> tuple[str, ...]:
-    """Keys of a dotted path written as in TOML, such as "links.valve.area"."""
+    """Keys of a dotted path as in TOML, such as "links.valve.area"; a text that is not valid is split at its dots."""
     try:
         table: Any = tomllib.loads(f"{key} = 0") if "\n" not in key and "=" not in key else None
     except ValueError:

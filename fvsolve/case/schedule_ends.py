@@ -29,8 +29,8 @@ def notices(case: Any) -> list[Notice]:
 def starts_after_end(part: Any, end: float) -> Iterator[tuple[str, float]]:
     """Yield (key, time [s]) for schedules of a part that change after the time `end` [s], and for a trip after it.
 
-    The time is that of the last change or of the trip; for a periodic schedule it is the end of its first period.
-    Schedules of more than `MAX_ENTRIES` entries are left out.
+    The time is that of the last entry or of the trip. A periodic schedule counts if its period exceeds `end`; its time
+    is then the period. Schedules of more than `MAX_ENTRIES` entries are left out.
     """
     for name, info in type(part).model_fields.items():
         value = getattr(part, name)

@@ -20,7 +20,8 @@ PRESENCE_KEYS = ("required_pressure",)  # keys whose presence alone changes the 
 def update_values(reader: Any) -> Case | None:
     """Copy of the case `reader.before` with new numbers of parts; None if more may change, or if there is a fault.
 
-    reader : reader of the new case. Names, types, connections, probes, expectations and all other tables are kept.
+    reader : reader of the new case; parts as read and faults are written to it, also if the result is None
+    Names, types, connections, probes, expectations and all other tables are kept.
     """
     before, raw = reader.before, reader.raw
     if (
@@ -71,7 +72,7 @@ def read_before(given: dict[str, Any], before: dict[str, Any], part: Any) -> dic
 
 
 def is_self_contained(case: Case) -> bool:
-    """True if a case has no files, signals, scalars, basins, placed parts or equilibrium to compute."""
+    """True if a case has no files, measurements, signals, scalars, basins, placed parts or computed equilibrium."""
     no_outer_input = not (
         placed(add_bends(case.raw))
         or case.signals
@@ -85,7 +86,7 @@ def is_self_contained(case: Case) -> bool:
 
 
 def is_number_key(raw: Any, keys: tuple) -> bool:
-    """True if the value at a key path of a case is a number or a schedule of a part.
+    """True if the value at a key path of a case is a number or a schedule of a part, or lies within one.
 
     Keys in `PRESENCE_KEYS` are excluded. raw : case before its values are read (`Raw`)
     """

@@ -35,8 +35,8 @@ BASIC_COMMANDS = ("run", "check", "list", "new", "schema", "methods", "compare",
 def main() -> None:
     """Entry point of `fvsolve`. Every failure is a message on standard error and an exit code, without a traceback.
 
-    Exit codes: 0 done; 1 a run stopped early, an expectation or limit does not hold, or an internal error; 2
-    bad input; 130 interrupted.
+    Exit codes: 0 done; 1 a run stopped early or its results are wrong, an expectation or limit does not hold (it fails
+    or is open), memory is exhausted, or an internal error; 2 bad input; 130 interrupted.
     """
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # false if a caller has replaced the stream by another file object

@@ -48,6 +48,7 @@ Json = Annotated[bool, typer.Option("--json", help="print one JSON object on sta
 def load_case(name: str, overrides: list[str], scheme: str | None = None, method: str | None = None):
     """Read a case and apply the overrides. Raises CaseError with all faults of the case and of the overrides.
 
+    Raises FvsolveError if there is neither a file nor a shipped case `name`.
     scheme, method : names for a study, separated by commas, or None. If the case is invalid with its own scheme and
         method, it is read with the first of these names: the overrides may be valid only with these.
     """

@@ -165,7 +165,7 @@ def methods(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """List Runge-Kutta methods: order, stability, cost. With NAME also print the tableau, R(s) and stability region."""
+    """List Runge-Kutta methods: order, stability, cost. With NAME show its tableau, R(s) and stability region."""
     from fvsolve.cli import methods
 
     if name is None and out is not None:

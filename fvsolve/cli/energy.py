@@ -113,6 +113,7 @@ def interrupt_message(words: str) -> Iterator[None]:
 def ledger(case, port, out, as_json: bool) -> None:
     """Run a case, write its energy balance and a picture, and print the balance with the passivity verdict at a port.
 
+    It ends the program, with exit code 130 if interrupted, 1 if the run is not ok, else 0.
     port : name of the port, or None; out : folder of the files, or None
     """
     from fvsolve.cli.progress import run_progress
@@ -183,7 +184,8 @@ def _ledger(result, case, folder) -> None:
 def compare_pairs(case, schemes, methods, port, out, as_json: bool) -> None:
     """Run a case with several schemes and methods, and print the energy that each pair of them creates.
 
-    port : name of a port, or None; out : folder of the files, or None
+    It ends the program with exit code 2 if all pairs were refused. port : name of a port, or None
+    out : folder of the files, or None
     """
     from fvsolve.cli.progress import interruptible
     from fvsolve.cli.terminal import console, line, print_sheet

@@ -20,7 +20,7 @@ def precompile(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Compile the functions that the shipped cases need on this machine, so that later runs start at once."""
+    """Compile the functions that cases need on this machine, so that later runs start at once."""
     from fvsolve.case import load, shipped
     from fvsolve.cli import terminal
     from fvsolve.cli.progress import progress_bar

@@ -52,7 +52,8 @@ REASONS_SHOWN = 10  # summary.json has all
 def print_result(run) -> None:
     """Print the results of a run: extremes, marks, cavities, events, ledgers, verdicts, comparisons, notices and steps.
 
-    At most ROWS probes, EVENTS_SHOWN events and REASONS_SHOWN reasons of errors are printed.
+    Verdicts are those on expectations and limits. At most ROWS probes, EVENTS_SHOWN events and REASONS_SHOWN reasons of
+    errors are printed; of many notices only the first.
     """
     summary, time_text = run.summary, time_formatter(run.summary)
     console = _console()
@@ -106,7 +107,7 @@ def print_files(run) -> None:
 
 
 def exit_code(run) -> int:
-    """Exit code: 130 interrupted; 1 stopped early, or an expectation or limit does not hold; otherwise 0."""
+    """Exit code: 130 interrupted; 1 if the run is not ok, or an expectation or limit fails or is open; otherwise 0."""
     if run.reason.startswith("interrupted"):
         return 130
     return 0 if run.ok and all(claim.ok for claim in [*run.expectations, *run.verdicts]) else 1
@@ -115,7 +116,7 @@ def exit_code(run) -> int:
 def print_checks(case, facts: dict, every: bool = False) -> None:
     """Print fluid, parts and basins at the start, moving parts, notices, the step and its cost.
 
-    facts : contents of the case, as `Model.checks`
+    facts : contents of the case, as `Model.checks`, with the result of `divisible_rows` as "threads"
     every : True for all rows, otherwise only notable rows of long tables
     """
     console = _console()

@@ -42,7 +42,7 @@ def plot(
     phase: Annotated[list[str], typer.Option(metavar="X:Y", help="phase plane: probe Y over probe X")] = [],  # noqa: B006
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="folder of the pictures (default RUN)")] = None,
 ) -> None:
-    """Draw long sections with events along the route, histories of probes and phase planes, without a browser."""
+    """Draw long sections (heads, limits, devices), histories of probes and phase planes, without a browser."""
     from fvsolve.report.pictures import write_pictures
 
     for path in write_pictures(directory, probes, route, phase, out):

@@ -35,7 +35,7 @@ def size(
     error: Annotated[
         bool,
         typer.Option(
-            "--error", help="require margins above their numerical errors, estimated by two more runs for each value"
+            "--error", help="require margins above their numerical errors, estimated by further runs for each value"
         ),
     ] = False,
     set: Set = [],  # noqa: B006

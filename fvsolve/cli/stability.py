@@ -108,7 +108,10 @@ def refuse_options(case: str | None, of_a_case: dict, of_a_grid: dict) -> None:
 
 
 def pictures(result, folder: Path) -> list[str]:
-    """Draw the spectrum over the stability region for each pair with a linear scheme; returns the file names."""
+    """Draw the spectrum over the stability region of each pair with a linear scheme; returns the file names.
+
+    Pairs on a case with delay lines have no picture.
+    """
     from fvsolve.draw.spectrum_picture import spectrum_figure
     from fvsolve.steppers import analyse
 

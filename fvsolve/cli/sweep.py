@@ -78,7 +78,7 @@ def sweep(
 def ranges(texts: list[str], option: str) -> dict[str, list]:
     """Ranges of keys from texts `KEY=LOW,HIGH` : key -> [low, high]. Raises FvsolveError for a key that is given twice.
 
-    option : name of the option, for the message
+    The number of values is not checked. option : name of the option, for the message
     """
     pairs = [key_and_values(text, option, RANGE_FORMAT) for text in texts]
     duplicates = [key for key, _ in pairs if [name for name, _ in pairs].count(key) > 1]
@@ -90,7 +90,7 @@ def ranges(texts: list[str], option: str) -> dict[str, list]:
 def write_charts(result, outcomes: list[str], folder: Path, heads: dict[str, str]) -> list[Path]:
     """Draw a picture of each outcome (default all extremes) in the folder `charts`; returns the paths.
 
-    heads : key -> heading of the key with its unit
+    Pictures of earlier sweeps in this folder are deleted. heads : key -> heading of the key with its unit
     """
     from fvsolve.draw.sweep_picture import outcome_figure
 

@@ -22,7 +22,7 @@ def line(output, text: str, style: str | None = None) -> None:
 
 
 def table(headers: list[str], rows: list[list[str]], output=None) -> None:
-    """Print a table of rows under their headers; columns of numbers are right-aligned."""
+    """Print a table of rows under their headers; columns that contain a number or "-" are right-aligned."""
     from rich.table import Table
     from rich.text import Text
 

@@ -17,8 +17,9 @@ def order_figure(sizes: Sequence[float], curves: Mapping, measure: str, title: s
     """Figure of errors over cell sizes or time steps, with a panel for each variable.
 
     curves : variable -> norm -> (errors : float64[sizes], fit); measure : label of the axis of sizes
-    A fit has `order`, `constant` and `marks`, a text for each size. Sizes with an empty mark are fitted and have solid
-    markers; other sizes have open markers. The line is the fitted slope, with its order in the legend.
+    A fit has `order`, its uncertainty `spread`, `constant`, `reason` (a text if no order can be fitted), and `marks`, a
+    text for each size. Sizes with an empty mark are fitted and have solid markers; other sizes have open markers. The
+    line is the fitted slope, with its order in the legend. A variable without positive errors has no panel.
     """
     names = [name for name in curves if any(np.any(np.asarray(e) > 0.0) for e, _ in curves[name].values())]
     columns = min(2, max(1, len(names)))

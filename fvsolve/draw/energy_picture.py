@@ -19,7 +19,8 @@ def energy_figure(t, supplied, stored, dissipated, numerical, title="", port=Non
     supplied, stored, dissipated, numerical : name -> float64[k] [J], cumulative. Positive values are stacked upwards,
     negative values downwards. Stored energy is drawn relative to its least value in the run. The gap between the areas
     and the line above them is the remainder of the energy balance.
-    port : (name, integral of pressure times flow at the port, lower bound of the integral) for a fourth panel
+    port : (name, integral of pressure times flow at the port : float64[k] [J], its lower bound : float64[k] [J]) for a
+    fourth panel
     units : unit of t, and (size [J], name) of the unit of energies, or None to choose it by size
     """
     figure = style.figure(8.2 if port is None else 9.8)
@@ -57,7 +58,8 @@ def energy_figure(t, supplied, stored, dissipated, numerical, title="", port=Non
 def _port_panel(axes, t, name, work, bound, given) -> None:
     """Draw the supplied energy at the port `name`, and its lower bound.
 
-    work : float64[k]  integral of pressure times flow [J]; bound : its lower bound [J], only in the legend if far below
+    work : float64[k]  integral of pressure times flow [J]
+    bound : float64[k]  its lower bound [J], only in the legend if far below
     given : (size [J], name) of the unit of energies, or None to choose it by size
     """
     span = max(np.ptp(work), np.max(np.abs(work)))

@@ -81,7 +81,7 @@ def _panel(axes, result, scheme: str) -> None:
 
 
 def _error_text(square) -> str:
-    """Text of the error of a run as a percentage; "" if the error is not known."""
+    """Text of the error of a run as a percentage; "" if it is not known, and for blown up, refused or missing runs."""
     error = square.measures.error
     if not math.isfinite(error) or square.verdict in ("blown up", "refused", "not run"):
         return ""
@@ -89,9 +89,9 @@ def _error_text(square) -> str:
 
 
 def limit_place(result, squares) -> float | None:
-    """Position of the predicted stability limit in a row, in columns; None if it is beyond the last column or unknown.
+    """Position of the predicted stability limit in a row, in columns; None if no step exceeds it or it is unknown.
 
-    squares : runs of the row
+    If all steps exceed their limits, it is -0.5, before the first column. squares : runs of the row
     """
     limits = [square.limit for square in squares]
     if None in limits or any(square.step is None for square in squares):

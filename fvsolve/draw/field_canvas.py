@@ -114,7 +114,8 @@ class FieldCanvas:
     def _lines(self) -> np.ndarray:
         """Line segments of pipes and bodies of the first frame in picture coordinates : float64[c, 2, 2].
 
-        Also sets `cover`, the points that names should not cover, and `labels`, the names of bodies.
+        Also sets `cover`, the points that names should not cover, `labels`, the names of bodies if there is only one
+        frame, and the pipes of the scene, in output units.
         """
         self.cover, self.labels, segments = np.zeros((0, 2)), [], [np.zeros((0, 2, 2))]
         for file in self.scene.frames[0][1]:

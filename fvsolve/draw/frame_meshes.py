@@ -20,7 +20,8 @@ TUBE_RADIUS = 0.008  # radius of a pipe as a fraction of the diagonal of the sce
 def field_extent(scene: DrawnScene) -> tuple[tuple[float, float], np.ndarray, bool]:
     """Ends of the colour range, bounding box of all frames float64[6], and True if a frame has depths of water.
 
-    The colour range is that of the field in the wet cells of all frames, see `colour_range`; (0, 1) if all are dry.
+    The colour range is that of the field in all frames, for basins in wet cells, see `colour_range`; (0, 1) if all are
+    dry. The bounding box is in output units: least and greatest x, then y, then z.
     The process exits with a message if no frame has the field, since the function runs in a process of its own.
     """
     known, lows, highs, boxes, wet, field = {}, [], [], [], False, scene.quantity.name
@@ -44,7 +45,10 @@ def field_extent(scene: DrawnScene) -> tuple[tuple[float, float], np.ndarray, bo
 
 
 def read_frame(file: str | Path, scene: DrawnScene) -> Any:
-    """Read a frame, and convert its lengths and the drawn field to output units; a vector becomes its magnitude."""
+    """Read a frame, and convert its lengths and the drawn field to output units; a vector becomes its magnitude.
+
+    If the quantity of the scene has no unit, its unit is set to that in the file.
+    """
     import pyvista
 
     mesh, quantity = pyvista.read(file), scene.quantity

@@ -47,7 +47,8 @@ def link_nodes(link) -> list[str]:
 def node_positions(case) -> dict[str, tuple[float, float]]:
     """Position of each node in the figure of a case : name -> (x, y).
 
-    It is the stated position if all nodes have one, otherwise (number of links from the first node, row).
+    It is the stated position if all nodes have one. Otherwise it is (number of links from the first node of the
+    connected part of the network, row).
     """
     given = {name: node.position for name, node in case.nodes.items()}
     if all(item is not None for item in given.values()):
@@ -76,7 +77,7 @@ def node_positions(case) -> dict[str, tuple[float, float]]:
 
 @style.without_markup
 def model_figure(model):
-    """Figure of the heads at the nodes of a model at the start."""
+    """Bar chart of the heads at the nodes of a model at the start, see `bar_figure`."""
     names, unit = model.node_names, model.case.unit_of("head")
     heads = [convert(node["head"], "head", unit) for node in model.checks["nodes"].values()]
     return bar_figure(names, heads, f"head at the start [{unit}]", model.case.title or model.case.name)
@@ -117,7 +118,7 @@ def sweep_figure(sweep):
 
 
 def bar_figure(names, values, label: str, title: str):
-    """Bar chart with a bar for each name, up to MAX_NAMED_NODES bars; label : label of the axis of values."""
+    """Bar chart with a bar for each of the first MAX_NAMED_NODES names; label : label of the axis of values."""
     names, values = list(names)[:MAX_NAMED_NODES], list(values)[:MAX_NAMED_NODES]
     figure = style.figure(0.9 + 0.22 * max(len(names), 3))
     axes = figure.subplots()

@@ -55,9 +55,10 @@ def draw_parts(stage, scene: DrawnScene, segments: np.ndarray) -> tuple[int, int
 
 
 def symbol_positions(scene: DrawnScene, aspect: Projection, axes, apart: float) -> dict[str, np.ndarray]:
-    """Positions of symbols [pixels] : key of a part -> float64[2].
+    """Positions of symbols [pixels] : key of a part, or of a linked patch -> float64[2].
 
-    A node whose position is not fixed is moved if a link to it is shorter than `apart` [pixels].
+    A node whose position is not fixed is moved if a link to it is shorter than `apart` [pixels]. The symbol of a link
+    is at the middle of its ends, or above its only end, unless it has its own place.
     aspect : projection of the picture
     """
     nodes = [part for part in scene.parts if not part.link]
@@ -139,7 +140,7 @@ def _write_names(stage, scene: DrawnScene, segments, at, blocks, ties) -> tuple[
 
 
 def _names_to_draw(scene: DrawnScene, at, pixels, half: float) -> list[DrawnName]:
-    """Names to draw, in order of priority: parts, then pipes if there are few, then plain junctions.
+    """Names to draw, in order of priority: parts, pipes if they are few, and plain junctions if parts are few.
 
     at : positions of symbols [pixels]; pixels : float64[c, 2, 2]  pipes [pixels]
     half : half width of a symbol [points]

@@ -116,7 +116,8 @@ def draw_symbol(axes, symbol: str, at, along=(1.0, 0.0), half: float = HALF_SYMB
 def colour_range(low: float, high: float) -> tuple[float, float]:
     """Ends of the colour range of a field with values from `low` to `high`.
 
-    A uniform field has a range of EVEN_RANGE to each side of its value.
+    A uniform field has a range of EVEN_RANGE times its value to each side of it, and a zero field the range (0, 1). For
+    other fields, an end near zero is set to zero.
     """
     most = max(abs(low), abs(high))
     if most == 0.0:

@@ -75,7 +75,7 @@ def label_decades(axes) -> None:
 
 
 def legend(axes) -> None:
-    """Draw the legend to the right of the axes, where it does not cover any curve."""
+    """Draw the legend to the right of the axes, where it does not cover any curve; nothing without labels."""
     if axes.get_legend_handles_labels()[0]:
         axes.legend(
             loc="upper left",
@@ -89,7 +89,7 @@ def legend(axes) -> None:
 
 
 def title(fig, text: str) -> None:
-    """Set the title of a figure."""
+    """Set the title of a figure; a text longer than `MAX_TITLE_LENGTH` is cut."""
     text = text if len(text) <= MAX_TITLE_LENGTH else text[: MAX_TITLE_LENGTH - 3] + "..."
     if text:
         fig.suptitle(visible(text), fontsize=10.5, color=INK, x=0.012, ha="left")

@@ -49,7 +49,8 @@ def outcome_figure(sweep, name: str, heads: Mapping[str, str]):
 def axis_positions(values: list) -> tuple[list[float], list[str]]:
     """Positions of values on an axis, and texts of the ticks : (positions, texts).
 
-    Numbers keep their value and have no texts; other values are numbered in order of first appearance.
+    Numbers keep their value and have no texts. Other values are numbered in order of first appearance; more than
+    MAX_WORDS of them have no texts.
     """
     if all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in values):
         return [float(value) for value in values], []
@@ -62,6 +63,7 @@ def axis_positions(values: list) -> tuple[list[float], list[str]]:
 def map_figure(sweep, names, heads: Mapping[str, str]):
     """Figure of columns of a `Sweep` over two keys, as maps of squares or as dots; failed runs are crossed.
 
+    Squares are drawn if there is exactly one run for each pair of values.
     names : names of the columns; heads : key -> label of its axis
     """
     across = min(len(names), 2)

@@ -22,7 +22,8 @@ def view(scene: DrawnScene, out: Path) -> None:
     """Write a single frame as a picture, several as an animation (.gif or .mp4), to the file `out`.
 
     Matplotlib draws networks in this process. PyVista draws basins and bodies in a second process, because VTK ends its
-    process if there is no OpenGL library. Raises FvsolveError if the field is unknown or the picture cannot be drawn.
+    process without an OpenGL library. Raises FvsolveError for an unknown field, a file name without a format of
+    animations for several frames, and a picture that cannot be drawn.
     """
     animated = len(scene.frames) > 1
     if animated and out.suffix not in (".gif", ".mp4"):

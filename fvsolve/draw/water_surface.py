@@ -12,10 +12,11 @@ BUILDING_INSET = 1e-3  # relative reduction of a building, so that its walls do 
 
 
 def water_mesh(mesh: Any, rise: float, fields: tuple[str, ...], least: float = WET_DEPTH) -> Any:
-    """Mesh of the water surface of a basin, cut at the shore, with `height` [m] above the bed at its points.
+    """Mesh of the water surface of a basin, cut at the shore, with `height` above the bed at its points.
 
-    Cells deeper than `least` [m] are wet. The surface of wet cells is extrapolated over adjacent dry cells. If it lies
-    above their bed, as at a front on level ground, the shore is drawn at the middle of the dry cells.
+    Cells deeper than `least` are wet; heights and `least` are in the unit of the depths of `mesh`. The surface of wet
+    cells is extrapolated over adjacent dry cells. If it lies above their bed, as at a front on level ground, the shore
+    is drawn at the middle of the dry cells.
     fields : names of fields whose values at points are means over wet cells; rise : factor on heights
     """
     cells, wet = _cells(mesh), mesh.cell_data["depth"] > least

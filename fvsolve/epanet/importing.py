@@ -41,7 +41,7 @@ def import_network(path: str | Path, hour: float = 0.0, wave_speed: float = 1200
     hour : time from the start of EPANET's run [h]; wave_speed : wave speed of every pipe [m/s]
     shortest : least length of a pipe in the case [m]; a shorter pipe is lengthened, and keeps the friction loss of its
     original length
-    Raises FvsolveError if WNTR is missing, or if EPANET finds faults in the file.
+    Raises FvsolveError for an invalid hour, if file or WNTR are missing, or if EPANET finds faults in the file.
     """
     if not (math.isfinite(hour) and hour >= 0.0):
         raise FvsolveError(f"hour {hour:g} is not valid; expected hours from the start of EPANET's run, 0 or more")

@@ -77,7 +77,8 @@ def read_network(path: Path) -> Any:
 def state_at(network: Any, hour: float) -> HourState:
     """Run EPANET on a network up to an hour, with all controls and rules; return its state at that hour.
 
-    Raises FvsolveError if EPANET rejects the network or finds no solution.
+    The options of `network` for accuracy, trials, duration and report are changed.
+    Raises FvsolveError if EPANET rejects the network, finds no solution, or has no results at the hour.
     """
     package, seconds = wntr(), round(3600.0 * hour)
     options = network.options

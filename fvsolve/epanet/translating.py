@@ -21,7 +21,8 @@ REGULATING_STATUS = 2  # WNTR's code of a valve that is neither fixed open nor f
 class Translation:
     """Nodes and links of a case made from an EPANET network, and notes on differences from EPANET.
 
-    network : network of WNTR; hour : EPANET's solution at the imported hour; shortest : least length of a pipe [m]
+    network : network of WNTR; hour : EPANET's solution at the imported hour
+    wave_speed : wave speed of every pipe [m/s]; shortest : least length of a pipe [m]
     nodes, links : name -> table of the case file
     lengths : EPANET's name of a pipe -> its length in the case [m]
     notes : list of (text, EPANET's names)

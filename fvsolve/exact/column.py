@@ -2,7 +2,7 @@
 
 (L / A) dM/dt = D - K |M| M: mass flow M [kg/s], length L and area A of the column, drive D (difference of
 p + rho g z between the ends) and resistance K. Both are constant on each interval between jumps of the opening of the
-valve, where M is tanh, coth, tan or a straight line in time.
+valve, where M is tanh, coth, tan, a hyperbola or a straight line in time.
 """
 
 from __future__ import annotations

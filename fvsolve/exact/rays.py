@@ -62,7 +62,7 @@ def find_faults(case):
 def solution(case, start: ExactStart) -> Solution:
     """Pressures of nodes [Pa], flows of valves [m3/s] and fields of pipes, as functions of time.
 
-    The case must be one for which `find_faults` yields nothing.
+    The case must be one for which `find_faults` yields nothing. Raises OverflowError as `RayPaths`.
     """
     rays = RayPaths(case, start)
     nodes = {name: (lambda t, n=name: rays.pressure(n, t)) for name in case.nodes}
@@ -74,6 +74,7 @@ class RayPaths:
     """Wave paths of a case between groups of nodes.
 
     Nodes joined by a valve form a group; any other node is a group by itself.
+    Raises OverflowError if the state of a group depends on more than MAX_PATHS earlier states.
     """
 
     def __init__(self, case, start: ExactStart) -> None:

@@ -17,7 +17,8 @@ def coolprop_properties(name: str, temperature: float, pressure: float, law: str
     """Fields of `Fluid` from CoolProp, as a dict; temperature [K], pressure [Pa], law : name of the density law.
 
     density, bulk_modulus and viscosity are None if the fluid boils at this state; bulk_modulus is None for a fluid
-    "INCOMP::...". Raises FluidError for unknown names and for states outside CoolProp's range.
+    "INCOMP::...", and viscosity where CoolProp has no data.
+    Raises FluidError for unknown names and for states outside CoolProp's range.
     """
     backend, _, rest = name.rpartition("::")
     if backend not in ("", "HEOS", "INCOMP"):

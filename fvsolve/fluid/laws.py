@@ -170,8 +170,8 @@ class LinearLaw(Law, name="linear"):
 
         row : row of the pipe in the tables of the model; start : pressures at the start [Pa]
         waves : sum of forward and backward wave in each cell [kg/s]
-        profile : masses per length [kg/m] of the cells of all pipes at the steady start; not used by the density law
-        `linear`
+        profile : table `profile` of the model, with masses per length [kg/m] at the steady start from index
+        row["center"] on; not used by the density law `linear`
         """
         return start + waves / row["admittance"]
 

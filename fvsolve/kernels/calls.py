@@ -26,6 +26,9 @@ RATES, READS, ENERGIES = "tVVVH", "tVVHV", "tVVVHV"  # argument types of the fun
 ARGUMENTS = dict.fromkeys((RHS, CLOSE, DERIVE, DAMP), RATES)
 ARGUMENTS |= dict.fromkeys((OBSERVE, RECORD, EVENTS), READS) | dict.fromkeys((POWER, STORED), ENERGIES)
 HOOKS = {  # functions of the law of a part: types of arguments and of the result
+    # out : network values (node pressures as changes since the start [Pa], mass flows [kg/s], ...), read and written at
+    # the offsets in tables.layout[0] (LAYOUT of `kernels.dtypes`); tables : open handle, its attributes are the tables
+    # device : row of the part in tables.devices; t, y, dydt : time [s], states and their rates (empty if not requested)
     "set": (
         "tVVTD",
         "",

@@ -38,7 +38,10 @@ class Content:
 
 
 def load_file(path: Path) -> Content:
-    """Triangles, quadrilaterals and named lines of a mesh file; raises MeshError if it contains no plane mesh."""
+    """Triangles, quadrilaterals and named lines of a mesh file.
+
+    Raises MeshError if the file is missing, cannot be read, or contains no plane mesh.
+    """
     file_mesh, notes = _read_by_meshio(path)
     kinds: dict[str, int] = {}
     for block in file_mesh.cells:
@@ -76,7 +79,7 @@ def load_file(path: Path) -> Content:
 
 
 def _read_by_meshio(path: Path) -> tuple[Any, tuple[str, ...]]:
-    """(mesh object of meshio, messages that meshio printed)."""
+    """(mesh object of meshio, messages that meshio printed); raises MeshError for a missing or unreadable file."""
     import meshio
 
     if not path.is_file():

@@ -71,8 +71,9 @@ class CsvRows:
     def numbers(self, column: int, dimension: str, ambient: float = 101325.0) -> np.ndarray:
         """Values of a column in SI : float64[n].
 
-        The header of the column states its unit; pressures become absolute.
+        The header of the column states its unit, SI if it has none; pressures become absolute.
         dimension : dimension that the unit must have; ambient : ambient pressure [Pa], added to gauge pressures
+        Raises ValueError for a unit of another dimension, and for texts that are not numbers.
         """
         unit = split_header(self.header[column])[1]
         try:
@@ -85,7 +86,10 @@ class CsvRows:
         return known.si(values) + (ambient if known.gauge and dimension == "pressure" else 0.0)
 
     def plain(self, column: int) -> list[float]:
-        """Numbers of a column without conversion of units. Raises CsvError for other texts."""
+        """Numbers of a column without conversion of units.
+
+        Raises CsvError for other texts, and for a decimal comma below a number with a decimal point.
+        """
         values, points = [], False
         for k, (line, row) in enumerate(zip(self.lines, self.cells, strict=True)):
             text = row[column]
@@ -116,7 +120,10 @@ def number(text: str) -> float | None:
 
 
 def read_rows(path: Path) -> CsvRows:
-    """Read header and rows of a CSV file. Raises ValueError for rows that do not match the header."""
+    """Read header and rows of a CSV file; empty lines and lines that begin with # are skipped.
+
+    Raises ValueError for a file that cannot be read, a missing header, or rows that do not match the header.
+    """
     lines = [(n, line) for n, line in enumerate(read_text(path).splitlines(), 1) if line.strip() and line[0] != "#"]
     if len(lines) < 2:
         raise ValueError(f"{path.name} is empty; expected a header and rows of numbers")

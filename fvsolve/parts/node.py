@@ -14,7 +14,7 @@ USUAL_ELEVATIONS = UsualRange(-12e3, 9e3, "boreholes to mountains")
 
 
 class Node(Table):
-    """Place with a single potential: pressure at its elevation (hydraulic), or velocity (translational).
+    """Place with a single potential: pressure at its elevation (hydraulic), or velocity (translational or spatial).
 
     Ports: those of the links that name it. Stored and dissipated energy: none, unless its type states otherwise.
     """
@@ -30,7 +30,7 @@ class Node(Table):
     driven: ClassVar[tuple[str, float] | None] = (
         None  # key of a prescribed flow, and its sign as flow into links; 0 for a prescribed pressure
     )
-    domain: ClassVar[str] = "hydraulic"  # | "translational"
+    domain: ClassVar[str] = "hydraulic"  # | "translational" | "spatial"
 
     elevation: Annotated[
         float | None,
@@ -60,7 +60,7 @@ class Node(Table):
 
     @classmethod
     def bodies(cls, given: dict[str, Any]) -> tuple[str, ...]:
-        """Names of the bodies that carry the node, as in the case file."""
+        """Names of the bodies that carry the node or move its walls, as in the case file."""
         return ()
 
     def inner(self, name: str) -> tuple[dict[str, Node], dict[str, Any]]:

@@ -1,7 +1,7 @@
 """Nominal pipe sizes and fittings by name, from the tables of the package `fluids`.
 
 Loss coefficients of fittings are those of Crane TP-410: K = (L / D) f_T, with the equivalent length L over the diameter
-D, and f_T the friction factor of clean commercial steel in fully turbulent flow.
+D, and f_T the friction factor of clean commercial steel in fully turbulent flow. The fitting `entrance` has K = 0.5.
 """
 
 from __future__ import annotations

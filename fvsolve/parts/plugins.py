@@ -28,7 +28,7 @@ def register_part(folder: str | os.PathLike) -> None:
     Modules of the folder use relative imports. Their sources belong to the key of the compilation cache, so they are
     recompiled after an edit.
     Child processes register the part too; the environment variable FVSOLVE_PARTS lists the folders.
-    Raises FvsolveError if there is no part.py, or if the name of the part exists already.
+    Raises FvsolveError if there is no part.py, or if the name of the part or of its folder exists already.
     """
     path = Path(folder).resolve()
     if not (path / "part.py").is_file():

@@ -49,7 +49,7 @@ class Schedule:
     0 to 1 between its two times
     wave : (mean, amplitude, period [s], phase [rad]) of a harmonic schedule,
     value = mean + amplitude sin(2 pi t / period + phase)
-    origin : table as in a case file, in SI
+    origin : table as in a case file, in SI; None for a constant that is stated as a number
     """
 
     kind: str
@@ -76,7 +76,7 @@ class Schedule:
 
     @property
     def first(self) -> float:
-        """Value before and at the first entry [SI]."""
+        """Value before and at the first entry [SI]; of a harmonic schedule its minimum."""
         return float(self.value[0])
 
     @property

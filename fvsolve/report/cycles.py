@@ -39,6 +39,7 @@ class FatigueStrength:
 def count_cycles(values: np.ndarray, bins: int = 10) -> list[tuple[float, float]]:
     """Cycles of a series by rainflow counting : list of (range, number of cycles), greatest range first.
 
+    Cycles of a range below `SMALLEST_RANGE` times the greatest range are left out.
     bins : number of equal bins of ranges; each range in the result is the upper end of its bin
     """
     cycles = list(import_library("rainflow").extract_cycles(values.tolist()))

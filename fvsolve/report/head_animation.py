@@ -30,7 +30,7 @@ class HeadAnimation(NamedTuple):
 
 
 def head_animations(result, ways: Iterable[SectionPath]) -> list[HeadAnimation]:
-    """Animated heads of the sections `ways`, with at most `MAX_NUMBERS` values in all; [] if no frames were stored.
+    """Animated heads of the sections `ways`, with about `MAX_NUMBERS` values at most; [] if no frames were stored.
 
     Raises RunError if a frame cannot be read.
     """

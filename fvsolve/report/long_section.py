@@ -50,7 +50,7 @@ class Section:
     along : quantity -> float64[n]
     lines : name -> float64[n]  heads of vapour pressure, pressure class and limits; NaN where a line does not apply
     ends : chainages of both ends
-    cavity_spans : (begin, end) of chainage where cavities formed, see `cavity_pressure`
+    cavity_spans : (begin, end) of chainage where the least pressure is at most `cavity_pressure`
     violations : (chainage, head, name of the limit) of points where a limit is violated
     """
 
@@ -168,9 +168,10 @@ def section_of(result, way: SectionPath) -> Section:
 
 
 def cavity_pressure(result) -> float | None:
-    """Pressure [Pa] below which a pipe has a cavity; None for a fluid without vapour pressure.
+    """Pressure [Pa] below which a pipe has a cavity: the vapour pressure, which is 0 for a fluid without one.
 
-    It is the vapour pressure, or twice the vapour pressure under a density law that computes cavities.
+    It is twice the vapour pressure under a density law that computes cavities. The result is None if the summary of
+    the run has no vapour pressure.
     """
     return None if result.summary["fluid"]["vapor_pressure"] is None else result.case.law.cavity_pressure
 

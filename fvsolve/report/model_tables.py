@@ -32,7 +32,7 @@ HIDDEN_KEYS = (
 
 
 def all_tables(result) -> list[ReportTable | None]:
-    """All tables of the model, in order; None instead of a table without rows."""
+    """Tables of the fluid, pipes, walls and other parts; None instead of pipes or walls that the case lacks."""
     return [fluid(result), pipes(result), walls(result), parts(result)]
 
 
@@ -79,7 +79,10 @@ def pipes(result) -> ReportTable | None:
 
 
 def walls(result) -> ReportTable | None:
-    """Table of pipe walls: allowable pressure, thickness, modulus and source; None if no pipe states a wall."""
+    """Table of pipe walls: allowable pressure, thickness, modulus and source.
+
+    The result is None if no pipe has an elastic wall or an allowable pressure.
+    """
     case, rows = result.case, []
     thick, allowable = column("", "length", case), column("", "pressure", case)
     modulus = _pressure_column(column("", "modulus", case), case)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fvsolve.output.unit_columns import column
 from fvsolve.report.tables import ReportTable, value_text
 
-LEDGER_UNITS = {"mass": "kg", "energy": "J"}  # units of ledgers; ledgers of scalars have the unit of the scalar
+LEDGER_UNITS = {"mass": "kg", "energy": "J"}  # units of ledgers; ledgers of scalars, in kg times their unit, show none
 LEDGER_TERMS = ("initial", "inflow", "outflow", "spilled", "made_up", "final")
 
 

@@ -25,7 +25,8 @@ def write_pictures(
     probes : names separated by commas, drawn in probes.png
     route : name of a section; all sections are drawn if probes, route and phases are empty
     phases : pairs of probes "X:Y", drawn in phase.png
-    Raises RunError if the directory holds no finished run, FvsolveError with all unknown names.
+    Raises RunError if the directory holds no finished run, FvsolveError with all unknown names, or if there is nothing
+    to draw.
     """
     result, folder = open_checked_run(Path(directory)), Path(out) if out is not None else Path(directory)
     faults: list[str] = []

@@ -129,7 +129,7 @@ def verdict_table(result) -> ReportTable | None:
 
 
 def worst_tables(result) -> list[ReportTable]:
-    """Tables of the positions with the least margins, for each limit that applies to more than one part."""
+    """Tables of the positions with the least margins, for each limit with more than one part or bound."""
     length, height, time = (column("", dimension, result.case) for dimension in ("length", "head", "time"))
     tables = []
     for check in result.verdicts:

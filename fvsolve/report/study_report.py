@@ -182,7 +182,7 @@ def event_figures(event: str | None, number: int, runs: list, figures: dict[str,
 
 
 def warning_texts(runs: list) -> list[str]:
-    """Texts of the warnings of all runs, each once, with the names of the runs in which it occurs.
+    """First `MAX_WARNINGS` texts of warnings of all runs, each once, with the names of the runs in which it occurs.
 
     runs : as for `study_page`
     """

@@ -124,7 +124,10 @@ def decimal_places(numbers: Sequence[float]) -> int | None:
 
 
 def value_text(value: Any, places: int | None = None) -> str:
-    """Text of a value; a number has `places` decimals, or if that is None `DIGITS` significant digits."""
+    """Text of a value; a number has `places` decimals, or if that is None `DIGITS` significant digits.
+
+    The text of None and of numbers that are not finite is an en dash.
+    """
     if value is None or is_number(value) and not math.isfinite(value):
         return "\u2013"
     if isinstance(value, bool):

@@ -59,7 +59,7 @@ def extremes_of_pipes(result, ways: list[SectionPath]) -> ReportTable | None:
 
 
 def ranked_pipes(result) -> list[ReportTable]:
-    """Tables of pipes ranked by greatest and by least pressure, worst first; [] for a single pipe."""
+    """Tables of pipes ranked by greatest and by least pressure, worst first; [] for a single pipe or a diverged run."""
     if len(result.envelope) < 2 or not_valid(result.summary):
         return []
     return [_ranking(result, name, words, most, when) for name, words, most, when in EXTREMES[:2]]
@@ -78,7 +78,7 @@ def _ranking(result, name: str, words: str, most, when: str) -> ReportTable:
 
 
 def extremes_of_probes(result) -> ReportTable | None:
-    """Table of the least and greatest value of each probe over all accepted steps, with times and estimated errors."""
+    """Table of the extremes of each probe over all accepted steps, with times and errors; None without probes."""
     peaks, rows, invalid = result.summary.get("peaks", {}), [], not_valid(result.summary) or None
     clock = UnitColumn("t", "time", result.summary["time_unit"])
     for name, extremes in result.extremes.items():

@@ -22,8 +22,8 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
     """Advance `state` to the time `until` [s], with named inputs held at constant values; returns the new state.
 
     inputs : SI values, such as {"valve.opening": 0.3, "spool.position": -0.1, "lake.head": 12.0, "gate.demand": 0.1}
-    Raises FvsolveError for an unknown input or a value out of range, a time before the time of the state, and a run
-    that cannot continue.
+    Raises FvsolveError for a state that does not fit the model, an unknown input or a value out of range, a time before
+    the time of the state, and a run that cannot continue.
     """
     if not isinstance(model, Model) or not isinstance(state, State):
         raise FvsolveError(f"advance takes a Model and a State, not {type(model).__name__} and {type(state).__name__}")
@@ -65,7 +65,10 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
 
 
 def hold(model: Model, inputs: dict[str, float]) -> Model:
-    """Copy of a model with some inputs held at constant values: name of the input -> SI value."""
+    """Copy of a model with some inputs held at constant values: name of the input -> SI value.
+
+    Raises FvsolveError for an unknown input and for a value out of range.
+    """
     if not inputs:
         return model
     tables = model.tables

@@ -13,7 +13,10 @@ LEAST_STATES = 2**17  # least number of states of a basin: smaller basins stay i
 
 
 def blocked_sums(cut: Partition, k: int) -> np.ndarray:
-    """Table `sums` of `kernels.stage_sums` for band k : int64[n]; empty if no basin is large enough for blocks."""
+    """Table `sums` of `kernels.stage_sums` for band k : int64[n]; empty if no basin uses blocks.
+
+    A basin uses blocks if it has at least 2^17 states and `forms_stages` is True.
+    """
     model = cut.model
     blocked_basins = [
         b

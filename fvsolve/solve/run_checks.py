@@ -19,8 +19,8 @@ LEDGER_TOLERANCE = 1e-8  # greatest remainder of a ledger, relative to its large
 class RunChecks:
     """Checks during a run: wave rates of basins, size of the states, height of sloshing modes.
 
-    largest : float64[n]  allowed size of each state: 1e6 times the largest of the range of initial values, the range
-    of the schedules, and the Joukowsky jump if the initial flows stop
+    largest : float64[n]  allowed size of each state: 1e6 times its `forcing_sizes`. In cells these are the largest of
+    the range of initial values, the range of the schedules, and the Joukowsky jump if the initial flows stop
     sound : time of the last checked state without growth [s]
     """
 
@@ -68,7 +68,7 @@ class RunChecks:
         return f"stopped: {text}"
 
     def warnings(self, ledgers: dict) -> list[Notice]:
-        """Notices of all checks of a finished run; ledgers : balances of mass and scalars by name."""
+        """Notices of all checks at the end of a run; ledgers : balances of mass and scalars by name."""
         notices = list(self.predicted)
         # repeat the prediction with the wave rates and step errors of the run
         if self.model.case.numerics.step is not None and (notices or self.moving):

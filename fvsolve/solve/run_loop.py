@@ -34,8 +34,8 @@ MOST_EVENTS_IN_SPAN, SPAN = (
 class RunLoop:
     """Arrays of a run of a model; its method `run` steps until an output is due, a fault occurs or the segment ends.
 
-    structure : function without arguments that returns the sparsity structure of the Jacobian; default: that structure
-    of the model
+    structure : function without arguments that returns the sparsity structure of the Jacobian; default: that of the
+    model
     threads : number of threads
     comm : MPI communicator of all ranks, in place of threads
     """
@@ -195,7 +195,10 @@ class RunLoop:
         self.apply_events()
 
     def apply_events(self) -> None:
-        """Apply the immediate effects of events: tank levels are limited, discs stop at seats and end stops."""
+        """Apply the immediate effects of events: limits of tank levels, and sudden changes of states of devices.
+
+        Mass that a limit of a tank adds or removes is booked in the ledger.
+        """
         for i in self.tanks:
             node, sums = self.model.tables.nodes[i], self.stepper.ledger.reshape(LEDGER_ROWS, -1)
             part = tank_limits.overshoot_correction(node, self.armed, float(node["mass"] + self.now[node["y"]]))
@@ -231,6 +234,7 @@ class RunLoop:
     def stop_columns(self, limit: float) -> list[tuple[int, float]]:
         """Set the flows of rigid columns that stop, or that collide at a node without other flow.
 
+        Where columns separate at an air valve, the valve opens first.
         limit : time [s] at which schedules with a jump take the value before the jump
         Returns a pair (number of the column, lost mass flow [kg/s]) for each column whose flow has changed.
         """

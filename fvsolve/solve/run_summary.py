@@ -94,7 +94,7 @@ class Summary:
 
     @property
     def cost(self) -> float:
-        """CPU time of the steps per cell (or state, without cells) and step [ns]."""
+        """CPU time of the steps per step and cell, or per step without cells [ns]."""
         return 1e9 * self.processor / max(1, self.steps * max(1, self.cells))
 
 
@@ -251,12 +251,15 @@ def pressure_envelope(model: Model, pipe, distance, elevation, extremes) -> dict
 
 
 def relative(remainder: float, largest: float) -> float:
-    """Remainder of a balance as a fraction of its largest term; 0 if both are 0."""
+    """Magnitude of the remainder of a balance as a fraction of its largest term.
+
+    Without positive terms it is 0 for a remainder of 0, otherwise 1.
+    """
     return abs(remainder) / largest if largest > 0.0 else float(remainder != 0.0)
 
 
 def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, Any]:
-    """Mass balance of a run as a dict: stored mass at start and end, inflow, outflow, remainder [kg].
+    """Mass balance of a run as a dict: stored mass at start and end, inflow, outflow, spilled, made up, remainder [kg].
 
     ledger : float64[2, nodes]  inflow at each node [kg], and outflow as negative numbers
     The entry `relative` is the remainder as a fraction of the largest term.

@@ -61,6 +61,8 @@ def solve(model: Model, state: State, sink, progress=None, threads: int = 1, com
     threads : number of threads
     comm : MPI communicator, whose other ranks follow this rank, in place of threads
     A state with restart data in `memory` continues an interrupted run with identical bits, with any number of threads.
+    A run that fails or is interrupted returns too: see `Summary.reason`. Raises FvsolveError for invalid arguments, and
+    MemoryMismatch for restart data of another run.
     """
     if not isinstance(model, Model) or not isinstance(state, State):
         raise FvsolveError(f"solve takes a Model and a State, not {type(model).__name__} and {type(state).__name__}")
@@ -282,7 +284,10 @@ class Run:
         self.begin_segment(self.starts_with_jump)
 
     def stop_columns(self) -> None:
-        """Stop rigid columns that can no longer flow; record the time if the lost flow was above 1e-3 of its scale."""
+        """Stop rigid columns that collide or can no longer flow.
+
+        The first time at which a column loses a flow above 1e-3 of its scale is recorded in the marks.
+        """
         model, t = self.model, self.loop.t
         for k, flow in self.loop.stop_columns(self.bounds[self.segment][0]):
             at, scale = (
@@ -350,7 +355,7 @@ class Run:
 
     @property
     def busy(self) -> float:
-        """CPU time of all threads that step the run [s]."""
+        """CPU time of all threads or MPI ranks that step the run [s]."""
         return time.thread_time() + (0.0 if self.loop.team is None else self.loop.team.seconds)
 
     def pause(self) -> None:
@@ -378,7 +383,11 @@ class Run:
         return self.failure_text(code) + (self.model.case.law.advice if numbers else "")
 
     def failure_text(self, code: int) -> str:
-        """Text with failure, place, time and remedy for a code of `steppers.loop_indices`."""
+        """Text with failure, place, time and remedy for a code of `steppers.loop_indices`.
+
+        For BAD_VALUE and BAD_STATUS the loop returns to the state before the last step, see `RunLoop.step_back`; for
+        BAD_VALUE `invalid_from` is set.
+        """
         model, loop = self.model, self.loop
         place = ""
         if code == loop_indices.BAD_VALUE:

@@ -30,8 +30,9 @@ ROUNDING = 1e-10  # relative to ranges: a smaller error is too small to measure 
 class StepDoubling:
     """Estimate of the error of a run with steps of given length.
 
-    It checks all states under an implicit method, and states outside cells under an explicit method, where the Courant
-    limit bounds the errors of cells. Without such states or without a given step there is no check.
+    It checks states outside cells under an explicit method, where the Courant limit bounds the errors of cells, and all
+    states under an implicit method; states of delay lines are left out. Without such states or without a given step
+    there is no check.
 
     restart_data : float64[4 + 5 k]  number of checks, step count of the next check, step count of the last check,
     fraction r of an error that a step leaves; then five arrays over the k checked states: error of the last checked
@@ -141,7 +142,10 @@ class StepDoubling:
         return np.maximum(self.greatest - self.least, self.small)
 
     def worst(self) -> tuple[str, float]:
-        """Name of the part with the greatest error, and its mean error as a fraction of the range of the state."""
+        """Name of the state with the greatest error, without its cell, and its mean error over the range of the state.
+
+        The result is ("", 0) before the first check.
+        """
         if not self.restart_data[0]:
             return "", 0.0
         share = self.sums / self.restart_data[0] / self.widths()
@@ -150,7 +154,7 @@ class StepDoubling:
         return self.model.state_names[self.states[at]].partition("[")[0], float(share[at])
 
     def notice(self) -> Notice | None:
-        """Notice of a finished run, if the error is too large."""
+        """Notice at the end of a run if the mean error is 0.5 % or more of the range of a state, otherwise None."""
         place, share = self.worst()
         if not DOUBTFUL <= share < np.inf:  # a state that is not finite has stopped the run
             return None

@@ -135,7 +135,10 @@ class BandWorker:
 
 
 def copy_integrator(stepper: Integrator) -> Integrator:
-    """Copy of an integrator; it shares only the arrays that steps do not change."""
+    """Integrator with the method, settings and events of another, but without its states and step data.
+
+    The two share only arrays that steps do not change.
+    """
     copy = Integrator(
         stepper.method,
         stepper.scale.size,
@@ -193,6 +196,7 @@ class ThreadTeam:
         """Run the time loop on all bands; returns a code of `steppers.loop_indices`.
 
         functions, where : compiled functions, and index of the first ledger rate, from `RunLoop.functions`
+        An exception in a thread is raised again here.
         """
         for member in self.members:
             alike = [slice(*block) for block in self.cut.common_states()]

@@ -71,7 +71,8 @@ class AdvectionLimit:
     digits : significant digits of the method's published coefficients, None for exact coefficients
     courant : Courant number of `growth`: as given, otherwise 1 % above the limit (0.5 if the limit is 0)
     growth : growth factor per step, minus 1, of the fastest growing wave at `courant`; 0 where it is stable
-    steps : number of steps in which that wave grows 1000 times
+    steps : number of steps in which that wave grows 1000 times, None without growth
+    For an infinite limit courant and growth are None unless a number is given.
     """
 
     scheme: str
@@ -111,6 +112,7 @@ def advection_limits(
 
     schemes, methods : names, or None for all linear schemes or all methods
     courant : Courant number at which growth is computed, see `AdvectionLimit`
+    Raises FvsolveError for unknown names, and for schemes that are not linear.
     """
     schemes, methods = ([x] if isinstance(x, str) else x for x in (schemes, methods))
     schemes = list(dict.fromkeys(schemes or WEIGHTS))

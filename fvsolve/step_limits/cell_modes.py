@@ -105,7 +105,10 @@ def basin_scalar_modes(model) -> Modes:
 
 
 def greatest_diffusion_rate(mesh) -> float:
-    """Greatest decay rate by diffusion on a mesh, over the diffusivity [1/m2]; no flux passes the boundary."""
+    """Greatest decay rate by diffusion on a mesh, over the diffusivity [1/m2]; no flux passes the boundary.
+
+    It is 0 for fewer than 3 cells.
+    """
     from scipy.sparse import coo_array, diags_array
     from scipy.sparse.linalg import eigsh
 

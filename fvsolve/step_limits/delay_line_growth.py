@@ -52,7 +52,7 @@ def wave_growth(model, method: Method, h: float, span: float) -> tuple[float, st
 
 
 def line_growth_notices(model, method: Method, h: float, span: float) -> list[Notice]:
-    """Notice for the storing node where waves of a delay line grow most; an empty list if they do not grow.
+    """Notice for the storing node where waves of a delay line grow most; an empty list if they grow less than 10 times.
 
     h : step [s]; span : duration of the run [s]
     """
@@ -92,6 +92,8 @@ def lines_at(model, i: int):
 def reflection_factor(method: Method, a: float, steps: float) -> np.ndarray:
     """Complex reflection factor of a storing node for waves with the phases ANGLES (0 to pi) per step : complex[720].
 
+    It is the ratio of the wave that the node sends to the wave sent at the far end at the same time; it includes the
+    delay and the interpolation of the line once.
     a : h k Y of the node, see `storing_nodes`; steps : delay of the line in steps
     """
     solved = np.linalg.solve((np.eye(method.stages) + a * method.a).T, method.b)

@@ -56,7 +56,7 @@ def pressure_and_flow_range(model) -> tuple[float, float]:
 
 
 def states_outside_cells(model) -> np.ndarray:
-    """Numbers of the states outside cells and delay lines: vessels, columns, bodies, devices : int64[k]."""
+    """Numbers of the states outside cells and delay lines: storing nodes, columns, bodies, devices : int64[k]."""
     pipes = model.tables.pipes
     lines = set(pipes["y"][pipes["delay"] >= 0].tolist())
     names = model.state_names.single()

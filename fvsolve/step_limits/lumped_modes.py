@@ -102,7 +102,10 @@ def growth_factor(excess: float, steps: float) -> float:
 
 
 def modes_outside_cells(model) -> Modes:
-    """Eigenvalues [1/s] of the states outside cells at the start, each with the name of the state that moves most."""
+    """Eigenvalues [1/s] of the states outside cells at the start, each with the name of the state that moves most.
+
+    The list is empty for more than 300 such states, and for slopes that are not finite.
+    """
     states = states_outside_cells(model)
     if not 0 < states.size <= MOST:
         return []

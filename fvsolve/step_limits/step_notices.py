@@ -62,7 +62,7 @@ def step_limits(
 
     rates : greatest wave rate of each basin in the run so far, by name [1/s]; default: the initial rates
     step_error : greatest mean error of a state, relative to its range (`solve.step_doubling`); None before a run
-    run_data : data of a run, used to compute the initial rates and reset afterwards
+    run_data : data of a run, used for the initial rates as in `first_step`
     The list is empty under error control. For implicit methods it contains only the notice on delay lines.
     """
     numerics = model.case.numerics
@@ -146,8 +146,8 @@ def pipe_checks(model, method: str) -> list[CourantCheck]:
     """Check of the pipe whose step is the worst, as a list; empty if waves do not grow enough in any checked pipe.
 
     Checks that are not `only_doubtful` come first, then the greatest ratio of Courant number to limit. All pipes of few
-    cells are checked, and the one longer pipe with the greatest Courant number. The Courant number of the check may be
-    below its limit.
+    cells are checked by `short_pipe`, and of the longer pipes the one with the greatest Courant number by `long_pipe`.
+    The Courant number of the check may be below its limit.
     """
     own = model.tables.pipes["delay"] < 0  # pipes divided into cells
     if not own.any():
@@ -173,7 +173,8 @@ def pipe_checks(model, method: str) -> list[CourantCheck]:
 def long_pipe(model, method: str, k: int, courant: float) -> list[CourantCheck]:
     """Check of pipe number k as a grid without ends, as a list.
 
-    The list is empty if no wave grows at the Courant number, or if waves grow less than 10 times in the run.
+    The list is empty if no wave grows at the Courant number nor 1 % above it. If waves grow at every Courant number, it
+    is also empty if they grow less than 10 times in the run.
     """
     scheme = smooth_scheme(model.case.numerics.scheme)[0]
     if is_stable_with_margin(scheme, method, courant):
@@ -193,7 +194,10 @@ def proved(model) -> bool:
 
 
 def short_pipe(model, method: str, k: int, courant: float) -> CourantCheck | None:
-    """Check of pipe number k, of few cells; None if waves with reflections at its ends do not grow in the run."""
+    """Check of pipe number k, of few cells; None if waves with the worst reflections grow less than 10 times in a run.
+
+    The growth of the check is that with the reflections at the ends of this pipe, if the scheme has no limiter.
+    """
     cells, own_scheme = model.pipes[k].cells, SCHEMES[model.case.numerics.scheme]
     scheme, limited = smooth_scheme(
         own_scheme.shorter if own_scheme.limited and own_scheme.shorter else own_scheme.name
@@ -212,7 +216,8 @@ def short_pipe(model, method: str, k: int, courant: float) -> CourantCheck | Non
 def reflection_products(model, k: int) -> tuple[float, ...]:
     """Possible products of the pressure reflection factors of both ends of pipe number k.
 
-    An end joined to other parts than pipes has two possible factors: that of the pipes alone and -1 (open end).
+    A junction joined to valves too has two possible factors: that of the pipes alone and -1 (open end). Any node other
+    than a junction has -1.
     """
     row, nodes, valves = model.tables.pipes[k], model.tables.nodes, model.tables.valves
     ends = []
@@ -225,7 +230,7 @@ def reflection_products(model, k: int) -> tuple[float, ...]:
 
 
 def basin_checks(model, method: str, rates: dict[str, float]) -> list[CourantCheck]:
-    """Checks of all basins whose waves grow.
+    """Checks of all basins whose waves grow; under methods that allow no Courant number at least 10 times in the run.
 
     rates : greatest wave rate of each basin in the run so far, by name [1/s]
     Courant numbers and limits refer to the rate that limits the steps of a basin. This rate is the wave rate times the

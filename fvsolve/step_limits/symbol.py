@@ -24,7 +24,7 @@ def weights_of(scheme: str) -> Weights:
     """Five weights of a linear scheme in the value at the outflow face of a cell.
 
     They belong to the cells from two upstream to two downstream of this cell. Raises FvsolveError for a nonlinear
-    scheme.
+    scheme and for an unknown name.
     """
     if scheme in WEIGHTS:
         return WEIGHTS[scheme]

@@ -9,7 +9,7 @@ from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import method_named
 
 EXPLICIT, IMPLICIT, TIGHT_IMPLICIT = "dormand-prince", "rodas-5p", "radau-iia-5"
-TIGHT_BELOW = 1e-6  # rtol below which TIGHT costs less: `benchmarks/stiff.py auto`
+TIGHT_BELOW = 1e-6  # rtol below which TIGHT_IMPLICIT costs less: `benchmarks/stiff.py auto`
 # Cost of factorisation and solves of a step, in rhs calls: DENSE times the number of states squared; SPARSE in total.
 DENSE_COST, SPARSE_COST = 0.05, 40.0
 

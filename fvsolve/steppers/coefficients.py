@@ -2,8 +2,8 @@
 
 The array holds A (s x s), b, c and the weights of the error estimate, for s stages. For fully implicit methods the data
 of their Newton iterations follow (`newton_transform.py`), and last the result of `start_slope_correction` and its
-length. An implicit method whose first stage is not the rate f at the start of the step gets this rate as an extra first
-stage with weight zero.
+length. If the first stage of an implicit method is not the rate f at the start of the step, this rate is an extra
+first stage with weight zero.
 """
 
 from __future__ import annotations
@@ -24,8 +24,9 @@ def coefficients(method: Method, damped: bool = False) -> tuple[np.ndarray, np.n
 
     The flat coefficients are listed at the top of this file, those of Rosenbrock methods in `Rosenbrock.coefficients`.
     The stages include the start of the step as an explicit stage where the method is implicit.
-    damped : True for `semi_implicit`, which stores the rates at the start in addition to the rates of its first stage
-    Raises FvsolveError if A, without an explicit first stage, is singular or has no basis of eigenvectors.
+    damped : True for `semi_implicit`, which stores the rates at the start in addition to the rates of its first stage.
+    Raises FvsolveError if A of a fully implicit method is singular or has no basis of eigenvectors; an explicit first
+    stage is left out of A.
     """
     if method.kind == "linear":
         return method.coefficients
@@ -54,8 +55,8 @@ def start_slope_correction(method: Method) -> np.ndarray:
 
     The collocation polynomial p(theta) does not have the slope f of the solution at the start. The polynomial
     p + h psi(theta) (f - p'(0)) has this slope, with the nodes c_i and psi = integral from 0 to theta of
-    prod (x - c_i) / prod (-c_i). It has the same slopes at the stages and, from two stages on, the same end, as
-    psi(1) = 0; its order is one higher.
+    prod (x - c_i) / prod (-c_i). It has the same slopes at the stages, and its order is one higher. For two or more
+    Radau nodes it has the same end, as psi(1) = 0.
     Returns the weights of the stages in p'(0), then the coefficients of psi; an empty array for other methods.
     """
     c, dense = method.c, method.dense

@@ -158,7 +158,8 @@ def attempt(
 ):  # fmt: skip
     """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
-    The error is 0 unless the step is under error control, and NEWTON_FAILED if Newton fails with a fresh Jacobian too.
+    The error is 0 unless the step is under error control, and NEWTON_FAILED if simplified and damped Newton fail with a
+    fresh Jacobian.
     structure : flat array of `Structure.shape`; factor, solve : its functions for real shifts (`Structure.functions`)
     work : header of `loop_indices`, Jacobian and work space, kept between steps
     vectors : float64[rows, n]  data of the last step and work space, listed in `newton`

@@ -31,7 +31,8 @@ def attempt(
 ):  # fmt: skip
     """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
-    The error is 0 unless the step is under error control.
+    The error is 0 unless the step is under error control. If controls[WATCH] is set, the spectral radius is written to
+    `loop_state`.
     t, h : start and length of the step; rhs(t, y, dydt, out, handle) : function for the rates f
     y : float64[4, n]  states, y[3] is work space; k : float64[s, n]  rates at the stages
     ledger_rates : float64[s, m]  receives out[ledger_offset : ledger_offset + m] at the stages

@@ -55,9 +55,9 @@ def locate(
 ):  # fmt: skip
     """Shorten a step so that it ends just past the first event, by the Illinois rule; returns its length and error.
 
-    h, e : length and error of the full step; y[new] receives the end of the shortened step
+    h, e : length and error of the full step; y[new] and g_new receive the values at the end of the shortened step
     g, g_new : float64[events]  values of the event functions at the start and the end of the step
-    attempt, events : step of the method, event functions; other arguments as for `erk.attempt`
+    attempt, events : step of the method, event functions; other arguments as for `erk.attempt` and `dirk.attempt`
     The error is NEWTON_FAILED if a stage could not be solved, or if an event function jumps over zero in an implicit
     step (Newton) of given length: then the stages of the step have several solutions, those of a shorter step only one.
     """

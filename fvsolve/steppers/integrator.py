@@ -23,7 +23,7 @@ class Integrator:
     n : number of states
     ledgers : number of rates (such as inflows of nodes) that are integrated in addition to the states
     structure : function without arguments that returns the structure of the Jacobian, used for implicit methods only
-    scale : float64[n]  reference size of small deviations of each state
+    scale : float64[n]  reference size of small deviations of each state; negative: see `error_scale`
     damped : True for semi-implicit stages, see `semi_implicit`
     """
 
@@ -132,7 +132,7 @@ class Integrator:
             reset(self.work)
 
     def restart_arrays(self) -> list[np.ndarray]:
-        """Views of all arrays on which the next step depends, except t and y."""
+        """Views of all arrays of this object on which the next step depends, except the states y."""
         views = [self.loop_state, self.ledger, self.carry]
         if self.restart_size:  # header and Jacobian; f at the start of the last step, and its stages
             views += [self.work[: self.restart_size], self.vectors[self.k.shape[0]], self.k]
@@ -158,7 +158,8 @@ class Integrator:
     def single_step(self, rhs, handle, ledger_offset: int, t: float, h: float, y: np.ndarray) -> np.ndarray:
         """State after a single step of length h from state y at time t; NaN if its stages cannot be solved.
 
-        The step does not depend on earlier steps, except that Newton iterations use the stored Jacobian.
+        It is for an object whose time loop has not run (`call`): then the step depends on earlier single steps only
+        through the stored Jacobian of Newton iterations. Changes `y`, `k` and `loop_state`.
         rhs, handle : compiled right-hand side and its argument; ledger_offset : index of the first ledger rate in `out`
         """
         self.y[0] = y

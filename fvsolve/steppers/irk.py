@@ -134,7 +134,7 @@ def factor_blocks(factor, factor_complex, structure, coefficients, s, h, work, f
     """Factor shift I - J for every block (real or complex shift) of L / h, and store the factors one after another.
 
     L : block diagonal matrix of `newton_transform.transformed`; J : Jacobian; n : number of states
-    Returns the number of factors, or 0 if a pivot is zero. Other arguments as for `attempt`.
+    Returns the number of factors, or 0 if a block has no good pivot. Other arguments as for `attempt`.
     """
     q, blocks, b, real, pair, count = s - 1, matrix(coefficients, s, BLOCKS), 0, 0, n, 0
     jacobian, size = work[HEADER:], int(work[FACTOR_SIZE])
@@ -380,7 +380,8 @@ def attempt(
 ):  # fmt: skip
     """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
-    The error is 0 unless the step is under error control, and NEWTON_FAILED if Newton fails with a fresh Jacobian too.
+    The error is 0 unless the step is under error control, and NEWTON_FAILED if Newton with a fresh Jacobian and the
+    sweeps of `stage_sweeps` fail.
     factor_complex, solve_complex, complex_factors : linear algebra and factors for complex shifts
     Other arguments as for `dirk.attempt`.
     """

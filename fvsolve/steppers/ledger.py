@@ -58,6 +58,7 @@ def amount_and_rate(theta, total, r0, r1, m, ledger_rates, dense):
 def smaller_side(total, r0, r1, m, ledger_rates, dense):
     """Size of the smaller of inflow and outflow in a step in which rate number m changes its sign, divided by the step.
 
+    It is 0 if the rate of the dense output has the same sign at both ends.
     Arguments as for `amount_and_rate`.
     """
     low, high = 0.0, 1.0

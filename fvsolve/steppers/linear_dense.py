@@ -1,6 +1,6 @@
-"""Dense LU factors of shift I - J with partial pivoting, row by row, for a few dozen states at most.
+"""Dense LU factors of shift I - J with partial pivoting, row by row, for few states, or where sparse factors fill up.
 
-The array `factors` holds the rows of L and U, with 1 / U_ii on the diagonal, then the original row of each pivot.
+The array `factors` holds the rows of L and U, with 1 / U_ii on the diagonal, then the row exchanged at each pivot.
 """
 
 import numpy as np

@@ -17,7 +17,7 @@ from fvsolve.steppers.structure import SOLVER_DATA
 BLOCKS, ORDER, L_STARTS, L_COLUMNS, U_STARTS, U_COLUMNS, J_STARTS, J_PLACES, J_ENTRIES = range(9)
 PARTS = 9
 LEAST_DETERMINANT = (
-    1e-13  # least determinant of a diagonal block, relative to its value before elimination and to its two terms
+    1e-13  # least determinant of a diagonal block, relative to the sizes of its two products, see `factor`
 )
 
 

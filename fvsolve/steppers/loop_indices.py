@@ -1,6 +1,6 @@
 """Indices into the flat arrays of the time loop: its state, its controls, its progress within a step."""
 
-# loop_state : float64[MEMORY], stored by a restart
+# loop_state : float64[LOOP_STATE_SIZE], stored by a restart
 T, STEP, T_MARK, N_MARK, ERROR_OLD, NEXT_OUTPUT, NEXT_FIELD, STEPS, REJECTIONS, CALLS, LAST, UNBOOKED = range(12)
 JACOBIANS, FACTORS, NEWTON, NEWTON_FAILURES, WORST, RADIUS, SWITCH_COUNT, SWITCHES = range(12, 20)
 # Rest of a given step that is taken in parts [s], and the number of such steps.
@@ -11,7 +11,7 @@ COUNTS = {
     "newton": NEWTON, "newton_failures": NEWTON_FAILURES,
     "parted": SPLIT_STEPS,
 }  # fmt: skip
-# controls : float64[ORDERS], set before each call
+# controls : float64[CONTROLS_SIZE], set before each call
 START, END, EVERY, FIELD_EVERY, CONTROL, SIZE, STEP_MAX, BUDGET, FIELD_COUNT, STOP_AT, ALLOW_FUSED = range(11)
 # Power of h of the error estimate; 1 where the last stage is the first stage of the next step; kind of step; 1 for the
 # stiffness test, and the cost of an implicit step in explicit steps; source of rows with and without error control.

@@ -68,6 +68,8 @@ def reset(work: np.ndarray) -> None:
 def begin(k, y, scale, controls, loop_state, work, vectors):
     """Prepare the first attempt of a step: store the last stages for prediction, discard a slow Jacobian.
 
+    The weights of increments, 1 over the tolerance of each state, are written to `vectors`. Repeated attempts change
+    nothing.
     A Jacobian is slow if the greatest ratio of successive Newton increments in the last step was above STALE.
     Arguments as for `dirk.attempt`; y : state at the start of the step.
     """
@@ -152,8 +154,8 @@ def damping_factor(part, ahead, size):
     """Damping factor of an increment after a trial with the factor `part`; it equals `part` if the trial is accepted.
 
     ahead, size : results of `next_increment` for the next increment, computed with the same Jacobian factors
-    The trial is accepted if the next increment is shorter or 0 <= ahead <= 1. If the next increment is reversed, the
-    factor follows from the secant rule (natural monotonicity: Deuflhard 2004, 3.3).
+    The trial is accepted if the next increment is at most 1 - part / 4 times as long, or if 0 <= ahead <= 1. If the
+    next increment is reversed, the factor follows from the secant rule (natural monotonicity: Deuflhard 2004, 3.3).
     """
     if not size < np.inf:
         return 0.25 * part
@@ -206,7 +208,7 @@ def convergence(turn, size, before, controls, work):
     """(True to stop after Newton iteration `turn`, CONVERGED or FAILED).
 
     size, before : norms of this and of the previous increment, in units of the tolerance
-    controls, work : as for `dirk.attempt`
+    controls, work : as for `dirk.attempt`; the ratio of increments and its factor are stored in `work`
     """
     enough, rounded = stop_limits(controls)
     if not size < np.inf:
@@ -263,6 +265,7 @@ def damped_newton(
 ):  # fmt: skip
     """Solve stage i, k[i] = f(t, base + h_gamma k[i]), by damped Newton, with a new Jacobian for every iterate.
 
+    The iteration starts from k[i].
     t : time of the stage; base : state from earlier stages, in `vectors`
     h_gamma : step times the diagonal coefficient of the method; nnz : number of Jacobian entries
     Returns CONVERGED or FAILED. Other arguments as for `dirk.attempt`.
@@ -374,9 +377,9 @@ def smoothed_error(
 ):  # fmt: skip
     """Error of a step that damped Newton has solved, in units of the tolerance.
 
-    It is the norm of (I - J / shift)^-1 h sum e_j k_j with the Jacobian J at the start of the step and the weights e_j
-    in `error`. The matrix reduces the error of stiff components (Hosea and Shampine 1996). If it reverses the error,
-    because J jumps, the unfiltered error is used. Returns NEWTON_FAILED if the matrix is singular.
+    It is the norm of (I - J / shift)^-1 h sum e_j k_j. J is the Jacobian at the start of the step, and `error` contains
+    the weights e_j. The matrix reduces the error of stiff components (Hosea and Shampine 1996). If it reverses the
+    error, because J jumps, the unfiltered error is used. Returns NEWTON_FAILED if the matrix is singular.
     y, y_new : states at the start and the end of the step; other arguments as for `dirk.attempt`
     """
     s, n = k.shape

@@ -34,13 +34,13 @@ def integrate(
     f : f(t, y) -> float64[n], or f(t, y, dydt), which fills its last argument; compiled if numba can compile it
     method : a name, a tableau, or "auto": explicit while stability allows it, implicit where that is cheaper
     rtol : relative tolerance for methods with an error estimate; default 1e-6
-    atol : absolute tolerance, a number or float64[n]; default: equal to rtol
+    atol : absolute tolerance, a number or float64[n]; default: equal to rtol; not used under `step`
     step : fixed step [s], possible with every method except "auto"
     counts : dict that receives the numbers of steps, rejections, rhs calls, Jacobians, factorisations and so on
     Values at the times t come from dense output if it is accurate enough. Otherwise steps end there under `rtol`, and
     separate steps lead there under `step`.
-    Raises FvsolveError for two step settings, a method without an error estimate and without a step, times that do not
-    rise, a solution that does not stay finite, and Newton iterations that do not converge.
+    Raises FvsolveError for invalid arguments, two step settings, a method without an error estimate and without a step,
+    times that do not rise, a solution that does not stay finite, and Newton iterations that do not converge.
     """
     automatic_choice = isinstance(method, str) and method == AUTO
     if automatic_choice and step is not None:
@@ -141,6 +141,7 @@ def _numbers(name, given) -> np.ndarray:
 def _scale(atol, rtol: float, n: int) -> np.ndarray:
     """Size that is added to the size of each state in its error tolerance, atol / rtol : float64[n].
 
+    Raises FvsolveError for a wrong shape and for numbers that are not positive.
     n : number of states
     """
     atol = _numbers("atol", atol)
@@ -150,7 +151,10 @@ def _scale(atol, rtol: float, n: int) -> np.ndarray:
 
 
 def _check_rates(f, t, y0) -> None:
-    """Call f once and check the number of its values, because compiled code does not check it."""
+    """Call f(t, y) once and check the number of its values, because compiled code does not check it.
+
+    A function f(t, y, dydt) is not called. Raises FvsolveError for a wrong number.
+    """
     if not in_place(f):
         given = f(t, y0.copy())
         count = 0 if given is None else np.size(given)
@@ -217,7 +221,7 @@ def _no_events(t, y, handle, g):
 
 
 def in_place(f) -> bool:
-    """True if f has three parameters without default, (t, y, dydt), and fills the last of them."""
+    """True if f has exactly three parameters without default; then it is f(t, y, dydt), which fills dydt."""
     parameters = inspect.signature(getattr(f, "py_func", f)).parameters.values()
     return sum(parameter.default is inspect.Parameter.empty for parameter in parameters) == 3
 

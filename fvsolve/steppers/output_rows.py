@@ -90,7 +90,7 @@ def limit_to_bounds(states, bounds, y_old, y, out):
     states : int64[3 q]  for each bounded state its number and the numbers of up to two states for its reference amount,
     -1 for none, see `reference_amount`
     bounds : float64[q, 4]  base and gain of the reference amount, least and greatest ratio of the state to this amount;
-    greater ratios at the start or end of the step widen these limits
+    ratios outside this range at the start or end of the step widen it
     y_old, y : states at the start and the end of the step; out : interpolated state, which is changed
     """
     for r in range(bounds.shape[0]):
@@ -159,6 +159,8 @@ def emit(
     """Write the output rows due up to the present time; returns a code of `loop_indices`.
 
     DONE : all rows are written; FIELD : a field frame is due, its state is in y_out; ROWS_FULL : `rows` has no space
+    Rows from controls[STOP_AT] on are not written. Where a separate step cannot be solved, its row is interpolated
+    linearly.
     t_old : time of the last state; now, old : rows of the present and the last state in y
     f_old, f : rates of the last and the present state; start_slope : result of `start_slope_correction`
     Other arguments as for `time_loop.run_steps`.

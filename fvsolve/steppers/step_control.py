@@ -43,7 +43,7 @@ COUNT_DECREASE = 0.4  # decrease of the count by a step that stability does not 
 CLOSING_FRACTION = 0.15
 APPROACH = 0.95  # fraction of the rest of a segment that the second-last step takes
 HUGE = 1e308  # a time that is never reached [s]
-DEAD_BAND = 1.2  # an implicit step that may grow by a smaller factor keeps its length, and so its factorisation
+DEAD_BAND = 1.2  # a step solved by Newton that may grow by a smaller factor keeps its length, and so its factorisation
 
 
 @njit(forceinline=True)
@@ -73,7 +73,8 @@ def first_step(k, scale, controls, loop_state):
 def next_step(controls, loop_state, out_rate, k, scale):
     """Length of the step to try [s], without regard to the end of the segment; out_rate : greatest wave rate [1/s].
 
-    k, scale : rates and sizes of the states, for `first_step`; controls, loop_state : see `loop_indices`
+    k, scale : rates and sizes of the states, for `first_step`
+    controls, loop_state : see `loop_indices`; a first step, and a new given step with its start, are stored there
     """
     if controls[CONTROL] == TOLERANCE:
         if too_short(controls, loop_state, loop_state[STEP]):  # no step is stored, or it does not change the time
@@ -106,7 +107,7 @@ def approaches(controls, loop_state, rest):
 
 @njit(forceinline=True)
 def row_step_end(controls, loop_state, due, h):
-    """Time [s] of an output row at which a step of length h under error control has to end; 1e308 if no row is due.
+    """Time [s] of an output row at which a step of length h under error control has to end; 1e308 without such a row.
 
     due : time of the next row [s]
     """
@@ -140,6 +141,7 @@ def end_of(controls, loop_state, h, last, due):
 def closing_step(loop_state, closing, h, least):
     """Length of the next step [s]: the given step h, or a part of it if an opening closes fast within it.
 
+    A step that is divided is stored as SPLIT_REMAINDER in `loop_state`, and counted.
     closing : relative rate -x'/x of the closing opening x [1/s]; least : least length of a part [s]
     """
     if h * closing <= CLOSING_FRACTION or h <= 2.0 * least:
@@ -152,7 +154,10 @@ def closing_step(loop_state, closing, h, least):
 
 @njit(forceinline=True)
 def arriving_step(controls, loop_state, arrives, h):
-    """Length of the next step [s]: h, or its part up to the time `arrives` [s] at which a jump of a wave arrives."""
+    """Length of the next step [s]: h, or its part up to the time `arrives` [s] at which a jump of a wave arrives.
+
+    A given step that is divided is stored as SPLIT_REMAINDER in `loop_state`.
+    """
     rest = arrives - loop_state[T]
     if not 0.0 < rest < h * (1.0 - 1e-9):
         return h
@@ -187,9 +192,10 @@ def watch(controls, loop_state, h, e, out_rate):
     """Count the steps for which the other kind of method (explicit or implicit) would have been cheaper.
 
     Returns True if there are enough such steps to change the method. An implicit method would be cheaper if stability
-    limits the explicit step (Hairer and Wanner 1996, IV.2) by more than the cost ratio of an implicit step. An explicit
-    method would be cheaper if its steps within the stability boundary cost less than half.
-    h, e : length and error of the step; out_rate : greatest wave rate [1/s]
+    limits the explicit step (Hairer and Wanner 1996, IV.2). Where the greatest wave rate is known, the error must also
+    allow a step longer by more than the cost ratio of an implicit step. An explicit method would be cheaper if its
+    steps within the stability boundary cost less than half. Writes SWITCH_COUNT and RADIUS in `loop_state`.
+    h, e : length and error of the step; out_rate : greatest wave rate [1/s], 0 if not known
     """
     if controls[KIND] == EXPLICIT:
         growth = 0.9 * max(e, 1e-30) ** (-1.0 / controls[ORDER])
@@ -207,7 +213,7 @@ def watch(controls, loop_state, h, e, out_rate):
 
 @njit(forceinline=True)
 def retains_length(controls, grow):
-    """True if an implicit step keeps its length, and so its factorisation: it could grow by a factor of 1.2 at most.
+    """True if a step solved by Newton keeps its length, and so its factorisation: it may grow by a factor of 1 to 1.2.
 
     grow : factor by which the error would allow the step to grow
     """

@@ -96,7 +96,8 @@ def start_slope_defect(begin, end, start_slope, k, slope, known, out):
 def interpolate(begin, end, theta, h, y, f, y_new, f_new, k, dense, start_slope, out):
     """out <- state at t + theta h within a step, for the states from `begin` to `end` - 1 (dense output).
 
-    It is the method's own polynomial, or the Hermite cubic with values y, y_new and slopes f, f_new at both ends.
+    It is the method's own polynomial with f in place of k[0], or the Hermite cubic with values y, y_new and slopes
+    f, f_new at both ends.
     k : rates at the stages; dense : coefficients of the dense output, empty for the cubic
     start_slope : result of `start_slope_correction`; if it is not empty, f is the result of `start_slope_defect`
     """

@@ -34,7 +34,7 @@ class Structure:
 
     pattern : bool[n + m, n]  sparse by columns: rows of n states, then of m ledger rates, which are not factored
     kind : "dense", "banded" or "sparse"; default: chosen by the size and the density of the pattern
-    fine : numbers of the states whose increments in finite differences are smaller than usual
+    fine : numbers of the states whose increments in finite differences are smaller than usual.
     Raises FvsolveError for another kind and for a pattern with fewer rows than columns.
     """
 

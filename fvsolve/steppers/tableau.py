@@ -46,7 +46,7 @@ class Method:
     """A Runge-Kutta method with step h and s stages k_i: equations (14) and (23) of docs/course.md.
 
     k_i = f(y + h sum_j a_ij k_j, t + c_i h), y+ = y + h sum_i b_i k_i.
-    All properties except name, source and text are derived on first use:
+    All properties except the fields, which are arguments of `tableau`, are derived on first use:
     a, b, c : float64[s, s], float64[s], float64[s]  Butcher array
     error : float64[s] or empty  weights of the stages in the difference of y+ and the embedded solution
     start_error : weight of f(t, y) at the start of the step in this difference
@@ -68,7 +68,7 @@ class Method:
 
     @functools.cached_property
     def digits(self) -> int | None:
-        """Number of significant digits in the published coefficients; None if they are exact."""
+        """Number of significant digits in the published coefficients; None if they are exact, as with six at most."""
         count = self.given_digits or digits(self.text)
         return count if count > EXACT_DECIMALS else None
 
@@ -182,13 +182,15 @@ def tableau(
     In place of the text: the matrix A, s x s, with b and c as numbers
     b : s weights, or two rows of weights, the second for the embedded solution
     c : s times of the stages; default: the sums of the rows of A. Integers and fractions are exact; floating-point
-    numbers count as rounded in their last digit
+    numbers count as their shortest decimals, see `digits`
     source : origin of the coefficients; dense : coefficients of the dense output, see `Method`
     start_weight : weight of f(t, y) at the start of the step in an embedded solution that integrates polynomials
     numbers : names for irrational numbers, such as `{"g": ("x^3-3x^2+3x/2-1/6", 0.4358665215)}`: the root of the
     polynomial that is nearest to the given value
-    digits : significant digits of the entries; default: decimals of more than six digits are rounded, others exact
-    Raises FvsolveError with all faults: rows of wrong length, rows that do not add up to c, invalid entries.
+    digits : significant digits of the entries, by default the greatest number in any decimal; up to six digits all
+    entries count as exact, above as rounded in the last digit
+    Raises FvsolveError for an empty or built-in name, and with all faults of the array: rows of wrong length, rows that
+    do not add up to c, invalid entries.
     """
     if name in BUILT_IN or name == "auto" or not name.strip() or name != name.strip():
         raise FvsolveError(f'method name "{name}" is not free: it is empty, has blanks at an end or names a built-in '
@@ -209,7 +211,7 @@ def tableau(
 def method_of_file(path: Path) -> Method:
     """Define the method whose tableau a text file contains; its name is the file name without its ending.
 
-    Raises FvsolveError for a file that is not a tableau, and for a name that another method has.
+    Raises FvsolveError for a file that is not a tableau, and for a name that a different method has.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -341,7 +343,7 @@ def _mixed_roots(rows: list) -> list[str]:
 
 
 def _faults(head: list, weights: list, rounding: Fraction) -> list[str]:
-    """Texts of the faults of a tableau: rows of wrong length or wrong sum.
+    """Texts of the faults of a tableau: rows of wrong length or wrong sum, a wrong number of rows of weights.
 
     head, weights : results of `_rows`; rounding : relative error of a coefficient
     """

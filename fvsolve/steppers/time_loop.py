@@ -159,6 +159,7 @@ def run_steps(
     The caller handles the reason and calls the function again with the same arrays.
     attempt : step of the method; rhs(t, y, dydt, out, handle) : rates dydt and other results `out` of the model; with
     an empty dydt it computes only `out`, which is enough for an output row
+    observe, record : functions for the probes of an output row, and for each accepted state; events : event functions
     fused_step(t, h, y, y_new, out, handle, values) : complete step of a one-stage method that ends at t, with `out` and
     the record of its end; used if controls[ALLOW_FUSED] allows it and no output row is due
     join(sums, row_blocks, handle) : exchange of partial sums between bands that are stepped in parallel

@@ -177,7 +177,7 @@ def field_deviations(run: Outcome, truth) -> dict[tuple, Deviation]:
     The range of a pressure in a pipe is that over the run; the range of its flow is this range times A / (rho a), with
     area A, density rho and wave speed a. The range of a quantity in a basin is that over the cells at the end; flows
     along x and y both have the greater of their two ranges. All ranges are those of the `Reference` truth; ranges of
-    pipes are nan if it does not know them. Basins that it does not contain are left out.
+    pipes that are not in its `spans` are nan. Basins without values in the reference are left out.
     """
     model, deviations = run.model, {}
     reference_fields = truth.fields(model) if model.pipes or model.basins else {}

@@ -24,7 +24,7 @@ def has_diverged(reason: str) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """Outcome of a run, in SI; the outcome of a refused case has only a reason.
+    """Outcome of a run, in SI; the outcome of a refused case has only `refused` and a reason.
 
     reason : reason of the end of the run, or of the refusal; ok : True if the run reached its end
     t : time of the last state [s]; y : float64[n]  last state

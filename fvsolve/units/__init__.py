@@ -27,7 +27,7 @@ _NUMBER = re.compile(r"\s*([+-]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*
 def parse(given: Any, dimension: str) -> Any:
     """SI value of a bare number, or of text with a number and a unit.
 
-    For a pressure the result is (value, True if the unit is a gauge unit).
+    For the dimensions "pressure" and "gauge_pressure" the result is (value, True if the unit is a gauge unit).
     For a kinematic viscosity, where `dimension` is "viscosity", it is a `Kinematic` [m2/s].
     Raises ValueError with the text found, the dimension expected and a suggestion.
     """
@@ -53,9 +53,10 @@ class Kinematic(float):
 
 
 def find(spelling: str, dimension: str, number: str = "") -> Unit:
-    """Unit with a given spelling that measures `dimension`.
+    """Unit with a given spelling that measures `dimension`; for "viscosity" also a unit of kinematic viscosity.
 
-    Raises ValueError with a suggestion if the spelling is unknown, or belongs to a unit of another dimension.
+    Raises ValueError with a suggestion if the spelling is unknown, or belongs to a unit of another dimension, or to a
+    gauge or absolute unit where the dimension does not allow it.
     number : text of the number before the unit, for the message
     """
     if len(spelling) > LONGEST:  # pint would take minutes to read it

@@ -230,8 +230,8 @@ class Physics(Table):
     ) -> dict[str, Any]:
         """State of a patch at rest: "elevation" [m], "depth" of water [m] and "pressure" [Pa] -> value.
 
-        Depth and pressure are means over the cells behind the patch; None for a quantity that the equations do not
-        have.
+        Depth and pressure are means over the cells behind the patch. A value is None for a quantity that the equations
+        do not have, and for an elevation that is not stated.
         mean : function from a formula to its means over all cells
         cells : numbers of the cells behind the patch; area : areas of all cells [m2]
         """

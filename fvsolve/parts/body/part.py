@@ -195,7 +195,7 @@ class Joint(Table):
 
     @property
     def centre_velocity(self) -> np.ndarray:
-        """Velocity of the centre of mass of a free body at the start [m/s] : float64[3]."""
+        """Velocity of the centre of mass of a free body at the start [m/s], in axes of the world : float64[3]."""
         return np.array(self.velocity or (0.0, 0.0, 0.0))
 
 

@@ -1,8 +1,8 @@
 """A check valve that shuts at a reverse velocity given by its manufacturer's curve.
 
 It is OPEN, or REVERSED (the flow has reversed and the valve is still open), or SHUT. The flags armed[event] to
-armed[event + 2] mark the mode and change on accepted states only. From the reversal on, two states store the reverse
-velocity at which the valve shuts [m/s] and the deceleration of the flow at the reversal [m/s2].
+armed[event + 2] mark the mode and change on accepted states only. While it is REVERSED, two states store the reverse
+velocity at which the valve shuts [m/s] and the deceleration of the flow at the reversal [m/s2]; otherwise they are 0.
 """
 
 from fvsolve.jit import njit
@@ -52,8 +52,9 @@ def events(t, y, out, tables, device, g):
 
     The function of the present mode is minus the margin left in this mode; that of a mode that may follow is the
     margin.
-    The margin is the velocity left until the flow reverses or the valve shuts [m/s], or the drop left until it opens
-    [Pa].
+    The margin is the velocity left until the flow reverses, is forward again, or the valve shuts [m/s].
+    Of a shut valve it is the drop left until it opens [Pa]; of an open valve at a junction without flow, it is the drop
+    plus PRESSURE_MARGIN [Pa].
     The last function is the last deceleration of the curve minus that at the reversal [m/s2].
     """
     k, at, data, o, present = (

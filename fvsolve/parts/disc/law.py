@@ -79,14 +79,14 @@ def lead(t, y, tables, device, before, behind, drop, ahead):
 
 @njit
 def lift_rate_slope(tables, device):
-    """Derivative [1/s/Pa] of the rate of the lift dx/dt by the lifting pressure; 0 for a disc with inertia."""
+    """Derivative [1/s/Pa] of the rate of the lift dx/dt by the lifting pressure; 0 unless the disc has a lag."""
     floats, data = tables.floats, device["data"]
     return 1.0 / (floats[data + TIME_CONSTANT] * floats[data + SPAN]) if device["states"] == 1 else 0.0
 
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    """Write the rates of lift and speed of the disc to `dydt`, 0 at a stop, and raise out[RATE] to its rate limit.
+    """Write the rates of lift and speed of the disc to `dydt`, 0 at stop and seat; raise out[RATE] to its rate limit.
 
     While the disc closes on a rigid column, out[CLOSING] is raised to -x'/x, with the lift x. A column that flows back
     slams the disc, with x ~ (time left)^(1/3), and a time step must not pass that instant.
@@ -133,6 +133,8 @@ def events(t, y, out, tables, device, g):
 
     They are the distances of the lift from the stop and from the seat, and from the lift at which the disc stops
     controlling a rigid column, or begins to.
+    While the disc rests there, the distance from stop or seat is replaced by the drive away from it, minus STOP_MARGIN.
+    The drive is the target minus the lift on the seat, and its negative at the stop.
     """
     armed, at, o = tables.armed, device["event"], device["y"]
     x, drive = disc_lift(y, tables, device), disc_drive(y, out, tables, device)

@@ -1,6 +1,7 @@
 """Bore, wall, roughness and allowable pressure of a pipe from its material and class.
 
-Values of the case file take precedence; the key `source` lists the sources of all other values.
+Values of the case file take precedence. The key `source`, if it is not given, lists the sources of all other values,
+except those of steel schedules.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ WALL_KEYS = ("youngs_modulus", "poisson_ratio")
 
 
 def from_catalogue(given: dict[str, Any]) -> dict[str, Any]:
-    """Table of a pipe, completed with the data of its material and class; raises ValueFault with all faults."""
+    """Table of a pipe, completed with the data of its material and class; raises ValueFault at the first fault."""
     name = given.get("material")
     material = materials().get(name) if isinstance(name, str) else None
     if material is None and "class" not in given and "lining" not in given:
@@ -116,6 +117,7 @@ def _add_wall(table: dict[str, Any], sources: list[str], material: Material) -> 
     """Add Young's modulus and Poisson's ratio of the material to the wall of a pipe, if they are not given.
 
     sources : list to which the sources of these values are appended
+    Do nothing if the wave speed is given; otherwise raise ValueFault if the wall thickness is missing.
     """
     wall = table.get("wall", {})
     if "wave_speed" in table or not isinstance(wall, dict):

@@ -112,7 +112,8 @@ def check_slope(profile: Profile) -> None:
 def from_lists(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """(columns, table): arrays of the points by key [m], read from lists of equal length, and the same lists in SI.
 
-    setting : context for reading. Raises ValueFault with all faults.
+    setting : context for reading
+    Raises ValueError if a list is missing (see `columns_among`), otherwise ValueFault with all faults.
     """
     keys = columns_among(list(given), "keys")
     columns, faults = {}, [((key,), f"unknown key; expected {' and '.join(keys)}") for key in given if key not in keys]

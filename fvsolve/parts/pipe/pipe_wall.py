@@ -125,6 +125,7 @@ class Restraint(Value):
 def restraint_factor(restraint: str | float | None, bore: float, wall: Wall) -> float:
     """Factor c of the growth of the bore area A with pressure, dA / A = c D / (E e) dp; 1 without a restraint.
 
+    restraint : the factor itself, or one of `RESTRAINTS`
     D : bore, E : Young's modulus, e : thickness, nu : Poisson's ratio of the wall
     For a thin wall (D/e >= 25) it is 1 with expansion joints, 1 - nu/2 anchored upstream only, 1 - nu^2 anchored
     throughout.

@@ -60,7 +60,7 @@ class ClassSize(NamedTuple):
 
 
 class UnknownSize(ValueError):
-    """Error for a nominal size that a class does not have."""
+    """Error for a text that is not a nominal size of classes, such as "NPS 4"."""
 
 
 @functools.cache
@@ -79,7 +79,11 @@ SCHEDULE = re.compile(r"(?:schedule|sch\.?)\s*(\w+)", re.IGNORECASE)
 
 
 def class_size(name: str, nominal: str, material: str | None) -> ClassSize:
-    """Size data of a class at a nominal size. Raises ValueError for an unknown class or a size without data."""
+    """Size data of a class at a nominal size, for a material name or None.
+
+    Raises ValueError for an unknown class, a class of another material or a size without data, UnknownSize for a text
+    that is not a nominal size.
+    """
     text = name.strip().upper().replace(" ", "")
     if match := IRON.fullmatch(text):
         if material != "ductile-iron":

@@ -110,7 +110,7 @@ class HeadCurve(Value):
         return faults
 
     def check_polynomial(self, coefficients: tuple[float, ...]) -> None:
-        """Raise ValueFault if the head of a polynomial never falls to zero, or rises at a lower flow."""
+        """Raise ValueFault if the head of a polynomial does not fall from above 0 to 0, or rises at a lower flow."""
         end = zero_head_flow(coefficients)
         if coefficients[0] <= 0.0 or end is None:
             raise ValueFault([(("coefficients",), "the head must start above 0 and fall to 0 at some flow; for example "
@@ -187,6 +187,7 @@ class SuterTable:
 
     The torque is rated torque (n^2 + v^2) WB(x), with x = pi + atan2(v, n), v = flow / rated_flow and n = speed / rated
     speed.
+    rated_flow, rated_head : rated point [m3/s], [m]
     head, torque : values of the functions WH and WB at equal intervals of x from 0 to 2 pi
     """
 

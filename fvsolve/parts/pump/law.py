@@ -205,7 +205,7 @@ def events(t, y, out, tables, device, g):
     """Write the event function of the check valve and its negative to g.
 
     It is the flow plus the margin of reversal while the valve is open [kg/s], and the drop minus that at which the
-    valve opens while it is shut [Pa].
+    valve opens while it is shut [Pa]. Both are 1 for a pump without check valve.
     """
     layout, k, at = tables.layout[0], device["valve"], device["event"]
     valve, floats = tables.valves[k], tables.floats

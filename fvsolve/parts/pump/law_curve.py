@@ -153,8 +153,8 @@ def curve_flow(floats, at, speed, head, flow):
 def curve_step(floats, at, speed, rho, weight, g, m, drop):
     """(a [kg/s], s [kg/s/Pa]) of the next Newton step dM = a + s d(drop) of a pump, M the mass flow.
 
-    The chord of the curve between the present flow and the flow at the drop replaces the slope. It is at least as steep
-    as that of a restriction of conductance g.
+    The chord of the curve between the present flow and the flow at the drop replaces the slope. As for a restriction of
+    conductance g, s is at most sqrt(g) / LEAST.
     floats[at:] : parameters of the head curve; speed : relative speed
     rho, weight : density [kg/m3] and rho g [N/m3] of the fluid
     g : conductance [kg2/s2/Pa]; m : present mass flow [kg/s]; drop : drop across the pump [Pa]

@@ -81,8 +81,8 @@ def power_law(curve: CurvePoints) -> tuple[float, float, float] | None:
 def rated_point(part, weight: float) -> tuple[float, float]:
     """(flow [m3/s], head [m]) at the rated point of a pump; weight : rho g [N/m3]
 
-    It is the single point of the curve, the middle of three points, or the point with the greatest flow times head. A
-    Suter table states its rated point.
+    It is the single point of the curve, the middle of three points from no flow on, or the point with the greatest flow
+    times head. A Suter table states its rated point; that of a pump with constant power is at a head of 10 m.
     """
     if part.suter is not None:
         return part.suter.rated_flow, part.suter.rated_head

@@ -56,7 +56,7 @@ def table_power(table, numbers, flow: float, head: float, last: float) -> tuple[
 
 
 def rated_efficiency(part) -> float:
-    """Efficiency of a pump at its rated point."""
+    """Efficiency of a pump at its rated point; EFFICIENCY if it is not stated, or stated as a curve."""
     return EFFICIENCY if part.efficiency is None or isinstance(part.efficiency, CurvePoints) else part.efficiency
 
 
@@ -103,7 +103,10 @@ def inertia(part, weight: float) -> float | None:
 
 
 def rated_power(part, weight: float) -> float:
-    """Shaft power of a pump at its rated point [W]; weight : rho g [N/m3]"""
+    """Shaft power of a pump at its rated point [W], with `rated_efficiency` if no power is stated.
+
+    weight : rho g [N/m3]
+    """
     flow, head = rated_point(part, weight)
     if part.shaft_power is not None:
         return float(np.interp(flow, *shaft_power(part, weight, flow, 0.0)))

@@ -85,7 +85,7 @@ def regulator_error(t, out, tables, device):
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    """Write the rate of the opening to `dydt`, 0 at a stop, and raise out[RATE] to the rate limit of the valve."""
+    """Write the rate of the opening to `dydt`, 0 at full opening and on the seat; raise out[RATE] to the rate limit."""
     out[RATE] = max(out[RATE], regulator_rate(y, out, tables, device))
     if dydt.size == 0:
         return
@@ -96,7 +96,7 @@ def move(t, y, dydt, out, tables, device):
 
 @njit
 def regulator_rate(y, out, tables, device):
-    """Rate of the control loop of the valve [1/s].
+    """Rate of the control loop of the valve [1/s]; 0 while a pressure-controlled valve controls its rigid column.
 
     Where a rigid column sets the flow, the derivative of the drop dP by the opening x is -2 dP / x.
     """
@@ -117,6 +117,9 @@ def events(t, y, out, tables, device, g):
     They are the flow [kg/s], or while the valve is shut against reverse flow the drop minus a margin [Pa]; the distance
     of the opening from full opening; its distance from the seat; and its distance from the opening at which the valve
     stops controlling a rigid column, or begins to.
+    The first is the drop plus the margin for a valve that is almost shut or without flow, and 1 for flow control. While
+    the valve rests fully open or on its seat, the error over the band that moves it away, minus STOP_MARGIN, replaces
+    the distance.
     """
     layout, armed = tables.layout[0], tables.armed
     at, x, error = device["event"], regulator_opening(y, tables, device), regulator_error(t, out, tables, device)

@@ -65,8 +65,9 @@ class PressureSustaining(Regulating, kind="pressure-sustaining"):
 class FlowControl(Regulating, kind="flow-control"):
     """Valve that limits the flow q from `from` to `to`: q = x Cd A sqrt(2 |dp| / rho) sign(dp).
 
-    dp is the drop. The opening x follows time_constant dx/dt = (set_flow - q) / set_flow, 0 <= x <= 1. For reverse flow
-    the valve is open. Ports: from, to. Stored energy: none. Dissipated power: dp q [W].
+    dp is the drop. The opening x follows time_constant dx/dt = (set_flow - q) / q0, 0 <= x <= 1, with the first value
+    q0 of `set_flow`. For reverse flow the valve is open. Ports: from, to. Stored energy: none. Dissipated power: dp q
+    [W].
     """
 
     set_flow: Annotated[Schedule, Scheduled("flow", positive, "greatest flow, at the reference density [m3/s]")]

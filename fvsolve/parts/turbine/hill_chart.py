@@ -100,7 +100,7 @@ class HillChartValue(Value):
         return chart_of(curves, places, faults, [entry.table() for entry in curves.values()])
 
     def curve(self, given: Any, setting: ReadContext) -> OpeningCurve:
-        """Read the curve of an opening from its table."""
+        """Read the curve of an opening from its table; raises ValueError, or ValueFault for faults of its keys."""
         if not isinstance(given, dict):
             raise ValueError(f"{show(given)} is not a table; expected for example {EXAMPLE}")
         keys = read_keys(given, self.keys, setting)
@@ -118,6 +118,7 @@ def from_file(given: dict[str, Any], setting: ReadContext) -> HillChart:
     """Hill chart from a CSV file with the columns opening, unit_speed, unit_flow, and efficiency or unit_torque.
 
     The points of each opening are in order along its curve. given : table { file } of the case file
+    Raises ValueFault with all faults.
     """
     unknown = [((key,), "unknown key; expected only file") for key in given if key != "file"]
     if unknown or not isinstance(given["file"], str):
@@ -147,6 +148,7 @@ def columns_of(rows) -> tuple[list, str]:
     """(columns, key of the last column) of the CSV file of a hill chart; rows : rows of the file
 
     The columns are opening, n11, Q11, and efficiency or T11.
+    Raises ValueError for a missing column, a unit that does not fit, or a text instead of a number.
     """
     words = [word for word in (EFFICIENCY, TORQUE) if word in rows.names]
     if len(words) != 1:

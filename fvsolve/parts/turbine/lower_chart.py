@@ -1,7 +1,7 @@
 """Hill charts as numbers for the kernels: values on rays from the origin of the plane of unit speed and unit flow.
 
-The plane has the coordinates n = omega / speed and u = flow / capacity at a head of 1 m; `capacity` is the greatest
-flow of a curve.
+The plane has the coordinates n = omega / speed and u = flow / (flow scale capacity) at a head of 1 m. The flow scale is
+the greatest flow of the chart, `capacity` the greatest flow of a curve over this scale.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ def nodes_of(curve, part, speed: float, flow: float, torque_scale: float, weight
     speed, flow : scales of speed [rad/s] and flow [m3/s] at 1 m; torque_scale : weight flow / speed
     weight : rho g [N/m3]
     Assumptions outside the given points: at standstill, forward flow is that of the last point, and reverse flow is the
-    greatest flow of the curve; no head at backward rotation without flow; zero forward flow at the distance of the
-    first point from the origin.
+    greatest flow of the curve; no head at backward rotation without flow; at forward rotation without flow, the
+    distance of the first point from the origin.
     """
     d = part.diameter
     capacity = max(curve.flow) * d * d / flow

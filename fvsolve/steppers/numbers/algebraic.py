@@ -12,13 +12,14 @@ from fvsolve.steppers.numbers.sturm import count_roots
 MIXED_ROOTS = (
     "{} are used in one tableau. Expected a single root, or decimals of 20 digits or more in place of all roots"
 )
-BITS = 160  # precision of the first bracket of a root: enough for most signs and every float
+BITS = 160  # precision of the first bracket of a square root: enough for most signs and every float
 
 
 class Field:
     """Field of the rational numbers and a root theta of a polynomial.
 
     name : name of theta in texts; near : value near theta. Multiple roots of the polynomial are made single.
+    Raises ValueError if no single root is near it.
     """
 
     def __init__(self, name: str, polynomial: Polynomial, near: float):
@@ -60,9 +61,9 @@ class SquareRoot(Field):
 
 
 class Algebraic:
-    """Irrational number of a `Field`, as coefficients of powers of its root theta.
+    """Number of a `Field`, as coefficients of powers of its root theta.
 
-    Operations return a fraction where the result is rational.
+    Operations return a fraction if only the coefficient of theta^0 remains, and raise ValueError for different fields.
     """
 
     __slots__ = ("field", "parts")
@@ -210,7 +211,7 @@ class Algebraic:
 
 
 def number(field: Field, parts):
-    """Number with the coefficients `parts` of powers of theta, lowest first; a fraction if it is rational."""
+    """Number with the coefficients `parts` of powers of theta, lowest first; a fraction if all but the first are 0."""
     parts = list(parts)
     while len(parts) > 1 and not parts[-1]:
         parts.pop()

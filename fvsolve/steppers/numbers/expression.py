@@ -32,7 +32,8 @@ def value_of(text: str, names: Mapping | None = None):
 def root(name: str, polynomial: str, near: float):
     """Root nearest to `near` of a polynomial in x, as an exact number that is printed as `name`.
 
-    polynomial : text such as "x^3-3x^2+3x/2-1/6"
+    polynomial : text such as "x^3-3x^2+3x/2-1/6", of degree 2 or more
+    Raises ValueError for another text, and if no single root is near `near`.
     """
     p = value_of(polynomial, {"x": Polynomial([0, 1])})
     if not isinstance(p, Polynomial) or p.degree < 2 or not all(isinstance(x, Fraction) for x in p.coefficients):

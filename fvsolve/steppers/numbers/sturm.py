@@ -45,7 +45,7 @@ def odd_part(p: Polynomial) -> Polynomial:
 
 
 def first_sign_change(p: Polynomial) -> float | None:
-    """Least x > 0 at which p changes sign, accurate to about the last bit; None if p never changes sign."""
+    """Least x > 0 at which p changes sign, accurate to about the last bit; None without sign change there."""
     p = odd_part(p) if p.degree > 0 else p
     while p.degree > 0 and p.coefficients[0] == 0:
         p = Polynomial(p.coefficients[1:])

@@ -4,8 +4,8 @@ A row is a size (of cells, steps or a tolerance) with the error of the run. The 
 reduce, such as rounding or the error of the reference. The window is a group of successive rows. The fit is the
 least-squares slope of log error over log size in the window. The window ends at the last row above the floor. It begins
 where the orders between rows come near the slope. Rows before the window are pre-asymptotic, rows after it are at the
-floor. At most a single other row may remain: one whose error lies far below the line, or a last row that leaves it. It
-is marked "off the line". Otherwise no order is found.
+floor. Rows off the line are errors at the floor before larger errors, a single error far below the line, and a single
+last row that leaves the line. If other rows remain, there is no order, and no number is given.
 """
 
 from __future__ import annotations

@@ -115,7 +115,7 @@ class UserFunction:
         try:
             first, second = (np.broadcast_to(np.asarray(field, dtype=float), shape) for field in values)
         except (TypeError, ValueError) as error:
-            size = "x ".join(map(str, shape))
+            size = " x ".join(map(str, shape))
             raise self.fault_for(pipe, f"must return two numbers or arrays of {size} values, one for each x") from error
         for field in (first, second):
             if not np.all(np.isfinite(field)):

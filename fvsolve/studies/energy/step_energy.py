@@ -104,7 +104,7 @@ class EnergyLoop(RunLoop):
         """Limit the next step so that the quadrature error of the dissipated energy stays small.
 
         h : this step [s]; off : quadrature error in this step [J]; lost : dissipated energy so far [J]
-        The error is to stay below a thousandth of `lost`; the step grows by a factor of 8 at most.
+        The error is to stay below a thousandth of `lost`. The limit is 0.1 to 8 times h, also without error control.
         The error control of states does not cover this error: for states that are parabolas in time, a method of order
         two is exact, but the integral of the power is not.
         """
@@ -193,9 +193,9 @@ class EnergyLoop(RunLoop):
     def released_stops(self, t: float, y: np.ndarray, part: np.ndarray) -> np.ndarray:
         """Correct the energies `part` of the step from (t, y) for end stops whose contact opens within the step.
 
-        Returns `part`, which is changed. The stored energy changes by the exact difference between the ends of the step; the remainder is
-        dissipated. The rate of the stored energy has a kink where the contact force ends, which stage values do not
-        resolve.
+        Returns `part`, which is changed. The stored energy changes by the exact difference between the ends of the
+        step; the remainder is dissipated. The rate of the stored energy has a kink where the contact force ends, which
+        stage values do not resolve.
         """
         tables, lines = self.model.tables, self.accounts.stops
         if not lines:

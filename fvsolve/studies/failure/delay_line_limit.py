@@ -40,9 +40,10 @@ class WaveGrowthLimit:
         return wave_growth(self.model(h), method_named(method), h, numerics.end - numerics.start)[0] >= VISIBLE_GROWTH
 
     def __call__(self, method: str) -> float | None:
-        """Greatest step [s] up to which waves do not grow with a method; inf if they never grow, 0 if they always do.
+        """Greatest step [s] up to which waves grow less than 1000 times in the run with a method.
 
-        The result is None for Rosenbrock methods if delay lines end at storing nodes, as their growth is not known.
+        It is inf if they do so at all steps tried, and 0 if they grow more at the shortest of these steps. The result
+        is None for Rosenbrock methods if delay lines end at storing nodes, as their growth is not known.
         """
         if method_named(method).kind == "linear" and any(storing_nodes(self.model(self.steps[0]), 1.0)):
             return None

@@ -1,4 +1,4 @@
-"""Greatest step at which no eigenvalue mode grows, equation (13) of docs/course.md."""
+"""Greatest step at which no eigenvalue mode grows visibly, equation (13) of docs/course.md."""
 
 from __future__ import annotations
 

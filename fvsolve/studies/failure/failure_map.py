@@ -34,9 +34,10 @@ OUTPUT_ROWS = 1000  # rows of the history of each run
 class Square:
     """Run of a failure map, with its verdict.
 
-    column : number of its column; step, courant : step [s] and Courant number, None unless the step is given
+    column : number of its column; step : given step [s], None unless the column has one
+    courant : step times the wave rate of the first column (see `Columns`), None without a given step or without cells
     halved_error : error with half the step, None if it was not run
-    limit : predicted greatest stable step [s], None if it is not known
+    limit : predicted greatest stable step [s], inf if no step fails, None if it is not known
     """
 
     scheme: str
@@ -57,8 +58,9 @@ class FailureMap:
     key : "step" [s] or the key of the case that changes along the columns; values : its values
     squares : runs of all schemes, methods and columns, in this order of loops
     tolerance : greatest allowed mean error, relative to the range of a probe
-    reference : description of the reference; doubt : uncertainty of its values, relative to the range of a probe
-    wave_rate : cells that a wave crosses per second [1/s], None without cells
+    reference : description of the reference of the first column
+    doubt : greatest uncertainty of the references of all columns, relative to the range of a probe
+    wave_rate : greatest number of cells that a wave crosses per second in the first column [1/s], None without cells
     limited : limited schemes, whose limits are computed with the weights in smooth flow; lines : True with delay lines
     """
 
@@ -121,7 +123,8 @@ def failure_map(
     tolerance : greatest allowed mean error, relative to the range of a probe
     out : folder in which finished runs are stored and found again
     progress : function of (runs done, runs in total, next run); jobs, dask : processes for the runs, as in `sweep`
-    Raises FvsolveError for unknown names, for numbers out of range, and if the reference is not accurate enough.
+    Raises CaseError for an invalid case, and FvsolveError for unknown names, for numbers out of range, for a case with
+    basins, and if a reference is not accurate enough.
     """
     case = load(case, dict(set or {}))
     refuse_basins(case, "map")
@@ -155,7 +158,7 @@ class MapRuns:
     """Runs of one failure map, with their references, predicted limits and verdicts.
 
     base : keys and values that all runs set; column_set : columns of the map; points : cache of finished runs
-    collecting : True while `missing_runs` lists the runs that are not in the cache; meanwhile no run is made
+    collecting : True while `missing_runs` lists the runs that are not in the cache; only references are run meanwhile
     """
 
     def __init__(
@@ -230,8 +233,8 @@ class MapRuns:
     def square(self, scheme: str, method: str, k: int) -> Square:
         """Run of a scheme and a method in column k, with its verdict.
 
-        If only the error decides on the verdict and is above the tolerance, runs with half and with a quarter of the
-        step follow.
+        If only the error decides on the verdict and is above the tolerance, a run with half the step follows, and if
+        that does not help, one with a quarter. Implicit methods are not run for more than 50 000 steps.
         """
         trial = {**self.base, **self.columns.sets[k], "numerics.scheme": scheme, "numerics.method": method}
         step, waves = trial.get("numerics.step"), self.columns.wave_rate

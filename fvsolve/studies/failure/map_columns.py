@@ -28,7 +28,7 @@ class Columns:
     name : "step" or the varied key; values : its value in each column; sets : keys that each column sets
     span : duration of the run [s]
     rates : fastest rate and wave rate [1/s] of each column, or one pair for all columns; delay lines count as cells
-    wave_rate : cells that a wave crosses per second in the first column [1/s]; None without cells
+    wave_rate : greatest number of cells that a wave crosses per second in the first column [1/s]; None without cells
     """
 
     name: str
@@ -57,7 +57,8 @@ def map_columns(case, base: dict, courants, steps, key) -> Columns:
     """Columns of a failure map: the given Courant numbers or steps [s], values of a key, or default steps.
 
     base : keys of all runs; key : (name, values) of a varied key, or None
-    Raises FvsolveError for options that exclude each other and for values out of range.
+    Raises FvsolveError for options that exclude each other, for values out of range, and for Courant numbers without
+    pipes with cells.
     """
     _check_options(courants, steps, key)
     span = case.numerics.end - case.numerics.start
@@ -76,7 +77,7 @@ def map_columns(case, base: dict, courants, steps, key) -> Columns:
 
 
 def _step_control(courants, steps) -> dict:
-    """Key and value that set the step in all columns of a varied key; empty if the case itself sets the step."""
+    """Key and value that set the step in all columns of a varied key; empty without given numbers."""
     if courants is not None:
         return {"numerics.courant": courants[0]}
     return {} if steps is None else {"numerics.step": steps[0]}
@@ -85,8 +86,8 @@ def _step_control(courants, steps) -> dict:
 def _fastest_and_wave_rate(case, set: dict) -> tuple[float, float | None]:
     """(fastest rate, wave rate) of a case [1/s], with delay lines replaced by cells.
 
-    The fastest rate is the greatest modulus of an eigenvalue; with too many states for eigenvalues it is the wave rate.
-    The wave rate is None without cells.
+    The fastest rate is the greatest modulus of an eigenvalue; with too many states for eigenvalues it is the wave rate,
+    or infinity without cells. The wave rate is the greatest of all pipes, None without cells.
     """
     set = set | cells_for_delay_lines(case, set)
     model = study_model(case, set)
@@ -97,13 +98,16 @@ def _fastest_and_wave_rate(case, set: dict) -> tuple[float, float | None]:
 
 
 def _wave_rate(case, set: dict) -> float | None:
-    """Cells that a wave crosses per second in pipes with cells [1/s]; None without such pipes."""
+    """Greatest number of cells that a wave crosses per second in pipes with cells [1/s]; None without such pipes."""
     model = study_model(case, set)
     return float(max(model.wave_rates[model.tables.pipes["delay"] < 0], default=0.0)) or None
 
 
 def cells_for_delay_lines(case, set: dict) -> dict:
-    """Keys and values that replace delay lines by cells, with the default number of cells in the slowest line."""
+    """Keys and values that replace delay lines by cells, with the default number of cells in the slowest line.
+
+    They are empty without delay lines.
+    """
     case = load(case, set)
     travel = _slowest_travel_time(case)
     return cells_for_lines(case, travel / DEFAULT_CELLS) if travel else {}
@@ -117,10 +121,10 @@ def _slowest_travel_time(case) -> float:
 def _default_steps(case, rates, waves: float | None) -> list[float]:
     """Default steps of a failure map [s], in three cases.
 
-    If waves have the fastest rate, the steps are around Courant number 1. In a stiff case they go from 1.5 over the
-    fastest rate (0.3 without cells) to a tenth of the run or Courant number 1.5, whichever is less. With delay lines
-    and no cells they go from a hundredth of the greatest travel time, or 0.3 over the fastest rate of storing parts if
-    that is less, to a tenth of the run or that travel time, whichever is less.
+    With cells and a fastest rate up to 8 wave rates, the steps are around Courant number 1. With delay lines and no
+    cells they go from a hundredth of the greatest travel time, or 0.3 over the fastest rate of storing parts if that is
+    less, to a tenth of the run or that travel time, whichever is less. Otherwise they go from 1.5 over the fastest rate
+    (0.3 without cells) to a tenth of the run or Courant number 1.5, whichever is less, and over a decade at least.
     rates : result of `_fastest_and_wave_rate`
     waves : wave rate of the cells of the case itself [1/s], None without cells
     """
@@ -137,7 +141,10 @@ def _default_steps(case, rates, waves: float | None) -> list[float]:
 
 
 def default_schemes(case, columns: Columns) -> list[str]:
-    """Default schemes of a failure map: the scheme of the case, and `upwind` if waves have the fastest rate."""
+    """Default schemes of a failure map: the scheme of the case, before it `upwind` if the first column is not stiff.
+
+    Without cells it is the scheme of the case alone.
+    """
     own = case.numerics.scheme
     return [own] if columns.wave_rate is None or columns.stiff(0) else ["upwind", own]
 

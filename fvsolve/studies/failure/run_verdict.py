@@ -41,8 +41,8 @@ class Measures:
 
     reason : reason for the end of the run; ok : True if the run finished; refused : True if the run did not begin
     error : mean distance from the reference over time; nan if the run did not finish
-    farthest : greatest distance of a value after a step from the range of values of the reference, 0 inside this range;
-    nan if the run did not finish
+    farthest : greatest distance of a recorded value from the range of values of the reference, 0 inside this range;
+    nan if the run did not finish. Long runs record windows of steps, see `RecordedRun`.
     ringing, variation : see `ringing_amplitude` and `excess_variation`
     steps : number of steps; seconds : elapsed time of the steps [s]
     """
@@ -62,7 +62,7 @@ def verdict(run: Measures, shorter: Callable[[], Measures], tolerance: float) ->
     """Verdict on a run, a key of `VERDICT_TEXTS`.
 
     shorter : function that returns the measures of the run with half the step, and at the second call with a quarter;
-    it is called only if the error is above the tolerance
+    it is called only if the error is above the tolerance and no earlier verdict applies
     """
     if run.reason.startswith(GIVEN_UP):
         return NOT_RUN

@@ -41,7 +41,8 @@ class Spectrum:
     def poles(self) -> list[dict]:
         """Dict for each real pole s and each complex pair: parts of s, frequency, damping ratio and time constant.
 
-        The frequency is |s| / 2 pi [Hz], the damping ratio -Re s / |s|, the time constant 1 / |Re s| [s].
+        The frequency is |s| / 2 pi [Hz], the damping ratio -Re s / |s| (None for s = 0), and the time constant
+        1 / |Re s| [s] (None for Re s = 0).
         """
         rows = []
         for s in self.values[self.values.imag >= 0.0]:

@@ -53,12 +53,13 @@ STATE_UNITS = {
 class Linear:
     """Linear system dx/dt = A x + B u, y = C x + D u for deviations of states x, inputs u, outputs y from a state; SI.
 
-    These are equations (9) and (10) of docs/course.md. at : operating point
+    These are equations (9) and (10) of docs/course.md; the constant rate `at.rate` of a state that is not steady is
+    left out. at : operating point
     a : float64[n, n]  A, or a sparse scipy array if n > 1000; b : float64[n, inputs]  B; c : float64[outputs, n]  C
     d : float64[outputs, inputs]  D; input_values, output_values : values at the operating point
     error : {"A", "C" or "BD" : greatest error of an entry of A, of C, and of B and D}
-    The error of an entry is the difference of its difference quotients with two steps, relative to the sum of |entry|
-    times small deviation over its row.
+    The error of an entry is the difference of its difference quotients with two steps. In A and C it is relative to the
+    sum of |entry| times small deviation over its row, in B and D to the quotient itself.
     """
 
     at: OperatingPoint
@@ -130,8 +131,9 @@ def linearise(
     inputs : names such as "valve.opening", "lake.pressure"; outputs : probes; default: the probes of the case
     before : True to hold schedules at the values just before a kink or jump at this time
     scheme : linear scheme that replaces the scheme of the case; set : changed keys of the case
-    Differences are one-sided for an input at the end of its range. Raises CaseError, and FvsolveError for an unknown
-    name, a state without a derivative (a limited scheme, a valve at a drop of zero, a kink), and a case without states.
+    Delay lines are replaced by cells. Differences are one-sided for an input at the end of its range. Raises CaseError,
+    and FvsolveError for an unknown name, a state without a derivative (a limited scheme, a valve at a drop of zero, a
+    kink), a case without states, and a run that does not reach `at`.
     """
     set = dict(set or {}) | ({} if scheme is None else {"numerics.scheme": scheme})
     point = operating_point(case, set, at, before, outputs or ())
@@ -139,7 +141,10 @@ def linearise(
 
 
 def linearise_at(at: OperatingPoint, inputs=(), outputs: int = 0) -> Linear:
-    """Linearise about an operating point, with named inputs; outputs are the first `outputs` of its probes."""
+    """Linearise about an operating point, with named inputs; outputs are the first `outputs` of its probes.
+
+    Raises FvsolveError for an unknown input, and for a state, input or output without a derivative.
+    """
     model, inputs = at.model, tuple(dict.fromkeys(inputs))
     available = inputs_of(model)
     for name in inputs:
@@ -203,7 +208,8 @@ def input_column(at, name, input_, value, size, outputs, steps) -> tuple[np.ndar
 
     at : operating point; name, input_ : name and data of the input; value : its value at the operating point
     size : float64[n]  size of each row of A; outputs : number of outputs; steps : factors on the small change
-    Differences are one-sided if the value is at an end of the range of the input.
+    Differences are one-sided if the value is at an end of the range of the input. Raises FvsolveError if the effect of
+    the input has no derivative.
     """
     model = at.model
     width = np.array([input_width(at, input_, value)])

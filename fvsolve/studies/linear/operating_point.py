@@ -47,8 +47,8 @@ def operating_point(case, set=None, at: float | None = None, before: bool = Fals
     probes : names of probes that are added before the probes of the case
     Delay lines are replaced by cells. If the case gives no scheme and the default scheme is limited, it is replaced by
     the linear scheme that it equals in smooth solutions, or by `upwind` in a case with basins. Raises CaseError for a
-    case or probe that cannot be read, and FvsolveError for a case without states and for a run that does not reach
-    `at`.
+    case or probe that cannot be read, and FvsolveError for a case without states, for a time `at` before the start, and
+    for a run that does not reach `at`.
     """
     from fvsolve.case import load
 

@@ -57,8 +57,8 @@ def state_matrix(at: OperatingPoint) -> tuple[Any, np.ndarray, float, np.ndarray
     """(A, size of each of its rows : float64[n], error, steps), where steps are the factors on the small deviations.
 
     The size of row i is the sum over j of |A_ij| times the small deviation of state j; the error is relative to it.
-    States whose columns have no row in common (equal colours) are changed together. Raises FvsolveError for a state
-    without a derivative.
+    A is a full array, or a sparse scipy array for more than 1000 states. States whose columns have no row in common
+    (equal colours) are changed together. Raises FvsolveError for a state without a derivative.
     """
     from scipy.sparse import csc_array
 

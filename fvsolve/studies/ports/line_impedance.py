@@ -74,9 +74,11 @@ class LineImpedance:
 class SweepVerdict(PlainData):
     """Result of a sweep of H(s) along the line Re s = shift [1/s], over frequencies w from 0 to `high` [rad/s].
 
-    positive_real : False if Re H < 0 at a sample, True if the bound proves Re H >= 0, otherwise None
-    reason : result in words; samples : number of samples
-    least : least sample of Re H, at the frequency `worst` [rad/s]; floor : proven lower bound of Re H
+    positive_real : False if Re H < 0 at a sample or if a known pole is right of the line, True if the bound proves
+    Re H >= 0, otherwise None
+    reason : result in words; samples : number of samples, 0 if a known pole decides
+    least : least sample of Re H, at the frequency `worst` [rad/s], both nan without samples
+    floor : proven lower bound of Re H, -inf without samples
     """
 
     positive_real: bool | None
@@ -109,10 +111,11 @@ def sweep_positive_real(
     slope : bound of |dH/ds| on this line, a number or a function of arrays (low, high) of frequencies [rad/s]
     high : greatest frequency w [rad/s]; the period of a periodic H covers the whole line
     tolerance : difference of samples and lower bound, relative to |H|, below which an interval is not halved
-    rightmost : real part of the rightmost poles [1/s], if known
+    rightmost : real part of the rightmost poles [1/s], if known; right of the line it makes the result False
     If H is analytic and bounded right of the line, Re H >= 0 on the line implies Re H >= 0 everywhere right of it.
     Between two samples Re H_1 and Re H_2 at w_1 and w_2, Re H is at least (Re H_1 + Re H_2 - slope (w_2 - w_1)) / 2.
-    Raises FvsolveError for an invalid range or bound, and if H is not finite on the line.
+    The result is None if 200 000 samples do not decide. Raises FvsolveError for an invalid range or bound, and if H is
+    not finite on the line.
     """
     if rightmost > shift:
         return SweepVerdict(False, f"a pole with Re s = {rightmost:.6g} 1/s, right of the line", math.nan, math.nan,

@@ -58,8 +58,8 @@ class AxisPole:
 class Band:
     """Interval of frequencies low < w < high [rad/s] with Re H(jw) < 0.
 
-    width : (high - low) / (high + low), inf for an infinite `high`; least : infimum of Re H(jw)
-    worst : frequency of the infimum [rad/s]
+    width : high - low [rad/s], accurate also for nearly equal ends, inf for an infinite `high`
+    least : infimum of Re H(jw), -inf if it is unbounded; worst : frequency of the infimum [rad/s]
     """
 
     low: float
@@ -75,8 +75,8 @@ class Verdict(PlainData):
 
     positive_real : True if H is positive real by definition (4.1) of docs/course.md, extended to a pole at infinity
     strictly : True if H(s - e) is positive real for some e > 0 (Khalil, Nonlinear Systems, definition 6.4)
-    lossless : True if H is positive real with Re H(jw) = 0 at every w
-    reason, reasons : texts with all faults, or with the proof
+    lossless : True if H is positive real with Re H(jw) = 0 at every w, and H is not 0
+    reason, reasons : texts with all faults, or with the proof; then texts on hidden poles
     poles : poles after common factors are removed; axis_poles : poles on the imaginary axis and at infinity, w >= 0
     bands : intervals with Re H(jw) < 0, w >= 0
     zeros : frequencies with Re H(jw) = 0 [rad/s], empty if it is zero everywhere
@@ -183,7 +183,7 @@ def _origin(n: Polynomial, d: Polynomial, locations: RootLocations) -> list[Axis
 def _pair(n: Polynomial, d: Polynomial, x: Root, order: int) -> AxisPole:
     """Pole of n / d at s = j sqrt(x), of the given order.
 
-    With d = C(s^2) R(s), where C has the roots on the imaginary axis, the residue of a simple pole is n / (2 s C' R).
+    With d = C(-s^2) R(s), where C(x) is the result of `axis_factor`, the residue of a simple pole is -n / (2 s C' R).
     """
     name = f"the pole at w = {x.frequency:.12g} rad/s"
     if order > 1:
@@ -278,7 +278,7 @@ def _zeros(even: Polynomial, below: Polynomial) -> list[float]:
 
 
 def _strictly(n: Polynomial, d: Polynomial, locations: RootLocations, even: Polynomial, zeros: list[float]) -> bool:
-    """True if all poles are left of the imaginary axis, Re H(jw) > 0 at every finite w, and Re H decays slowly enough.
+    """True if a positive real H is strictly so: no pole on the axis, Re H(jw) > 0 at every w, and a slow decay of Re H.
 
     At infinity w^2 Re H must not tend to zero if H does, and otherwise Re H must not tend to zero.
     n, d : numerator and denominator of H; locations : locations of the roots of d; even : polynomial E of `_real_part`

@@ -22,6 +22,7 @@ class Response:
 
     kind : "admittance" of a reservoir (u pressure [Pa], y flow into the network [m3/s]) or "impedance" (u inflow
     [m3/s], y pressure [Pa]); when : state about which the case is linearised
+    scheme : scheme in use, None without cells of pipes
     states, state_units : names and units of x
     a : float64[n, n]  A; b, c : float64[n]  B and C; d : D; error : relative error of A, B, C, D
     transfer : transfer function H(s); verdict : result of the test for positive realness
@@ -82,7 +83,8 @@ def response(
     port : name of a reservoir (for an admittance), or of a junction, inflow, chamber or tank (for an impedance)
     at, before, scheme : time, side of a jump, and linear scheme as in `linearise`; set : changed keys of the case
     frequencies : float64[k]  frequencies of the response [rad/s]; default: 200 in each decade around the poles
-    Raises FvsolveError for an invalid port, a case that cannot be linearised, and more than 800 states.
+    Raises CaseError for an invalid case, and FvsolveError for an invalid port, a case that cannot be linearised, and
+    more than 800 states.
     """
     from fvsolve.case import load
 
@@ -135,7 +137,7 @@ def _linear_system(case, port: str, at, before, scheme):
 
 
 def port_flows(case, port: str) -> dict[str, float]:
-    """Signs of the probes whose sum is the flow from a node into its links [m3/s]: name of the probe -> 1 or -1."""
+    """Signs with which probes add up to the flow from a node into its links [m3/s]: name of the probe -> 1 or -1."""
     signs: dict[str, float] = {}
     for name, link in case.links.items():
         for end, node in link.ports.items():
@@ -178,8 +180,8 @@ def _transfer(at, a, b, c, d, error: float) -> Transfer:
 def _frequency_table(verdict: StateVerdict, h: Transfer) -> np.ndarray:
     """Frequencies of the response [rad/s] : float64[k], in increasing order.
 
-    They are a logarithmic grid, the poles within it that are off the imaginary axis, and in each frequency band with Re
-    H < 0 the frequency of the least Re H / |H|.
+    They are a logarithmic grid, |Im s| within it of the poles s off the imaginary axis, and in each frequency band with
+    Re H < 0 the frequency of the least Re H / |H|.
     """
     low, high = verdict.low, verdict.high
     grid = np.geomspace(low, high, int(POINTS_PER_DECADE * np.log10(high / low)) + 1)

@@ -25,10 +25,12 @@ DEFECT = 1e-7  # greatest error of a pole relative to the norm of A, also for de
 class Transfer:
     """Transfer function H(s) = D + C (s - A)^-1 B with a single input and output, by a Schur form of the balanced A.
 
-    a, b, c, d : float64[n, n], float64[n], float64[n], float  matrices A, B, C, D; error : relative error of A
+    a, b, c, d : float64[n, n], float64[n], float64[n], float  matrices A, B, C, D; as attributes after balancing
+    error : relative error of A
     poles : complex128[n]  poles [1/s]; residues : complex128[n]  their residues
     pole_error : float64[n]  errors of the poles due to rounding and `error` [1/s]
     visible : bool[n]  True if the residue of the pole is not zero, so that H shows it
+    Raises FvsolveError for matrices of sizes that do not match.
     """
 
     @validated(a=MATRIX, b=SERIES, c=SERIES, d=NUMBER, error=NUMBER)
@@ -100,6 +102,7 @@ class Transfer:
 class Dip:
     """Interval of frequencies low < w < high [rad/s] with Re H < 0.
 
+    An interval that contains the first or last tested frequency has the end 0 or infinity.
     worst : frequency of the least Re H / |H| [rad/s]; real, angle : Re H and Re H / |H| there
     """
 

@@ -52,7 +52,8 @@ class DelayLineLimits:
     def model(self, h: float | None):
         """Model with schedules held at the start, and delay lines divided for steps of h [s]; None: step of the case.
 
-        Raises FvsolveError for a limited scheme in pipes with cells, and for more than 400 states.
+        Raises CaseError if the case is refused with this step, and FvsolveError for a limited scheme in pipes with
+        cells and for more than 400 states.
         """
         step = {} if h is None else {"numerics.step": h}
         model = study_model(self.case, self.set | step)

@@ -26,7 +26,7 @@ class DelayLineRuns(RealRuns):
     """Real runs at fixed steps, each from the deviation with the greatest growth in the linear system of the step.
 
     limits : a `delay_line_row.DelayLineLimits`; steps : number of steps of a run; threshold : growth at which it fails
-    end : a step that is predicted to fail [s], nan for none
+    end : a step that is predicted to fail [s]; inf if no step is, nan if there is no prediction
     """
 
     def __init__(self, limits, steps: int, threshold: float, end: float) -> None:
@@ -53,8 +53,8 @@ class DelayLineRuns(RealRuns):
     def limit(self, guess: float) -> StepLimit:
         """Limit of real runs, searched close to the predicted limit `guess` [s].
 
-        If `guess` is inf or nan, all steps are searched. Otherwise the search stays close because steps that do not
-        divide the delay of a line may be safe above the limit.
+        If `guess` is inf or nan, steps up to twice the longest travel time are searched. Otherwise the search stays
+        close because steps that do not divide the delay of a line may be safe above the limit.
         """
         if not np.isfinite(guess):
             return bisect_limit(self.fails, self.first, self.far, STEP_RATIO if np.isnan(guess) else STEP_RATIO_UP)
@@ -69,7 +69,7 @@ class DelayLineRuns(RealRuns):
     def growth(self, h: float) -> tuple[float, int]:
         """(greatest growth of a deviation with steps of h [s], number of steps after which it is reached).
 
-        The growth is infinite if a run stops.
+        The growth is infinite if a run stops. Raises TimeoutError at the time limit.
         """
         system = self.system(h)
         predicted = system.growth(self.steps, self.threshold)

@@ -1,9 +1,9 @@
 """Fixed steps of a model with delay lines as a linear system of states and of waves in the lines.
 
-Deviations from a state at rest follow x' = A x + B w, s = C x + D w: x are the states outside the lines, w the waves
-that arrive at the ends of lines, s the waves that nodes send into lines. An arriving wave was sent one delay earlier
-and is interpolated between steps by the polynomials of the lines; friction in the middle of each stretch of a line
-reflects a part of it. A step computes x by the tableau of the method, with w at its stages, and stores s.
+Deviations from the initial steady state follow x' = A x + B w, s = C x + D w: x are the states outside the lines, w
+the waves that arrive at the ends of lines, s the waves that nodes send into lines. An arriving wave was sent one delay
+earlier and is interpolated between steps by the polynomials of the lines; friction in the middle of each stretch of a
+line reflects a part of it. A step computes x by the tableau of the method, with w at its stages, and stores s.
 """
 
 from __future__ import annotations
@@ -50,9 +50,12 @@ class DelayLineSystem:
     a, b, c, d : matrices of x' = A x + B w, s = C x + D w, with the states x outside the delay lines, the waves w that
     arrive at the ends of lines, and the waves s that nodes send into lines
     states : indices of x in the state vector
-    delays : delay of each stretch of a line, in steps; first, last : first and last stretch of each line
+    delays : age in steps of the waves that are read from each stretch of a line: its delay, or the longest step for a
+    shorter stretch; now : fraction of a wave that crosses such a shorter stretch at once, else 0
+    first, last : first and last stretch of each line; history_steps : number of past steps whose waves are read
     reflection : fraction of a wave that friction in a stretch reflects
-    history_steps : number of past steps whose waves are read
+    parts, energy_rows : names and rows of an `EnergyForm`
+    weight : factors on past waves, after which the sum of their squares is their energy
     """
 
     def __init__(self, model, method: Method, h: float) -> None:
@@ -92,7 +95,7 @@ class DelayLineSystem:
         return step, [weights[:, i * n : (i + 1) * n] @ self.b for i in range(s)]
 
     def reading_weights(self, c: float) -> tuple[np.ndarray, np.ndarray]:
-        """Interpolation of past waves at the time c h after the start t_n of a step: six entries and weights.
+        """Interpolation of the past waves that arrive c h after the start of step n: six entries and weights.
 
         Returns (int64[6, stretches], numbers of the entries relative to step n; float64[6, stretches], their weights).
         """

@@ -17,7 +17,8 @@ def growth_method(
     """Object that computes the growth of deviations: `DenseGrowth` for up to 500 states, `VectorGrowth` for more.
 
     e : Jacobian in coordinates of the energy norm [1/s]; steps : number of steps over which growth counts
-    threshold : growth above which a step fails; latest : end of the computation on the monotonic clock [s]
+    threshold : growth above which a step fails
+    latest : time of the monotonic clock [s] after which `VectorGrowth` raises TooLarge; default: in 30 s
     """
     if e.shape[0] <= DENSE:
         return DenseGrowth(method, e if isinstance(e, np.ndarray) else e.toarray(), steps, threshold)
@@ -29,9 +30,10 @@ def growth_method(
 
 
 def predicted_limit(growth: Any) -> StepLimit:
-    """Limit of the step of a linear system, below which no step fails.
+    """Limit of the step of a linear system, below which no step is found to fail.
 
-    growth : result of `growth_method`. The search goes from 0.1 / ||J|| to 1e4 / ||J|| with the norm of the Jacobian J.
+    growth : result of `growth_method`. The search goes from 0.1 / ||J||, or less if that fails, to 1e4 / ||J||, with
+    the norm of the Jacobian J. The limit is inf if no step fails, and for J = 0.
     """
     if growth.size == 0.0:
         return StepLimit(np.inf, np.inf)

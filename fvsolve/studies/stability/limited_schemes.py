@@ -46,7 +46,7 @@ class LimitedLimit(PlainData):
     found to fail within these steps; None if none fails up to 20
     least : least measured limit over the initial values, for each number of steps
     sharp : False if `least` falls by more than 5 % from the fewest to the most steps (exponential growth alone would
-    change it less), None if no run failed
+    change it less), None unless runs of both the fewest and the most steps fail
     """
 
     scheme: str

@@ -90,7 +90,7 @@ def measured_limits(
 ) -> list[MeasuredLimit]:  # fmt: skip
     """Predicted and measured Courant limits of linear schemes with explicit methods on a periodic grid.
 
-    schemes, methods : names; default: all linear schemes, all explicit methods
+    schemes, methods : names; default: all linear schemes, all explicit methods; implicit methods are left out
     cells : cells of the grid; steps : number of steps of a run
     progress : function of (limits done, limits in total, next pair)
     Raises FvsolveError for unknown names, and for too few cells or steps.

@@ -101,10 +101,11 @@ class RealRuns:
     def growth(self, h: float) -> tuple[float, int]:
         """(greatest growth of a deviation with steps of h [s], number of steps after which it is reached).
 
-        The growth is infinite if a run stops. If the growth exceeds the threshold, the run is repeated with a larger
-        deviation at the start. If both growths agree, the deviation itself has grown. Otherwise round-off or Newton
-        residuals have grown, whose size does not depend on the start; then the larger deviation is used, and the check
-        is repeated.
+        The growth is infinite if a run stops because of the step. If the growth exceeds the threshold, the run is
+        repeated with a larger deviation at the start, unless this is 1e-6 of a small deviation or more. If both growths
+        agree, the deviation itself has grown. Otherwise round-off or Newton residuals have grown, whose size does not
+        depend on the start; then the larger deviation is used, and the check is repeated. Raises TimeoutError at the
+        time limit.
         """
         size, after, base_at = 1.0, 0, self.base_states(h)
         for start, width in self.starts:
@@ -123,7 +124,8 @@ class RealRuns:
     def base_states(self, h: float) -> Callable[[int], np.ndarray | None]:
         """Function of k that returns the state from which deviations are measured at check number k.
 
-        It is the state of a run from the operating point with steps of h [s], or None if this run has stopped.
+        It is the state of a run from the operating point with steps of h [s], or None if this run has stopped. At a
+        steady state it is the operating point itself.
         """
         run, states = None if self.at_rest else self.loop(self.at.y, h), []
 
@@ -140,7 +142,7 @@ class RealRuns:
         """(greatest growth of the deviation `start` with steps of h [s], number of steps after which it is reached).
 
         The run ends when the growth exceeds the threshold. The growth is infinite if a run stops because of the step.
-        base_at : result of `base_states`
+        base_at : result of `base_states`. Raises TimeoutError at the time limit.
         """
         size, after, run = 1.0, 0, self.loop(self.at.y + start, h)
         first = np.linalg.norm(self.form.forward @ start)
@@ -176,7 +178,10 @@ class RealRuns:
         return self.growth(h)[0] > self.threshold
 
     def limit(self, guess: float) -> StepLimit:
-        """Greatest safe step by bisection around the step `guess` [s], after a check that smaller steps are safe."""
+        """Greatest safe step by bisection around the step `guess` [s], after a check that smaller steps are safe.
+
+        It is inf if no step fails up to about 20 times `guess`, and nan if no safe step is found.
+        """
         for part in SAFE_PARTS:
             if self.fails(part * guess):
                 return self.limit_below(part * guess)
@@ -207,9 +212,9 @@ class RealRuns:
 def measure_limit(
     runs: RealRuns, guess: float, size: float, left_out: dict[str, str], quantity: str = "measured"
 ) -> dict:
-    """Columns of a stability row with the limit of real runs, see `measured_limit_of`.
+    """Columns of a stability row with the limit of real runs, see `measured_limit_of`; empty if not found in time.
 
-    quantity : name under which `left_out` receives the reason if the limit is not found in time
+    quantity : name under which `left_out` then receives the reason
     """
     try:
         return measured_limit_of(runs, guess, size)
@@ -224,10 +229,12 @@ def too_long(runs: RealRuns) -> str:
 
 
 def measured_limit_of(runs: RealRuns, guess: float, size: float) -> dict:
-    """Dict with the limit of real runs, `measured` [s], and the longest tested step, `measured_up_to` [s].
+    """Dict with the limit of real runs, `measured` [s], and a step above it, `measured_up_to` [s].
 
+    `measured_up_to` is a step with which runs fail, or the longest tested step if none fails.
     guess : predicted limit [s]; if it is infinite, runs with two long steps are made
     size : norm of the Jacobian [1/s]. The dict is empty if `guess` is 0, or if `guess` is infinite and `size` is 0.
+    Raises TimeoutError at the time limit.
     """
     if np.isfinite(guess) and guess > 0.0:
         limit = runs.limit(guess)

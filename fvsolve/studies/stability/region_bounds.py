@@ -20,7 +20,8 @@ def region_limit(method: Method, points: np.ndarray) -> float:
     """Greatest step h [s] for which all points s [1/s] times any shorter step are in the stability region.
 
     The result is 0 if there is no such step, inf if all steps are possible. Points within 1e-10 of the imaginary axis
-    (round-off, relative to the greatest |s|) are moved onto it. Points to its right allow no step.
+    (round-off, relative to the greatest |s|) are moved onto it, and points within 1e-10 of 0 are left out. Points to
+    the right of the axis allow no step.
     """
     size = np.max(np.abs(points), initial=0.0)
     points = points[np.abs(points) > ZERO_TOLERANCE * size]

@@ -60,7 +60,7 @@ class Stability:
     systems: dict[str, Callable[[str], LinearSystem]] = field(repr=False)
 
     def system(self, scheme: str) -> LinearSystem:
-        """Linear system with one of the requested linear schemes."""
+        """Linear system with one of the requested schemes; raises FvsolveError for a limited scheme."""
         return self.systems[scheme](scheme)
 
     def plain(self) -> dict:
@@ -71,7 +71,8 @@ class Stability:
 class LinearSystem:
     """Case linearised with one linear scheme about a state, and data that do not depend on the time method.
 
-    linear : state-space form; form : energy norm in use; e : Jacobian in the coordinates of this norm [1/s]
+    linear : state-space form; full_form : energy form of the model
+    form : energy norm in use, `full_form` suited to the Jacobian; e : Jacobian in the coordinates of this norm [1/s]
     """
 
     def __init__(self, at: OperatingPoint) -> None:
@@ -98,7 +99,7 @@ class LinearSystem:
 
     @property
     def rate(self) -> float:
-        """Greatest wave rate [1/s]; 0 without cells."""
+        """Greatest wave rate of pipes and basins [1/s]; 0 without cells."""
         return self.at.model.wave_rate
 
 
@@ -122,14 +123,14 @@ def stability(
 ) -> Stability:  # fmt: skip
     """Compute the greatest stable steps of a case for each scheme and time method: a row for each pair.
 
-    schemes, methods : names; default: scheme and method of the case
+    schemes, methods : names; default: scheme and method of the case; `auto` counts as its first method
     at : time of the state about which deviations grow [s]; default: the start
     before : True to take schedules just before a jump or kink at this time
     steps : number of steps over which growth counts; threshold : growth above which a step fails
     set : changed keys of the case; out : folder in which finished rows are stored and found again
     progress : function of (rows done, rows in total, next row); jobs, dask : processes, as in `sweep`
-    Raises CaseError, and FvsolveError for a state that cannot be linearised, and for too few steps or too small a
-    threshold.
+    Raises CaseError, and FvsolveError for a state that cannot be linearised, for `at` with delay lines, for a
+    prediction that takes too long, and for too few steps or too small a threshold.
     """
     if steps < 10 or not threshold > 1.0:
         raise FvsolveError(
@@ -225,7 +226,8 @@ class SchemeRows:
     def frozen_systems(self) -> Iterator[tuple[str, LinearSystem]]:
         """Yield (name, linear system) for each linear scheme that the limited scheme becomes with constant weights.
 
-        All systems are linearised at the state of the limited scheme.
+        All systems are linearised at the state of the limited scheme. In a case with basins or cavities the only system
+        is that of `upwind`.
         """
         at = self.at(self.scheme)
         if at.model.cavitates or at.model.basins:  # their only linear scheme is upwind
@@ -287,7 +289,10 @@ class SchemeRows:
         return row | {"left_out": left_out}
 
     def limited_row(self, method) -> StabilityRow:
-        """Row of a limited scheme: predicted limits with its weights held constant, and the limit of real runs."""
+        """Row of a limited scheme: predicted limits with its weights held constant, and the limit of real runs.
+
+        For Euler it has also the limit of runs of ten times as many steps.
+        """
         at = self.at(self.scheme)
         limits, starts, left_out, latest = {}, {}, {}, time.monotonic() + TIME_LIMIT
         try:

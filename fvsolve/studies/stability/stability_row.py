@@ -15,12 +15,13 @@ class StabilityRow:
     predicted : greatest step with which the linearised case grows by `threshold` at most
     growth, after : greatest growth with a slightly longer step, and its number of steps
     where, share : part with the most energy of the grown deviation, and its share of the energy
-    measured : limit of real runs; measured_up_to : longest step of a real run
+    measured : limit of real runs, nan also if no safe step is found
+    measured_up_to : a step with which real runs fail, or the longest step of real runs if none fails
     eigenvalues, field_of_values, von_neumann : bounds, the greatest steps with which the eigenvalues, the field of
-    values, or the waves of a uniform grid are in the stability region; greatest_real : greatest real part of an
-    eigenvalue [1/s]
+    values, or the waves of a uniform grid are in the stability region
+    greatest_real : greatest real part of an eigenvalue [1/s], 0 if none is positive
     rate : greatest wave rate [1/s]; the Courant number is the step times this rate; 0 without cells
-    frozen : for a limited scheme, predicted limits with its weights held at their extremes
+    frozen : for a limited scheme, predicted limits with constant weights, by name of the resulting linear scheme
     lines : True for a case with delay lines, for which there are no bounds
     longer : for a limited scheme with Euler, the measured limit for ten times as many steps
     left_out : reason for each missing column
@@ -57,7 +58,7 @@ class StabilityRow:
 
     @property
     def difference(self) -> float:
-        """Relative difference of the limits, measured / predicted - 1; nan if either limit is missing."""
+        """Relative difference of the limits, measured / predicted - 1; nan unless both are finite and positive."""
         known = np.isfinite(self.measured) and np.isfinite(self.predicted) and self.predicted > 0.0
         return self.measured / self.predicted - 1.0 if known else np.nan
 

@@ -25,7 +25,8 @@ class VectorGrowth:
 
     The matrix and its transpose are used in turn, as in a power iteration for the 2-norm. Start vectors are random with
     a fixed seed. The result is a lower bound of the greatest growth, close to it after four passes.
-    e : sparse Jacobian in coordinates of the energy norm [1/s]; latest : end on the monotonic clock [s]
+    e : sparse Jacobian in coordinates of the energy norm [1/s]; size : its 2-norm
+    latest : time of the monotonic clock [s] from which computations raise TooLarge; default: 30 s after the start
     """
 
     def __init__(
@@ -38,7 +39,7 @@ class VectorGrowth:
         self.start_block = np.random.default_rng(1).standard_normal((e.shape[0], VECTORS))
 
     def two_norm(self) -> float:
-        """2-norm of the Jacobian [1/s], by power iteration."""
+        """Estimate of the 2-norm of the Jacobian [1/s], by power iteration."""
         v = np.random.default_rng(2).standard_normal(self.e.shape[0])
         for _ in range(50):
             v = self.transpose @ (self.e @ (v / np.linalg.norm(v)))
@@ -60,7 +61,8 @@ class VectorGrowth:
     def growth(self, h: float, enough: float = np.inf) -> Growth:
         """Greatest growth found with steps of h [s], and the deviation with this growth.
 
-        The search ends when the growth exceeds `enough`.
+        The search ends when the growth exceeds a finite `enough`, or is so far below it after a pass that the norm of
+        no power can reach it. Raises TooLarge at the time limit.
         """
         forth, back = step_function(self.method, h, self.e), step_function(self.method, h, self.transpose)
         v, unit = self.start_block, self.start_block[:, 0] / np.linalg.norm(self.start_block[:, 0])
@@ -104,7 +106,7 @@ class VectorGrowth:
 
 
 class TooLarge(FvsolveError):
-    """Error: the time limit of a prediction is exceeded."""
+    """Error: the prediction has taken longer than its time limit."""
 
 
 def too_large(states: int, steps: int) -> str:
