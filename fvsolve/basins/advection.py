@@ -1,7 +1,7 @@
 """Advection of scalars over a grid of rectangles by given flows.
 
 s_t + div(F c) = 0, with c the value of a scalar, s = depth c its amount per area, and F the flow per width [m2/s]. The
-rate of a uniform c is c times the divergence of F, to the last bit.
+rate of a uniform c is -c times the divergence of F, to the last bit.
 
 The Courant number is the step times the rate of `grid_fastest`. In flows without divergence, Euler steps keep every
 value within the range of its neighbours up to these Courant numbers: upwind 1; muscl 1/2, next to an inlet 1/3; muscl
@@ -102,6 +102,7 @@ def add_fifth_order(
 ):
     """Add the rates by upwind5 or weno5, minus the rates by upwind, to `rate`, which contains the rates by upwind.
 
+    Fluxes of weno5 are limited so that an Euler step of Courant number WENO_COURANT keeps the bounds.
     scheme : LINEAR for upwind5, or WENO5; least, most : bounds that weno5 keeps, infinite for none
     fastest : result of `grid_fastest` for the flows [1/s]; other arguments as for `grid_advection`
     """

@@ -1,7 +1,7 @@
 """Advection and diffusion of scalars by given flows through the faces of any mesh.
 
 s_t + div(F c) = div(D depth grad c), with c the value of a scalar, s = depth c its amount per area, F the flow per
-width [m2/s] and D the diffusivity. The rate of a uniform c is c times the divergence of F, to the last bit.
+width [m2/s] and D the diffusivity. The rate of a uniform c is -c times the divergence of F, to the last bit.
 
 Euler steps up to the reciprocal of the returned rate keep all values between two bounds, because the value at a side of
 a cell differs from the value of the cell by no more than the distance to the nearer bound. So the value of the outflow
@@ -10,8 +10,8 @@ within the range of the neighbours. Other limiters have second order on any mesh
 
 Diffusion uses the difference of two cells along the line between their centres. Where this line is not normal to the
 face, the mean of the gradients of both cells gives the oblique part: this is of second order, but without bounds.
-Diffusion
-has no flux through walls and where the flow leaves; where it enters, the value outside holds at the face.
+Diffusion has no flux through walls and where the flow leaves. Where a given velocity enters, the value outside holds at
+the face.
 
 c, d : values and depths of the cells of a block; w : scratch of a block, float64[ROWS BLOCK]; geo, far : first and last
 group of measures of sides in `floats`, see `cell_sides`.

@@ -1,10 +1,11 @@
 """Power of flows into basins through patches, under the density law `linear`.
 
 The last entries of the array `power` belong to basins, five for each basin [W]: power of the inflow through patches at
-their total pressure; loss at patches (inflow has no kinetic energy, and the total pressure does not include that of
-outflow); friction; rate of storage; on a body, power dissipated by the density law. An entry of `stored` for each basin
-contains the change of its energy since the start [J]. Each type of basin writes the entries that are not zero for it.
-Kinetic energy is computed from squares of cell means.
+their potential p - p_ambient + rho g z, and of moving walls and bodies; loss at patches (inflow has no kinetic energy,
+and the potential does not include that of outflow); friction; rate of storage; on a body, power that the model of the
+water dissipates (`frame_energy`). An entry of `stored` for each basin contains its energy minus that at rest [J]; on a
+body see `frame_energy.add_stored`. Each type of basin writes the entries that are not zero for it. Kinetic energy is
+computed from squares of cell means.
 """
 
 from fvsolve.jit import njit
@@ -21,7 +22,7 @@ def basin_first_row(tables, power, b):
 
 @njit(forceinline=True)
 def rest_potential(st, basin):
-    """Total pressure p - p_ambient + rho g z of a basin in the initial steady state [Pa]; z above energy datum."""
+    """Potential p - p_ambient + rho g z of a basin in the initial steady state [Pa]; z above energy datum."""
     return basin["rest"] - st["rho"] * st["gravity"] * st["datum"]
 
 

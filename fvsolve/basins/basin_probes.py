@@ -47,6 +47,6 @@ def observe_dense_flows(t, y, out, handle, values):
 
 @njit
 def patch_flow(tables, probe, out):
-    """Mass flow into a basin through the patch of a probe [kg/s]."""
+    """Mass flow into a basin through the patch of a probe [kg/s], from links or through an open boundary."""
     layout, i = tables.layout[0], probe["index"]
     return out[layout["net"] + i] + out[layout["supply"] + i]

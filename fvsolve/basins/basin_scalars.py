@@ -29,7 +29,7 @@ def depth_at(tables, basin, y, i):
 
 @njit
 def cell_value(tables, basin, q, y, i):
-    """Value of scalar q in cell i of a basin."""
+    """Value of scalar q in cell i of a basin, towards 0 below the depth THIN."""
     return y[basin["carried"] + q * basin["n"] + i] / max(depth_at(tables, basin, y, i), THIN)
 
 
@@ -83,7 +83,10 @@ def put_boundary_values(t, tables, patch, basin, q):
 
 @njit
 def prepare_scalars(t, tables, b, y):
-    """Write the depths of the cells of basin b, and the values of scalars beyond its boundary, to `tables.work`."""
+    """Write the depths of the cells of basin b, and the values of scalars beyond its boundary, to `tables.work`.
+
+    Depths are written only for a basin with depth, in the cells of `stencil_cells`.
+    """
     plane, basin, patches = tables.plane, tables.basins[b], tables.patches
     n, o, at, seen = basin["n"], basin["y"], basin["plan"], deviations_of(basin, tables.seen, y)
     if basin["deep"] == 1:

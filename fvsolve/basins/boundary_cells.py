@@ -71,7 +71,10 @@ def has_given_flows(basin):
 
 @njit
 def patch_inflow(tables, patch):
-    """Inflow through all faces of a patch: [m3/s] of water, [m2/s] by a given velocity, [kg/(m s)] of a liquid."""
+    """Inflow through all faces of an open patch: [m3/s] of water, [m2/s] by a given velocity, [kg/(m s)] of a liquid.
+
+    That by a given velocity is at full speed, without `flow_factor`.
+    """
     basin, total = tables.basins[patch["basin"]], 0.0
     flows = tables.plane if has_given_flows(basin) else tables.work
     for m in range(patch["faces"]):

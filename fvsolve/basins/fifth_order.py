@@ -3,8 +3,8 @@
 Values at faces are linear (upwind5) or WENO-Z (Borges et al. 2008), written in differences, so that a uniform value
 stays uniform. The mean of a product over a face is the product of the means plus two terms. These are 1/12 and 1/180 of
 the products of the first and of the second Legendre coefficients along the face. The flux through a face minus the
-upwind flux is an excess, which
-`limit_excesses` may reduce. Arguments as for `advection.grid_advection`; c : values of cells.
+upwind flux is an excess, which `limit_excesses` may reduce. Arguments as for `advection.grid_advection`; c : values of
+cells.
 """
 
 from fvsolve.jit import inline, njit
@@ -80,7 +80,7 @@ def face_excesses(scheme, factor, flow, a, b, c, d, e, g, q, excess):
 
 @njit
 def pad_sides(nx, ny, factor, flow_x, flow_y, outside, c, v):
-    """Copy the cell means c to v, with ghost cells beyond the sides of the grid; see `ghost_values`.
+    """Copy the cell means c to v, with three ghost cells beyond the sides of the grid: `ghost_values`, the last twice.
 
     v : float64[ny + 6, nx + 6] as one array; other arguments as for `advection.grid_advection`
     """

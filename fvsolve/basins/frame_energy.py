@@ -12,8 +12,8 @@ g, z : gravity, height of the origin; d : gravity in axes of the basin; lever : 
 
 A liquid has no lever, and its stored energy in its own axes is that of `liquid_energy`. A body that is loaded with
 force F and torque T supplies the power -(F . V + T . W); see `frame_reaction`. The acceleration a of the origin along
-the normal changes the weight of the water, but does not act on columns that rise. So the model dissipates
-a d/dt (sum of mass h / 2), which may be negative.
+the normal, for zero joint accelerations, changes the weight of the water, but does not act on columns that rise. So the
+model dissipates a d/dt (sum of mass h / 2), which may be negative.
 """
 
 from fvsolve.basins.basin_energy import basin_first_row as energy_row
@@ -115,7 +115,10 @@ def rise_moment(tables, basin, y, dydt):
 
 @njit
 def energy_rate(tables, basin, b, y, dydt, out, vx, vy, vz):
-    """Rate of kinetic and potential energy of the water in basin b [W]; vx, vy, vz : result of `origin_velocity`."""
+    """Rate of kinetic and potential energy of the water in basin b [W]; vx, vy, vz : result of `origin_velocity`.
+
+    For a liquid the energy in its own axes, see `liquid_energy`, is left out.
+    """
     plane, n, o, at, per_area = tables.plane, basin["n"], basin["y"], basin["frame"], mass_factor(tables, basin)
     m, wx, wy, wz = tables.layout[0]["tank"] + TANK_OUT * b, plane[at + WX], plane[at + WY], plane[at + WZ]
     ax, ay, az, bx, by, bz = origin_acceleration(tables, basin, b, out)
@@ -158,6 +161,8 @@ def energy_rate(tables, basin, b, y, dydt, out, vx, vy, vz):
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
     """Write the kinetic plus potential energy [J] of the water in basins on bodies to `stored`.
+
+    The potential energy is zero at elevation 0.
 
     For a liquid it is added to the energy in its own axes there; for water with a free surface it replaces the entry.
     """

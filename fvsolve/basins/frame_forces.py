@@ -24,8 +24,9 @@ from fvsolve.kernels.table_handle import open_tables
 def add_frame_forces(t, y, dydt, out, handle):
     """Add Coriolis and Euler forces to the rates of flow in basins on bodies, and loads of the water to the bodies.
 
-    Under the density law `linear`, the inertia of a liquid is its inertia at rest. Loads are added only where forces
-    move the body or a probe observes the load of a joint.
+    Under the density law `linear`, the inertia of a liquid is its inertia at rest. Loads are added only where column
+    `loads_body` is 1: forces move the body, a probe observes the load of a joint, or energy is computed. The Coriolis
+    rate 2 W_z raises out[RATE], which limits the step. If `dydt` is empty, the rates are those in `tables.work`.
     """
     tables = open_tables(handle)
     for b in range(tables.basins.size):
@@ -44,7 +45,10 @@ def add_frame_forces(t, y, dydt, out, handle):
 
 @njit
 def correct_for_bodies(t, y, dydt, out, handle):
-    """Correct the rates of flow in basins on bodies for the accelerations of the joints of these bodies."""
+    """Correct the rates of flow in basins on bodies for the accelerations of the joints of these bodies.
+
+    The inertia is that at the present depth or density, under all density laws.
+    """
     tables = open_tables(handle)
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]

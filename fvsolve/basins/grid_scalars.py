@@ -46,7 +46,10 @@ def grid_arrays(tables, basin):
 
 @njit
 def advect_on_grids(t, y, dydt, out, handle):
-    """Write the rates of the amounts of all scalars in grids by upwind or muscl."""
+    """Write the rates of the amounts of all scalars in grids by muscl, or by upwind under all other schemes.
+
+    out[RATE], which limits the step, is raised. Requested stage sums are formed too.
+    """
     tables = open_tables(handle)
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]
@@ -139,7 +142,7 @@ def add_fifth_order_on_grids(t, y, dydt, out, handle):
 
 @njit
 def diffuse_on_grids(t, y, dydt, out, handle):
-    """Add diffusion to the rates of the amounts of all scalars in grids."""
+    """Add diffusion to the rates of the amounts of all scalars in grids; raise out[RATE], which limits the step."""
     tables = open_tables(handle)
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]

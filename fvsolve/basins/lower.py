@@ -10,7 +10,7 @@ from fvsolve.kernels import dtypes as rec
 
 
 def lower_basins(draft) -> None:
-    """Fill the tables of basins and of their patches in a draft of a model, and add the states of cells to it."""
+    """Fill the tables of basins, moving walls and patches in a draft of a model, and add the states of basins to it."""
     case = draft.case
     draft.basins = [rows_class(case.nodes[name].physics_type)(case, name) for name in case.meshes]
     draft.basin_table = np.zeros(len(draft.basins), rec.BASIN)

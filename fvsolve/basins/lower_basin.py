@@ -81,14 +81,14 @@ class BasinRows:
         return [1.0] * len(self.quantities)
 
     def start(self, attitude: np.ndarray | None = None) -> np.ndarray:
-        """Deviations of cells from the steady state at the start : float64[quantities, n].
+        """Deviations of cells at the start of a run from the state at rest : float64[quantities, n].
 
         attitude : rotation matrix of the body that carries the basin, None for that at the start
         """
         return np.zeros((len(self.quantities), self.n))
 
     def fields(self, y: np.ndarray) -> dict[str, np.ndarray]:
-        """Output fields by name, with a value for each cell, in SI units.
+        """Output fields by name, with a value (a vector of three for the velocity) for each cell, in SI units.
 
         y : float64[quantities, n]  deviations of cells from rest
         """
@@ -135,7 +135,7 @@ class BasinRows:
 
     @property
     def has_constant_speed(self) -> bool:
-        """True if the wave speed is the same in all states."""
+        """True if the wave speed and the sizes of cells are the same in all states."""
         return False
 
     @property
@@ -155,14 +155,17 @@ class BasinRows:
         return 0.0, np.zeros(self.n)
 
     def weights(self, y: np.ndarray) -> np.ndarray:
-        """Weights w, for which a small deviation d from y stores the energy w d^2 [J] : float64[quantities, n]."""
+        """Weights w, for which a small deviation d from y stores the energy w d^2 [J] : float64[quantities, n].
+
+        y : float64[quantities, n]  deviations of cells from rest
+        """
         return np.tile(0.5 * self.mesh.area, (len(self.quantities), 1))
 
     def above(self, y: np.ndarray, datum: float) -> float:
         """Energy at deviations y [J], relative to water at rest with its surface at the elevation `datum`.
 
-        Where the bed is above that surface, it is relative to a dry bed. For a liquid it is relative to the state with
-        zero total pressure.
+        Where the bed is above that surface, it is relative to a dry bed. For a liquid it is relative to rest at the
+        potential 0, that is p - p_ambient + rho g z = 0 with z above `datum`.
         """
         return 0.0
 
@@ -401,7 +404,10 @@ class BasinRows:
             draft.warnings.append(Notice("bounds", f"nodes.{self.name}", text + reason, key, value, limit))
 
     def bounds_violation(self, row) -> tuple[str, str, float | None, float | None] | None:
-        """Reason why scalars may leave their bounds: (key of the case, text, value, limit); None if they cannot."""
+        """Reason why scalars may leave their bounds: (key of the case, text, value, limit); None if they cannot.
+
+        The key is None if no key is the cause; value and limit are None if they are not numbers.
+        """
         numerics, method = self.case.numerics, METHODS.get(self.case.numerics.method)
         if row["scheme"] == rec.LINEAR:
             return "scheme", "upwind5 does not keep scalars within bounds; upwind, muscl and weno5 do", None, None
@@ -432,7 +438,10 @@ class BasinRows:
         return None
 
     def scalar_scale(self, name: str) -> float:
-        """Size of a small amount of a scalar per area: its greatest value at the start."""
+        """Scale of the amount of a scalar per area: its greatest absolute value at the start, for the depth 1.
+
+        For a scalar without a formula for this basin the ambient value counts too. The scale is 1 if all are 0.
+        """
         given, scalar = self.part.scalars.get(name), self.case.scalars[name]
         values = np.abs([scalar.initial, scalar.ambient]) if given is None else np.abs(self.formula(given))
         return float(values.max()) or 1.0
@@ -442,7 +451,7 @@ class BasinRows:
         return np.ones(self.n)
 
     def start_scalars(self, y: np.ndarray) -> None:
-        """Write the amounts of scalars at the start to the states y of the model."""
+        """Write the amounts of scalars at the start to the states y of the model, for the depths of cells in y."""
         for name, amounts in zip(self.scalars, self.amounts(y), strict=True):
             given = self.part.scalars.get(name)
             value = self.case.scalars[name].initial if given is None else self.formula(given)
@@ -454,12 +463,18 @@ class BasinRows:
         return y[at : at + len(self.scalars) * self.n].reshape(-1, self.n)
 
     def values(self, y: np.ndarray) -> dict[str, np.ndarray]:
-        """Values of scalars in cells at the states y of the model : name -> float64[n]."""
+        """Values of scalars in cells at the states y of the model : name -> float64[n].
+
+        Below the depth THIN they tend to 0.
+        """
         depth = np.maximum(self.depth_of(self.deviations(y)), THIN) * (self.area_ratios(y) if self.moves else 1.0)
         return {name: amounts / depth for name, amounts in zip(self.scalars, self.amounts(y), strict=True)}
 
     def mass_per_depth(self) -> np.ndarray:
-        """Mass of fluid per depth in each cell : float64[n] [kg/m]; times an amount per area, the mass of a scalar."""
+        """Mass of fluid per depth in each cell : float64[n] [kg/m]; times an amount per area, the mass of a scalar.
+
+        For a basin with a given velocity, whose depth is 1, it is the mass of the cell [kg].
+        """
         return np.zeros(self.n)
 
     def lower_patch(self, draft, patch: str, row) -> None:

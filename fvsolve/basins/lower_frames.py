@@ -100,6 +100,7 @@ def level_at_start(basin, attitude: np.ndarray | None = None) -> np.ndarray:
 def axes_in_world(basin, out: np.ndarray, layout) -> tuple[np.ndarray, np.ndarray]:
     """(origin [m], axes as columns) of a basin on a body, in axes of the world : float64[3], float64[3, 3].
 
+    The origin is that of the coordinates of its mesh, not the middle of the basin.
     out, layout : output array of the right-hand side, and the places of its parts
     """
     from fvsolve.kernels.dtypes import BODY_OUT

@@ -11,7 +11,10 @@ STENCIL_RADIUS = 3  # stencil radius of the fifth order
 
 
 def interior_pattern(basin) -> tuple[np.ndarray, np.ndarray]:
-    """(rates, states) as indices in y: each rate of each cell, paired with the states on which it depends."""
+    """(rates, states) as indices in y: each rate of each cell, paired with the states on which it depends.
+
+    Amounts of scalars are left out, see `scalar_pattern`.
+    """
     near, count = neighbours(basin), len(basin.quantities)
     pattern = kron(coo_array(np.ones((count, count), dtype=bool)), near).tocoo()
     at = int(basin.row["y"])

@@ -53,7 +53,10 @@ def lower_walls(draft) -> None:
 
 
 def lower_lines(draft, basin, row) -> None:
-    """Reserve space in `plane` for the speeds of the moving lines of a basin, and for the stretching of its cells."""
+    """Reserve space in `plane` for speeds of moving lines, present areas and stretching of the cells of a basin.
+
+    Space in `work` is reserved for the forces on boundary faces.
+    """
     mesh, axis = basin.mesh, case.axis_of(basin.part, basin.mesh)
     row["turn"], row["area"] = axis, draft.to_plane(mesh.area)
     row["thrust"] = draft.to_work(2 * row["outer"])

@@ -11,7 +11,10 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def advect_on_meshes(t, y, dydt, out, handle):
-    """Write the rates of all scalars in basins on meshes other than grids, by advection and diffusion."""
+    """Write the rates of all scalars in basins on meshes other than grids, by advection and diffusion.
+
+    out[RATE], which limits the step, is raised.
+    """
     tables = open_tables(handle)
     plane, work, scalars, integers = tables.plane, tables.work, tables.scalars, tables.integers
     for b in range(tables.basins.size if dydt.size > 0 else 0):

@@ -146,7 +146,7 @@ def put_side(scratch, geo):
     """Write the measures of one side of each cell of a block to `geo`, and add to the sums over sides in `scratch`.
 
     scratch : ends of the side, see `gather_ends`, and sums for the least-squares gradient
-    geo : first group of measures of the side, see `cell_sides`
+    geo : first group of measures of the side, see `cell_sides`; weights of the gradient are final after `put_weights`
     """
     for i in range(BLOCK):
         xa, ya, xb, yb, cx, cy = (
@@ -218,7 +218,10 @@ def put_weights(scratch, geo):
 
 @njit
 def update_sides(tables, basin):
-    """Write all measures of `cell_sides` in blocks where corners move, and the centres of cells there."""
+    """Write the measures of `cell_sides` in blocks where corners move, and the centres of cells there.
+
+    The last group is written only for a basin with scalars; lengths of inner faces only where flows are needed.
+    """
     floats, integers = tables.plane[basin["mesh"] :], tables.integers[basin["links"] :]
     x, y, _, cx, cy, scratch = mesh_positions(tables.plane, basin)
     area = tables.plane[basin["area"] :]

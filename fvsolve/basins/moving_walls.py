@@ -1,12 +1,12 @@
 """Moving walls of basins, and the grid lines that move with them.
 
 Let U be a quantity per area, A the area of a cell, F the flux through a face of the cell and w the speed of the face.
-The rate of the amount A U in a cell is the sum of F - w U over its faces (Reynolds' transport theorem, (71) to (73) of
-docs/course.md). So the states are changes of the amount over the undeformed area, (A U - A0 U0) / A0, with U0 at rest;
-travels of walls are states too. Areas are then linear in the states; every Runge-Kutta method keeps this relation, and
-a uniform state stays uniform to round-off. All walls of a basin move along the same axis. Other functions read
-deviations U - U0 (`seen`) in place of the states, and the present lines and areas in `plane`. On other meshes, corners
-take the place of grid lines (see `moving_meshes`).
+The amount A U in a cell falls at the rate of the sum of the outward fluxes F - w U over its faces (Reynolds' transport
+theorem, (71) to (73) of docs/course.md). So the states are changes of the amount over the undeformed area,
+(A U - A0 U0) / A0, with U0 at rest; travels of walls are states too. Areas are then linear in the states; every
+Runge-Kutta method keeps this relation, and a uniform state stays uniform to round-off. All walls of a basin move along
+the same axis. Other functions read deviations U - U0 (`seen`) in place of the states, and the present lines and areas
+in `plane`. On other meshes, corners take the place of grid lines (see `moving_meshes`).
 """
 
 from math import sqrt
@@ -51,6 +51,7 @@ def stretching_counts(basin):
 def update_geometry(t, y, seen, out, handle):
     """Compute lines and areas of basins at y, and write deviations of values per area from rest to `tables.seen`.
 
+    All states other than those of basins with moving walls are copied to `tables.seen`.
     If the argument `seen` is empty, kernels of rates follow. Then, if the kernel of a basin reads the states
     themselves, only deviations next to patches and walls are computed, unless scalars or friction need all.
     """
@@ -183,7 +184,7 @@ def stretch_patch(tables, basin, patch):
 
 @njit
 def speed_of(t, tables, wall, y):
-    """Speed of a wall along its axis [m/s]: the speed of its mass, of its body or of its schedule."""
+    """Speed of a wall [m/s], positive along its axis x or y: the speed of its mass, of its body or of its schedule."""
     if wall["mass"] >= 0:
         return motion(tables.masses[wall["mass"]], y)[1]
     if wall["body"] >= 0:
@@ -198,7 +199,8 @@ def speed_of(t, tables, wall, y):
 def set_line_speeds(t, y, dydt, out, handle):
     """Write the speeds of all grid lines and the rates of the travels of walls; raise out[RATE], which limits the step.
 
-    The status is set to NO_WIDTH if a cell is narrower than LEAST_WIDTH times its undeformed width.
+    On other meshes the speeds are those of corners, and `moving_meshes.set_side_speeds` raises out[RATE]. The status is
+    set to NO_WIDTH if a cell is narrower than LEAST_WIDTH times its undeformed width.
     """
     tables = open_tables(handle)
     plane, walls = tables.plane, tables.walls
@@ -339,7 +341,10 @@ def stretch_scalar_rates(t, y, dydt, out, handle):
 
 @njit
 def observe_walls(t, y, out, handle, values):
-    """Write the values of probes of walls: inward force on the fluid [N], power supplied to it [W], travel [m]."""
+    """Write the values of probes of walls: inward force on the fluid [N], power supplied to it [W], travel [m].
+
+    The travel is positive along the axis x or y.
+    """
     tables = open_tables(handle)
     for p in range(tables.probes.size):
         probe = tables.probes[p]

@@ -25,7 +25,10 @@ def stencil_cells(tables, b):
 
 @njit
 def put_boundary_flows(t, y, dydt, out, handle):
-    """Write the flows through open patches of all basins again, after all bands have computed their fluxes."""
+    """Write the flows through open patches again, after all bands have computed their fluxes.
+
+    Basins with a given velocity are left out, as their flows are not computed.
+    """
     tables = open_tables(handle)
     band_exchange.get_runs(tables.joint, band_exchange.SEND_FLOWS, tables.work)
     for b in range(tables.basins.size):

@@ -1,9 +1,9 @@
 """Advection of values over a grid, of second or first order.
 
 F is the flow through a face [m2/s], q the value at the face, c the value of the cell; kx and ky are 1 / width and
-1 / height of the cell [1/m]. The rate of a cell is kx ky times the sum of F (q - c) over the inflows, minus c times the
-divergence of F. So the rate of a uniform value is the value times the divergence, to the last bit. The slope of an
-upwind cell uses the differences across the face and across the opposite face of that cell.
+1 / height of the cell [1/m]. The rate of a cell is kx ky times the sum of F (q - c) over its faces, F inward, minus c
+times the divergence of F. So the rate of a uniform value is minus the value times the divergence, to the last bit. The
+slope of an upwind cell uses the differences across the face and across the opposite face of that cell.
 
 Arguments: factor : factor on all flows; b, c, d, e : values of four cells in line, faces are between c and d.
 """

@@ -52,6 +52,14 @@ CURVES = [
 ]
 
 
+@pytest.mark.parametrize("lift", [20.0, 59.9, 60.0, 70.0])
+def test_a_straight_curve_of_three_points_has_a_slope_at_no_flow(lift):
+    """Its head is zero at 0.6 m3/s, where the parabola of its end begins, b' = 100 / 1.2; reverse flow adds b' q^2."""
+    found = fvsolve.build(fvsolve.load(rising(lift, curve={"flow": [0.0, 0.1, 0.2], "head": [60.0, 50.0, 40.0]})))
+    q = system(lambda q: 60.0 - 100.0 * q + (100.0 / 1.2 * q * q if q < 0.0 else 0.0), lift)
+    assert found.tables.valves[0]["flow"] / RHO == approx(q, rel=1e-9, abs=1e-12)
+
+
 @pytest.mark.parametrize("curve, f", CURVES, ids=["one", "three", "four", "polynomial"])
 @pytest.mark.parametrize("speed", [1.0, 0.9])
 def test_operating_point_is_where_curve_and_system_meet(curve, f, speed):

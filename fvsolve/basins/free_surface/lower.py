@@ -42,9 +42,9 @@ SHORE_COURANT_FACTOR = 6.0  # and to sixths of cells under fifth order with a sh
 def depth_at_start(level: np.ndarray, bed: np.ndarray) -> np.ndarray:
     """Depth of the water at the start in each cell, whose bed is replaced by its mean : float64[n] [m].
 
-    It is the mean of max(level - bed, 0). If a bank in the cell separates water of a uniform level, it is instead the
-    height of this level above the mean bed, because the water then stays at rest. This correction is smaller, the more
-    the level varies with the bed. level, bed : `samples` of both in cells
+    It is the mean of max(level - bed, 0). If a part of the cell is dry and the water in it has a uniform level, it is
+    instead the height of this level above the mean bed, at least 0, because the water then stays at rest. This
+    correction is smaller, the more the level varies with the bed. level, bed : `samples` of both in cells
     """
     deep = level - bed
     wet = deep > ROUNDING * (np.abs(level) + np.abs(bed))
@@ -141,7 +141,10 @@ class FreeSurfaceRows(BasinRows):
 
     @property
     def rate_cap(self) -> float:
-        """Cap of the decay rate of flows by friction [1/s]; without a cap inf, or NO_CAP with the method `auto`."""
+        """Cap of the decay rate of flows by friction [1/s]; without a cap inf, or NO_CAP with the method `auto`.
+
+        A finite cap also makes friction limit the time step.
+        """
         if self.has_rate_cap:
             return RATE_CAP
         return NO_CAP if self.case.numerics.method == AUTO else math.inf

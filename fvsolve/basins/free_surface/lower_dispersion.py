@@ -43,7 +43,8 @@ NO_WAVES = SurfaceWaves(0.0, math.nan, math.nan)
 def surface_waves(basin, y: np.ndarray, seen: float = LEAST_AT_START) -> SurfaceWaves:
     """Properties of the waves of a basin at deviations y of its cells from rest.
 
-    They are `NO_WAVES` if the root mean square of the surface is not above `seen` times the mean depth.
+    They are `NO_WAVES` if the root mean square of the surface is not above `seen` times the mean depth, or not finite,
+    or if all cells are dry.
     y : float64[quantities, n]
     """
     depth, area = basin.depth + y[0], basin.mesh.area

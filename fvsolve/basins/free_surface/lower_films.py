@@ -38,9 +38,9 @@ def slow_film_error(basin, y: np.ndarray) -> tuple[float, float, float]:
 def fast_film_error(basin, y: np.ndarray) -> tuple[float, float, float]:
     """Mean error of films that are too fast at deviations y, as three numbers; (0, nan, nan) without flow.
 
-    They are speed / correct speed - 1, depth [m], and decay rate of the flow by friction [1/s], all averaged with the
-    flow as weight. If friction at the rate r = C u balances a slope and is capped as r / (1 + r / RATE_CAP), then u^2
-    is too great by the factor 1 + r / RATE_CAP.
+    They are speed / correct speed - 1, depth [m], and decay rate of the flow by friction [1/s], all averaged with unit
+    flow times cell area as weight. If friction at the rate r = C u balances a slope and is capped as
+    r / (1 + r / RATE_CAP), then u^2 is too great by the factor 1 + r / RATE_CAP.
     """
     depth, part = basin.depth_of(y), basin.part
     flow = np.where(depth > DRY_DEPTH, np.hypot(y[1], y[2]) * basin.mesh.area, 0.0)

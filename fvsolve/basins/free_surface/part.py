@@ -66,8 +66,8 @@ class FreeSurface(Physics, name="free-surface"):
     def rest(cls, basin, mean, cells, area) -> dict[str, Any]:
         """Elevation [m], depth [m] and pressure (None) of the node of a patch at rest, as a dict.
 
-        The elevation is the mean height of the bed in the cells under water, or in the lowest cells if all are dry. It
-        is None if neither elevation nor bed of the basin is stated.
+        The elevation is that of the mean bed of the cells under water, or of the lowest cells if all are dry. It is
+        None if neither elevation nor bed of the basin is stated.
         mean : function from a formula to its means over all cells; cells : numbers of the cells behind the patch
         area : areas of all cells [m2]
         """

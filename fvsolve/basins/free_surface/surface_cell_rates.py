@@ -73,9 +73,9 @@ def add_bed_friction(tables, b, a, z, y, rates, out):
 
 @njit
 def damp_stages(h, y, rates, quick, handle):
-    """Divide the rates of a stage by 1 + h R for bed friction, in all basins for which it is needed.
+    """Divide the rates of unit flows of a stage by 1 + h R for bed friction, in all basins for which it is needed.
 
-    quick : values h R of the states; for R see `bed_friction.damp_flows`
+    h : time step [s]; quick : h R of each unit flow is written here; for R see `bed_friction.damp_flows`
     """
     tables = open_tables(handle)
     for b in range(tables.basins.size):
@@ -159,7 +159,8 @@ def by_blocks(tables, b, g, kx, ky, reflect, plan, dh, qx, qy, through, work, y,
 def on_grid(tables, b, y, dydt, out, moves):
     """Write the rates of the cells of basin b, whose mesh is a grid. moves : None, or as in `surface_grid.grid_rates`
 
-    If walls move, the states are depths and flows times the area of a cell over its undeformed area.
+    If walls move, the states are those of `basins.cell_stretching`. If `dydt` is empty, the rates are written to
+    `tables.work`. Flows through faces (for scalars) and open patches, and out[RATE], are written too.
     """
     st, plane, work, basin = tables.settings[0], tables.plane, tables.work, tables.basins[b]
     n, o, at, k, f = basin["n"], basin["y"], basin["plan"], basin["spacing"], basin["flows"]
@@ -205,8 +206,7 @@ def rates_on_grids(t, y, dydt, out, handle):
 def on_mesh(tables, b, y, dydt, out, moves):
     """Write the rates of the cells of basin b, whose mesh is not a grid.
 
-    moves : None, or as in `surface_mesh.shallow_rates`
-    If walls move, the states are depths and flows times the area of a cell over its undeformed area.
+    moves : None, or as in `surface_mesh.shallow_rates`; otherwise as for `on_grid`
     """
     st, plane, work, integers = tables.settings[0], tables.plane, tables.work, tables.integers
     basin = tables.basins[b]

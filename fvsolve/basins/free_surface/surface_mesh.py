@@ -95,9 +95,10 @@ def put_mirror_sides(edges, nx, ny, number, reflect, ul, vl, w, moves):
 def add_side_fluxes(g, h0, e0, c0, hl, el, ul, vl, geo, w, speeds):
     """Subtract the outflow through one side of each cell of a block (HLLC flux) from the rates in `w`.
 
-    g : gravity [m/s2]; h0, e0, c0 : depth, surface and wave speed of the cells; hl, el, ul, vl : depth, surface and
-    velocities at the side
-    from inside; `w` contains the values from beyond; geo : measures of the side, see `cell_sides`
+    The flow through the side and the sums for the limit of the time step are written to `w` too.
+    g : gravity [m/s2]; h0, e0, c0 : depth, surface and wave speed of the cells
+    hl, el, ul, vl : depth, surface and velocities at the side from inside; `w` contains the values from beyond
+    geo : measures of the side, see `cell_sides`
     speeds : None, or speeds of moving sides along their outward normals [m/s]; the flux is then relative to the side
     """
     half = 0.5 * g
@@ -201,9 +202,10 @@ def shallow_rates(
 ):  # fmt: skip
     """Write the rates of all cells of a mesh; return the greatest rate that limits the time step [1/s].
 
-    It is the greatest of two values over all cells: the sum of L (|u| + c) / (2 A) over the sides of the cell (length
-    L, area A of the cell, normal velocity u, wave speed c), and the outflow from the cell over its volume. Explicit
-    Euler steps up to 1 / (2 rate) leave no depth below zero.
+    It is the greatest of two values over all cells: the sum of L (|u| + c) / (2 A) over the sides of the cell, and the
+    outflow from the cell over its volume. L is the length of a side and A the area of the cell. The normal velocity u,
+    relative to a moving side, and the wave speed c are the greatest of both cells at a side. Explicit Euler steps up to
+    1 / (2 rate) leave no depth below zero.
     g : gravity normal to the basin [m/s2]; scheme : UPWIND or MUSCL
     wide_by : factor on the range of the neighbours that limits values at sides; with 1 they stay within that range
     floats, integers : geometry and neighbours, see `basins.cell_sides`; n cells, f faces, b boundary faces

@@ -32,7 +32,8 @@ def water_at_patch(tables, patch, y):
 
     Rise and depth are means with the weight area times `outflow_weight`, so that a dry bank does not count; the volume
     is the sum of these weights. The rise counts from the surface at rest, or from the lowest bed if the patch is dry at
-    rest. In a basin on a body it counts from the level at rest.
+    rest. In a basin on a body it counts from the level at rest. Without water it is that of the cell with the lowest
+    bed.
     """
     basin, plane = tables.basins[patch["basin"]], tables.plane
     n, plan, low, lowest = basin["n"], basin["plan"], inf, 0.0
@@ -59,7 +60,8 @@ def bottom_pressure_at_patch(plane, basin, patch, rise, depth):
     """Deviation of the pressure at the bottom of a patch on a body from the steady start, over density [J/kg].
 
     The water is at rest in the frame of the basin, so its surface is an equipotential, and its height over any position
-    follows from the potential phi of gravity and inertial forces. A dry position has no pressure.
+    follows from the potential phi of gravity and inertial forces. A dry position has no pressure, and below the depth
+    SHALLOW the pressure is multiplied by `available_fraction`.
     rise, depth : results of `water_at_patch`
     """
     at, (fx, fy, xx, xy, yy) = patch["sizes"] + 2, potential_coefficients(plane, basin["frame"], 1.0)
@@ -73,7 +75,7 @@ def patch_pressures(t, y, dydt, out, handle):
     """Write pressure, its slope and available fraction of outflow at every patch of water to its node in `out`.
 
     The pressure is the deviation from the steady start [Pa]; the slope is per mass in the cells next to the patch
-    [Pa/kg].
+    [Pa/kg]. The supply of the node is set to 0.
     """
     tables = open_tables(handle)
     st, layout = tables.settings[0], tables.layout[0]

@@ -262,8 +262,8 @@ def work_size(nx, ny):
 def put_moving_row(c, ny, j, up, down, along, moves):
     """Convert the waves `up` and `down` at the moving faces between rows j - 1 and j to mass and momentum fluxes.
 
-    At the sides of the grid the pressures on the faces are written to `moves` too. along : flow densities along the
-    faces; moves : as in `grid_rates`
+    At the sides of the grid the pressures and energy losses on the faces are written to `moves` too.
+    along : mass-flow densities along the faces, of all cells of the grid; moves : as in `grid_rates`
     """
     nx, count = up.size, moves[2].size // 2
     if j == 0 or j == ny:

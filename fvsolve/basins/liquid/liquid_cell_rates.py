@@ -45,8 +45,8 @@ def states_of(tables, basin, y):
 def rates_of(tables, basin, dydt):
     """Arrays to which the rates of the three states of cells are written.
 
-    If `dydt` is empty, they are work arrays, which no other function reads. If walls move, the states are masses and
-    momenta per undeformed area, see `basins.cell_stretching`.
+    If `dydt` is empty, they are work arrays, which only `frame_forces.add_frame_forces` reads. If walls move, the rates
+    are those of the states of `basins.cell_stretching`.
     """
     n, (to, first) = basin["n"], (dydt, basin["y"]) if dydt.size > 0 else (tables.work, basin["boundary_rates"])
     return to[first : first + n], to[first + n : first + 2 * n], to[first + 2 * n : first + 3 * n]

@@ -263,8 +263,8 @@ def liquid_rates(
 ):  # fmt: skip
     """Write the rates of all cells of a mesh; return the greatest sum of L (|u| + c) / (2 A) over the sides of a cell.
 
-    The sum [1/s] limits the time step: length L of a side, area A of the cell, velocity u normal to the side, wave
-    speed c.
+    The sum [1/s] limits the time step: length L of a side, area A of the cell, wave speed c, velocity u of the cell
+    normal to the side and relative to it. Under the density law `linear`, u is only the speed of a moving side.
     law : LAW_LINEAR or LAW_LOG; c0, rho : wave speed [m/s] and density [kg/m3] at rest
     table : table of `riemann_invariants` in place of a law, or None; scheme : UPWIND or MUSCL
     wide_by : factor on the range of the neighbours that limits values at sides; with 1 they stay within that range
@@ -279,7 +279,8 @@ def liquid_rates(
         float64[2 b]  pressures on boundary faces above that at rest [Pa], then, under the density law `linear`, speed
             (c^2 r^2 - |m|^2) there [kg^2/(m3 s3)]; divided by 2 rho, this is the power lost per area
         `wide` : areas of cells over undeformed areas, see `basins.cell_stretching`
-    phi : None, or under laws with the full momentum flux the potential [J/kg] of cells (padded to blocks) and of sides
+    phi : None, or under laws with the full momentum flux the potential [J/kg] of cells, float64[n], and of sides in the
+        order of `cell_sides`, padded to blocks
     """
     slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]
     count, first_order = blocks(integers), scheme == UPWIND

@@ -84,8 +84,8 @@ def table_on_moving_meshes(t, y, dydt, out, handle):
 def displaced_potential(tables, wall):
     """Gravitational energy of the volume that a wall adds to its basin, per travel of the wall along its axis [N].
 
-    It is rho g z times the area of the wall, with the elevation z above energy datum; negative if the axis points
-    inward.
+    It is rho g z times the area of the wall, with the elevation z above energy datum; the sign is reversed if the axis
+    points inward.
     """
     basin, length = tables.basins[wall["basin"]], 0.0
     for m in range(wall["count"]):

@@ -28,7 +28,8 @@ def patch_pressures(t, y, dydt, out, handle):
     """Write the pressure at every patch of a liquid and its slope to the node of the patch in `out`.
 
     The pressure is the deviation from the steady start [Pa]; the slope is per mass in the cells next to the patch
-    [Pa/kg]. This holds for the density laws `linear` and `log`.
+    [Pa/kg]. Both are those of the density laws `linear` and `log`; under `table`, `liquid_table_law` replaces them. The
+    supply of the node is set to 0, the available fraction of outflow to 1.
     """
     tables = open_tables(handle)
     layout = tables.layout[0]

@@ -16,8 +16,8 @@ PRESSURE = FIRST_OWN
 def observe_liquid(t, y, out, handle, values):
     """Write the values of probes in cells of liquids: pressures [Pa] or velocities [m/s].
 
-    A pressure is `scale` times the first result of `read_liquid` plus `offset`.
-    `scale` and `offset` are columns of the table of probes.
+    A pressure is `scale` times the first result of `read_liquid` plus `offset`, two columns of the table of probes.
+    Under the density law `table`, `liquid_table_law.observe_pressures` replaces it.
     """
     tables = open_tables(handle)
     for k in range(tables.probes.size):

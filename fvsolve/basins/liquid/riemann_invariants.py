@@ -61,7 +61,7 @@ def invariant_at_potential(c0, rho, table, w, phi):
     """Invariant of a liquid at rest where the potential is higher by phi [J/kg] than where the invariant is w.
 
     It satisfies c dw = dp / rho = -d(phi). Under the density law `log` (table None) it is exact: the new c^2 is the old
-    c^2 plus phi. Under `table` it is that of the midpoint rule, with a relative error of (phi / c^2)^3.
+    c^2 plus phi. Under `table` it is that of the midpoint rule, with an error of the order of c (phi / c^2)^3.
     c0, rho : wave speed [m/s] and density [kg/m3] at rest
     """
     if table is None:

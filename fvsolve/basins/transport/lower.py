@@ -14,7 +14,10 @@ from fvsolve.kernels.rhs_assembly import RhsTerms
 
 
 class TransportRows(BasinRows):
-    """Rows of the tables of a model for a basin with a given velocity; its only states are scalars, its depth is 1."""
+    """Rows of the tables of a model for a basin with a given velocity; its only states are scalars, its depth is 1.
+
+    A velocity that crosses the outline where there is no named patch raises CaseError in `lower`.
+    """
 
     given = banded = True
 
@@ -64,10 +67,11 @@ class TransportRows(BasinRows):
             row["through"] = draft.to_plane(inward[self.ring()] if self.is_grid else inward)
 
     def unsplit(self, row, passing: list[str]) -> float:
-        """Factor on the greatest rate of outflow of a cell; the product is the rate that limits the time step.
+        """Factor on column `fastest`, the greatest rate of flow through a cell [1/s], in the rate that limits the step.
 
-        Explicit Euler steps of Courant number 1 by this rate keep scalars within their bounds, except with upwind5,
-        which has no bounds. row : row of the table of basins; passing : names of the patches with flow through them
+        Without divergence and diffusion, Euler steps of Courant number 1 by this rate keep scalars within their bounds,
+        except with upwind5, which has no bounds.
+        row : row of the table of basins; passing : names of the patches with flow through them
         """
         if row["scheme"] in (rec.UPWIND, rec.LINEAR):
             return 1.0
@@ -77,7 +81,10 @@ class TransportRows(BasinRows):
         return patch in self.passing
 
     def flows(self, draft) -> np.ndarray:
-        """Flow through every face of the mesh along its normal, per thickness : float64[f] [m2/s]."""
+        """Flow through every face of the mesh along its normal, per thickness : float64[f] [m2/s].
+
+        It is that at full speed, without the factor of `period`. Raises CaseError for a wrong velocity.
+        """
         given, mesh = self.part.velocity.given, self.mesh
         if self.part.velocity.form == "u, v":
             return velocity_flows(mesh, *(given[key].at(*np.ascontiguousarray(mesh.middle.T)) for key in "uv"))

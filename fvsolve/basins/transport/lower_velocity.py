@@ -117,6 +117,7 @@ def _by_corners(mesh: Mesh, stream: np.ndarray) -> np.ndarray:
     """Flows through faces as differences of a stream function, rounded so that the differences are exact : float64[f].
 
     stream : float64[p]  stream function at the corners [m2/s]
+    Raises ValueError for another shape or a value that is not finite.
     """
     stream = np.asarray(stream, float)
     if stream.shape != (len(mesh.points),):

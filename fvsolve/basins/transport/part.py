@@ -24,7 +24,7 @@ class Velocity:
     given : {"u": formula, "v": formula}, {"stream": formula}, {"expression": name, and its parameters}
         or {"file": path}
     period : period of the factor cos(pi t / period) on the velocity [s], None for a constant velocity
-    stated : the table as written in the case file
+    stated : the table of the case file, with the period in seconds and the file as the name of its copy
     """
 
     form: str
@@ -33,7 +33,7 @@ class Velocity:
     stated: dict[str, Any]
 
     def table(self) -> dict[str, Any]:
-        """Table as written in the case file."""
+        """Table of the case file, see `stated`."""
         return self.stated
 
 

@@ -9,7 +9,10 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit
 def observe_given_flows(t, y, out, handle, values):
-    """Write the values of probes of the inflow through patches [m3/s], in basins with a given velocity."""
+    """Write the values of probes of the inflow through patches [m3/s], in basins with a given velocity.
+
+    It is 0 at patches without flow.
+    """
     tables = open_tables(handle)
     for k in range(tables.probes.size):
         if tables.probes[k]["kind"] == GIVEN_FLOW:

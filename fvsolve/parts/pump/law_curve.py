@@ -45,8 +45,10 @@ def base_head(floats, at, x):
     """
     own, count = at + OWN, int(floats[at + COUNT])
     if floats[at + LAW] == POWER:
-        part = floats[own + 1] * x ** floats[own + 2]
-        return floats[own] - part, -floats[own + 2] * part / x
+        part, exponent = floats[own + 1] * x ** floats[own + 2], floats[own + 2]
+        if exponent == 1.0:  # a straight curve may begin at no flow
+            return floats[own] - part, -floats[own + 1]
+        return floats[own] - part, -exponent * part / x
     if floats[at + LAW] == POINTS:
         return piecewise(floats, own, count, x)
     head, slope = 0.0, 0.0

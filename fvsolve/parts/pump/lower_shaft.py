@@ -103,7 +103,7 @@ def inertia(part, weight: float) -> float | None:
 
 
 def rated_power(part, weight: float) -> float:
-    """Shaft power of a pump at its rated point [W], with `rated_efficiency` if no power is stated.
+    """Shaft power of a pump at its rated point [W], with `rated_efficiency` if `shaft_power` is not stated.
 
     weight : rho g [N/m3]
     """
