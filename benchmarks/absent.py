@@ -1,4 +1,4 @@
-"""What two tanks cost beside two states written by hand: the same method, the same steps, through the same loop.
+"""Time of a run of two tanks compared with two states stepped by hand, with one method and one step.
 
 python benchmarks/absent.py [--quick]
 """
@@ -36,7 +36,7 @@ def by_hand(t, y, dydt):
 
 
 def scene(steps: int) -> tuple[float, float]:
-    """(seconds, level of the high tank at the end) of the case."""
+    """Wall time of the case [s] and level of the high tank at the end [m]."""
     model = build(load(CASE, {"numerics.end": steps * STEP, "output.every": steps * STEP}))
     loop = RunLoop(model)
     loop.begin(steps * STEP, NO_LIMIT)
@@ -47,14 +47,14 @@ def scene(steps: int) -> tuple[float, float]:
 
 
 def hand(steps: int) -> tuple[float, float]:
-    """The same of the two states."""
+    """Wall time of the function `by_hand` [s] and level of the high tank at the end [m]."""
     begun = time.perf_counter()
     found = integrate(by_hand, [4.0, 1.0], [0.0, steps * STEP], "rk4", step=STEP)
     return time.perf_counter() - begun, float(found[-1, 0])
 
 
 def main() -> None:
-    """Best of several, compiled before."""
+    """Print the least times of several runs after compilation."""
     steps, times = (2_000, 2) if parser(__doc__).parse_args().quick else (200_000, 7)
     scene(steps), hand(steps)
     a, b = (min(f(steps) for _ in range(times)) for f in (scene, hand))

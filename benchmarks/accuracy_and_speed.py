@@ -1,9 +1,9 @@
-"""The charts that choose the defaults: `fvsolve chart` over cases that stand for kinds of scenes. Writes docs/charts/.
+"""Charts from which the defaults are chosen: `fvsolve chart` on cases of several kinds, written to docs/charts.
 
     python benchmarks/accuracy_and_speed.py [--quick] [NAME...]
 
-Points are kept in build/charts, so that a run that was broken off goes on; delete the folder to measure again. With
-`--quick` points and pictures go to a temporary folder.
+Results of runs are stored in build/charts, so an interrupted benchmark continues; delete the folder to measure again.
+With `--quick` results and pictures are written to a temporary folder.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from fvsolve.studies.accuracy.pareto import find_crossing
 ROOT = Path(__file__).resolve().parents[1]
 PICTURES, POINTS = ROOT / "docs" / "charts", ROOT / "build" / "charts"
 SMOOTH = {"time": [1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6], "value": [1.0, 0.97, 0.8, 0.5, 0.2, 0.03, 0.0], "kind": "smooth"}
-SUDDEN = {"time": [0.9, 1.0037], "value": [1.0, 0.0], "kind": "step"}  # no wave meets a row just as it is written
-SCENES = {  # name -> (shipped case, keys, what it stands for)
+SUDDEN = {"time": [0.9, 1.0037], "value": [1.0, 0.0], "kind": "step"}  # no wave arrives at the time of a row
+SCENES = {  # name -> (shipped case, overrides, description)
     "closure-smooth": ("valve-closure", {"links.valve.opening": SMOOTH}, "one pipe, a smooth closure"),
     "closure-ramp": ("valve-closure", {}, "one pipe, a ramp of 50 ms"),
     "closure-sudden": ("valve-closure", {"links.valve.opening": SUDDEN}, "one pipe, a jump"),
@@ -38,14 +38,17 @@ SCENES = {  # name -> (shipped case, keys, what it stands for)
     "chamber-chain": ("chamber-chain", {}, "no pipe, stiff"),
     "cylinder-servo": ("cylinder-servo", {}, "no pipe, stiff, a mass"),
 }
-QUICK = {  # name -> what of its chart is made by `--quick`
+QUICK = {  # name -> options of its chart with `--quick`
     "closure-ramp": {"schemes": ["muscl"], "methods": ["ssp-rk3"], "cells": [40, 80]},
 }
 TARGETS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
 
 def made(name: str, points: Path, pictures: Path, **few) -> Chart:
-    """The chart of a scene, its picture written; few : of schemes, methods, cells and tolerances."""
+    """Chart of a scene, whose picture is written.
+
+    few : options of the chart, such as schemes, methods and cells
+    """
     case, keys, about = SCENES[name]
     found = chart(shipped.find(case), keys, out=points / name, **few)
     pictures.mkdir(parents=True, exist_ok=True)
@@ -55,7 +58,7 @@ def made(name: str, points: Path, pictures: Path, **few) -> Chart:
 
 
 def costs(found: Chart, target: float, cost: str = "seconds") -> dict[str, float]:
-    """Curve -> what it costs at a target; curves that do not reach it are left out."""
+    """Cost of each curve at a target error; curves that do not reach the target are left out."""
     met, floor = {}, found.floor["trajectory"]
     for name, points in found.curves().items():
         errors = [max(one.trajectory, floor) if one.ok else float("inf") for one in points]
@@ -66,7 +69,7 @@ def costs(found: Chart, target: float, cost: str = "seconds") -> dict[str, float
 
 
 def front(name: str, found: Chart, cost: str = "seconds") -> None:
-    """Print what each curve costs at each target, over the cheapest; the cheapest in ms or million updates."""
+    """Print the cost of each curve at each target over the cheapest, and the cheapest in ms or million updates."""
     targets = [one for one in TARGETS if costs(found, one, cost)]
     at = {one: costs(found, one, cost) for one in targets}
     unit, factor = ("ms", 1e3) if cost == "seconds" else ("million updates", 1e-6)
@@ -82,14 +85,17 @@ def front(name: str, found: Chart, cost: str = "seconds") -> None:
 
 
 def overshoots(found: Chart) -> None:
-    """Print by how much each curve leaves the range of the reference, from coarse to fine."""
+    """Print the overshoot of each curve in ranges of the reference, from coarse to fine."""
     print("\novershoot, in ranges, from coarse to fine")
     for curve, points in found.curves().items():
         print(f"{curve:>26}: " + "  ".join(f"{one.overshoot:.1e}" for one in points))
 
 
 def implied(charts: dict[str, Chart]) -> None:
-    """Print for every curve how many targets it reaches over the scenes, and its cost beside default and cheapest."""
+    """Print for each curve the number of targets reached over the scenes, and its cost relative to other curves.
+
+    The cost is relative to the cheapest curve and to the default.
+    """
     asked = [(name, target) for name, found in charts.items() for target in TARGETS[1:] if costs(found, target)]
     at = {one: costs(charts[one[0]], one[1]) for one in asked}
     found = next(iter(charts.values()))
@@ -113,14 +119,14 @@ def implied(charts: dict[str, Chart]) -> None:
 
 
 def _mean(ratios: list[float]) -> float:
-    """Geometric mean."""
+    """Geometric mean; nan without numbers."""
     return exp(sum(map(log, ratios)) / len(ratios)) if ratios else float("nan")
 
 
 def main() -> None:
-    """All scenes, or those named."""
+    """Print the tables of all scenes, or of the given ones."""
     options = parser(__doc__)
-    options.add_argument("names", nargs="*", metavar="NAME", help=f"{', '.join(SCENES)}; all if none is named")
+    options.add_argument("names", nargs="*", metavar="NAME", help=f"scenes: {', '.join(SCENES)} (default all)")
     given = options.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         where = (Path(folder), Path(folder)) if given.quick else (POINTS, PICTURES)
@@ -128,7 +134,10 @@ def main() -> None:
 
 
 def tables(names, where: tuple[Path, Path], few: dict) -> None:
-    """Tables of scenes, and of what they imply together; where : folders of points and of pictures."""
+    """Print the tables of each scene, and a summary of each group of scenes.
+
+    where : folders of results and of pictures; few : scene -> options of its chart
+    """
     charts = {}
     for name in names:
         began = perf_counter()

@@ -1,5 +1,6 @@
-"""A pulse in a lossless pipe of cells between a reservoir and a closed end, and the ordinary differential equations
-that fvsolve makes of it, for other solvers. Knows fvsolve's models; steps nothing.
+"""Pulse in a lossless pipe between a reservoir and a closed end, and its ordinary differential equations.
+
+The class `Acoustics` gives other solvers the compiled rates of fvsolve's model, and the exact solution.
 """
 
 from functools import cached_property
@@ -16,12 +17,12 @@ from fvsolve.model import RunData, State, build
 from fvsolve.steppers.signatures import addresses, rhs_at
 
 LENGTH = SPEED = 1000.0  # [m, m/s]
-END = 2.0  # [s] there and back
-WIDTH = 0.08  # of the pulse, exp(-((x - 1/2) / WIDTH)^2), in lengths
+END = 2.0  # twice the travel time of the pipe [s]
+WIDTH = 0.08  # of the pulse exp(-((x - 1/2) / WIDTH)^2), in lengths of the pipe
 
 
 def case(cells: int, scheme: str = "upwind5", **numerics) -> dict:
-    """The pipe at rest."""
+    """Case of the pipe at rest."""
     main = {"type": "pipe", "from": "lake", "to": "end", "length": LENGTH, "diameter": 0.5, "wave_speed": SPEED}
     return {
         "schema": 1,
@@ -35,28 +36,31 @@ def case(cells: int, scheme: str = "upwind5", **numerics) -> dict:
 
 
 class Acoustics:
-    """The pipe as y' = L y from a pulse: states as fvsolve keeps them, or interleaved so that L has a narrow band."""
+    """Pipe as y' = L y from a pulse.
+
+    States are in fvsolve's order or interleaved; interleaved states give L a narrow band.
+    """
 
     def __init__(self, cells: int) -> None:
         self.cells = cells
         self.model = self.build(method="rk4", courant=1.0)
-        self.mixed = np.arange(2 * cells).reshape(2, cells).T.ravel()  # interleaved place -> fvsolve's place
+        self.mixed = np.arange(2 * cells).reshape(2, cells).T.ravel()  # interleaved -> fvsolve's position
         self.rhs = self._rhs()
         self.rhs_mixed = self._rhs_mixed()
 
     def build(self, **numerics):
-        """fvsolve's model with these numerics."""
+        """Model of the case with these numerics."""
         return build(load(case(self.cells, **numerics)))
 
     @cached_property
     def start(self) -> State:
-        """Half of a pulse, on its way to the end."""
+        """State at the start: a forward wave with the shape of the pulse."""
         x = (np.arange(self.cells) + 0.5) / self.cells
         return State(0.0, np.concatenate([np.exp(-(((x - 0.5) / WIDTH) ** 2)), np.zeros(self.cells)]))
 
     @cached_property
     def matrix(self) -> csc_array:
-        """L : float64[n, n] [1/s], column by column: f is linear."""
+        """Matrix L of the linear rates : csc[n, n] [1/s], computed column by column."""
         rate, columns = np.empty(2 * self.cells), []
         for j in range(2 * self.cells):
             unit = np.zeros(2 * self.cells)
@@ -67,21 +71,21 @@ class Acoustics:
 
     @cached_property
     def exact(self) -> np.ndarray:
-        """exp(L END) y0."""
+        """Exact state at END, exp(L END) y0."""
         return expm_multiply(self.matrix * END, self.start.y)
 
     def distance(self, y: np.ndarray) -> float:
-        """Greatest error of a state at END, in the pulse's height."""
+        """Greatest error of a state at END, relative to the height of the pulse."""
         return np.abs(y - self.exact).max()
 
     @property
     def band(self) -> tuple[int, int]:
-        """(lower, upper) bandwidth of L interleaved."""
+        """Lower and upper bandwidth of L in interleaved order."""
         found = self.matrix[self.mixed][:, self.mixed].tocoo()
         return int((found.row - found.col).max()), int((found.col - found.row).max())
 
     def _rhs(self):
-        """fvsolve's own compiled rhs as f(t, y, dydt); its tables and `out` by their addresses."""
+        """Compiled right-hand side of the model as f(t, y, dydt); it reads its tables and `out` at their addresses."""
         at, slate, out = int(addresses((self.model.functions.rhs,))[0]), RunData(self.model), self.model.new_out()
         self._kept, handle = (slate, out), slate.handle
         handle_at, handle_size, out_at, out_size = handle.ctypes.data, handle.size, out.ctypes.data, out.size
@@ -95,7 +99,7 @@ class Acoustics:
         return function
 
     def _rhs_mixed(self):
-        """The same for interleaved states."""
+        """Compiled right-hand side f(t, y, dydt) of interleaved states."""
         rhs, cells = self.rhs, self.cells
 
         @numba.njit(error_model="numpy")

@@ -1,9 +1,9 @@
-"""Column separation on the Adelaide rig: the case `adelaide` over a measurement, into docs/adelaide.png.
+"""Picture of the case `adelaide` and measured pressures, column separation on the Adelaide rig: docs/adelaide.png.
 
     python benchmarks/adelaide.py [--quick] [MEASURED.csv [PICTURE]]
 
-MEASURED.csv : columns t_s and p_gauge_kPa (Bergant and Simpson 1999), comments by #. `--quick` takes what
-the case expects for the measurement, and draws into a temporary folder.
+MEASURED.csv : columns t_s and p_gauge_kPa (Bergant and Simpson 1999), with comment lines that begin with #. With
+`--quick` the pressures that the case expects replace the measurement, and the picture is in a temporary folder.
 """
 
 import tempfile
@@ -23,7 +23,7 @@ EXPECTED = "0.04,2080\n0.2,-98.99\n0.405,1965\n0.6,-98.99\n"  # cases/adelaide.t
 
 
 def main() -> None:
-    """The picture of a measurement, or of what the case expects."""
+    """Draw the picture of a measurement, or of the pressures that the case expects."""
     options = parser(__doc__)
     options.add_argument("measured", nargs="?", type=Path, metavar="MEASURED.csv", help="measured pressures")
     options.add_argument("picture", nargs="?", type=Path, default=ROOT / "docs" / "adelaide.png", help="file to draw")
@@ -39,7 +39,7 @@ def main() -> None:
 
 
 def draw(measured: str, picture: Path, cells: int) -> float:
-    """Measured and computed pressures into a picture, their greatest difference [kPa].
+    """Draw measured and computed pressures, and return their greatest difference [kPa].
 
     measured : lines of time [s] and gauge pressure [kPa]
     """

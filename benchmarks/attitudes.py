@@ -1,8 +1,9 @@
-"""Ways to step an attitude: how far spinning tops end from where they should, what drifts, and where angles fail.
+"""Methods to step an attitude: errors of spinning tops, drift of invariants, and failure of angles near their pole.
 
 python benchmarks/attitudes.py [--quick]
 
-The truth of the tops is SciPy's DOP853 at 1e-13; of the turn past a pitch of 90 degrees a rotation about one axis (43).
+The reference of the tops is SciPy's DOP853 at 1e-13. The reference of the turn past a pitch of 90 degrees is a rotation
+about a fixed axis (43).
 """
 
 from __future__ import annotations
@@ -16,23 +17,26 @@ from fvsolve.steppers import METHODS
 
 INERTIA = np.array([1.0, 2.0, 3.0])  # [kg m2]
 START = attitude.euler_parameters(attitude.of_axis([0.6, 0.8, 0.0], 0.6))
-TOPS = {  # weight times its arm [N m], angular velocity in the body [rad/s], time [s], steps
+TOPS = {  # weight times lever arm [N m], angular velocity in the body [rad/s], time [s], steps
     "torque-free": (0.0, np.array([0.3, 0.05, 1.2]), 20.0, (400, 1600)),
     "heavy": (5.0, np.array([0.1, 0.2, 6.0]), 10.0, (400, 1600)),
 }
 DELTAS, STEPS = (0.3, 0.1, 0.03, 0.01, 0.003), (0.05, 0.02, 0.005)
-TURN = np.array([0.0, 1.0, 0.0])  # [rad/s], about y of a body that is rolled by delta
+TURN = np.array([0.0, 1.0, 0.0])  # angular velocity about the y axis of a body rolled by delta [rad/s]
 WAYS = ("e, R of e/|e|", "e renormalised", "roll-pitch-yaw", "e by gauss-4")
 
 
 def spin_rate(w, up, weight):
-    """dw/dt of a body that is held at a point on its z axis (68); `up` as the body sees it."""
+    """dw/dt of a body held at a point on its z axis (68).
+
+    up : vertical direction in the axes of the body
+    """
     torque = weight * np.array([up[1], -up[0], 0.0])
     return (torque - np.cross(w, INERTIA * w)) / INERTIA
 
 
 def by_parameters(weight):
-    """f(t, y) of e and w; R of e over its length."""
+    """Function f(t, y) of Euler parameters e and angular velocity w, with R from e / |e|."""
     return lambda t, y: np.concatenate([
         attitude.euler_parameters_rate(y[:4], y[4:]),
         spin_rate(y[4:], attitude.of_euler_parameters(y[:4])[2], weight),
@@ -40,25 +44,25 @@ def by_parameters(weight):
 
 
 def angle_rates(angles, w):
-    """Rates of roll, pitch and yaw: E^-1 R w (53), as large as 1 / cos(pitch)."""
+    """Rates of roll, pitch and yaw, E^-1 R w (53), which grow like 1 / cos(pitch)."""
     rotation = attitude.of_roll_pitch_yaw(*angles)
     return np.linalg.solve(attitude.jacobian_roll_pitch_yaw(angles[1], angles[2]), rotation @ w)
 
 
 def by_angles(weight):
-    """f(t, y) of roll, pitch, yaw and w."""
+    """Function f(t, y) of roll, pitch, yaw and w."""
     return lambda t, y: np.concatenate([
         angle_rates(y[:3], y[3:]), spin_rate(y[3:], attitude.of_roll_pitch_yaw(*y[:3])[2], weight)
     ])  # fmt: skip
 
 
 def stepped(f, y, end, steps, method="rk4"):
-    """Where equal steps end."""
+    """State at the end, after equal steps of a method."""
     return integrate(f, y, [0.0, end], method, step=end / steps)[-1]
 
 
 def renormalised(f, y, end, steps):
-    """The same by rk4, but e is brought back to length 1 after each step."""
+    """State at the end, after equal steps of rk4 with e scaled to length 1 after each step."""
     method, h = METHODS["rk4"], end / steps
     for _ in range(steps):
         k = np.zeros((method.stages, y.size))
@@ -80,7 +84,7 @@ def ends(weight, w, end, steps):
 
 
 def tops(quick):
-    """Rows of the first table: name, steps, largest error of R by each way; if quick of one top for 1 s."""
+    """Rows of the first table: name, steps, largest error of R for each of WAYS; with `quick` a single top for 1 s."""
     for name, (weight, w, end, many) in {"heavy": (*TOPS["heavy"][:2], 1.0, (40,))}.items() if quick else TOPS.items():
         found = solve_ivp(by_parameters(weight), (0.0, end), [*START, *w], "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
         exact = attitude.of_euler_parameters(found[:4])
@@ -89,7 +93,7 @@ def tops(quick):
 
 
 def drifts(steps, h=0.05):
-    """Rows of the second: method, |e| - 1, relative changes of energy and moment of momentum of the torque-free top."""
+    """Rows of the second table: method, relative changes of |e|, energy and moment of momentum of a torque-free top."""
     w = TOPS["torque-free"][1]
     for method in ("rk4", "gauss-4"):
         y = stepped(by_parameters(0.0), np.concatenate([START, w]), steps * h, steps, method)
@@ -99,7 +103,7 @@ def drifts(steps, h=0.05):
 
 
 def past_the_pole(deltas, lengths):
-    """Rows of the third: delta, and by steps of these lengths the largest error of R by angles and by parameters."""
+    """Rows of the third table: delta, and for each length of steps the errors of R by angles and by parameters."""
     end = 3.0
     for delta in deltas:
         start = attitude.about_x(delta)
@@ -114,7 +118,7 @@ def past_the_pole(deltas, lengths):
 
 
 def main() -> None:
-    """The three tables."""
+    """Print the three tables."""
     quick = parser(__doc__).parse_args().quick
     steps, deltas, lengths = (40, DELTAS[:1], STEPS[:1]) if quick else (4000, DELTAS, STEPS)
     print(f"largest error of R    steps  {'  '.join(f'{way:>14}' for way in WAYS)}")

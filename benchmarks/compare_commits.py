@@ -1,20 +1,20 @@
-"""Proof that a change of names changed no result: shipped cases of two commits, compared to the bit.
+"""Comparison of the shipped cases of two commits to the bit, as a proof that a change of names changed no result.
 
     python benchmarks/compare_commits.py OLD NEW [--map names.tsv] [--cases a,b] [--quick]
 
-Both commits are extracted to a temporary folder; uncommitted changes are not seen. Each commit runs its own cases, in a
-process of its own with an empty cache of compiled code. Of each case are compared (dump_cases.py):
+Both commits are extracted to a temporary folder; uncommitted changes are ignored. Each commit runs its own cases in a
+separate process, without `--quick` with an empty cache of compiled code. dump_cases.py dumps for each case:
 
-- the right-hand side in full (`dydt` and all that it writes beside), by a time and a state and by what a state
-  remembers, and all probes: at the start, at a quarter of the run and at its end as `advance` gives them, again at the
-  start, and halfway between start and end;
+- the right-hand side (`dydt` and all other output) by time and state vector, the rates of the stored state, and all
+  probes: at the start, after a quarter of the run and at its end as computed by `advance`, and again at the start;
+- the right-hand side at the mean of the states at the start and at the end;
 - the files of the run: history, envelope, routes, fields and lines of all frames, the summary, the resolved case;
-  cases in `dump_cases.ENDS` end earlier than they are shipped.
+  cases in `dump_cases.ENDS` end earlier than shipped.
 
-Not compared are times of the clock, costs, versions and hashes in the summary, the checkpoint, and pictures. Texts for
-people (titles, notices, reasons after their first word) are compared by number and kind, not by their words.
+Wall times, costs, versions and hashes in the summary, the checkpoint and pictures are not compared. Texts for people
+(titles, notices, reasons after the colon) are compared by number and kind, not by their words.
 
-A line of the map is KIND, OLD and NEW name with tabs between (compare_dumps.py). Kind `public` renames words of keys,
+A line of the map is KIND, OLD and NEW name, separated by tabs (compare_dumps.py). Kind `public` renames words of keys,
 columns and texts: `extremes.least` is `least` below `extremes`. Other kinds (`module`, `name`, `member`, `column`,
 `arg`) are names of Python, by which dump_cases.py finds functions of either commit.
 
@@ -39,11 +39,11 @@ from compare_dumps import Dump, Names, compare, count
 HERE = Path(__file__).resolve().parent
 PARTS = ("fvsolve", "cases")  # folders of a commit that are extracted
 TINY = "accumulator"  # the case of --quick
-SHOWN = 3  # differences of a case that are printed
+SHOWN = 3  # number of printed differences of a case
 
 
 class Side:
-    """One commit: its files, and the process that dumps its cases."""
+    """Commit with its files and the process that dumps its cases."""
 
     def __init__(self, commit: str, folder: Path, written: Path, fresh: bool) -> None:
         self.commit, self.folder, self.tree = commit, folder, folder / "tree"
@@ -57,11 +57,11 @@ class Side:
 
     @property
     def cases(self) -> dict[str, Path]:
-        """Name -> file of its shipped cases."""
+        """Shipped cases of the commit : name -> path."""
         return {path.stem: path for path in sorted((self.tree / "cases").glob("*.toml"))}
 
     def dump(self, name: str) -> Dump | str:
-        """The dump of a case, or how its process ended."""
+        """Dump of a case, or a text with the exit status if the process ended."""
         begun, out = time.perf_counter(), self.folder / "dump"
         if self.process is None:
             self.process = subprocess.Popen(
@@ -88,14 +88,14 @@ class Side:
 
 
 def extract(commit: str, tree: Path) -> None:
-    """The package and the cases of a commit."""
+    """Extract the package and the cases of a commit."""
     packed = subprocess.run(["git", "archive", commit, *PARTS], cwd=HERE.parent, capture_output=True, check=True)
     with tarfile.open(fileobj=io.BytesIO(packed.stdout)) as archive:
         archive.extractall(tree, filter="data")
 
 
 def revision(name: str) -> str:
-    """Short hash of a commit; ValueError for an unknown one."""
+    """Short hash of a commit; raises ValueError if it is unknown."""
     command = ["git", "rev-parse", "--verify", "--quiet", "--short", f"{name}^{{commit}}"]
     found = subprocess.run(command, cwd=HERE.parent, capture_output=True, text=True)
     if found.returncode:
@@ -104,7 +104,10 @@ def revision(name: str) -> str:
 
 
 def pairs(old: Side, new: Side, names: Names, asked: list[str]) -> list[tuple[str | None, str | None]]:
-    """Names of each case on both sides, None where a side has none; ValueError for unknown ones that are asked for."""
+    """Names of each case in both commits, None where a commit lacks the case.
+
+    Raises ValueError if a given name is unknown.
+    """
     unknown = [name for name in asked if name not in old.cases]
     if unknown:
         raise ValueError(f"{old.commit} has no case {', '.join(unknown)}; expected some of {', '.join(old.cases)}")
@@ -116,7 +119,7 @@ def pairs(old: Side, new: Side, names: Names, asked: list[str]) -> list[tuple[st
 
 
 def compared(old: Side, new: Side, names: Names, name: str | None, other: str | None) -> tuple[bool, str]:
-    """True if a case is equal on both sides; the line that says so."""
+    """True if a case is equal in both commits, and the line that reports the result."""
     for side, missing in ((old, name is None), (new, other is None)):
         if missing:
             return False, f"{name or other}: differs: {side.commit} has no such case"
@@ -135,13 +138,13 @@ def compared(old: Side, new: Side, names: Names, name: str | None, other: str | 
 
 def main() -> int:
     parser = measure.parser(__doc__)
-    parser.add_argument("old", nargs="?", default="HEAD", help="commit (default HEAD)")
-    parser.add_argument("new", nargs="?", default="HEAD", help="commit (default HEAD)")
-    parser.add_argument("--map", type=Path, help="file of renamed words: KIND, OLD and NEW name with tabs between")
-    parser.add_argument("--cases", default="", help="names of cases of OLD with commas between (default all)")
+    parser.add_argument("old", nargs="?", default="HEAD", help="old commit (default HEAD)")
+    parser.add_argument("new", nargs="?", default="HEAD", help="new commit (default HEAD)")
+    parser.add_argument("--map", type=Path, help="file of renamed words: KIND, OLD and NEW name, separated by tabs")
+    parser.add_argument("--cases", default="", help="names of cases of OLD, separated by commas (default all)")
     given, begun = parser.parse_args(), time.perf_counter()
     if given.quick and not (HERE.parent / ".git").exists():
-        print(f"the repository of git is not there: {measure.SKIPPED}")
+        print(f"there is no git repository: {measure.SKIPPED}")
         return 0
     asked = [name for name in given.cases.split(",") if name] or ([TINY] if given.quick else [])
     sides: list[Side] = []

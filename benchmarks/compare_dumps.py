@@ -1,7 +1,7 @@
-"""Comparison of two dumps of a run to the bit, with a map of renamed words between them. Imports nothing of fvsolve.
+"""Comparison of two dumps of a run to the bit, with a map of renamed words. Imports nothing of fvsolve.
 
 A dump maps places to values: a place is a tuple of texts, such as ("summary.json", "extremes", "gate.head", "least"),
-a value is None, a bool, an int, a float, a text, or an array of numpy.
+a value is None, a bool, an int, a float, a text, or a numpy array.
 """
 
 from __future__ import annotations
@@ -14,18 +14,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 Dump = dict[tuple[str, ...], Any]
-KINDS = ("module", "name", "member", "column", "arg", "public")  # of lines of a map
+KINDS = ("module", "name", "member", "column", "arg", "public")  # kinds of lines of a map
 WORD = re.compile(r"[^\W\d]\w*(?:-\w+)*")
 DOTTED = re.compile(rf"{WORD.pattern}(?:\.{WORD.pattern})*")
-# Keys of texts for people, whose words may differ. Of a reason the words before its colon are compared.
+# Keys of texts for people, which may differ. Only the words of a reason before the colon are compared.
 PROSE = ("title", "description", "source", "text", "why")
 REASON = "reason"
-LABELS = "expectations"  # where `text` is an expression of the case file, no prose
-MANY = 6  # words of a place; if the map renames more of them, it renames all or none
+LABELS = "expectations"  # place in which `text` is an expression of the case file, not prose
+MANY = 6  # greatest number of renamed words of a place; above it, either all or none are renamed
 
 
 class Difference(NamedTuple):
-    """A place and what both sides have there, as text."""
+    """Place at which two dumps differ, and both values as text."""
 
     place: str
     old: str
@@ -36,11 +36,11 @@ class Difference(NamedTuple):
 
 
 class Names:
-    """Map of names from old to new. ValueError lists all faults of its lines.
+    """Map of old names to new names. Raises ValueError with all faults of its lines.
 
     public : words of keys, columns and texts; "extremes.least" is `least` anywhere below `extremes`; a name with blanks
     is a whole text
-    other kinds : names of Python, where the last part counts
+    other kinds : names of Python, of which the last part counts
     """
 
     def __init__(self, lines: list[str] | None = None) -> None:
@@ -54,7 +54,7 @@ class Names:
             raise ValueError("\n".join(faults))
 
     def _add(self, number: int, line: str) -> str:
-        """Add a line and return the text of its fault, "" for a good one."""
+        """Add a line and return the text of its fault, empty for a valid line."""
         if not line.strip() or line.startswith("#"):
             return ""
         fields = [field.strip() for field in line.split("\t")]
@@ -79,7 +79,7 @@ class Names:
         return ""
 
     def spellings(self, name: str) -> list[str]:
-        """A name of Python or of a key, then all names that the map renames to it or from it."""
+        """Spellings of a name of Python or of a key: the name, then all names that the map connects with it."""
         if name in self.known:
             return self.known[name]
         pairs = self.python + [(a[-1], b[-1]) for entries in self.words.values() for a, b in entries]
@@ -90,10 +90,10 @@ class Names:
         return found
 
     def renamed(self, words: list[str]) -> list[str]:
-        """New words of a list of old words. The parts of an entry must stand among them in order."""
+        """New words of a list of old words. The parts of an entry must occur among them in order."""
         found = list(words)
         for at, word in enumerate(words):
-            for before, after in self.words.get(word, ()):  # the most parts last
+            for before, after in self.words.get(word, ()):  # entries with most parts last
                 places = _above(words[:at], before[:-1])
                 if places is None:
                     continue
@@ -103,7 +103,7 @@ class Names:
         return found
 
     def unused(self) -> list[str]:
-        """Public names of the map that no place and no text has used."""
+        """Public names of the map that occur in no place and no text."""
         known = {".".join(before) for entries in self.words.values() for before, _ in entries}
         return sorted((known | self.whole.keys()) - self.used)
 
@@ -138,7 +138,7 @@ class Names:
 
 
 def compare(old: Dump, new: Dump, names: Names) -> list[Difference]:
-    """All differences of two dumps, in the order of the old dump; places of the new dump alone come last."""
+    """Differences of two dumps in the order of the old dump, then places of the new dump alone."""
     pairs, left = _paired(old, new, names)
     found = []
     for place, other in pairs.items():
@@ -152,7 +152,7 @@ def compare(old: Dump, new: Dump, names: Names) -> list[Difference]:
 
 
 def count(dump: Dump) -> int:
-    """Numbers and texts of a dump."""
+    """Number of values of a dump; each element of an array counts."""
     return sum(np.size(value) for value in dump.values())
 
 
@@ -172,7 +172,7 @@ def _paired(old: Dump, new: Dump, names: Names) -> tuple[dict, list]:
 
 
 def _different(place: tuple[str, ...], old: Any, new: Any, names: Names) -> tuple[str, str, str] | None:
-    """Position in a place at which two values differ, and both values as text; None for equal values."""
+    """Position at which two values of a place differ, and both values as text; None if they are equal."""
     if type(old) is not type(new):
         return "", _shown(old), _shown(new)
     if isinstance(old, np.ndarray):
@@ -185,7 +185,7 @@ def _different(place: tuple[str, ...], old: Any, new: Any, names: Names) -> tupl
 
 
 def _different_texts(place, old: str, new: str, names: Names) -> tuple[str, str, str] | None:
-    """Line that differs; None for equal texts and for prose."""
+    """Position and text of the first line that differs; None for equal texts and for prose."""
     known = [set(names.spellings(key)) for key in PROSE]
     if any(place[-1] in key for key in known) and not any(one in place for one in names.spellings(LABELS)):
         return None
@@ -201,7 +201,7 @@ def _different_texts(place, old: str, new: str, names: Names) -> tuple[str, str,
 
 
 def _different_arrays(old: np.ndarray, new: np.ndarray) -> tuple[str, str, str] | None:
-    """Index of the first number that differs, and how many more differ."""
+    """Index of the first number that differs, with the count of the others, and both numbers; None if all are equal."""
     if old.dtype != new.dtype or old.shape != new.shape:
         return "", f"{old.dtype}{list(old.shape)}", f"{new.dtype}{list(new.shape)}"
     a, b = (np.ascontiguousarray(one).reshape(-1) for one in (old, new))
@@ -215,7 +215,7 @@ def _different_arrays(old: np.ndarray, new: np.ndarray) -> tuple[str, str, str] 
 
 
 def _shown(value: Any) -> str:
-    """A value as text, a float with its hexadecimal form."""
+    """Value as text; a float also in hexadecimal form."""
     if isinstance(value, float):
         return f"{value!r} ({value.hex() if value == value else _bits(value).hex()})"
     if isinstance(value, np.ndarray):
@@ -229,7 +229,7 @@ def _bits(value: float) -> bytes:
 
 
 def _above(words: list[str], parts: list[str]) -> list[int] | None:
-    """Positions of the parts among the words, in order, each the last possible one; None if a part is missing."""
+    """Positions of the parts among the words in order, each the last possible; None if a part is missing."""
     places, at = [], len(words)
     for part in reversed(parts):
         at = next((k for k in range(at - 1, -1, -1) if words[k] == part), -1)
@@ -240,6 +240,6 @@ def _above(words: list[str], parts: list[str]) -> list[int] | None:
 
 
 def _ends(many: int) -> Iterator[tuple[bool, ...]]:
-    """All true, then all false."""
+    """Two choices: all true, and all false."""
     yield (True,) * many
     yield (False,) * many

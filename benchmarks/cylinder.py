@@ -1,11 +1,11 @@
-"""A valve-controlled cylinder with mass and spring as y' = f(t, y), in numba. Knows no solver.
+"""Valve-controlled cylinder with mass and spring as y' = f(t, y), compiled by numba.
 
-A four-port valve of small underlap sends oil through two short hoses of a few cubic centimetres to both sides of
-a double-acting cylinder, whose rod moves a mass on a spring. Two strokes: the valve moves as sin(2 pi t / PERIOD).
-Six states, each in a unit that makes it of order one (LSODA in numbalsoda takes one absolute tolerance for all):
+A four-port valve with a small underlap supplies oil through two short hoses of 0.3 cm3 to both sides of a double-acting
+cylinder, whose rod moves a mass on a spring. Two strokes: the valve moves as sin(2 pi t / PERIOD). Each of the six
+states has a unit that makes it of order one, because LSODA in numbalsoda takes one absolute tolerance for all:
 pressures in 10 MPa at the valve's ports A and B and in the chambers A and B, stroke in 0.1 m, velocity in 1 m/s.
 
-Orifices: q = C sign(dp) |dp| / (dp^2 + d^2)^(1/4), C = Cd A sqrt(2/rho), whose slope at dp = 0 is finite.
+Orifices: q = C sign(dp) |dp| / (dp^2 + d^2)^(1/4), C = Cd A sqrt(2/rho), with a finite slope at dp = 0.
 """
 
 from math import pi, sin, sqrt
@@ -18,33 +18,33 @@ NAMES = ("hose A", "hose B", "chamber A", "chamber B", "stroke", "velocity")
 PERIOD, END = 0.2, 0.2  # [s]
 SUPPLY, TANK = 1.5e7, 1e5  # [Pa]
 BETA, RHO = 1.2e9, 860.0  # bulk modulus [Pa], density [kg/m3]
-VALVE = 0.61 * 1.0e-5 * sqrt(2.0 / RHO)  # of one metering edge, wide open [m3/s/sqrt(Pa)]
-HOSE = 0.61 * 1.5e-5 * sqrt(2.0 / RHO)  # of the port of a chamber [m3/s/sqrt(Pa)]
-SOFT = 2e4  # [Pa] below it orifices are laminar
-UNDERLAP = 0.02  # of the valve's stroke
+VALVE = 0.61 * 1.0e-5 * sqrt(2.0 / RHO)  # coefficient of a metering edge, fully open [m3/s/sqrt(Pa)]
+HOSE = 0.61 * 1.5e-5 * sqrt(2.0 / RHO)  # coefficient of the port of a chamber [m3/s/sqrt(Pa)]
+SOFT = 2e4  # pressure drop below which orifices are laminar [Pa]
+UNDERLAP = 0.02  # fraction of the stroke of the valve
 HOSE_VOLUME, DEAD_VOLUME = 3e-7, 1e-5  # [m3]
 AREA_A, AREA_B, STROKE = 8e-4, 5e-4, 0.1  # [m2, m2, m]
-LEAKAGE = 1e-13  # from chamber to chamber [m3/s/Pa]
+LEAKAGE = 1e-13  # between the chambers [m3/s/Pa]
 MASS, STIFFNESS, DAMPING = 20.0, 2e4, 400.0  # [kg, N/m, N s/m]
-START = 0.02  # where the spring is slack [m]
-P_A = 5e6  # [Pa] at the start; P_B holds it in balance
+START = 0.02  # position at which the spring has no force [m]
+P_A = 5e6  # pressure of A at the start, which that of B balances [Pa]
 
 
 @numba.njit(error_model="numpy")
 def orifice(c, dp):
-    """Flow [m3/s] through an orifice of coefficient c under a pressure drop [Pa]."""
+    """Flow [m3/s] through an orifice with coefficient c at a pressure drop dp [Pa]."""
     return c * dp / sqrt(sqrt(dp * dp + SOFT * SOFT))
 
 
 @numba.njit(error_model="numpy")
 def edge(s):
-    """Opening of a metering edge whose spool stands s open: s where open, 0 where shut, round between."""
+    """Opening of a metering edge at spool position s: nearly s if positive, nearly 0 if negative, smooth between."""
     return 0.5 * (s + sqrt(s * s + UNDERLAP * UNDERLAP))
 
 
 @numba.njit(error_model="numpy")
 def rhs(t, y, dydt):
-    """dydt = f(t, y), states as UNITS says."""
+    """Rates dydt = f(t, y) of the states in UNITS."""
     a, b, p_a, p_b = 1e7 * y[0], 1e7 * y[1], 1e7 * y[2], 1e7 * y[3]
     x, v = 0.1 * y[4], y[5]
     s = sin(2.0 * pi / PERIOD * t)
@@ -62,13 +62,13 @@ def rhs(t, y, dydt):
 
 
 def start():
-    """y at t = 0: at rest, forces in balance : float64[6]."""
+    """State y at t = 0, at rest with balanced forces : float64[6]."""
     p_b = P_A * AREA_A / AREA_B
     return np.array([P_A, p_b, P_A, p_b, START, 0.0]) / UNITS
 
 
 def jacobian(t, y):
-    """df/dy by central differences : float64[6, 6] [1/s]."""
+    """Jacobian df/dy by central differences : float64[6, 6] [1/s]."""
     found, high, low = np.empty((6, 6)), np.empty(6), np.empty(6)
     for j in range(6):
         step = np.zeros(6)

@@ -1,9 +1,9 @@
-"""Dumps of shipped cases of one checkout: rates at a few states, and all that a run writes. Read by compare_commits.py.
+"""Dumps of shipped cases of one checkout for compare_commits.py: rates at a few states, and all files of a run.
 
     python -P dump_cases.py CHECKOUT MAP
 
-Each line of standard input is a case file and the file of its dump, with a tab between. The program writes the dump,
-then a line on standard output. It looks up names of fvsolve through the map, because two commits may spell them
+Each line of standard input is a case file and the file of its dump, separated by a tab. The program writes the dump,
+then a line on standard output. It finds names of fvsolve through the map, because two commits may spell them
 differently.
 """
 
@@ -25,17 +25,17 @@ import numpy as np
 sys.path.append(str(Path(__file__).resolve().parent))
 from compare_dumps import Dump, Names  # noqa: E402
 
-# Keys of summary.json that hold times of the clock, versions and hashes.
+# Keys of summary.json with wall times, versions and hashes.
 LEFT_OUT = ("seconds", "seconds_setup", "seconds_total", "cost", "ended", "versions")
-# A run writes its checkpoint by the clock, with versions and hashes.
+# The checkpoint depends on wall time, and contains versions and hashes.
 UNREAD = ("restart.npz",)
 # Earlier ends of cases that take more than half a minute [s].
 ENDS = {"tracer-basin": 150.0}
-PART = 0.25  # of the run, after which the rates are evaluated too
+PART = 0.25  # fraction of the run after which the rates are evaluated as well
 
 
 class Named:
-    """Attributes of an object, under any name that the map has for them."""
+    """Object whose attributes are found under any name that the map gives them."""
 
     def __init__(self, one, names: Names) -> None:
         self.one, self.names = one, names
@@ -50,7 +50,7 @@ class Named:
 
 
 def dump(path: Path, names: Names, fvsolve) -> Dump:
-    """All values of a case: its model at some states, then its run."""
+    """Values of a case: its model at some states, then its run; for an invalid case the kind and number of faults."""
     api, found = Named(fvsolve, names), {}
     try:
         model = api.build(api.load(path, shorter(path, names)))
@@ -79,7 +79,7 @@ def dump(path: Path, names: Names, fvsolve) -> Dump:
 
 
 def shorter(path: Path, names: Names) -> dict | None:
-    """The key of an earlier end, for `load`."""
+    """Override with the earlier end of a case in ENDS; None for other cases."""
     end = next((ENDS[one] for one in names.spellings(path.stem) if one in ENDS), None)
     if end is None:
         return None
@@ -89,7 +89,7 @@ def shorter(path: Path, names: Names) -> dict | None:
 
 
 def state_values(label: str, model, state, names: Names) -> Dump:
-    """A state, the right-hand side by its time and vector and by its memory, all probes."""
+    """Values of a state: time, vector, memory, right-hand side by vector and by state, and all probes."""
     own, of = Named(state, names), Named(model, names)
     found = {(label, "t"): float(own.t), (label, "y"): own.y.copy(), (label, "memory"): own.memory.copy()}
     found |= rates(label, model, own.t, own.y, names)
@@ -97,7 +97,7 @@ def state_values(label: str, model, state, names: Names) -> Dump:
 
 
 def rates(label: str, model, t: float, y, names: Names) -> Dump:
-    """Right-hand side at (t, y) with all that it writes beside."""
+    """Right-hand side at (t, y) with all other output of its evaluation."""
     dydt, out = Named(model, names).evaluate(t, y)
     return {(label, "dydt"): dydt, (label, "out"): out}
 
@@ -114,7 +114,7 @@ def directory(folder: Path, names: Names) -> Dump:
 
 
 def summary(path: Path, names: Names) -> Dump:
-    """Values of summary.json but for the keys that are left out."""
+    """Values of summary.json without the keys of LEFT_OUT."""
     left = {spelling for key in LEFT_OUT for spelling in names.spellings(key)}
     said = json.loads(path.read_text(encoding="utf-8"))
     return dict(leaves({key: value for key, value in said.items() if key not in left}))
@@ -126,7 +126,10 @@ def case(path: Path, names: Names) -> Dump:
 
 
 def leaves(value, place: tuple[str, ...] = ()):
-    """(place, value) of all values in tables and lists; a list of floats is an array, an empty list a text."""
+    """Place and value of all values in nested tables and lists.
+
+    A list of floats is an array, an empty list or table a text.
+    """
     if isinstance(value, list) and value and all(type(one) is float for one in value):
         yield place, np.array(value)
     elif isinstance(value, (dict, list)) and value:
@@ -139,7 +142,7 @@ def leaves(value, place: tuple[str, ...] = ()):
 
 
 def table(path: Path, names: Names) -> Dump:
-    """Columns by their headers; the order of the headers."""
+    """Columns of a CSV file by header, and the order of the headers."""
     with open(path, encoding="utf-8", newline="") as file:
         headers, *rows = csv.reader(file)
     found: Dump = {("headers",): "\n".join(headers)}
@@ -153,7 +156,7 @@ def table(path: Path, names: Names) -> Dump:
 
 
 def frame(path: Path, names: Names) -> Dump:
-    """Arrays of a file of VTK by section and name, with their units."""
+    """Arrays of a VTK file by section and name, with their units."""
     import meshio
 
     mesh = meshio.vtu.read(str(path))
@@ -168,7 +171,7 @@ def frame(path: Path, names: Names) -> Dump:
 
 
 def series(path: Path, names: Names) -> Dump:
-    """Times and files of the frames."""
+    """Times and files of the frames of a PVD file."""
     root = ElementTree.parse(path).getroot()
     return {(str(k), key): text for k, one in enumerate(root.iter("DataSet")) for key, text in one.attrib.items()}
 

@@ -1,4 +1,4 @@
-"""Exact heads of lossless pipe networks by counting wave paths. Knows pipes and time; knows no solver."""
+"""Exact heads of lossless pipe networks by counting wave paths, without cells or time steps."""
 
 from dataclasses import dataclass
 from math import erfc, pi
@@ -9,7 +9,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Pipe:
-    """A lossless pipe: length [m], wave_speed [m/s], diameter [m]."""
+    """Lossless pipe with length [m], wave speed [m/s] and diameter [m]."""
 
     name: str
     from_: str
@@ -31,7 +31,7 @@ class Pipe:
 
 @dataclass(frozen=True)
 class Network:
-    """Lossless pipes, reservoirs of one head [m], a node `gate` that draws `flow` [m3/s] until it closes."""
+    """Lossless pipes, reservoirs with one head [m], and a node `gate` with the demand `flow` [m3/s] until it closes."""
 
     name: str
     pipes: tuple
@@ -49,13 +49,13 @@ class Network:
 
     @property
     def jump(self):
-        """Head rise of an instant closure at the gate, Q / sum(g A/a) [m] (Joukowsky)."""
+        """Head rise of an instantaneous closure of the gate, Q / sum(g A/a) [m] (Joukowsky)."""
         return self.flow / self.admittance(self.gate)
 
 
 @dataclass(frozen=True)
 class Closure:
-    """The fraction of the flow that has been shut off at time t [s].
+    """Fraction of the flow that is shut off at time t [s].
 
     erf:     1 - erfc((t - start)/width)/2, within [start - 6.5 width, start + 6.5 width] (erfc there 4e-20)
     ramp:    (t - start)/width within [start, start + width]
@@ -68,16 +68,16 @@ class Closure:
 
     @property
     def begin(self):
-        """Nothing is shut off before this time [s]."""
+        """Time at which the closure begins [s]."""
         return self.start - 6.5 * self.width if self.kind == "erf" else self.start
 
     @property
     def finish(self):
-        """All is shut off from this time on [s]."""
+        """Time from which the gate is closed [s]."""
         return self.start + (6.5 if self.kind == "erf" else 1.0) * self.width
 
     def open(self, times):
-        """Fraction of the flow that still passes, float64[n]."""
+        """Fraction of the flow that remains : float64[n]."""
         code = KINDS.index(self.kind)
         times = np.asarray(times, float)
         return np.array([1.0 - shut(code, t, self.start, self.width) for t in times])
@@ -88,7 +88,7 @@ KINDS = ("erf", "ramp", "instant")
 
 @numba.njit(error_model="numpy")
 def shut(code, t, start, width):
-    """Fraction shut off at t; see Closure."""
+    """Fraction of the flow that is shut off at t, by the formulas of `Closure`; code : index in KINDS."""
     if code == 0:
         return 1.0 - 0.5 * erfc((t - start) / width)
     if code == 1:
@@ -97,11 +97,11 @@ def shut(code, t, start, width):
 
 
 def impulse_response(network):
-    """Delays [s] and weights [m per m3/s] of the pulses that reach each probe after a pulse at the gate.
+    """Delays [s] and weights [m per m3/s] of the pulses that arrive at each probe after a pulse at the gate.
 
-    A pulse's delay is sum(m_i T_i), m_i how often it passed pipe i: the counts m (seven bits each) are its
-    name, so that pulses which arrive together by different ways are added exactly. One round is one passage.
-    Returns dict probe -> (float64[k] delays ascending, float64[k] weights).
+    The delay of a pulse is sum(m_i T_i), where m_i is the number of its passages through pipe i. The counts m (seven
+    bits each) identify a pulse, so pulses that arrive together on different paths are added exactly. One round is one
+    passage. Returns dict probe -> (float64[k] delays ascending, float64[k] weights).
     """
     pipes = network.pipes
     if len(pipes) > 9:
@@ -153,10 +153,10 @@ def _ascending(parts):
 
 
 def exact_heads(network, closure, times, response=None):
-    """Heads [m] at the probes of `network` while its gate closes: dict probe -> float64[n].
+    """Heads [m] at the probes of `network` during the closure of its gate: dict probe -> float64[n].
 
     h(t) = head + flow sum_k w_k shut(t - delay_k), exact to rounding for any lengths, with kinks and jumps.
-    `response`: what impulse_response(network) gave, if at hand.
+    `response`: result of impulse_response(network), computed if None.
     """
     response = response or impulse_response(network)
     times = np.ascontiguousarray(times, float)

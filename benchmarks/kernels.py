@@ -1,10 +1,12 @@
-"""Cell-steps per second of one acoustic pipe, beside a triad: `python benchmarks/kernels.py [--quick] [cells ...]`.
+"""Cell-steps per second of each scheme on one acoustic pipe, compared with a STREAM triad and PyClaw.
 
-A cell-step is one cell over one whole step of the method, by the stepping loop of fvsolve.run: a pipe between a
-reservoir and a gate that shuts, without friction, with the envelope kept and NaN looked for; no rows in between.
-The STREAM triad has arrays of twice as many elements as there are cells: as many bytes in play as two fields
-with three buffers each. `of triad` is the share of its bandwidth for the bytes that a cell-step cannot do without:
-for SSP-RK2 80: each stage in one pass over both fields (the loop makes several). One thread.
+    python benchmarks/kernels.py [--quick] [CELLS]...
+
+A cell-step is one cell in one whole step of the method, in the time loop of fvsolve.run. The pipe without friction lies
+between a reservoir and a closing gate; the loop records the envelope and searches for NaN, without rows in between.
+The arrays of the STREAM triad have twice as many elements as there are cells: as many bytes as two fields with three
+buffers each. `of triad` is the fraction of its bandwidth for the bytes that a cell-step must move, 80 for SSP-RK2: each
+stage in one pass over both fields (the loop makes several). One thread.
 """
 
 from __future__ import annotations
@@ -25,15 +27,15 @@ from fvsolve.solve import initial_state
 from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
 
 SIZES = (1_000, 10_000, 100_000, 1_000_000)  # [cells]
-TRIAD_BYTES = 24  # per element: two read, one written (the line fetched before writing is not counted)
-BUDGET = 0.2  # for one measurement [s]
+TRIAD_BYTES = 24  # per element: two reads, one write (the line fetched before writing is not counted)
+BUDGET = 0.2  # time of one measurement [s]
 
 
 @dataclass(frozen=True)
 class Subject:
-    """Something that steps cells: `prepare(cells)` gives `advance(steps)`, compiled and warm.
+    """Program that steps cells: `prepare(cells)` returns `advance(steps)`, compiled and warm.
 
-    bytes : that a cell-step must read and write at the least, out of cache
+    bytes : least number of bytes that a cell-step reads and writes out of cache
     """
 
     name: str
@@ -55,7 +57,7 @@ STEP_BYTES = 16 * (2 + 3)
 
 
 def schemes() -> list[Subject]:
-    """fvsolve's schemes with SSP-RK2 and two fields, and upwind with Euler, which leaps."""
+    """fvsolve's schemes with SSP-RK2 and two fields, and upwind with Euler, whose steps are fused."""
     subjects = [Subject("upwind, Euler", 32, stepping("upwind", "", "euler", 1.0))]
     for scheme, limiter, courant in SCHEMES:
         title = f"{scheme} {limiter}".strip() + ", SSP-RK2"
@@ -64,7 +66,7 @@ def schemes() -> list[Subject]:
 
 
 def stepping(scheme: str, limiter: str, method: str, courant: float) -> Callable[[int], Callable[[int], None]]:
-    """fvsolve's loop on one pipe."""
+    """Function that prepares fvsolve's time loop on one pipe."""
 
     def prepare(cells: int) -> Callable[[int], None]:
         case = networks.uniform_case(networks.UNIFORM, cells, 10**9, rows=1)
@@ -81,7 +83,7 @@ def stepping(scheme: str, limiter: str, method: str, courant: float) -> Callable
 
 
 def of_pyclaw() -> list[Subject]:
-    """PyClaw's classic Fortran solver, if there: Lax-Wendroff with the MC limiter, periodic, Courant 0.9."""
+    """PyClaw's classic Fortran solver if installed: Lax-Wendroff with the MC limiter, periodic, Courant 0.9."""
     if pyclaw is None:
         return []
 
@@ -109,7 +111,7 @@ def of_pyclaw() -> list[Subject]:
 
 @numba.njit(error_model="numpy")
 def triad(a, b, c, s, times):
-    """a = b + s c, `times` over, the arrays changing places so that no pass can be left out."""
+    """Compute a = b + s c `times` times; the arrays change places so that no pass can be left out."""
     for _ in range(times):
         for i in range(a.size):
             a[i] = b[i] + s * c[i]
@@ -118,7 +120,7 @@ def triad(a, b, c, s, times):
 
 
 def rate(advance: Callable[[int], object], elements: int, repeats: int = 5, budget: float = BUDGET) -> float:
-    """Elements per second, best of `repeats`, each long enough to be timed."""
+    """Elements per second, the best of `repeats` measurements, which together take about `budget` [s]."""
     advance(1)
     times, wall = 1, 0.0
     while wall < budget / 10.0:
@@ -136,14 +138,14 @@ def rate(advance: Callable[[int], object], elements: int, repeats: int = 5, budg
 
 
 def bandwidth(elements: int, budget: float = BUDGET) -> float:
-    """What the triad moves [bytes/s] on arrays of this many elements."""
+    """Memory traffic of the triad [bytes/s] on arrays of this many elements."""
     a, b, c = np.zeros(elements), np.ones(elements), np.ones(elements)
     return TRIAD_BYTES * rate(lambda times: triad(a, b, c, 0.0, times), elements, budget=budget)
 
 
 def main() -> None:
     options = parser(__doc__)
-    options.add_argument("cells", nargs="*", type=int, help=f"numbers of cells; {SIZES} if none is given")
+    options.add_argument("cells", nargs="*", type=int, help=f"numbers of cells (default {SIZES})")
     given = options.parse_args()
     sizes, budget = given.cells or (SIZES[:1] if given.quick else SIZES), 0.01 if given.quick else BUDGET
     reached = {cells: bandwidth(2 * cells, budget) for cells in sizes}

@@ -1,16 +1,19 @@
-"""Large networks beside rthym-moc 0.4.1: `python benchmarks/large_networks.py [net3] [ky4] [trip] [net6] [grid]`.
+"""Large networks compared with rthym-moc 0.4.1: cells and delay lines of fvsolve on networks of EPANET and on a grid.
 
-net3, ky4: the largest demand stops smoothly in 0.2 s. trip: the river pump of Net3 trips. Heads of all junctions are
-compared each 50 ms; errors in jumps, Joukowsky's of the demand or the greatest change of a head by the trip: the
-greatest of all, and rms over junctions at its worst time. net6: 20 s of 10 ms steps. grid: 2 000 pipes, checked and
-run. Envelopes of delay lines are taken at all nodes and each second along them, in the middle at least, or as a row
-says. They run by Euler's method, as nothing but tanks, and after the trip a pump's speed, is stepped there.
+    python benchmarks/large_networks.py [net3] [ky4] [trip] [net6] [grid]
 
-The reference is `upwind5` with cells of 2.5 ms of true lengths, kept in the temporary folder. All take 1438.656 m/s
-(4720 ft/s, rthym-moc's rigid pipe). rthym-moc's own heads drift by 290 m on Net3, so its error is that of the
-characteristics that it solves, with wave speeds bent to its step; its time is its own. CPU time a simulated second is
-that of the stepping alone for fvsolve (its own summary), of the solve call for rthym-moc; `whole` is all that
-`fvsolve.run(model)` does.
+In net3 and ky4 the largest demand stops smoothly in 0.2 s; in trip the river pump of Net3 trips. Heads of all junctions
+are compared each 50 ms. Errors are in jumps: Joukowsky's jump of the demand, or the greatest change of a head after the
+trip. The tables give the greatest error of all, and the rms over junctions at its worst time. net6 runs 20 s in steps
+of 10 ms. grid checks and runs 2 000 pipes. Envelopes of delay lines are recorded at all nodes and at each second of
+travel, at least in the middle, unless a row states otherwise. Delay lines use Euler's method, because only tanks and,
+after the trip, the speed of a pump have states.
+
+The reference is `upwind5` with cells of 2.5 ms and true lengths, stored in the temporary folder. All programs use a
+wave speed of 1438.656 m/s (4720 ft/s, rthym-moc's rigid pipe). The heads of rthym-moc drift by 290 m on Net3. Its error
+is therefore that of its method of characteristics, with wave speeds changed to fit its step, as computed by fvsolve;
+its time is its own. CPU time per simulated second is that of the stepping alone for fvsolve (from its summary), and of
+the solve call for rthym-moc; `whole` is that of the whole call `fvsolve.run(model)`.
 """
 
 import hashlib
@@ -36,20 +39,20 @@ from fvsolve.model.build import build
 rthym_moc, wntr = peer_module("rthym_moc", "rthym-moc"), peer_module("wntr", "wntr")
 NETWORKS = Path(wntr.__file__).parent / "library" / "networks" if wntr else None
 SPEED, GRAVITY = 4720 * 0.3048, 9.80665
-BEGIN, STOP, EVERY = 0.5, 0.2, 0.05  # the event, how long it takes, between rows [s]
+BEGIN, STOP, EVERY = 0.5, 0.2, 0.05  # start and duration of the event, interval of rows [s]
 ENDS = {"Net3": 6.0, "ky4": 4.0}
-FINE, FEW, MORE = 2.5e-3, 1.0, 0.1  # cells of the reference, and of envelopes of delay lines [s]
-TODAY = (0.01, 0.025)  # cells [s]
-STEPS, PEER = (0.0025, 0.01, 0.0165, 0.02, 0.025, 0.05), (0.0025, 0.01)  # of delay lines, of rthym-moc [s]
-ACCURACY = 5e-3  # of delay lines: half the default, at hardly any cost
+FINE, FEW, MORE = 2.5e-3, 1.0, 0.1  # travel time of cells of the reference, and between places of envelopes [s]
+TODAY = (0.01, 0.025)  # travel times of cells [s]
+STEPS, PEER = (0.0025, 0.01, 0.0165, 0.02, 0.025, 0.05), (0.0025, 0.01)  # steps of delay lines and of rthym-moc [s]
+ACCURACY = 5e-3  # `delay_tolerance`: half the default, at little cost
 ERROR, THIRTIETH, HUNDREDTH, QUARTER = 1.5e-2, 30.0, 100.0, 4.0
 REPEATS = 5
-SIDE, LINES = 32, ("cells", "delay")  # of the grid: junctions along a side, kinds of lines
+SIDE, LINES = 32, ("cells", "delay")  # grid: junctions along a side, pipe models
 
 
 @dataclass
 class Row:
-    """CPU time a simulated second, of the stepping and of all [s], and errors in jumps."""
+    """Result of a program: CPU time per simulated second, of the stepping and of the run [s], and errors in jumps."""
 
     what: str
     cpu: float
@@ -59,7 +62,7 @@ class Row:
 
 
 def town(name, shortest=0.0):
-    """An EPANET network as a case, the heads of all its junctions recorded."""
+    """Case of an EPANET network that records the heads of all junctions."""
     table = tomllib.loads(import_network(NETWORKS / f"{name}.inp", wave_speed=SPEED, shortest=shortest).text)
     junctions = [node for node, part in table["nodes"].items() if part["type"] == "junction"]
     table["output"] = {"every": EVERY, "fields": 0, "probes": [f"nodes.{node}.head" for node in junctions]}
@@ -67,7 +70,7 @@ def town(name, shortest=0.0):
 
 
 def stopped(name, shortest=0.0):
-    """The largest demand stops; the case and Joukowsky's jump [m]."""
+    """Case in which the largest demand stops, and Joukowsky's jump [m]."""
     table = town(name, shortest)
     drawn = {node: 1e-3 * float(part["demand"].split()[0]) for node, part in table["nodes"].items() if "demand" in part}
     most = max(drawn, key=drawn.get)
@@ -81,7 +84,7 @@ def stopped(name, shortest=0.0):
 
 
 def tripped(name, shortest=0.0):
-    """Net3's river pump trips."""
+    """Case in which Net3's river pump trips, and None for the jump."""
     table = town(name, shortest)
     table["links"]["335"] |= {"rated_speed": "890 rpm", "inertia": "47 kg m2", "trip": BEGIN}
     table["numerics"]["end"] = ENDS[name]
@@ -89,15 +92,18 @@ def tripped(name, shortest=0.0):
 
 
 def solved(table, repeats=None, **numerics):
-    """Least CPU time a simulated second, of the stepping and of all, and heads at every row : float64[times, nodes]."""
+    """Least CPU times per simulated second, of the stepping and of the whole run [s], and heads at every row.
+
+    The heads are float64[times, nodes] [m].
+    """
     case = load({**table, "numerics": table["numerics"] | numerics})
     model, cpu, whole, repeats = build(case), np.inf, np.inf, REPEATS if repeats is None else repeats
-    for turn in range(repeats + 1):  # the first may compile
+    for turn in range(repeats + 1):  # the first run may compile
         wall, busy = perf_counter(), process_time()
         result = fvsolve.run(model)
         wall, busy = perf_counter() - wall, process_time() - busy
         if turn or not repeats:
-            cpu = min(cpu, result.summary["seconds"] * min(1.0, busy / wall))  # less what others took of this core
+            cpu = min(cpu, result.summary["seconds"] * min(1.0, busy / wall))  # without other processes
             whole = min(whole, busy)
     if result.reason != "finished":
         raise SystemExit(f"{case.title}: {result.reason}")
@@ -108,7 +114,7 @@ def solved(table, repeats=None, **numerics):
 
 
 def bent(table, step):
-    """The pipes as characteristics cut them: a whole number of steps long, at a wave speed that fits."""
+    """Case with pipes as characteristics divide them: a whole number of steps long, at a wave speed that fits."""
     links = {}
     for name, part in table["links"].items():
         if part["type"] == "pipe":
@@ -120,7 +126,7 @@ def bent(table, step):
 
 
 def reference(table):
-    """Heads by fine cells, from the temporary folder where they have been found before."""
+    """Heads with fine cells [m], read from the temporary folder if an earlier run stored them."""
     numerics = {"scheme": "upwind5", "method": "rk4", "pipe_model": "finite-volume", "cell_time": FINE}
     said = json.dumps([table, numerics, fvsolve.__version__], sort_keys=True, default=str)
     kept = Path(tempfile.gettempdir()) / f"fvsolve-reference-{hashlib.sha256(said.encode()).hexdigest()[:16]}.npy"
@@ -130,7 +136,7 @@ def reference(table):
 
 
 def peer(name, step, end):
-    """rthym-moc's CPU time a simulated second."""
+    """CPU time of rthym-moc per simulated second [s]."""
     with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder, chdir(folder):
         warnings.simplefilter("ignore")
         solver = rthym_moc.load_inp(str(NETWORKS / f"{name}.inp"), stub_length_ft=SPEED / 0.3048 * step)
@@ -143,7 +149,7 @@ def peer(name, step, end):
 
 
 def event(name, scene, title):
-    """All programs on one event; rows by what they are."""
+    """Print the rows of all programs for one event."""
     table, jump = scene(name)
     exact = reference(table)
     jump = jump or np.abs(exact - exact[0]).max()
@@ -163,7 +169,7 @@ def event(name, scene, title):
         row(today(time), *cells)
     for step in STEPS:
         row(delay(step), *delayed(table, step, FEW))
-    row("the same by 10 ms, envelopes each 0.1 s", *delayed(table, 0.01, MORE))
+    row("10 ms, envelopes each 0.1 s of travel", *delayed(table, 0.01, MORE))
     for step in PEER if rthym_moc else ():
         cut = solved(bent(table, step), 0, scheme="upwind", method="euler", pipe_model="finite-volume", courant=1.0)[2]
         row(f"rthym-moc, steps of {1e3 * step:g} ms", peer(name, step, table["numerics"]["end"]), np.nan, cut)
@@ -171,14 +177,17 @@ def event(name, scene, title):
 
 
 def delayed(table, step, places, repeats=None):
-    """The case as delay lines, by steps that are given; envelopes at places a travel time of `places` [s] apart."""
+    """Results of `solved` for delay lines with a given step.
+
+    Places of envelopes are a travel time of `places` [s] apart.
+    """
     return solved(
         table, repeats, pipe_model="delay-line", method="euler", step=step, cell_time=places, delay_tolerance=ACCURACY
     )
 
 
 def verdict(found):
-    """Ratios beside the goals."""
+    """Print the ratios of CPU times with their goals."""
     if not rthym_moc:
         return
     good = [row for what, row in found.items() if "delay" in what and row.greatest <= ERROR]
@@ -190,23 +199,23 @@ def verdict(found):
         for other, goal in ((near, THIRTIETH), (found[today(TODAY[0])], HUNDREDTH)):
             print(f"    {other.cpu / best.cpu:.3g} times less than {other.what} (goal {goal:g})")
     else:
-        print(f"  error {ERROR:g}: no step of delay lines is so good")
+        print(f"  error {ERROR:g}: no step of delay lines reaches it")
     theirs, ours = found["rthym-moc, steps of 10 ms"].cpu, found[delay(0.01)].cpu
     print(f"  both at 10 ms: {theirs / ours:.3g} times less (goal {QUARTER:g})")
 
 
 def delay(step):
-    """Name of a row."""
+    """Name of the row of delay lines with a step [s]."""
     return f"fvsolve, delay lines, steps of {1e3 * step:g} ms"
 
 
 def today(time):
-    """Name of a row."""
+    """Name of the row of cells with a travel time [s]."""
     return f"fvsolve, cells of {1e3 * time:g} ms, upwind5 rk4"
 
 
 def net6():
-    """20 s of 10 ms steps."""
+    """Print the CPU times of Net6 for 20 s in steps of 10 ms."""
     table = town("Net6")
     table["numerics"]["end"], table["output"]["probes"] = 20.0, table["output"]["probes"][:10]
     begun = process_time()
@@ -218,7 +227,10 @@ def net6():
 
 
 def lattice(side, lakes=16, pipe_model="delay-line"):
-    """Streets: side x side junctions with a demand each, pipes between neighbours and to lakes, 2 000 in all."""
+    """Case of streets: side x side junctions with a demand each, pipes between neighbours and to lakes.
+
+    With a side of 32 there are 2 000 pipes.
+    """
     rng, nodes, links = np.random.default_rng(1), {}, {}
 
     def join(a, b):
@@ -248,7 +260,7 @@ def lattice(side, lakes=16, pipe_model="delay-line"):
 
 
 def grid():
-    """`check` as a process, and the run beside the time that it simulates."""
+    """Print the CPU time of `check` as a process, and of a run of the grid of streets."""
     print(f"\na grid of {len(lattice(SIDE)['links'])} pipes, 10 s")
     with tempfile.TemporaryDirectory() as folder:
         for line in LINES:
@@ -268,7 +280,7 @@ def grid():
 
 
 def children():
-    """CPU time of processes that have ended [s]."""
+    """CPU time of finished child processes [s]."""
     import resource
 
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -285,17 +297,19 @@ SCENES = {
 
 
 def main():
-    """Print the tables asked for."""
+    """Print the selected tables."""
     global ENDS, FINE, TODAY, STEPS, PEER, REPEATS, SIDE, LINES
     options = parser(__doc__)
-    options.add_argument("what", nargs="*", help=f"{', '.join(SCENES)}; all if none is named")
+    options.add_argument(
+        "what", nargs="*", help=f"tables: {', '.join(SCENES)} (default all, with --quick net3 and grid)"
+    )
     given = options.parse_args()
     if given.quick:
         ENDS, FINE, TODAY, STEPS, PEER, REPEATS = {"Net3": 0.6}, 0.025, (0.05,), (0.01,), (0.01,), 1
         SIDE, LINES = 4, LINES[1:]
     print(machine("numpy", "numba", "rthym-moc", "wntr"))
     for name in given.what or (("net3", "grid") if given.quick else SCENES):
-        if wntr or name == "grid":  # the others are networks of WNTR's
+        if wntr or name == "grid":  # the other tables read networks of WNTR
             SCENES[name]()
 
 

@@ -1,9 +1,10 @@
-"""Bands of `fvsolve run --estimate-error` of random networks of delay lines, held against eight times their resolution.
+"""Error bands of random networks of delay lines, compared with runs of eight times the resolution.
 
 python benchmarks/line_bands.py [--quick] [--seed 1] [--random 22]
 
-Pipes of 3 to 900 m, with and without friction, between a lake and an end at which a valve or a demand stops at once or
-by a ramp; a check valve on the way in some; steps by Courant number, by length or by tolerance.
+The bands are those of `fvsolve run --estimate-error`. Networks have pipes of 3 to 900 m, with or without friction,
+between a lake and a valve that closes at once or by a ramp, in part or in full. Some have a check valve or a branch.
+Steps are given by Courant number, by length or by tolerance.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ FRICTIONS = (
 
 
 def network(random: np.random.Generator) -> dict:
-    """A random chain of two to four pipes with a branch."""
+    """Case of a random chain of two to four pipes, some with a branch or a check valve."""
     many = int(random.integers(2, 5))
     nodes = {"lake": {"type": "reservoir", "head": float(random.uniform(40, 150))}}
     links, before, friction = {}, "lake", FRICTIONS[int(random.integers(3))]
@@ -56,14 +57,14 @@ def network(random: np.random.Generator) -> dict:
 
 
 def pipe(random: np.random.Generator, one: str, other: str, friction: dict) -> dict:
-    """A pipe of 3 to 900 m."""
+    """Random pipe of 3 to 900 m between two nodes."""
     return {"type": "pipe", "from": one, "to": other, "length": float(10.0 ** random.uniform(0.5, 2.95)),
             "diameter": float(random.choice([0.15, 0.2, 0.3])), "wave_speed": float(random.uniform(900, 1300)),
             "friction": friction, "cells": int(random.integers(4, 30))}  # fmt: skip
 
 
 def bands(given: dict) -> list[tuple[str, float, float]]:
-    """(peak, band, difference to eight times the resolution), of a band that is not known infinite."""
+    """Name, band, and difference from eight times the resolution, of each peak; an unknown band is infinite."""
     case = model_of(given).case
     said = peak_errors(run(given, pictures=False), case)
     every = {"output.every": case.output.every / 8.0}
@@ -75,8 +76,10 @@ def bands(given: dict) -> list[tuple[str, float, float]]:
 
 def main() -> None:
     options = parser(__doc__)
-    options.add_argument("--seed", type=int, default=1, help="seed of the random networks; 1")
-    options.add_argument("--random", type=int, metavar="N", help="number of random networks; 22, by --quick 1")
+    options.add_argument("--seed", type=int, default=1, help="seed of the random networks (default 1)")
+    options.add_argument(
+        "--random", type=int, metavar="N", help="number of random networks (default 22, with --quick 1)"
+    )
     given, began, rows = options.parse_args(), time.perf_counter(), []
     many = given.random or (1 if given.quick else 22)
     for k in range(many):

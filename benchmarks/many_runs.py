@@ -1,7 +1,7 @@
-"""Scenarios per second and core: fresh runs, models varied in place, rows of sweeps, what Dask costs; and their errors.
+"""Scenarios per second and core, with errors: fresh runs, models varied in place, rows of sweeps, workers of Dask.
 
-python benchmarks/many_runs.py [--quick]  valve-closure, 10 s, told at 20 places; CPU time, the mean of the quicker half
-python benchmarks/many_runs.py --dask     the same rows on one process of a LocalCluster
+python benchmarks/many_runs.py [--quick]  valve-closure, 10 s, results at 20 places; CPU time, mean of the faster half
+python benchmarks/many_runs.py --dask     rows of a sweep in this process and on one process of a LocalCluster
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from fvsolve.studies.sweep_row import RowMaker
 CASE, KEY, GOAL, SHARE = "valve-closure", "links.valve.area", 500.0, 0.9
 CELLS = {"links.main.cells": 20, "numerics.scheme": "upwind5", "numerics.method": "rk4", "output.fields": 0}
 LINE = {"links.main.cells": 20, "numerics.pipe_model": "delay-line", "numerics.method": "euler", "output.fields": 0}
-DELAYS = (0.01, 0.05)  # steps of delay lines [s]: of the second errors are those of 20 cells
-FINE, PROBE = 2000, "gate.pressure"  # cells of the run that errors are taken from
+DELAYS = (0.01, 0.05)  # steps of delay lines [s]; the errors of the second are near those of 20 cells
+FINE, PROBE = 2000, "gate.pressure"  # cells of the reference run, and probe of the errors
 TIMES, RUNS, REPEATS = 200, 2000, 20
 
 
 def area(k: int) -> dict[str, float]:
-    """Values that no run had before."""
+    """Override with an area of the valve that no earlier run used."""
     return {KEY: 0.0017 + 1e-7 * k}
 
 
 def cost(one) -> float:
-    """CPU seconds of one call, the mean of the quicker half of TIMES: others use the machine too."""
+    """CPU time of one call [s], mean of the faster half of TIMES calls, because other processes use the machine too."""
     spent = []
     for k in range(TIMES + 5):
         began = time.process_time()
@@ -40,20 +40,20 @@ def cost(one) -> float:
 
 
 def told(name: str, seconds: float, goal: float | None = None) -> None:
-    """A line of the table."""
+    """Print a line of the table."""
     wanted = "" if goal is None else f"  (goal {goal:.0f})"
     print(f"{name:44} {1e3 * seconds:8.2f} ms {1.0 / seconds:8.0f} a second and core{wanted}", flush=True)
 
 
 def errors(result, fine) -> tuple[float, float]:
-    """(rms over all rows, of the greatest), in units of the jump of a fine run."""
+    """Errors of the probe relative to a fine run, rms over all rows and of the peak, in units of the jump."""
     times, found = fine.t, np.interp(fine.t, result.t, result.si(PROBE)) - fine.si(PROBE)
     jump, peak = np.ptp(fine.si(PROBE)[times < 1.5]), result.si(PROBE).max() - fine.si(PROBE).max()
     return float(np.sqrt(np.mean(found**2)) / jump), float(abs(peak) / jump)
 
 
 def by(base: dict, name: str, goal: float | None, fine) -> None:
-    """Ways to the same numbers."""
+    """Print the cost of each way to run a scenario with these overrides."""
     model, rows = build(load(CASE, base)), RowMaker(CASE, base)
     result = min((run(model) for _ in range(REPEATS)), key=lambda one: one.summary["seconds"])
     fresh, varied = (one.si(PROBE) for one in (run(CASE, base | area(0)), run(vary(model, area(0)))))
@@ -63,12 +63,12 @@ def by(base: dict, name: str, goal: float | None, fine) -> None:
     print(f"{name}: {steps} steps, {1e3 * seconds:.2f} ms in them; error of the jump, rms and of the peak: {off}")
     told("  fresh: run(case, set)", cost(lambda values: run(CASE, base | values)))
     told("  in place: run(vary(model, set))", cost(lambda values: run(vary(model, values))))
-    told("  of it vary(model, set)", cost(lambda values: vary(model, values)))
+    told("  of which vary(model, set)", cost(lambda values: vary(model, values)))
     told("  a row of a sweep", cost(rows), goal)
 
 
 def dask() -> None:
-    """Rows here, and on a worker of Dask's, by the CPU time of either process."""
+    """Print the CPU time of rows in this process and on a worker of Dask."""
     if not (distributed := peer_module("distributed", "distributed")):
         return
     rows, points = RowMaker(CASE, CELLS), [area(k) for k in range(RUNS)]
@@ -80,23 +80,23 @@ def dask() -> None:
     made = distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0")
     with made as cluster, distributed.Client(cluster) as client:
         for _ in run_tasks(RowMaker(CASE, CELLS), points[:50], dask=cluster.scheduler_address):
-            pass  # which compiles there
+            pass  # compiles on the worker
         before, began = sum(client.run(time.process_time).values()), time.process_time()
         for _ in run_tasks(RowMaker(CASE, CELLS), points, dask=cluster.scheduler_address):
             pass
         there = (sum(client.run(time.process_time).values()) - before) / RUNS
         beside = (time.process_time() - began) / RUNS
-    told(f"{RUNS} rows here", here)
-    told("the same on a worker of Dask's", there)
+    told(f"{RUNS} rows in this process", here)
+    told(f"{RUNS} rows on a worker of Dask", there)
     print(f"{'share of the rate':44} {here / there:8.2f}  (goal {SHARE})")
     print(f"{'scheduler and parent':44} {1e3 * beside:8.2f} ms a run")
 
 
 def main() -> None:
-    """All, or Dask alone."""
+    """Print all tables, or only that of Dask."""
     global FINE, TIMES, RUNS, REPEATS
     options = parser(__doc__)
-    options.add_argument("--dask", action="store_true", help="rows on a worker of Dask's alone")
+    options.add_argument("--dask", action="store_true", help="only the rows on a worker of Dask")
     given = options.parse_args()
     if given.quick:
         FINE, TIMES, RUNS, REPEATS = 100, 2, 50, 1

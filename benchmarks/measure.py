@@ -1,4 +1,4 @@
-"""Options of all scripts, peers that may be missing, and runs of a solver at several settings, printed."""
+"""Options of all scripts, optional peers, and printed runs of solvers at several settings."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from types import ModuleType
 
 import numpy as np
 
-QUICK, SKIPPED = "a quick run: its figures are no measurement", "rows skipped"  # which quick.py looks for
-SLOW = 2.0  # a run that takes longer is not repeated, and no finer one is tried [s]
+QUICK, SKIPPED = "a quick run: its figures are no measurement", "rows skipped"  # quick.py reads these
+SLOW = 2.0  # a longer run is not repeated, and no finer run follows [s]
 
 
 class Quick(argparse.Action):
-    """`--quick`, which says that figures are no measurement."""
+    """Action of `--quick`, which prints that figures are not measurements."""
 
     def __call__(self, parser, namespace, values, option=None) -> None:
         namespace.quick = True
@@ -26,14 +26,16 @@ class Quick(argparse.Action):
 
 
 def parser(about: str) -> argparse.ArgumentParser:
-    """Options of a script whose docstring is `about`; every script has `--quick`."""
+    """Parser of a script with the docstring `about`; it has the option `--quick`."""
     made = argparse.ArgumentParser(description=about.splitlines()[0])
-    made.add_argument("--quick", action=Quick, nargs=0, default=False, help="small sizes, few repeats: 5 s if compiled")
+    made.add_argument(
+        "--quick", action=Quick, nargs=0, default=False, help="small sizes and few repeats: 5 s if compiled"
+    )
     return made
 
 
 def peer_module(name: str, wheel: str) -> ModuleType | None:
-    """Module of a peer; None, and a printed line, where its wheel is not installed or fails to import."""
+    """Module of a peer; None, with a printed line, if its wheel is not installed or fails to import."""
     try:
         return import_module(name)
     except ImportError as error:
@@ -44,16 +46,16 @@ def peer_module(name: str, wheel: str) -> ModuleType | None:
 
 
 def agree(what: str, difference: float, most: float) -> None:
-    """Exit with a message, unless a difference is `most` or less."""
+    """Exit with a message unless a difference is `most` or less."""
     if not difference <= most:
         raise SystemExit(f"{what}: {difference:.3g}, expected at most {most:g}")
 
 
 @dataclass(frozen=True)
 class Solver:
-    """`solve(setting)` gives a solution; `count(setting)` gives (steps, calls of f), nan where it is not told.
+    """Solver: `solve(setting)` returns a solution, `count(setting)` returns (steps, calls of f), nan if unknown.
 
-    setting : a tolerance or what the table calls it
+    setting : tolerance, or another number in the column `setting` of the table
     """
 
     name: str
@@ -63,7 +65,7 @@ class Solver:
 
 @dataclass(frozen=True)
 class Run:
-    """One solver at one setting: error, wall time [s], steps and calls of f."""
+    """Run of one solver at one setting: error, wall time [s], steps and calls of f."""
 
     setting: float
     error: float
@@ -73,7 +75,7 @@ class Run:
 
 
 def best(function: Callable[[], object], budget: float, most: int = 300) -> float:
-    """Wall time [s] of the quickest call, of as many as fit into a budget [s]."""
+    """Wall time [s] of the fastest call, of as many as fit into a budget [s]."""
     walls, began = [], perf_counter()
     while not walls or (len(walls) < most and perf_counter() - began < budget):
         start = perf_counter()
@@ -83,11 +85,12 @@ def best(function: Callable[[], object], budget: float, most: int = 300) -> floa
 
 
 def chart(solvers, settings, distance: Callable, budget: float, rounds: int = 3, enough: float = 0.0) -> dict:
-    """Runs of all solvers at their settings, printed, by solver's name; `distance` is the error of a solution.
+    """Run all solvers at their settings, print the runs, and return them by name of the solver.
 
-    settings : the same for all, or a dict by name. A solver's series ends where its error falls below `enough` and
-    where a run takes longer than SLOW. Wall times are the best of several rounds over all, so that one noisy moment
-    spoils no single solver. Whatever a solver raises is a line, and the others go on.
+    settings : sequence for all solvers, or a dict by name; distance : error of a solution
+    A series of a solver ends when its error falls below `enough` or a run takes longer than SLOW. Wall times are the
+    best of several rounds over all solvers, so that a disturbance of the machine affects all of them. An exception of
+    a solver is printed, and the other solvers continue.
     """
     found = {solver.name: {} for solver in solvers}
     for solver in solvers:
@@ -107,7 +110,7 @@ def chart(solvers, settings, distance: Callable, budget: float, rounds: int = 3,
 
 
 def first(solver: Solver, setting, distance: Callable) -> Run | str:
-    """A run, timed once, or why there is none."""
+    """Run of a solver, timed once, or the text of its failure."""
     try:
         error = distance(solver.solve(setting))
         counts = solver.count(setting)
@@ -127,12 +130,12 @@ def table(name: str, runs: dict[float, Run | str]) -> None:
 
 
 def against(goal: float, factor: float) -> str:
-    """A goal, and whether it is met."""
+    """Goal as text, with the result: achieved, or the factor by which it is missed."""
     return f"goal {goal:.3g}: {'met' if factor >= goal else f'missed by {goal / factor:.2f} times'}"
 
 
 def machine(*packages: str) -> str:
-    """Processor and versions, in a line."""
+    """Processor and versions of packages, in one line."""
     with open("/proc/cpuinfo") as lines:
         names = [line.split(":")[1].strip() for line in lines if line.startswith("model name")]
     versions = ", ".join(f"{p} {installed(p)}" for p in packages)
@@ -140,7 +143,7 @@ def machine(*packages: str) -> str:
 
 
 def installed(package: str) -> str:
-    """Its version, if any."""
+    """Version of a package, or a text if it is not installed."""
     try:
         return version(package)
     except PackageNotFoundError:

@@ -1,13 +1,13 @@
-"""Bodies beside pinocchio, MuJoCo and exudyn, and what the room of mechanisms compiles.
+"""Bodies compared with pinocchio, MuJoCo and exudyn, and the time to compile mechanisms.
 
-python benchmarks/mechanisms.py            the first three of these tables, all by --quick smaller
-python benchmarks/mechanisms.py rates      accelerations of chains beside `pin.aba`, called from Python both [us]
-python benchmarks/mechanisms.py chain      a chain by rk4 beside MuJoCo's: error and CPU time of the steps
-python benchmarks/mechanisms.py arm        an arm on a cylinder beside exudyn's: CPU time at an error of 1e-5 rad
-python benchmarks/mechanisms.py compile    seconds that a first pendulum compiles, in an empty cache
+python benchmarks/mechanisms.py            the first three of these tables, smaller with --quick
+python benchmarks/mechanisms.py rates      accelerations of chains compared with `pin.aba`, both called from Python [us]
+python benchmarks/mechanisms.py chain      a chain by rk4 compared with MuJoCo: error and CPU time of the steps
+python benchmarks/mechanisms.py arm        an arm on a cylinder compared with exudyn: CPU time at an error of 1e-5 rad
+python benchmarks/mechanisms.py compile    time to compile a first pendulum with an empty cache [s]
 
-Best of several, the peers in turn with us. Errors of chain and arm are each solver's to its own finest run. Peers come
-by `python -m pip install pin mujoco exudyn`; where one is missing, its table is left out.
+Times are the best of several, with fvsolve and the peer in turn. Errors of chain and arm are relative to the finest run
+of each solver. `python -m pip install pin mujoco exudyn` installs the peers; the table of a missing peer is left out.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from measure import agree, machine, parser, peer_module
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 SIZES, CALLS, ROUNDS = (1, 3, 6, 12, 30), 2000, 15
-STEPS, FINEST, CLOSE = (1000, 4000, 16000), 64000, 1e-5  # of a chain; [rad]
-ARM = {  # settings of each solver, its finest
+STEPS, FINEST, CLOSE = (1000, 4000, 16000), 64000, 1e-5  # steps of a chain; error of the arm [rad]
+ARM = {  # settings of each solver, and its finest setting
     "fvsolve, rtol": ((1e-3, 1e-4, 1e-5, 1e-6, 1e-8), 1e-12),
     "exudyn, steps": ((1000, 2000, 4000, 8000), 32000),
 }
@@ -35,7 +35,7 @@ WHOLE = "import fvsolve; m = fvsolve.build(fvsolve.load({case!r})); m.rhs(0.0, m
 
 
 def chain(many: int) -> dict:
-    """Revolute joints about random axes, each body on the one before."""
+    """Bodies of a chain with revolute joints about random axes, each body on the one before."""
     from reference.trees import random_tree
 
     found = random_tree(np.random.default_rng(many), many, "revolute", kinds=("revolute",))
@@ -52,7 +52,7 @@ def taken(call) -> float:
 
 
 def calls(call) -> float:
-    """CPU time of one of CALLS from Python [us]."""
+    """Mean CPU time of CALLS calls from Python [us]."""
     began = process_time()
     for _ in range(CALLS):
         call()
@@ -60,7 +60,7 @@ def calls(call) -> float:
 
 
 def rates(bodies: dict):
-    """A call of the compiled rates of a chain, as a stepper makes it, so many calls, and where the rates are."""
+    """Run data of a chain, a call of its compiled rates as a stepper makes it, a loop of such calls, and the rates."""
     from reference.bodies import bodies as scene_of
 
     import fvsolve
@@ -82,13 +82,13 @@ def rates(bodies: dict):
 
 
 def beside(call, peer) -> tuple[float, float]:
-    """The least of both, called in turn."""
+    """Least times of fvsolve and of a peer, called in turn."""
     found = [(call(), peer()) for _ in range(ROUNDS)]
     return min(one for one, _ in found), min(other for _, other in found)
 
 
 def speed() -> None:
-    """Accelerations of chains."""
+    """Print the times of accelerations of chains."""
     from reference.trees import pinocchio_of
 
     print(f"{'bodies':>6} {'in a loop':>10} {'from Python':>12} {'pin.aba from Python':>20} {'ratios (goal 0.75)':>20}")
@@ -106,7 +106,7 @@ def speed() -> None:
 
 
 def solved(case: dict) -> tuple[np.ndarray, float]:
-    """Rows of probes of a run, and CPU time of its steps [s]."""
+    """Rows of the probes of a run, and CPU time of its steps [s]."""
     import fvsolve
     from fvsolve.output.memory_sink import MemorySink
     from fvsolve.solve.solve import initial_state, solve
@@ -118,7 +118,7 @@ def solved(case: dict) -> tuple[np.ndarray, float]:
 
 
 def chains() -> None:
-    """Errors and times of a chain, at the same steps of the same method."""
+    """Print errors and times of a chain, with equal numbers of steps of rk4 in both programs."""
 
     def own(steps):
         rows, busy = solved(peers_bodies.chain_case(steps))
@@ -139,7 +139,7 @@ def chains() -> None:
 
 
 def arms() -> None:
-    """CPU time of an arm on a cylinder at an error, log-log between runs."""
+    """Print the CPU times of an arm on a cylinder at an error, interpolated log-log between runs."""
 
     def own(rtol):
         rows, busy = solved(peers_bodies.arm_case(rtol))
@@ -155,7 +155,10 @@ def arms() -> None:
 
 
 def at_error(name: str, solve, settings, finest) -> tuple[float, np.ndarray]:
-    """CPU time of a solver at an error of CLOSE [s], with a row a setting; its finest angles."""
+    """CPU time of a solver at an error of CLOSE [s], and the angles of its finest run.
+
+    Prints a row for each setting.
+    """
     true, errors, least = solve(finest)[0], [], []
     for setting in settings:
         errors.append(np.abs(solve(setting)[0] - true).max())
@@ -167,7 +170,7 @@ def at_error(name: str, solve, settings, finest) -> tuple[float, np.ndarray]:
 
 
 def compiling() -> None:
-    """A pendulum in an empty cache, beside a scene of two masses there."""
+    """Print the time to the first rates of two masses and of a pendulum, each with an empty cache."""
     from reference.bodies import bodies, pendulum
     from reference.scenes import scene
 
@@ -189,10 +192,10 @@ TABLES = {
 
 
 def main() -> None:
-    """Print the tables that are asked for, all but `compile` where none is."""
+    """Print the selected tables, by default all but `compile`."""
     global SIZES, CALLS, ROUNDS, STEPS, FINEST, ARM
     options = parser(__doc__)
-    options.add_argument("what", nargs="*", help=f"{', '.join(TABLES)}, compile; all but compile if none is named")
+    options.add_argument("what", nargs="*", help=f"tables: {', '.join(TABLES)}, compile (default all but compile)")
     given = options.parse_args()
     if given.quick:
         SIZES, CALLS, ROUNDS, STEPS, FINEST = (6,), 100, 1, (500,), 1000

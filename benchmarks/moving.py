@@ -1,7 +1,8 @@
-"""What motion costs: right-hand sides of basins between walls that move, and on bodies, beside those that stand still.
+"""Cost of motion: right-hand sides of basins with moving walls and on bodies, compared with basins at rest.
 
-`python benchmarks/moving.py [--quick]` prints nanoseconds a cell, best of several, all in one process and in turn, and
-their ratios; the goal is 1.2. Water on grids, then on triangles, then liquids. Everything is compiled before.
+`python benchmarks/moving.py [--quick]` prints nanoseconds per cell, the best of several, measured in turn in one
+process, and their ratios; the goal is 1.2. Water on grids, then liquids, then both on triangles. Everything is compiled
+before.
 """
 
 import tempfile
@@ -39,7 +40,10 @@ SURFACE = {"level": 1.0, "start": {"level": f"1 + 0.1*{HUMP}"}}
 
 
 def model_of(cells: int, keys: dict, joint: dict | None, scheme: str, law: str = "", shape: dict | None = None):
-    """The model of a square basin with a hump of water, or of a liquid under a law; shape : of a mesh for a grid."""
+    """Model of a square basin with a hump of water, or of a liquid if a law is given.
+
+    shape : keys of a mesh in place of a grid
+    """
     shape = shape or {"size": [10, 10], "cells": [cells, cells]}
     basin = {"type": "basin"} | shape | (LIQUID if law else SURFACE) | keys
     nodes = {"basin": basin} | ({"body": {**BODY, "joint": joint}} if joint else {})
@@ -50,7 +54,7 @@ def model_of(cells: int, keys: dict, joint: dict | None, scheme: str, law: str =
 
 
 def evaluation(model, y: np.ndarray, handle):
-    """times -> CPU time of so many right-hand sides [s]."""
+    """Function that returns the CPU time of a number of right-hand sides [s]."""
     out, dydt = model.new_out(), np.empty_like(y)
 
     def spent(times: int) -> float:
@@ -65,7 +69,7 @@ def evaluation(model, y: np.ndarray, handle):
 
 
 def main() -> None:
-    """Print the table."""
+    """Print the tables."""
     quick = parser(__doc__).parse_args().quick
     print(machine("numpy", "numba"))
     rounds, sizes, side = (2, (16,), 16) if quick else (25, (64, 256), 128)
@@ -90,7 +94,7 @@ def main() -> None:
 
 
 def table(title: str, scenes: dict, rounds: int, *what) -> None:
-    """Scenes of one kind, `what` as `model_of` has it beside keys and joint."""
+    """Print the times of scenes of one kind and their ratios; what : arguments of `model_of` except keys and joint."""
     timers, (cells, *more) = {}, what
     for name, (keys, joint) in scenes.items():
         model = model_of(cells, keys, joint, *more)
@@ -98,7 +102,7 @@ def table(title: str, scenes: dict, rounds: int, *what) -> None:
             timers[name] = evaluation(model, initial_state(model).y, slate.handle), slate, model
     many = next(iter(timers.values()))[2].all_cells
     times, best = max(1, 60000 // many + 1) * 4, dict.fromkeys(timers, np.inf)
-    for _ in range(rounds):  # in turn, so that one noisy moment spoils no single scene
+    for _ in range(rounds):  # in turn, so that a disturbance affects all scenes
         for name, (spent, *_) in timers.items():
             best[name] = min(best[name], spent(times) / times)
     print(f"\n{title:24s}       ns a cell    ratio (goal {GOAL:g})")

@@ -1,11 +1,11 @@
-"""The networks and closures of the water-hammer benchmark, and their case for fvsolve. Runs nothing."""
+"""Networks and closures of the water-hammer benchmark, and their cases for fvsolve."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 from exact import Closure, Network, Pipe
 
-GRAVITY = 32.2 * 0.3048  # what rthym-moc has built in [m/s2]; fvsolve takes any
+GRAVITY = 32.2 * 0.3048  # fixed value of rthym-moc [m/s2]
 
 THREE = Network(
     name="three",
@@ -23,7 +23,7 @@ THREE = Network(
     end=7.3,
 )
 
-# The loops, sizes and rough lengths of Streeter and Wylie's network, lengths and speeds made incommensurate.
+# Loops, diameters and approximate lengths of Streeter and Wylie's network, with incommensurate lengths and speeds.
 NINE = replace(
     THREE,
     name="nine",
@@ -50,17 +50,17 @@ CLOSURES = {
 
 
 def demand(network, closure):
-    """The closing gate as an fvsolve schedule."""
+    """Demand of the closing gate as a schedule of fvsolve."""
     if closure.kind == "ramp":
         return {"start": closure.start, "duration": closure.width, "value": [network.flow, 0.0]}
     if closure.kind == "instant":
         return {"time": [0.0, closure.start], "value": [network.flow, 0.0], "kind": "step"}
-    times = np.linspace(closure.begin, closure.finish, 513)  # off by 3e-7 of the flow between them
+    times = np.linspace(closure.begin, closure.finish, 513)  # interpolation error 3e-7 of the flow
     return {"time": times.tolist(), "value": (network.flow * closure.open(times)).tolist(), "kind": "smooth"}
 
 
 def case(network, closure, cell_time, every, scheme="upwind5", method="rk4", courant=0.9, **numerics):
-    """A network as an fvsolve case: cells of about `cell_time` [s] of travel, rows each `every` [s]."""
+    """Case of a network with cells of about `cell_time` [s] of travel and rows each `every` [s]."""
     nodes = {p: {"type": "junction"} for pipe in network.pipes for p in (pipe.from_, pipe.to)}
     nodes |= {name: {"type": "reservoir", "head": network.head} for name in network.reservoirs}
     nodes[network.gate]["demand"] = demand(network, closure)
@@ -101,7 +101,7 @@ WATER = {
 
 @dataclass(frozen=True)
 class UniformPipe:
-    """One pipe with Darcy friction `factor` between a lake and a gate that shuts within `duration` [s]."""
+    """Pipe with the Darcy factor `factor` between a lake and a gate that closes within `duration` [s]."""
 
     length: float = 1000.0
     wave_speed: float = 1000.0
@@ -114,7 +114,7 @@ class UniformPipe:
 
     @property
     def jump(self):
-        """Joukowsky's head a v/g [m]."""
+        """Joukowsky jump of the head, a v / g [m]."""
         return self.wave_speed * self.flow / (np.pi / 4 * self.diameter**2) / self.gravity
 
 
@@ -122,7 +122,7 @@ UNIFORM = UniformPipe()
 
 
 def uniform_case(pipe, cells, steps, rows=500):
-    """The uniform pipe as an fvsolve case: upwind and Euler at Courant 1, which are the characteristics."""
+    """Case of the uniform pipe: upwind and Euler at Courant 1, which equal the method of characteristics."""
     end = pipe.length / pipe.wave_speed / cells * steps
     return {
         "schema": 1,

@@ -1,12 +1,13 @@
-"""Bands of `fvsolve run --estimate-error` held against finer runs of all shipped cases, or of random mains.
+"""Error bands of `fvsolve run --estimate-error`, compared with finer runs of all shipped cases or of random mains.
 
 python benchmarks/peak_bands.py [--quick] [CASE]...
 python benchmarks/peak_bands.py --random 160 [--seed 0]
 
-Of every peak and claim the band, and how far it is from the run of four times the resolution (twice where there are
-basins, whose finest run then is one of the three); of random mains from that of eight times, with limits at 0.9 to 1.1
-of each peak, whose verdicts the finer run turns or not. Prints those outside their band, how many have none, and how
-wide bands are beside the differences, of those above 5e-6 of their value, the least band.
+The band of every peak and expectation is compared with the difference from a run of four times the resolution (twice
+for basins with cells, for which the finest run of the estimate has that resolution). Random mains are compared with
+runs of eight times the resolution. They have limits at 0.9 to 1.1 of each peak, whose verdicts the finer run may
+change. Prints the values outside their band, the number without a band, and the ratio of band to difference, for
+differences above 5e-6 of the value, which is the least band.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ QUIET = {"output.fields": 0, "output.lines": {}}
 
 
 class Row(NamedTuple):
-    """A peak or claim: its band, its value and that of a finer run."""
+    """Peak or expectation: its band, its value, and the value of a finer run."""
 
     name: str
     band: float | None
@@ -41,7 +42,7 @@ class Row(NamedTuple):
 
 
 def rows_of(name: str, said: dict, fine: dict) -> list[Row]:
-    """Peaks and claims of a case beside those of a finer run."""
+    """Rows of the peaks and expectations of a case and of a finer run."""
     rows = [Row(f"{name} {side} {probe}", peak[side]["error"], peak[side]["value"], fine["extremes"][probe][side])
             for probe, peak in said["peaks"].items() for side in SIDES]  # fmt: skip
     return rows + [Row(f"{name} {one['text']}", one["error"], one["found"], other["found"])
@@ -57,7 +58,7 @@ def of_shipped(name: str) -> list[Row]:
 
 
 def of_main(seed: int) -> tuple[list[Row], list[Row], list[str]]:
-    """Peaks, places of limits, and verdicts that turn, of one random main."""
+    """Rows of peaks and of limits of one random main, and the verdicts that the finer run changes."""
     case = load(random_main(seed))
     parts = {name: whole(run(case, pictures=False), name) for name in ("end", "j", "a", "b")}
     case = load(random_main(seed) | {"limits": limits_near(parts, seed)})
@@ -72,7 +73,7 @@ def of_main(seed: int) -> tuple[list[Row], list[Row], list[str]]:
 
 
 def whole(result, name: str) -> tuple[float, float]:
-    """Least and greatest pressure of a part."""
+    """Least and greatest pressure of a part [Pa]."""
     if name in result.envelope:
         one = result.envelope[name]
         return float(one["min_pressure"].min()), float(one["max_pressure"].max())
@@ -81,7 +82,7 @@ def whole(result, name: str) -> tuple[float, float]:
 
 
 def tell(rows: list[Row], what: str) -> int:
-    """Print a table; the number of rows outside their band."""
+    """Print a table, and return the number of rows outside their band."""
     known = [row for row in rows if row.band is not None]
     misses = [row for row in known if row.off > row.band]
     for row in misses:
@@ -96,9 +97,11 @@ def tell(rows: list[Row], what: str) -> int:
 
 def main() -> None:
     options = parser(__doc__)
-    options.add_argument("cases", nargs="*", metavar="CASE", help="shipped cases; all if none is named")
-    options.add_argument("--random", type=int, default=0, metavar="N", help="number of random mains instead; 0")
-    options.add_argument("--seed", type=int, default=0, help="seed of the first main; 0")
+    options.add_argument("cases", nargs="*", metavar="CASE", help="shipped cases (default all)")
+    options.add_argument(
+        "--random", type=int, default=0, metavar="N", help="number of random mains in place of the cases (default 0)"
+    )
+    options.add_argument("--seed", type=int, default=0, help="seed of the first main (default 0)")
     asked, began, outside = options.parse_args(), time.process_time(), 0
     if asked.quick and not asked.random:
         asked.random, asked.cases = 1, asked.cases or ["two-tanks"]

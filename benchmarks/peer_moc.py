@@ -1,12 +1,12 @@
-"""The door to rthym-moc 0.4.1 (method of characteristics, C++). Knows its units and habits; judges nothing.
+"""Runs of rthym-moc 0.4.1 (method of characteristics, C++) from values in SI units.
 
-Its habits, met here so that none of them counts as its error:
+Properties of rthym-moc, for which this module compensates so that none of them counts as its error:
 - US units with rounded constants (g 32.2 ft/s2, 1 gpm = 0.002228 ft3/s);
-- a wave speed comes from a wall, a = 4860 ft/s / sqrt(1 + K D/(E e)), K = 319 000 psi, and is then bent so
-  that the pipe holds a whole number of steps;
-- step n ends at (n + 1) dt with the demand of n dt, so schedules are handed over one step early;
-- the friction factor cannot be below 0.001, so lossless pipes run at 1e-6 of the flow (all is linear then);
-- heads below the vapour pressure are clamped, so that pressure is set out of reach.
+- the wave speed follows from the wall, a = 4860 ft/s / sqrt(1 + K D/(E e)), K = 319 000 psi, and is then changed so
+  that the pipe has a whole number of steps;
+- step n ends at (n + 1) dt with the demand of n dt, so schedules are passed one step early;
+- the friction factor cannot be below 0.001, so lossless pipes run at 1e-6 of the flow (all equations are then linear);
+- heads below the vapour pressure are clamped, so the vapour pressure is set far below all pressures.
 """
 
 from dataclasses import dataclass, replace
@@ -24,12 +24,12 @@ FAINT = 1e-6
 
 
 def wall(wave_speed):
-    """K D/(E e) that gives a wave speed [m/s], as Young's modulus [psi] of a wall of e = D."""
+    """Young's modulus [psi] of a wall with e = D that gives a wave speed [m/s]."""
     return 319_000.0 / ((4860.0 * FOOT / wave_speed) ** 2 - 1.0)
 
 
 def pipe(name, from_, to, length, diameter, wave_speed, flow, roughness=1e6):
-    """A PipeInput from SI; `roughness` is its Hazen-Williams C."""
+    """Pipe of rthym-moc from values in SI units; `roughness` is its Hazen-Williams coefficient."""
     p = rthym_moc.PipeInput()
     p.id, p.from_node, p.to_node = name, from_, to
     p.length, p.diameter, p.flow_gpm = length / FOOT, diameter / INCH, flow / GPM
@@ -39,7 +39,7 @@ def pipe(name, from_, to, length, diameter, wave_speed, flow, roughness=1e6):
 
 
 def node(name, kind, head, demand=0.0):
-    """A NodeInput from SI."""
+    """Node of rthym-moc from values in SI units."""
     n = rthym_moc.NodeInput()
     n.id, n.type, n.head, n.demand = name, kind, head / FOOT, demand / GPM
     n.elevation = 0.0
@@ -47,7 +47,10 @@ def node(name, kind, head, demand=0.0):
 
 
 def timed(solver, end, dt, repeats=1, friction=None):
-    """Best CPU time [s] of `repeats` runs, and the results of one; `friction`: usf_tau [s], k_bru; steady if None."""
+    """Least CPU time [s] of `repeats` runs, and the results of the last run.
+
+    friction : usf_tau [s] and k_bru; steady friction if None
+    """
     best = np.inf
     for _ in range(repeats):
         start = process_time()
@@ -57,7 +60,7 @@ def timed(solver, end, dt, repeats=1, friction=None):
 
 
 def network_solver(network, closure, dt, flows):
-    """The network with its gate closing, for steps of dt; `flows`: the pipes' steady flows [m3/s]."""
+    """Solver of the network with its closing gate for steps of dt; `flows`: steady flows of the pipes [m3/s]."""
     solver = rthym_moc.MOCSolver()
     for name in dict.fromkeys(end for p in network.pipes for end in (p.from_, p.to)):
         kind = "PressureBoundary" if name in network.reservoirs else "Junction"
@@ -71,7 +74,7 @@ def network_solver(network, closure, dt, flows):
 
 
 def steady_flows(network):
-    """Least-norm steady flows of lossless pipes that feed the gate [m3/s]."""
+    """Least-norm steady flows of lossless pipes that supply the gate [m3/s]."""
     names = [n for n in dict.fromkeys(e for p in network.pipes for e in (p.from_, p.to))]
     names = [n for n in names if n not in network.reservoirs]
     balance = np.zeros((len(names), len(network.pipes)))
@@ -85,7 +88,7 @@ def steady_flows(network):
 
 
 def heads(network, closure, dt, repeats=1):
-    """CPU time [s], times [s] and heads [m] at the probes, rescaled to the network's own flow."""
+    """CPU time [s], times [s] and heads [m] at the probes, rescaled to the flow of the network."""
     faint = replace(network, flow=network.flow * FAINT)
     solver = network_solver(faint, closure, dt, steady_flows(faint))
     cpu, results = timed(solver, network.end, dt, repeats)
@@ -97,7 +100,7 @@ def heads(network, closure, dt, repeats=1):
 
 @dataclass
 class Trace:
-    """CPU time of a run [s], its times [s] and the head at the gate [m]."""
+    """Result of a run: CPU time [s], times [s] and head at the gate [m]."""
 
     cpu: float
     time: np.ndarray
@@ -105,7 +108,7 @@ class Trace:
 
 
 def hazen_williams(pipe):
-    """The Hazen-Williams C by which rthym-moc finds the Darcy factor of `pipe` at its flow.
+    """Hazen-Williams coefficient from which rthym-moc computes the Darcy factor of `pipe` at its flow.
 
     The slope f v^2/(2 g D) is 10.44 Q^1.852 / (C^1.852 D^4.871) with Q in gpm and D in inches [ft per ft].
     """
@@ -116,7 +119,7 @@ def hazen_williams(pipe):
 
 
 def uniform_pipe(uniform, nodes, steps, repeats=1, friction=None):
-    """One pipe with friction whose gate shuts: `nodes` reaches, `steps` steps at Courant 1."""
+    """Result of one pipe with friction and a closing gate: `nodes` reaches, `steps` steps at Courant 1."""
     dt = uniform.length / uniform.wave_speed / nodes
     solver = rthym_moc.MOCSolver()
     solver.add_node(node("lake", "PressureBoundary", uniform.head))

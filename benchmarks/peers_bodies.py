@@ -1,4 +1,4 @@
-"""Peers of mechanisms.py: a chain in MuJoCo, an arm on a cylinder in exudyn, and the same as cases. Prints nothing."""
+"""Peers of mechanisms.py: a chain in MuJoCo and an arm on a cylinder in exudyn, and both scenes as cases of fvsolve."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 LINK = {"length": 1.0, "mass": 1.0, "across": 1.0 / 12.0, "along": 1e-3}
 CHAIN, CHAIN_END, GRAVITY = (1.2, 0.5, -0.4), 5.0, 9.80665  # [rad], [s]
 ARM_END, ROWS = 1.0, 200
-MASS, LONG, SWUNG = 120.0, 1.0, 120.0 / 12.0  # of the arm, and its moment about its centre
-FOOT, EYE = -0.25, 0.25  # of the cylinder: below the pivot, and along the arm
+MASS, LONG, SWUNG = 120.0, 1.0, 120.0 / 12.0  # arm: mass [kg], length [m], moment of inertia about its centre [kg m2]
+FOOT, EYE = -0.25, 0.25  # ends of the cylinder: below the pivot, and along the arm [m]
 AREAS, DEAD, STROKE, BETA = (1e-3, 6e-4), (2e-4, 2e-4), 0.2, 1.2e9
-SUPPLY, RETURN, BACK = 2e7, 1e5, 6e5  # gauge pressures of the pump, of the tank, and of chamber B at the start
-FLOW = 1e-4 / np.sqrt(1e5) * 0.1  # of an edge of the valve that is open [m3/s/Pa^(1/2)]
+SUPPLY, RETURN, BACK = 2e7, 1e5, 6e5  # gauge pressures of the pump, of the tank, and of chamber B at the start [Pa]
+FLOW = 1e-4 / np.sqrt(1e5) * 0.1  # coefficient of an open edge of the valve [m3/s/Pa^(1/2)]
 RHO, CD = 870.0, 0.61
 OPENS = ((0.1, 0.0), (0.12, 1.0), (0.5, 1.0), (0.52, 0.0))
 
 
 def chain_case(steps: int) -> dict:
-    """Three even rods, one below the other, as a case of rk4."""
+    """Case of a chain of three uniform rods, stepped by rk4."""
     from reference.bodies import bodies
     from reference.trees import body
 
@@ -41,7 +41,7 @@ def chain_case(steps: int) -> dict:
 
 
 def chain_in_mujoco(steps: int) -> tuple[np.ndarray, float]:
-    """Angles at the end, and CPU time of the steps [s]; what a chain does not need is off."""
+    """Angles at the end [rad] and CPU time of the steps [s] in MuJoCo, without contacts and constraints."""
     import mujoco
 
     rod = (
@@ -61,13 +61,13 @@ def chain_in_mujoco(steps: int) -> tuple[np.ndarray, float]:
 
 
 def held() -> float:
-    """Gauge pressure in chamber A that holds the arm."""
+    """Gauge pressure in chamber A that supports the arm [Pa]."""
     lever = EYE * -FOOT / np.hypot(EYE, FOOT)
     return (MASS * GRAVITY * LONG / 2.0 / lever + AREAS[1] * BACK) / AREAS[0]
 
 
 def arm_case(rtol: float) -> dict:
-    """An arm lifted through a valve that opens for 0.4 s, as a case."""
+    """Case of an arm that a cylinder lifts through a valve, which opens for 0.4 s."""
     from reference.bodies import bodies
     from reference.scenes import AMBIENT, reservoir
     from reference.trees import body
@@ -96,9 +96,9 @@ def arm_case(rtol: float) -> dict:
 
 
 def arm_in_exudyn(steps: int) -> tuple[np.ndarray, float]:
-    """Angles of the same arm, and CPU time of the steps, less what Python needs to move the valve [s].
+    """Angles of the arm [rad] and CPU time of the steps [s] in exudyn, without the Python function of the valve.
 
-    Its chambers count volumes of oil where ours count its mass, so that its angles are 1 to 5 % from ours.
+    The chambers of exudyn balance volumes of oil, those of fvsolve masses, so the angles differ by 1 to 5 %.
     """
     import exudyn as exu
     import exudyn.utilities as make

@@ -1,8 +1,8 @@
-"""EPANET's Net3 left alone for 20 s: CPU time and drift of fvsolve and rthym-moc, which reads the same file.
+"""EPANET's Net3 without events for 20 s: CPU time and drift of fvsolve and of rthym-moc, which reads the same file.
 
-Both take 1438.656 m/s (4720 ft/s, rthym-moc's rigid pipe). rthym-moc cuts every pipe at its wave speed times its step;
-with cells fvsolve's step follows the shortest, 2.5 ms long here, so it is met twice: at the same step, and at the same
-length of cells. Delay lines keep true lengths at any step.
+Both use a wave speed of 1438.656 m/s (4720 ft/s, rthym-moc's rigid pipe). rthym-moc divides every pipe by its wave
+speed times its step. With cells the step of fvsolve follows the shortest pipe, 2.5 ms long here; therefore rthym-moc
+runs twice, at that step and at the same length of cells. Delay lines keep true lengths at any step.
 """
 
 import tomllib
@@ -24,12 +24,12 @@ rthym_moc, wntr = peer_module("rthym_moc", "rthym-moc"), peer_module("wntr", "wn
 NET = Path(wntr.__file__).parent / "library" / "networks" / "Net3.inp" if wntr else None
 SPEED, END, REPEATS = 4720 * 0.3048, 20.0, 3
 SETTINGS = [("upwind", "euler"), ("muscl", "ssp-rk2"), ("upwind5", "rk4")]
-SHORTEST = 2.5e-3 * SPEED  # pipe among cells [m]
+SHORTEST = 2.5e-3 * SPEED  # shortest pipe with cells [m]
 
 
 def rthym(dt):
-    """CPU time [s], greatest drift of a head [m], steps."""
-    with warnings.catch_warnings(), TemporaryDirectory() as folder, chdir(folder):  # where it leaves temp.inp and more
+    """CPU time [s], greatest and median drift of a head [m], and number of rows of rthym-moc."""
+    with warnings.catch_warnings(), TemporaryDirectory() as folder, chdir(folder):  # rthym-moc writes temp.inp and more
         warnings.simplefilter("ignore")
         solver = rthym_moc.load_inp(str(NET), stub_length_ft=4720 * dt)
     best = np.inf
@@ -43,7 +43,7 @@ def rthym(dt):
 
 
 def ours(shortest, **numerics):
-    """The same, and the number of cells."""
+    """CPU time [s], greatest and median drift of a head [m], steps, and number of cells of fvsolve."""
     table = tomllib.loads(import_network(NET, wave_speed=SPEED, shortest=shortest).text)
     table["numerics"] |= {"end": END, **numerics}
     names = [name for name, node in table["nodes"].items() if node["type"] == "junction"]
@@ -60,7 +60,10 @@ def ours(shortest, **numerics):
 
 
 def row(name, cpu, most, median, steps, cells=""):
-    """Print a row; drifts of fvsolve are millimetres, of rthym-moc hundreds of metres."""
+    """Print a row; exit if the drift of fvsolve is above 0.1 m.
+
+    Drifts of fvsolve are millimetres, those of rthym-moc hundreds of metres.
+    """
     print(f"{name:36} {1e3 * END / steps:9.3g} {cpu:8.3f} {1e6 * cpu / steps:9.1f} {most:10.2g} {median:10.2g} {cells}")
     agree(f"drift of {name} [m]", most if name.startswith("fvsolve") else 0.0, 0.1)
 

@@ -1,6 +1,6 @@
-"""Solvers of y' = f(t, y) from elsewhere, each in its fastest form from Python: numbalsoda, scikit-sundae, SciPy.
+"""Solvers of y' = f(t, y) in numbalsoda, scikit-sundae and SciPy, each in its fastest form from Python.
 
-Every one is given the same compiled f(t, y, dydt) and one tolerance, relative and absolute. Knows no problem.
+Every solver has the same compiled f(t, y, dydt) and one tolerance, relative and absolute.
 """
 
 from collections.abc import Callable
@@ -16,14 +16,14 @@ from scipy import sparse
 from scipy.integrate import odeint, solve_ivp
 
 numbalsoda, sundae = peer_module("numbalsoda", "numbalsoda"), peer_module("sksundae.cvode", "scikit-sundae")
-MANY = 10**8  # steps allowed between two times
+MANY = 10**8  # greatest number of steps between two times
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """y' = f(t, y) from y0 at t[0], wanted at the times t.
+    """Initial value problem y' = f(t, y) from y0 at t[0], with results at the times t.
 
-    rhs : compiled f(t, y, dydt); band : (lower, upper) bandwidth of df/dy, or None where it is full
+    rhs : compiled f(t, y, dydt); band : (lower, upper) bandwidth of df/dy, or None if it is full
     """
 
     rhs: Callable
@@ -33,7 +33,7 @@ class Problem:
 
 
 def peers(problem: Problem, quick: bool) -> list[Solver]:
-    """All that are made for stiff problems; if quick one of each package."""
+    """Solvers for stiff problems, with `quick` one of each package."""
     if quick:
         return [*numbalsodas(problem, "LSODA"), *cvodes(problem)[:1], scipy_ivp(problem, "Radau")]
     found = [*numbalsodas(problem, "LSODA"), *cvodes(problem)]
@@ -44,7 +44,7 @@ def peers(problem: Problem, quick: bool) -> list[Solver]:
 
 
 def address(problem: Problem):
-    """f as the C function that numbalsoda calls; it counts calls in data[0]."""
+    """C function of f for numbalsoda, which counts its calls in data[0]."""
     rhs, n = problem.rhs, problem.y0.size
 
     def function(t, u, du, data):
@@ -55,12 +55,12 @@ def address(problem: Problem):
 
 
 def numbalsodas(problem: Problem, *names: str) -> list[Solver]:
-    """Its LSODA (C++; it knows full matrices only) and DOP853 (Fortran), compiled f; none where it is not installed."""
+    """LSODA (C++, full matrices only) and DOP853 (Fortran) of numbalsoda, if installed, with compiled f."""
     return [numba_solver(problem, name) for name in names] if numbalsoda else []
 
 
 def numba_solver(problem: Problem, name: str) -> Solver:
-    """One of them by its name."""
+    """Solver of numbalsoda by its name."""
     function, run = address(problem), getattr(numbalsoda, name.lower())
     counter = np.zeros(1)
 
@@ -77,7 +77,7 @@ def numba_solver(problem: Problem, name: str) -> Solver:
 
 
 def explicit_reference(problem: Problem, tolerance: float = 1e-13) -> np.ndarray:
-    """y at all times by DOP853, whose steps stability keeps short; by SciPy's where there is no numbalsoda."""
+    """Solution y at all times by DOP853 of numbalsoda, or of SciPy if numbalsoda is not installed."""
     solver = scipy_ivp(problem, "DOP853") if numbalsoda is None else numba_solver(problem, "DOP853")
     return solver.solve(tolerance)
 
@@ -89,7 +89,7 @@ WRITE = types.float64[::1]
 
 
 def cvodes(problem: Problem) -> list[Solver]:
-    """CVODE's BDF, df/dy by its own differences and by compiled ones; none where it is not installed."""
+    """CVODE's BDF, if installed, with df/dy by its own differences and by compiled ones."""
     if sundae is None:
         return []
     own = cvode_options(problem)
@@ -101,18 +101,18 @@ def cvodes(problem: Problem) -> list[Solver]:
 
 
 def cvode_options(problem: Problem) -> dict:
-    """BDF with a dense matrix, or a band where the problem has one."""
+    """Options of BDF with a dense matrix, or with a band if the problem has one."""
     if problem.band is None:
         return {"method": "BDF", "linsolver": "dense"}
     return {"method": "BDF", "linsolver": "band", "lband": problem.band[0], "uband": problem.band[1]}
 
 
 def cvode(problem: Problem, name: str, options: dict) -> Solver:
-    """CVODE with a compiled f."""
+    """Solver CVODE with a compiled f."""
     rhs = problem.rhs
 
     @numba.njit(types.void(types.float64, READ, WRITE), error_model="numpy")
-    def function(t, y, yp):  # y is read-only there, which is another type to numba
+    def function(t, y, yp):  # CVODE passes a read-only y, which has another type in numba
         rhs(t, numba.carray(pointer(y.ctypes.data), y.size, np.float64), yp)
 
     def solver(tolerance):
@@ -129,7 +129,7 @@ def cvode(problem: Problem, name: str, options: dict) -> Solver:
 
 
 def differences(problem: Problem):
-    """df/dy : float64[n, n] by one-sided differences, compiled, as CVODE calls it."""
+    """Jacobian df/dy : float64[n, n] by one-sided differences, compiled, with the arguments of CVODE."""
     rhs = problem.rhs
 
     @numba.njit(types.void(types.float64, READ, READ, types.float64[:, :]), error_model="numpy")
@@ -151,7 +151,7 @@ def differences(problem: Problem):
 
 
 def returning(problem: Problem):
-    """f(t, y) -> dydt, compiled."""
+    """Compiled function that returns dydt = f(t, y)."""
     rhs = problem.rhs
 
     @numba.njit(error_model="numpy")
@@ -164,7 +164,7 @@ def returning(problem: Problem):
 
 
 def scipy_ivp(problem: Problem, method: str) -> Solver:
-    """solve_ivp with a compiled f and, where there is a band, its pattern."""
+    """Solver solve_ivp with a compiled f and, if the problem has a band, its pattern."""
     function = returning(problem)
     options = {}
     if problem.band and method == "LSODA":
@@ -186,7 +186,7 @@ def scipy_ivp(problem: Problem, method: str) -> Solver:
 
 
 def scipy_odeint(problem: Problem) -> Solver:
-    """The same LSODA without solve_ivp's Python between steps."""
+    """Solver LSODA by odeint, without solve_ivp's Python code between steps."""
     options = {"ml": problem.band[0], "mu": problem.band[1]} if problem.band else {}
     run = partial(odeint, returning(problem), problem.y0, problem.t, tfirst=True, mxstep=10**6, **options)
 

@@ -1,12 +1,12 @@
-"""fvsolve beside rthym-moc 0.4.1: `python benchmarks/peers_water_hammer.py [rate] [three] [nine]`.
+"""fvsolve compared with rthym-moc 0.4.1: `python benchmarks/peers_water_hammer.py [rate] [three] [nine]`.
 
 rate:         one uniform pipe with friction, Courant 1: node-steps per second.
-three, nine:  networks whose lengths share no step: CPU time against error to the exact heads (exact.py).
+three, nine:  networks whose lengths have no common step: CPU time against error of the heads (exact.py).
 
-CPU time is the best of several: of the stepping alone for fvsolve (its own summary), of the solve call for
-rthym-moc; `whole` is all that fvsolve.run(dict) does once compiled. One thread. `error` is the difference of
-the heads at gate and junction to the exact ones over the run, in Joukowsky jumps: the greatest for the smooth
-closure, the mean for ramp and instant closure.
+CPU time is the best of several: of the stepping alone for fvsolve (from its summary), of the solve call for rthym-moc;
+`whole` is that of the whole call fvsolve.run(dict) after compilation. One thread. `error` is the difference from the
+exact heads at gate and junction over the run, in Joukowsky jumps: the greatest for the smooth closure, the mean for
+ramp and instant closure.
 """
 
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ from price import price
 
 import fvsolve
 
-EVERY = 0.02  # [s] between the rows that are compared
+EVERY = 0.02  # interval of the compared rows [s]
 RATES = ((100, 500_000), (1_000, 100_000), (10_000, 40_000))  # nodes, steps
 REPEATS, CLOSURES = 7, networks.CLOSURES
 GOALS = {
@@ -36,19 +36,19 @@ MUSCL = dict(scheme="muscl", limiter="van-leer", method="ssp-rk3", courant=0.9)
 DELAY = [
     dict(pipe_model="delay-line", method="euler", courant=1.0, delay_tolerance=share) for share in (1e-2, 2e-2, 5e-2)
 ]
-SCHEMES = {  # closure: (numerics, cell times [s], of delay lines steps), those that do best and one to compare
+SCHEMES = {  # closure: (numerics, cell times [s]), the best pair and one for comparison
     "smooth": ((UPWIND5, 0.04 / 2 ** (0.5 * np.arange(8))), (UPWIND, 0.01 / 2.0 ** np.arange(5))),
     "ramp": ((UPWIND, 0.01 / 2.0 ** np.arange(6)), (UPWIND5, 0.02 / 2.0 ** np.arange(5))),
     "instant": ((UPWIND, 0.01 / 2.0 ** np.arange(6)), (MUSCL, 0.02 / 2.0 ** np.arange(5))),
 }
-LINES = 0.16 / 2.0 ** np.arange(6)  # [s]
+LINES = 0.16 / 2.0 ** np.arange(6)  # steps of delay lines [s]
 for closure in SCHEMES:
     SCHEMES[closure] += tuple((numerics, LINES) for numerics in (DELAY if closure == "instant" else DELAY[:1]))
 
 
 @dataclass
 class Run:
-    """One run: what sets its size [s], cells, CPU time [s], greatest and mean error, whole call [s]."""
+    """Run of a program: cell time or step [s], cells, CPU time [s], greatest and mean error, whole call [s]."""
 
     size: float
     cells: int
@@ -59,33 +59,33 @@ class Run:
 
 
 def solved(case, repeats):
-    """The quickest of `repeats` runs of a case: result, CPU time of its stepping and of the whole call."""
+    """Fastest of `repeats` runs of a case: result, CPU time of its stepping and of the whole call [s]."""
     best, cpu, whole = None, np.inf, np.inf
     for _ in range(repeats):
         wall, busy = perf_counter(), process_time()
         result = fvsolve.run(case)
         wall, busy = perf_counter() - wall, process_time() - busy
-        if result.reason != "finished":  # at Courant 1 friction lets upwind grow, which `ok` minds and a rate does not
+        if result.reason != "finished":  # not `ok`: with friction upwind grows at Courant 1, at an equal rate
             raise SystemExit(f"{case['title']}: {result.reason}")
         whole = min(whole, busy)
-        stepping = result.summary["seconds"] * min(1.0, busy / wall)  # less what others took of this core
+        stepping = result.summary["seconds"] * min(1.0, busy / wall)  # without the time of other processes on this core
         if stepping < cpu:
             best, cpu = result, stepping
     return best, cpu, whole
 
 
 def by_cells(network, closure, response, cell_time, **numerics):
-    """fvsolve's run with cells of `cell_time`."""
+    """Run of fvsolve with cells, or with steps of delay lines, of `cell_time` [s]."""
     case = networks.case(network, closure, cell_time, EVERY, **numerics)
     result, cpu, whole = solved(case, REPEATS if cell_time > 1e-3 else 3)
-    last = np.append(np.diff(result.t) > 0, True)  # at a jump, the row after it
+    last = np.append(np.diff(result.t) > 0, True)  # the row after a jump
     exact = exact_heads(network, closure, result.t[last], response)
     found = np.array([np.abs(result[f"{p}.head"][last] - exact[p]) for p in network.probes]) / network.jump
     return Run(cell_time, result.summary["cells"], cpu, found.max(), found.mean(), whole)
 
 
 def by_characteristics(network, closure, response, dt):
-    """rthym-moc's run with steps of dt."""
+    """Run of rthym-moc with steps of dt [s]."""
     cpu, times, heads = peer_moc.heads(network, closure, dt, repeats=min(5, REPEATS) if dt > 4e-4 else 1)
     stride = max(1, round(EVERY / dt))
     exact = exact_heads(network, closure, times[stride - 1 :: stride], response)
@@ -95,7 +95,7 @@ def by_characteristics(network, closure, response, dt):
 
 
 def fitting_step(network, dt):
-    """The step within a factor sqrt(2) of dt that bends the wave speeds least [s]."""
+    """Step within a factor sqrt(2) of dt that changes the wave speeds least [s]."""
     steps = np.geomspace(dt / 2**0.5, dt * 2**0.5, 20_001)
     travel = np.array([p.travel for p in network.pipes])[:, None]
     bend = np.abs(np.maximum(1, np.round(travel / steps)) * steps / travel - 1).max(axis=0)
@@ -103,7 +103,7 @@ def fitting_step(network, dt):
 
 
 def table(title, runs, unit):
-    """Print one program's runs."""
+    """Print the runs of one program."""
     print(f"  {title}")
     print(f"    {unit:>11} {'cells':>7} {'CPU ms':>10} {'greatest':>9} {'mean':>9} {'whole ms':>9}")
     for r in runs:
@@ -113,7 +113,7 @@ def table(title, runs, unit):
 
 
 def verdict(name, own, peer):
-    """Print the prices at the goals' errors and their ratio; own, peer: (runs halved, runs picked to fit)."""
+    """Print the costs at the errors of the goals, and their ratio; own, peer: (runs halved, runs picked to fit)."""
 
     def error(r):
         return r.greatest if name == "smooth" else r.mean
@@ -127,7 +127,7 @@ def verdict(name, own, peer):
 
 
 def network_table(network):
-    """All closures of one network, both programs."""
+    """Print the runs of both programs for all closures of one network."""
     response = impulse_response(network)
     paths = ", ".join(f"{len(w)} pulses at {p}" for p, (_, w) in response.items())
     print(f"\n{network.name} pipes, {network.end} s; exact: {paths}; jump {network.jump:.3f} m")
@@ -153,7 +153,7 @@ def network_table(network):
 
 
 def agreement(network, dt=1e-3):
-    """Print how far rthym-moc is from the exact heads where every pipe holds a whole number of steps."""
+    """Print the difference of rthym-moc from the exact heads where every pipe has a whole number of steps."""
     pipes = (replace(p, length=round(p.travel / dt) * dt * p.wave_speed) for p in network.pipes)
     whole = replace(network, pipes=tuple(pipes))
     worst = max(
@@ -165,7 +165,7 @@ def agreement(network, dt=1e-3):
 
 
 def rate_table():
-    """One pipe with friction at Courant 1: node-steps per second of both, the same physics."""
+    """Print the node-steps per second of both programs on one pipe with friction at Courant 1."""
     print("\nOne pipe with friction, Courant 1, unsteady friction off")
     print(f"  {'nodes':>6} {'steps':>8} {'rthym-moc':>12} {'fvsolve':>12} {'factor':>7} {'difference':>11}")
     for nodes, steps in RATES if peer_moc.rthym_moc else ():
@@ -183,10 +183,10 @@ def rate_table():
 
 
 def main():
-    """Print the tables asked for."""
+    """Print the selected tables."""
     global RATES, REPEATS, CLOSURES, PEER_STEPS, SCHEMES
     options = parser(__doc__)
-    options.add_argument("what", nargs="*", help="rate, three, nine; all if none is named, by --quick rate and three")
+    options.add_argument("what", nargs="*", help="tables: rate, three, nine (default all, with --quick rate and three)")
     given = options.parse_args()
     what = given.what or ["rate", "three", "nine"][: 2 if given.quick else None]
     if given.quick:

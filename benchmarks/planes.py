@@ -1,11 +1,11 @@
-"""Fields in the plane beside PyClaw, in one process: `python benchmarks/planes.py [speed] [error] [start]`.
+"""Basins compared with PyClaw, in one process: `python benchmarks/planes.py [speed] [error] [start]`.
 
 speed: million cell-steps per second of each physics on grids of 64^2 to 1024^2 and on triangles.
-error: CPU time to an L1 error on a swirl there and back, a hump of water that spreads and a round pulse of pressure.
-start: the first run of each physics on a machine, what a scene without basins compiles, memory per cell.
+error: CPU time to an L1 error of a swirl that turns back, a hump of water that spreads and a round pulse of pressure.
+start: first run of each physics on a machine, functions that a scene without basins compiles, memory per cell.
 
-`--quick` for one small grid of water, without `start`, which planes_start.py has. One thread, CPU time, the best of
-several, everything compiled before. PyClaw (`clawpack` from PyPI, built with gfortran) is left out where it does not
+`--quick` runs one small grid of water, without `start`, which planes_start.py contains. One thread, CPU time, the best
+of several, everything compiled before. PyClaw (`clawpack` from PyPI, built with gfortran) is left out if it does not
 import.
 """
 
@@ -18,9 +18,11 @@ TABLES = {"speed": speed_table, "error": error_table, "start": start_table}
 
 
 def main() -> None:
-    """Print the tables asked for."""
+    """Print the selected tables."""
     options = parser(__doc__)
-    options.add_argument("what", nargs="*", help=f"{', '.join(TABLES)}; all if none is named, by --quick two")
+    options.add_argument(
+        "what", nargs="*", help=f"tables: {', '.join(TABLES)} (default all, with --quick speed and error)"
+    )
     given = options.parse_args()
     print(machine("numpy", "numba", "clawpack"))
     for name in given.what or list(TABLES)[: 2 if given.quick else None]:

@@ -1,4 +1,4 @@
-"""CPU time against L1 error in the plane, fvsolve beside PyClaw on three smooth fields whose truth is known."""
+"""CPU time against L1 error of basins, fvsolve compared with PyClaw on three smooth fields with known solutions."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from scipy.special import j0
 import fvsolve
 
 SIZES = (32, 48, 64, 96, 128, 192, 256)  # cells along a side
-SLOW = 1.0  # [s of CPU] beyond which a run is not repeated, and no finer one tried
-TARGETS = (1e-2, 1e-3, 1e-4)  # L1 error over the L1 size of the field at the start
+SLOW = 1.0  # CPU time above which a run is not repeated, and no finer run follows [s]
+TARGETS = (1e-2, 1e-3, 1e-4)  # L1 error over the L1 norm of the field at the start
 GOAL = 4.0  # times less CPU time
-GRAVITY, SPEED = 9.80665, 1000.0  # [m/s2], of sound in fvsolve's liquid [m/s]
-PERIOD, SPREAD, RADII = 1.0, 0.6, 2.0  # of the swirl [s], of the hump [s], of the pulse [radii]
+GRAVITY, SPEED = 9.80665, 1000.0  # [m/s2], wave speed of fvsolve's liquid [m/s]
+PERIOD, SPREAD, RADII = 1.0, 0.6, 2.0  # durations of the swirl [s], of the hump [s], of the pulse [radii]
 SCHEMES = {
     "muscl, SSP-RK2": {"limiter": "monotonized-central", "courant": 0.9},
     "upwind5, RK4": {"scheme": "upwind5", "method": "rk4", "courant": 1.4},
@@ -42,10 +42,10 @@ PEERS = {
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A field in a square between walls, `first` and `last` : functions of x, y; as a basin and as PyClaw has it.
+    """Field in a square between walls, as a basin and as a state of PyClaw; `first` and `last` : functions of x, y.
 
-    ends : in the times of fvsolve and of PyClaw; rest : what PyClaw's field is where nothing is
-    usual : fvsolve's Courant number of what is 1 elsewhere; water keeps half of it for shores, and here are none
+    ends : times of the end in fvsolve and in PyClaw; rest : value of PyClaw's field at rest
+    usual : Courant number of fvsolve relative to other physics; water uses half because of shores, absent here
     """
 
     name: str
@@ -61,7 +61,7 @@ class Problem:
 
     @functools.cache  # noqa: B019  three problems live as long as the program
     def averages(self, cells: int) -> tuple[np.ndarray, np.ndarray]:
-        """Averages over cells^2 of both, by Gauss points : float64[cells, cells], rows by y."""
+        """Averages of first and last field over cells^2 by Gauss points : float64[cells, cells], rows by y."""
         nodes, weights = np.polynomial.legendre.leggauss(5)
         x = ((np.arange(cells)[:, None] + (nodes + 1) / 2) * self.size / cells).ravel()
         w = np.tile(weights / 2, cells)
@@ -77,7 +77,7 @@ class Problem:
         return np.abs(found - last).sum() / np.abs(first).sum()
 
     def by_fvsolve(self, numerics: dict, cells: int) -> tuple[float, np.ndarray]:
-        """(CPU time, the field at the end)."""
+        """CPU time of fvsolve [s], and its field at the end."""
         numerics = numerics | {"courant": self.usual * numerics["courant"]}
         case = scene(square(cells, self.size) | self.basin, self.ends[0], **numerics)
         model = fvsolve.build(fvsolve.load(case))
@@ -88,14 +88,14 @@ class Problem:
         return process_time() - start, found.y[: cells**2].reshape(cells, cells)
 
     def by_pyclaw(self, made: Callable, cells: int) -> tuple[float, np.ndarray]:
-        """The same."""
+        """CPU time of PyClaw [s], and its field at the end."""
         solver, aux = made(self.flux), None
         q = np.zeros((peer.FIELDS.get(self.flux, 3), cells, cells))
         q[0] = self.rest + self.averages(cells)[0]
         if self.flux == "vc_advection_2D":
             aux = swirl_faces(cells, self.size)
             solver.before_step = turning(aux)
-            solver.dt_max = 1.8 / cells  # else it takes any step where the swirl stands
+            solver.dt_max = 1.8 / cells  # without a limit steps are arbitrary where the swirl is at rest
             if isinstance(solver, peer.pyclaw.SharpClawSolver2D):
                 solver.call_before_step_each_stage = solver.aux_time_dep = True
                 solver.dt_max = 2.45 / cells
@@ -109,7 +109,7 @@ class Problem:
 
 
 def turning(aux: np.ndarray) -> Callable:
-    """What turns the swirl back: classic steps see the middle of a step, stages of SharpClaw their own time."""
+    """Function that turns the swirl back: classic steps use the middle of a step, stages of SharpClaw their time."""
     whole = np.asfortranarray(aux.transpose(0, 2, 1))
 
     def turn(solver, state) -> None:
@@ -120,7 +120,7 @@ def turning(aux: np.ndarray) -> Callable:
 
 
 def swirl() -> Problem:
-    """A smooth bump, drawn out by LeVeque's swirl and brought back."""
+    """Smooth bump that LeVeque's swirl deforms and brings back."""
 
     def bump(x, y):
         return np.exp(-((x - 0.35) ** 2 + (y - 0.5) ** 2) / 0.01)
@@ -131,7 +131,7 @@ def swirl() -> Problem:
 
 
 def hump() -> Problem:
-    """A hump of 0.2 m spreads on water 1 m deep."""
+    """Hump of 0.2 m that spreads on water 1 m deep."""
     level = radial(SPREAD)
     return Problem(
         "hump of water", 12.0, (SPREAD, SPREAD), lambda x, y: 0.2 * gauss(np.hypot(x - 6, y - 6)),
@@ -141,7 +141,7 @@ def hump() -> Problem:
 
 
 def pulse() -> Problem:
-    """A round pulse of pressure spreads, by Hankel's integral."""
+    """Round pulse of pressure that spreads, by Hankel's integral."""
     r = np.linspace(0.0, 9.0, 500)
     found = quad_vec(lambda k: k / 2 * np.exp(-k * k / 4) * np.cos(k * RADII) * j0(k * r), 0.0, 16.0, epsrel=1e-12)[0]
     shape, basin = CubicSpline(r, found), {"physics": "liquid", "pressure": 1e6, "thickness": 1.0, "wave_speed": SPEED}
@@ -152,12 +152,12 @@ def pulse() -> Problem:
 
 
 def gauss(r):
-    """The shape of hump and pulse."""
+    """Shape of hump and pulse, exp(-r^2)."""
     return np.exp(-r * r)
 
 
 def radial(end: float, points: int = 180, radius: float = 9.0) -> Callable:
-    """Rise of the hump at a time, of the distance: shallow water about an axis, by Chebyshev polynomials in space."""
+    """Rise of the hump at time `end` as a function of distance: axisymmetric shallow water by Chebyshev polynomials."""
     k = np.arange(points)
     x, c = np.cos(pi * k / (points - 1)), np.where((k == 0) | (k == points - 1), 2.0, 1.0) * (-1.0) ** k
     steps = x[:, None] - x + np.eye(points)
@@ -169,7 +169,7 @@ def radial(end: float, points: int = 180, radius: float = 9.0) -> Callable:
         h = 1.0 + e
         flow = q * q / h
         push = -(d @ flow + flow / r + GRAVITY * h * (d @ e))
-        push[[0, -1]] = 0.0  # a wall, where nothing comes
+        push[[0, -1]] = 0.0  # a wall that no wave reaches
         return np.concatenate([-(d @ q + q / r), push])
 
     start = np.concatenate([0.2 * gauss(r), np.zeros(points)])
@@ -179,7 +179,7 @@ def radial(end: float, points: int = 180, radius: float = 9.0) -> Callable:
 
 
 def runs(problem: Problem, solve: Callable, sizes, rounds: int) -> dict[int, tuple[float, float]]:
-    """Cells along a side -> (CPU time, error), the best of some rounds; as fine as targets want."""
+    """Cells along a side -> (CPU time, error), the best of some rounds, up to the finest grid that the targets need."""
     found = {}
     solve(sizes[0])  # compiles
     for cells in sizes:
@@ -193,7 +193,7 @@ def runs(problem: Problem, solve: Callable, sizes, rounds: int) -> dict[int, tup
 
 
 def error_table(quick: bool) -> None:
-    """CPU times and errors of every scheme, and what an L1 error costs."""
+    """Print CPU times and errors of every scheme, and the costs of the target errors."""
     sizes, rounds, schemes, problems = SIZES, 4, SCHEMES, (swirl, hump, pulse)
     if quick:
         sizes, rounds, schemes, problems = SIZES[:2], 1, dict(list(SCHEMES.items())[:1]), (hump,)
@@ -213,7 +213,7 @@ def error_table(quick: bool) -> None:
 
 
 def verdict(charts: dict) -> None:
-    """Print the cheapest of both programs at every error."""
+    """Print the least costs of both programs at every target error."""
     for target in TARGETS:
         costs = {name: price(list(chart.values()), target) for name, chart in charts.items()}
         best = {

@@ -1,4 +1,4 @@
-"""Basins that planes.py runs, as cases for fvsolve. Runs nothing."""
+"""Basins of planes.py as cases for fvsolve."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ BASINS = {
 
 
 def scene(basin: dict, end: float, **numerics) -> dict:
-    """A basin alone between walls, as a case; muscl, van Leer's limiter and SSP-RK2 if nothing else is said."""
+    """Case of a single basin between walls, by default with muscl, van Leer's limiter and SSP-RK2."""
     used = {"end": end, "scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.9} | numerics
     if used["scheme"] != "muscl":
         del used["limiter"]
@@ -34,12 +34,15 @@ def scene(basin: dict, end: float, **numerics) -> dict:
 
 
 def square(cells: int, size: float = SIZE) -> dict:
-    """A grid of cells^2."""
+    """Keys of a grid of cells^2."""
     return {"size": [size, size], "cells": [cells, cells]}
 
 
 def of_triangles(path: Path, cells: int) -> dict:
-    """About cells^2 triangles of the same square, written to a file if there is none; `lid` is its eastern side."""
+    """Keys of a mesh of about cells^2 triangles of this square; `lid` is its eastern side.
+
+    The mesh file is written if it does not exist.
+    """
     if not path.exists():
         east = {"lid": lambda x, y: np.abs(x - SIZE) < 1e-6}
         write_msh(path, *triangles((SIZE, SIZE), SIZE / cells * np.sqrt(4.0 / np.sqrt(3.0))), east)

@@ -1,4 +1,4 @@
-"""Million cell-steps per second in the plane, fvsolve beside PyClaw. Knows no truth."""
+"""Million cell-steps per second of basins, fvsolve compared with PyClaw."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
 
 SIZES = (64, 128, 256, 512, 1024)  # cells along a side
 LARGEST = {"triangles": 256, "PyClaw": 512}
-AT, WATER = 256, "free surface with bed"  # where goals hold
+AT, WATER = 256, "free surface with bed"  # size of the goals; physics of `--quick` and of triangles
 GOALS = {"advection": 400.0, "free surface with bed": 80.0, "free surface, triangles": 25.0}  # [million/s]
 TIMES_PYCLAW, FLAT = 8.0, 1.3
-END = 1e6  # [s] that no run here comes to
-PEERS = {  # the same of PyClaw: Riemann solver, speed of waves [m/s], what it is given
+END = 1e6  # end that no run here reaches [s]
+PEERS = {  # PyClaw: Riemann solver, wave speed [m/s], data of the problem
     "advection": ("vc_advection_2D", 1.0, {}),
     "free surface with bed": ("shallow_bathymetry_fwave_2D", 4.5, dict(grav=9.81, dry_tolerance=1e-3, sea_level=0.0)),
     "liquid": ("acoustics_2D", 1.0, dict(rho=1.0, bulk=1.0, zz=1.0, cc=1.0)),
 }
-COURANT = 0.4  # of PyClaw's steps here; cost per step does not depend on it
+COURANT = 0.4  # of PyClaw's steps; the cost of a step does not depend on it
 
 
 def rate(advance: Callable[[int], object], elements: int, repeats: int = 20, chunk: float = 0.02) -> float:
@@ -50,7 +50,7 @@ def rate(advance: Callable[[int], object], elements: int, repeats: int = 20, chu
 
 
 def rates(model: Model, repeats: int) -> tuple[int, float, float]:
-    """(cells, whole steps and evaluations of the right-hand side per second and cell)."""
+    """Number of cells, cell-steps per second, and evaluations of the right-hand side per second times cells."""
     cells, y, out = model.basins[0].mesh.area.size, initial_state(model).y, model.new_out()
     dydt, loop = np.empty_like(y), RunLoop(model)
 
@@ -64,7 +64,7 @@ def rates(model: Model, repeats: int) -> tuple[int, float, float]:
 
 
 def of_pyclaw(name: str, cells: int, split: bool, repeats: int) -> float:
-    """The same of PyClaw's classic solver, whole steps."""
+    """Cell-steps per second of PyClaw's classic solver."""
     flux, speed, given = PEERS[name]
     x, y = np.meshgrid(*[(np.arange(cells) + 0.5) * SIZE / cells] * 2)
     hump, aux = np.exp(-((x - 5.0) ** 2 + (y - 5.0) ** 2)), None
@@ -88,7 +88,7 @@ def swirl_faces(cells: int, size: float = SIZE) -> np.ndarray:
 
 
 def speed_table(quick: bool) -> None:
-    """Cell-steps per second of every physics and size, ratios to PyClaw and to the smallest and largest grids."""
+    """Print cell-steps per second of every physics and size, with ratios to PyClaw and between sizes."""
     sizes, repeats, basins, table, each = SIZES, 30, BASINS, {}, {}
     if quick:
         sizes, repeats, basins = (32,), 3, {WATER: BASINS[WATER]}
@@ -123,7 +123,7 @@ def speed_table(quick: bool) -> None:
 
 
 def verdict(table: dict, sizes) -> None:
-    """Print what the goals say, of the largest grid where the one they are for is left out."""
+    """Print the results for the goals, on the largest grid if the grid of the goals is left out."""
     at = AT if AT in sizes else sizes[-1]
     for name in dict.fromkeys(key[0] for key in table):
         reached = [table[name, n] for n in sizes if (name, n) in table]

@@ -1,10 +1,10 @@
-"""First runs of each physics, as whole processes; what a scene without basins compiles; memory per cell.
+"""First runs of each physics, as whole processes; functions that a scene without basins compiles; memory per cell.
 
     python benchmarks/planes_start.py [--quick]
 
-This file runs itself, with `--memory KIND CELLS FOLDER` too. Cold is the first run in an empty cache;
-`after` the first run in a cache where a scene of two tanks has been, which has neither basins nor pipes; warm every run
-from then on. `compile` is cold less warm, `own` after less warm. With `--quick` all are in the user's own cache.
+This file also starts itself, with `--memory KIND CELLS FOLDER`. `cold` is the first run with an empty cache. `after` is
+the first run after that of a scene of two tanks, which has neither basins nor pipes, with the same cache. `warm` is any
+later run. `compile` is cold less warm, `own` after less warm. With `--quick` all runs use the user's own cache.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from planes_scenes import BASINS, of_triangles, scene, square
 from start_up import cache, seconds
 
 CASES = Path(__file__).resolve().parent.parent / "cases"
-GOAL = 10.0  # [s] that compiling a physics adds
+GOAL = 10.0  # additional time to compile a physics [s]
 KINDS = {
     "transport": ("advection", {}),
     "transport, weno5": ("advection", {"scheme": "weno5"}),
@@ -33,14 +33,14 @@ SMALL, LARGE = 8, 512  # cells along a side
 
 
 def case(kind: str, cells: int, folder: Path) -> dict:
-    """A scene of a kind that ends after a step or two."""
+    """Case of a kind that ends after one or two steps."""
     basin, numerics = KINDS[kind]
     shape = of_triangles(folder / f"{cells}.msh", cells) if "triangles" in kind else square(cells)
     return scene(shape | BASINS[basin], 1e-5, **numerics)
 
 
 def start_table(quick: bool) -> None:
-    """Times of first and later runs; what a cache holds after a scene of a pipe; bytes per cell."""
+    """Print times of first and later runs, functions in the cache after a scene of a pipe, and bytes per cell."""
     print("\nStart-up, whole processes, wall (CPU) [s]")
     print(f"| physics | cold | after | warm | compile | own, goal {GOAL:g} |\n|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory(prefix="fvsolve-planes-") as name:
@@ -67,17 +67,17 @@ def start_table(quick: bool) -> None:
             files = list((folder / "pipe").rglob("*.nbi"))
             strays = sorted({path.name.split("-")[0] for path in files if path.parent.name.startswith("plane_")})
             print(f"\nOf {len(files)} functions that a scene of one pipe compiles, of the plane: {strays or 'none'}")
-        print("Threads: there are none yet.\n\nMemory [bytes per cell]")
+        print("\nMemory [bytes per cell]")
         for kind in kinds:
             cells = (2 * SMALL if quick else LARGE) // (2 if "triangles" in kind else 1)
             command = [sys.executable, __file__, "--memory", kind, str(cells), name]
-            for _ in range(1 + ("triangles" in kind)):  # making these takes more memory than running on them
+            for _ in range(1 + ("triangles" in kind)):  # a mesh needs more memory to make than to run
                 told = subprocess.run(command, check=True, capture_output=True, text=True)
             print(f"  {kind}: {told.stdout.strip()}", flush=True)
 
 
 def spent(command: list[str], cache: Path) -> tuple[float, float]:
-    """(wall, CPU) time of a process and those it starts [s]."""
+    """Wall and CPU time of a process with its child processes [s]."""
 
     def busy() -> float:
         used = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -88,7 +88,7 @@ def spent(command: list[str], cache: Path) -> tuple[float, float]:
 
 
 def memory(kind: str, cells: int, folder: Path) -> str:
-    """A run's arrays and the peak of its process beyond a small run's, per cell."""
+    """Bytes per cell of the tables, of the time loop, and of the peak of the process above a small run, as text."""
     import fvsolve
     from fvsolve.solve.run_loop import RunLoop
 
@@ -109,9 +109,11 @@ def memory(kind: str, cells: int, folder: Path) -> str:
 
 
 def main() -> None:
-    """Print the table, or what one process of it finds."""
+    """Print the tables, or the memory of one run."""
     options = parser(__doc__)
-    options.add_argument("--memory", nargs=3, metavar=("KIND", "CELLS", "FOLDER"), help="one run of the table")
+    options.add_argument(
+        "--memory", nargs=3, metavar=("KIND", "CELLS", "FOLDER"), help="one run, whose memory is printed"
+    )
     given = options.parse_args()
     if given.memory:
         kind, cells, folder = given.memory

@@ -1,4 +1,4 @@
-"""An address as a pointer, for `numba.carray`. Knows no array."""
+"""Conversion of an address to a pointer, for `numba.carray`."""
 
 from numba.core import cgutils, types
 from numba.extending import intrinsic
@@ -6,7 +6,7 @@ from numba.extending import intrinsic
 
 @intrinsic
 def pointer(typing, address):
-    """The void pointer at an integer address."""
+    """Void pointer at an integer address."""
 
     def generate(context, builder, signature, arguments):
         return builder.inttoptr(arguments[0], cgutils.voidptr_t)

@@ -1,19 +1,19 @@
-"""What an error costs, read off runs of a solver: log-log between two runs. Knows pairs of numbers."""
+"""Cost of an error, interpolated log-log between runs of a solver."""
 
 import numpy as np
 
 
 def front(runs):
-    """Runs that beat all cheaper ones, cheapest first."""
+    """Runs that are more accurate than all cheaper ones, cheapest first."""
     runs = sorted(runs)
     return [(cost, error) for k, (cost, error) in enumerate(runs) if all(error < e for _, e in runs[:k])]
 
 
 def price(runs, target):
-    """Cost at which runs, (cost, error) each, reach an error, and how it was found.
+    """Cost at which runs, (cost, error) each, reach a target error, and a mark of its kind.
 
-    "": log-log between the two runs of the front about it; "<": the cheapest run is better already; "~": beyond the
-    best run, along the least-squares line of the logarithms of all.
+    "": log-log between two runs of the front; "<": the cheapest run is already better; "~": beyond the best run,
+    along the least-squares line of the logarithms of all runs.
     """
     best = front(runs)
     if best[0][1] <= target:

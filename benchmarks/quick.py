@@ -1,9 +1,9 @@
-"""All scripts of this folder with `--quick`, two at a time, a line for each.
+"""Run all scripts of this folder with `--quick`, two at a time, and print a line for each.
 
 python benchmarks/quick.py [NAME]...
 
-Fails if a script fails, has no `--quick`, or takes longer than LIMIT. Says where a script takes more CPU time than
-EACH, and all together more than ALL: so they do where kernels are not in the cache yet.
+Fails if a script fails, has no `--quick`, or takes longer than LIMIT. Reports a script that takes more CPU time than
+EACH, and a total time above ALL; both occur if the cache does not contain all kernels.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from measure import QUICK, SKIPPED
 
 HERE = Path(__file__).resolve().parent
 ALONE = os.environ | {"OPENBLAS_NUM_THREADS": "1"}  # two scripts share the cores
-EACH, ALL, LIMIT = 5.0, 180.0, 600.0  # CPU time of a script, wall time of all, of one at the most [s]
+EACH, ALL, LIMIT = 5.0, 180.0, 600.0  # CPU time of a script, wall time of all, wall time of a script [s]
 
 
 def scripts() -> list[Path]:
-    """Files of this folder that are started by name, all but this one."""
+    """Paths of the scripts of this folder, except this one."""
     found = sorted(HERE.glob("*.py"))
     return [path for path in found if '__name__ == "__main__"' in path.read_text() and path.name != "quick.py"]
 
@@ -36,7 +36,7 @@ def run(path: Path) -> bool:
     began = perf_counter()
     process = subprocess.Popen([sys.executable, path, "--quick"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                                stdin=subprocess.DEVNULL, text=True, start_new_session=True, env=ALONE)  # fmt: skip
-    stop = Timer(LIMIT, os.killpg, (process.pid, signal.SIGKILL))  # with the processes that it started
+    stop = Timer(LIMIT, os.killpg, (process.pid, signal.SIGKILL))  # kills also the processes that it started
     stop.start()
     said = process.stdout.read()
     _, status, used = os.wait4(process.pid, 0)
@@ -54,9 +54,9 @@ def run(path: Path) -> bool:
 
 
 def main() -> None:
-    """Run all scripts, or those named."""
+    """Run all scripts, or the given ones."""
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    options.add_argument("names", nargs="*", metavar="NAME", help="names of scripts, without .py; all if none is named")
+    options.add_argument("names", nargs="*", metavar="NAME", help="names of scripts, without .py (default all)")
     names, began = options.parse_args().names, perf_counter()
     with ThreadPoolExecutor(2) as pool:
         found = list(pool.map(run, [HERE / f"{name}.py" for name in names] or scripts()))

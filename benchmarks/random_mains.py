@@ -1,4 +1,4 @@
-"""Random mains of two or three pipes with a valve at their end, and limits near their peaks. Runs nothing."""
+"""Random mains of two or three pipes with a valve at their end, and limits near their peaks."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ FLUID = {"name": "user", "density": 1000.0, "bulk_modulus": "2.2 GPa", "viscosit
          "vapor_pressure": "2.3 kPa", "law": "linear"}  # fmt: skip
 MIDDLES = ("junction", "junction", "accumulator", "tank", "dead end", "check valve", "branch")
 PROBES = ("end.pressure", "j.pressure", "a.flow", "b.pressure@0.37")
-VACUUM = 2300.0  # Pa, below which no limit is
-START = 0.2  # s, of the valve
-COURANT = {"linear-upwind": 0.6}  # whose limit is below the default
+VACUUM = 2300.0  # pressure below which no limit is set [Pa]
+START = 0.2  # start of the movement of the valve [s]
+COURANT = {"linear-upwind": 0.6}  # schemes with a Courant limit below the default
 SCHEME_NAMES = tuple(SCHEMES)
 
 
 def random_main(seed: int) -> dict[str, Any]:
-    """A lake, pipe `a`, a node `j` of some kind, pipe `b` and a valve at its end that moves within 2 ms to 2 s."""
+    """Case of a lake, pipe `a`, a random node `j`, pipe `b` and a valve at the end that moves within 2 ms to 2 s."""
     rng = np.random.default_rng(seed)
     nodes = {"lake": {"type": "reservoir", "head": rng.uniform(60.0, 160.0)},
              "end": {"type": "junction"}, "out": {"type": "reservoir", "pressure": 101325.0}}  # fmt: skip
@@ -34,7 +34,7 @@ def random_main(seed: int) -> dict[str, Any]:
 
 
 def pipe(rng: np.random.Generator, start: str, end: str) -> dict[str, Any]:
-    """A pipe of 16 to 100 cells, 100 to 1000 m."""
+    """Random pipe of 16 to 100 cells and 100 to 1000 m."""
     return {"type": "pipe", "from": start, "to": end, "length": rng.uniform(100.0, 1000.0),
             "diameter": float(rng.choice([0.1, 0.15, 0.2, 0.3, 0.4])), "wave_speed": rng.uniform(900.0, 1300.0),
             "friction": {"model": "quasi-steady", "factor": rng.uniform(0.01, 0.03)},
@@ -42,7 +42,7 @@ def pipe(rng: np.random.Generator, start: str, end: str) -> dict[str, Any]:
 
 
 def closing_valve(rng: np.random.Generator) -> dict[str, Any]:
-    """A valve from `end` that shuts in part or whole, opens, or shuts and opens again."""
+    """Random valve from `end` that closes in part or in full, opens, or closes and opens again."""
     duration = float(10.0 ** rng.uniform(-2.7, 0.3))
     ways = ([1.0, 0.0], [1.0, rng.uniform(0.0, 0.6)], [rng.uniform(0.2, 0.6), 1.0])
     opening: dict[str, Any] = {"start": START, "duration": duration, "value": ways[rng.choice(3, p=[0.4, 0.4, 0.2])]}
@@ -56,7 +56,7 @@ def closing_valve(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def add_middle(kind: str, rng: np.random.Generator, nodes: dict, links: dict) -> None:
-    """What stands between the pipes, under the name `j`."""
+    """Add the parts between the pipes, with the node `j`."""
     nodes["j"] = {"type": "junction"}
     if kind == "accumulator":
         volume = rng.uniform(0.05, 0.5)
@@ -74,7 +74,7 @@ def add_middle(kind: str, rng: np.random.Generator, nodes: dict, links: dict) ->
 
 
 def limits_near(peaks: dict[str, tuple[float, float]], seed: int) -> dict[str, Any]:
-    """An upper and a lower limit on pressure for each part, at 0.9 to 1.1 of what it met [Pa]."""
+    """Upper and lower limit on the pressure of each part, at 0.9 to 1.1 of its peaks [Pa]."""
     rng, made = np.random.default_rng([seed, 1]), {}
     for part, (least, greatest) in peaks.items():
         for bound, value in (("minimum", least), ("maximum", greatest)):

@@ -1,9 +1,9 @@
-"""A large dam break stopped by one process and resumed by two ranks, with --back the other way round too: hashes.
+"""Dam break on a large grid, stopped by one process and resumed by two ranks: comparison of hashes.
 
     python benchmarks/resumed.py [--quick] [--back] [CELLS]
 
-CELLS along a side are 4096 if nothing is said: each rank wants some 13 GiB for these while it makes
-its model, one after the other, and up to 10 after that.
+CELLS along a side are 4096 by default. Each rank then needs about 13 GiB while it builds its model, one after the
+other, and up to 10 afterwards. `--back` also stops with two ranks and resumes with one process.
 """
 
 from __future__ import annotations
@@ -29,18 +29,18 @@ from fvsolve.solve import initial_state
 from fvsolve.solve.run_loop import RunLoop
 from fvsolve.solve.solve import Run
 
-STEPS, STOP = 6, 3  # in all, and where it is stopped
+STEPS, STOP = 6, 3  # number of steps in total and before the stop
 
 
 class Kept(MemorySink):
-    """Keeps the last checkpoint."""
+    """Sink that stores the last checkpoint."""
 
     def checkpoint(self, state, extra: dict) -> None:
         self.state = state
 
 
 def model_of(cells: int):
-    """A dam break over a bed, from wall to wall, in steps that are given."""
+    """Model of a dam break over a bed between walls, with a given step."""
     pool = square(cells) | {"level": 1.0, "bed": "0.3*sin(x)*cos(y)", "manning": 0.02,
                             "start": {"level": f"where(x < {0.4 * SIZE}, 1.5, 1)"}}  # fmt: skip
     step = 0.05 * SIZE / cells
@@ -51,7 +51,7 @@ def model_of(cells: int):
 
 
 def stepped(model, state: State, parts: list[int], comm) -> list[State]:
-    """The states that so many steps, and so many more, make of one, with all that a resumed run needs."""
+    """States after each number of steps in `parts`, from a state, with all data that a resumed run needs."""
     run = Run(model, state, sink := Kept(model), None, comm=comm)
     if run.fresh:
         run.open()
@@ -67,10 +67,10 @@ def stepped(model, state: State, parts: list[int], comm) -> list[State]:
 
 
 def part(cells: int, begin: str, end: str, *parts: str) -> None:
-    """Step a checkpoint, or the start, as one process or as a rank; rank 0 keeps what the first part makes."""
+    """Step a checkpoint or the start, as one process or as a rank; rank 0 writes the state after the first part."""
     comm, start = mpi_run.world(), perf_counter()
     if comm is not None and comm.rank > 0:
-        comm.bcast(None)  # rank 0 has its model: two at a time would want more memory
+        comm.bcast(None)  # rank 0 has its model: two models at a time would need more memory
         loop = RunLoop(model_of(cells), comm=comm)
         loop.team.serve(*loop.functions)
         return
@@ -90,7 +90,7 @@ def part(cells: int, begin: str, end: str, *parts: str) -> None:
 
 
 def asked(many: int, *words) -> list[str]:
-    """What a part says that so many processes do; its hashes."""
+    """Run a part with a number of processes, print its output, and return its hashes."""
     command = [sys.executable, __file__, "--part", *map(str, words)]
     if many > 1:
         command = [str(Path(sys.executable).with_name("mpiexec")), "-n", str(many), *command]
@@ -102,9 +102,11 @@ def asked(many: int, *words) -> list[str]:
 
 def main() -> None:
     options = parser(__doc__)
-    options.add_argument("cells", nargs="?", type=int, help="number of cells along a side; 4096, by --quick 32")
-    options.add_argument("--back", action="store_true", help="also stopped by two ranks and resumed by one process")
-    options.add_argument("--part", nargs="+", metavar="WORD", help="what one process of these does")
+    options.add_argument(
+        "cells", nargs="?", type=int, help="number of cells along a side (default 4096, with --quick 32)"
+    )
+    options.add_argument("--back", action="store_true", help="also a stop by two ranks, resumed by one process")
+    options.add_argument("--part", nargs="+", metavar="WORD", help="arguments of one process that the script starts")
     given = options.parse_args()
     if given.part:
         part(int(given.part[0]), *given.part[1:])

@@ -1,10 +1,10 @@
-"""The greatest safe step, predicted and measured, for every linear scheme with every explicit method on four scenes.
+"""Greatest stable step, predicted and measured, of every linear scheme with every explicit method on four scenes.
 
     python benchmarks/stability_pairs.py [--quick] [cells] [steps]
 
-A closed pipe, a pipe with inflow (ends that send nothing back), a junction of three pipes with a flowing valve, and a
-chain of chambers; Courant numbers, and by how much measurement and prediction differ. The periodic pipe is in
-`fvsolve stability --cells N`. Takes some minutes.
+The scenes are a closed pipe, a pipe with inflow (ends without reflection), a junction of three pipes with a valve with
+flow, and a chain of chambers. The tables give Courant numbers, and the difference of measurement and prediction.
+`fvsolve stability --cells N` computes the periodic pipe. Takes some minutes.
 """
 
 from __future__ import annotations
@@ -45,13 +45,13 @@ JUNCTION = {"type": "junction"}
 
 
 def closed(cells: int) -> dict:
-    """A pipe between a shut valve and a blind end."""
+    """Pipe between a closed valve and a dead end."""
     return scene({"A": reservoir(1e6), "a": JUNCTION, "b": JUNCTION},
                  {"v": valve("A", "a", 1e-3, 0.0), "p": pipe("a", "b", 100.0, 0.3, 1000.0, cells)})  # fmt: skip
 
 
 def inflow(cells: int) -> dict:
-    """A pipe whose end valves have its own slope, dM/dp = A / a: waves enter and leave, and none comes back."""
+    """Pipe with end valves of its own slope, dM/dp = A / a: waves enter and leave without reflection."""
     flow, admittance = 10.0, math.pi / 4 * 0.3**2 / 1000.0
     conductance = 2 * flow * admittance  # M |M| = G dp
     opened, drop = math.sqrt(conductance / (2 * RHO)), flow**2 / conductance
@@ -61,7 +61,7 @@ def inflow(cells: int) -> dict:
 
 
 def network(cells: int) -> dict:
-    """Three pipes meet; a reservoir, a flowing valve and a blind end."""
+    """Junction of three pipes, with a reservoir, a valve with flow and a dead end."""
     nodes = {"A": reservoir(1.2e6), "t": JUNCTION, "g": JUNCTION, "B": reservoir(1e6), "d": JUNCTION}
     links = {"p": pipe("A", "t", 100.0, 0.3, 1000.0, cells), "q": pipe("t", "g", 60.0, 0.2, 1100.0, max(5, cells // 2)),
              "r": pipe("t", "d", 80.0, 0.25, 900.0, max(5, cells // 2)), "v": valve("g", "B", 2e-3)}  # fmt: skip
@@ -69,7 +69,7 @@ def network(cells: int) -> dict:
 
 
 def chain(cells: int) -> dict:
-    """Chambers and flowing valves between two pressures."""
+    """Chambers in a row with flow through valves between two pressures."""
     inside = {f"c{k}": {"type": "chamber", "volume": 1e-3 * (1 + k % 3)} for k in range(cells)}
     nodes = {"in": reservoir(2e6), **inside, "out": reservoir(1e6)}
     names = list(nodes)
@@ -77,10 +77,10 @@ def chain(cells: int) -> dict:
 
 
 def main() -> None:
-    """Print a table for each scene and the greatest difference of all."""
+    """Print a table and the greatest difference for each scene."""
     options = parser(__doc__)
-    options.add_argument("cells", nargs="?", type=int, help="number of cells; 16, by --quick 8")
-    options.add_argument("steps", nargs="?", type=int, help="number of steps; 1000, by --quick 200")
+    options.add_argument("cells", nargs="?", type=int, help="number of cells (default 16, with --quick 8)")
+    options.add_argument("steps", nargs="?", type=int, help="number of steps (default 1000, with --quick 200)")
     given = options.parse_args()
     cells, steps = given.cells or (8 if given.quick else 16), given.steps or (200 if given.quick else 1000)
     methods = [name for name, one in METHODS.items() if one.name == name and one.explicit]

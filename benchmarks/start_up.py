@@ -1,13 +1,13 @@
-"""Whole-process time of `fvsolve run` on the main case: to the answer, and to whole pictures; cold, by a store, warm.
+"""Time of the process `fvsolve run` on the main case, to the answer and to finished pictures: cold, with a store, warm.
 
     python benchmarks/start_up.py [--quick] [--times 5] [--beside CHECKOUT] [CASE]
 
-Cold is a new cache folder: kernels are compiled and CoolProp is asked. With a store is the first run from a copy of
-what `fvsolve precompile` leaves, code and fluid properties, without numba's own cache; `without fluids`
-of its code alone, so that CoolProp is asked. Warm is every run after that. `--beside` takes turns with another
-checkout, of an earlier version, and prints ratios. The answer is there when the terminal says how the run ended, the
-pictures when the process has. With `--quick` two-tanks is run, and the user's own cache stands for the new one, so that
-nothing is compiled if it has been before.
+`cold` has a new cache folder: kernels are compiled and CoolProp is called. `store` is the first run with a copy of the
+files that `fvsolve precompile` writes, code and fluid properties, without numba's own cache; `store without fluids`
+copies the code only, so CoolProp is called. `warm` is every later run. `--beside` alternates with another checkout, of
+an earlier version, and prints ratios. The answer is complete when the terminal shows how the run ended, the pictures
+when the process ends. With `--quick` the case is two-tanks, and the user's own cache replaces the new one, so code
+that was compiled before is not compiled again.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ from measure import agree, parser
 
 HERE = Path(__file__).resolve().parent.parent
 CASE = HERE / "cases" / "valve-closure.toml"
-GOALS = {"cold": 15.0, "store": 3.0, "warm": 0.7}  # [s] of the whole on a quiet machine
-RATIO = 0.5  # of an earlier version's, warm
-IMPORTS = "import numpy, numba"  # the floor of what loads numba
+GOALS = {"cold": 15.0, "store": 3.0, "warm": 0.7}  # times of the whole process on an idle machine [s]
+RATIO = 0.5  # ratio to the time of an earlier version, warm
+IMPORTS = "import numpy, numba"  # least time of a process that imports numba
 ENDS = b"finished at "
 
 
 def seconds(command: list[str], cache: Path, package: Path = HERE) -> float:
-    """Wall time of one process [s]; raises where it fails."""
+    """Wall time of one process [s]; raises CalledProcessError if it fails."""
     return measured(command, cache, package)[1]
 
 
 def measured(command: list[str], cache: Path, package: Path = HERE) -> tuple[float, float, float]:
-    """(wall time to the answer, to the end of the process, CPU time of all its processes) [s]."""
+    """Wall time to the answer, wall time to the end of the process, and CPU time of all its processes [s]."""
     environment = os.environ | {"FVSOLVE_CACHE": str(cache), "PYTHONPATH": str(package), "PYTHONUNBUFFERED": "1"}
-    environment.pop("PYTHONDONTWRITEBYTECODE", None)  # byte code is kept, as it is on a user's machine
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)  # byte code is written, as on a user's machine
     before, start, answer = busy(), time.perf_counter(), float("nan")
     with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stdin=subprocess.DEVNULL) as process:
         for line in process.stdout:
@@ -51,13 +51,13 @@ def measured(command: list[str], cache: Path, package: Path = HERE) -> tuple[flo
 
 
 def busy() -> float:
-    """CPU time of all processes that have ended [s]."""
+    """CPU time of all finished child processes [s]."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 
 
 def cache(folder: Path, quick: bool) -> Path:
-    """A new cache folder; if quick the user's own instead, where code has been compiled before."""
+    """New cache folder, or with `quick` the user's own, which may contain compiled code."""
     if not quick:
         return folder
     from fvsolve.jit import cache_folder
@@ -66,7 +66,7 @@ def cache(folder: Path, quick: bool) -> Path:
 
 
 def measure(case: Path, times: int, packages: dict[str, Path], quick: bool) -> dict[tuple[str, str], list[tuple]]:
-    """(version, start) -> what was measured of each run, versions in turn."""
+    """Times of each run by (version, start), with the versions in turn."""
     found: dict[tuple[str, str], list[tuple]] = {}
     with tempfile.TemporaryDirectory(prefix="fvsolve-start-up-") as folder:
         top = Path(folder)
@@ -96,9 +96,11 @@ def measure(case: Path, times: int, packages: dict[str, Path], quick: bool) -> d
 
 def main() -> None:
     options = parser(__doc__)
-    options.add_argument("case", nargs="?", type=Path, help="case to run; valve-closure, by --quick two-tanks")
-    options.add_argument("--times", type=int, help="number of warm runs; 5, by --quick 1")
-    options.add_argument("--beside", type=Path, help="a checkout of another version")
+    options.add_argument(
+        "case", nargs="?", type=Path, help="case to run (default valve-closure, with --quick two-tanks)"
+    )
+    options.add_argument("--times", type=int, help="number of warm runs (default 5, with --quick 1)")
+    options.add_argument("--beside", type=Path, help="checkout of another version")
     arguments = options.parse_args()
     arguments.case = arguments.case or (CASE.with_stem("two-tanks") if arguments.quick else CASE)
     arguments.times = arguments.times or (1 if arguments.quick else 5)

@@ -1,4 +1,4 @@
-"""`auto` beside every method that estimates its error: CPU time at equal error, in stiff cases with their own cells."""
+"""CPU time of `auto` at equal error, compared with every method that estimates its error, in stiff cases."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from fvsolve.studies.outcome import Outcome, outcome, study_model
 
 HERE = Path(__file__).resolve().parent
 SCENES = ("cylinder-servo", "hydraulic-drive", "chamber-chain", "pipe-tiny-chamber", "temperature-front", "servo-arm")
-GOAL = 1.5  # times the CPU time of the best single method, at most
-TARGETS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # mean errors of the worst probe, in its range
+GOAL = 1.5  # greatest ratio to the CPU time of the best single method
+TARGETS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # rms errors of the worst probe, relative to its range
 TRUTH = {"numerics.method": "radau-iia-5", "numerics.rtol": 1e-12}
-SLOW, ROUNDS = 4.0, 5  # [s] of CPU time: a longer run is not timed again, and no finer one is tried
+SLOW, ROUNDS = 4.0, 5  # CPU time [s]: a longer run is not repeated, and no finer run follows
 
 
 def auto_table(quick: bool) -> None:
-    """Price of `auto` over the least price of the others, case by case."""
+    """Print the cost of `auto` over the least cost of the other methods, case by case."""
     if quick:
         worst = beside("chamber-chain", (1e-3, 1e-5), 1, ["radau-iia-5", "auto"])
-        agree("auto beside the best single method, which comes to a truth", worst, 1e6)
+        agree("ratio of auto to the best single method", worst, 1e6)
     else:
         methods = [m.name for m in METHODS.values() if m.adaptive] + ["auto"]
         worst = max(beside(name, 10.0 ** -np.arange(2.0, 10.1, 0.5), ROUNDS, methods) for name in SCENES)
@@ -35,7 +35,7 @@ def auto_table(quick: bool) -> None:
 
 
 def beside(name: str, tolerances, rounds: int, methods: list[str]) -> float:
-    """Print what each error costs in a case; returns what `auto` costs beside the best, at worst."""
+    """Print the cost of each error in a case, and return the greatest ratio of `auto` to the best method."""
     path = next(
         p
         for p in (HERE.parent / "cases" / f"{name}.toml", HERE.parent / "tests" / "reference" / f"{name}.toml")
@@ -44,7 +44,7 @@ def beside(name: str, tolerances, rounds: int, methods: list[str]) -> float:
     case, truth = load(path), outcome(path, TRUTH)
     models = {}
     runs = {method: series(case, method, tolerances, truth, models) for method in methods}
-    for _ in range(rounds):  # in turns, so that one noisy moment spoils no single method
+    for _ in range(rounds):  # in turn, so that a disturbance affects all methods
         for method, found in runs.items():
             for rtol, (cost, error) in found.items():
                 if cost < SLOW:
@@ -54,7 +54,7 @@ def beside(name: str, tolerances, rounds: int, methods: list[str]) -> float:
 
 
 def series(case, method: str, tolerances, truth: Outcome, models: dict) -> dict[float, tuple[float, float]]:
-    """(CPU time [s], error) of a method by tolerance, the widest first."""
+    """CPU time [s] and error of a method by tolerance, the largest tolerance first."""
     found = {}
     for rtol in tolerances:
         models[method, rtol] = model = study_model(case, {"numerics.method": method, "numerics.rtol": float(rtol)})
@@ -66,21 +66,24 @@ def series(case, method: str, tolerances, truth: Outcome, models: dict) -> dict[
 
 
 def limited(model, state, sink, progress) -> Run:
-    """A run of SLOW seconds at most."""
+    """Run of at most SLOW seconds."""
     made = CappedRun(model, state, sink, progress)
     made.max_seconds = SLOW
     return made
 
 
 def distance(run: Outcome, truth: Outcome) -> float:
-    """Root mean square over the rows of a probe in its range, of the worst probe."""
+    """Root mean square error over the rows of the worst probe, relative to its range."""
     reach = np.ptp(truth.rows[:, 1:], axis=0)
     apart = np.sqrt(np.mean((run.rows[:, 1:] - truth.rows[:, 1:]) ** 2, axis=0))
     return float(np.max(apart[reach > 0] / reach[reach > 0]))
 
 
 def verdict(runs: dict, target: float) -> float:
-    """Print one line; returns the price of `auto` over the best of the others, zero where none gets there."""
+    """Print one line, and return the cost of `auto` over the best other method.
+
+    The ratio is 0 if no method reaches the error, infinite if only `auto` does not.
+    """
     prices = {}
     for method, found in runs.items():
         pairs = list(found.values())
@@ -88,7 +91,7 @@ def verdict(runs: dict, target: float) -> float:
             prices[method] = price(front(pairs), target)
     best = sorted((cost, method) for method, (cost, _) in prices.items() if method != "auto")
     if not best or "auto" not in prices:
-        print(f"  {target:.0e}: {'auto does not get there' if best else 'no method gets there'}")
+        print(f"  {target:.0e}: {'auto does not reach it' if best else 'no method reaches it'}")
         return np.inf if best else 0.0
     least, ratio = best[0][0], prices["auto"][0] / best[0][0]
     others = ", ".join(f"{method} {cost / least:.2f}" for cost, method in best[:4])

@@ -1,4 +1,4 @@
-"""The stiff cylinder: error of the trajectory against wall time, fvsolve beside its peers, printed and drawn."""
+"""Stiff cylinder: error of the trajectory against wall time of fvsolve and its peers, printed and drawn."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PICTURE = Path(__file__).with_name("stiff.png")
 
 
 def cylinder_table(quick: bool) -> None:
-    """Work against precision, and the goals."""
+    """Print errors and wall times, and the results for the goals."""
     end = 0.01 * cylinder.END if quick else cylinder.END
     problem = Problem(cylinder.rhs, cylinder.start(), np.linspace(0.0, end, 201))
     truth = explicit_reference(problem)
@@ -50,18 +50,18 @@ def cylinder_table(quick: bool) -> None:
 
 
 def reached(charts: dict[str, list[Run]], error: float) -> None:
-    """Exit with a message, unless every solver comes to an error."""
+    """Exit with a message unless every solver reaches an error."""
     for name, runs in charts.items():
         agree(f"least error of {name}", min((run.error for run in runs), default=np.nan), error)
 
 
 def implicit_methods(quick: bool) -> list[str]:
-    """Implicit methods with an error estimate; if quick the default alone."""
+    """Implicit methods with an error estimate, with `quick` only the default."""
     return [DEFAULT] if quick else [m.name for m in METHODS.values() if m.adaptive and not m.explicit]
 
 
 def fvsolve_solver(problem: Problem, method: str) -> Solver:
-    """fvsolve.integrate by one method."""
+    """Solver fvsolve.integrate with one method."""
 
     def solve(tolerance, counts=None):
         options = {"rtol": tolerance, "atol": tolerance, "counts": counts}
@@ -76,7 +76,7 @@ def fvsolve_solver(problem: Problem, method: str) -> Solver:
 
 
 def verdict(charts: dict[str, list[Run]], target: float) -> None:
-    """Print what an error costs, each peer beside fvsolve's best method and its default."""
+    """Print the wall time of each solver at an error, relative to fvsolve's best method and to its default."""
     prices = {name: price(front([(r.wall, r.error) for r in runs]), target) for name, runs in charts.items() if runs}
     prices = {name: found for name, found in prices.items() if np.isfinite(found[0])}
     ours = {name: cost for name, (cost, _) in prices.items() if name.startswith("fvsolve")}
@@ -89,7 +89,7 @@ def verdict(charts: dict[str, list[Run]], target: float) -> None:
 
 
 def draw(charts: dict[str, list[Run]], picture: Path) -> None:
-    """Wall time against error of all solvers."""
+    """Draw wall time against error of all solvers."""
     from fvsolve.draw import style
 
     made = style.figure(4.6)
@@ -110,7 +110,7 @@ def draw(charts: dict[str, list[Run]], picture: Path) -> None:
 
 
 def returning(rhs):
-    """f(t, y) -> dydt around f(t, y, dydt), compiled."""
+    """Compiled function that returns dydt, from f(t, y, dydt)."""
 
     @numba.njit(error_model="numpy")
     def function(t, y):

@@ -1,4 +1,4 @@
-"""What a step of Newton's method costs in networks of pipes, beside SuperLU and the figures of numba.md."""
+"""Cost of a step of Newton's method in networks of pipes, compared with SuperLU and with the figures of numba.md."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from fvsolve.steppers.structure import Structure
 
 SIZES = ((10, 100), (50, 200))  # (pipes, cells of each)
 SCHEMES = ("upwind", "upwind5")
-COURANT, METHOD = 20.0, "alexander-2"  # two stages, solved in turn with one factor
+COURANT, METHOD = 20.0, "alexander-2"  # two stages, solved one after the other with one factorisation
 STUDY = {"factor": 71.0, "solve": 18.0}  # [us] for 10 pipes of 100 cells, 2 000 unknowns, first order (numba.md)
-GOAL = 1.5  # times the study's time at the most
-BUDGET = 0.2  # of a measurement [s]
+GOAL = 1.5  # greatest ratio to the time of the study
+BUDGET = 0.2  # time of a measurement [s]
 
 
 def network(pipes: int, cells: int, scheme: str, **numerics) -> dict:
-    """Pipes between two lakes and junctions, a ring with chords, of which one junction's demand shuts."""
+    """Case of pipes between two lakes and junctions, a ring with chords; the demand of one junction stops."""
     nodes = {f"n{i}": {"type": "junction"} for i in range(pipes // 2 + 1)}
     count = len(nodes)
     nodes |= {name: {"type": "reservoir", "head": head} for name, head in (("high", 60.0), ("low", 50.0))}
@@ -64,7 +64,7 @@ class Costs:
 
 
 def network_table(quick: bool) -> None:
-    """Parts of a Newton step and whole runs."""
+    """Print the times of the parts of a Newton step, and of whole runs."""
     title = f"{'factor':>9} {'study':>6} {'SuperLU':>8} {'solve':>8} {'study':>6} {'SuperLU':>8} {'f':>7} {'df/dy':>8}"
     print(f"\nNetworks at Courant {COURANT:g} [us]; study: times the figures of numba.md, scaled by the unknowns")
     print(f"  {'pipes':>5} {'unknowns':>8} {'scheme':8} {'kind':7} {title}")
@@ -84,7 +84,7 @@ def network_table(quick: bool) -> None:
 
 
 def parts(model) -> tuple[Structure, Costs, csc_array]:
-    """The model's structure, what its parts cost at the start, and the matrix that is factored there."""
+    """Structure of the model's Jacobian, costs of the parts of a step at the start, and the matrix factored there."""
     structure, rhs = Structure(jacobian_pattern(model)), model.functions.rhs
     factor, solve = structure.functions()
     slate = RunData(model)
@@ -125,26 +125,26 @@ def parts(model) -> tuple[Structure, Costs, csc_array]:
 
 @njit
 def many(at, times, y, dydt, out, handle):
-    """The right-hand side at an address, `times` over."""
+    """Evaluate the right-hand side at an address `times` times."""
     for _ in range(times):
         rhs_at(at)(0.0, y, dydt, out, handle)
 
 
 @njit
 def change(at, handle, shape, where, t, y, f, supply, scale, y_work, f_work, out, jacobian):
-    """A Jacobian by differences of the right-hand side at an address."""
+    """Compute the Jacobian by differences of the right-hand side at an address."""
     differences(rhs_at(at), handle, shape, where, t, y, f, supply, scale, y_work, f_work, out, jacobian)
 
 
 def superlu(matrix: csc_array) -> tuple[float, float]:
-    """(factor, solve) by SciPy's SuperLU, ordered for symmetric patterns [us]."""
+    """Times to factor and to solve by SciPy's SuperLU, ordered for symmetric patterns [us]."""
     options = {"permc_spec": "MMD_AT_PLUS_A", "options": {"SymmetricMode": True}, "diag_pivot_thresh": 0.0}
     made, b = splu(matrix, **options), np.ones(matrix.shape[0])
     return 1e6 * best(lambda: splu(matrix, **options), BUDGET), 1e6 * best(lambda: made.solve(b), 0.5 * BUDGET)
 
 
 def whole(pipes: int, cells: int, scheme: str, costs: Costs, scaled: dict) -> None:
-    """A run through the scene: what an iteration takes in all, beside the study's figures for what it did."""
+    """Print the time of a Newton iteration in a run, and the ratio of the run to the figures of the study."""
     runs = [fvsolve.run(network(pipes, cells, scheme)) for _ in range(3)]
     if not runs[0].ok:
         raise SystemExit(runs[0].reason)

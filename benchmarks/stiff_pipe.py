@@ -1,4 +1,4 @@
-"""Acoustics of a pipe of 1 000 cells: fvsolve beside its peers on the very same ordinary differential equations."""
+"""Acoustics of a pipe of 1 000 cells: fvsolve and its peers on the same ordinary differential equations."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from stiff_cylinder import implicit_methods, reached
 import fvsolve
 
 TARGET = 1e-6
-GOALS = {"explicit": 7.0, "implicit": 1.0}  # times faster than every peer; than CVODE with a band matrix
-BEYOND = "numbalsoda DOP853"  # no peer of the goals: explicit, compiled, and with the same f
+GOALS = {"explicit": 7.0, "implicit": 1.0}  # least ratio of every peer, and of CVODE with a band matrix
+BEYOND = "numbalsoda DOP853"  # outside the goals: explicit, compiled, and with the same f
 COURANTS = {"rk4": (1.4, 1.2, 1.0, 0.7), "dormand-prince": (1.4, 1.0)}  # upwind5 and RK4 are stable up to 1.43
 
 
 def pipe_table(quick: bool) -> None:
-    """Error of the end state to the exact one of the semi-discrete equations, against wall time."""
+    """Print the error of the end state, relative to the exact one of the semi-discrete equations, against wall time."""
     pulse = Acoustics(50 if quick else 1000)
     low, up = pulse.band
     print(
@@ -30,7 +30,7 @@ def pipe_table(quick: bool) -> None:
     )
     print(f"{call_time(pulse.rhs, pulse.start.y):.2f} us, interleaved {call_time(pulse.rhs_mixed, pulse.start.y):.2f}")
     budget, rounds = (0.0, 1) if quick else (0.3, 3)
-    tolerances = (1e-6,) if quick else 10.0 ** -np.arange(5.0, 10.0)  # at 1e-4 LSODA turns to full matrices
+    tolerances = (1e-6,) if quick else 10.0 ** -np.arange(5.0, 10.0)  # at 1e-4 LSODA switches to full matrices
     groups = {
         "explicit": [stepped(pulse, method, "courant") for method in COURANTS],
         "implicit": [stepped(pulse, method, "rtol") for method in implicit_methods(quick)],
@@ -58,7 +58,7 @@ def call_time(rhs, y) -> float:
 
 
 def stepped(pulse: Acoustics, method: str, control: str) -> Solver:
-    """fvsolve.advance through the scene; the setting is a Courant number or a tolerance."""
+    """Solver fvsolve.advance; its setting is a Courant number or a tolerance."""
     models = {}
 
     def solve(setting):
@@ -70,9 +70,9 @@ def stepped(pulse: Acoustics, method: str, control: str) -> Solver:
 
 
 def pipe_peers(pulse: Acoustics, quick: bool) -> list[Solver]:
-    """Peers on the same equations: interleaved where they know a band, else as fvsolve keeps the states.
+    """Solvers on the same equations: interleaved states for solvers with a band, otherwise states in fvsolve's order.
 
-    If quick one of each package.
+    With `quick` one of each package.
     """
     t = np.array([0.0, 0.5 * END, END])
     straight = Problem(pulse.rhs, pulse.start.y, t)
@@ -90,12 +90,12 @@ def pipe_peers(pulse: Acoustics, quick: bool) -> list[Solver]:
 
 
 def at_end(solver: Solver, order) -> Solver:
-    """The same, with the end state alone, in fvsolve's order."""
+    """Solver that returns the end state alone, in fvsolve's order."""
     return replace(solver, solve=lambda setting: solver.solve(setting)[-1][order])
 
 
 def verdict(charts) -> None:
-    """Print prices at end error TARGET beside fvsolve's best explicit and best implicit run."""
+    """Print wall times at the end error TARGET, relative to fvsolve's best explicit and best implicit run."""
     prices = {
         name: (*price([(r.wall, r.error) for r in runs], TARGET), group)
         for group, solvers in charts.items()

@@ -1,9 +1,10 @@
-"""What an implicit run takes longer than an explicit one of the same scene, as whole processes.
+"""Additional time of an implicit run over an explicit run of the same scene, as whole processes.
 
     python benchmarks/stiff_start.py [--quick]
 
-This file runs itself, with `--run KIND METHOD` too. Cold is the first run in an empty cache; `after` the first implicit
-run where the explicit one has been before; warm every run from then on. With `--quick` all are in the user's own cache.
+This file also starts itself, with `--run KIND METHOD`. `cold` is the first run with an empty cache. `after` is the
+first implicit run after the explicit one, with the same cache. `warm` is any later run. With `--quick` all runs use the
+user's own cache.
 """
 
 from __future__ import annotations
@@ -17,13 +18,13 @@ from networks import WATER
 from start_up import cache
 
 EXPLICIT, IMPLICIT = "ssp-rk3", ("radau-iia-5", "esdirk-4")
-GOALS = {"cold": 8.0, "warm": 0.8}  # [s] more than the explicit run
+GOALS = {"cold": 8.0, "warm": 0.8}  # in addition to the explicit run [s]
 SCENES = {"dense": (1, 5), "banded": (1, 60), "sparse": (3, 30)}  # linear algebra -> (pipes, cells of each)
-ROOMS = ("irk", "dirk", "newton", "differences", "linear_", "structure", "pivots", "auto")  # that implicit steps are of
+ROOMS = ("irk", "dirk", "newton", "differences", "linear_", "structure", "pivots", "auto")  # of implicit steps
 
 
 def scene(kind: str, method: str) -> dict:
-    """Pipes that leave a lake for one gate, which shuts."""
+    """Case of pipes from a lake to one gate, which closes."""
     pipes, cells = SCENES[kind]
     links = {
         f"p{i}": {
@@ -47,7 +48,7 @@ def scene(kind: str, method: str) -> dict:
 
 
 def start_table(quick: bool) -> None:
-    """Wall times of first and later runs, and what a cache holds after an explicit run."""
+    """Print wall times of first and later runs, and functions of implicit steps in the cache after explicit runs."""
     print("\nStart-up, whole processes [s]; more: beyond the explicit run of the same scene")
     print(f"  {'scene':8} {'method':12} {'cold':>6} {'more':>6} {'after':>6} {'more':>6} {'warm':>6} {'more':>6}")
     worst = {"cold": 0.0, "warm": 0.0}
@@ -57,7 +58,7 @@ def start_table(quick: bool) -> None:
             base, first = first_and_later(own, kind, EXPLICIT, quick)
             print(f"  {kind:8} {EXPLICIT:12} {first:6.2f} {'':6} {'':6} {'':6} {base:6.2f}", flush=True)
             if not quick:
-                print(f"    compiled of the implicit rooms: {', '.join(compiled_rooms(own)) or 'nothing'}")
+                print(f"    functions of implicit steps compiled: {', '.join(compiled_rooms(own)) or 'nothing'}")
             for method in IMPLICIT[: 1 if quick else None]:
                 cold = seconds(kind, method, cache(Path(folder) / f"{kind}-{method}", quick))
                 warm, after = first_and_later(own, kind, method, quick)
@@ -74,7 +75,10 @@ def start_table(quick: bool) -> None:
 
 
 def first_and_later(cache: Path, kind: str, method: str, quick: bool) -> tuple[float, float]:
-    """(best later, first) wall time of one scene in one cache [s]; if quick the first for both."""
+    """Least wall time of later runs, and wall time of the first run, of one scene with one cache [s].
+
+    With `quick` both are that of the first run.
+    """
     first = seconds(kind, method, cache)
     return min((seconds(kind, method, cache) for _ in range(0 if quick else 5)), default=first), first
 
@@ -87,7 +91,7 @@ def seconds(kind: str, method: str, cache: Path) -> float:
 
 
 def compiled_rooms(cache: Path) -> list[str]:
-    """Cached functions of the rooms that only implicit steps need."""
+    """Names of cached functions that only implicit steps need."""
     names = {path.name.split("-")[0] for path in cache.rglob("*.nbi")}
     return sorted(name for name in names if name.startswith(ROOMS))
 
@@ -95,7 +99,7 @@ def compiled_rooms(cache: Path) -> list[str]:
 def main() -> None:
     """Print the table, or make one run of it."""
     options = parser(__doc__)
-    options.add_argument("--run", nargs=2, metavar=("KIND", "METHOD"), help="one run of the table")
+    options.add_argument("--run", nargs=2, metavar=("KIND", "METHOD"), help="scene and method of one run of the table")
     given = options.parse_args()
     if given.run:
         import fvsolve

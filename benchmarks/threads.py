@@ -1,9 +1,9 @@
-"""What threads and ranks are worth in the plane: speed-ups, weak scaling, speed by size; sixteen cores modelled.
+"""Speed-ups of basins by threads and ranks: two of each, weak scaling, speed by size, and a model of sixteen cores.
 
-Wall times per step, the least of many, both numbers of threads in turn: on shared cores nothing else says anything, and
-where they are never free not even that. So CPU times stand beside them: twice that of one thread over that of two is
-what free cores would allow, but for memory that they share. Run with --quick for a small grid alone, --large for
-4096^2 too, --flat 64 256 1024 for speeds by these sizes alone.
+Wall times per step are the least of many, with both numbers of threads in turn, because cores are shared. If cores are
+never free, even these are too long; therefore CPU times are printed as well: twice that of one thread over that of two
+is the speed-up that free cores would allow, except for the memory that they share. `--quick` runs only a small grid,
+`--large` also 4096^2, `--flat 64 256 1024` only speeds by these sizes.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ from fvsolve.solve import initial_state
 from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
 from fvsolve.solve.thread_team import yield_address
 
-END = 1e6  # [s] that no run here comes to
+END = 1e6  # end that no run here reaches [s]
 WATER = "free surface with bed"
 SIZES, GOAL_TWO, GOAL_SIXTEEN, GOAL_WEAK = (256, 512, 1024), 1.8, 12.0, 0.85
 WEAK, MODELLED, BY_SIZE = 512, (512, 1024), (64, 128, 256, 512, 1024)  # cells along a side
 FLAT = {"advection": 1.25, "liquid": 1.25, WATER: 1.2}
-CHUNK, ROUNDS = 0.02, 60  # [s] of a call, and how many of each
+CHUNK, ROUNDS = 0.02, 60  # time of a call [s], number of calls of each loop
 
 
 def model_of(name: str, nx: int, ny: int):
-    """A basin of nx by ny square cells."""
+    """Model of a basin of nx by ny square cells."""
     basin = square(nx) | BASINS[name] | {"cells": [nx, ny], "size": [10.0, 10.0 * ny / nx]}
     return build(load(scene(basin, END)))
 
 
 def begun(model, **team) -> RunLoop:
-    """A loop at the start of a model, warm."""
+    """Time loop at the start of a model, warm."""
     loop = RunLoop(model, **team)
     loop.now[:] = initial_state(model).y
     loop.begin(END, NO_LIMIT)
@@ -53,14 +53,14 @@ def begun(model, **team) -> RunLoop:
 
 
 def steps_of(loop: RunLoop) -> float:
-    """Steps of a call."""
+    """Number of steps of a call, at least 2, that takes about CHUNK."""
     start = perf_counter()
     loop.run(2.0)
     return max(2.0, np.ceil(2.0 * CHUNK / (perf_counter() - start)))
 
 
 def least(loops: list[RunLoop], rounds: int) -> list[np.ndarray]:
-    """(wall, CPU) time of a step of each [s], in turn, the least of many calls."""
+    """Wall and CPU time of a step of each loop [s], in turn, the least of many calls."""
     found, steps = [np.full(2, np.inf) for _ in loops], [steps_of(loop) for loop in loops]
     for _ in range(rounds):
         for k, loop in enumerate(loops):
@@ -72,7 +72,7 @@ def least(loops: list[RunLoop], rounds: int) -> list[np.ndarray]:
 
 
 def by_threads(models, counts, rounds: int) -> list[np.ndarray]:
-    """The same of models by so many threads."""
+    """Wall and CPU time of a step of each model with its number of threads [s]."""
     loops = [begun(model, threads=many) for model, many in zip(models, counts, strict=True)]
     found = least(loops, rounds)
     for loop in loops:
@@ -81,7 +81,7 @@ def by_threads(models, counts, rounds: int) -> list[np.ndarray]:
 
 
 def apart(model) -> float:
-    """Greatest difference between states after ten steps by one thread and by two."""
+    """Greatest difference between the states after ten steps with one thread and with two."""
     states = []
     for many in (1, 2):
         loop = begun(model, threads=many)
@@ -93,13 +93,13 @@ def apart(model) -> float:
 
 @njit
 def meet(own, times):
-    """Wait for each other so often."""
+    """Wait at a barrier `times` times."""
     for _ in range(times):
         band_exchange.barrier(own)
 
 
 def waiting(times: int = 2000, rounds: int = 200) -> float:
-    """Wall time [s] in which two threads find that both are there, the least."""
+    """Least wall time of a barrier of two threads [s]."""
     best = np.inf
     for _ in range(rounds):
         board, owns = aligned_zeros(2 * band_exchange.LINE), np.zeros((2, band_exchange.HEAD), dtype=np.int64)
@@ -120,7 +120,7 @@ def waiting(times: int = 2000, rounds: int = 200) -> float:
 
 
 def two_threads(sizes, rounds: int) -> None:
-    """Speed-ups of two threads, by physics and size."""
+    """Print the speed-ups of two threads, by physics and size."""
     print("\nWall time of a step [us] by one thread and by two: speed-up (by CPU time what free cores would allow)")
     print("| |" + "".join(f" {n}^2 |" for n in sizes))
     print("|---|" + "---|" * len(sizes))
@@ -138,7 +138,7 @@ def two_threads(sizes, rounds: int) -> None:
 
 
 def weak(rounds: int) -> None:
-    """Twice the rows by twice the threads."""
+    """Print the weak scaling: twice the rows with twice the threads."""
     models = [model_of(WATER, WEAK, rows) for rows in (WEAK // 2, WEAK)]
     (one, cpu), (two, both) = by_threads(models, (1, 2), rounds)
     print(f"\nWeak scaling, {WEAK} x {WEAK // 2} cells a thread: "
@@ -147,7 +147,7 @@ def weak(rounds: int) -> None:
 
 
 def by_size(sizes) -> None:
-    """Speed per cell on one thread, CPU time, beside what it is where stages are formed after all rates."""
+    """Print speeds per cell on one thread by CPU time, and those with stages formed after all rates."""
     print("\nMillion cell-steps a second of CPU time, one thread (in brackets: stages formed apart from rates)")
     print("| |" + "".join(f" {n}^2 |" for n in sizes) + " spread |\n|---|" + "---|" * (len(sizes) + 1))
     for name in BASINS:
@@ -161,16 +161,16 @@ def by_size(sizes) -> None:
                     loop.run(steps)
                     best[k] = min(best[k], (process_time() - start) / steps)
             found = n * n / best / 1e6
-            speeds.append(found[0] if formed.size else found.max())  # small ones have one way
+            speeds.append(found[0] if formed.size else found.max())  # small basins have one kind of stages
             row += f" {speeds[-1]:.1f}{f' ({found[1]:.1f})' if formed.size else ''} |"
         spread = max(speeds) / min(speeds)
         print(f"{row} {spread:.2f}, goal {FLAT[name]}: {'met' if spread <= FLAT[name] else 'missed'} |", flush=True)
 
 
 def sixteen(size: int, wait: float, many: int = 16, stages: int = 2) -> None:
-    """What so many cores would give: their rates are measured on bands one after the other, waiting is scaled up.
+    """Print the modelled speed-up of many cores: rates measured on one band after the other, waiting scaled up.
 
-    A wait of n looks at n lines: n / 2 times that of two. Memory that cores share is not in it.
+    A barrier of n threads reads n lines: n / 2 times the wait of two. The memory that cores share is not included.
     """
     model = model_of(WATER, size, size)
     loop, y, out = begun(model), initial_state(model).y, model.new_out()
@@ -187,7 +187,7 @@ def sixteen(size: int, wait: float, many: int = 16, stages: int = 2) -> None:
 
     slowest = max(rates(cuts[k], cuts[k + 1]) for k in range(many))
     rest = max(step - stages * rates(0, size), 0.0) / many
-    rows = 2 * 5 * 3 * size * 8 / 5e9  # taken from both neighbours [s], at 5 GB/s
+    rows = 2 * 5 * 3 * size * 8 / 5e9  # time to read rows of both neighbours at 5 GB/s [s]
     waits = (3 * stages + 1) * wait * many / 2.0
     found = stages * (slowest + rows) + rest + waits
     print(f"MODELLED, {many} cores, {WATER}, {size}^2: rates of the slowest band {1e6 * slowest:.0f} us (measured), "
@@ -196,7 +196,7 @@ def sixteen(size: int, wait: float, many: int = 16, stages: int = 2) -> None:
 
 
 def rank(sizes, rounds: int) -> None:
-    """What one rank of MPI does: rank 0 prints its wall times of steps."""
+    """Run the steps of one rank of MPI; rank 0 prints its wall times of steps."""
     comm = mpi_run.world()
     for n in sizes:
         model = model_of(WATER, n, n)
@@ -213,7 +213,7 @@ def rank(sizes, rounds: int) -> None:
 
 
 def two_ranks(sizes, rounds: int) -> None:
-    """Speed-ups of two ranks."""
+    """Print the speed-ups of two ranks."""
     if not peer_module("mpi4py", "mpi4py"):
         return
     start = Path(sys.executable).with_name("mpiexec")
@@ -230,9 +230,11 @@ def two_ranks(sizes, rounds: int) -> None:
 def main() -> None:
     global BASINS, CHUNK, WEAK, MODELLED, BY_SIZE
     options = parser(__doc__)
-    options.add_argument("--large", action="store_true", help="speeds of 2048^2 and 4096^2 cells too")
-    options.add_argument("--flat", nargs="+", type=int, metavar="SIZE", help="speeds by these sizes alone")
-    options.add_argument("--rank", nargs="+", type=int, metavar="SIZE", help="what one rank of MPI does")
+    options.add_argument("--large", action="store_true", help="also speeds of 2048^2 and 4096^2 cells")
+    options.add_argument("--flat", nargs="+", type=int, metavar="SIZE", help="only speeds by these sizes")
+    options.add_argument(
+        "--rank", nargs="+", type=int, metavar="SIZE", help="grids of one rank of MPI that the script starts"
+    )
     given, sizes, rounds = options.parse_args(), SIZES, ROUNDS
     if given.quick:
         sizes, rounds, WEAK, MODELLED, BY_SIZE, BASINS, CHUNK = (
@@ -254,7 +256,7 @@ def main() -> None:
     print(machine("fvsolve", "numba", "mpi4py"))
     print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f} when this began")
     wait = waiting(*((200, 5) if given.quick else ()))
-    print(f"two threads find each other in {1e9 * wait:.0f} ns, the least")
+    print(f"least time of a barrier of two threads {1e9 * wait:.0f} ns")
     two_threads(sizes, rounds)
     weak(rounds)
     two_ranks(sizes, rounds)

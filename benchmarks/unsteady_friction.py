@@ -1,10 +1,11 @@
 """Unsteady friction as the step halves: `python benchmarks/unsteady_friction.py`.
 
-A valve shuts at the end of the 914 m main of cases/valve-closure.toml (Reynolds 131 000), in 50 ms and at once.
-Joukowsky and the friction head let the head at the gate rise to 326 ft; unsteady friction may add 1 %. Beside fvsolve
-rthym-moc 0.4.1 with its unsteady friction on and its defaults (usf_tau 0.5 s, Vardy-Brown coefficient; its closure is a
-demand that ends), and TSNet 0.3.1 with friction "unsteady", skipped where it is not installed. The same step in all
-three; the head of the first plateau, 1 s behind the closure, and the greatest head over 9 s from the closure on.
+A valve closes at the end of the 914 m main of cases/valve-closure.toml (Reynolds 131 000), in 50 ms and at once.
+By Joukowsky's jump and the friction head, the head at the gate rises to 326 ft; unsteady friction may add 1 %. The
+peers are rthym-moc 0.4.1 with unsteady friction and its defaults (usf_tau 0.5 s, Vardy-Brown coefficient; its closure
+is a demand that ends), and TSNet 0.3.1 with friction "unsteady"; a peer that is not installed is skipped. All programs
+use the same step. The tables give the head of the first plateau, 1 s after the closure, and the greatest head over 9 s
+from the closure on.
 """
 
 import contextlib
@@ -31,7 +32,7 @@ END, SHUT = 10.0, 1.0  # [s]
 
 @dataclass
 class Main:
-    """The main of the case, in SI, as `peer_moc` takes it."""
+    """Main of the case in SI units, with the attributes that `peer_moc` reads."""
 
     length: float = 914.4
     diameter: float = 0.3048
@@ -43,7 +44,7 @@ class Main:
 
 
 def by_fvsolve(reaches, duration):
-    """(times from the closure [s], heads at the gate [ft], CPU time [s])."""
+    """Times from the closure [s], heads at the gate [ft] and CPU time [s] of fvsolve."""
     keys = {"links.main.cells": reaches, "links.main.friction": {"model": "unsteady", "roughness": "0.26 mm"},
             "links.valve.opening": {"start": SHUT, "duration": duration, "value": [1.0, 0.0]}}  # fmt: skip
     begin = process_time()
@@ -52,7 +53,10 @@ def by_fvsolve(reaches, duration):
 
 
 def by_rthym(reaches, duration):
-    """The same; the demand ends at the start."""
+    """Times from the closure [s], heads at the gate [ft] and CPU time [s] of rthym-moc.
+
+    The demand ends at the start.
+    """
     begin, step = process_time(), Main.length / Main.wave_speed / reaches
     trace = peer_moc.uniform_pipe(
         Main(duration=max(duration, step)), reaches, int(9.0 * 1219.2 / 914.4 * reaches), friction=(0.5, -1.0)
@@ -61,7 +65,7 @@ def by_rthym(reaches, duration):
 
 
 def numbers(solve):
-    """A function of TSNet whose arrays of one are made numbers, which numpy 2 does not do by itself."""
+    """Function of TSNet with arrays of one element converted to numbers, which numpy 2 does not do by itself."""
 
     def wrapped(*given):
         return tuple(float(np.ravel(one)[0]) for one in solve(*given))
@@ -70,14 +74,17 @@ def numbers(solve):
 
 
 def stepped(tm, reaches):
-    """Give a TSNet model its step; its own `set_time` leaves arrays of one."""
+    """Set the step of a TSNet model, because its own `set_time` leaves arrays of one element."""
     for _, pipe in tm.pipes():
         pipe.number_of_segments = reaches // 2
     tm.simulation_period, tm.time_step = END, Main.length / Main.wave_speed / reaches
 
 
 def by_tsnet(reaches, duration):
-    """The same; the main in two halves, for TSNet knows no end of a pipe that is alone."""
+    """Times from the closure [s], heads at the gate [ft] and CPU time [s] of TSNet.
+
+    The main is in two halves, because TSNet does not support a single pipe.
+    """
     import tsnet
     import wntr
     from tsnet.simulation import single, solver
@@ -117,7 +124,7 @@ def by_tsnet(reaches, duration):
 
 
 def table(duration):
-    """Print what all three find for a closure."""
+    """Print the results of all programs for a closure."""
     print("peer       reaches  plateau  change  greatest  over 326 ft  CPU [s]")
     peers = (("rthym-moc", by_rthym),) * bool(peer_moc.rthym_moc) + (("TSNet", by_tsnet),) * bool(TSNET)
     for name, solve in (("fvsolve", by_fvsolve), *peers):
@@ -128,7 +135,7 @@ def table(duration):
             change = "" if before is None else f"{plateau - before:+.3f}"
             more = 100.0 * (head.max() / BOUND - 1.0)
             print(f"{name:10s} {reaches:7d}  {plateau:7.2f} {change:>7s}  {head.max():8.1f}  {more:9.1f} %  {cpu:7.2f}")
-            if name != "rthym-moc":  # whose own is far above
+            if name != "rthym-moc":  # its plateau is far above
                 agree(f"plateau of {name} beside {BOUND:g} ft", abs(plateau / BOUND - 1.0), 0.02)
             before = plateau
 

@@ -133,6 +133,11 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
     return f'; did you mean "{close}"?' if close else ""
 
 
+def article(noun: str) -> str:
+    """Noun with its indefinite article: "a pipe", "an accumulator"."""
+    return f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}"
+
+
 EXTRA_NAMES = 2  # names above the limit of a listing that are still listed
 
 

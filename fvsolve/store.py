@@ -146,8 +146,8 @@ def read(path: Path, identity: str) -> Code | None:
     header, _, object_code = data.partition(b"\n")
     head = json.loads(header)
     if head["target"] != target()["name"]:
-        _warn(f"{path.parent} contains code compiled for {head['target']}; this machine is {target()['name']}; it is "
-                "compiled again")  # fmt: skip
+        _warn(f"{path.parent} contains code compiled for {head['target']}; this machine is {target()['name']}; the "
+                "code is compiled again")  # fmt: skip
         return None
     if head["function"] != identity:
         return None
@@ -155,7 +155,9 @@ def read(path: Path, identity: str) -> Code | None:
     if not missing:
         with contextlib.suppress(RuntimeError):  # LLVM writes missing symbols to standard error
             return _link(head["symbols"], head["wanted"], object_code, identity)
-    reason = f"numba {numba_version()} has no {', '.join(missing)}" if missing else "it calls what is not loaded"
+    reason = (
+        f"numba {numba_version()} has no {', '.join(missing)}" if missing else "it calls functions that are not loaded"
+    )
     _warn(f"{path}: code of {identity.split()[0]} cannot be loaded: {reason}; it is compiled again")
     return None
 

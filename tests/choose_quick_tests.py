@@ -1,10 +1,10 @@
-"""Choose the quick tests: record what each test costs, and write the others to `tests/durations.json`.
+"""Choose the quick tests: record the cost of each test, and write the other tests to `tests/durations.json`.
 
     python tests/choose_quick_tests.py [--seconds 415] [--recording FOLDER]
 
-A test costs its own processor time and its share of compiling: the time to compile a function, divided by the number of
-quick tests that call it. The dearest test goes, again and again, until the rest takes the time that is given. A test
-stays that alone runs a part, scheme, method, density law, command or shipped case.
+The cost of a test is its own processor time and its share of compilation: the time to compile a function, divided by
+the number of quick tests that call it. The most expensive tests are removed until the others take the given time. A
+test stays if no other test runs a part, scheme, method, density law, command or shipped case.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ CALLED: set[str] = set()  # functions that the present test calls
 
 
 def recording(cache):
-    """The same decorator as `cache`, but a cached result counts as calls of the functions that computing it called."""
+    """Decorator like `cache`, except that a cached result counts as calls of the functions that computed it."""
 
     def decorator(function):
         calls: dict = {}
@@ -66,7 +66,7 @@ def recording(cache):
 
 
 class Recorder:
-    """Plugin of pytest that writes a line for each test of a worker process."""
+    """Pytest plugin that writes a line for each test of a worker process."""
 
     def __init__(self, path: Path) -> None:
         self.file = path.open("a", buffering=1, encoding="utf-8")
@@ -138,7 +138,7 @@ def pytest_configure(config) -> None:
 
 
 def record(folder: Path) -> None:
-    """Run all tests from a cold cache, and record each."""
+    """Run all tests with an empty cache, and record each."""
     with tempfile.TemporaryDirectory(prefix="fvsolve-cache-") as cache:
         environment = os.environ | {FOLDER: str(folder), "FVSOLVE_CACHE": cache, "PYTHONPATH": str(LIST.parent)}
         command = [
@@ -178,7 +178,7 @@ def costs(rows: list[dict]) -> tuple[dict[str, Cost], dict[str, float]]:
 
 
 def needed(tests: dict[str, Cost]) -> set[str]:
-    """The cheapest tests that cover each name: the rarest name first."""
+    """Cheapest tests that cover each name, chosen for the rarest name first."""
     covers: dict[str, list[str]] = defaultdict(list)
     for test, cost in tests.items():
         for name in cost.names:

@@ -1,4 +1,4 @@
-"""Fixtures of all tests, the choice between quick tests and all tests, and what every test restores.
+"""Fixtures of all tests, the choice between quick tests and all tests, and the surroundings that a test must restore.
 
 `pytest` without paths runs the quick tests: all but those that `tests/durations.json` lists as slow. `pytest --full`
 and `pytest PATH` run every test. `tests/choose_quick_tests.py` writes the list from a recording.
@@ -116,7 +116,7 @@ def fvs(monkeypatch, capsys):
 
 @pytest.fixture(scope="session")
 def cluster():
-    """Two processes of Dask."""
+    """Cluster of two processes of Dask."""
     distributed = pytest.importorskip("distributed", reason="Dask is an extra")
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as local:
         yield local

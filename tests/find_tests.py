@@ -2,9 +2,9 @@
 
     python tests/find_tests.py fvsolve/steady.py              tests, and how many lines of the module each runs
     python tests/find_tests.py fvsolve/steady.py --line 120   tests that run a line
-    python tests/find_tests.py --record                       record anew: ten minutes on two cores
+    python tests/find_tests.py --record                       make a new recording: ten minutes on two cores
 
-The recording has two parts, by coverage.py: the quick tests, for Python, and the quick tests of `UNCOMPILED` without
+The recording by coverage.py has two parts: the quick tests, for Python, and the quick tests of `UNCOMPILED` without
 compilation, for kernels. Tests of the second part that need a compiler, or more than LIMIT, fail as expected.
 """
 
@@ -42,7 +42,7 @@ RECORDINGS = {  # name -> environment and paths of its tests
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item):
-    """Fail a test that takes longer than LIMIT: a hook for the tests without compilation."""
+    """Fail a test that takes longer than LIMIT; a hook for the tests without compilation."""
 
     def stop(*_):
         raise TimeoutError(f"longer than {LIMIT} s")

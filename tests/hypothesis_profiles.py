@@ -1,9 +1,9 @@
 """Settings of tests that draw their input by hypothesis: every commit draws the same input.
 
-Hypothesis seeds by the source of a test and draws constants that it finds in loaded modules, so that each edit of the
-package would give other scenes. Here the seed is the name of the test, and no constant is taken from a module.
-FVSOLVE_EXAMPLES=1000 draws that many new inputs a test, for a long run. An input that fails is kept for good: paste the
-arguments that hypothesis prints, as a dictionary, into the list in `tests/failing_examples/MODULE.TEST.txt`.
+Hypothesis uses a seed from the source of a test, and constants of loaded modules, so each edit of the package would
+change the input. Here the seed is the name of the test, and no constant of a module is used. FVSOLVE_EXAMPLES=1000
+draws that many new inputs per test, for a long run. Store an input that fails: paste the arguments that hypothesis
+prints, as a dictionary, into the list in `tests/failing_examples/MODULE.TEST.txt`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ settings.register_profile("quick", max_examples=5, derandomize=not NEW, **COMMON
 
 
 def fix_constants() -> None:
-    """Keep hypothesis from drawing constants of the modules that are loaded."""
+    """Prevent hypothesis from drawing constants of the modules that are loaded."""
     providers.is_local_module_file = lambda path: False
 
 

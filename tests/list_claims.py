@@ -1,4 +1,4 @@
-"""List the claims of the tests, or those that a commit had and the working tree has not.
+"""List the claims of the tests, or the claims of a commit that are missing in the working tree.
 
     python tests/list_claims.py [COMMIT]
 

@@ -3,8 +3,8 @@
     python tests/planted_faults.py [--full] [--only TEXT] [--jobs 2]
 
 A fault is a sign, an index or a factor of 1.01. Each is planted alone in a copy of the repository. The quick tests of
-the folder run first, then all quick tests; with --full a fault that these miss meets all tests. A fault that stops the
-import of fvsolve would be found by any test, and is an error of this list.
+the corresponding folder run first, then all quick tests; with --full all tests run on a fault that these miss. A fault
+that stops the import of fvsolve would be found by any test, and is an error of this list.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ QUICK_NEEDED, ALL_NEEDED = 36, 40
 
 @dataclass(frozen=True)
 class Fault:
-    """Replacement of a text that stands once in a file of the package.
+    """Replacement of a text that occurs once in a file of the package.
 
     path : below fvsolve
     """
@@ -35,7 +35,7 @@ class Fault:
     new: str
 
     def planted(self, text: str) -> str:
-        """Text of the file with the fault; raises ValueError where the old text does not stand once in it."""
+        """Text of the file with the fault; raises ValueError if the old text does not occur exactly once."""
         if text.count(self.old) != 1:
             raise ValueError(f"fvsolve/{self.path}: {self.old!r} stands {text.count(self.old)} times, expected once")
         return text.replace(self.old, self.new)
@@ -172,7 +172,7 @@ def tests_fail(folder: Path, jobs: int, *options: str) -> str:
 
 
 def near(fault: Fault) -> str:
-    """Folder of tests of the folder of the package in which a fault stands."""
+    """Folder of tests that corresponds to the folder of a fault, tests/schemes if there is none."""
     folder = TOP / "tests" / fault.path.split("/")[0]
     return f"tests/{folder.name}" if folder.is_dir() else "tests/schemes"
 

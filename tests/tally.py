@@ -10,7 +10,7 @@ from reference import folders
 
 
 class Tally:
-    """Names that were run, by kind; filled by hooks in this process, merged from workers of pytest-xdist."""
+    """Names that were run, by kind, from hooks in this process and from workers of pytest-xdist."""
 
     def __init__(self) -> None:
         self.names: dict[str, set[str]] = defaultdict(set)
@@ -35,7 +35,7 @@ class Tally:
         return {kind: sorted(names) for kind, names in self.names.items()}
 
     def missing(self) -> list[str]:
-        """One line for each kind with a name that was not run, and for each listed test that does not exist."""
+        """Lines for each kind with a name that was not run, and for each listed test that does not exist."""
         lines = {kind: sorted(names - self.names[kind]) for kind, names in expected().items()}
         unknown = [f"tests/durations.json: {name} is not a test" for name in sorted(self.names["unknown"])]
         return [f"{kind}: {', '.join(names)}" for kind, names in lines.items() if names] + unknown

@@ -198,7 +198,7 @@ class BasinRows:
         if self.scalars and self.opening is not None:
             return f"scalars flow through its open boundary {self.opening}"
         if decaying := [name for name in self.scalars if self.case.scalars[name].decay > 0.0]:
-            return f"{listing(decaying)} decays"
+            return f"{listing(decaying)} {'decay' if len(decaying) > 1 else 'decays'}"
         return "" if self.banded else f"its physics {self.part.physics} cannot be distributed over threads"
 
     @property
@@ -418,13 +418,14 @@ class BasinRows:
         if diffusing and not self.is_grid:
             return (
                 None,
-                f"{listing(diffusing)} diffuses on a mesh with oblique faces; a rectangle keeps the bounds",
+                f"{listing(diffusing)} {'diffuse' if len(diffusing) > 1 else 'diffuses'} on a mesh with oblique faces; "
+                "a rectangle keeps the bounds",
                 None,
                 None,
             )
         if self.max_divergence > ROUNDING * row["fastest"]:
             reason = f"the velocity has a divergence of up to {self.max_divergence:.3g} 1/s"
-            text = f"{reason}, which concentrates or dilutes scalars; a velocity by a stream function has none"
+            text = f"{reason}, which concentrates or dilutes scalars; a velocity by a stream function has no divergence"
             return "velocity", text, self.max_divergence, 0.0
         radius = ssp_radius(method)
         if numerics.courant > radius:
@@ -434,7 +435,7 @@ class BasinRows:
                 else "with this method no Courant number keeps the bounds"
             )
             key = "courant" if radius else "method"
-            return key, f"{advice}, with ssp-rk3 up to 1", numerics.courant, radius
+            return key, f"{advice}; with ssp-rk3 those up to 1 do", numerics.courant, radius
         return None
 
     def scalar_scale(self, name: str) -> float:

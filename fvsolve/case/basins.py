@@ -223,22 +223,28 @@ def find_faults(
             if patch not in known:
                 yield (*key, "patches", patch), f"the mesh has no such patch; {_patch_hint(basin, known, patch)}"
             elif f"{name}.{patch}" in joined and not own.joined:
-                yield (*key, "patches", patch), "a link joins here, but the key `velocity` gives the flow"
+                yield (
+                    (*key, "patches", patch),
+                    "a link joins this patch, but the key `velocity` gives the flow; expected no link",
+                )
             elif f"{name}.{patch}" in joined and (options.boundary or options.impedance) is not None:
                 key_name = "boundary" if options.boundary else "impedance"
                 yield (
                     (*key, "patches", patch, key_name),
-                    "a link joins here and is the boundary of the patch; leave this key out",
+                    "a link joins this patch and is its boundary; leave this key out",
                 )
             if options.impedance is not None and not own.allows_impedance:
-                yield (*key, "patches", patch, "impedance"), f"does not apply to physics {show(basin.physics)}"
+                yield (
+                    (*key, "patches", patch, "impedance"),
+                    f"does not apply to physics {show(basin.physics)}; leave this key out",
+                )
         shapes = [*own.formulas(basin, meshes[name])]
         if basin.start is not None:
             shapes += [
                 (("start", key_name), getattr(basin.start, key_name), None) for key_name in BasinStart.model_fields
             ]
             for other in sorted(basin.start.model_fields_set - set(own.starts.model_fields)):
-                yield (*key, "start", other), f"does not apply to physics {show(basin.physics)}"
+                yield (*key, "start", other), f"does not apply to physics {show(basin.physics)}; leave this key out"
         shapes += [(("scalars", scalar), shape, None) for scalar, shape in basin.scalars.items()]
         for below, shape, points in shapes:
             try:

@@ -10,7 +10,7 @@ import numpy as np
 from fvsolve.case import sloshing
 from fvsolve.case.bodies import carrier_of, point_inertia, poses
 from fvsolve.case.cell_means import means, samples
-from fvsolve.errors import did_you_mean, listing
+from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.parts.basin.part import Physics
 from fvsolve.parts.body.part import Body
 from fvsolve.parts.node import PlaceOnBody
@@ -65,7 +65,7 @@ def place_faults(name: str, node: PlaceOnBody, nodes: dict[str, Any], named: Any
     if node.on is None:
         for other in ("at", "attitude"):
             if getattr(node, other, None) is not None:
-                yield (*key, other), "is a position on a body; give the body as `on = BODY`"
+                yield (*key, other), "has no effect without a body; give the body as `on = BODY`, or remove this key"
         return
     if node.on in nodes or node.on not in named:  # otherwise the body itself is faulty
         yield from (((*key, "on"), text) for text in body_faults(node.on, nodes, named))
@@ -88,8 +88,9 @@ def overturned(nodes: dict[str, Any], poses: dict[str, Any]) -> Faults:
             continue
         turn = poses[on].attitude @ getattr(node, "rotation", np.eye(3))
         if turn[2, 2] <= 0.0:
-            text = f"its bottom is inclined by {np.degrees(np.arccos(turn[2, 2])):.3g} deg on {on}, which is fixed"
-            yield ("nodes", name, "on"), f"{text}: its contents would run out; expected less than 90 deg"
+            angle = np.degrees(np.arccos(turn[2, 2]))
+            text = f"the bottom of {name} is inclined by {angle:.3g} deg on {on}, which is fixed"
+            yield ("nodes", name, "on"), f"{text}: the contents would run out; expected less than 90 deg"
 
 
 def body_faults(on: str, nodes: dict[str, Any], named: Any) -> Iterator[str]:
@@ -97,7 +98,7 @@ def body_faults(on: str, nodes: dict[str, Any], named: Any) -> Iterator[str]:
     bodies = [body for body, node in nodes.items() if isinstance(node, Body)]
     bodies += [body for body in named if body not in nodes and getattr(named[body], "get", {}.get)("type") == "body"]
     if not isinstance(nodes.get(on), Body):
-        state = f"is a {nodes[on].kind}" if on in nodes else "is not a node"
+        state = f"is {article(nodes[on].kind)}" if on in nodes else "is not a node"
         yield f"{show(on)} {state}; expected a body: {listing(bodies) or 'the case has none'}{did_you_mean(on, bodies)}"
         return
 

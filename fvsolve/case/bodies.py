@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fvsolve import attitude
-from fvsolve.errors import did_you_mean, listing
+from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.exact.schedule_values import value
 from fvsolve.parts.attitude_keys import is_zero_vector
 from fvsolve.parts.body.part import Body
@@ -206,7 +206,7 @@ def coincident_ends(nodes: dict[str, Any], links: dict[str, Any], poses_of: dict
             continue
         if None not in [body_point(nodes, end) for end in ends] and separation(nodes, poses_of, *ends) == 0.0:
             text = f"{ends[0]} and {ends[1]} coincide at the start, so the line between them has no direction"
-            yield ("links", name), text
+            yield ("links", name), f"{text}; expected a distance above 0"
 
 
 def open_pins(nodes: dict[str, Any], links: dict[str, Any], poses_of: dict[str, Pose]) -> Faults:
@@ -219,7 +219,7 @@ def open_pins(nodes: dict[str, Any], links: dict[str, Any], poses_of: dict[str, 
         turn = poses_of.get(points[0][0], AT_REST).attitude
         gap = float(np.linalg.norm(link.directions() @ (turn.T @ (there - here))))
         if gap > PIN_GAP * (1.0 + float(np.linalg.norm(points[0][1]))):
-            across = " across its axis" if link.axis else ""
+            across = " across the axis of the pin" if link.axis else ""
             yield (
                 ("links", name),
                 f"{link.from_} and {link.to} lie {gap:.4g} m apart{across} at the start; expected the same place",
@@ -239,7 +239,7 @@ def find_faults(nodes: dict[str, Any], named: Any) -> Faults:
         if on == WORLD or (on not in nodes and on in named):  # the carrier itself is faulty
             continue
         if on not in own:
-            state = f"is a {nodes[on].kind}" if on in nodes else "is not a node"
+            state = f"is {article(nodes[on].kind)}" if on in nodes else "is not a node"
             hint = did_you_mean(on, own) or f"; bodies are {listing(bodies)}"
             yield keys, f"{show(on)} {state}; expected a body, a point of a body, or a point of a frame{hint}"
         elif point and point not in own[on].points:

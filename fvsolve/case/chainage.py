@@ -17,7 +17,7 @@ import numpy as np
 
 from fvsolve import units
 from fvsolve.case.raw import split_key
-from fvsolve.errors import did_you_mean, listing
+from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.parts import KINDS, Pipe
 from fvsolve.units import show
 
@@ -123,11 +123,10 @@ def unfit_reason(group: str, part: dict[str, Any]) -> str | None:
     """Reason why a part of a known type cannot be placed on a pipe; None if it can."""
     kind = kind_of(group, part)
     if group == "nodes" and (kind.domain != "hydraulic" or kind.own_places(part) is not None):
-        return f"a {kind.kind} cannot be placed on a pipe; expected a hydraulic node, such as a junction"
+        return f"{article(kind.kind)} cannot be placed on a pipe; expected a hydraulic node, such as a junction"
     if group == "links" and not set(kind.joins) <= {"from", "to"}:
-        return (
-            f"a {kind.kind} has other ports than `from` and `to`; place a junction on the pipe and join the part to it"
-        )
+        text = f"{article(kind.kind)} has other ports than `from` and `to`"
+        return f"{text}; place a junction on the pipe and join the part to this junction"
     if kind is Pipe:
         return "a pipe has a length, so it cannot be placed on a pipe; place a junction there and join the pipe to it"
     return None
@@ -198,7 +197,7 @@ def faults(table: dict[str, Any]) -> Iterator[tuple[tuple, str]]:
         elif "from" in part:
             yield (
                 (*key, "from"),
-                "`on` and `at` place it on a pipe, so it starts there; remove `from`, or `on` and `at`",
+                "`on` and `at` place this link on a pipe, where it starts; remove `from`, or `on` and `at`",
             )
 
 
@@ -298,7 +297,10 @@ def sort_parts(parts: list[Placed], report: Report) -> bool:
     parts.sort(key=lambda part: part.distance)
     pairs = [(part, other) for part, other in zip(parts, parts[1:], strict=False) if part.distance == other.distance]
     for part, other in pairs:
-        report((other.group, other.name, "at"), f"{part.name} has the same place; join the part to it, or change `at`")
+        report(
+            (other.group, other.name, "at"),
+            f"{part.name} has the same place; join {other.name} to {part.name}, or change `at`",
+        )
     return not pairs
 
 
@@ -340,11 +342,11 @@ def name_faults(
         for place in dict.fromkeys(item.joins) if item.group == "links" else ():
             if place in result.table["nodes"]:
                 result.connections_known = False
-                text = f"{item.name} joins {item.given['on']} at a place that also has the name {show(place)}"
+                text = f"{item.name} joins {item.given['on']} at a new node {show(place)}, and this name exists already"
                 report(("nodes", place), f"{text}; rename this node")
     own = given.get("pieces", {})
     if not isinstance(own, dict) or not all(isinstance(item, dict) for item in own.values()):
-        report(("links", name, "pieces"), f"{show(own)} is not a table; expected tables by the names of pieces")
+        report(("links", name, "pieces"), f"{show(own)} is not a table; expected a table for each piece, by its name")
         return
     for item in own:
         if item not in names:

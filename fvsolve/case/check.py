@@ -11,7 +11,7 @@ from fvsolve.case.bodies import WORLD
 from fvsolve.case.expectations import Expect
 from fvsolve.case.raw import Raw
 from fvsolve.case.sections import CAVITY_SCHEMES, FluidSpec, Numerics
-from fvsolve.errors import did_you_mean, listing
+from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.parts import KINDS, Chamber
 from fvsolve.parts.context import CaseContext
 from fvsolve.parts.value import ROOT
@@ -322,7 +322,7 @@ def _unknown_place(place: str, places: dict[str, Any], nodes: dict[str, Any], li
     if place in links:
         own = [other for other in places if other not in nodes and other.startswith(f"{place}.")]
         if own:
-            return f"{show(place)} is a {_dict(links[place])['type']}; its places are {listing(own)}"
+            return f"{show(place)} is {article(_dict(links[place])['type'])}; its places are {listing(own)}"
         return f"{show(place)} is a link, and a link joins places: put a junction between; places are {listing(places)}"
     return f"no place named {show(place)}; places are {listing(places)}{did_you_mean(place, places)}"
 
@@ -335,12 +335,11 @@ def chambers_of(link: Any) -> list[str]:
 def _wrong_domain(place: str, domain: str, places: dict[str, Any], nodes: dict[str, Any], link: dict[str, Any]) -> str:
     owned = "shaft" if places[place] == "rotational" else "chamber"
     owned = "point" if places[place] == "spatial" else owned
-    state = f"is a {nodes[place]['type']}" if place in nodes else f"is a {owned}"
+    state = f"is {article(nodes[place]['type'] if place in nodes else owned)}"
     alike = [name for name, other in places.items() if _fits(other or "", domain)]
     has = f"; {domain} places are {listing(alike)}" if alike else ""
-    return (
-        f"{show(place)} {state}, a {places[place]} place, and this port of a {link['type']} needs a {domain} place{has}"
-    )
+    text = f"{show(place)} {state}, a {places[place]} place, and this port of {article(link['type'])} needs"
+    return f"{text} a {domain} place{has}"
 
 
 def _islands(ends: dict[str, list[str]]) -> list[list[str]]:

@@ -86,7 +86,7 @@ def find_faults(table: Mapping[str, Any], setting: ReadContext) -> Iterator[tupl
         if kind not in KINDS:
             yield (
                 ("defaults", kind),
-                f"defaults of {show(kind)} are unknown{did_you_mean(kind, KINDS)}; expected defaults of pipe",
+                f"{show(kind)} has no defaults{did_you_mean(kind, KINDS)}; expected defaults of pipe",
             )
         elif not isinstance(keys, dict):
             yield ("defaults", kind), f"{show(keys)} is not a table; expected keys of a {kind}"
@@ -103,7 +103,7 @@ def _of_keys(kind: str, given: dict[str, Any], setting: ReadContext) -> Iterator
             if key not in COMPLETED:
                 yield from _of_value(key, known[key], value, setting)
         elif key in (*NOT_DEFAULT, "type"):
-            yield (key,), f"cannot be a default; each {kind} states its own"
+            yield (key,), f"cannot be a default; each {kind} states its own value"
         else:
             hint = KINDS[kind].synonyms.get(key)
             near = f"; use {hint}" if hint else did_you_mean(key, known) or f"; keys are {listing(list(known))}"

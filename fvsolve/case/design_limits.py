@@ -132,7 +132,7 @@ def read_limit(
         with suppress(KeyError, ValueError):
             bounds[key] = keys[key][0].read(given[key], setting)
     if not any(key in given for key in BOUNDS):
-        faults.append(((), f"bound is missing; expected one of {', '.join(BOUNDS)}"))
+        faults.append(((), f"bound is missing; expected at least one of {', '.join(BOUNDS)}"))
     if bounds["maximum"] is not None and bounds["class_fraction"] is not None:
         faults.append((("class_fraction",), "maximum and class_fraction are given; keep one"))
     minimum, maximum = bounds["minimum"], bounds["maximum"]
@@ -162,10 +162,13 @@ def limit_faults(limit: DesignLimit | None, fluid: Any, gravity: float) -> Itera
 def pipes_without_class(extent: Extent, links: Mapping[str, Any]):
     """Fault of the key `class_fraction` if the quantity is not a pressure, or if a part has no pressure class."""
     if extent.quantity not in OF_PRESSURE or extent.quantity == "head":
-        yield ("class_fraction",), f"a class limits pressure, not {extent.quantity}; leave out `quantity`"
+        yield ("class_fraction",), f"a pressure class limits the pressure, not {extent.quantity}; leave out `quantity`"
         return
     bare = {name for name, link in links.items() if getattr(link, "allowable_pressure", None) is None}
     parts = [name for group, name in extent.parts if group != "links" or name in bare]
     if parts:
         more = f" and {len(parts) - 1} more" if len(parts) > 1 else ""
-        yield ("class_fraction",), f"{parts[0]}{more} has no pressure class; give it `class` or `allowable_pressure`"
+        yield (
+            ("class_fraction",),
+            f"no pressure class is given for {parts[0]}{more}; expected the key `class` or `allowable_pressure` there",
+        )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fvsolve.case.probe import Kinds, Probe, may_be_piece
-from fvsolve.errors import did_you_mean, listing
+from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.parts import KINDS, Pipe, Reservoir
 from fvsolve.parts.value import ValueFault
 from fvsolve.units import show
@@ -94,8 +94,9 @@ def read_extent(given: Any, quantity: str, kinds: Kinds, routes: Mapping[str, An
     if lacking:
         group, name, known = lacking[0]
         more = f", and {len(lacking) - 1} more" if len(lacking) > 1 else ""
-        has = f"it has {', '.join(known)}{did_you_mean(quantity, known)}" if known else "it has no quantities"
-        text = f"{name}{more} has no {show(quantity)}: it is a {kinds[group][name].kind}; {has}"
+        has = f"has {', '.join(known)}{did_you_mean(quantity, known)}" if known else "has no quantities"
+        verb = "have" if more else "has"
+        text = f"{name}{more} {verb} no {show(quantity)}: {name} is {article(kinds[group][name].kind)} and {has}"
         raise ValueFault([(("quantity",), text)])
     if not known:
         return None

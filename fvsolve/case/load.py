@@ -579,7 +579,7 @@ class _Reader:
         if worst is not None and counts[worst] > MOST_CELLS:
             self.fault(
                 ("numerics", "cell_time"),
-                f"would cut {worst} into {counts[worst]:.3g} cells; expected at most {MOST_CELLS:.0e}",
+                f"would cut {worst} into {counts[worst]:.3g} cells, more than {MOST_CELLS:.0e}; expected a longer time",
             )
             return links
         filled = {name: links[name].model_copy(update={"cells": count}) for name, count in counts.items()

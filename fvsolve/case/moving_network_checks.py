@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.case.basins_on_bodies import free_joints, place_faults
+from fvsolve.errors import article
 from fvsolve.parts.basin.part import Basin
 from fvsolve.parts.node import Node, PlaceOnBody
 from fvsolve.units import show
@@ -45,7 +46,7 @@ def find_faults(nodes: dict[str, Any], links: dict[str, Any], patches: dict[str,
         if node.on is not None and getattr(node, "head", None) is not None:
             yield (
                 ("nodes", name, "head"),
-                f"the node is on {node.on}, and a head counts from the ground; expected pressure",
+                f"the node is on {node.on}, and a head counts from the ground; expected `pressure` instead",
             )
     for name, link in links.items():
         ends = [place for port, place in link.ports.items() if link.joins.get(port) == "hydraulic"]
@@ -68,9 +69,12 @@ def missing_reactions(nodes: dict[str, Any], links: dict[str, Any], free: bool =
     for name in tanks:
         for key in ("connection", "height"):
             if getattr(nodes[name], key) is not None:
-                yield ("nodes", name, key), "the reaction of its flow on the body is not modelled yet; leave it out"
+                yield (
+                    ("nodes", name, key),
+                    "the reaction of this flow on the body is not modelled yet; leave this key out",
+                )
         if hasattr(nodes[name].area, "area"):
-            yield ("nodes", name, "area"), "a tank on a body has only one area yet; expected a number"
+            yield ("nodes", name, "area"), "a tank on a body supports only a constant area yet; expected a number"
     for name, link in links.items():
         ends = [place for port, place in link.ports.items() if link.joins.get(port) == "hydraulic"]
         if not any(map(on_body, ends)):
@@ -86,16 +90,14 @@ def missing_reactions(nodes: dict[str, Any], links: dict[str, Any], free: bool =
         elif link.kind == "rigid-column":
             for end in ends:
                 if end in nodes and set_by_columns(end, nodes, links):
-                    yield (
-                        key,
-                        f"at {end} it joins only valves and columns, whose reaction is not modelled yet; {USE_PIPE}",
-                    )
+                    text = f"at {end} this column joins only valves and columns, whose reaction is not modelled yet"
+                    yield key, f"{text}; {USE_PIPE}"
         elif link.kind != "pipe" or free:
             for end in dict.fromkeys(end for end in ends if end in tanks):
                 reason = "the flow of a pipe" if link.kind == "pipe" else "the flow of a valve"
                 yield (
                     key,
-                    f"neither {reason} nor the tank has inertia at {end}; expected a rigid-column between them",
+                    f"at {end} neither {reason} nor the tank has inertia; expected a rigid-column at the tank",
                 )
 
 
@@ -138,7 +140,7 @@ def link_faults(link: Any, ends: list[str], nodes: dict[str, Any], patches: dict
     points = np.array([where[0].place, *getattr(link, "route", []), where[-1].place])
     way = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
     if length is None and way > LENGTH_TOLERANCE:
-        text = f"its ends lie {way:g} m apart{position_text(ends, patches)}, and a {link.kind} has no length"
+        text = f"its ends lie {way:g} m apart{position_text(ends, patches)}, and {article(link.kind)} has no length"
         yield (), f"{text}; expected both ends at one place, and a pipe or rigid-column to the other place"
     elif length is not None and way > length * (1.0 + LENGTH_TOLERANCE):
         yield (

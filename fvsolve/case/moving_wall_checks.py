@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.errors import did_you_mean, listing
+from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.exact.schedule_values import value
 from fvsolve.parts.formula import SpatialField
 from fvsolve.units import show
@@ -105,7 +105,7 @@ def wall_faults(
         yield (), f"physics {show(basin.physics)} does not support moving walls"
     for other in ("boundary", "impedance", "scalars"):
         if getattr(options, other):
-            yield (other,), "applies only to an open boundary, and this is a moving wall; leave it out"
+            yield (other,), "applies only to an open boundary, and this is a moving wall; leave this key out"
     if options.span is not None:
         yield ("span",), "a moving wall is a whole side; leave out `span`"
     if options.body is not None and (
@@ -127,7 +127,10 @@ def wall_faults(
         return
     size, zone = float(np.ptp(at)), options.zone or float(np.ptp(at))
     if zone > size * (1.0 + 1e-9):
-        yield ("zone",), f"{zone:g} m is more than the length of the basin along {'xy'[axis]}, {size:g} m"
+        yield (
+            ("zone",),
+            f"{zone:g} m is more than the length of the basin along {'xy'[axis]}, {size:g} m; expected less",
+        )
     if options.travel is not None:
         per = area_growth(mesh, axis, weights(basin, mesh, patch, at))
         yield from ((("travel",), text) for text in travel_faults(options.travel, side, zone, times, mesh, per))
@@ -144,11 +147,11 @@ def body_faults(name: str, nodes: dict[str, Any], axis: int) -> Iterator[str]:
     known = [other for other, node in nodes.items() if getattr(node, "kind", "") in ("mass", "body")]
     node = nodes.get(name)
     if node is None:
-        yield f"no mass or body named {show(name)}; there are {listing(known) or 'none'}{did_you_mean(name, known)}"
+        yield f"no mass or body named {show(name)}; the case has {listing(known) or 'none'}{did_you_mean(name, known)}"
     elif node.kind == "body":
         yield from slider_faults(name, node, nodes, axis)
     elif node.kind != "mass":
-        still = "a frame, which is fixed" if node.kind == "frame" else f"a {node.kind}"
+        still = "a frame, which is fixed" if node.kind == "frame" else article(node.kind)
         yield f"{name} is {still}; expected a mass, a body on a prismatic joint, or `travel` instead of `body`"
 
 
@@ -179,7 +182,7 @@ def travel_faults(travel: Any, side: float, zone: float, times: tuple, mesh: Any
     places = value(travel, np.concatenate([np.linspace(*times, SAMPLES), inside]))
     inward = float((side * (places[0] - places)).max())
     if inward >= zone:
-        yield f"moves {inward:g} m inward, but its zone is only {zone:g} m wide; expected less travel, or a wider zone"
+        yield f"moves the wall {inward:g} m inward in a zone {zone:g} m wide; expected less travel, or a wider zone"
         return
     least = np.minimum((places.min() - places[0]) * per, (places.max() - places[0]) * per)
     if least.min() <= -1.0:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from fvsolve.errors import did_you_mean, listing
+from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.parts import KINDS
 from fvsolve.parts.table_model import Table
 from fvsolve.parts.value import VALUE, Quantity, ReadContext, Value, ValueFault
@@ -130,7 +130,7 @@ def find_faults(
                 continue
             unknown = True
             if pipe in links:
-                yield place, f"{show(pipe)} is a {links[pipe].kind}, not a pipe; leave it out"
+                yield place, f"{show(pipe)} is {article(links[pipe].kind)}, not a pipe; leave this name out"
             else:
                 known = [*pipes, *pieces]
                 near = did_you_mean(pipe, known) or f"; pipes are {listing(known)}"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from fvsolve import units
-from fvsolve.errors import did_you_mean, listing
+from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.parts import Link, Node, Pipe, Scalar
 from fvsolve.units import show
 
@@ -195,16 +195,15 @@ def _quantity(
     begin: float,
 ) -> tuple[float | None, str]:
     known = {**along, **own, **getattr(kind, "fields", {})}
-    article = "an" if kind.kind[0] in "aeiou" else "a"
     if quantity not in known:
         has = f"it has {', '.join(known)}{did_you_mean(quantity, known)}" if known else "its water is part of its body"
-        raise ValueError(f"{name} is {article} {kind.kind}, which has no {show(quantity)}; {has}")
+        raise ValueError(f"{name} is {article(kind.kind)}, which has no {show(quantity)}; {has}")
     if place is None:
         if quantity not in own:
             raise ValueError(
-                f'{name} is a {kind.kind}, and this probe needs a place, for example "{name}.{quantity}@0.5"'
+                f'{name} is {article(kind.kind)}, and this probe needs a place, for example "{name}.{quantity}@0.5"'
             )
         return (0.0 if quantity in along else None), known[quantity]
     if quantity not in along:
-        raise ValueError(f"{name} is {article} {kind.kind}, and {quantity} has no place along it; leave @{place} out")
+        raise ValueError(f"{name} is {article(kind.kind)}, and {quantity} has no place along it; leave @{place} out")
     return fraction_of(place, length, begin), known[quantity]

@@ -12,7 +12,7 @@ from typing import Any
 
 from fvsolve.case.defaults import default_place
 from fvsolve.case.toml_lines import key_lines
-from fvsolve.errors import CaseError, Fault, did_you_mean
+from fvsolve.errors import CaseError, Fault, article, did_you_mean
 from fvsolve.units import show
 
 DEEPEST = 40
@@ -73,7 +73,7 @@ def read_raw(source: Any) -> Raw:
     if isinstance(source, Mapping):
         return Raw(_copy(source))
     if not isinstance(source, (str, Path)):
-        raise CaseError([Fault("", f"a {type(source).__name__} is not a case; expected a path or a dict")])
+        raise CaseError([Fault("", f"{article(type(source).__name__)} is not a case; expected a path or a dict")])
     path = Path(source)
     text = _read_text(path)
     try:
@@ -211,7 +211,7 @@ def _bare_name(line_text: str) -> str:
 def _copy(value: Any, depth: int = 0) -> Any:
     """Copy to plain dicts, lists and scalars, from NumPy too. Raises CaseError if nested deeper than `DEEPEST`."""
     if depth > DEEPEST:
-        raise CaseError([Fault("", "tables or lists nested too deep")])
+        raise CaseError([Fault("", f"tables or lists are nested too deep; expected at most {DEEPEST} levels")])
     if isinstance(value, Mapping):
         return {str(key): _copy(item, depth + 1) for key, item in value.items()}
     if isinstance(value, (list, tuple)):

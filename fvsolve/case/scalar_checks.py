@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from fvsolve.case.resource_checks import LONGEST_NAME
-from fvsolve.errors import did_you_mean, listing
+from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.fluid.laws import LAWS, law_names
 from fvsolve.parts import KINDS, Basin
 from fvsolve.parts.basin.part import VELOCITY_FIELDS, Physics
@@ -40,7 +40,7 @@ def find_faults(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str,
                 if (text := _value_fault(scalar, value, part, scalars)) is not None:
                     yield (group, name, "scalars", scalar), text
             if scalars and isinstance(part, Basin) and not part.physics_type.carries:
-                text = f"is a basin of {part.physics}, which does not support scalars; expected a free surface"
+                text = f"scalars are not supported with physics {show(part.physics)}; expected a free surface"
                 yield (group, name), text
             for patch, patch_options in getattr(part, "patches", {}).items():
                 for scalar in patch_options.scalars:
@@ -54,8 +54,7 @@ def find_faults(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str,
                             'boundary = "open"',
                         )
             if scalars and part.no_scalars:
-                article = "an" if part.kind[0] in "aeiou" else "a"
-                yield (group, name), f"is {article} {part.kind}; {part.no_scalars}"
+                yield (group, name), f"is {article(part.kind)}; {part.no_scalars}"
     if not scalars:
         return
     if fluid is not None and not LAWS[fluid.law].scalars:
@@ -74,7 +73,9 @@ def _value_fault(scalar: str, value: Any, part: Any, scalars: dict[str, Any]) ->
     if part.own_scalars == "start" and not value.constant:
         return "is the value at the start; expected a number, not a schedule"
     if not part.own_scalars:
-        return f"a {part.kind} has no value of a scalar; expected an inflow, a reservoir, a tank, a chamber or a pipe"
+        return (
+            f"{article(part.kind)} has no scalar values; expected an inflow, a reservoir, a tank, a chamber or a pipe"
+        )
     return None
 
 

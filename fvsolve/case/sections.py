@@ -103,9 +103,9 @@ class FluidSpec(Table):
     saturation_pressure: Annotated[
         float | None, Quantity("pressure", positive, "pressure above which all gas is dissolved, law mixture [Pa]")
     ] = None
-    cavitation: Annotated[bool | None, Flag("cavitation: vapour pressure added to the gas pressure, law mixture")] = (
-        None
-    )
+    cavitation: Annotated[
+        bool | None, Flag("cavities of gas and vapour: vapour pressure is added to the gas pressure, law mixture")
+    ] = None
 
     @classmethod
     def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
@@ -224,7 +224,7 @@ class Numerics(Table):
         Choice(
             "linear algebra",
             KINDS,
-            "linear solver of implicit steps; by structure of the case if left out",
+            "linear solver of implicit steps; chosen by the structure of the case if left out",
             changes=VALUE,
         ),
     ] = None
@@ -246,13 +246,18 @@ class Numerics(Table):
         float,
         Number(
             between(0, 1, open=True),
-            "allowed error of pipe models chosen by auto, as a fraction of the largest jump; smaller jumps in a delay "
-            "line are smoothed",
+            "allowed error of pipe models chosen by auto, and size below which jumps in a delay line are smoothed; "
+            "both as a fraction of the largest jump",
             changes=SHAPE,
         ),
     ] = DEFAULT_ACCURACY
     below_vapor: Annotated[
-        str, Choice("choice", ("continue", "stop"), "action below vapour pressure: mark it and continue, or stop")
+        str,
+        Choice(
+            "choice",
+            ("continue", "stop"),
+            "action at pressures below vapour pressure: mark the results and continue, or stop",
+        ),
     ] = "continue"
 
     def filled(self, has_cells: bool, carries: bool, rubs: bool, parts: bool) -> Numerics:

@@ -206,12 +206,12 @@ def find_faults(nodes: dict[str, Any], lumped: dict[str, Any], poses: dict[str, 
         elif np.ptp(bed := means(samples(basin.bed, mesh))) > FLAT * abs(basin.level - bed.min()):
             yield (*key, "bed"), 'modes are known only over a flat bed; expected a single height, or sloshing = "cells"'
         elif not basin.level > bed[0]:
-            yield (*key, "level"), f"there is no water above the bed, at {bed[0]:g} m"
+            yield (*key, "level"), f"{basin.level:g} m is not above the bed, at {bed[0]:g} m; expected a higher level"
         yield from unsupported_keys(key, basin)
         if (pose := poses.get(basin.on)) is not None:
             upright = float((pose.attitude @ basin.rotation)[2, 2])
             if upright < UPRIGHT:
-                text = f"its bed is {np.degrees(np.arccos(upright)):.3g} deg off level at the start, where modes are "
+                text = f"the bed is {np.degrees(np.arccos(upright)):.3g} deg off level at the start, where modes are "
                 yield (*key, "sloshing"), text + 'not valid; expected "cells" or "frozen"'
 
 
@@ -233,10 +233,10 @@ def unsupported_keys(key: tuple, basin: Any) -> Faults:
         yield (*key, "start", key_name), "modes start from level water at rest; leave this key out"
     for patch, patch_options in basin.patches.items():
         if patch_options.boundary == "open":
-            yield (*key, "patches", patch, "boundary"), "modes are valid only for closed tanks; expected a wall"
+            yield (*key, "patches", patch, "boundary"), "modes are valid only with walls on all sides; expected a wall"
     for key_name in ("manning", "factor"):
         if getattr(basin, key_name) is not None:
-            yield (*key, key_name), "modes have no friction; leave it out"
+            yield (*key, key_name), "modes have no friction; leave this key out"
 
 
 def held_water(basin: Any, mesh: Any, density: float) -> tuple[float, np.ndarray, np.ndarray]:

@@ -150,13 +150,13 @@ def _show(result, paths) -> None:
         "smaller errors have no meaning",
     )
     if result.left_out:
-        line(terminal, f"left out: {', '.join(result.left_out)}; these methods cannot model cavities in pipes")
+        line(terminal, f"left out, because they cannot model cavities in pipes: {', '.join(result.left_out)}")
     for text in result.told:
         line(terminal, f"no reference: {text}")
     for point in result.failed:
         line(terminal, f"failed: {point.setting.name}, {point.setting.fineness}: {point.reason}")
     line(terminal, f"compiling or loading took {result.compile_seconds:.2g} s, not included in the times above"
-         + (f"; {result.reused} points were reused from earlier runs" if result.reused else ""))  # fmt: skip
+         + (f"; points reused from earlier runs: {result.reused}" if result.reused else ""))  # fmt: skip
     line(terminal, "wrote " + ", ".join(str(path) for path in paths))
     if result.aim is not None:
         _show_target(terminal, result)

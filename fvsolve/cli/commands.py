@@ -238,9 +238,11 @@ def _places(cases: list[str], out: Path | None) -> dict[str, Path]:
         place = out if out and len(cases) == 1 else (out or Path("runs")) / stem
         other = taken.setdefault(os.path.normcase(place), name)
         if name in paths or other != name:
-            conflict = f"{name} is named twice" if other == name else f"{other} and {name} would both write {place}"
+            if other == name:
+                raise FvsolveError(f"{name} is named twice. Name each case once")
             raise FvsolveError(
-                f"{conflict}. Run each case in a command of its own with its own --out DIR, or rename a case"
+                f"{other} and {name} would both write {place}. Run each case in a command of its own with its own "
+                "--out DIR, or rename a case"
             )
         paths[name] = place
     return paths

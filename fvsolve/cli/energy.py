@@ -287,7 +287,7 @@ def print_claims(schemes, methods, as_json: bool) -> None:
     line(terminal, "")
     line(
         terminal,
-        "Methods: passive on any network at any step; greatest passive step on a leak, a resonator, a closed pipe",
+        "Methods: passivity on any network at any step; greatest passive step on a leak, a resonator, a closed pipe",
         "bold",
     )
     good = [entry.scheme for entry in known if entry.passive]
@@ -296,9 +296,12 @@ def print_claims(schemes, methods, as_json: bool) -> None:
     print_sheet(ResultTable([*METHOD, *(Column(name, f"{name}: C", _limit(name)) for name in good)], rows), terminal)
     bad = [entry.scheme for entry in known if not entry.passive]
     if bad:
-        line(terminal, f"{', '.join(bad)}: create energy at pipe ends with every method, up to the gain above")
+        line(
+            terminal,
+            f"schemes that create energy at pipe ends with every method, up to the gain above: {', '.join(bad)}",
+        )
     never = [
         f"{entry.scheme} with {entry.method}" for entry in result.pairs if entry.courant == 0.0 and entry.scheme in good
     ]
     if never:
-        line(terminal, f"create energy at every step size: {', '.join(never)}")
+        line(terminal, f"pairs that create energy at every step size: {', '.join(never)}")

@@ -138,11 +138,12 @@ def _show(result, files: list[Path], head: str) -> None:
     for word in VERDICT_TEXTS:
         if word in present:
             terminal.line(console, f"{word}: {VERDICT_TEXTS[word]}")
-    terminal.line(console, f"tolerance: {result.tolerance:g} of a probe's range, mean over the run, worst probe")
+    terminal.line(console, f"tolerance: {result.tolerance:g} of a probe's range (mean error over the run, worst probe)")
     terminal.line(console, f"reference: {result.reference}; its error is at most {result.doubt:.2g}")
     terminal.line(
         console,
-        "predicted limit: least step at which an eigenmode grows by 1000 within the run (docs/course.md, equation 13)",
+        "predicted limit: least step at which an eigenmode grows 1000 times within the run "
+        "(docs/course.md, equation 13)",
     )
     if result.lines:
         terminal.line(
@@ -152,7 +153,7 @@ def _show(result, files: list[Path], head: str) -> None:
     if result.limited:
         terminal.line(
             console,
-            f"limit of {', '.join(result.limited)}: from the weights in smooth flow, an estimate and not a bound",
+            f"predicted limits of {', '.join(result.limited)}: estimates from the weights in smooth flow, not bounds",
         )
     for reason in {square.measures.reason: None for square in result.squares if square.verdict == "refused"}:
         terminal.line(console, f"refused: {reason}")

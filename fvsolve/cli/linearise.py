@@ -125,9 +125,7 @@ def print_system(system, values, poles: list[dict], folder: Path) -> None:
     terminal.line(output, f"  derivatives by two difference steps agree to {worst:.1e}, relative to each row")
     terminal.print_sheet(ResultTable([column for column in POLES if column.key != "pair"], poles[:SHOWN]), output)
     more = len(poles) - SHOWN
-    terminal.line(
-        output, f"poles: {values.description}" + (f"; {more} faster poles are in poles.csv" if more > 0 else "")
-    )
+    terminal.line(output, f"poles: {values.description}" + (f"; faster poles in poles.csv: {more}" if more > 0 else ""))
     terminal.line(
         output, f"{folder}: linear.npz, {'A-sparse' if system.sparse else 'A'}.csv, B.csv, C.csv, D.csv, poles.csv"
     )

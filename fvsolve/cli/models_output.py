@@ -35,7 +35,7 @@ def show_models(case, target: float, as_json: bool) -> None:
     richest, cheapest = hierarchy.richest, hierarchy.cheapest
     terminal.line(
         console,
-        "error: root mean square over time of the worst probe (column of), over its range; "
+        'error: root mean square over time of the worst probe (column "of"), over its range; '
         "greatest: maximum over time;",
     )
     terminal.line(console, f"reference for both: {richest.name}, {richest.law}")

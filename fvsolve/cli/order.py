@@ -183,4 +183,4 @@ def reason_lines(result):
             yield f"{name} ({', '.join(norms)}): {text}"
     others = [fit.reason for name in result.variables[SHOWN_VARIABLES:] for fit in result.fits[name].values()]
     if any(reason and reason != NO_ERROR for reason in others):
-        yield "other variables have no order either; --json gives the reasons"
+        yield "of the other variables some have no order; --json gives the reasons"

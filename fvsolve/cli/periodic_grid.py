@@ -135,9 +135,11 @@ def _sentences(limit: AdvectionLimit) -> list[str]:
         sentences.append(f"set by {words}")
     if limit.steps is not None:
         steps = f"a thousandfold in {limit.steps:.4g} steps"
-        sentences.append(f"at {limit.courant:.6g} the worst wave grows by {_growth(limit.growth)} a step, {steps}")
+        sentences.append(
+            f"at Courant number {limit.courant:.6g} the worst wave grows by {_growth(limit.growth)} a step, {steps}"
+        )
     elif limit.growth is not None:
-        sentences.append(f"at {limit.courant:.6g} no wave grows")
+        sentences.append(f"at Courant number {limit.courant:.6g} no wave grows")
     for low, high in limit.stable:
         if low > 0.0:
             place = f"from {low:.10g} to {high:.10g}" if math.isfinite(high) else f"above {low:.10g}"

@@ -67,7 +67,8 @@ def print_result(run) -> None:
     for event in summary["events"][:EVENTS_SHOWN]:
         _line(console, f"{event['name']} {event['what']} at t = {time_text(event['time'])}")
     if len(summary["events"]) > EVENTS_SHOWN:
-        _line(console, f"and {len(summary['events']) - EVENTS_SHOWN} more events; summary.json has all")
+        more = len(summary["events"]) - EVENTS_SHOWN
+        _line(console, f"and {more} more event{'s' if more > 1 else ''}; summary.json has all")
     for name, ledger in summary["ledgers"].items():
         _line(console, f"{name} ledger: {_ledger_text(ledger)}")
     for claim in summary["expectations"]:
@@ -341,7 +342,7 @@ def _step_text(case, facts: dict) -> str:
     if facts["step"] is None:
         return f"step: {facts['step_set_by']}"
     expected = facts["expected_seconds"]
-    cost = "" if expected is None else f", about {expected:.2g} s"
+    cost = "" if expected is None else f", about {expected:.2g} s of computing time"
     step = f"step at the start {case.step_amount(facts['step'])}, set by {facts['step_set_by']}"
     return f"{step}; {facts['steps']} steps of this size in the run{cost}"
 

@@ -18,7 +18,7 @@ def report(
         Path | None, typer.Option(metavar="FILE", help="file of the report (default RUN_OR_STUDY/report.html)")
     ] = None,
     xlsx: Annotated[
-        bool, typer.Option("--xlsx", help="write also a workbook with the tables, in the folder of the report")
+        bool, typer.Option("--xlsx", help="also write a workbook with the tables, in the folder of the report")
     ] = False,
 ) -> None:
     """Write an offline HTML page of a run or a study: verdicts, long sections, histories, model, numerics."""

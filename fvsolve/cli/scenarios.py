@@ -76,7 +76,7 @@ def _show(result) -> None:
     names = [name or "the case as it is" for name in result.holds]
     if result.limited:
         message = f"all limits hold in all events with: {', '.join(names)}"
-        message = message if names else "no protection holds all limits in all events"
+        message = message if names else "no protection satisfies all limits in all events"
         terminal.line(console, message, "green" if names else "bold red")
     else:
         terminal.line(console, "the case states no limits, so none is checked", "yellow")

@@ -86,7 +86,9 @@ def _show(result) -> None:
         return
     bracket = "at the end of the range" if result.bracket is None else (
         f"bracket {min(result.bracket):.6g} to {max(result.bracket):.6g}{unit}")  # fmt: skip
-    line = f"{result.goal} value that holds all limits: {result.value:.6g}{unit}; {bracket}; {len(result.runs)} runs"
+    line = (
+        f"{result.goal} value that satisfies all limits: {result.value:.6g}{unit}; {bracket}; {len(result.runs)} runs"
+    )
     terminal.line(console, line, "green")
 
 
@@ -94,12 +96,12 @@ def _no_value_text(result) -> str:
     """Text for a size search without result: the nearest value, its margin, and the direction in which to search."""
     nearest, values = result.nearest, sorted(run.value for run in result.runs)
     unit = f" {result.unit}" if result.unit else ""
-    text = (f"none of the values tried between {values[0]:.6g} and {values[-1]:.6g}{unit} holds all limits; "
-            f"the nearest is {nearest.value:.6g}")  # fmt: skip
+    text = (f"none of the values tried between {values[0]:.6g} and {values[-1]:.6g}{unit} satisfies all limits; "
+            f"the nearest is {nearest.value:.6g}{unit}")  # fmt: skip
     if nearest.margin is None:
         return f"{text}; no margin is known"
     text += f", with a margin of {nearest.margin:.3g} of the limit {nearest.limit}"
     beyond = {values[0]: "below", values[-1]: "above"}.get(nearest.value)
     return (
-        f"{text}; margins increase towards that end. Try values {beyond} it or change another key" if beyond else text
+        f"{text}; margins increase towards this value. Try values {beyond} it or change another key" if beyond else text
     )

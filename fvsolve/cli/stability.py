@@ -30,10 +30,16 @@ def stability(
         typer.Argument(metavar="[CASE]", help="case file or shipped case (default none: advection on a periodic grid)"),
     ] = None,
     scheme: Annotated[
-        str | None, typer.Option(metavar="A,B", help="schemes to study (default scheme of the case)")
+        str | None,
+        typer.Option(
+            metavar="A,B", help="schemes to study (default scheme of the case, or without a case all linear schemes)"
+        ),
     ] = None,
     method: Annotated[
-        str | None, typer.Option(metavar="A,B", help="methods to study (default method of the case)")
+        str | None,
+        typer.Option(
+            metavar="A,B", help="methods to study (default method of the case, or without a case all methods)"
+        ),
     ] = None,
     steps: Annotated[
         int | None, typer.Option(help="number of steps in which growth is measured (default 1000)")
@@ -141,8 +147,8 @@ def print_stability(result, folder: Path, files: list[str]) -> None:
     cells = first_row.rate > 0.0
     terminal.line(
         console,
-        f"{result.case} at {first_row.when}: {first_row.states} states; a step fails if a deviation grows by "
-        f"{first_row.threshold:g} (energy norm) within {first_row.steps} steps",
+        f"{result.case} at {first_row.when}: {first_row.states} states; a step fails if a deviation grows "
+        f"{first_row.threshold:g} times (energy norm) within {first_row.steps} steps",
     )
     if cells:
         terminal.line(console, f"Courant number: step times {first_row.rate:.6g} 1/s; bounds as Courant numbers")

@@ -36,7 +36,9 @@ def sweep(
     set: Values = [],  # noqa: B006
     points: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.csv", help="CSV file with the values of every run: a column for each key"),
+        typer.Option(
+            metavar="FILE.csv", help="CSV file from which the runs are read: a row for each run, a column for each key"
+        ),
     ] = None,
     sample: Annotated[
         str | None,

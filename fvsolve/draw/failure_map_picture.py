@@ -120,7 +120,7 @@ def _legend(figure, result) -> None:
         if word in seen
     ]
     looks = {"dotted" if scheme in result.limited else "solid" for scheme in result.schemes}
-    labels = {"solid": "predicted limit (13)", "dotted": "predicted limit, with the weights of smooth flow"}
+    labels = {"solid": "predicted limit", "dotted": "predicted limit, with the weights of smooth flow"}
     handles += [
         Line2D([], [], color=style.INK, lw=2.2, linestyle=look, label=labels[look]) for look in labels if look in looks
     ]

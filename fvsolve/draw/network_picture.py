@@ -79,7 +79,7 @@ class NetworkPicture:
         notes = []
         if self.aspect.kind == "aslant":
             own, times = self.scene.plan == "own scale", self.aspect.rise / self.scene.height_ratio
-            notes.append("heights have a separate scale" if own else f"heights drawn {times:g} times")
+            notes.append("heights have a separate scale" if own else f"heights enlarged {times:g} times")
         if self.scene.plan == "laid out":
             notes.append("laid out by lengths")
         if self.scene.plan == "own scale":

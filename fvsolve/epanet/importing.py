@@ -104,10 +104,8 @@ def _short_pipes_comment(translation: Translation, short: list[str]) -> str:
     """Comment for the case file on the pipes that are shorter than a cell; short : their names in EPANET"""
     first = translation.link_names.given[short[0]]
     pipes = f"{first} is" if len(short) == 1 else f"{len(short)} pipes are"
-    return (
-        f"{pipes} shorter than a cell; {first}, {translation.lengths[short[0]]:.4g} m long, would limit the steps with "
-        "cells"
-    )
+    length = f"{translation.lengths[short[0]]:.4g} m"
+    return f"{pipes} shorter than a cell; with cells, {first} of {length} would limit the steps"
 
 
 def _probes(translation: Translation) -> list[str]:

@@ -113,7 +113,8 @@ def _root_cause(error: BaseException) -> str:
     if isinstance(chain[-1], UnicodeDecodeError):
         cause = chain[-1]
         return (
-            f"byte {cause.object[cause.start]:#x} is not UTF-8 text, as from EPANET on Windows; save the file as UTF-8"
+            f"byte {cause.object[cause.start]:#x} is not UTF-8 text, in which EPANET on Windows does not save; "
+            "save the file as UTF-8"
         )
     coded = [link for link in chain if "(Error " in str(link)]
     text = str(coded[-1] if coded else chain[-1]).replace("%s", "").replace(" ()", "")

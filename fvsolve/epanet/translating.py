@@ -207,10 +207,10 @@ class Translation:
         diameter = self.size(link)
         if kind in ("PRV", "PSV") and link.initial_status == REGULATING_STATUS and self.set_too_high(name, link):
             state = "an open" if kind == "PRV" else "a shut"
-            self.note(f"{kind} set above every source: imported as {state} valve", name)
+            self.note(f"{kind} with a set head above every source: imported as {state} valve", name)
             return part_tables.valve(ends, diameter, link.minor_loss, opening=1.0 if kind == "PRV" else 0.0)
         if kind in part_tables.REGULATING and link.initial_status == REGULATING_STATUS:
-            self.note(f"{kind}: EPANET has no time constant, here {part_tables.TIME_CONSTANT}", name)
+            self.note(f"{kind}: EPANET states no time constant, {part_tables.TIME_CONSTANT} is used", name)
             return part_tables.regulating(kind, ends, diameter, self.setting(name, link), link.minor_loss)
         if status in CLOSED:
             self.note(f"{kind} is shut at this hour: imported as a shut valve", name)

@@ -33,7 +33,10 @@ def find_faults(case):
         if part.kind == "reservoir" and not (part.pressure or part.head).constant:
             yield ("nodes", node), f'the exact solution "{name}" needs a constant pressure'
         if part.kind == "junction" and part.demand.kind not in ("constant", "step", "smooth"):
-            yield ("nodes", node, "demand"), f'the exact solution "{name}" needs a demand that jumps or is "smooth"'
+            yield (
+                ("nodes", node, "demand"),
+                f'the exact solution "{name}" needs a demand that is constant, jumps or is "smooth"',
+            )
     for link, pipe in pipes:
         kinds = sorted(case.nodes[end].kind for end in (pipe.from_, pipe.to))
         if kinds != ["junction", "reservoir"]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fvsolve.errors import article
 from fvsolve.exact.schedule_values import value
 
 Law = Callable[[np.ndarray], np.ndarray]  # values at times
@@ -139,10 +140,8 @@ def type_faults(case, nodes: tuple[str, ...], links: tuple[str, ...]):
     for group, parts, known in (("nodes", case.nodes, nodes), ("links", case.links, links)):
         for part, item in parts.items():
             if item.kind not in known:
-                yield (
-                    (group, part),
-                    f'the exact solution "{name}" does not support a {item.kind}; it supports {", ".join(known)}',
-                )
+                text = f'the exact solution "{name}" does not support {article(item.kind)}'
+                yield (group, part), f"{text}; it supports {', '.join(known)}"
 
 
 def count_faults(case, items: list, noun: str):

@@ -114,7 +114,8 @@ def _check_numbers(numbers: dict[str, float], law: str) -> None:
         raise FluidError("law", f'"{law}" is an unknown density law{laws}')
     for key, value in numbers.items():
         if not math.isfinite(value) or value < 0.0 or (value == 0.0 and key != "vapor_pressure"):
-            raise FluidError(key, f"{value:g} is not a positive, finite number")
+            least = "of 0 or more" if key == "vapor_pressure" else "above 0"
+            raise FluidError(key, f"{value:g} is out of range; expected a finite number {least}")
 
 
 def _missing(name: str, key: str) -> str:

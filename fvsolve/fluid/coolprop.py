@@ -43,7 +43,8 @@ def _pure_properties(name: str, temperature: float, pressure: float, law: str) -
         state.update(CoolProp.PT_INPUTS, pressure, temperature)
     except ValueError as error:
         raise FluidError(
-            "pressure", f"{name} is two-phase at that state, or has no data there (CoolProp: {error})"
+            "pressure",
+            f"{name} is two-phase at this temperature and pressure, or has no data there (CoolProp: {error})",
         ) from None
     values |= dict(density=state.rhomass(), bulk_modulus=state.rhomass() * state.speed_sound() ** 2)
     values["viscosity"] = value_or_none(state.viscosity)
@@ -92,7 +93,7 @@ def _check_range(state: Any, name: str, temperature: float, pressure: float) -> 
 
     _check_temperature(name, temperature, state.Tmin(), state.Tmax())
     if pressure > state.pmax():
-        raise FluidError("pressure", f"{pressure:g} Pa is above the range of {name}, {state.pmax():g} Pa")
+        raise FluidError("pressure", f"{pressure:g} Pa is above the range of {name}, up to {state.pmax():g} Pa")
     melting = value_or_none(lambda: state.melting_line(CoolProp.iT, CoolProp.iP, pressure))
     if melting is not None and temperature < melting:
         where = f"{celsius(temperature)} and {pressure:g} Pa"

@@ -92,7 +92,8 @@ def isentrope(state: Any, name: str, vapor_pressure: float) -> FluidTable:
     temperature, pressure, entropy = state.T(), state.p(), state.smass()
     if not 0.0 < vapor_pressure < pressure:
         raise FluidError(
-            "law", f'"table" needs a liquid, and {name} is not liquid at that state; use "linear" or "log"'
+            "law",
+            f'"table" needs a liquid, and {name} is not liquid at this temperature and pressure; use "linear" or "log"',
         )
     span = (vapor_pressure, _reach(state, temperature, pressure))
     intervals, max_intervals = INTERVALS
@@ -102,7 +103,9 @@ def isentrope(state: Any, name: str, vapor_pressure: float) -> FluidTable:
             intervals *= 2
             table = _tabulate(state, span, intervals, temperature, entropy)
     except ValueError as error:
-        raise FluidError("law", f'no "table" of {name} from that state (CoolProp: {error}); use "log"') from None
+        raise FluidError(
+            "law", f'"table" of {name} cannot be computed from this state (CoolProp: {error}); use "log"'
+        ) from None
     if table.error > MAX_ERROR or not _monotone(table):
         text = f'"table" of {name} has an error of {table.error:.1g}, too near the critical point; use "log"'
         raise FluidError("law", text)

@@ -314,7 +314,9 @@ class MixtureLaw(DenseLaw, name="mixture"):
         """
         if self.cavitates:
             return ""
-        return "; where much gas expands, set `cavitation = true` in [fluid] and a scheme for it (docs/cavitation)"
+        return (
+            "; where much gas expands, set `cavitation = true` in [fluid] and a suitable scheme (see docs/cavitation)"
+        )
 
     def wave_speed(self, row, pressure: np.ndarray) -> float:
         """Harmonic mean of the local wave speeds along a pipe [m/s]; arguments as for `Law.wave_speed`."""

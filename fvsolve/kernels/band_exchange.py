@@ -150,8 +150,9 @@ else:
 
 @njit
 def barrier(joint):
-    """Wait until all bands have called this function: poll first, then yield the processor, which a late band may need.
+    """Wait until all bands have called this function.
 
+    It polls the counters of the bands. After SPIN_LIMIT polls it also yields the processor, which a late band may need.
     A band is a part of the states, which one thread or process steps.
     joint : int64 array of this band with counters and memory addresses shared by all bands
     """

@@ -120,7 +120,7 @@ def column_pressures_barotropic(t, y, dydt, out, handle):
 
 @njit
 def apply_seating_drop(t, y, tables, out, k, x, index):
-    """Correct the pressure change p' of node x from a column at rest to a moving column and valve disc.
+    """Replace the pressure change p' of node x for a column at rest with that for a moving column and valve disc.
 
     p' : pressure change since the start [Pa], read from `out` and replaced there
     k, index : number of the column, and number of the valve near its seat that controls the column

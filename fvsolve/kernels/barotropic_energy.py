@@ -143,9 +143,9 @@ def pipe_energy_barotropic(st, floats, profile, pipe, z, r, l, rows):
 
 @njit
 def jet_losses(profile, pipe, out, end, nodes):
-    """Power lost by the jets from both ends of a pipe into tanks, chambers and reservoirs, M v^2 / 2 [W].
+    """Power lost by the jets from both ends of a pipe into all nodes except junctions, M v^2 / 2 [W].
 
-    M, v : mass flow and velocity of a jet; profile : values of the initial steady state
+    M, v : mass flow and velocity of a jet; profile : values of the initial steady state; nodes : table of nodes
     end : index in `out` of the four waves at the ends of the pipe (forward and backward at `from`, then at `to`) [kg/s]
     """
     lost = 0.0
@@ -230,7 +230,7 @@ def power_pistons_barotropic(y, dydt, out, tables, power, at):
 def vessel_energy(st, floats, node, mass, volume, p):
     """Energy of a vessel, m (h + g z) - (p - p_ambient) V [J].
 
-    m, V : `mass` and `volume` of its fluid; z : elevation above datum
+    m, V : `mass` and `volume` of its fluid; z : elevation above datum; node : row of the vessel in the table of nodes
     h : specific enthalpy above its value at ambient pressure [J/kg]
     """
     head = relative_enthalpy(st, floats, p) + st["gravity"] * (node["elevation"] - st["datum"])

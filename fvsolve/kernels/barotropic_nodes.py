@@ -2,7 +2,7 @@
 
 Stagnation enthalpy is conserved from pipe ends to nodes, and flows through valves have the upstream density. A simple
 wave leads from the state extrapolated from the cells to the state at the pipe end, where h(p_end) + v^2 / 2 =
-h(p_node), with specific enthalpy h and velocity v. A jet into a tank, chamber or reservoir loses its v^2 / 2.
+h(p_node), with specific enthalpy h and velocity v. A jet into any node except a junction loses its v^2 / 2.
 """
 
 import numpy as np
@@ -97,7 +97,7 @@ def end_flow(st, floats, pipe, m_inside, into_inside, p_node, still):
 
     m_inside, into_inside : mass per length [kg/m] and mass flow towards the node [kg/s], extrapolated from the cells
     p_node : pressure of the node [Pa]
-    still : True if the node is a tank, chamber or reservoir, False for a junction
+    still : True for any node except a junction, because a jet into such a node loses its v^2 / 2
     """
     p_inside = pressure_of_mass(st, floats, pipe, m_inside)
     v_inside = into_inside / m_inside
@@ -175,7 +175,7 @@ def outgoing_waves_barotropic(t, y, dydt, out, handle):
 
 @njit
 def mean_density(st, floats, p_i, p_j):
-    """Mean density dp / dh between two pressures [kg/m3], h : specific enthalpy."""
+    """Mean density dp / dh between the pressures p_i and p_j [kg/m3], h : specific enthalpy."""
     dp = p_i - p_j
     if abs(dp) > 1e-3:
         return dp / (enthalpy(st, floats, p_i) - enthalpy(st, floats, p_j))
@@ -295,8 +295,9 @@ def largest_magnitude(a):
 
 @njit
 def limit_step(most, a, right):
-    """Scale a Newton step so that no pressure rises by more than `most` [Pa], over which density grows by a factor e.
+    """Scale a Newton step so that no pressure rises by more than `most` [Pa].
 
+    most : bulk modulus, because a rise by it multiplies the density by about e
     a : changes of valve flows at constant drop [kg/s]; right : changes of node pressures [Pa]; both are scaled
     """
     greatest = 0.0
@@ -313,8 +314,9 @@ def limit_step(most, a, right):
 def given_flows(t, y, out, tables):
     """Write the demands of junctions, and flows of valves between two nodes of known pressure, to `out`.
 
-    The change since the start of the given inflow of junctions is added to out[net], and their pressures are reset to
-    the initial steady state.
+    A demand is written to out[supply] as a negative number. The change since the start of the given inflow of a
+    junction
+    is added to out[net]. Pressures of junctions are reset to the initial steady state.
     """
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
     for i in range(nodes.size):

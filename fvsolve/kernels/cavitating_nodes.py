@@ -34,13 +34,12 @@ def end_side(st, floats, pipe, inside, v_in, p_node, still):
 
     Returns the state (see `riemann.state_at`), its velocity towards the node [m/s], and the derivative of this velocity
     with respect to p_node [m/s/Pa].
-
     inside, v_in : state extrapolated from the cells, and its velocity towards the node [m/s]
     p_node : pressure of the node [Pa]
-    still : True if the node is a tank, chamber or reservoir
-
-    Where the flow runs into the node at more than half the speed of sound, or into a vessel at rest, the pressure of
-    the end is that of the node: v^2 / 2 is lost.
+    still : True for any node except a junction
+    Where the flow runs into the node at more than half the speed of sound, or into a node with `still` True, the
+    pressure
+    of the end is that of the node: v^2 / 2 is lost.
     """
     floor, target, side = st["floor"], enthalpy(st, floats, p_node), state_at(st, floats, pipe, p_node)
     change, rise = wave_jump(st, floats, pipe, inside, side)
@@ -71,10 +70,9 @@ def end_flow_of_state(st, floats, pipe, p_in, v_in, p_node, still):
 
     Returns the flow into the node [kg/s], its derivative with respect to p_node [kg/s per Pa], and the mass per length
     at the end [kg/m].
-
     p_in, v_in : pressure [Pa] and velocity towards the node [m/s], extrapolated from the cells
     p_node : pressure of the node [Pa]
-    still : True if the node is a tank, chamber or reservoir
+    still : True for any node except a junction, because a jet into such a node loses its kinetic energy
     """
     inside = state_at(st, floats, pipe, p_in)
     side, v, slope = end_side(st, floats, pipe, inside, v_in, p_node, still)

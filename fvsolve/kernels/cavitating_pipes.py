@@ -82,11 +82,11 @@ def face_state(st, floats, profile, pipe, i, k, ahead, p, v, dp, dv):
 
     k : index of this cell in p, v, dp, dv, see `fill_cells`
     ahead : 1 if the face is after the cell, -1 if it is before it
-
-    The reconstructed change is added to the steady pressure, except in two cases. First, if this would bring the gas
-    pressure below half its value in the cell. Second, if a cavity lies at an end of the pipe, where no liquid has
-    weight or friction to compress it. In these cases the pressure itself is reconstructed. A face has at most twice the
-    mass per length of a cell with gas, so that no more flows out than there is.
+    The reconstructed change is added to the steady pressure, except in two cases, in which the pressure itself is
+    reconstructed. First, if the sum would bring the gas pressure below half its value in the cell. Second, if the cell
+    contains gas and the face is an end of the pipe, because there no weight or friction of liquid compresses the
+    cavity.
+    A face has at most twice the mass per length of a cell with gas, so that no more flows out than there is.
     """
     dp_face, dv_face = face_value(st, dp, k, ahead), face_value(st, dv, k, ahead)
     undisturbed = dp_face == 0.0 and dv_face == 0.0

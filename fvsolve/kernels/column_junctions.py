@@ -311,7 +311,7 @@ def add_column_rates(y, tables, out, n, skip, solved):
 def far_end_pressure(y, tables, out, k, end, solved):
     """(pressure change at the far end of column k at constant flow [Pa], its fall per d/dt of this flow [Pa s2/kg]).
 
-    The change is counted since the start of the run.
+    The pressure change is that since the start of the run.
     end : 1 if the near end is the `to` end, -1 if it is the `from` end
     solved : True if the pressures of nodes are solved, False if they are estimates
     """

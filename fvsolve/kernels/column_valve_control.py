@@ -237,7 +237,7 @@ def zero_flow_pressure(tables, out, x, index, solved):
 
 @njit
 def zero_flow_range(tables, out, x, solved):
-    """(least, greatest) result of `zero_flow_pressure` for all valves of node x [Pa]."""
+    """(least, greatest) result of `zero_flow_pressure` for all valves of node x [Pa]; solved : as for that function."""
     least, most = 1e300, -1e300
     for e in range(tables.nodes[x]["gate_count"]):
         level = zero_flow_pressure(tables, out, x, tables.integers[tables.nodes[x]["gates"] + e], solved)
@@ -319,7 +319,7 @@ def controlled_pressure(t, tables, out, x, own, stationary, inertia, solved):
 
 @njit
 def controlled_rate(t, y, tables, out, k, end):
-    """d/dt of the flow of column k out of its end that valves control [kg/s2]; the flow keeps its direction.
+    """d/dt of the flow of column k out of the end at which valves control it [kg/s2]; the flow keeps its direction.
 
     At the switch to valve control the state has an error of about 1 %. Below the fraction SWITCH_LOSS of the flow at
     the switch, the flow is relaxed to zero instead of changing its sign.

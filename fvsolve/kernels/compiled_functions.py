@@ -49,7 +49,10 @@ class Functions:
         ]
 
     def store_hooks(self, *hooks: str) -> None:
-        """Write the addresses of the law functions with these names (keys of `calls.HOOKS`) of all laws to `hooks`."""
+        """Write the addresses of functions of the laws of all parts to the attribute `hooks`.
+
+        hooks : names of these functions, keys of `calls.HOOKS`
+        """
         for row, law in zip(self.hooks, self.cast.modules(), strict=True):
             for hook in hooks:
                 if (function := calls.hook_of(law, hook)) is not None:

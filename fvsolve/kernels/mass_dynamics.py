@@ -101,7 +101,10 @@ def contact_force(stiffness, damping, depth, speed):
 
 @njit
 def leak_flow(tables, piston, p_a, p_b):
-    """Mass flow from chamber A to chamber B past the piston [kg/s], at the upstream density."""
+    """Mass flow from chamber A to chamber B past the piston [kg/s], at the upstream density.
+
+    p_a, p_b : pressures of the chambers [Pa]
+    """
     st = tables.settings[0]
     rho = st["rho"]
     if st["law"] != LAW_LINEAR:

@@ -79,7 +79,7 @@ def stiffness_of(nodes, layout, out, i):
 def stored_rates(y, dydt, out, tables):
     """Write d/dt of the stored mass of every node to `dydt`, and the supply from outside to `out` [kg/s].
 
-    A supply is the outflow of a reservoir, the spill of a full tank (negative), or the unmet demand from a dry tank.
+    A supply is the outflow of a reservoir, the spill of a full tank (negative), or the missing outflow of a dry tank.
     """
     layout, nodes, armed = tables.layout[0], tables.nodes, tables.armed
     for i in range(nodes.size):

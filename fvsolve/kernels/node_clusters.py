@@ -61,7 +61,7 @@ def has_converged(change, last_change):
 
 @njit
 def total_inflows(cluster, tables, out, c):
-    """Write the flow into each node of a cluster from all links but its valves, at unchanged pressure, to c [kg/s].
+    """Write the flow into each node of a cluster from all links except its valves, at unchanged pressure, to c [kg/s].
 
     Returns True if these flows have not changed since the start.
     cluster : nodes that are solved together
@@ -158,7 +158,10 @@ def assemble(cluster, tables, out, g, m, c, connected, a, s, lift, matrix, right
 
 @njit
 def add_couplings(cluster, tables, out, n, matrix, right):
-    """Add the instantaneous flow between the ends of short delay lines to the equations of a cluster of n nodes."""
+    """Add the instantaneous flow between the ends of short delay lines to the equations of a cluster of n nodes.
+
+    cluster : nodes that are solved together; matrix, right : equations, as for `add_valve`
+    """
     layout, nodes, integers = tables.layout[0], tables.nodes, tables.integers
     for k in range(cluster["couples"]):
         line = tables.delays[integers[cluster["first_couple"] + k]]
@@ -203,7 +206,7 @@ def apply_step(cluster, tables, out, m, a, s, lift, right):
 def prepare_cluster(cluster, tables, out, g, m):
     """Write conductances g and start flows m of the valves of a cluster (nodes solved together); reset its pressures.
 
-    Returns True if no conductance, pump speed and pressure at the valves has changed since the initial steady state.
+    Returns True if all conductances, pump speeds and pressures at the valves are those of the initial steady state.
     """
     layout, valves = tables.layout[0], tables.valves
     integers, unchanged = tables.integers, True

@@ -16,7 +16,11 @@ GAUSS = 0.28867513459481287  # 1 / sqrt(12): two Gauss points of a cell, in cell
 
 @njit
 def scheme_family(settings, n):
-    """Scheme family for a pipe of n cells: below five cells fifth-order stencils would be unstable or would not fit."""
+    """Scheme family for a pipe of n cells.
+
+    Below five cells a shorter scheme replaces schemes of fifth order, whose stencils would be unstable or would not
+    fit.
+    """
     family = settings["scheme"]
     if n < 5 and family == LINEAR and settings["degree"] > 2:
         return SHORT
@@ -124,12 +128,13 @@ def rates_linear(settings, k, backward, c, datum, edge, d):
 
 @njit
 def subtract_friction(k, flow, loss, base, r, l, dr, dl):
-    """Subtract the friction loss |M| M minus the initial steady drag from the rates of both waves.
+    """Subtract half of the friction from the rate of the forward wave; add half to the rate of the backward wave.
 
+    The friction is loss |M| M minus the initial steady drag [kg/s2], M : mass flow.
     dr, dl : float64[cells]  rates; on entry -k and k times the differences of face values [kg/s2], k = wave speed / dx
     r, l : float64[cells]  forward and backward wave [kg/s]
     flow : initial steady mass flow [kg/s]; base : half of the initial steady drag [kg/s2]
-    loss : coefficient of |M| M [1/kg], M : mass flow
+    loss : coefficient of |M| M [1/kg]
     The friction is averaged over two Gauss points of a cell: fourth order, and no kink of the law is missed.
     """
     half, spread = 0.25 * loss, GAUSS / k

@@ -253,7 +253,7 @@ class ModelFeatures:
     forces: bool = False
 
     def components(self) -> Iterator[RhsTerms]:
-        """Terms (`RhsTerms`) of all components of the model, in the order in which functions of a phase run."""
+        """Yield the terms (`RhsTerms`) of all components of the model, in the order in which the functions run."""
         if self.bands:
             yield BANDS
         if self.boundary_exchange:

@@ -89,7 +89,7 @@ def request_sums(sums, mode, y, h, weights, count, k, to, last):
 
 @njit
 def sum_runs(sums, first, last, y, h, weights, count, k, to):
-    """Form the requested sums for runs number `first` to `last` - 1, which no rate function forms, or not in time.
+    """Form the requested sums for runs number `first` to `last` - 1, which no rate function forms in time.
 
     A run is a range of states, listed in `sums`; y, h, weights, count, k, to : see `request_sums`
     """

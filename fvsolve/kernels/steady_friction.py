@@ -59,7 +59,7 @@ def power_of_square(square):
     """|M|^0.852 = (M^2)^0.426 from `square` = M^2 >= 0, relative error 2e-14 for 1e-150 <= |M| <= 1e150.
 
     The power of the mantissa in [1, 2) is a Chebyshev interpolation polynomial; that of the exponent is in a table.
-    Without branch and call a loop over cells is vectorised by four, and a product and its sum are a single instruction.
+    Without branches and calls, a loop over cells is vectorised by four, and a product and its sum are one instruction.
     """
     bits = np.float64(square).view(np.int64)
     u = np.int64((bits & MANTISSA) | BITS_OF_ONE).view(np.float64) - 1.5

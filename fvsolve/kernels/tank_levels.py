@@ -30,7 +30,10 @@ def level_of_volume(floats, shape, rows, volume):
 
 @njit(forceinline=True)
 def tank_level(node, floats, rho, stored):
-    """Level [m] of a tank whose mass differs by `stored` [kg] from its initial steady mass."""
+    """Level [m] of a tank whose mass differs by `stored` [kg] from its initial steady mass.
+
+    node : row of the tank in the table of nodes; rho : density of its fluid [kg/m3]
+    """
     if node["shape"] < 0:
         return node["level"] + stored / (rho * node["area"])
     return level_of_volume(floats, node["shape"], node["shapes"], (node["mass"] + stored) / rho)

@@ -47,7 +47,7 @@ def column_control_limit(out, tables, device, mobility, speed):
 
     It is CONTROL_LIFT, or more until a given step resolves the exchange between lift x and flow. The rate of this
     exchange is (2 dP / x) (speed + (A / L) / sqrt(G dP)), with drop dP and conductance G.
-    speed : derivative of dx/dt with respect to the drop [1/s/Pa]
+    device : row of the device of the valve; speed : derivative of dx/dt with respect to the drop [1/s/Pa]
     """
     root = sqrt(abs(head_drop(tables, out, device["valve"])[1]))
     rate = 2.0 * root * (root * speed + mobility / sqrt(tables.valves[device["valve"]]["conductance"]))
@@ -59,7 +59,7 @@ def control_events(out, tables, device, g, x, share, speed):
     """Write two event functions of the lift x to g: for the end of the control of a column, and for its beginning.
 
     Control ends at the lift of `control_limit`, and begins at the fraction `share` of it; never if `share` is 0.
-    speed : derivative of dx/dt with respect to the drop [1/s/Pa]
+    device : row of the device of the valve; speed : derivative of dx/dt with respect to the drop [1/s/Pa]
     """
     at, most = device["controls_column"], control_limit(out, tables, device, speed)
     if tables.armed[at] > 0.0:

@@ -117,7 +117,7 @@ def contact_faults(sketch: Sketch, edges: Edges, named: np.ndarray) -> list[Faul
                 cell=sketch.show(cell[i]), neighbour=sketch.show(cell[j]), face=sketch.face((start[i], stop[i]))
             )
             number = len(np.unique(pairs[:, 0])) if kind == "middle" else len(pairs)
-            places = f"at {number}{'' if complete else ' or more'} places faces"
+            places = f"at {number}{'' if complete else ' or more'} place{'' if number == 1 and complete else 's'} faces"
             faults.append(Fault("boundary", f"{places} {text}"))
     return faults
 
@@ -154,23 +154,25 @@ def assign_patches(
     for name, members in groups.items():
         place = f"groups.{name}"
         if not members.size:
-            remedy = "expected lines of the boundary; Gmsh omits them with Mesh.SaveAll = 1"
+            remedy = "expected lines of the boundary (with Mesh.SaveAll = 1 Gmsh writes no lines of groups)"
             faults.append(Fault(place, f"the group contains no line of the file; {remedy}"))
             continue
         member_keys = key_of(lines[members], len(sketch.points))
         spot = order[np.minimum(np.searchsorted(keys, member_keys, sorter=order), keys.size - 1)]
         missing = keys[spot] != member_keys
         if missing.any():
-            text = f"{missing.sum()} of {members.size} lines are not boundary faces"
+            text = f"lines that are not boundary faces: {missing.sum()} of {members.size}"
             location = _line_location(sketch, edges, lines[members][missing][0])
-            faults.append(Fault(place, f"{text}: {location}; expected a curve of the boundary"))
+            faults.append(Fault(place, f"{text}; {location}; expected a curve of the boundary"))
         spot = spot[~missing]
         taken = spot[(patch[spot] >= 0) & (patch[spot] != names.index(name))]
         if taken.size:
             others = listing(f'"{names[k]}"' for k in np.unique(patch[taken]))
             first = edges.outer[taken[0]]
             where = sketch.face((edges.start[first], edges.stop[first]))
-            faults.append(Fault(place, f"shares {taken.size} faces with {others}, {where}; expected each in one group"))
+            faults.append(
+                Fault(place, f"faces shared with {others}: {taken.size}, {where}; expected each in one group")
+            )
         patch[spot] = names.index(name)
     return faults, names, patch
 

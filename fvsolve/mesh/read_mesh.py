@@ -36,7 +36,7 @@ def read(path: str | Path, unit: str = "m") -> Mesh:
     notes = list(content.notes)
     spare = len(content.points) + 1 - used.size
     if spare:
-        notes.append(f"{spare} of {len(content.points)} points in the file belong to no cell: ignored")
+        notes.append(f"points in the file that belong to no cell: {spare} of {len(content.points)}, ignored")
     lines = _renumber(content.lines, used[1:])
     sketch = Sketch(content.points[used[1:], :2], cells, unit)
     faults, bad, clockwise = shape_faults(sketch)
@@ -78,7 +78,8 @@ def _place_faults(content: Content, unit: str) -> list[Fault]:
         return [
             Fault(
                 "points",
-                f"{invalid.size} of {used.size} have invalid coordinates (not a number, or too large), "
+                f"{invalid.size} of {used.size} {'has' if invalid.size == 1 else 'have'} invalid coordinates "
+                f"(not a number, or too large), "
                 f"first point {invalid[0]}",
             )
         ]
@@ -117,9 +118,11 @@ def _notes(sketch: Sketch, factor: float, patch: np.ndarray, grouped: bool) -> l
     notes = []
     unnamed = int((patch < 0).sum())
     if not grouped:
-        notes.append(f'the file contains no named group of lines: all {unnamed} boundary faces are "{WALL}"')
+        notes.append(
+            f'the file contains no named group of lines: the patch of all {unnamed} boundary faces is "{WALL}"'
+        )
     elif unnamed:
-        notes.append(f'{unnamed} of {patch.size} boundary faces are in no group: they are "{WALL}"')
+        notes.append(f'boundary faces in no group: {unnamed} of {patch.size}; their patch is "{WALL}"')
     extent = factor * np.ptp(sketch.points, axis=0).max()
     if sketch.unit == "m" and not SMALL <= extent <= LARGE:
         guess = 'unit = "mm"' if extent > LARGE else 'unit = "km"'

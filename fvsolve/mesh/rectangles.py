@@ -206,7 +206,7 @@ def _patch_range(place: str, side: str, span: list, lines: Sequence[np.ndarray],
     along = lines[SIDES[side]]
     cells = {"west": solid[:, 0], "east": solid[:, -1], "south": solid[0], "north": solid[-1]}[side]
     if not cells.any():
-        return Fault(place, f"the holes remove the whole {side} side")
+        return Fault(place, f"the holes remove the whole {side} side; expected another side, or other holes")
     if not span:
         return along[0], along[-1]
     if len(span) != 2 or not all(math.isfinite(value) for value in span) or not span[0] < span[1]:

@@ -18,7 +18,7 @@ EQUILIBRIUM_SHARE = (
 def refuse_massless(draft, at: StaticForces) -> None:
     """Add a fault for a body whose joint allows a motion without inertia, of the body or of bodies attached to it.
 
-    Likewise for a body that the fluid in its tanks outweighs. Only the last such body in the table gets a fault.
+    A body that the fluid in its tanks outweighs gets a fault too. Only the last such body in the table gets one.
     """
     at.run(MOTION, ACCELERATE)
     n = len(draft.freedom_table)
@@ -32,7 +32,7 @@ def refuse_massless(draft, at: StaticForces) -> None:
                 remedy = "expected wider tanks, a heavier body, or a driven joint"
                 return draft.fault(f"nodes.{name}.mass", f"{text}; {remedy}")
             if not left > least:
-                text = "its inertia is 0 in a direction in which its joint allows motion"
+                text = "the inertia of the body is 0 in a direction in which its joint allows motion"
                 return draft.fault(
                     f"nodes.{name}.inertia", f"{text}. Expected an inertia above 0 about the axis of the joint"
                 )

@@ -166,8 +166,8 @@ def relative_turn(draft, places: tuple[str, str]) -> float:
 def distance_and_rate(draft, places: tuple[str | None, str], line) -> tuple[float, float]:
     """Distance between two points at the start [m], and its rate [m/s]; a point None is the origin of the world.
 
-    For a line that acts TOWARD a direction, 0 and the relative velocity in it. For a line that acts ABOUT an axis, 0
-    and the relative angular velocity about it [rad/s]. line : entry of `draft.lines`
+    For a line that acts TOWARD a direction the result is (0, relative velocity in this direction [m/s]). For a line
+    that acts ABOUT an axis it is (0, relative angular velocity about the axis [rad/s]). line : entry of `draft.lines`
     """
     ends = []
     for place in places:

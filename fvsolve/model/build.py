@@ -162,10 +162,10 @@ def fill_rises(draft: ModelDraft) -> None:
 
 
 def pack(draft: ModelDraft, profile: np.ndarray) -> None:
-    """Make the tuple of tables and the shapes of run arrays.
+    """Make the tuple of tables, `draft.tables`, and the shapes of run arrays, `draft.shapes`.
 
     The tuple contains the tables of the draft themselves, so that later changes of their records appear in it.
-    `integers` and `floats` are copied.
+    `integers` and `floats` are copied. profile : the table `profile`, see `profile_size`
     """
     settings = settings_of(draft)
     draft.probe_table = lower_probes(draft)
@@ -211,7 +211,11 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
 
 
 def column_rates(draft: ModelDraft):
-    """Natural angular frequency [1/s] of each rigid column and its end nodes, of which constant stiffnesses count."""
+    """Yield sqrt(k A / L) [1/s] for each rigid column of area A and length L.
+
+    k is the sum of the stiffnesses of its end nodes that are known before the start: chambers, and tanks with their
+    least area.
+    """
     stiff = draft.node_table["stiffness"]
     for row in draft.column_table:
         k = stiff[row["from_node"]] + stiff[row["to_node"]]

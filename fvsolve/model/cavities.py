@@ -22,7 +22,7 @@ def coarse_for_cavities(draft) -> list[Notice]:
         return []
     error = DURATION * longest.cells**-RATE
     better = DURATION * ENOUGH**-RATE
-    text = (f"{longest.name}: with {longest.cells} cells the duration of a first cavity is about "
-            f"{100.0 * error:.2g} % too short with little damping; "
+    text = (f"{longest.name}: with {longest.cells} cell{'s' if longest.cells > 1 else ''} the duration of a first "
+            f"cavity is about {100.0 * error:.2g} % too short with little damping; "
             f"with {ENOUGH} cells it is {100.0 * better:.2g} %")  # fmt: skip
     return [Notice("cells", f"links.{longest.name}", text, "cells", float(longest.cells), float(ENOUGH))]

@@ -213,16 +213,16 @@ def regularise(draft, ks) -> None:
 
 
 def set_transition(draft, name: str, link, row) -> None:
-    """Set the flow of a restriction at Reynolds number 10, below which it is laminar [kg/s]."""
+    """Set the transition flow of a restriction [kg/s], its flow at Reynolds number 10; below it the flow is laminar."""
     row["transition"] = draft.hydraulics.transition_flow(name, link, 10.0, draft.fault)
 
 
 def tolerated_drop(draft, ks) -> float:
-    """Pressure drop [Pa] whose decay changes each adjacent storing node by at most a few error tolerances.
+    """Pressure drop [Pa] whose decay changes each storing node at the valves ks by at most a few error tolerances.
 
     It is 0 without error control or without such nodes. Near zero drop the slope of the square-root law is unbounded.
     Linearly implicit steps then alternate in sign: each error is below the tolerance, but the flow never comes to rest.
-    A chamber of 10 l took 1e6 steps in 10 s.
+    A chamber of 10 l took 1e6 steps in 10 s. ks : rows of the valves
     """
     rtol, nodes = draft.case.numerics.rtol, draft.node_table
     ends = {int(draft.valve_table[k][end]) for k in ks for end in ("from_node", "to_node")}

@@ -101,7 +101,7 @@ def jump_times(past: np.ndarray, delays: np.ndarray, begin: float, end: float) -
 
 
 def steps_left(past: np.ndarray, delays: np.ndarray) -> int:
-    """Number of steps that can be taken before an entry is overwritten that is still needed."""
+    """Number of steps that can be taken before an entry that is still needed is overwritten."""
     count, sizes = int(past[at.COUNT]), int(past[at.RING_FACTOR]) * delays["ring_size"]
     if count == 0:
         return int(sizes.min()) - MARGIN_ENTRIES - LEAST_STEPS

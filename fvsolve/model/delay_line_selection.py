@@ -212,7 +212,7 @@ def divide_lines(draft) -> list[str]:
             continue
         if row["now"] > 0.0 and attenuation > MAX_ATTENUATION:
             bound = math.inf
-            facts[name]["line_why"] += ", where friction attenuates a wave too much"
+            facts[name]["line_why"] += "; for so short a line friction attenuates a wave too much"
         stated = case.links[name].pipe_model or case.numerics.pipe_model
         if stated == "auto" and bound > case.numerics.delay_tolerance:
             unfit.append(name)

@@ -66,7 +66,7 @@ class EnergyForm:
         return self if self.closed(a) else self.full_norm()
 
     def full_norm(self) -> EnergyForm:
-        """Energy form in which motions without energy of amount 1 has the energy `least`.
+        """Energy form in which a motion without energy, in the amount 1, has the energy `least`.
 
         Thus it is a norm of all states.
         """
@@ -123,8 +123,8 @@ def form_of(rows: Any, parts: tuple[str, ...], scale: np.ndarray) -> EnergyForm:
     """Energy form of |L d|^2 from the matrix L.
 
     rows : L; parts : name of the part of each row; scale : float64[n]  size of a small deviation of each state
-    A state that is alone in a row is a coordinate; singular values separate groups of states that rows join. Raises
-    FvsolveError if a group is too large.
+    A state with a row of its own gives a coordinate. In each group of other states that rows join, coordinates and
+    motions without energy follow from a singular value decomposition. Raises FvsolveError if a group is too large.
     """
     from scipy.sparse import coo_array
 
@@ -225,7 +225,7 @@ def greatest_value(model, q: int) -> float:
 
 
 def spring_rows(model, y: np.ndarray, elongations: Elongations):
-    """Rows of L for springs, and for stops in contact : (name, state -> factor)."""
+    """Yield (name, state -> factor) of each row of L for springs, and for stops in contact."""
     braces, stops = rows_in(model.case, "brace"), rows_in(model.case, "stop")
     for k, ((name, *_), row) in enumerate(zip(braces, model.tables.braces, strict=True)):
         if row["stiffness"] > 0.0:
@@ -237,7 +237,7 @@ def spring_rows(model, y: np.ndarray, elongations: Elongations):
 
 
 def device_rows(model, y: np.ndarray):
-    """Rows of L for the energy stored by devices : (name, state -> factor)."""
+    """Yield (name, state -> factor) of each row of L for the energy stored by devices."""
     if not model.devices:
         return
     out = model.evaluate(model.case.numerics.start, y)[1]
@@ -247,7 +247,7 @@ def device_rows(model, y: np.ndarray):
 
 
 def chamber_rows(model, y: np.ndarray, elongations: Elongations):
-    """Rows of L for the chambers of cylinders at y : (index of the mass state, state -> factor).
+    """Yield (index of the mass state, state -> factor) of the row of L for each chamber of cylinders at y.
 
     The same excess mass e [kg] in less volume has more pressure. If the cylinder joins points of bodies, the mass state
     is e plus the gained volume times the density at the start.
@@ -316,7 +316,7 @@ class Elongations:
 
 
 def kinetic_rows(model, y: np.ndarray):
-    """Rows of L for the kinetic energy of bodies : (name, state -> factor).
+    """Yield (name, state -> factor) of each row of L for the kinetic energy of bodies.
 
     The energy is v' M v / 2 = |F v|^2 / 2: velocities v, mass matrix M = F' F with the factor F from the kernels.
     """
@@ -333,7 +333,7 @@ def kinetic_rows(model, y: np.ndarray):
 
 
 def joint_spring_rows(model):
-    """Rows of L for the springs of joints : (name, state -> factor)."""
+    """Yield (name, state -> factor) of the row of L for each spring of a joint."""
     for name, body in zip(model.body_names, model.tables.bodies, strict=True):
         if body["stiffness"] > 0.0:
             yield name, {int(body["y"]): float(np.sqrt(0.5 * body["stiffness"]))}

@@ -55,7 +55,7 @@ def attitude_from(rotation: np.ndarray) -> Attitude:
 
 
 def position_notices(case) -> Iterator[Notice]:
-    """Notices of bodies and masses whose equilibrium position differs from the stated position."""
+    """Yield notices of bodies and masses whose equilibrium position differs from the stated position."""
     for name, node in case.equilibrium_nodes.items():
         before = case.nodes[name]
         if node.kind == "mass":
@@ -74,9 +74,10 @@ def position_notices(case) -> Iterator[Notice]:
 
 
 def attitude_notices(case, name: str, free: bool, pose, before) -> Iterator[Notice]:
-    """Notice of the equilibrium attitude of a body on a ball joint or a free body; of a free body also its position.
+    """Yield a notice of the equilibrium attitude of a body with a ball or free joint.
 
-    pose, before : pose in equilibrium, and as stated
+    A free body gives a second notice, of its position.
+    free : True for a free body; pose, before : pose in equilibrium, and as stated
     """
     turn = attitude.axis_angle(attitude.deviation(pose.attitude, before.attitude))[1]
     roll, pitch, yaw = np.degrees(attitude.roll_pitch_yaw(pose.attitude))
@@ -114,9 +115,9 @@ def report_unbalanced(at: Configuration, force: np.ndarray, scale: np.ndarray) -
         own = np.array([owner_name(at, i) == name for i in range(at.size)])
         residuals = [f"{np.linalg.norm(force[own & part]):.4g} {unit}"
                 for part, unit in ((~angular, "N"), (angular, "N m")) if np.any(unbalanced & own & part)]  # fmt: skip
-        text = f'"equilibrium" finds no position where its forces balance: {" and ".join(residuals)} remain'
+        text = f'"equilibrium" finds no position where the forces on {name} balance: {" and ".join(residuals)} remain'
         remedy = (
-            "support it by a spring, a cylinder or a driven joint, state a position nearer to equilibrium, "
+            "add a spring, a cylinder or a driven joint as support, state a position nearer to equilibrium, "
             'or use initial = "steady"'
         )
         at.draft.fault(f"nodes.{name}", f"{text}; {remedy}")
@@ -130,5 +131,5 @@ def refuse_overturned(at: Configuration, y: np.ndarray) -> None:
         return
     where = int(at.out[rec.WHERE]) - len(at.draft.basins)
     name = list(at.draft.case.places)[where] if where >= 0 else at.draft.basins[where].name
-    text = "in the equilibrium found it is turned over, and its contents would run out"
-    at.draft.fault(f"nodes.{name}", f'{text}; hold its body upright, state another position, or use initial = "steady"')
+    text = f"in the equilibrium found {name} is turned over, and the contents would run out"
+    at.draft.fault(f"nodes.{name}", f'{text}; hold the body upright, state another position, or use initial = "steady"')

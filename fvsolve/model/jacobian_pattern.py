@@ -28,7 +28,8 @@ def lumped_states(model) -> np.ndarray:
     """Indices of all states except waves in cells of pipes, states of basins and travels of their walls : int64[q].
 
     Most are states of lumped parts such as tanks, chambers and masses. Their pressures are hundreds of bars, while the
-    flow of restrictions bends within few pascals. Empty under density laws whose pressures come from iterations.
+    flow of restrictions bends within a few pascals. The result is empty under density laws whose pressures come from
+    iterations.
     """
     if model.case.law.name not in ("linear", "log"):  # pressures come from iterations, rougher than rounding
         return np.zeros(0, dtype=np.int64)

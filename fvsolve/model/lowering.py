@@ -153,10 +153,10 @@ class Restriction(Lowering):
         return Edge(i, j, newton, math.sqrt(g * density_ratio * TYPICAL_DROP))
 
     def stepper(self, start, k: int, g: float, density_ratio: float):
-        """Function (flow [kg/s], drop [Pa]) -> (a, s) of the part's own law, as before any event.
+        """Function (flow [kg/s], drop [Pa]) -> (a, s) of the part's own law, with the event flags as before any event.
 
-        Its next Newton step changes the flow by a + s d(drop). g : conductance [kg2/s2/Pa]; density_ratio : upstream
-        density over reference density
+        The next Newton step of this law changes the flow by a + s d(drop), with the change d(drop) of the drop.
+        g : conductance [kg2/s2/Pa]; density_ratio : upstream density over reference density
         """
         hook = calls.function_address(self.law.step, calls.HOOKS["step"][0])
         return lambda flow, drop: step_at(hook, start.out, start.handle, k, g, float(flow), float(drop), density_ratio)

@@ -233,14 +233,14 @@ class ModelDraft:
         row["from_node"], row["to_node"] = self.node_index[link.from_], self.node_index[link.to]
 
     def stiff(self) -> int:
-        """Number of a new node whose stiffness (pressure per stored mass) is not constant."""
+        """Index of a new node among the nodes whose stiffness (pressure per stored mass) is not constant."""
         self.moving += 1
         return self.moving - 1
 
     def restriction(self, name, link, row) -> None:
         """Set the conductance of a fully open valve [kg2/s2/Pa] in its row.
 
-        If `laminar_reynolds` is stated, also the flow below which the valve is laminar [kg/s].
+        If `laminar_reynolds` is stated, the flow below which the valve is laminar [kg/s] is set too.
         """
         row["conductance"] = 2.0 * self.fluid.density * link.flow_area() ** 2
         if link.laminar_reynolds is not None:

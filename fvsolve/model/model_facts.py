@@ -27,7 +27,7 @@ LOCAL_EXCESS = (
     0.05  # relative excess of sound speed at a pressure over that at the reference, for laws that are not linear
 )
 VALVE_SHARE = 0.1  # least share of the greatest rate by which a valve must exceed all else to be reported as the cause
-MAX_VALVES = 100  # valves
+MAX_VALVES = 100  # greatest number of valves that are tried
 COSTLY_RATIO, COSTLY_STEPS = (
     10.0,
     20_000,
@@ -131,7 +131,7 @@ def cost_notices(model, steps: int | None, set_by: str) -> list[Notice]:
     reason = set_by if numerics.rtol is None else "a part that is faster than waves"
     text = (
         f"{numerics.method}: about {count} steps, {ratio:.3g} times as many as waves need ({reason}); "
-        'method = "auto" or "rodas-5p" with rtol = 1e-6 is not limited by it'
+        'method = "auto" or "rodas-5p" with rtol = 1e-6 avoids this limit'
     )
     return [Notice("cost", "numerics", text, "method", float(count), float(count / ratio))]
 
@@ -198,7 +198,7 @@ def step_and_reason(model) -> tuple[float | None, str]:
     else:  # waves only: implicit steps are not limited by other parts
         own, rate = model.wave_rates, model.wave_rate
     if not rate > 0.0:
-        return None, "nothing limits it"
+        return None, "no part limits the step"
     if not model.case.law.linear and len(own):
         own = own * (1.0 + LOCAL_EXCESS) + velocities(model) / model.tables.pipes["dx"]
     if len(own) and own.max() >= rate * (1 - 1e-12):
@@ -210,7 +210,7 @@ def step_and_reason(model) -> tuple[float | None, str]:
         return numerics.courant / rate, f"links.{valve}: its flow responds at once to the nodes it joins{others}"
     part = fastest_parts(model) + (", faster than every pipe cell" if len(own) else "")
     if len(own) and rate > STIFF_RATIO * own.max():
-        part += f', by a factor of {rate / own.max():.3g}; rtol with method = "rodas-5p" is not limited by it'
+        part += f', by a factor of {rate / own.max():.3g}; rtol with method = "rodas-5p" avoids this limit'
     return numerics.courant / rate, part
 
 

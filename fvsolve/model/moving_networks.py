@@ -46,7 +46,7 @@ def lower_moving_segments(draft) -> None:
     draft.moving_segment_table = np.array(rows, rec.MOVING_SEGMENT) if rows else np.zeros(0, rec.MOVING_SEGMENT)
     if reads_joint_forces(draft):
         for place, text in moving_network_checks.missing_reactions(draft.case.nodes, draft.case.links):
-            draft.fault(".".join(place), f"{text}, but a probe reads forces of joints")
+            draft.fault(".".join(place), f"a probe reads forces of joints, but {text}")
 
 
 def reads_joint_forces(draft) -> bool:

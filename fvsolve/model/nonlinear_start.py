@@ -76,8 +76,9 @@ class NonlinearStart(SteadyStart):
             row["drag"] = self.pipe_drop(row)
             b_to = self.march(row, mesh, flow)[2]
             if not math.isfinite(b_to):
-                self.draft.fault(f"links.{names[k]}", "no steady state: its pressure falls below the range of the "
-                                 'density law; check the heads at its ends, or use initial = "rest"')  # fmt: skip
+                self.draft.fault(f"links.{names[k]}", "no steady state: the pressure in this pipe falls below the "
+                                 "range of the density law; check the heads at its ends, or use "
+                                 'initial = "rest"')  # fmt: skip
                 self.draft.check()
             exit_loss = 0.5 * (flow / self.ends[1]) ** 2 if flow > 0.0 and self.at_rest(j) else 0.0
             self.exit_losses[names[k]] = self.jet(row, *self.ends)

@@ -25,7 +25,8 @@ COSTLY_RATIO = 10.0  # steps shorter by this factor than those of other pieces o
 def too_few_cells(draft: Any) -> list[Notice]:
     """Notices of pipes with too few cells for waves of an event, or next to a check valve or accumulator.
 
-    Without a notice of the second kind, also of a piece of a cut pipe with far shorter steps than other pieces.
+    If there are no notices of the second kind, a piece of a cut pipe with far shorter steps than other pieces gives
+    one.
     """
     table = draft.pipe_table
     if not len(table):
@@ -35,7 +36,7 @@ def too_few_cells(draft: Any) -> list[Notice]:
 
 
 def events(case: Any) -> Iterator[tuple[str, float]]:
-    """Changes that a case states within its run : (dotted key, duration [s]); the duration of a sudden change is 0.
+    """Yield (dotted key, duration [s]) of each change that a case states within its run; 0 for a sudden change.
 
     Trips are included at any time.
     """
@@ -65,7 +66,7 @@ def duration(schedule: Schedule, start: float, end: float) -> float:
 
 
 def _behind_events(draft: Any, cells: np.ndarray) -> list[Notice]:
-    """Notice of pipes with too few cells for the waves of the fastest event."""
+    """List with a notice of pipes with too few cells for the waves of the fastest event; empty without such pipes."""
     case, scheme = draft.case, draft.case.numerics.scheme
     needed = SCHEME_CELLS.get(scheme, OTHER_CELLS) * _diffusion(draft)
     few = cells < needed
@@ -119,7 +120,10 @@ def _near_events(draft: Any, durations: dict[str, float], travel: np.ndarray) ->
 
 
 def _near_answering(draft: Any, cells: np.ndarray) -> list[Notice]:
-    """Notice of pipes with too few cells for their waves to reach a check valve or accumulator next to them."""
+    """List with a notice of pipes with too few cells to resolve the waves at a check valve or accumulator next to them.
+
+    It is empty without such pipes.
+    """
     if not (cells < LEAST_CELLS).any():
         return []
     case, parts_at = draft.case, answering_parts(draft.case)
@@ -129,8 +133,8 @@ def _near_answering(draft: Any, cells: np.ndarray) -> list[Notice]:
         return []
     worst = int(np.argmin(np.where(few, draft.pipe_table["dx"] * draft.pipe_table["cells"], np.inf)))
     name, cost = draft.pipe_names[worst], "".join(f"; {notice.text}" for notice in _costly_piece(draft, cells))
-    text = (f"{_location(case, name)}: {_cells(cells[worst])}, too few for its waves to reach "
-            f"{listing(adjacent[worst], 3)}; expected {_advice(case, name)}"
+    text = (f"{_location(case, name)}: {_cells(cells[worst])}, too few to resolve the waves at "
+            f"{listing(adjacent[worst], 3)}; next to a check valve or accumulator give {_advice(case, name)} or more"
             f"{_others(draft, few, worst)}{cost}")  # fmt: skip
     return [Notice("cells", f"links.{name}", text, "cells", float(cells[worst]), float(LEAST_CELLS))]
 
@@ -146,7 +150,7 @@ def answering_parts(case: Any) -> dict[str, list[str]]:
 
 
 def _costly_piece(draft: Any, cells: np.ndarray) -> list[Notice]:
-    """Notice of a piece of a cut pipe that needs far shorter steps than the other pieces of this pipe."""
+    """List with a notice of a piece of a cut pipe that needs far shorter steps than its other pieces; else empty."""
     case, numerics = draft.case, draft.case.numerics
     if numerics.courant is None:
         return []

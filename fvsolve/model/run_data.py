@@ -43,7 +43,8 @@ class RunData:
     clock : end of the segment (schedules take their left limit there) and the given step, see `kernels.dtypes.CLOCK`
     armed : flag of each event, 1.0 while its condition holds; marks : first times at which the model does not hold [s]
     envelope : float64[4, cells]  least sum of both waves in each cell [kg/s], its time [s], greatest sum, its time
-    extremes : float64[4, probes]  likewise of probes, then of watched quantities
+    extremes : float64[4, probes]  least value, its time, greatest value and its time, of probes, then of watched
+    quantities
     bands : for each basin, first row (of a mesh: first cell) that this thread computes, and the one after its last
     joint : see `kernels.band_exchange`, empty if one thread computes all; sums : see `kernels.stage_sums`
     """

@@ -42,7 +42,7 @@ class ScalarCouplings:
         self.values = self.mixed_values()
 
     def own(self, i: int) -> list:
-        """States that set the scalar's value at node i if it stores or is a patch of a basin; else an empty list."""
+        """States that set the scalar's value at node i, a storing node or a patch of a basin; else an empty list."""
         if i in self.of.patches:
             return [self.behind(i), self.of.behind(i, 1)]
         return [self.places[i], self.of.own(i)] if self.stores[i] else []
@@ -76,7 +76,7 @@ class ScalarCouplings:
         return [joined[group[i]] if inner[i] else unique_states(*self.own(i)) for i in range(len(group))]
 
     def pairs(self) -> Iterator[Pairs]:
-        """All couplings of the scalar, except some of a state with itself.
+        """Yield all couplings of the scalar, except some of a state with itself.
 
         Those within basins are yielded for all scalars together, with the first scalar.
         """
@@ -101,7 +101,10 @@ class ScalarCouplings:
                 yield all_pairs(self.close(pipe, right), self.read(pipe, right, i))
 
     def boundary_pairs(self, basin) -> Iterator[Pairs]:
-        """Couplings of the flow through the open boundary of a basin, booked at its patches, with the cells there."""
+        """Yield couplings of the flow through open boundaries of a basin with the cells there.
+
+        This flow is booked at the patches of the basin.
+        """
         nodes = [i for i, row in self.of.patches.items() if self.of.basins[row["basin"]] is basin]
         if basin.row["through"] >= 0:
             behind = [self.of.integers[row["first"] :][: row["count"]] for row in map(self.of.patches.get, nodes)]
@@ -110,7 +113,7 @@ class ScalarCouplings:
             yield all_pairs(self.ledger + np.array(nodes), read)
 
     def decay_pairs(self) -> Iterator[Pairs]:
-        """Couplings of the decay in the ledger with the amounts and masses that decay.
+        """Yield couplings of the decay in the ledger with the amounts and masses that decay.
 
         The ledger has a single row for the decay of all states, or a row for each state.
         """
@@ -129,7 +132,7 @@ class ScalarCouplings:
                 yield pick(basin.row["lost"] + cells), first + cells
 
     def inside(self, pipe) -> Iterator[Pairs]:
-        """Couplings of the amount in each cell of a pipe with amounts and waves in neighbouring cells."""
+        """Yield couplings of the amount in each cell of a pipe with amounts and waves in neighbouring cells."""
         n = int(pipe["cells"])
         cells, at = np.arange(n), self.row["y"] + pipe["cell"]
         for offset in range(-self.wide, self.wide + 1):
@@ -158,6 +161,6 @@ class ScalarCouplings:
 
 
 def scalar_pairs(couplings, model) -> Iterator[Pairs]:
-    """Couplings of all scalars of a model, see `ScalarCouplings`."""
+    """Yield the couplings of all scalars of a model, see `ScalarCouplings`."""
     for q in range(len(model.tables.scalars)):
         yield from ScalarCouplings(couplings, model, q).pairs()

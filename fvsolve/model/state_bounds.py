@@ -35,7 +35,7 @@ def bound_rows(states, first, second, base, gain, least, most) -> tuple[np.ndarr
 
 
 def depths(model):
-    """Bounds that keep depths of water in basin cells at 0 or above."""
+    """Yield `bound_rows` that keep depths of water in basin cells at 0 or above."""
     for basin in model.basins:
         if basin.deep:
             states = int(basin.row["y"]) + np.arange(basin.n)
@@ -43,7 +43,10 @@ def depths(model):
 
 
 def in_pipes(model, q: int):
-    """Bounds of a scalar's amounts per length in pipes, by the mass per length that follows from both waves."""
+    """Yield `bound_rows` of the amounts per length of scalar q in each pipe.
+
+    They are its least and greatest value times the mass per length that follows from both waves.
+    """
     row, profile = model.tables.scalars[q], model.tables.profile
     for pipe in model.tables.pipes:
         n, k = int(pipe["cells"]), np.arange(pipe["cells"])
@@ -53,7 +56,10 @@ def in_pipes(model, q: int):
 
 
 def in_nodes(model, q: int):
-    """Bounds of a scalar's amounts in tanks and chambers, by the mass there."""
+    """Yield `bound_rows` of the amount of scalar q in each tank and chamber.
+
+    They are its least and greatest value times the mass there.
+    """
     row, nodes = model.tables.scalars[q], model.tables.nodes
     places = model.tables.integers[row["places"] : row["places"] + len(nodes)]
     for node, place in zip(nodes, places, strict=True):
@@ -62,7 +68,11 @@ def in_nodes(model, q: int):
 
 
 def in_basins(model, q: int):
-    """Bounds of a scalar's amounts per area in basins, by the depth; by 1 in basins without variable depth (`deep`)."""
+    """Yield `bound_rows` of the amounts per area of scalar q in each basin with scalars.
+
+    They are its least and greatest value times the depth, or times 1 in a basin without variable depth (`basin.deep`
+    False).
+    """
     row = model.tables.scalars[q]
     for basin in model.basins:
         if basin.row["carried"] < 0:

@@ -60,7 +60,7 @@ class Couplings:
         self.sets = self.pressures()  # for each node, the states that set its pressure
 
     def pairs(self) -> Iterator[Pairs]:
-        """All couplings of the model, except some of a state with itself."""
+        """Yield all couplings of the model, except some of a state with itself."""
         for pipe in self.pipes:
             if pipe["delay"] >= 0:
                 yield all_pairs(unique_states(pipe["y"]), unique_states(*(self.sets[i] for i in ends_of(pipe))))
@@ -80,7 +80,7 @@ class Couplings:
         yield from self.moving_fluid_pairs()
 
     def boundary_pairs(self) -> Iterator[Pairs]:
-        """Couplings of the flow through open patches of basins with the cells there."""
+        """Yield couplings of the flow through open patches of basins with the cells there."""
         for i, row in self.patches.items():
             basin, behind = self.basins[row["basin"]], row["ring"] + row["faces"]
             if row["open"]:
@@ -178,7 +178,7 @@ class Couplings:
         return self.ties[root]
 
     def spatial(self) -> Iterator[Pairs]:
-        """Couplings of bodies: with all bodies of their tree, and with the trees and chambers that push them."""
+        """Yield couplings of bodies with all bodies of their tree, and with the trees and chambers that push them."""
         for root in np.unique([self.tree_root(root) for root in self.bodies["root"]]):
             own = [self.tree_states(root, order) for order in (0, 1)]
             yield all_pairs(unique_states(*own), unique_states(*own))
@@ -219,7 +219,7 @@ class Couplings:
         return [joined[group[i]] if self.inner[i] else self.pressure_states(i) for i in range(len(group))]
 
     def stored(self) -> Iterator[Pairs]:
-        """Couplings of the masses in tanks, chambers and patches, and of the ledger, with the flows into them."""
+        """Yield couplings of the masses in tanks, chambers and patches, and of the ledger, with the flows into them."""
         into = [[self.pressure_states(i)] for i in range(len(self.nodes))]
         for pipe in self.pipes:
             for right, i in enumerate(ends_of(pipe)):
@@ -239,12 +239,15 @@ class Couplings:
             yield all_pairs(unique_states(self.own(i), self.behind(i), self.size + i), unique_states(*into[i]))
 
     def column_pairs(self) -> Iterator[Pairs]:
-        """Couplings of the flow of rigid columns with the pressures at both ends."""
+        """Yield couplings of the flow of each rigid column with the pressures at both ends."""
         for column in self.columns:
             yield all_pairs(unique_states(column["y"]), unique_states(*(self.sets[i] for i in ends_of(column))))
 
     def moving(self) -> Iterator[Pairs]:
-        """Couplings of positions of masses with their velocities, and of these with adjacent masses and chambers."""
+        """Yield couplings of positions of masses with their velocities, and of these with adjacent masses and chambers.
+
+        The couplings of bodies, see `spatial`, follow.
+        """
         at = self.masses[self.masses >= 0]
         yield at, at + 1
         for row in [*self.braces, *self.pistons]:
@@ -257,16 +260,19 @@ class Couplings:
         yield from self.spatial()
 
     def device_pairs(self) -> Iterator[Pairs]:
-        """Couplings of states of devices with each other, with pressures at their ends and at the node they sense."""
+        """Yield couplings of the states of each device with each other, and with pressures.
+
+        The pressures are those at its ends and at the node that it senses.
+        """
         for row in self.devices:
             ends = ends_of(self.valves[row["valve"]]) if row["valve"] >= 0 else ()
             read = [self.sets[i] for i in (*ends, row["node"]) if i >= 0]
             yield all_pairs(self.device_states(row), unique_states(self.device_states(row), *read))
 
     def wall_pairs(self) -> Iterator[Pairs]:
-        """Couplings of basin cells with the travel of moving walls, and of the travel with the parts that move a wall.
+        """Yield couplings of basin cells with the travel of moving walls, and of this travel with masses and bodies.
 
-        Also couplings of these masses and bodies with the cells at the walls.
+        The masses and bodies are those that move the walls; their couplings with the cells at the walls are included.
         """
         for wall in self.walls:
             basin, mass = self.basins[wall["basin"]], self.masses[wall["mass"]] if wall["mass"] >= 0 else -1
@@ -280,7 +286,7 @@ class Couplings:
             yield all_pairs(speed, unique_states(wall["y"], pattern.cell_states(basin, cells)))
 
     def moving_fluid_pairs(self) -> Iterator[Pairs]:
-        """Couplings of fluid on bodies and of the bodies that it moves.
+        """Yield couplings of fluid on bodies and of the bodies that it moves.
 
         They depend on each other, and on chambers that push the bodies.
         """
@@ -301,7 +307,7 @@ class Couplings:
             yield all_pairs(both, unique_states(*cells, *own, *pushing))
 
     def moving_fluid_states(self) -> Iterator[tuple[int, np.ndarray]]:
-        """Fluid on bodies : (row of `moving_segments`, its states and those that set its pressures)."""
+        """Yield (row of `moving_segments`, its states and those that set its pressures) for the fluid on bodies."""
         for i, node in enumerate(self.nodes):
             if node["moving_segment"] >= 0:
                 yield node["moving_segment"], unique_states(self.own(i), self.sets[i])
@@ -319,7 +325,7 @@ class Couplings:
         return bool(not self.linear or rough or (pipe["loss"] != 0.0 and not self.upwind))
 
     def inside(self, pipe) -> Iterator[Pairs]:
-        """Couplings of the waves in cells of a pipe with the waves in neighbouring cells."""
+        """Yield couplings of the waves in cells of a pipe with the waves in neighbouring cells."""
         cells = np.arange(pipe["cells"])
         stencil = np.arange(-self.reach.behind, self.reach.ahead + 1)
         local = [0] if pipe["loss"] != 0.0 else []
@@ -332,7 +338,7 @@ class Couplings:
                     yield pipe["y"] + wave * cells.size + here, first + here + offset
 
     def friction_memory_pairs(self, pipe) -> Iterator[Pairs]:
-        """Couplings of waves with memory states of unsteady friction, and of these with the waves in their cell.
+        """Yield couplings of waves with memory states of unsteady friction, and of these with the waves in their cell.
 
         Under density laws other than `linear` the memory is that of the velocity, which depends on neighbouring cells
         too.
@@ -351,7 +357,7 @@ class Couplings:
                     yield pipe["memory"] + k * n + here, wave + here + offset
 
     def creep_pairs(self, pipe) -> Iterator[Pairs]:
-        """Couplings of wall creep: waves and creep states of a cell with each other.
+        """Yield couplings of wall creep: waves and creep states of a cell with each other.
 
         Creep states also depend on the waves that set the mean pressure of their cell.
         """
@@ -383,7 +389,7 @@ class Couplings:
         return leaves[edge] if self.linear else unique_states(leaves[edge], enters[edge])
 
     def beyond(self, pipe) -> Iterator[Pairs]:
-        """Couplings of cells whose stencil crosses a pipe end.
+        """Yield couplings of cells whose stencil crosses a pipe end.
 
         They depend on the polynomial that continues the waves there and, where a wave enters, on the node.
         """

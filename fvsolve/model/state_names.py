@@ -67,7 +67,7 @@ class StateNames(Sequence):
         return repr(list(self))
 
     def single(self) -> Iterator[tuple[int, str]]:
-        """Index and name of each state outside the sequences `Numbered`, which are the names of basin cells."""
+        """Yield index and name of each state outside the sequences `Numbered`, which are the names of basin cells."""
         for first, part in zip(self.firsts, self.parts, strict=True):
             if not isinstance(part, Numbered):
                 yield from enumerate(part, first)

@@ -202,7 +202,8 @@ class SteadyStart:
     def friction_edge(self, name: str, row, length: float) -> Edge:
         """Edge of a pipe or rigid column in the steady problem, with its potential drop.
 
-        The drop is length / area times the drag, plus the entries of `extra` and `exit_losses`. The drag [kg/s2] is the
+        The drop is the sum of three terms: length / area times the drag, the entry of the part in `extra`, and M |M|
+        times its loss coefficient in `exit_losses` for the end at which the mass flow M leaves. The drag [kg/s2] is the
         friction of the mass flow, see `kernels.steady_friction.drag`. A stated `initial_flow` is a fixed flow.
         """
         law = tuple(row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds"))
@@ -230,9 +231,10 @@ class SteadyStart:
         return Edge(i, j, newton, first, drop=drop)
 
     def valve_edge(self, k: int) -> Edge:
-        """Edge of a valve in the steady problem, M |M| = G dP, linearised with the slope of a chord of the root.
+        """Edge of a valve in the steady problem, with the square-root law M |M| = G dP or the valve's own law.
 
-        Also sets `open` of its row. M : mass flow [kg/s]; G : conductance [kg2/s2/Pa]; dP : drop of potential [Pa]
+        The square-root law is linearised with the slope of a chord. The method also sets `open` of the row of the
+        valve. M : mass flow [kg/s]; G : conductance [kg2/s2/Pa]; dP : drop of potential [Pa]
         """
         row = self.valves[k]
         own = self.valve_lowering(k).edge(self, k)
@@ -342,18 +344,16 @@ class SteadyStart:
             > 1e-6 * PRESSURE_SCALE
         ]
         for name in swinging:
-            text = (
-                f"{name}: without friction between unequal heads no flow is steady; it starts from rest and oscillates"
-            )
+            text = f"{name}: without friction between unequal heads no flow is steady"
+            text += "; the flow starts from rest and oscillates"
             self.draft.warnings.append(Notice("start", f"links.{name}", text))
         loops, before = {name: pair for name, pair in ends.items() if name not in swinging}, None
         while self.answer.split and loops != before:  # a link to a node that no other link joins is in no loop
             before, counts = loops, Counter(end for pair in loops.values() for end in pair)
             loops = {name: pair for name, pair in loops.items() if min(counts[end] for end in pair) > 1}
         if self.answer.split and (loops or not swinging):
-            text = (
-                f"{listing(loops) or 'paths'}: loops without friction, in which the flow is the solution of least norm"
-            )
+            text = f"{listing(loops) or 'paths'}: flow in loops without friction is not unique"
+            text += "; the start is the solution of least norm"
             self.draft.warnings.append(Notice("start", f"links.{next(iter(loops))}" if loops else "links", text))
 
     def freeze_factors(self) -> None:
@@ -461,7 +461,10 @@ class SteadyStart:
             self.moving += device.begin(self, part, row)
 
     def set_point_tolerance(self, end: str) -> float:
-        """Tolerance of a regulated pressure [Pa], or if `end` is "" of a regulated flow [kg/s], from rounding."""
+        """Tolerance of a regulated pressure [Pa], 1e-6 of PRESSURE_SCALE.
+
+        If `end` is "", it is that of a regulated flow [kg/s], 1e-6 of the flow scale.
+        """
         return 1e-6 * PRESSURE_SCALE if end else 1e-6 * self.flow_scale
 
     def valve_drive(self, k: int) -> tuple[float, float]:
@@ -495,9 +498,8 @@ class SteadyStart:
             moving.append(f"pipe {name}: a pressure difference of {drop}, not balanced by friction, drives its flow")
         for name, row in zip(self.draft.column_names, self.columns, strict=True):
             if row["offset"] != 0.0:
-                moving.append(
-                    f"rigid column {name}: an unbalanced {amount(row['offset'], 'pressure', span=True)} drives its flow"
-                )
+                drop = amount(row["offset"], "pressure", span=True)
+                moving.append(f"rigid column {name}: an unbalanced pressure of {drop} drives its flow")
         for k, (name, row) in enumerate(zip(self.draft.valve_names, self.valves, strict=True)):
             if row["drop"] != 0.0 and row["open"] == 0.0 and row["flow"] == 0.0:
                 if self.conductance(k) > 0.0:

@@ -61,7 +61,8 @@ def terms(
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Terms of W as a sum of m exp(-n tau) : (m, n, highest angular frequency w at which it is accurate).
 
-    w is in units of 1 / tau. cell : travel time of a wave through a cell, as tau; span : duration of the run, as tau
+    w is in units of 1 / tau. weighting : "zielke" or "vardy-brown"; reynolds, roughness : as for `vardy_brown`
+    cell : travel time of a wave through a cell, as tau; span : duration of the run, as tau; accuracy : as for `fit`
     """
     top = 2.0 ** math.floor(math.log2(FASTEST_DECAY / cell))
     top = max(top, 512.0) if weighting == "zielke" else top
@@ -109,7 +110,10 @@ def _zeros() -> list[np.ndarray]:
 
 
 def _decays(starts, low: float, top: float, count: int):
-    """Sets of `count` decays to try: geometric from about `low` to `top`, or continued from the given first decays."""
+    """Yield sets of `count` decays to try: geometric from about `low` to `top`, or continued from given first decays.
+
+    starts : sets of first decays, which may be empty
+    """
     for given in starts:
         if given.size == 0:
             yield from (np.geomspace(bottom * low, top, count) for bottom in SLOWEST_DECAYS)
@@ -132,7 +136,10 @@ def _weights(w, value, tolerance, n):
 
 
 def reserve_terms(draft, row) -> None:
-    """Reserve space in `floats` for the terms of a pipe, which depend on its flow at the start."""
+    """Reserve space in `floats` for the relaxation terms of unsteady friction of a pipe.
+
+    The terms depend on its flow at the start.
+    """
     row["term"] = len(draft.floats)
     draft.floats += [0.0] * (2 * MAX_TERMS)
 
@@ -140,8 +147,8 @@ def reserve_terms(draft, row) -> None:
 def add_terms(draft) -> dict[str, dict]:
     """Add terms and states of pipes with unsteady friction, from flows at the start; return facts for `check`.
 
-    Raises the rate that limits explicit steps where terms need it. Adds a fault if the weighting function needs a flow
-    at the start, or if no sum of exponentials is accurate enough.
+    The rate that limits explicit steps is increased where terms need it. Adds a fault if the weighting function needs a
+    flow at the start, or if no sum of exponentials is accurate enough.
     """
     facts, settings, floats = {}, draft.tables.settings[0], draft.tables.floats
     numerics, fluid = draft.case.numerics, draft.fluid

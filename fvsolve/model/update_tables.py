@@ -15,7 +15,7 @@ CHANGING_FIELDS = ("nodes", "links", "raw", "read")  # fields of a case that dif
 def with_new_sizes(packed: ModelDraft, case: Case) -> ModelDraft | None:
     """Copy of packed tables with the restrictions of a case; None if the case differs in more than their sizes.
 
-    None also with basins, and for a change that `Lowering.resize` does not support.
+    The result is also None with basins, and for a change that `Lowering.resize` does not support.
     """
     before = packed.case
     changed = changed_links(before, case)
@@ -32,7 +32,7 @@ def with_new_sizes(packed: ModelDraft, case: Case) -> ModelDraft | None:
 def changed_links(before: Case, case: Case) -> list[str] | None:
     """Names of the links that differ between two cases; None if anything else differs, or a link has another type.
 
-    None also if the start of the first case is a static equilibrium.
+    The result is also None if the start of the first case is a static equilibrium.
     """
     same = all(
         getattr(before, field.name) is getattr(case, field.name)

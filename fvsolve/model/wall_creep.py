@@ -11,9 +11,7 @@ def add_creep(draft, name: str, link, row) -> None:
         return
     place = f"links.{name}.wall.creep"
     if draft.case.scalars:
-        draft.fault(
-            place, "takes up liquid, into which scalars are not followed; remove either the scalars or the creep"
-        )
+        draft.fault(place, "takes up liquid, whose scalars are not computed; remove either the scalars or the creep")
     if any(getattr(draft.case.places[end], "on", None) for end in link.ports.values()):
         draft.fault(place, "is not supported for a pipe on a body; remove the creep")
     numbers = np.column_stack(gains(link, draft.fluid.density, float(row["speed"])))
@@ -49,7 +47,7 @@ def mass_in_creep(floats: np.ndarray, row, y: np.ndarray) -> float:
 
 
 def limit_creep_step(draft, unsteady: dict) -> dict[str, dict]:
-    """Raise the rate that limits explicit steps to the greatest rate of a pipe with creep; return facts for `check`.
+    """Increase the rate that limits explicit steps to the greatest rate of a pipe with creep; return facts for `check`.
 
     unsteady : result of `add_terms`
     The result is name of a pipe -> facts, with the wave speed after complete creep as `slow_speed` [m/s].

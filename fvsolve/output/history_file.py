@@ -29,7 +29,7 @@ class HistoryFile:
     def continue_from(self, rows: int, size: int) -> None:
         """Open the file to continue from a checkpoint, at which it had `rows` rows and `size` bytes.
 
-        What follows is cut off. Raises RunError if the file is missing or shorter.
+        Later rows are cut off. Raises RunError if the file is missing or shorter.
         """
         if not self.path.is_file() or self.path.stat().st_size < size:
             raise RunError(f"{self.path} is shorter than at its checkpoint; start the run again with --force")
@@ -81,7 +81,10 @@ def read_table(path: Path) -> np.ndarray:
             text = f"a row does not have {names} numbers; the file was truncated or edited, run again with --force"
             raise RunError(f"{path} cannot be read: {text}") from None
     if table.size and table.shape[1] != names:
-        raise RunError(f"{path} cannot be read: rows have {table.shape[1]} numbers, the header has {names} columns")
+        raise RunError(
+            f"{path} cannot be read: rows have {table.shape[1]} numbers, the header has {names} columns; "
+            "run again with --force"
+        )
     return table if table.size else np.empty((0, names))
 
 

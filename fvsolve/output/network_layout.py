@@ -113,7 +113,8 @@ def _plan(count: int, edges: list[tuple[int, int, float]]) -> np.ndarray:
 def _distances(count: int, edges: list[tuple[int, int, float]]) -> np.ndarray:
     """Lengths of the shortest paths between all nodes : float64[count, count] (Floyd 1962).
 
-    It is twice the greatest length between nodes that no path joins. edges : (node, node, length) of each link
+    Between nodes that no path joins, the result is twice the greatest of these lengths. edges : (node, node, length) of
+    each link
     """
     distance = np.full((count, count), np.inf)
     np.fill_diagonal(distance, 0.0)
@@ -151,7 +152,7 @@ def _has_branches(distance: np.ndarray) -> float:
 def _minimise_stress(plan: np.ndarray, distance: np.ndarray) -> np.ndarray:
     """Plan positions x with less stress, sum((|x_i - x_j| - d_ij)^2 / d_ij^2), d_ij the given distance of two nodes.
 
-    Guttman transforms with weights 1 / d_ij^2, starting from `plan`.
+    They follow from `plan` by Guttman transforms with weights 1 / d_ij^2.
     """
     weight = np.where(distance > 0.0, 1.0 / np.where(distance > 0.0, distance, 1.0) ** 2, 0.0)
     laplacian = np.diag(weight.sum(1)) - weight

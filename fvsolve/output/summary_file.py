@@ -87,7 +87,7 @@ def read_summary(path: Path) -> dict:
         summary = json.loads(path.read_text(encoding="utf-8"))
         missing = [key for key in REQUIRED_KEYS if key not in summary] if isinstance(summary, dict) else ["a table"]
         if missing:
-            raise ValueError(f"{listing(missing)} missing, so it is not the summary of a run; run again with --force")
+            raise ValueError(f"this is not the summary of a run, {listing(missing)} missing; run again with --force")
         return summary
     except FileNotFoundError:
         raise RunError(f"{path.parent} does not hold a finished run (no {path.name})") from None

@@ -52,10 +52,10 @@ class Attitude(Table):
             usual=USUAL_ANGLES,
         ),
     ] = None
-    axis: Annotated[tuple[float, ...] | None, Rows("number", length=3, about="axis of a single rotation by angle")] = (
-        None
-    )
-    angle: Annotated[float | None, Angle("angle of a single rotation about axis [rad]")] = None
+    axis: Annotated[
+        tuple[float, ...] | None, Rows("number", length=3, about="axis of a single rotation by `angle`")
+    ] = None
+    angle: Annotated[float | None, Angle("angle of a single rotation about `axis` [rad]")] = None
     euler_parameters: Annotated[
         tuple[float, ...] | None, Rows("number", length=4, about="Euler parameters [eta, e1, e2, e3]")
     ] = None

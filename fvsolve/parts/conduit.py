@@ -92,7 +92,7 @@ class Conduit(TwoPort):
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         if self.diameter > self.length:
             text = (
-                f"{self.diameter:g} m is more than its length of {self.length:g} m, so the flow is not one-dimensional"
+                f"{self.diameter:g} m is more than the length of {self.length:g} m, so the flow is not one-dimensional"
             )
             yield ("diameter",), self.diameter, self.length, text
         rough, most = self.friction.roughness or 0.0, MAX_ROUGHNESS * self.diameter

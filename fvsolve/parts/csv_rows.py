@@ -126,7 +126,7 @@ def read_rows(path: Path) -> CsvRows:
     """
     lines = [(n, line) for n, line in enumerate(read_text(path).splitlines(), 1) if line.strip() and line[0] != "#"]
     if len(lines) < 2:
-        raise ValueError(f"{path.name} is empty; expected a header and rows of numbers")
+        raise ValueError(f"{path.name} has no rows; expected a header and rows of numbers")
     readings = {mark: split_lines(path, lines, mark) for mark in SEPARATORS if mark in lines[0][1]} or {
         ",": split_lines(path, lines)
     }

@@ -35,7 +35,7 @@ class SpatialField:
             values[part] = self.rule(x[part], y[part])
         if not np.isfinite(values).all():
             k = int(np.argmax(~np.isfinite(values)))
-            raise ValueError(f"{show(self.given)} is not a number at x = {x[k]:.6g} m, y = {y[k]:.6g} m")
+            raise ValueError(f"{show(self.given)} is not finite at x = {x[k]:.6g} m, y = {y[k]:.6g} m")
         return values
 
     def table(self) -> Any:
@@ -109,7 +109,7 @@ def read_points(path: Path, dimension: str) -> np.ndarray:
     if len(rows.header) != 3:
         raise ValueError(f"{path.name} has {len(rows.header)} columns; expected x, y and the value")
     if len(rows.lines) < 3:
-        raise ValueError(f"{path.name}: {len(rows.lines)} points; expected at least three")
+        raise ValueError(f"{path.name}: too few points ({len(rows.lines)}); expected at least three")
     return np.column_stack([rows.numbers(k, kind) for k, kind in enumerate(("length", "length", dimension))])
 
 

@@ -64,7 +64,8 @@ class Friction(Table):
         Choice(
             "weighting function",
             WEIGHTINGS,
-            "weighting function of past flow changes, model unsteady; by the initial Reynolds number if left out",
+            "weighting function of past flow changes, model unsteady; "
+            "chosen by the initial Reynolds number if left out",
         ),
     ] = None
     accuracy: Annotated[

@@ -66,5 +66,5 @@ def declare_installed() -> None:
         try:
             read(place)
         except Exception as error:
-            text = f"{source}: the part {place} cannot be read: {error}; correct or remove it"
+            text = f"{source}: the part {place} cannot be read: {error}; correct or remove this part"
             warnings.warn(text, RuntimeWarning, stacklevel=2)

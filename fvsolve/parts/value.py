@@ -300,7 +300,8 @@ class Rows(Value):
 
     def read(self, given: Any, setting: ReadContext) -> tuple[float, ...]:
         if not isinstance(given, (list, tuple)) or not given:
-            raise ValueError(f"{show(given)} is not a list; expected a list of values")
+            state = "has no values" if isinstance(given, (list, tuple)) else "is not a list"
+            raise ValueError(f"{show(given)} {state}; expected a list of values")
         if self.length is not None and len(given) != self.length:
             raise ValueError(f"{show(given)} has {len(given)} values; expected {self.length}")
         item = Quantity(self.dimension, self.range)
@@ -337,7 +338,7 @@ class Matrix(Value):
 
     def read(self, given: Any, setting: ReadContext) -> tuple[tuple[float, ...], ...]:
         if not isinstance(given, (list, tuple)) or len(given) != 3:
-            raise ValueError(f"{show(given)} is not a matrix; expected three rows of three")
+            raise ValueError(f"{show(given)} is not a matrix; expected three rows of three numbers")
         rows, faults = [], []
         for index, row in enumerate(given):
             try:
@@ -365,4 +366,5 @@ def check_increasing(values: Any, given: Any, noun: str = "values") -> None:
     """
     for before, after, text_before, text_after in zip(values, values[1:], given, given[1:], strict=False):
         if not after > before:
-            raise ValueError(f"{noun} out of order: {show(text_after)} comes after {show(text_before)}")
+            wrong = f"{show(text_after)} comes after {show(text_before)}"
+            raise ValueError(f"{noun} out of order: {wrong}; expected rising {noun}")

@@ -99,7 +99,7 @@ def open_reason(result) -> str:
         return "from some time on the results are not to be trusted"
     if any(notice.kind == "end" for notice in result.warnings):
         return "a schedule continues after the end of the run"
-    return "their margins are smaller than the numerical errors"
+    return "margins are smaller than the numerical errors"
 
 
 def verdict_table(result) -> ReportTable | None:

@@ -79,7 +79,11 @@ class ReportTable:
     def left_out(self) -> str:
         """Note below a table that has more rows than the page shows; "" if all rows are shown."""
         hidden = len(self.rows) - self.most
-        return f"{hidden} more rows: {self.more or 'in the workbook (--xlsx)'}" if hidden > 0 else ""
+        return (
+            f"{hidden} more row{'' if hidden == 1 else 's'}: {self.more or 'in the workbook (--xlsx)'}"
+            if hidden > 0
+            else ""
+        )
 
 
 def is_number(value: Any) -> bool:

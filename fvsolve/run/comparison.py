@@ -46,7 +46,7 @@ def comparison(compare, column: UnitColumn, result) -> dict:
 
 
 def interpolated(t: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Values at `times`, linear between rows (t, values); at a jump (two rows of one time) of the later row.
+    """Values at `times`, linear between rows (t, values); at a jump (two rows at one time) the value of the later row.
 
     Beyond the rows they are those of the first and last row.
     """

@@ -33,11 +33,11 @@ def world():
         from mpi4py import MPI
     except ImportError as error:
         raise FvsolveError(
-            f"MPI started {count} processes, but mpi4py is not installed ({error}); {EXTRA} installs it"
+            f"MPI started {count} processes, but mpi4py is not installed ({error}); {EXTRA} installs mpi4py"
         ) from None
     if MPI.COMM_WORLD.size < 2:
         text = f"MPI started {count} processes, but the MPI of mpi4py sees each of them as a single process"
-        raise FvsolveError(f"{text}; start them with the mpiexec of the MPI that mpi4py uses; {EXTRA} installs one")
+        raise FvsolveError(f"{text}; start them with the mpiexec of the MPI that mpi4py uses; {EXTRA} installs an MPI")
     return MPI.COMM_WORLD
 
 

@@ -43,9 +43,9 @@ def warm(
 ) -> CacheState:  # fmt: skip
     """Compile the code that some cases need, in several processes, and return the state of the cache.
 
-    cases : paths of case files; whole : True to compile the steps and linear algebra of all kinds of methods too; jobs
-    : number of processes; progress(done, total, task) is called after each task. Raises CaseError, FvsolveError, and
-    RunError if a process is killed.
+    cases : paths of case files; whole : True to compile the steps and linear algebra of all kinds of methods too
+    jobs : number of processes; progress : called as progress(done, total, task) after each task
+    Raises CaseError, FvsolveError, and RunError if a process is killed.
     """
     folder, began = _folder(), time.perf_counter()
     before = code_files(folder)
@@ -71,7 +71,7 @@ def warm(
 def _folder() -> Path:
     """Folder of compiled code. Raises FvsolveError if nothing is compiled, or if the requested one cannot be used."""
     if not jit.COMPILING:
-        raise FvsolveError("NUMBA_DISABLE_JIT is set, so nothing is compiled; expected it to be unset")
+        raise FvsolveError("NUMBA_DISABLE_JIT is set, so nothing is compiled; unset this variable")
     requested, folder = os.environ.get("FVSOLVE_CACHE"), jit.cache_folder()
     if requested and Path(requested).expanduser().absolute() != folder:
         raise FvsolveError(

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fvsolve.display import Displayable, save_if_path
-from fvsolve.errors import FvsolveError, Notice, RunError, did_you_mean, listing
+from fvsolve.errors import FvsolveError, Notice, RunError, did_you_mean
 from fvsolve.output.fields import read_series
 from fvsolve.output.unit_columns import UnitColumn
 from fvsolve.units import show
@@ -45,7 +45,7 @@ class ResultMark(NamedTuple):
 class Extremes(NamedTuple):
     """Least and greatest value of a probe over all accepted steps and rows, in its unit, and their times [s].
 
-    A value and its time are None if it was reached after the time from which a diverged run is not valid.
+    A value and its time are None if it was reached at or after the time from which a diverged run is not valid.
     """
 
     minimum: float
@@ -337,7 +337,7 @@ class Result(Displayable):
         if self.directory is None:
             return "nothing was written; run again with a run directory (`out`)"
         if not {part.kind for part in (*self.case.nodes.values(), *self.case.links.values())} & KINDS_WITH_FIELDS:
-            return f"the case has no {listing(sorted(KINDS_WITH_FIELDS))}"
+            return "the case has no basin, body or pipe"
         if self.case.output.fields == 0:
             return "[output] fields is 0; run again with --set output.fields=20"
         return f"{self.directory / 'fields.pvd'} is missing; run again with --force"

@@ -236,7 +236,7 @@ class Chainages:
         return None
 
     def leg(self, pipe: str, on: tuple[str, ...]) -> Leg:
-        """Leg (pipe with chainages and direction) of a pipe for chainages; on : names of routes in the limit"""
+        """Leg (pipe with chainages and direction) of a pipe for chainages; on : names of routes in the limit."""
         result = next((leg for name in self.ordered(on) for leg in self.legs[name] if leg.pipe == pipe), None)
         return pipe_leg(pipe, self.case.links) if result is None else result
 

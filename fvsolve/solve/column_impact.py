@@ -78,7 +78,7 @@ def impact_impulses(model: Model, carried: np.ndarray, out: np.ndarray, places: 
 def separate(run_data: RunData, t: float, y: np.ndarray, out: np.ndarray) -> int | None:
     """Number of the opening event of the air valve where columns separate fastest; None if no columns separate.
 
-    y : state at time t [s]; out : output array of the right-hand side there
+    run_data : data of the run; y : state at time t [s]; out : output array of the right-hand side there
     """
     model = run_data.model
     places = shut_places(model, out)

@@ -166,7 +166,7 @@ def single_thread_reason(model: Model) -> str:
 
 
 def undivided_basins(model: Model) -> str:
-    """Basins that every thread steps completely, with the reasons."""
+    """Text with the basins that every thread steps completely, and the reasons."""
     return "; ".join(f"{basin.name}: {basin.undivided_reason}" for basin in model.basins if basin.undivided_reason)
 
 
@@ -192,11 +192,13 @@ def threads_of(model: Model, threads: int) -> tuple[int, list[Notice]]:
     divisible = divisible_rows(model)
     if reason := divisible["why"]:
         return 1, [Notice("threads", "numerics", f"threads = {threads}, but one thread is used: {reason}", "threads")]
-    few = [f"{name} has {rows} rows" for name, rows in divisible["rows"].items() if rows < threads]
+    few = [
+        f"{name} has {rows} row{'' if rows == 1 else 's'}" for name, rows in divisible["rows"].items() if rows < threads
+    ]
     if few:
         raise FvsolveError(
             f"threads = {threads}: {listing(few)}, and each thread needs a row of cells. Expected "
-            f"{divisible['most']} at most"
+            f"at most {divisible['most']}"
         )
-    text = f"each thread computes the whole of {undivided_basins(model)}"
+    text = f"each thread computes all rows of these basins: {undivided_basins(model)}"
     return threads, [Notice("threads", "numerics", text, "threads")] if divisible["whole"] else []

@@ -157,7 +157,7 @@ class RunLoop:
         return self.steps(budget)
 
     def steps(self, budget: float) -> int:
-        """Take at most `budget` steps, for which the wave history of delay lines has space; returns a code as `run`."""
+        """Take at most `budget` steps, for which the wave history has space; returns a code, see `run`."""
         self.controls[loop_indices.BUDGET] = budget
         code = loop_indices.SWITCHED
         while code == loop_indices.SWITCHED:
@@ -222,7 +222,7 @@ class RunLoop:
         return self.at_once <= MOST_EVENTS_AT_ONCE + 4 * self.armed.size and not crowded
 
     def evaluate(self, limit: float) -> np.ndarray:
-        """Compute the output array `out` at the present state, and record the events that a jump has caused.
+        """Compute and return the output array `out` at the present state, and record the events that a jump has caused.
 
         limit : time [s] at which schedules with a jump take the value before the jump
         """
@@ -285,7 +285,7 @@ def longest_step(model: Model) -> float:
 def fused_step_allowed(model: Model, method: Method) -> bool:
     """True if a single function can compute both rates and step (a fused step).
 
-    Required are the linear density law, the upwind scheme, a one-stage explicit method without error control, no state
+    It requires the linear density law, the upwind scheme, a one-stage explicit method without error control, no state
     except cells of pipes, no events, no pipe on a moving body, and no friction or a constant friction factor.
     """
     settings, numerics = model.tables.settings[0], model.case.numerics

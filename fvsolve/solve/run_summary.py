@@ -94,7 +94,7 @@ class Summary:
 
     @property
     def cost(self) -> float:
-        """CPU time of the steps per step and cell, or per step without cells [ns]."""
+        """CPU time of the steps per step and cell [ns]; for a model without cells per step."""
         return 1e9 * self.processor / max(1, self.steps * max(1, self.cells))
 
 
@@ -116,14 +116,14 @@ def find_marks(run_data: RunData) -> list[Mark]:
     kinds += [("outside its curve", f"links.{name}") for name, *_ in model.devices]
     texts = {
         "stopped dead": (
-            "its last outlet shut during flow, or it hit another column; a rigid column has no pressure surge: "
-            "use a pipe"
+            "the last outlet of the column shut during flow, or the column hit another column; a rigid column has "
+            "no pressure surge: use a pipe"
         ),
         "outside its curve": (
             "the pump works in reverse or beyond the last flow of its curve; give the key `rated_speed` to extend the "
             "curve by the Suter table of its specific speed, or `suter = { rated_flow, rated_head, table }` instead"
         ),
-        "beyond its stroke": "the piston is beyond an end of its stroke; an end-stop would stop it",
+        "beyond its stroke": "the piston is beyond an end of its stroke; add an end-stop",
         "below vapor pressure": (
             "pressure falls below vapour pressure; the liquid column would separate; to model this, set "
             f"{model.case.law.cavitation_keys}cavitation = true in [fluid]"
@@ -172,8 +172,9 @@ def drift_notices(model: Model, y: np.ndarray) -> list[Notice]:
         at = int(row["y"]) + first
         length = float(np.linalg.norm(row["start"][first : first + 4] + y[at : at + 4]))
         if abs(length - 1.0) > DRIFT:
-            text = (f"{name}: its Euler parameters have drifted from length 1 to {length:.9g} and are divided by it; "
-                    'the error of its attitude is about as large; method = "gauss-4" conserves the length')  # fmt: skip
+            text = (f"{name}: its Euler parameters have drifted from length 1 to {length:.9g} and are divided by this "
+                    "length; the error of its attitude is about as large; "
+                    'method = "gauss-4" conserves the length')  # fmt: skip
             notices.append(Notice("drift", f"nodes.{name}", text, None, length - 1.0, DRIFT))
     return notices
 
@@ -200,13 +201,13 @@ def find_extremes(run_data: RunData) -> dict[str, tuple[float, float, float, flo
 
 
 def find_watched(run_data: RunData) -> dict[str, tuple[float, float, float, float]]:
-    """Extremes, as `find_extremes`, of the quantities that studies and limits need but that are not probes."""
+    """Extremes of the quantities that studies and limits need without a probe, in the form of `find_extremes`."""
     table, probe_count = run_data.extremes, len(run_data.model.probes)
     return {probe.text: tuple(map(float, table[:, probe_count + k])) for k, probe in enumerate(run_data.model.watched)}
 
 
 def find_point_envelopes(run_data: RunData) -> dict[str, dict[str, np.ndarray]]:
-    """Envelopes, as `find_envelope`, at the ends of pipes and the points of their elevation profiles.
+    """Envelopes of pipes at their ends and at the points of their elevation profiles, in the form of `find_envelope`.
 
     Pipes without an elevation profile are left out, unless a limit or expectation refers to their pressure. Each
     envelope has in addition the initial pressure, `initial_pressure` [Pa].

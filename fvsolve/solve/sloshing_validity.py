@@ -56,7 +56,7 @@ class SloshingCheck:
     def weight(
         self, out: np.ndarray, i: int, place: np.ndarray, normal: np.ndarray, modal: bool
     ) -> tuple[float, float]:
-        """Effective gravity along the normal of a basin's bed, and gravity that its waves use [m/s2].
+        """(effective gravity along the normal of a basin's bed, gravity that its waves use) [m/s2].
 
         out : output array of the right-hand side; i : number of the body; place, normal : centre of the basin [m] and
         unit normal of its bed in the axes of the body; modal : True for sloshing modes

@@ -79,7 +79,9 @@ def solve(model: Model, state: State, sink, progress=None, threads: int = 1, com
         model.checked(state.t, state.y)
         run = Run(model, state, sink, progress, threads, comm)
         if missing:
-            raise FvsolveError(f"sink = {show(sink)} is not a sink: it has no {listing(missing)}()")
+            raise FvsolveError(
+                f"sink = {show(sink)} is not a sink: it has no {listing(f'{name}()' for name in missing)}"
+            )
     except BaseException:
         if comm is not None:
             comm.bcast(CLOSE_MESSAGE)
@@ -404,11 +406,12 @@ class Run:
                 device.remedy: None for name, _, device in model.devices if name.removesuffix(".inside") in names
             }
             parts_text = listing(names) if names else "a leak, or a demand that follows the pressure,"
-            remedy = ", or ".join(remedies) or "put a chamber at its node"
-            return f"stopped: {parts_text} opens and shuts without end at {when}; {remedy}"
+            verbs = "open and shut" if len(names) > 1 else "opens and shuts"
+            remedy = ", or ".join(remedies) or "put a chamber at the node of this part"
+            return f"stopped: {parts_text} {verbs} without end at {when}; {remedy}"
         if code == loop_indices.STOPPED:
             event = "a cavity opened" if model.cavitates else "pressure below vapour pressure"
-            return f"stopped: {event} at {when}, as the key `below_vapor` requires"
+            return f"stopped: {event} at {when}, where the key `below_vapor` stops the run"
         if code in (loop_indices.BAD_VALUE, loop_indices.BAD_STATUS):
             loop.step_back()
         if code == loop_indices.NEWTON_STUCK:
@@ -431,7 +434,7 @@ class Run:
                     "its body")  # fmt: skip
         if code == loop_indices.BAD_STATUS:
             return f"stopped: Newton did not converge{place} at {when}; try a smaller step"
-        return f"stopped: a value is not finite{place} at {when}; the step is beyond the limit of the method: halve it"
+        return f"stopped: a value is not finite{place} at {when}; the step is too long for the method: halve the step"
 
     def methods(self) -> list[dict]:
         """Time methods used in the run: dicts with start time [s], name and reason."""

@@ -97,7 +97,7 @@ class StepDoubling:
     def accumulate(self, loop, h: float, steps: float, error: np.ndarray) -> None:
         """Add the errors of the steps since the last check to the accumulated errors.
 
-        h : length of the last step [s]; steps : number of steps since the last check
+        loop : the `RunLoop`; h : length of the last step [s]; steps : number of steps since the last check
         error : float64[n]  error of the last step
         For each step between the two checks, the lesser of the errors at this check and at the last check is added.
         """
@@ -119,7 +119,7 @@ class StepDoubling:
     def single_step(self, loop, t: float, y: np.ndarray, h: float, first=False) -> np.ndarray:
         """State after one step of length h [s] from state y at time t [s], with the method of the run.
 
-        first : True to discard the stored Jacobian, for the first step from a new state
+        loop : the `RunLoop`; first : True to discard the stored Jacobian, for the first step from a new state
         """
         if self.stepper is None:
             model = self.model

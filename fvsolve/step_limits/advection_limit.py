@@ -325,7 +325,8 @@ def _signs(p: Polynomial) -> set[int]:
 def _stable_ranges(weights: tuple, r: StabilityFunction, tolerance: Fraction, left_half_plane: bool):
     """Stable ranges of Courant numbers as pairs of `RangeEnd`, and True if they are proved.
 
-    r, tolerance : result of `_rational`; left_half_plane : True for an A-stable method
+    weights : face weights as in `limit_of`; r, tolerance : result of `_rational`
+    left_half_plane : True for an A-stable method
     """
     if left_half_plane and 1 not in _signs(real_part(weights)):
         return ALL_STABLE, True

@@ -52,16 +52,16 @@ def wave_growth(model, method: Method, h: float, span: float) -> tuple[float, st
 
 
 def line_growth_notices(model, method: Method, h: float, span: float) -> list[Notice]:
-    """Notice for the storing node where waves of a delay line grow most; an empty list if they grow less than 10 times.
+    """List with a notice for the storing node where waves of a delay line grow most.
 
-    h : step [s]; span : duration of the run [s]
+    It is empty if they grow less than 10 times. h : step [s]; span : duration of the run [s]
     """
     grows, name, a = wave_growth(model, method, h, span)
     if grows < LEAST_GROWTH:
         return []
     wrong, other = grows >= LEAST_GROWTH**2, '"rk4" or "trapezoid"' if a < RK4_BOUND else '"trapezoid"'
-    text = (f"{name}: waves between it and the delay lines grow {grows:.3g} times in the run (an estimate), with "
-            f"{method.name} and steps of {model.case.step_amount(h)}, {a:.3g} times its filling time; "
+    text = (f"{name}: waves between this part and the delay lines grow {grows:.3g} times in the run (an estimate), "
+            f"with {method.name} and steps of {model.case.step_amount(h)}, {a:.3g} times its filling time; "
             f"{'the numbers are not to be trusted' if wrong else 'the results may be wrong'}; "
             f"give method = {other}, or shorter steps")  # fmt: skip
     return [Notice("step-limit", name, text, "method", a, None, not wrong)]

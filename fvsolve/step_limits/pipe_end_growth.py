@@ -46,8 +46,9 @@ def pipe_limit(scheme: str, method: str, cells: int, returned: tuple[float, ...]
 
 @functools.lru_cache(maxsize=4096)
 def pipe_growth(scheme: str, method: str, cells: int, courant: float, returned: tuple[float, ...] = WORST) -> float:
-    """Greatest growth factor of a mode of a pipe in a step, minus 1; negative if all modes decay.
+    """Greatest growth factor of a mode of a pipe of `cells` cells in a step, minus 1; negative if all modes decay.
 
+    scheme, method : names; courant : Courant number
     returned : products of the pressure reflection factors at both ends
     """
     r = stability_function(method_named(method))

@@ -74,7 +74,11 @@ def is_unstable(z: np.ndarray, method: str, courant: float) -> bool:
 
 
 def plane_eigenvalues(scheme: str, share: float, waves: bool) -> np.ndarray:
-    """Eigenvalues of the waves (or of advection) for all tested pairs of phases in x and y, for a wave rate of 1."""
+    """Eigenvalues of the waves (or of advection) for all tested pairs of phases in x and y, for a wave rate of 1.
+
+    scheme, share, waves : as for `plane_limit`
+    Returns complex128[phases in y, phases in x], with a last axis of length 3 for waves.
+    """
     weights = weights_of(scheme)
     x, y = np.meshgrid(np.linspace(0.0, np.pi, PHASES), np.linspace(-np.pi, np.pi, 2 * PHASES - 1))
     zx, zy = share * symbol(weights, x), (1.0 - share) * symbol(weights, y)

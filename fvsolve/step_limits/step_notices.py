@@ -117,6 +117,7 @@ def given_step(model) -> float:
 def mode_notice(case, h: float, mode: Mode, method: str, step_error: float | None, jumps: bool) -> Notice:
     """Notice for a mode that grows with steps of h [s].
 
+    mode : from `lumped_modes`; method : name of the method
     step_error : measured mean error of a state after a run, relative to its range; None before a run
     jumps : True if a schedule has a jump
     """
@@ -143,11 +144,12 @@ def mode_notice(case, h: float, mode: Mode, method: str, step_error: float | Non
 
 
 def pipe_checks(model, method: str) -> list[CourantCheck]:
-    """Check of the pipe whose step is the worst, as a list; empty if waves do not grow enough in any checked pipe.
+    """List with the check of the pipe whose step is the worst; empty if waves do not grow enough in any checked pipe.
 
-    Checks that are not `only_doubtful` come first, then the greatest ratio of Courant number to limit. All pipes of few
-    cells are checked by `short_pipe`, and of the longer pipes the one with the greatest Courant number by `long_pipe`.
-    The Courant number of the check may be below its limit.
+    A check that is not `only_doubtful` is worse than others; then the ratio of Courant number to limit decides. All
+    pipes
+    of few cells are checked by `short_pipe`, and of the longer pipes the one with the greatest Courant number by
+    `long_pipe`. The Courant number of the check may be below its limit.
     """
     own = model.tables.pipes["delay"] < 0  # pipes divided into cells
     if not own.any():
@@ -173,6 +175,7 @@ def pipe_checks(model, method: str) -> list[CourantCheck]:
 def long_pipe(model, method: str, k: int, courant: float) -> list[CourantCheck]:
     """Check of pipe number k as a grid without ends, as a list.
 
+    method : name of the method; courant : Courant number of the pipe
     The list is empty if no wave grows at the Courant number nor 1 % above it. If waves grow at every Courant number, it
     is also empty if they grow less than 10 times in the run.
     """
@@ -196,6 +199,7 @@ def proved(model) -> bool:
 def short_pipe(model, method: str, k: int, courant: float) -> CourantCheck | None:
     """Check of pipe number k, of few cells; None if waves with the worst reflections grow less than 10 times in a run.
 
+    method : name of the method; courant : Courant number of the pipe
     The growth of the check is that with the reflections at the ends of this pipe, if the scheme has no limiter.
     """
     cells, own_scheme = model.pipes[k].cells, SCHEMES[model.case.numerics.scheme]
@@ -230,8 +234,9 @@ def reflection_products(model, k: int) -> tuple[float, ...]:
 
 
 def basin_checks(model, method: str, rates: dict[str, float]) -> list[CourantCheck]:
-    """Checks of all basins whose waves grow; under methods that allow no Courant number at least 10 times in the run.
+    """Checks of all basins whose waves grow, as a list.
 
+    If waves grow at every Courant number, a basin is left out in which they grow less than 10 times in the run.
     rates : greatest wave rate of each basin in the run so far, by name [1/s]
     Courant numbers and limits refer to the rate that limits the steps of a basin. This rate is the wave rate times the
     factor `unsplit` of the table of basins.
@@ -282,7 +287,10 @@ def only_doubtful(check: CourantCheck) -> bool:
 
 
 def courant_notice(model, check: CourantCheck, method: str) -> Notice:
-    """Notice for a pipe or a basin beyond its limit."""
+    """Notice for a pipe or a basin whose Courant number is above its limit.
+
+    check : its Courant number and limit; method : name of the method
+    """
     numerics = model.case.numerics
     scheme = model.case.numerics.scheme
     about = f", which there equals {check.scheme}," if check.scheme != scheme else ""

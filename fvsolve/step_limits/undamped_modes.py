@@ -39,7 +39,7 @@ def undamped_notices(model, method: str, step: float, span: float) -> list[Notic
     text = (f"{mode.place}: an oscillation at {mode.frequency:.4g} Hz with little damping grows {grows} in the run, at "
             f"{math.log(mode.growth) / span:.3g} 1/s, with {method} and steps of {model.case.step_amount(step, 4)} "
             "(estimated at the start), because the method is unstable on the imaginary axis; give "
-            f'numerics.method = "ssp-rk3", or numerics.courant = {size}, with which it grows by 1 %')  # fmt: skip
+            f'numerics.method = "ssp-rk3", or numerics.courant = {size}, with which the growth is 1 %')  # fmt: skip
     return [Notice("swing", mode.place, text, "courant", mode.growth, NOTICE_GROWTH, mode.growth < LEAST_GROWTH)]
 
 

@@ -47,9 +47,10 @@ def differences(rhs, handle, structure, ledger_offset, t, y, f, rates0, scale, y
 
 @njit
 def multiply(structure, jacobian, x, product):
-    """product <- J x with the Jacobian J; product : float64[n + m], first n states, then m ledger rates.
+    """Write the product J x of the Jacobian J and a vector x to `product`.
 
-    jacobian : float64[nnz]  entries of J, in the order of the pattern; x : float64[n]
+    product : float64[n + m]  entries of n states, then of m ledger rates; x : float64[n]
+    jacobian : float64[nnz]  entries of J, in the order of the pattern; structure : flat array of `Structure.shape`
     """
     n = structure[SIZE]
     starts, rows = structure[structure[STARTS] :], structure[structure[ROWS] :]

@@ -158,7 +158,8 @@ class Integrator:
     def single_step(self, rhs, handle, ledger_offset: int, t: float, h: float, y: np.ndarray) -> np.ndarray:
         """State after a single step of length h from state y at time t; NaN if its stages cannot be solved.
 
-        It is for an object whose time loop has not run (`call`): then the step depends on earlier single steps only
+        Only an object whose time loop (`call`) has not run may be used: then the step depends on earlier single steps
+        only
         through the stored Jacobian of Newton iterations. Changes `y`, `k` and `loop_state`.
         rhs, handle : compiled right-hand side and its argument; ledger_offset : index of the first ledger rate in `out`
         """

@@ -90,7 +90,7 @@ def matrix(coefficients, s, index):
 
 @njit
 def blend(base_weight, base, m, at, q, first, vectors, target):
-    """target <- base_weight base + sum of m[at + j] vectors[first + j] over j < q, three terms in each pass.
+    """Write base_weight base + sum over j < q of m[at + j] vectors[first + j] to `target`, three terms in each pass.
 
     m : flat matrix; target, base : float64[n]
     """
@@ -111,7 +111,8 @@ def predict(coefficients, h, h_last, s, buffer, vectors):
     """Predict the transformed stage increments W = T^-1 Z by extrapolation of the slopes of the last step.
 
     Z : increments of the implicit stages over the start of the step; T : see `newton_transform.transformed`
-    h, h_last : this step and the last step; buffer : float64[q q]  work array; W is stored in `vectors`
+    coefficients, s : flat coefficients of the method, and its number of stages; h, h_last : this step and the last step
+    buffer : float64[q q]  work array; W is stored in `vectors`
     """
     q, c = s - 1, nodes_of(coefficients, s)
     back, ahead = matrix(coefficients, s, T_INVERSE), matrix(coefficients, s, EXTRAPOLATION)
@@ -185,6 +186,7 @@ def iterate(
 ):  # fmt: skip
     """Compute the transformed stage increments W = T^-1 Z by Newton iterations; returns CONVERGED or FAILED.
 
+    W is stored in `vectors`, in place of its prediction.
     Z : increments of the implicit stages over the start of the step; T : see `newton_transform.transformed`
     y, k0 : float64[n]  state and rates at the start of the step; y_stage : work array; other arguments as for `attempt`
     """

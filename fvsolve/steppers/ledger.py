@@ -115,7 +115,10 @@ def combined(weights, rates, m):
 
 @njit(forceinline=True)
 def add(ledger, m, at, part):
-    """Add `part` to the positive (at = 0) or negative (at = 1) sum of rate number m, with compensated rounding."""
+    """Add `part` to the positive (at = 0) or negative (at = 1) sum of rate number m, with compensated rounding.
+
+    ledger : array of the sums, see the top of this file
+    """
     count = ledger.size // LEDGER_ROWS
     ledger[at * count + m], ledger[(2 + at) * count + m] = add_up(ledger[at * count + m], part,
                                                                   ledger[(2 + at) * count + m])  # fmt: skip
@@ -126,6 +129,7 @@ def book(h, b, ledger_rates, dense, use_stage_rates, known, end, ledger):
     """Add an accepted step of length h, whose end state is valid, to the ledger.
 
     b : weights of the stages; ledger_rates : float64[s, m]  rates at the stages; end : float64[m]  rates at the end
+    dense : coefficients of the dense output; ledger : array of the sums, see the top of this file
     use_stage_rates : True to use the rates of the last stage at the end of the step, because f amplifies the Newton
     residual; known : True to do so at the start of the step too, where the last step is available
     """

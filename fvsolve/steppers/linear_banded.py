@@ -62,7 +62,7 @@ def entries(pattern) -> tuple[np.ndarray, np.ndarray]:
 
 @njit(forceinline=True)
 def subtract(factor, x, y, chunks):
-    """y <- y - factor x for the first 4 `chunks` entries, four at a time."""
+    """Subtract `factor` times x from y, in the first 4 `chunks` entries, four at a time."""
     for c in range(chunks):
         a = y[4 * c] - factor * x[4 * c]
         b = y[4 * c + 1] - factor * x[4 * c + 1]
@@ -72,9 +72,10 @@ def subtract(factor, x, y, chunks):
 
 
 def factor(structure, jacobian, shift, factors):
-    """factors <- L U of shift I - J, with row exchanges; returns 0, or 1 + the number of a state without a pivot.
+    """Factor the matrix shift I - J = L U with row exchanges; returns 0, or 1 + the number of a state without a pivot.
 
     structure : flat array of `Structure.shape`; jacobian : entries of J in the order of the pattern
+    factors : receives L, U and the row exchanges
     """
     n, own = structure[SIZE], structure[structure[SOLVER_DATA] :]
     below, above, width, order = own[BELOW], own[ABOVE], own[WIDTH], own[ORDER:]
@@ -121,7 +122,7 @@ def factor(structure, jacobian, shift, factors):
 
 
 def solve(structure, factors, x):
-    """x <- (shift I - J)^-1 x, with the factors that `factor` has computed."""
+    """Replace x with (shift I - J)^-1 x, with the factors that `factor` has computed."""
     n, own = structure[SIZE], structure[structure[SOLVER_DATA] :]
     below, width, order = own[BELOW], own[WIDTH], own[ORDER:]
     lower = factors[n * width :]

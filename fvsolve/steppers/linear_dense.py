@@ -19,9 +19,10 @@ def prepare(pattern) -> tuple[np.ndarray, int]:
 
 
 def factor(structure, jacobian, shift, factors):
-    """factors <- L U of shift I - J, with row exchanges; returns 0, or 1 + the number of a column without a pivot.
+    """Factor the matrix shift I - J = L U with row exchanges; returns 0, or 1 + the number of a column without a pivot.
 
     structure : flat array of `Structure.shape`; jacobian : entries of J in the order of the pattern
+    factors : receives L, U and the row exchanges
     """
     n = structure[SIZE]
     starts, rows, pivots = structure[structure[STARTS] :], structure[structure[ROWS] :], factors[n * n :]
@@ -56,7 +57,7 @@ def factor(structure, jacobian, shift, factors):
 
 
 def solve(structure, factors, x):
-    """x <- (shift I - J)^-1 x, with the factors that `factor` has computed."""
+    """Replace x with (shift I - J)^-1 x, with the factors that `factor` has computed."""
     n = structure[SIZE]
     pivots = factors[n * n :]
     for k in range(n):

@@ -104,10 +104,11 @@ def fill(n: int, starts, columns) -> tuple[np.ndarray, np.ndarray, np.ndarray, n
 
 @njit
 def eliminate(starts, columns, l_starts, l_columns, u_starts, u_columns, chain):
-    """Compute the patterns of L and U by rows; returns False if the arrays are too short.
+    """Write the patterns of L and U by rows to four arrays; returns False if the arrays are too short.
 
     starts, columns : pattern of the matrix by rows. A row of U contains the entries of the matrix row, and of the rows
     of U whose numbers are the columns of the row of L.
+    l_starts, l_columns, u_starts, u_columns : receive the patterns of L and U
     chain : int64[n + 1]  linked list of the columns of a row; chain[n] holds the first column, n ends the list
     """
     n = chain.size - 1
@@ -158,11 +159,12 @@ def clear(block):
 
 
 def factor(structure, jacobian, shift, factors):
-    """factors <- L, U and inverse diagonal blocks of shift I - J; returns 0, or 1 + a state without a good pivot.
+    """Factor the matrix shift I - J = L U by blocks; returns 0, or 1 + the number of a state without a good pivot.
 
     The pivot of a diagonal block is good if its determinant is above 1e-13 times the sum of the sizes of its two
     products, after and before elimination. This measure does not depend on the units of states.
     structure : flat array of `Structure.shape`; jacobian : entries of J in the order of the pattern
+    factors : receives L, U and the inverses of the diagonal blocks
     """
     count, order = structure[structure[SOLVER_DATA]], structure[place(structure, ORDER) :]
     l_starts, l_columns = structure[place(structure, L_STARTS) :], structure[place(structure, L_COLUMNS) :]
@@ -216,7 +218,7 @@ def factor(structure, jacobian, shift, factors):
 
 
 def solve(structure, factors, x):
-    """x <- (shift I - J)^-1 x, with the factors that `factor` has computed."""
+    """Replace x with (shift I - J)^-1 x, with the factors that `factor` has computed."""
     count, order = structure[structure[SOLVER_DATA]], structure[place(structure, ORDER) :]
     l_starts, l_columns = structure[place(structure, L_STARTS) :], structure[place(structure, L_COLUMNS) :]
     u_starts, u_columns = structure[place(structure, U_STARTS) :], structure[place(structure, U_COLUMNS) :]

@@ -244,10 +244,10 @@ def book_increment(structure, nnz, d, ledger_rates, i, work):
 
 @inline
 def evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, loop_state, residual):
-    """Compute the rates f at the state base + h_gamma ki of a stage with slope ki, and the residual f - ki.
+    """Write the rates at the state base + h_gamma ki of a stage with slope ki to f, and f - ki to `residual`.
 
     t : time of the stage; base : state from earlier stages; h_gamma : step times the diagonal coefficient of the method
-    y_stage : float64[n]  receives the state
+    y_stage : float64[n]  receives the state; other arguments as for `dirk.attempt`
     """
     for j in range(ki.size):
         y_stage[j] = base[j] + h_gamma * ki[j]

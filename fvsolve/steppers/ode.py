@@ -79,7 +79,8 @@ def integrate(
 def _solve_steps(stepper: Integrator, functions: tuple, key: int, t, y0) -> np.ndarray:
     """Take all steps, and return the states at the times t : float64[len(t), n].
 
-    functions : result of `_functions`; key : number of the call, with which compiled code finds the Python function
+    stepper : `Integrator` of the call; y0 : state at t[0]; functions : result of `_functions`
+    key : number of the call, with which compiled code finds the Python function
     """
     controls, loop_state, progress = stepper.controls, stepper.loop_state, stepper.progress
     stepper.times, stepper.rows = np.ascontiguousarray(t[1:]), np.zeros((t.size, y0.size + 1))
@@ -195,7 +196,7 @@ def _call_python(t, y, dydt, out, handle):
 
 
 def _python(t, y, dydt, key):
-    """Call f as a Python function; its exception is stored until the loop returns, as compiled code cannot raise it."""
+    """Call f as a Python function; store its exception until the loop returns: compiled code cannot raise it."""
     try:
         _PYTHON[key](t, y, dydt)
     except BaseException as error:
@@ -251,7 +252,7 @@ def _compile(function, letters: str) -> DeclaredFunction:
 
 @compile_once
 def observers() -> tuple:
-    """(fused step, observe, record, events) for the time loop of a system without events; its rows are its states."""
+    """(fused step, observe, record, events) for the time loop of a system without events; rows are its states."""
     functions = (_no_fused_step, FUSED_STEP), (_row, OBSERVE), (_nothing, OBSERVE), (_no_events, EVENTS)
     return tuple(_compile(numba.njit(function), letters) for function, letters in functions)
 

@@ -89,8 +89,9 @@ def sweep(
 def extrapolate(q, k, first_row, weights, vectors, weight):
     """Extrapolate the slopes K after a sweep, and store the change d and the result of this sweep.
 
-    K <- K - weight g (K - K_last), g = <d, d - d_before> / |d - d_before|^2, but at least -GREATEST_EXTRAPOLATION, with
-    the changes d, d_before in this and in the last sweep, and the result K_last of the last sweep before extrapolation.
+    The new slopes are K - weight g (K - K_last), g = <d, d - d_before> / |d - d_before|^2, but g is at least
+    -GREATEST_EXTRAPOLATION.
+    d, d_before : changes in this and in the last sweep; K_last : result of the last sweep before its extrapolation
     q : number of implicit stages; first_row : as in `sweep`; weights : float64[n]  factors on states in the products
     weight : 1 to extrapolate, 0 to store only
     """

@@ -48,7 +48,7 @@ DEAD_BAND = 1.2  # a step solved by Newton that may grow by a smaller factor kee
 
 @njit(forceinline=True)
 def shortest(controls, loop_state):
-    """Least step [s] to which stability may reduce a step; the rate of a column at a closing valve is unbounded."""
+    """Least step [s] to which stability may reduce a step: the rate of a column at a closing valve is unbounded."""
     return 1e-13 * max(abs(loop_state[T]), abs(controls[END]))
 
 
@@ -60,7 +60,10 @@ def too_short(controls, loop_state, h):
 
 @njit(forceinline=True)
 def first_step(k, scale, controls, loop_state):
-    """Cautious first step [s], from the size of the rates k[0] relative to the scale of the states."""
+    """Cautious first step [s], from the size of the rates k[0] relative to the scale of the states.
+
+    controls, loop_state : arrays of the time loop, see `loop_indices`
+    """
     total, tolerance, span = 0.0, controls[SIZE], controls[END] - loop_state[T]
     limit = min(span, max(1e-3 * span, shortest(controls, loop_state)))
     for i in range(scale.size):
@@ -109,7 +112,7 @@ def approaches(controls, loop_state, rest):
 def row_step_end(controls, loop_state, due, h):
     """Time [s] of an output row at which a step of length h under error control has to end; 1e308 without such a row.
 
-    due : time of the next row [s]
+    due : time of the next row [s]; controls, loop_state : arrays of the time loop, see `loop_indices`
     """
     if controls[END_AT_ROWS] == 0.0 or controls[CONTROL] != TOLERANCE:  # given steps do not depend on output rows
         return HUGE
@@ -124,6 +127,7 @@ def end_of(controls, loop_state, h, last, due):
 
     last : True for the last step of a segment; due : time from `row_step_end`. Full steps of given length end at a
     multiple of the step, so that rounding does not accumulate.
+    controls, loop_state : arrays of the time loop, see `loop_indices`
     """
     if last:
         return controls[END]
@@ -177,6 +181,7 @@ def grown(controls, loop_state, h, e):
     """Factor on the step length h after an accepted step with the error e, in units of the tolerance.
 
     Explicit methods use PI control (Gustafsson 1991), implicit methods predictive control (Gustafsson 1994).
+    controls, loop_state : arrays of the time loop, see `loop_indices`
     """
     e, old, order = max(e, 1e-10), max(loop_state[ERROR_OLD], 1e-4), controls[ORDER]
     if controls[KIND] == EXPLICIT:

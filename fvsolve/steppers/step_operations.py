@@ -23,8 +23,10 @@ def error_scale(scale, y):
 def squares(begin, end, h, error, k, y, y_new, scale, tolerance):
     """Sum of the squared errors of the states from `begin` to `end` - 1, in units of the tolerance.
 
-    The error of a state is h sum e_j k_j with the weights e_j in `error`; its unit is `tolerance` times `error_scale`
-    at the greater of |y| and |y_new|.
+    The error of a state is h sum e_j k_j with the weights e_j in `error`, the rates k_j of the stages and the step h.
+    Its
+    unit is `tolerance` times `error_scale` at the greater of |y| and |y_new|, the sizes at the start and the end.
+    scale : see `error_scale`
     """
     first, last = 0, error.size
     while last > 0 and error[last - 1] == 0.0:
@@ -43,7 +45,7 @@ def squares(begin, end, h, error, k, y, y_new, scale, tolerance):
 
 @njit
 def error_norm(h, error, k, y, y_new, scale, tolerance):
-    """Root mean square of the errors of all states in units of the tolerance, see `squares`."""
+    """Root mean square of the errors of all states in units of the tolerance; arguments as for `squares`."""
     return sqrt(squares(0, y.size, h, error, k, y, y_new, scale, tolerance) / max(y.size, 1))
 
 
@@ -53,6 +55,7 @@ def error_of_bands(join, handle, row_blocks, sums, h, error, k, y, y_new, scale,
 
     A band is a part of the states, which one thread or process steps.
     join : function that exchanges `sums`; row_blocks : int64[q, 4]  states of this band and their partial sums
+    h, error, k, y, y_new, scale, tolerance : as for `squares`
     """
     for m in range(row_blocks.shape[0]):
         begin, count = row_blocks[m, BEGIN], row_blocks[m, SUMS]
@@ -78,9 +81,9 @@ def weight(theta, dense, j):
 
 @njit
 def start_slope_defect(begin, end, start_slope, k, slope, known, out):
-    """out <- slope of the solution at the start of a step minus the slope of its collocation polynomial there.
+    """Write the slope of the solution at the start of a step, minus that of its collocation polynomial there, to `out`.
 
-    begin, end : range of states; start_slope : result of `start_slope_correction`
+    begin, end : range of states; start_slope : result of `start_slope_correction`; k : rates at the stages
     known : True if `slope`, the slope of the last stage of the previous step, is available. Otherwise the slope is the
     rate f, and `out` is 0 for states where the difference exceeds that between the first and last stages (a stiff f)
     """
@@ -94,7 +97,7 @@ def start_slope_defect(begin, end, start_slope, k, slope, known, out):
 
 @njit
 def interpolate(begin, end, theta, h, y, f, y_new, f_new, k, dense, start_slope, out):
-    """out <- state at t + theta h within a step, for the states from `begin` to `end` - 1 (dense output).
+    """Write the state at t + theta h within a step to `out`, for the states from `begin` to `end` - 1 (dense output).
 
     It is the method's own polynomial with f in place of k[0], or the Hermite cubic with values y, y_new and slopes
     f, f_new at both ends.
@@ -185,7 +188,7 @@ def exceeded(join, handle, row_blocks, sums, y, largest):
 
 @njit(forceinline=True)
 def add_up(total, part, carry):
-    """(sum total + part with the previous rounding error `carry` added back, new rounding error) (Kahan 1965)."""
+    """(total + part + carry, new rounding error) with the rounding error `carry` of the previous sum (Kahan 1965)."""
     corrected = part + carry
     new = total + corrected
     return new, corrected - (new - total)

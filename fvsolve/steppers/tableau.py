@@ -68,7 +68,7 @@ class Method:
 
     @functools.cached_property
     def digits(self) -> int | None:
-        """Number of significant digits in the published coefficients; None if they are exact, as with six at most."""
+        """Number of significant digits in the published coefficients; None if at most six: they are then exact."""
         count = self.given_digits or digits(self.text)
         return count if count > EXACT_DECIMALS else None
 
@@ -363,7 +363,7 @@ def _faults(head: list, weights: list, rounding: Fraction) -> list[str]:
         elif differs(row, c):
             faults.append(f"row {i} adds up to {_show(sum(row, Fraction(0)))}; expected c = {_show(c)}")
     if not 1 <= len(weights) <= 2 or any(len(row) != s for row in weights):
-        faults.append(f"wrong rows of weights below the line. Expected one or two rows of {s}")
+        faults.append(f"wrong rows of weights below the line. Expected one or two rows of {s} numbers")
     else:
         for row in weights:
             if differs(row, 1):

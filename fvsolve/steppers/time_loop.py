@@ -117,7 +117,10 @@ if COMPILING:
 
 @njit(forceinline=True)
 def can_use_fused_step(controls, loop_state, times, h):
-    """True if fused steps are allowed, and a step of length h ends before the next row, field or end of the segment."""
+    """True if fused steps are allowed, and a step of length h ends before the next row, field or end of the segment.
+
+    times : times of the output rows if given as a list; controls, loop_state : arrays of the time loop
+    """
     if (
         controls[ALLOW_FUSED] == 0.0
         or too_short(controls, loop_state, h)
@@ -394,7 +397,10 @@ def run_steps_at(
     bounded_states, bounds, work, vectors, factors, complex_factors, spare, spare_ledger_rates, spare_flat,
     spare_complex, largest,
 ):  # fmt: skip
-    """Call `run_steps` with the functions whose addresses are in `calls`, in the order of its arguments."""
+    """Call `run_steps` with the functions whose addresses are in `calls`, in the order of its arguments.
+
+    Other arguments and result as for `run_steps`.
+    """
     return run_steps(
         attempt_at(calls[0]), fused_step_at(calls[1]), observe_at(calls[2]), record_at(calls[3]), events_at(calls[4]),
         rhs_at(calls[5]), factor_at(calls[6]), solve_at(calls[7]), factor_complex_at(calls[8]),

@@ -238,7 +238,7 @@ class LeastSquaresFit:
         )
 
     def differences(self, x: np.ndarray) -> list[np.ndarray]:
-        """Run the case at x; returns the differences of every series as `Residuals`, an empty list if the run fails."""
+        """Run the case at x; returns the differences of every series as `Residuals`, or [] if the run fails."""
         self.runs += 1
         answer = self.work(self.values(x))
         self.progress(len(self.points), len(self.points), f"{self.runs} runs")

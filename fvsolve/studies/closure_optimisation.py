@@ -89,7 +89,10 @@ class ClosureSearch:
         return times.tolist(), (self.first + (self.last - self.first) * shares).tolist()
 
     def __call__(self, z: np.ndarray) -> float:
-        """Run the case with the schedule of z, see the class; returns its peak, infinite if it is None."""
+        """Run the case with the schedule of z, see the class; returns its peak.
+
+        The result is infinite if the run failed or the peak is not known.
+        """
         time, value = self.law(z)
         quiet = {"output.fields": 0, "output.lines": {}, "expect": peak_expectation(self.minimise)}
         result = run(load(self.case, {self.key: {"time": time, "value": value}, **quiet}))
@@ -154,7 +157,7 @@ def find_faults(case: Case | None, key: str, minimise: str, knots: int, runs: in
         faults.append(Fault("knots", f"{knots} is out of range. Expected 1 to {MAX_KNOTS}"))
     if runs < fewest:
         faults.append(
-            Fault("runs", f"{runs} are too few. Expected {fewest} or more for {fewest // len(START_SHAPES) - 2} knots")
+            Fault("runs", f"{runs} is too few. Expected {fewest} or more for knots = {fewest // len(START_SHAPES) - 2}")
         )
     if case is not None:
         with collect_faults(faults, f"--schedule {key}"):
@@ -194,7 +197,7 @@ def span_of(case: Case, key: str) -> tuple[float, float, float, float]:
 
 
 def schedules(case: Case) -> Iterator[tuple[str, Schedule]]:
-    """Pairs (dotted key, schedule) of all scheduled values of the nodes and links of a case."""
+    """Yield (dotted key, schedule) for all scheduled values of the nodes and links of a case."""
     for group in ("nodes", "links"):
         for name, part in getattr(case, group).items():
             values = {info.alias or field: getattr(part, field) for field, info in type(part).model_fields.items()}

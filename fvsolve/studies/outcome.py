@@ -97,7 +97,9 @@ def outcome(
     case, set: Mapping | None = None, y: np.ndarray | None = None, best_of: int = 1, run: Callable | None = None,
     budget: float = np.inf,
 ) -> Outcome:  # fmt: skip
-    """Run a case with changed keys, or a model, without `set`. A refused case gives an outcome with its reason.
+    """Run a case with changed keys, or a model as it is. A refused case gives an outcome with its reason.
+
+    set : changed keys of a case, ignored for a model
 
     y : float64[n]  initial state (default `solve.initial_state`, zero except for a basin with a start of its own)
     best_of : number of runs, of which the fastest counts. Runs after the first contain no compilation; they are omitted

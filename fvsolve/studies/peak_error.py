@@ -190,7 +190,7 @@ def usable(signals_of_place: Sequence) -> bool:
 def signals(runs: dict[float, Result], probe: str, rising: Callable[[np.ndarray], np.ndarray]) -> list:
     """Signals (times [s], rising(values)) of a probe, from all finished runs that recorded it, coarsest first.
 
-    rising : function of the values after which the peak is a maximum
+    rising : function that converts the values so that the peak is a maximum
     """
     finished = [runs[times] for times in sorted(runs) if runs[times].reason == "finished"]
     return [(run.seconds, rising(run[probe])) for run in finished if probe in run.units]
@@ -282,7 +282,8 @@ def description(runs: dict[float, Result], case: Any) -> str:
         text += "; column separation, so no order of convergence is assumed"
     stopped = [f"{factor:g}" for factor in sorted(runs) if runs[factor].reason != "finished"]
     if stopped:
-        text += f"; the run at {' and '.join(stopped)} did not finish"
+        runs_text = f"run{'s' if len(stopped) > 1 else ''} at {' and '.join(stopped)} times the resolution"
+        text += f"; the {runs_text} did not finish"
     if 0.5 not in runs:
         text += "; half the resolution is not possible (patches would begin within cells), so no order is assumed"
     return text

@@ -12,9 +12,9 @@ from fvsolve.studies.delay_line_keys import delay_lines, fixed_choices, slowest_
 def refined_keys(case, times: float) -> dict[str, Any]:
     """Overrides that multiply the resolution by `times`: cells, stretches of delay lines, steps and tolerances.
 
-    The tolerance `rtol` is divided by the square of `times`. The Courant number stays, except by `refined_step_keys`.
-    Empty if nothing can be refined, or if the coarser case is invalid, for example because a patch of a basin would
-    begin within a cell.
+    The tolerance `rtol` is divided by the square of `times`. The Courant number stays, except in cases with delay
+    lines, see `refined_step_keys`. The result is empty if nothing can be refined, or if the coarser case is invalid,
+    for example because a patch of a basin would begin within a cell.
     """
     keys = cell_keys(scaled(cell_counts(case), times))
     if times < 1.0 and not is_valid(case, scaled(cell_counts(case), times)):
@@ -33,8 +33,8 @@ def refined_keys(case, times: float) -> dict[str, Any]:
 def refined_step_keys(case, times: float) -> dict[str, Any]:
     """Overrides with which a case with delay lines takes `times` as many steps; empty if the case states the step.
 
-    If the case states a Courant number and has no cells, this number changes; otherwise the key `cells` of the slowest
-    line, which then sets the step.
+    If the case states a Courant number and has no cells, this number changes. Otherwise the key `cells` of the slowest
+    line changes, which then sets the step.
     """
     if case.numerics.step is not None:
         return {}

@@ -176,7 +176,7 @@ class Heading:
         quantity = key_quantity(raw, name) if is_known(raw, name) else None
         try:
             if unit and quantity is None:
-                raise ValueError(f"values of {name} have no unit")
+                raise ValueError(f"values of {name} have no unit; leave [{unit}] out")
             if unit:
                 units.find(unit, quantity.dimension)
         except ValueError as error:

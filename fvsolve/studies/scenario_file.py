@@ -44,7 +44,7 @@ class Scenarios:
     protections: dict[str, dict[str, Any]]
 
     def runs(self) -> Iterator[tuple[str | None, str | None, dict[str, Any]]]:
-        """(event, protection, overrides) of every run; event or protection is None if the file has none."""
+        """Yield (event, protection, overrides) of every run; event or protection is None if the file has none."""
         for event, of_event in (self.events or {None: {}}).items():
             for protection, of_protection in (self.protections or {None: {}}).items():
                 yield event, protection, {**of_protection, **of_event}
@@ -89,7 +89,7 @@ def read_scenarios(path: str | Path) -> Scenarios:
 
 
 def possible_paths(keys: tuple) -> Iterator[tuple]:
-    """Paths in the TOML file under which an override may be written, to find its line; most specific first.
+    """Yield paths in the TOML file under which an override may be written, to find its line; most specific first.
 
     keys : (group, name of the event or protection, dotted key), or its first entries alone. The dotted key may be
     written as nested tables or as one quoted key. The paths of the tables that contain it follow.
@@ -158,7 +158,7 @@ def read_overrides(table: Any, group: str, fault) -> dict[str, dict[str, Any]]:
 
 
 def dotted_keys(table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Flatten tables of overrides to pairs (dotted key, value).
+    """Flatten tables of overrides; yields pairs (dotted key, value).
 
     A named part, such as links.main, gives a pair for each of its keys; deeper tables remain values.
     """
@@ -179,9 +179,9 @@ def dotted_path(*keys: str) -> str:
 
 
 def all_conflicts(events: dict, protections: dict) -> Iterator[tuple[str, str, str, str]]:
-    """Conflicts between events and protections, which set the same key, or a key and a part of it.
+    """Yield (event, protection, key of the event, key of the protection) for each pair of overrides in conflict.
 
-    Yields (event, protection, key of the event, key of the protection).
+    They are in conflict as in `conflicting_keys`.
     """
     for event, of_event in events.items():
         for protection, of_protection in protections.items():
@@ -192,7 +192,7 @@ def all_conflicts(events: dict, protections: dict) -> Iterator[tuple[str, str, s
 
 
 def conflicting_keys(first: dict[str, Any], second: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """Pairs (key of `first`, key of `second`) that are equal or of which one contains the other.
+    """Yield (key of `first`, key of `second`) for keys that are equal, or one of which contains the other.
 
     Equal keys with equal values are left out.
     """
@@ -236,10 +236,10 @@ def run_faults(design: Scenarios, fault: AddFault) -> None:
 
 
 def responsible_sets(design: Scenarios, place: str | None, pairs: list) -> Iterator[tuple]:
-    """(group, name, place) of the events and protections that set the key `place`, a part of it, or a table around it.
+    """Yield (group, name, place) of events and protections that set `place`, a part of it, or a table that contains it.
 
-    pairs : (event, protection) of the runs with a fault at `place`. If `place` is None: (group, name) of the events, or
-    of the protections if there are no events.
+    place : key with a fault. If it is None, (group, name) of each event is yielded, or of each protection if there are
+    no events. pairs : (event, protection) of the runs with the fault
     """
     for position, group in enumerate(("events", "protections")):
         for name in dict.fromkeys(pair[position] for pair in pairs if pair[position] is not None):

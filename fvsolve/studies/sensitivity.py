@@ -126,7 +126,7 @@ def values_of(result, outcome: str) -> np.ndarray:
     if missing:
         values = ", ".join(f"{key} = {missing[0][key]:.6g}" for key in result.keys)
         raise FvsolveError(f"{len(missing)} of {len(result.rows)} runs have no {name}, the first at {values}: "
-                           f"{missing[0]['reason']}. Expected ranges in which all runs have it")  # fmt: skip
+                           f"{missing[0]['reason']}. Expected ranges in which all runs have {name}")  # fmt: skip
     return np.array([float(row[name]) for row in result.rows])
 
 
@@ -174,4 +174,4 @@ def _require_salib() -> None:
     try:
         import SALib  # noqa: F401
     except ImportError:
-        raise FvsolveError("sensitivity needs the package SALib: pip install fvsolve[study]") from None
+        raise FvsolveError('sensitivity needs the package SALib: pip install "fvsolve[study]"') from None

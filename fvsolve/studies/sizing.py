@@ -318,7 +318,7 @@ def parse_ties(texts: Sequence[str]) -> dict[str, str]:
             example = '"nodes.vessel.gas_volume = x / 2"'
             faults.append(Fault(f"--dependent {text}", f'expected "KEY = formula of x", for example {example}'))
         elif key in ties:
-            faults.append(Fault(f"--dependent {text}", f"{key} is given before as {ties[key]}. Give it once"))
+            faults.append(Fault(f"--dependent {text}", f"{key} is given before as {ties[key]}. Give each key once"))
         ties.setdefault(key, rule)
     if faults:
         raise CaseError(faults)

@@ -111,7 +111,8 @@ def unknown_parts(case: Any) -> dict[Part, str]:
     reasons: dict[Part, str] = {}
     if pulses := brief_pulses(case):
         text = (
-            f"{listing(pulses, MAX_NAMES)} changes in both directions within the travel time of a cell; use more cells"
+            f"{listing(pulses, MAX_NAMES)} {'change' if len(pulses) > 1 else 'changes'} in both directions within the "
+            "travel time of a cell; use more cells"
         )
         reasons = {(group, name): text for group in ("nodes", "links") for name in getattr(case, group)}
     texts = {name: f"{name} is shorter than a cell of {neighbour}; set links.{neighbour}.cells = {cells}"

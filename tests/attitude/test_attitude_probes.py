@@ -1,4 +1,4 @@
-"""What a run says of a body's attitude is what the case said, in every form, and where angles fail too."""
+"""Attitude probes return the attitude of the case in every form, also where angles fail."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PITCHES = [0.3, -1.2, pi / 2 - 1e-6, pi / 2 - 1e-9, pi / 2 - 1e-14, pi / 2, -pi 
 
 
 def said(*attitudes: dict) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    """(name, angles, Euler parameters) that probes of bodies read at the start, of each attitude by each of KINDS."""
+    """Name, angles and Euler parameters that probes of bodies read at the start, for each attitude and joint kind."""
     bodies = {
         f"b{k}_{kind}": {
             "type": "body", "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "joint": {"kind": kind, "attitude": given}

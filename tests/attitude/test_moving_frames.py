@@ -1,4 +1,4 @@
-"""Places, velocities and accelerations of points of axes that move (59) to (68), against differences and symbols."""
+"""Positions, velocities and accelerations of points in moving axes (59) to (68), by differences and by symbols."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ TIMES = [0.0, 0.4, 1.7]
 
 
 def along(of, t: float, times: int = 1):
-    """The derivative, or its derivative, of eighth order in the step."""
+    """First derivative, or for times = 2 the second, by differences of eighth order in the step."""
     weights = {1: (4 / 5, -1 / 5, 4 / 105, -1 / 280), 2: (8 / 5, -1 / 5, 8 / 315, -1 / 560)}[times]
     sign = (-1) ** times
     sides = [of(t + k * STEP) + sign * of(t - k * STEP) for k in range(1, 5)]
@@ -22,7 +22,7 @@ def along(of, t: float, times: int = 1):
 
 
 def rotation(t: float) -> np.ndarray:
-    """R^i_b of axes that roll, pitch and yaw, each at a rate of its own that changes."""
+    """R^i_b of axes that roll, pitch and yaw at different and changing rates."""
     return at.of_roll_pitch_yaw(0.3 + np.sin(t), 0.5 * np.cos(2 * t), t + 0.2 * t * t)
 
 
@@ -31,27 +31,27 @@ def origin(t: float) -> np.ndarray:
 
 
 def within(t: float) -> np.ndarray:
-    """Where a bead slides in the body, in its axes."""
+    """Position of a bead that slides in the body, in axes of the body."""
     return np.array([0.4 + 0.1 * t * t, np.sin(3 * t), -0.2 * t])
 
 
 def place(t: float) -> np.ndarray:
-    """(59), (60)."""
+    """Position of the bead in axes i (59), (60)."""
     return origin(t) + rotation(t) @ within(t)
 
 
 def spin(t: float) -> np.ndarray:
-    """w^i_ib by (48)."""
+    """Angular velocity w^i_ib (48)."""
     return at.angular_velocity(rotation(t), along(rotation, t))
 
 
 def seen(rate):
-    """What b sees of a rate, in axes i."""
+    """Function that converts a rate in axes b to axes i."""
     return lambda t: rotation(t) @ rate(t)
 
 
 def shares(t: float) -> dict[str, np.ndarray]:
-    """The terms of (65) behind that of the origin, in axes i."""
+    """Terms of (65) after that of the origin, in axes i."""
     w, r = spin(t), rotation(t) @ within(t)
     slide, pull = (rotation(t) @ along(within, t, times) for times in (1, 2))
     return {
@@ -86,7 +86,7 @@ def test_both_forms_of_an_acceleration_are_the_same_65_66(t):
 
 
 def test_both_forms_follow_from_55_in_symbols_65_66():
-    """In coordinates of b, of any motion: twice (55) of the place, term by term."""
+    """(65) and (66) are (55) of (55) of the position, for any motion, term by term in axes b."""
     sympy = pytest.importorskip("sympy", reason="symbols are a second proof of what differences show")
     t = sympy.symbols("t")
     w, v, r = (sympy.Matrix([sympy.Function(f"{name}{k}")(t) for k in "xyz"]) for name in "wvr")  # v of the origin
@@ -98,12 +98,12 @@ def test_both_forms_follow_from_55_in_symbols_65_66():
     exact = seen_from_i(v + seen_from_i(r))
     for form in (seen_from_i(v) + behind, v.diff(t) + w.cross(v) + behind):  # (65), (66)
         assert (exact - form).expand() == sympy.zeros(3, 1)
-    assert (seen_from_i(w) - w.diff(t)).expand() == sympy.zeros(3, 1)  # (64): from either axes the same
+    assert (seen_from_i(w) - w.diff(t)).expand() == sympy.zeros(3, 1)  # (64): equal from both axes
 
 
 @pytest.mark.parametrize("t", TIMES)
 def test_angular_acceleration_is_the_first_derivative_from_either_axes_64(t):
-    """And no second one, as the summary prints it: that has another unit."""
+    """The second derivative, which the summary of the course prints, has another unit and differs."""
     from_i = along(spin, t)
     from_b = rotation(t) @ along(lambda s: rotation(s).T @ spin(s), t)
     assert_allclose(from_b, from_i, atol=1e-7)

@@ -1,4 +1,4 @@
-"""Rotations are what SciPy, the matrix exponential and differences say."""
+"""Rotations compared with SciPy, the matrix exponential and differences."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ def same(found, wanted, far=1e-14):
 
 
 def derivative(of, t: float):
-    """Of fourth order in the step."""
+    """Derivative by differences of fourth order in the step."""
     near, far = (of(t + k * STEP) - of(t - k * STEP) for k in (1, 2))
     return (8 * near - far) / (12 * STEP)
 
 
 def path(angles: np.ndarray, t: float) -> np.ndarray:
-    """Three angles that move, at rates of their own."""
+    """Three angles that change at different rates."""
     return angles + t * np.array([0.7, -0.4, 1.1])
 
 
@@ -45,7 +45,7 @@ def test_coordinates_turn_and_turn_back_35_and_36():
     a_b, b_c = (at.of_zyz(*angles) for angles in RANDOM[:2])
     u, v = RANDOM[2], RANDOM[3]
     same(a_b.T @ (a_b @ v), v)
-    same(at.skew(a_b @ u), a_b @ at.skew(u) @ a_b.T)  # the last of (35), from the other side
+    same(at.skew(a_b @ u), a_b @ at.skew(u) @ a_b.T)  # the last equation of (35), reversed
     same((a_b @ b_c) @ v, a_b @ (b_c @ v))
     same(at.defect(a_b @ b_c), (0.0, 1.0))
     same(at.defect(np.diag([1.0, 1.0, -2.0])), (3.0, -2.0))
@@ -68,7 +68,7 @@ def test_every_form_is_scipy_s(angles):
 def test_axis_and_angle_are_the_exponential_43_and_turn_nothing_on_the_axis_42(turn):
     angle = np.linalg.norm(turn)
     found = at.of_axis(turn if angle else [1.0, 0.0, 0.0], angle)
-    same(found, expm(at.skew(turn)), 1e-13)  # whose own rounding grows with the angle
+    same(found, expm(at.skew(turn)), 1e-13)  # the rounding of expm grows with the angle
     same(found @ turn, turn)
 
 

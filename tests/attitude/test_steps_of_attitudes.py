@@ -1,4 +1,4 @@
-"""How steps follow an attitude: tops with closed forms, invariants that gauss methods keep, and where angles fail."""
+"""Steps of attitudes: tops with closed solutions, invariants that Gauss methods keep, and the failure of angles."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ START = at.euler_parameters(at.of_axis([0.6, 0.8, 0.0], 0.6))
 
 
 def free(t, y):
-    """Euler parameters, and Euler's equations (68) without a torque."""
+    """Rates of Euler parameters, and Euler's equations (68) without torque."""
     w = y[4:]
     return np.concatenate([at.euler_parameters_rate(y[:4], w), -np.cross(w, INERTIA * w) / INERTIA])
 
 
 def momentum(y):
-    """Moment of momentum in axes that stand still."""
+    """Moment of momentum in inertial axes."""
     return at.of_euler_parameters(y[:4]) @ (INERTIA * y[4:])
 
 
 def test_a_free_top_turns_by_jacobis_functions():
-    """(68) without a torque, moments 1, 2, 3: w1 = a cn, w2 = b sn, w3 = c dn (Landau and Lifshitz, Mechanics, 37)."""
+    """(68) without torque, moments 1, 2, 3: w1 = a cn, w2 = b sn, w3 = c dn (Landau and Lifshitz, Mechanics, 37)."""
     i1, i2, i3 = INERTIA
     w1, w3 = 0.3, 1.2  # w2 = 0 at the start
     energy, square = i1 * w1**2 + i3 * w3**2, (i1 * w1) ** 2 + (i3 * w3) ** 2
@@ -37,7 +37,7 @@ def test_a_free_top_turns_by_jacobis_functions():
     y = integrate(free, [*START, w1, 0.0, w3], t, "verner-7", rtol=1e-11)
     assert np.abs(y[:, 4:] - np.stack([w1 * cn, b * sn, w3 * dn], axis=1)).max() < 1e-9
     off = [np.abs(momentum(one) - momentum(y[0])).max() for one in y]
-    assert max(off) < 1e-9  # and so the attitude: what stands still is seen to
+    assert max(off) < 1e-9  # the attitude is exact as well: this vector is constant
 
 
 def test_a_heavy_symmetric_top_precesses_steadily():
@@ -65,7 +65,7 @@ def test_a_heavy_symmetric_top_precesses_steadily():
 
 
 def test_gauss_methods_keep_squares_and_rk4_does_not():
-    """|e|, energy and moment of momentum are squares of states."""
+    """|e|^2, energy and the square of the moment of momentum are quadratic in the states."""
     off = {}
     for method in ("rk4", "gauss-4"):
         end = integrate(free, [*START, 0.3, 0.05, 1.2], [0.0, 40.0], method, step=0.1)[-1]
@@ -77,7 +77,7 @@ def test_gauss_methods_keep_squares_and_rk4_does_not():
 
 
 def test_angles_lose_their_order_next_to_their_pole_and_euler_parameters_know_none():
-    """A body rolled by delta turns about its y axis, its pitch past 90 degrees at a distance of delta."""
+    """A body rolled by delta turns about its y axis, so its pitch passes 90 degrees at a distance of delta."""
     turn, h, end = np.array([0.0, 1.0, 0.0]), 0.02, 3.0
 
     def angles(t, y):
@@ -95,4 +95,4 @@ def test_angles_lose_their_order_next_to_their_pole_and_euler_parameters_know_no
     (far, whole), (near, same) = errors(0.3, h), errors(0.01, h)
     assert far < 1e-7 and near > 1e-3 and near > 1e4 * far
     assert whole == pytest.approx(same, rel=0.1) and same < 1e-9
-    assert errors(0.3, 2 * h)[0] / far > 10.0  # its order, away from the pole
+    assert errors(0.3, 2 * h)[0] / far > 10.0  # the order remains away from the pole

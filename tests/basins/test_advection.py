@@ -1,4 +1,4 @@
-"""Scalars carried over grids: orders, bounds, closed forms, what stays uniform, what is conserved, symmetries."""
+"""Advection of scalars over grids: orders, bounds, closed forms, uniform values, conservation and symmetries."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ def difference(case: Carried, one, other) -> float:
 
 
 def order(errors) -> float:
-    """Between errors on so many cells and on twice as many."""
+    """Observed order of the errors on n and on 2 n cells."""
     return float(np.log2(errors[0] / errors[1]))
 
 
 def returned(scheme, cells, velocity, start, factor=lambda t: 1.0, **more) -> float:
-    """The difference from the start, to which the exact solution has come back at 1 s."""
+    """Difference from the start at 1 s, when the exact solution has returned to the start."""
     case = carried(scheme, cells, velocity, **more)
     s = means(case.mesh, start)
     return difference(case, case.run(s, 1.0, 0.4, "rk4" if scheme in FIFTH else "ssp-rk2", factor), s)
 
 
 def mound(x, y):
-    """Of radius 0.28, with five derivatives, and nothing beyond."""
+    """Mound of radius 0.28 with five continuous derivatives, zero outside."""
     return np.maximum(1.0 - ((x - 0.5) ** 2 + (y - 0.7) ** 2) / 0.28**2, 0.0) ** 6
 
 
@@ -49,7 +49,7 @@ def forth_and_back(t):
     return np.cos(np.pi * t)
 
 
-# Met on 64 and 128 cells a side; limiters that flatten summits and first order are still on their way to their orders.
+# Observed orders on 64 and 128 cells per side; upwind and limiters that flatten maxima are pre-asymptotic there.
 TURNED = {"upwind": 0.54, "minmod": 1.75, "van-leer": 1.86, "monotonized-central": 1.76, "upwind5": 4.82, "weno5": 4.44}
 SWIRLED = {"upwind": 0.80, "minmod": 1.77, "van-leer": 2.51, "monotonized-central": 2.76, "upwind5": 4.89, "weno5": 5.1}
 
@@ -78,7 +78,7 @@ def slotted(x, y):
 
 
 DISK = {"upwind": 1.116, "minmod": 0.667, "van-leer": 0.480, "monotonized-central": 0.405, "upwind5": 0.211}
-DISK |= {"weno5": 0.222}  # difference after a turn over the disk's area, 100 cells a side
+DISK |= {"weno5": 0.222}  # difference after a turn over the area of the disk, 100 cells per side
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -91,13 +91,13 @@ def test_a_slotted_disk_turned_once_around_keeps_its_bounds(scheme):
     assert difference(case, end, start) / start.mean() == approx(DISK[scheme], rel=0.02)
 
 
-# Greatest Courant numbers of Euler steps: within, and where flow enters through the boundary.
+# Greatest Courant numbers of Euler steps: without and with inflow through the boundary.
 COURANT = {"upwind": (1.0, 1.0), "minmod": (2 / 3, 1 / 2), "van-leer": (1 / 2, 1 / 3)}
 COURANT |= {"monotonized-central": (1 / 2, 1 / 3), "weno5": (1 / 2, 1 / 2)}
 
 
 def random_case(scheme, seed, through=False, deep=False, **more) -> tuple[Carried, np.ndarray]:
-    """A graded grid with random flows, depths, amounts, and a stream function that is random as well."""
+    """Return (case, amounts): a graded grid with random depths, values and stream function."""
     random = np.random.default_rng(seed)
     mesh = rectangle((1.0, 0.7), (11, 9), grading=(3.0, 0.5))
     stream = random.normal(size=len(mesh.points))
@@ -126,7 +126,7 @@ def test_a_step_of_euler_keeps_the_values_within_those_around(scheme, through, d
 
 
 def surroundings(case, s):
-    """(least, greatest) of a cell's value, its four neighbours' and those outside."""
+    """Return (least, greatest) of the values of a cell, its four neighbours and boundary faces."""
     ny, nx = case.ny, case.nx
     west, east, south, north = np.split(case.outside, np.cumsum([ny, ny, nx]))
     wide = np.full((ny + 2, nx + 2), np.nan)
@@ -142,7 +142,7 @@ def test_the_linear_scheme_leaves_the_bounds():
 
 
 def ogata_banks(x, t, u, spread):
-    """Value behind an inlet that is held at 1 since t = 0 (Ogata and Banks 1961)."""
+    """Value behind an inlet at 1 from t = 0 on (Ogata and Banks 1961)."""
     wide = 2.0 * np.sqrt(spread * t)
     return 0.5 * (erfc((x - u * t) / wide) + np.exp(u * x / spread) * erfc((x + u * t) / wide))
 
@@ -226,7 +226,7 @@ def test_what_comes_in_through_the_boundary_is_what_there_is_more_inside(scheme,
 
 
 def twin(case, steepness, flows, outside):
-    """Rates of a case's amounts on its grid laid out otherwise, as a function of amounts and the way to lay them."""
+    """Return a function (amounts, permutation) that gives the rates of a case on its mirrored or transposed grid."""
 
     def rates(s, laid):
         other, shape = copy.copy(case), (case.ny, case.nx)

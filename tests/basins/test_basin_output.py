@@ -1,4 +1,4 @@
-"""What basins show: fields at points and along lines, flows through patches, frames, pictures, what check tells."""
+"""Output of basins: probes at points, lines, flows through patches, frames, pictures, and the command `check`."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def pool(**more) -> dict:
 
 
 def draining(probes, end=2.0, output=None, **more) -> dict:
-    """A basin that empties through a valve."""
+    """Return a case of a basin that drains through a valve."""
     nodes = {"pool": pool(**more), "out": reservoir(AMBIENT)}
     links = {"tap": valve("pool.outlet", "out", 0.02, ramp(0.0, 1.0, 0.0, 1.0))}
     case = scene(nodes, links, end, PLANE, probes, 0.1)
@@ -101,7 +101,7 @@ def random_state(model, scale) -> np.ndarray:
 
 
 def test_probes_between_centres_are_bilinear_in_what_frames_hold():
-    """Over a bed that is partly dry; the truth is SciPy's interpolation of the frame."""
+    """Probes over a partly dry bed equal SciPy's bilinear interpolation of the frame."""
     places = [(3.5, 1.2), (0.6, 3.3), (5.0, 2.0), (9.1, 0.3), (7.77, 2.9)]
     probes = [f"pool.{field}@{x},{y}" for x, y in places for field in FIELDS]
     case = draining(probes, bed="0.3*x", elevation=7.0)
@@ -123,7 +123,7 @@ def test_probes_between_centres_are_bilinear_in_what_frames_hold():
 
 
 def test_probes_of_a_liquid_read_its_frames_at_centres(tmp_path):
-    """On triangles and quadrilaterals of a file, each in a cell of its own."""
+    """Probes at cell centres equal the frame on triangles and quadrilaterals of a file."""
     path = write(tmp_path / "block.msh", *shaken())
     mesh = read(path)
     cells = (3, 17, len(mesh.cells) - 1)
@@ -142,7 +142,7 @@ def test_probes_of_a_liquid_read_its_frames_at_centres(tmp_path):
 
 
 def test_the_flow_of_a_patch_is_what_the_basin_gains():
-    """The rates of all cells, times their areas, are the flow through the only patch, when it falls dry as well."""
+    """The flow through the only patch is the sum of rates times areas, also where the patch falls dry."""
     model = fvsolve.build(fvsolve.load(draining(["pool.outlet.flow", "tap.flow"], level=2e-3)))
     area = SIZE[0] * SIZE[1] / (CELLS[0] * CELLS[1])
     shares = []
@@ -156,7 +156,7 @@ def test_the_flow_of_a_patch_is_what_the_basin_gains():
 
 
 def test_the_flow_of_a_patch_has_the_density_of_its_place():
-    """Under a law where density follows pressure: mass over the density at the patch's pressure."""
+    """If density follows pressure, the flow is the mass flow over the density at the pressure of the patch."""
     case = liquid(["block.hole.flow", "block.hole.pressure"], size=[1.0, 1.0], cells=[4, 4], pressure=2e7)
     case["nodes"]["block"]["patches"] = {"hole": {"side": "west"}}
     case["nodes"]["out"] = reservoir(AMBIENT)
@@ -298,7 +298,7 @@ def test_a_line_across_a_hole_has_nothing_there(tmp_path):
     model = fvsolve.build(case)
     line = LineSampler(case.output.lines["cut"], model.basins[0], case)
     rows = line.text(model.fields(model.start, model.new_out())["block"]).splitlines()
-    found = [float(row.split(",")[3]) for row in rows[1:]]  # the hole has its ends, 1 m and 2 m, as its outline
+    found = [float(row.split(",")[3]) for row in rows[1:]]  # points at 1 m and 2 m are on the outline
     assert found == approx([5e5, 5e5, 5e5, np.nan, *[5e5] * 5], rel=1e-12, nan_ok=True)
 
 
@@ -374,7 +374,7 @@ def drawn(fvs, *arguments) -> str:
 
 @pytest.fixture
 def dam(tmp_path, monkeypatch):
-    """A run directory of a dam that breaks, with two frames."""
+    """Run directory of a dam break with two frames."""
     monkeypatch.chdir(tmp_path)
     case = draining([], 0.5, {"fields": 1}, level=1.0, start={"level": "where(x < 5, 1, 0)"})
     fvsolve.run(case, out="dam")
@@ -401,7 +401,7 @@ def test_view_animates_all_frames(dam, fvs):
             film.seek(k)
             frames.append(np.asarray(film.convert("RGB")).astype(int))
     assert len(frames) == 2
-    bar = [frame[-60:, 30:430].std() for frame in frames]  # the bar of colours stands in every one
+    bar = [frame[-60:, 30:430].std() for frame in frames]  # every frame has the colour bar
     assert min(bar) > 20.0 and np.abs(frames[1] - frames[0])[:400].max() > 50
     code, _, err = fvs("view", dam, "--animate", "dam.avi")
     assert code == 2 and "Expected a file name that ends in .gif or .mp4" in err
@@ -431,7 +431,7 @@ def test_check_tells_of_basins(tmp_path, monkeypatch, fvs):
     assert one["depth"] == approx([2.0 - 0.975, 2.0 - 0.025])
     assert one["wave_speed"] == approx(np.sqrt(GRAVITY * np.array(one["depth"])))
     assert one["patches"]["outlet"] == {"faces": 4, "length": approx(2.0), "area": approx(1.0), "reflects": 1.0}
-    assert one["memory"] >= 8 * 160 * (3 + 2)  # its state, the profile's depth and bed at the least
+    assert one["memory"] >= 8 * 160 * (3 + 2)  # at least its state, and depth and bed of the profile
     code, out, _ = fvs("check", "run/case.toml")
     assert code == 0 and "pool.outlet" in out and "free-surface" in out and "1.025 to 1.975" in out
 
@@ -448,12 +448,12 @@ def test_a_summary_counts_the_cells_of_basins():
     assert fvsolve.run(draining([], 0.2)).summary["cells"] == 160
 
 
-# open sides and what is said of a basin ---------------------------------------------------------------------
+# open sides, and keys of basins -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("physics", ["free-surface", "liquid"])
 def test_rows_hold_what_passes_an_open_side(physics, tmp_path):
-    """What flows through the open side between two rows is what the contents gain between them."""
+    """The flow through the open side, integrated over the rows, is the gain of the content."""
     sea = {"sea": {"side": "west", "boundary": "open"}}
     if physics == "liquid":
         case = liquid(["block.sea.flow"], size=[1.0, 0.2], cells=[20, 2], patches=sea, start={"pressure": "1e5*x"})
@@ -469,7 +469,7 @@ def test_rows_hold_what_passes_an_open_side(physics, tmp_path):
 
 
 def sheet(**more) -> dict:
-    """A uniform stream that carries a dye along."""
+    """Return a case of a uniform stream that carries a dye."""
     one = {"type": "basin", "physics": "transport", "size": [2.0, 1.0], "cells": [16, 8], "scalars": {"dye": "x"},
            "velocity": {"expression": "constant", "u": "40 cm/s", "v": 0.0}, **more}  # fmt: skip
     ends = {"in": {"side": "west", "scalars": {"dye": 0.0}}, "out": {"side": "east"}}
@@ -479,7 +479,7 @@ def sheet(**more) -> dict:
 
 
 def test_a_line_has_scalars_and_a_velocity_by_name_its_parameters(tmp_path):
-    """c = (x - u t) exp(-decay t) away from the inlet, decay 1800 1/h."""
+    """c = (x - u t) exp(-decay t) away from the inlet, with a decay of 1800 1/h."""
     case = sheet()
     case["numerics"]["courant"] = 0.2
     case["output"] |= {
@@ -551,7 +551,7 @@ def test_a_fault_in_a_basin_comes_once(changes, said, tmp_path):
 
 
 def test_check_names_the_valve_that_sets_the_step():
-    """Between equal levels the slope of a valve's flow is great; a small valve sets nothing."""
+    """Between equal levels the slope of the flow through a large valve limits the step; a small valve does not."""
     nodes = {"pool": pool(), "pond": {"type": "tank", "area": 2.0, "level": 2.0}}
     case = scene(nodes, {"sluice": valve("pool.outlet", "pond", 0.5)}, 1.0, PLANE, [], 0.1)
     checks = fvsolve.build(fvsolve.load(case)).checks

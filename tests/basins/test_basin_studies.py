@@ -1,4 +1,4 @@
-"""Basins in studies: orders, patterns of Jacobians and implicit steps, limits of steps, energy, dispersion."""
+"""Basins in studies: orders, Jacobian patterns and implicit steps, step limits, energy, dispersion, charts."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from fvsolve.studies.linear.linearise import linearise
 from fvsolve.studies.stability.stability import stability
 
 PLANE = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.9}
-SLOSH = "1 + 0.05*cos(0.3141592653589793*x) + 0.03*cos(0.6283185307179586*y)"  # of 10 m by 5 m
+SLOSH = "1 + 0.05*cos(0.3141592653589793*x) + 0.03*cos(0.6283185307179586*y)"  # in 10 m by 5 m
 
 
 def pool(cells, level: str | None = None, size=(10.0, 5.0), depth: float = 1.0, **more) -> dict:
@@ -91,7 +91,7 @@ def test_cells_of_pipes_and_basins_double_together_in_both_directions():
 
 
 def test_what_a_basin_holds_is_the_same_on_coarser_cells():
-    """Averages keep contents to rounding, graded and holed too, and are those of the function to high order."""
+    """Projection keeps contents to rounding, also on graded grids and with holes, and approximates the function."""
     for more in ({}, {"grading": [3.0, 0.5]}, {"holes": [[2.5, 1.25, 5.0, 2.5]]}):
         cases = [fvsolve.load(alone(pool(cells, **more), 1.0)) for cells in ((48, 32), (24, 16))]
         fine, coarse = (FreeSurfaceRows(case, "pool") for case in cases)
@@ -109,7 +109,7 @@ def test_a_mesh_from_a_file_has_no_finer_one(tmp_path):
     meshio.write(tmp_path / "square.vtu", meshio.Mesh(points, [("triangle", np.array([[0, 1, 2], [0, 2, 3]]))]))
     basin = {"type": "basin", "mesh": {"file": str(tmp_path / "square.vtu")}, "level": 1.0}
     case = fvsolve.load(scene({"pool": basin}, {}, 1.0, PLANE))
-    with pytest.raises(FvsolveError, match="the mesh of pool is a file, which cannot be refined"):
+    with pytest.raises(FvsolveError, match="meshes from files cannot be refined \(pool\)"):
         refinement_plan(case, "both")
 
 
@@ -117,7 +117,7 @@ def test_a_mesh_from_a_file_has_no_finer_one(tmp_path):
 
 
 def fed(scheme: str, end: float = 1.0, **numerics) -> dict:
-    """A sloshing basin between a pipe and a valve that opens, and a drier one behind an orifice."""
+    """Return a case of a sloshing basin between a pipe with a valve that opens and a valve to a shallower basin."""
     west = pool((6, 4), SLOSH, elevation=0.0, patches={"in": {"side": "west"}, "gate": {"side": "east"}})
     east = pool((4, 3), size=(4.0, 3.0), depth=0.5, elevation=0.0, patches={"gate": {"side": "west"}}, bed="0.2*x")
     links = {
@@ -137,11 +137,11 @@ def test_no_rate_depends_on_a_state_that_its_pattern_has_not(scheme):
         y = model.start + model.scale * rng.normal(scale=0.2, size=model.y_size)
         assert stray(model, t, y) < 1e-9
     entries = jacobian_pattern(model).nnz
-    assert entries < 0.35 * model.y_size**2  # a pattern that has everything would show nothing
+    assert entries < 0.35 * model.y_size**2  # a full pattern would prove nothing
 
 
 def test_a_cell_feels_its_row_and_column_and_no_corner():
-    """Upwind: five cells of three quantities in the middle of a grid; muscl nine."""
+    """A row of the pattern has three quantities of five cells for upwind, and of nine for muscl."""
     for scheme, cells in (("upwind", 5), ("muscl", 9)):
         model = built(alone(pool((7, 7)), 1.0, scheme=scheme))
         per_row = np.diff(jacobian_pattern(model).tocsr().indptr)
@@ -161,7 +161,7 @@ def test_implicit_steps_come_to_where_explicit_ones_do(method):
 
 
 def test_implicit_steps_may_cross_many_cells():
-    """A deep pool that a shut valve joins: ten times the step that explicit ones can take, and mass stays."""
+    """Implicit steps of Courant number 10 in a closed pool keep the mass."""
     case = alone(pool((16, 8), SLOSH), 4.0, method="radau-iia-5", courant=10.0)
     run = fvsolve.run(case)
     assert run.ok and abs(run.ledger["mass"]["relative"]) < 1e-13
@@ -170,7 +170,7 @@ def test_implicit_steps_may_cross_many_cells():
 
 @pytest.mark.parametrize("physics", ["free-surface", "liquid"])
 def test_what_leaves_by_an_open_side_is_in_the_ledger_of_implicit_steps(physics):
-    """Its row of the pattern is that of the cells about the side: mass stays to round-off, as by explicit steps."""
+    """The pattern contains the cells at the open side, so implicit steps keep the mass to rounding."""
     case = alone(pool((12, 8), SLOSH), 3.0) if physics == "free-surface" else block((12, 8), 1e-3)
     (basin,) = case["nodes"].values()
     basin["patches"] = {"east": {"side": "east", "boundary": "open"}}
@@ -187,10 +187,10 @@ def test_what_leaves_by_an_open_side_is_in_the_ledger_of_implicit_steps(physics)
 
 
 def test_a_slosh_blows_up_at_the_predicted_step():
-    """16 by 4 cells at rest: prediction and real runs agree to bisection; about a moving slosh to half a per cent."""
+    """Prediction and runs agree to 3e-4 for 16 by 4 cells at rest, and to 1e-2 about a moving slosh."""
     still = stability(alone(pool((16, 4), size=(10.0, 4.0)), 1.0), ["upwind"], ["ssp-rk2"]).rows[0]
     assert still.difference == approx(0.0, abs=3e-4)
-    assert still.rate * still.predicted > 2.0  # two half cells: nothing fails at Courant 1
+    assert still.rate * still.predicted > 2.0  # Courant number 1, which counts half cells, is stable
     moving = stability(alone(pool((16, 4), SLOSH), 1.0), ["upwind"], ["ssp-rk2"]).rows[0]
     assert moving.difference == approx(0.0, abs=1e-2)
     assert any("the state is not steady" in note for note in moving.notes)
@@ -203,7 +203,7 @@ def test_a_limited_basin_is_measured_with_upwind_beside_it():
 
 
 def test_a_linearised_basin_sloshes_at_its_natural_frequencies():
-    """Poles about rest: the slowest oscillates as the longest of long waves, sqrt(g h) k, to second order."""
+    """The lowest frequency of the poles at rest is that of the longest wave, sqrt(g h) k, to 5e-3."""
     depth, size = 1.0, 10.0
     case = alone(pool((24, 2), size=(size, 1.0), depth=depth), 1.0, scheme="upwind")
     found = linearise(case)
@@ -220,14 +220,14 @@ def test_a_linearised_basin_sloshes_at_its_natural_frequencies():
 
 
 def scheme_loss(cells: int, **numerics) -> float:
-    """What the scheme takes of a closed slosh in a second [J]."""
+    """Energy that the scheme dissipates in a closed slosh in 1 s [J]."""
     found = energy(alone(pool((2 * cells, cells), SLOSH), 1.0, **numerics))
     assert not found.supplied and not found.dissipated
     return found.scheme["pool"][-1]
 
 
 def test_what_a_scheme_takes_of_a_slosh_falls_with_its_order():
-    """First order takes as much as cells are wide; limited slopes as their cube, for they differ at third order."""
+    """The loss by upwind falls with the width of cells, the loss by limited slopes with its cube."""
     upwind = [scheme_loss(n, scheme="upwind") for n in (8, 16, 32)]
     muscl = [scheme_loss(n) for n in (8, 16, 32)]
     assert min(upwind + muscl) > 0.0
@@ -236,7 +236,7 @@ def test_what_a_scheme_takes_of_a_slosh_falls_with_its_order():
 
 
 def test_a_method_that_keeps_squares_leaves_all_the_loss_to_the_scheme():
-    """What cells store is no square but near one: gauss-4 leaves a millionth of a millionth, ssp-rk2 creates."""
+    """The stored energy is nearly quadratic: the step loss by gauss-4 is below 1e-9 of it, and ssp-rk2 adds energy."""
     case = alone(pool((16, 8), SLOSH), 1.0)
     kept, made = (energy(case, {"numerics.method": method}) for method in ("gauss-4", "ssp-rk2"))
     size = energy_of_slosh()
@@ -245,7 +245,7 @@ def test_a_method_that_keeps_squares_leaves_all_the_loss_to_the_scheme():
 
 
 def energy_of_slosh() -> float:
-    """Of a slosh, above that of the lake at rest [J]: rho g a^2 A / 4 of each of two cosines."""
+    """Energy of the slosh above that of a lake at rest [J]: rho g a^2 A / 4 for each of its two cosines."""
     return RHO * GRAVITY * (0.05**2 + 0.03**2) / 4.0 * 50.0
 
 
@@ -274,7 +274,7 @@ def test_a_basin_that_drains_gives_the_valve_what_its_tank_gives():
 
 @pytest.mark.parametrize("head", [0.5, 3.0], ids=["out", "in"])
 def test_what_passes_a_patch_is_no_loss_of_the_scheme(head):
-    """Power that the scheme takes at any state: the same to rounding with the valve at a patch open and shut."""
+    """The power lost by the scheme in a state is equal to rounding with the valve at the patch open and closed."""
     found = []
     for opening in (0.0, 1.0):
         basin = pool((6, 4), patches={"west": {"side": "west"}}, elevation=0.0, bed="0.1*x")
@@ -288,7 +288,7 @@ def test_what_passes_a_patch_is_no_loss_of_the_scheme(head):
         found.append(kinds)
     shut, open_ = found
     assert open_["scheme", "pool"] == approx(shut["scheme", "pool"], rel=1e-9)
-    assert abs(open_["rate", "pool"] - shut["rate", "pool"]) > 100.0  # something did pass
+    assert abs(open_["rate", "pool"] - shut["rate", "pool"]) > 100.0  # water passes the valve
     assert open_["dissipated", "pool"] >= 0.0
 
 
@@ -296,13 +296,13 @@ def test_what_passes_a_patch_is_no_loss_of_the_scheme(head):
 
 
 def slower(k: float, depth: float) -> float:
-    """Per cent by which real waves of small height run slower than shallow water has them (Airy 1845)."""
+    """Reduction [%] of the speed of small waves (Airy 1845) from that in shallow water."""
     return 100.0 * (1.0 - math.sqrt(math.tanh(k * depth) / (k * depth)))
 
 
 @pytest.mark.parametrize("more", [{}, {"grading": [2.0, 1.0]}], ids=["even", "graded"])
 def test_a_slosh_is_warned_of_where_it_is_short_against_its_depth(more):
-    """One half wave in 10 m is quiet 0.5 m deep, k h = 0.16, and 4.9 % too quick at 1.8 m."""
+    """Half a wave in 10 m gives no notice at a depth of 0.5 m (k h = 0.16), and a notice at 1.8 m."""
     k = math.pi / 10.0
     for depth in (0.5, 1.8):
         basin = pool((32, 8), f"{depth} + 0.01*cos({k!r}*x)", depth=depth, **more)
@@ -314,7 +314,7 @@ def test_a_slosh_is_warned_of_where_it_is_short_against_its_depth(more):
 
 
 def test_wavenumbers_are_those_of_the_waves_that_there_are():
-    """To rounding by cosines, to second order across faces; a dam that breaks is as a wave of 1.1 half lengths."""
+    """Exact by cosines, of second order by faces; a dam break in a basin of length L has k = sqrt(12) / L."""
     k = math.hypot(2.0 * math.pi / 10.0, math.pi / 5.0)
     level = f"1 + 0.01*cos({2.0 * math.pi / 10.0!r}*x)*cos({math.pi / 5.0!r}*y)"
     model = built(alone(pool((32, 16), level), 1.0))
@@ -329,7 +329,7 @@ def test_wavenumbers_are_those_of_the_waves_that_there_are():
 
 
 def test_waves_that_come_about_in_a_run_are_warned_of_once(tmp_path):
-    """A valve lets water rush into a deep pool at rest: nothing at the start, one word at the end."""
+    """Inflow into a deep pool at rest gives no notice at the start and a single notice after the run."""
     nodes = {
         "pool": pool((20, 4), depth=3.0, patches={"in": {"side": "west"}}),
         "lake": {"type": "reservoir", "head": 9},
@@ -341,18 +341,18 @@ def test_waves_that_come_about_in_a_run_are_warned_of_once(tmp_path):
     assert len(said) == 1 and said[0].startswith("pool: waves about") and " s" in said[0].rsplit("at", 1)[1]
 
 
-# liquids, and what is carried ------------------------------------------------------------------------------------
+# liquids and scalars ---------------------------------------------------------------------------------------------
 
 
 def block(cells, end: float, **numerics) -> dict:
-    """A pulse of pressure in a block of liquid between walls."""
+    """Return a case of a pressure pulse in a liquid between walls."""
     start = {"pressure": "1e5*exp(-150*((x - 0.4)**2 + (y - 0.2)**2))"}
     given = {"size": [1.0, 0.5], "cells": list(cells), "pressure": 1e6, "thickness": 0.1, "wave_speed": 1000.0}
     return scene({"block": {"type": "basin", "physics": "liquid", "start": start, **given}}, {}, end, PLANE | numerics)
 
 
 def test_fifth_order_shows_on_grids_for_cells_start_from_their_means():
-    """A pulse in a liquid, and a slosh along one axis: from values at centres no more than second order would show."""
+    """A start from averages of cells shows order 5 in a liquid and in a slosh; values at centres show order 2."""
     found = order(block((32, 16), 1e-4, scheme="upwind5", method="rk4", courant=0.4), levels=4)
     assert min(found.fits["block at the end: density"]["L1"].pairwise[:2]) > 3.8
     slosh = alone(pool((20, 2), "1 + 0.02*cos(0.3141592653589793*x)"), 1.0, scheme="upwind5", method="rk4")
@@ -360,7 +360,7 @@ def test_fifth_order_shows_on_grids_for_cells_start_from_their_means():
 
 
 def test_energy_of_a_liquid_falls_by_what_the_scheme_takes():
-    """Quicker the finer the cells, at third order by limited slopes; what it starts with is that of the pulse."""
+    """The loss falls at third order with limited slopes; the energy at the start is that of the pulse."""
     loss = [energy(block((n, n // 2), 5e-4, courant=0.5)).scheme["block"][-1] for n in (32, 64, 128)]
     assert loss[0] > loss[1] > loss[2] > 0.0 and np.log2(loss[1] / loss[2]) == approx(3.0, abs=0.6)
     found = energy(block((128, 64), 1e-6, courant=0.5))
@@ -377,7 +377,7 @@ def test_a_liquid_blows_up_at_the_predicted_step(scheme):
 
 
 def test_friction_of_the_bed_is_booked_and_takes_what_it_takes():
-    """Beside what the scheme takes, a slosh over Manning's bed loses what it has less: to a hundredth."""
+    """Manning's friction dissipates what the stored energy loses besides the loss of the scheme, to 1 %."""
     smooth, rough = (energy(alone(pool((32, 16), SLOSH, **more), 2.0)) for more in ({}, {"manning": 0.05}))
     (taken,) = rough.dissipated.values()
     assert taken[-1] > 0.0 and rough.numerical_remainder[-1] == approx(smooth.numerical_remainder[-1], rel=0.01)
@@ -386,7 +386,7 @@ def test_friction_of_the_bed_is_booked_and_takes_what_it_takes():
 
 
 def swirl(**numerics) -> dict:
-    """A dye in a vortex that turns back (LeVeque 1996)."""
+    """Return a case of a dye in a vortex that reverses (LeVeque 1996)."""
     dye = "exp(-60*((x - 0.35)**2 + (y - 0.5)**2))"
     sheet = {"type": "basin", "physics": "transport", "size": [1.0, 1.0], "cells": [16, 16], "scalars": {"dye": dye}}
     sheet["velocity"] = {"expression": "swirl", "period": 1.5}
@@ -394,7 +394,7 @@ def swirl(**numerics) -> dict:
 
 
 def test_a_dye_in_a_vortex_that_turns_back_keeps_its_bounds_and_shows_its_order():
-    """Steps are those of its full speed: where it stands still for a moment they do not jump over what follows."""
+    """The step follows the greatest velocity of the run, so it is not too long after the vortex is at rest."""
     found = order(swirl(), levels=4, cells=32)
     assert found.fits["sheet at the end: dye"]["L1"].order == approx(2.1, abs=0.3)
     for cells in (32, 64):
@@ -405,13 +405,13 @@ def test_a_dye_in_a_vortex_that_turns_back_keeps_its_bounds_and_shows_its_order(
 
 
 def test_a_vortex_stands_still_where_it_is_linearised():
-    """What carries is held as it is at the start: the prediction is met, though the vortex would turn back."""
+    """The velocity keeps its value at the start, so predicted and measured limits agree."""
     row = stability(swirl(), ["upwind"], ["rk4"]).rows[0]
     assert row.difference == approx(0.0, abs=3e-4)
 
 
 def test_a_chart_of_a_slosh_lays_error_against_cost():
-    """Errors of probes and of all cells at the end fall along each curve; limited slopes beat first order."""
+    """Errors of probes and of all cells fall along each curve, and muscl has smaller errors than upwind."""
     case = alone(pool((16, 8), SLOSH), 1.0)
     case["output"]["probes"] = ["pool.depth@0.3,0.3"]
     found = chart(case, schemes=["upwind", "muscl"], methods=["ssp-rk2"], cells=[8, 16, 32])
@@ -425,5 +425,5 @@ def test_a_chart_of_a_slosh_lays_error_against_cost():
 
 
 def test_a_chart_says_that_cells_of_a_file_are_not_refined():
-    with pytest.raises(FvsolveError, match="the mesh of plain is a file"):
+    with pytest.raises(FvsolveError, match=r"meshes from files cannot be refined \(plain\)"):
         chart(CASES / "flooding.toml")

@@ -1,4 +1,4 @@
-"""Scalars of basins between the bounds that a case states: by default in steps, rows and frames; else with a notice."""
+"""Bounds of scalars in basins: kept by default in steps, rows and frames; a notice where a choice breaks them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PROBES = [f"sheet.dye@{x:.2f},{y:.2f}" for x in (0.25, 0.5, 0.75) for y in (0.25
 
 
 def shaped(path, shape: str, cells: int = 24) -> dict:
-    """A unit square of shaken triangles, of shaken quadrilaterals, or a rectangle."""
+    """Return keys of a unit square of distorted triangles or quadrilaterals, or of rectangles."""
     if shape == "rectangle":
         return {"size": [1.0, 1.0], "cells": [cells, cells]}
     triangles(path, cells, cells, quads=shape == "quadrilaterals")
@@ -23,7 +23,7 @@ def shaped(path, shape: str, cells: int = 24) -> dict:
 
 
 def swirled(shape: dict, numerics: dict, every: float = 0.0031, **dye) -> dict:
-    """A slotted disk of 1 in 0 that a vortex draws out."""
+    """Return a case of a slotted disk of value 1 in 0, which a vortex distorts."""
     velocity = {"expression": "swirl", "speed": 2.0}
     sheet = {"type": "basin", "physics": "transport", "velocity": velocity, "scalars": {"dye": DISK}, **shape}
     return scene({"sheet": sheet}, {}, 0.3, numerics, PROBES, every, scalars={"dye": dye})
@@ -39,7 +39,7 @@ def notices(case: dict) -> list:
 
 
 SHAPES = ("triangles", "quadrilaterals", "rectangle")
-WAYS = {  # all that says nothing of bounds
+WAYS = {  # numerics without a notice of bounds
     "default": {}, "minmod": {"limiter": "minmod"}, "monotonized-central": {"limiter": "monotonized-central"},
     "muscl": {"scheme": "muscl"}, "upwind": {"scheme": "upwind", "method": "ssp-rk2"}, "ssp-rk2": {"method": "ssp-rk2"},
     "euler": {"method": "euler", "courant": 1.0}, "ssp-rk3 at 1": {"method": "ssp-rk3", "courant": 1.0},
@@ -60,7 +60,7 @@ def test_what_no_notice_warns_of_stays_in_its_bounds(way, shape, tmp_path):
 
 
 def test_every_row_and_frame_between_steps_keeps_the_bounds_that_steps_keep(tmp_path):
-    """Upwind with ssp-rk2 at 0.9: the cubic through both ends of a step goes from -0.014 to 1.020."""
+    """The cubic dense output of upwind with ssp-rk2 at Courant number 0.9 goes from -0.014 to 1.020."""
     import meshio
 
     case = swirled(shaped(tmp_path, "rectangle", 32), {"scheme": "upwind", "method": "ssp-rk2", "courant": 0.9})
@@ -73,13 +73,13 @@ def test_every_row_and_frame_between_steps_keeps_the_bounds_that_steps_keep(tmp_
 
 
 def test_a_step_that_leaves_the_bounds_is_shown_as_it_is():
-    """Rows are held to what the ends of a step have, not to what they should have."""
+    """Rows are limited to the values at both ends of a step, not to the bounds."""
     found = rows(swirled({"size": [1.0, 1.0], "cells": [24, 24]}, {"scheme": "upwind5", "method": "ssp-rk3"}))
     assert found.max() > 1.01 or found.min() < -0.01
 
 
 def test_rows_of_pipes_keep_the_bounds_of_what_flows_in():
-    """A plug between steps as long as its cells take."""
+    """Rows between steps as long as cell travel times, for a sudden end of the dye."""
     nodes = {"a": reservoir(2e5, scalars={"dye": {"time": [0.0, 1.0], "value": [1.0, 0.0], "kind": "step"}}),
              "b": reservoir(1e5)}  # fmt: skip
     links = {"main": pipe("a", "b", 20.0, 0.3, 20.0, 20, friction={"model": "steady", "factor": 0.03})}
@@ -104,7 +104,7 @@ def test_decay_alone_does_not_overshoot_what_it_leads_to():
     assert found.min() >= 0.0 and found.max() <= 1.0 and np.all(np.abs(found[:, -1] - 0.5) < 1e-9)
 
 
-TOLD = {  # what is chosen, and what the notice names
+TOLD = {  # numerics, shape, key and limit of the notice, its text
     "upwind5": ({"scheme": "upwind5", "method": "ssp-rk3"}, "rectangle", ("scheme", None), "upwind5; ssp-rk3"),
     "rk4": ({"method": "rk4"}, "triangles", ("method", 0.0), "muscl, van-leer; rk4"),
     "beyond": ({"method": "ssp-rk2", "courant": 1.2}, "rectangle", ("courant", 1.0), "weno5; ssp-rk2"),

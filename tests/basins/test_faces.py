@@ -1,4 +1,4 @@
-"""Fields on meshes of any cells, kernels alone: orders on shaken triangles, lakes at rest, what is kept and lost."""
+"""Kernels on meshes: orders on distorted triangles, lakes at rest, conservation, reflection and bounds."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ NONE, FREE = np.zeros(0), (-math.inf, math.inf)
 
 @dataclass
 class Field:
-    """A mesh and its lowered arrays; states by place, centre and area too."""
+    """Mesh with its lowered arrays, and rates of the kernels on it."""
 
     mesh: Mesh
 
@@ -37,11 +37,11 @@ class Field:
         self.edge = self.mesh.middle[self.mesh.inner :]
 
     def lake(self, bed) -> np.ndarray:
-        """The plan of a lake at level 0 over a bed."""
+        """Return (depth, dry height) of a lake at level 0 over a bed."""
         return np.stack([np.maximum(-bed, 0.0), np.maximum(bed, 0.0)])
 
     def shallow(self, scheme, plan, y, reflect=NONE, flow=NONE, wide=2.0):
-        """(rates, greatest rate); work starts as NaN, so that what is read before it is written shows."""
+        """Return (rates, greatest rate); work starts as NaN, to detect values that are read before they are written."""
         work, found = np.full(shallow_faces.work_size(self.integers), np.nan), np.full_like(y, np.nan)
         rate = shallow_faces.shallow_rates(
             G, scheme, wide, self.floats, self.integers, reflect, plan, *y, flow, NONE, work, *found, None
@@ -74,13 +74,13 @@ class Field:
         )
 
     def stream(self, psi) -> np.ndarray:
-        """Flows through faces of a stream function, which have no divergence."""
+        """Return flows through faces by a stream function, which have no divergence."""
         at = psi(*self.mesh.points.T)
         return at[self.mesh.ends[:, 1]] - at[self.mesh.ends[:, 0]]
 
 
 def march(rates, y, end, courant, seen=lambda y: None):
-    """SSP-RK2 of (rates, greatest rate) = rates(y), at a Courant number."""
+    """Integrate (rates, greatest rate) = rates(y) to `end` by ssp-rk2 at a Courant number."""
     t = 0.0
     while t < end:
         k, rate = rates(y)
@@ -92,7 +92,10 @@ def march(rates, y, end, courant, seen=lambda y: None):
 
 
 def triangles(path, nx, ny, size=(1.0, 1.0), shake=0.2, angle=0.0, quads=False) -> Field:
-    """A rectangle whose inner points are moved by `shake` of a cell, cut into triangles or not, turned, from a file."""
+    """Return a rectangle of distorted triangles, or quadrilaterals if `quads` is True, rotated and read from a file.
+
+    shake : displacement of inner points over the size of cells; angle : rotation [rad]
+    """
     mesh = rectangle(size, (nx, ny))
     points, width = mesh.points.copy(), np.array(size) / (nx, ny)
     inside = ((points > 0.5 * width) & (points < np.array(size) - 0.5 * width)).all(1)
@@ -111,13 +114,13 @@ def mixed(path) -> Field:
 
 
 def hilly(field, level=0.0):
-    """A bed with islands in a lake, the lengths of the mesh."""
+    """Return a bed with islands in a lake, scaled to the mesh."""
     x, y = (field.centre - field.centre.min(0)).T / np.ptp(field.centre, axis=0).max()
     return 0.3 * np.sin(9 * x) * np.cos(7 * y) - level
 
 
 def test_a_rectangle_agrees_with_its_formula_at_first_order():
-    """Flux of Harten, Lax and van Leer over the higher bed, summed by faces in numpy."""
+    """Reference by NumPy: flux of Harten, Lax and van Leer over the higher bed, summed over faces."""
     field = Field(mesh := rectangle((3.0, 2.0), (9, 7), grading=(3.0, 0.5)))
     rng, n = np.random.default_rng(1), 63
     plan = field.lake(hilly(field))
@@ -170,7 +173,7 @@ def test_a_lake_with_dry_islands_rests_to_the_bit_and_no_water_is_lost(tmp_path,
 
 @pytest.mark.parametrize("kind", ["triangles", "quads"])
 def test_no_depth_falls_below_zero_when_a_dam_breaks_over_islands(tmp_path, kind):
-    """At Courant number 1, which counts half of a cell; nor is water lost."""
+    """At the limit for depths, half a cell per step, no depth is negative and no water is lost."""
     field = triangles(tmp_path, 30, 20, (3.0, 2.0), quads=kind == "quads")
     plan = field.lake(hilly(field, 0.05))
     y = np.zeros((3, len(plan[0])))
@@ -182,7 +185,7 @@ def test_no_depth_falls_below_zero_when_a_dam_breaks_over_islands(tmp_path, kind
 
 
 def stoker(x, t, high, low):
-    """Depth of a dam break on a wet bed (Stoker 1957), x from the dam."""
+    """Depth of a dam break on a wet bed (Stoker 1957) at the distance x from the dam."""
     c = math.sqrt(G * high)
     shock = lambda h: (h - low) * math.sqrt(0.5 * G * (h + low) / (h * low))  # noqa: E731
     h = brentq(lambda h: 2 * (c - math.sqrt(G * h)) - shock(h), low, high, xtol=1e-14)
@@ -192,7 +195,7 @@ def stoker(x, t, high, low):
 
 
 def test_a_dam_breaks_on_triangles_as_in_the_exact_solution(tmp_path):
-    """L1 of the depth falls at first order, all that a front allows."""
+    """The L1 error of the depth falls at first order, the limit at a front."""
     errors = []
     for nx in (100, 200):
         field = triangles(tmp_path, nx, nx // 20, (20.0, 1.0))
@@ -206,7 +209,7 @@ def test_a_dam_breaks_on_triangles_as_in_the_exact_solution(tmp_path):
 
 @pytest.mark.parametrize(("scheme", "order"), [(UPWIND, 1), (MUSCL, 2)], ids=["upwind", "muscl"])
 def test_a_vortex_stands_over_a_hill_with_the_order_of_its_scheme(tmp_path, scheme, order):
-    """u = A r (1 - r^2 / R^2)^3 about the middle, g de/dr = u^2 / r: steady over every bed that is round."""
+    """u = A r (1 - r^2 / R^2)^3 about the middle, g de/dr = u^2 / r: steady over every axisymmetric bed."""
     errors, sizes = [], (16, 32, 64)
     for n in sizes:
         field = triangles(tmp_path, n, n)
@@ -223,13 +226,13 @@ def test_a_vortex_stands_over_a_hill_with_the_order_of_its_scheme(tmp_path, sche
 
 @pytest.mark.parametrize(("scheme", "angle"), [(UPWIND, 0.7), (MUSCL, 0.5 * math.pi)], ids=["upwind", "muscl"])
 def test_a_turned_mesh_gives_turned_rates(tmp_path, scheme, angle):
-    """Slopes of both components are limited each by itself, so by a right angle there."""
+    """The rotation for muscl is a right angle, because slopes of both components are limited separately."""
     rng, turn = (
         np.random.default_rng(4),
         np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]),
     )
     fields = [triangles(tmp_path, 10, 8, angle=a) for a in (0.0, angle)]
-    assert np.array_equal(fields[0].mesh.cells, fields[1].mesh.cells)  # numbered alike
+    assert np.array_equal(fields[0].mesh.cells, fields[1].mesh.cells)  # same numbering
     n = len(fields[0].area)
     y = np.stack([0.1 * rng.random(n), *0.3 * rng.standard_normal((2, n))])
     turned = np.stack([y[0], *turn @ y[1:]])
@@ -242,7 +245,7 @@ def test_a_turned_mesh_gives_turned_rates(tmp_path, scheme, angle):
 
 @pytest.mark.parametrize(("scheme", "order"), [(UPWIND, 1), (MUSCL, 2)], ids=["upwind", "muscl"])
 def test_a_standing_wave_rings_on_triangles_with_the_order_of_its_scheme(tmp_path, scheme, order):
-    """cos(pi x) cos(pi y) cos(sqrt(2) pi c t) between walls."""
+    """Exact solution between walls: cos(pi x) cos(pi y) cos(sqrt(2) pi c t)."""
     errors, sizes = [], (16, 32, 64)
     for n in sizes:
         field = triangles(tmp_path, n, n)
@@ -266,13 +269,13 @@ def test_a_plane_wave_comes_back_from_a_side_as_its_share(tmp_path, reflect):
     x = field.centre[:, 0]
     pulse = np.exp(-(((x - 0.6) / 0.1) ** 2))
     y = np.stack([pulse, C * pulse, 0 * x])
-    end = march(lambda y: field.liquid(LAW_LINEAR, MUSCL, y, share), y, 0.08, 0.5)  # at 1.4, seen at 0.6 from the side
+    end = march(lambda y: field.liquid(LAW_LINEAR, MUSCL, y, share), y, 0.08, 0.5)  # 1.4 reflects to 0.6
     back = np.stack([reflect * pulse, -reflect * C * pulse, 0 * x])
     assert (np.abs(end - back)[0] @ field.area) < 0.03 * (pulse @ field.area)
 
 
 def test_a_log_liquid_parts_as_in_the_exact_riemann_problem(tmp_path):
-    """Two fifths of the modulus high, the fan a few cells wide: L1 falls at two thirds of an order."""
+    """At a jump of 0.4 of the modulus the fan is a few cells wide, and L1 errors fall at an order above 0.6."""
     fluid, errors = LogFluid(RHO, RHO * C**2, 0.0), []
     exact = Riemann(fluid, (40000.0, 0.0), (0.0, 0.0))
     for nx in (50, 100):
@@ -318,7 +321,7 @@ def slotted(field) -> np.ndarray:
     return ((np.hypot(x - 0.5, y - 0.3) < 0.2) & ~((np.abs(x - 0.5) < 0.05) & (y < 0.35))).astype(float)
 
 
-KEEPS = {  # scheme, how far beyond those around, bounds, greatest Courant number of Euler's steps
+KEEPS = {  # scheme, `wide` of the limiter, bounds, greatest Courant number of Euler steps
     "upwind": (UPWIND, 1.0, FREE, 1.0), "narrow": (MUSCL, 1.0, FREE, 2 / 3),
     "narrow, bounded": (MUSCL, 1.0, (0.0, 1.0), 1.0), "wide": (MUSCL, 2.0, (0.0, 1.0), 1.0),
 }  # fmt: skip
@@ -340,7 +343,7 @@ def test_a_slotted_disk_stays_between_its_bounds(tmp_path, name, quads):
 
 @pytest.mark.parametrize("wide", [1.0, 2.0])
 def test_a_step_of_euler_keeps_bounds_in_random_flows_and_depths(tmp_path, wide):
-    """Values at their bounds, flows in and out, with what they do to depths."""
+    """Values start at their bounds, with random flows through faces, which also change depths."""
     for seed in range(40):
         random, field = np.random.default_rng(seed), mixed(tmp_path) if seed % 2 else triangles(tmp_path, 9, 7)
         n = len(field.area)
@@ -370,7 +373,7 @@ def test_bounds_cost_a_smooth_value_nothing_that_shows(tmp_path, quads):
 
 
 def test_diffusion_fades_a_mode_at_second_order_and_meets_the_value_that_flows_in(tmp_path):
-    """exp(-2 pi^2 t) cos(pi x) cos(pi y) between walls; the front of Ogata and Banks (1961) behind a given value."""
+    """exp(-2 pi^2 t) cos(pi x) cos(pi y) between walls, and the front of Ogata and Banks (1961) behind an inlet."""
     errors, sizes = [], (16, 32)
     for n in sizes:
         field = triangles(tmp_path, n, n)

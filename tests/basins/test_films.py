@@ -1,4 +1,4 @@
-"""Water on rough beds at the steps of its waves: films after Manning and Darcy, backwater, lakes, notices."""
+"""Films of water on rough beds with the steps of waves: Manning's and Darcy's law, backwater, lakes, notices."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LONG, WIDE = 200.0, 6.0
 
 
 def sheet(slope, depth, u, numerics=None, friction=None, cells=(100, 3), long=LONG, end=30.0, **basin):
-    """A sheet of water on a plane that falls to an open side, and its speed and depth in the middle."""
+    """Return (result, velocity, depth in the middle) of a sheet of water on a plane that falls to an open side."""
     bed = f"{slope}*({long}-x)"
     own = {"size": [long, WIDE], "cells": list(cells), "patches": {"down": {"side": "east", "boundary": "open"}}}
     hill = {"type": "basin", "level": -1.0, "elevation": 0.0, "bed": bed, **(own | (friction or {}) | basin)}
@@ -30,7 +30,7 @@ def sheet(slope, depth, u, numerics=None, friction=None, cells=(100, 3), long=LO
 
 
 def manning(slope, n, depth):
-    """Speed of uniform flow [m/s]."""
+    """Velocity of uniform flow [m/s]."""
     return depth ** (2.0 / 3.0) * math.sqrt(slope) / n
 
 
@@ -85,7 +85,7 @@ def test_films_run_as_manning_says_on_triangles_and_down_a_diagonal(tmp_path):
 
 @pytest.mark.parametrize(("method", "order"), [("euler", 1.0), ("ssp-rk2", 2.0), ("ssp-rk3", 2.0)])
 def test_flow_comes_to_its_speed_with_the_order_of_the_method(method, order):
-    """du/dt = g S - C u^2 of even depth: u = v tanh(g S t / v)."""
+    """du/dt = g S - C u^2 at uniform depth, so u = v tanh(g S t / v)."""
     right, errors = manning(0.005, 0.03, 0.5), []
     for step in (8.0, 4.0, 2.0):
         _, u, _ = sheet(0.005, 0.5, 0.0, {"method": method, "step": step}, {"manning": 0.03}, (20, 1), 4000.0, 32.0)
@@ -94,7 +94,7 @@ def test_flow_comes_to_its_speed_with_the_order_of_the_method(method, order):
 
 
 def backwater(cells):
-    """Depths of 1 m2/s from uniform flow into a lake; what gradually varied flow has from the last of them."""
+    """Return (x, depth, depth of gradually varied flow) of 1 m2/s from uniform flow into a lake."""
     long, n, slope, wide = 2000.0, 0.03, 0.001, 20.0
     bed = f"{slope}*({long}-x)"
     river = {"type": "basin", "size": [long, wide], "cells": [cells, 1], "level": 2.0, "elevation": 0.0, "bed": bed,
@@ -119,7 +119,7 @@ def backwater(cells):
 
 
 def varied(x, depth, q, slope, n):
-    """dh/dx = (S - n^2 q^2 / h^(10/3)) / (1 - q^2 / (g h^3)), upstream from nine tenths of the way, by RK4."""
+    """Depth by dh/dx = (S - n^2 q^2 / h^(10/3)) / (1 - q^2 / (g h^3)), by RK4 upstream from 0.9 of the length."""
 
     def rise(h):
         return (slope - n * n * q * q / h ** (10.0 / 3.0)) / (1.0 - q * q / (G * h**3))
@@ -147,7 +147,7 @@ def test_backwater_is_of_second_order():
 
 
 def ended(basin, end):
-    """States of a basin at the start and at the end."""
+    """Return the states of a basin at the start and at the end."""
     model = fvsolve.build(fvsolve.load(scene({"box": basin}, {}, end, {"scheme": "muscl"})))
     start = fvsolve.initial_state(model)
     return start.y.copy(), fvsolve.advance(model, start, end).y
@@ -217,7 +217,7 @@ def slid(joint):
 
 
 def between_walls(tmp_path, kind):
-    """A film that a wall pushes together, on a rectangle or on triangles."""
+    """Return nodes with a film that a moving wall compresses, on a rectangle or on triangles."""
     if kind == "wall":
         return {"b": {**THIN, "patches": {"lid": {"side": "east", "travel": SLOWLY}}}}
     nx, ny = 20, 2

@@ -1,4 +1,4 @@
-"""Basins that ride on driven bodies: water at rest in boxes that turn, slow down or lean, sway, roll, bowls, faults."""
+"""Basins on driven bodies: water at rest in rotating, decelerated or tilted boxes, forced waves, a bowl, faults."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_a_box_that_turns_so_fast_that_its_middle_is_dry_rests_too():
     rate = 6.0
     bowl = f"{rate**2 / (2 * GRAVITY)} * ((x - 1)**2 + (y - 1)**2) - 0.6"
     flows = []
-    for n in (20, 40):  # cells at the shore are cut by a curve, and settle
+    for n in (20, 40):  # cells at the curved shore adjust
         basin = tank((n, n), at=[-1, -1, 0], start={"level": bowl})
         flows.append(np.abs(moved(turning(steady(rate)), basin, 1.0)[2][1:]).mean())
     assert flows[1] < 0.5 * flows[0] < 1e-3
@@ -86,7 +86,7 @@ def test_a_box_that_slows_down_steadily_holds_its_water_aslant_and_a_tilted_one_
 
 
 def forced(x, length, w, push, depth=0.3):
-    """V(x) of u = V cos(w t) under the force push sin(w t) in a closed box, from u = V at the start [m/s]."""
+    """V(x) [m/s] of u = V cos(w t) under the force per mass push sin(w t) in a closed box, with u = V at the start."""
     k = w / math.sqrt(GRAVITY * depth)
     a = push / w
     return -a + a * np.cos(k * x) + a * (1.0 - math.cos(k * length)) / math.sin(k * length) * np.sin(k * x)
@@ -102,7 +102,7 @@ def start_of(length, w, push, depth=0.3, along="x"):
 def test_a_box_that_swings_a_little_has_the_waves_of_the_closed_form(way):
     a, w, length, high = 1e-5, 3.0, 2.0, 1.5
     swing = {"mean": 0.0, "amplitude": a, "period": 2.0 * math.pi / w}
-    rolled = a * (GRAVITY + high * w**2)  # gravity along the box, and its bed's acceleration
+    rolled = a * (GRAVITY + high * w**2)  # gravity along the box, and acceleration of its bed
     push = {"sway": a * w**2, "surge": a * w**2, "heading": a * w**2, "roll": -rolled, "pitch": rolled}[way]
     along = "y" if way in ("surge", "roll") else "x"
     body = {
@@ -128,7 +128,7 @@ def test_a_box_that_swings_a_little_has_the_waves_of_the_closed_form(way):
     assert errors[1] < 1e-2
 
 
-# nonlinear: a bowl that stands still, seen from axes that turn ----------
+# nonlinear: a fixed bowl in rotating axes ----------
 
 
 def test_thackers_bowl_seen_from_axes_that_swing_is_the_bowl_that_stands_still():
@@ -163,7 +163,7 @@ def test_thackers_bowl_seen_from_axes_that_swing_is_the_bowl_that_stands_still()
 
 
 def test_a_tank_that_falls_freely_ends_the_run_by_name():
-    travel = {"start": 0.0, "duration": 10.0, "value": [0.0, 600.0], "exponent": 2}  # slows by 12 m/s2 going up
+    travel = {"start": 0.0, "duration": 10.0, "value": [0.0, 600.0], "exponent": 2}  # upward, slowing by 12 m/s2
     basin = tank((4, 4))
     case = scene({"body": sliding(travel, (0, 0, 1)), "b": basin}, {}, 1.0, {"scheme": "upwind"}, every=0.1)
     result = run(case)

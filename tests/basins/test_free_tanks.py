@@ -1,4 +1,4 @@
-"""Water that moves its body: frozen in heave, sway and roll on springs by closed forms, momentum, energy, restated."""
+"""Water that moves its body: heave, sway and roll on springs in closed form, momentum, energy, frozen water."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_a_tank_on_a_spring_swings_at_the_root_of_the_tangent_law(along):
     speed = 1e-5
     errors = []
     for n in (20, 40):
-        # cart at speed cos(w t): u from the forced mode, relative to it
+        # cart at speed cos(w t): u of the forced mode relative to the cart
         ratio = math.tan(0.5 * k * LENGTH)
         flow = f"{speed} * (cos({k} * {along}) + {ratio} * sin({k} * {along}) - 1)"
         basin = tank(n, along, start={"u" if along == "x" else "v": flow})
@@ -101,7 +101,7 @@ def test_a_free_tank_on_rails_keeps_its_momentum():
 
 
 def rocking(n=24, **numerics):
-    """A hull that rolls on a torsion spring with a tank across, swinging by two hundredths of a radian."""
+    """Return a case of a hull with a transverse tank that rolls on two springs."""
     hull = {
         "type": "body", "mass": 400.0, "inertia": [800.0, 800.0, 800.0], "centre_of_mass": [0, 0, -0.5],
         "points": {"right": [0, 2.0, 0], "left": [0, -2.0, 0]},
@@ -147,7 +147,7 @@ def test_what_drives_a_tank_is_what_its_water_gains_and_loses():
 
 
 def test_frozen_water_is_the_body_that_weighs_as_much():
-    """A block of water of 2 m x 1 m x 0.1 m at an angle on its cart, and the same block said as a body of its own."""
+    """Frozen water of 2 m x 1 m x 0.1 m at an angle on its body equals a body with its mass and inertia."""
     turn = {"yaw": "30 deg", "roll": "10 deg"}
     hull = {
         "type": "body", "mass": 300.0, "inertia": [30.0, 60.0, 70.0], "centre_of_mass": [0.1, 0.0, -0.2],

@@ -1,4 +1,4 @@
-"""Pressure waves of a liquid in the plane, kernels alone: modes of a box, sides, a vortex, exact Riemann problems."""
+"""Kernels of pressure waves in a liquid: modes of a box, reflecting sides, a vortex, exact Riemann problems."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ WALLS = np.zeros(0)
 
 @dataclass(frozen=True)
 class Box:
-    """A rectangle of cells; states are arrays [3, ny, nx]: deviation of density, mass-flow densities."""
+    """Rectangle of cells; states are arrays [3, ny, nx] of density deviation and two mass-flow densities."""
 
     nx: int
     ny: int
@@ -42,7 +42,7 @@ class Box:
     stretch: float = 0.0  # cell edges at s + stretch sin(2 pi s) / (2 pi) of the size
 
     def edges(self) -> tuple[np.ndarray, np.ndarray]:
-        """Edges of columns and of rows."""
+        """Edges of columns and of rows [m]."""
         x, y = (
             size * np.arange(n + 1) / n + size * self.stretch * np.sin(2 * np.pi * np.arange(n + 1) / n) / (2 * np.pi)
             for n, size in zip((self.nx, self.ny), self.size, strict=True)
@@ -50,7 +50,7 @@ class Box:
         return x, y
 
     def rates(self, state: np.ndarray, table: np.ndarray | None = None) -> tuple[np.ndarray, float]:
-        """(rates, greatest rate); work starts as NaN, so that what is read before it is written shows."""
+        """Return (rates, greatest rate); work starts as NaN, to detect values that are read before they are written."""
         kernel = liquid_log if self.log else liquid
         given = (C, RHO, table, 1e-18 * C**2) if self.log else (C, 1e-18 * (RHO * C) ** 2)
         kx, ky = (1.0 / np.diff(e) for e in self.edges())
@@ -66,7 +66,7 @@ class Box:
         return found.reshape(state.shape), rate
 
     def run(self, state: np.ndarray, end: float, courant: float = 0.8) -> np.ndarray:
-        """The state at `end` by RK4, in even steps."""
+        """State at `end` by RK4 with equal steps."""
         steps = math.ceil(end * self.rates(state)[1] / courant)
         h = end / steps
         for _ in range(steps):
@@ -104,7 +104,7 @@ def mode(box: Box, m: int, n: int, t: float):
 
 
 def order(box: Box, exact, end: float, sizes, courant: float = 0.5) -> float:
-    """Order at which exact(box, end) is met from exact(box, 0), nx and ny scaled alike, steps finer still."""
+    """Observed order against exact(box, end) from exact(box, 0), with nx and ny refined equally and smaller steps."""
     errors = []
     for n in sizes:
         finer = replace(box, nx=n, ny=box.ny * n // box.nx if box.ny > 1 else 1)
@@ -115,7 +115,7 @@ def order(box: Box, exact, end: float, sizes, courant: float = 0.5) -> float:
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_standing_modes_of_a_box_are_met_at_the_order_of_the_scheme(scheme):
-    """Periods of 0.12 and 0.08 s."""
+    """The modes have periods of 0.12 s and 0.08 s."""
     box = Box(4, 3, scheme, (1.0, 0.75))
     sizes, end, courant = ((16, 32), 0.1, 0.1) if ORDERS[scheme] == 5 else ((64, 128), 0.03, 0.5)
     for m, n in ((1, 1), (2, 1)):
@@ -125,13 +125,13 @@ def test_standing_modes_of_a_box_are_met_at_the_order_of_the_scheme(scheme):
 
 @pytest.mark.parametrize("scheme", ["muscl", "upwind5"])
 def test_on_graded_cells_every_scheme_is_second_order(scheme):
-    """Widths from half to one and a half of the mean, in both directions."""
+    """Widths of cells are 0.5 to 1.5 of the mean in both directions."""
     box = Box(4, 3, scheme, (1.0, 0.75), stretch=0.5)
     assert order(box, lambda b, t: mode(b, 1, 1, t), 0.03, (64, 128)) == approx(2, abs=0.1)
 
 
 def wave(box: Box, at: float, way: float) -> np.ndarray:
-    """A pulse at x = `at` that runs east (way 1) or west (-1)."""
+    """Pulse at x = `at` that travels east (way 1) or west (-1)."""
     return box.averages(lambda x, y: np.exp(-(((x - at) / 6) ** 2)) * np.array([1.0, way * C, 0.0])[:, None, None])
 
 
@@ -144,7 +144,7 @@ def test_a_plane_wave_is_carried_unchanged(scheme):
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_row_of_cells_is_a_pipe(scheme):
-    """Rates to round-off inside; after reflections at a reservoir and a dead end, both are as near to what is exact."""
+    """Rates are equal to rounding inside; after reflections at a reservoir and a dead end, so are errors to 2 %."""
     n, length, diameter = 200, 100.0, 0.5
     section = math.pi / 4 * diameter**2
     fluid = {"name": "user", "density": RHO, "bulk_modulus": RHO * C**2, "viscosity": 1e-3, "vapor_pressure": 100.0}
@@ -174,7 +174,7 @@ def test_a_row_of_cells_is_a_pipe(scheme):
 @pytest.mark.parametrize("log", [False, True], ids=["linear", "log"])
 @pytest.mark.parametrize("share", [1.0, 0.6, 0.0, -0.35, -1.0])
 def test_a_side_sends_back_the_stated_share_of_a_wave(share, log):
-    """A pulse leaves through the eastern side: what is left is `share` of it, running west; nothing else at all."""
+    """A pulse arrives at the eastern side; `share` of it returns westwards, and nothing else remains."""
     box = Box(200, 1, "upwind5", (100.0, 1.0), log=log, reflect=np.array([1.0, share] + [1.0] * 400))
     small = 1e-6 if log else 1.0
     found = box.run(small * wave(box, 60.0, 1.0), 8.0) / small
@@ -182,18 +182,18 @@ def test_a_side_sends_back_the_stated_share_of_a_wave(share, log):
 
 
 def noise(box: Box, size: float = 1.0) -> np.ndarray:
-    """Cells that have nothing to do with each other, density and speeds up to `size` of their scales."""
+    """Random independent values in all cells, up to `size` of the scales of density and mass flow."""
     numbers = np.random.default_rng(7).uniform(-size, size, (3, box.ny, box.nx))
     return numbers * (RHO * np.array([1.0, C, C])[:, None, None])
 
 
 def share(rng) -> float:
-    """A wall, an open side, a given pressure or what lies between them."""
+    """Random reflection factor: of a wall, an open side, a given pressure, or between them."""
     return rng.uniform(-1.0, 1.0) if rng.random() < 0.5 else float(rng.integers(-1, 2))
 
 
 def shares(box: Box, seed: int = 3) -> np.ndarray:
-    """Of every side another share; in the eastern one a patch that has its own."""
+    """Random reflection factors, another one for each side and for a patch in the eastern side."""
     rng = np.random.default_rng(seed)
     counts = (box.ny, box.ny, box.nx, box.nx)
     found = np.repeat([share(rng) for _ in counts], counts)
@@ -203,7 +203,7 @@ def shares(box: Box, seed: int = 3) -> np.ndarray:
 
 
 def holed(box: Box, seed: int) -> np.ndarray:
-    """Walls with a patch anywhere."""
+    """Reflection factors of walls with a patch at a random place."""
     rng = np.random.default_rng(seed)
     found = np.ones(2 * (box.nx + box.ny))
     first, last = sorted(rng.integers(0, found.size + 1, 2))
@@ -213,7 +213,7 @@ def holed(box: Box, seed: int) -> np.ndarray:
 
 @pytest.mark.parametrize("scheme", ["upwind", "upwind5"])
 def test_no_mode_grows_whatever_the_sides_send_back(scheme):
-    """Greatest real part of the eigenvalues of a linear scheme, per cell time."""
+    """Eigenvalues of linear schemes have no positive real part, to 1e-12 per travel time of a cell."""
     worst = []
     for nx, ny in ((5, 5), (8, 6), (6, 11)) if scheme == "upwind5" else ((1, 1), (1, 4), (3, 2), (8, 6)):
         box = Box(nx, ny, scheme, (nx, ny))
@@ -240,7 +240,7 @@ def test_noise_between_any_sides_dies_away(scheme, log):
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_round_pulse_stays_round(scheme):
-    """Against Hankel's integral; the errors along axes and along diagonals part at the order of the scheme."""
+    """Errors against Hankel's integral, and their difference between axes and diagonals, fall at the order."""
 
     def height(r, t):
         return quad_vec(lambda k: k / 2 * np.exp(-k * k / 4) * np.cos(C * k * t) * j0(k * r), 0.0, 16.0, epsrel=1e-12)[
@@ -317,7 +317,7 @@ def test_few_cells_between_walls_are_a_corner_of_their_mirror_images(nx, ny, log
 
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5"])
 def test_the_log_law_is_the_linear_one_for_small_waves(scheme):
-    """Their difference is of second order in the size of the waves."""
+    """The difference of the laws is of second order in the size of the waves."""
     box = Box(12, 9, scheme, (12, 9))
     apart = []
     for size in (1e-4, 1e-5):
@@ -332,7 +332,7 @@ def test_the_logarithm_is_exact_to_round_off():
 
 
 def vortex(box: Box, t: float, speed: float = 3.0, drift=(2.0, 1.0)) -> np.ndarray:
-    """Gaussian vortex carried along: 1 / rho falls by speed^2 exp(1 - r^2) / (2 K), so that dp/dr = rho u^2 / r."""
+    """Gaussian vortex in a stream: 1 / rho rises by speed^2 exp(1 - r^2) / (2 K), so that dp/dr = rho u^2 / r."""
     x0, y0 = (size / 2 + d * t for size, d in zip(box.size, drift, strict=True))
 
     def field_at(x, y):
@@ -346,14 +346,14 @@ def vortex(box: Box, t: float, speed: float = 3.0, drift=(2.0, 1.0)) -> np.ndarr
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_vortex_is_carried_unchanged(scheme):
-    """Mach number 0.3: averages of products are not products of averages, and fifth order ends at two."""
+    """At Mach number 0.3 averages of products are not products of averages, so fifth order falls to second."""
     found = order(Box(4, 4, scheme, (10.0, 10.0), log=True, reflect=-1.0), vortex, 0.2, (96, 192))
     assert found == approx(min(ORDERS[scheme], 2), abs=0.15)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_what_the_flow_carries_along_keeps_the_order_of_the_scheme(scheme):
-    """A velocity along the faces, in a stream that enters and leaves at given pressure."""
+    """Tangential velocity in a stream that enters and leaves at given pressure."""
 
     def exact(box, t):
         return box.averages(lambda x, y: (0 * x, RHO * 2.0 + 0 * x, RHO * np.exp(-(((x - 40.0 - 2.0 * t) / 6) ** 2))))
@@ -377,7 +377,7 @@ STATES = {
 @pytest.mark.parametrize("scheme", ["muscl", "weno5"])
 @pytest.mark.parametrize("name", STATES)
 def test_exact_riemann_problems_of_the_log_law(name, scheme):
-    """Error of density and flow in L1, which falls as shocks and corners allow."""
+    """L1 errors of density and flow fall at the order that shocks and kinks permit."""
     left, right = STATES[name]
     exact, errors, end = Riemann(FLUID, left, right), [], 1.8
 
@@ -398,7 +398,7 @@ def test_exact_riemann_problems_of_the_log_law(name, scheme):
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_stream_is_stopped_by_a_wall_at_the_exact_pressure(scheme):
-    """A third of the speed of sound, so that the pressure is 8 % above Joukowsky's."""
+    """At 0.3 of the speed of sound the pressure is 8 % above Joukowsky's."""
     box, u = Box(200, 1, scheme, (100.0, 1.0), log=True), 3.0
     start = np.zeros((3, 1, 200))
     start[1] = RHO * u
@@ -409,7 +409,7 @@ def test_a_stream_is_stopped_by_a_wall_at_the_exact_pressure(scheme):
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("size", [0.05, 0.5])
 def test_a_simple_wave_steepens_as_the_exact_one(size, scheme):
-    """At Mach number 0.005 the order is still that of the waves; at 0.05 products hold the fifth order down to two."""
+    """At Mach number 0.005 the order is that of linear waves; at 0.05 products reduce fifth order to second."""
 
     def velocity(x):
         return size * np.exp(-(((x - 30) / 5) ** 2))

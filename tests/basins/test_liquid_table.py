@@ -1,4 +1,4 @@
-"""Liquids in the plane under law `table`: against CoolProp's own isentrope, pipes under the same law, and law `log`."""
+"""Liquid basins under the law `table`: against CoolProp's isentrope, pipes under this law, and the law `log`."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def basin(**more) -> dict:
 
 
 def model_of(pool: dict, end: float = 1.0, **more):
-    """A basin alone; `more` are numerics."""
+    """Return the model of a single basin; `more` are numerics."""
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5} | more
     return fvsolve.build(fvsolve.load(scene({"pool": pool}, {}, end, numerics, (), end / 10, fluid=FLUID)))
 
@@ -55,7 +55,7 @@ STATES = {
 @pytest.mark.parametrize("scheme", ["muscl", "weno5"])
 @pytest.mark.parametrize("name", STATES)
 def test_exact_riemann_problems_of_the_isentrope(name, scheme):
-    """Errors of density and flow in L1 fall as shocks and corners allow; under law `log` 0.2 to 3 % stay."""
+    """L1 errors of density and flow fall as shocks and kinks permit; under the law `log` 0.2 % to 3 % remain."""
     left, right = STATES[name]
     exact, errors, end = Riemann(TRUTH, left, right), [], 0.03
     start = {"pressure": f"where(x < 50, {left[0] - REST}, {right[0] - REST})",
@@ -74,7 +74,7 @@ PULSE = "exp(-((x - 40)/6)^2)"
 
 
 def pipe_of(n: int, start: np.ndarray, end: float) -> np.ndarray:
-    """What a pipe of 100 m makes of density over that at rest and mass flow density : float64[2, n]."""
+    """Density minus that at rest, and mass flow density, at `end` in a pipe of 100 m : float64[2, n]."""
     nodes, numerics = {"left": reservoir(REST), "right": junction()}, {"scheme": "muscl", "method": "ssp-rk3"}
     links = {"main": stiff_pipe("left", "right", 100.0, 0.5, n, friction=NO_FRICTION)}
     model = fvsolve.build(fvsolve.load(scene(nodes, links, end, numerics | {"courant": 0.5}, (), end, fluid=FLUID)))
@@ -86,7 +86,7 @@ def pipe_of(n: int, start: np.ndarray, end: float) -> np.ndarray:
 
 
 def test_a_wave_in_a_row_of_cells_is_that_of_a_pipe_under_the_same_law():
-    """A pulse of 40 bar that parts and steepens: their difference is of the order of the schemes."""
+    """For a pulse of 40 bar that divides and steepens, the difference falls at the order of the schemes."""
     apart, end = [], 0.04
     for n in (200, 400):
         pool = basin(size=[100.0, 1.0], cells=[n, 1], start={"pressure": f"4e6*{PULSE}", "u": f"3*{PULSE}"})
@@ -94,14 +94,14 @@ def test_a_wave_in_a_row_of_cells_is_that_of_a_pipe_under_the_same_law():
         start = model.basins[0].deviations(model.start)[:2]
         found = ended(model, end) - [[model.basins[0].density], [0.0]]
         other = pipe_of(n, start, end)
-        assert np.abs(found - start).max(axis=1) == approx([16.0, 6400.0], rel=0.5)  # it has gone its way
+        assert np.abs(found - start).max(axis=1) == approx([16.0, 6400.0], rel=0.5)  # the pulse has moved
         apart.append(np.abs(found - other).mean(axis=1) / np.abs(found).mean(axis=1))
     assert (np.log2(apart[0] / apart[1]) > 1.8).all() and (apart[1] < 2e-3).all()
 
 
 @pytest.mark.parametrize("wave_speed", [None, 400.0])
 def test_pressures_are_those_of_the_fluids_own_table(wave_speed):
-    """As pipes have them, walls that swell too; with stiff walls CoolProp's. The kernels' table is as good as exact."""
+    """Pressures equal those of pipes, also with elastic walls, and those of CoolProp with rigid walls."""
     model = model_of(basin(wave_speed=wave_speed) if wave_speed else basin())
     st, floats, pool = model.tables.settings[0], model.tables.floats, model.basins[0]
     compliance = 1 / (pool.density * pool.speed**2) - law.log_density(st, floats, REST)[1]
@@ -110,7 +110,7 @@ def test_pressures_are_those_of_the_fluids_own_table(wave_speed):
     assert pool.pressure(deviations) + REST == approx(pressures, rel=1e-12, abs=1e-3)
     table = model.tables.plane[pool.row["table"] :]
     for p, r in zip(pressures, deviations, strict=True):
-        held = np.log1p(r / pool.density)  # over that at rest, which is the fluid's reference
+        held = np.log1p(r / pool.density)  # over the density at rest, the reference
         assert law.pressure_of_log(st, floats, compliance, held) == approx(p, rel=1e-9, abs=1.0)
         found, square = riemann_invariants.pressure(table, pool.density, r)
         assert found + REST == approx(p, rel=1e-7, abs=1.0)
@@ -120,7 +120,7 @@ def test_pressures_are_those_of_the_fluids_own_table(wave_speed):
 
 
 def of_log(rest: float, rho: float = RHO, c: float = C) -> np.ndarray:
-    """The table of a fluid whose density is that of law `log`, rho and c at rest."""
+    """Return the table of a fluid with the density of the law `log`, with rho and c at rest."""
     bulk = rho * c**2
     p = rest + bulk * np.linspace(-0.5, 0.5, 33)
     table = FluidTable(p, np.log(rho) + (p - rest) / bulk, np.full(p.size, 1.0 / bulk), 0.0)
@@ -131,7 +131,7 @@ def of_log(rest: float, rho: float = RHO, c: float = C) -> np.ndarray:
 @pytest.mark.parametrize("reflect", [1.0, 0.3, -1.0])
 def test_a_table_of_the_log_law_is_the_log_law(scheme, reflect):
     box = Box(12, 9, scheme, (12, 9), log=True, reflect=reflect)
-    state = noise(box, 0.02)  # which fifth order makes ten times as much of beyond a side
+    state = noise(box, 0.02)  # fifth order amplifies it tenfold beyond a side
     (exact, rate), (found, same) = box.rates(state), box.rates(state, of_log(1e5))
     assert np.abs(found - exact).max(axis=(1, 2)) == approx(0.0, abs=1e-9 * np.abs(exact).max())
     assert same == approx(rate, rel=1e-7)
@@ -158,7 +158,7 @@ def test_at_rest_nothing_moves_and_a_mirror_image_has_the_same_bits():
 
 @pytest.mark.parametrize("path", ["grid", "faces", "triangles"])
 def test_a_basin_is_relieved_into_the_network_and_all_of_it_is_booked(path, tmp_path):
-    """What leaves is Torricelli's flow at the density and pressure of the patch."""
+    """Outflow is Torricelli's at the density and pressure of the patch, and the mass balance closes."""
     pool = basin(patches={"out": {"side": "east", "span": [1.0, 2.0]}})
     if path == "triangles":
         points, cells = triangles((4.0, 2.0), 0.25)
@@ -226,7 +226,7 @@ def test_implicit_steps_agree_with_explicit_ones(holes):
 
 @pytest.mark.parametrize("wave_speed", [30.0, 120.0, 1000.0])
 def test_walls_that_give_much_leave_pressure_what_it_is(wave_speed):
-    """A slope of pressure pushes as it does between stiff walls, and comes back from the state it makes."""
+    """A slope of pressure accelerates the fluid as between rigid walls, and the state returns the given pressure."""
     pool = {
         "type": "basin", "physics": "liquid", "size": [1.0, 0.2], "cells": [10, 2], "pressure": 3e5, "thickness": 0.1,
         "wave_speed": wave_speed, "start": {"pressure": "1000 * (x - 0.5)"},

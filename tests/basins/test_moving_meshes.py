@@ -1,4 +1,4 @@
-"""Walls that move on meshes of any cells: geometry as it is now, what is conserved, closed forms, restatements."""
+"""Moving walls on meshes: geometry of moved corners, conservation, closed forms, and equivalent cases."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def straight(speed, end=10.0):
 
 
 def tub(tmp_path, kind="mixed", many=(12, 4), size=(2.0, 1.0), turned=False, seed=5, reach=0.25):
-    """The name of a file of a shaken grid of cells, triangles, quads or both, whose sides are groups of lines."""
+    """Return the name of a mesh file of distorted triangles, quads or both, whose sides are groups of lines."""
     mesh = rectangle(size, many)
     points = mesh.points.copy()
     inside = (points > points.min(0) + 1e-9).all(1) & (points < points.max(0) - 1e-9).all(1)
@@ -55,13 +55,13 @@ def pool(file, patches, physics="free-surface", **more):
 
 
 def moved(case, until):
-    """(model, state) at a time."""
+    """Return (model, state) at a time."""
     model = build(load(case))
     return model, advance(model, State(case["numerics"].get("start", 0.0), model.start.copy()), until)
 
 
 def as_it_is(mesh, points):
-    """The mesh with its corners elsewhere."""
+    """Return the mesh with its corners at `points`."""
     edges = edges_of(mesh.cells, len(points))
     patch = -1 - mesh.right[mesh.inner :]
     place = {key: k for k, key in enumerate(map(frozenset, mesh.ends[mesh.inner :].tolist()))}
@@ -106,7 +106,7 @@ def test_homologous_expansion_is_exact_to_round_off_under_every_method(tmp_path,
         model, state = moved(case, 0.5)
         basin = model.basins[0]
         found, grown = basin.deviations(state.y), 1.0 + 0.5 * rate
-        # Rosenbrock methods step by differences for a Jacobian; the iteration for two stages ends short of round-off
+        # Jacobians by differences limit Rosenbrock methods, iterations limit methods of two stages
         close = {"rodas-4": 1e-10, "gauss-4": 2e-12}.get(method, 1e-13)
         assert 1.0 + found[0] == pytest.approx(1.0 / grown, abs=close)
         assert found[1 + axis] / (1.0 + found[0]) == pytest.approx(rate * basin.mesh.centre[:, axis], abs=close)
@@ -139,7 +139,7 @@ def test_where_no_wave_has_come_yet_lines_that_swing_leave_a_lake_as_it_is(tmp_p
     patches = {"west": {"travel": swings}, "east": {"travel": straight(-0.3)}}
     case = scene({"b": pool(tub(tmp_path, many=(30, 2)), patches)}, {}, 1.0,
                  {"scheme": "upwind", "method": method, "step": 2e-3})  # fmt: skip
-    model, state = moved(case, 6e-3)  # three steps of four stages at most, each of which looks one cell further
+    model, state = moved(case, 6e-3)  # at most three steps of four stages, each one cell further
     basin = model.basins[0]
     far = np.abs(basin.mesh.centre[:, 0] - 1.0) < 0.1
     assert np.abs(basin.area_ratios(state.y)[far] - 1.0).min() > 1e-5
@@ -159,7 +159,7 @@ def test_a_wall_that_is_pushed_in_sends_out_the_exact_shock_and_does_its_work(tm
     depth = brentq(lambda h: (h - 1.0) * math.sqrt(0.5 * GRAVITY * (h + 1.0) / h) - speed, 1.0, 3.0)
     force = 0.5 * RHO * GRAVITY * depth**2 * 0.2
     result = run(case)
-    close = 3e-3 if scheme == "upwind" else 5e-4  # a wall that starts at once leaves some of its start behind
+    close = 3e-3 if scheme == "upwind" else 5e-4  # error of the sudden start of the wall
     assert result[f"b.{side}.force"][-1] == pytest.approx(force, rel=close)
     assert result[f"b.{side}.power"][-1] == pytest.approx(result[f"b.{side}.force"][-1] * speed, rel=1e-15)
     assert result[f"b.{side}.travel"][-1] == pytest.approx(sign * speed * 0.3, rel=1e-13)
@@ -188,7 +188,7 @@ def test_walls_of_a_file_that_cannot_move_are_refused_by_name(tmp_path):
         for more in ({"zone": 1.0}, {}):
             nodes = {"b": pool(files[name], {patch: {"travel": straight(0.01), **more}})}
             case = scene(nodes, {}, 1.0, {**STEPPED, "step": 0.01})
-            if more and patch in ("inlet", "west"):  # whose zone ends before what leans
+            if more and patch in ("inlet", "west"):  # the zone ends before the inclined outline
                 load(case)
                 continue
             with pytest.raises(CaseError, match=rf"nodes.b.patches.{patch}: {text}"):
@@ -234,7 +234,7 @@ def fluid(law):
 
 
 def column(law, patches, cells=12, side="east", file=None, length=2.0, wide=0.05, **more):
-    """A column of liquid along the way of the wall on a side: a rectangle, or a mesh of triangles."""
+    """Return a basin of liquid in the direction of the wall on a side: a rectangle, or triangles with `file`."""
     along = side in ("west", "east")
     shape = {"size": [length, wide] if along else [wide, length], "cells": [cells, 1] if along else [1, cells]}
     if file is not None:
@@ -247,7 +247,7 @@ def column(law, patches, cells=12, side="east", file=None, length=2.0, wide=0.05
 
 
 def law_of(basin, law, ratio):
-    """Pressure above that at rest where the density is so many times that at rest [Pa]."""
+    """Pressure above that at rest [Pa] where the density is `ratio` times that at rest."""
     if law == "table":
         return float(basin.pressure(np.array([basin.density * (ratio - 1.0)]))[0])
     return basin.density * basin.speed**2 * (ratio - 1.0 if law == "linear" else math.log(ratio))
@@ -288,7 +288,7 @@ def test_a_piston_that_starts_at_once_makes_a_water_hammer(tmp_path, law, side, 
                      [f"b.{side}.force", f"b.{side}.power"], every=1e-4, fluid=fluid(law))  # fmt: skip
         result, basin = run(case), build(load(case)).basins[0]
         rho, c = basin.density, basin.speed
-        wanted = rho * c * speed / (1.0 - speed / c)  # m = c r meets m = speed (rho + r)
+        wanted = rho * c * speed / (1.0 - speed / c)  # m = c r = speed (rho + r)
         if law == "log":  # a simple wave: c falls by half the speed
             wanted = -2.0 * rho * c * c * math.log1p(-0.5 * speed / c)
         assert wanted == pytest.approx(rho * c * speed, rel=1e-3)  # Joukowsky
@@ -346,7 +346,7 @@ def test_a_mass_on_a_spring_beside_a_column_of_liquid_swings_at_the_root_of_the_
 @pytest.mark.parametrize("law", ["log", "linear"])
 @pytest.mark.parametrize("method", ["ssp-rk3", "rodas-4"])
 def test_a_box_and_a_chamber_of_one_length_that_one_mass_compresses_have_one_pressure(law, method):
-    """A heavy mass, slow beside the waves of the box; of the chamber as of the box A dx is swept."""
+    """A heavy mass, slow compared with the waves of the box, sweeps A dx in the box and in the chamber."""
     nodes = {"b": column(law, {"west": {"body": "lid"}}, 4), "lid": {"type": "mass", "mass": 4e5,
              "initial_velocity": 0.05}, "ground": {"type": "frame"}}  # fmt: skip
     links = {"cyl": {"type": "cylinder", "ports": {"rod": "lid", "case": "ground"}, "stroke": 0.4, "area_A": 5e-3,
@@ -358,7 +358,7 @@ def test_a_box_and_a_chamber_of_one_length_that_one_mass_compresses_have_one_pre
     result = run(case)
     box = result["b.west.force"] / 5e-3 + AMBIENT
     assert result["cyl.B.pressure"].max() > 2e6
-    # what is left is the inertia of the liquid, rho a L / 3, and waves of the start, rho c v
+    # differences by inertia of the liquid, rho a L / 3, and by waves of the start, rho c v
     assert np.abs(box - result["cyl.B.pressure"])[1:].max() < 1.2 * RHO * 1483.0 * 0.05
     assert np.mean(box - result["cyl.B.pressure"]) == pytest.approx(0.0, abs=0.02 * box.max())
 
@@ -380,7 +380,7 @@ def test_momentum_changes_by_the_forces_of_both_walls_alone(tmp_path, law, schem
     west, east = out[int(model.layout["wall"]) :][:2]
     rate = np.sum(basin.mesh.area * basin.states_of(dydt)[1]) * (RHO if water else basin.part.thickness)
     swept = 0.0
-    if law == "linear":  # whose momentum does not ride along: w m is left behind, m = w (rho + r)
+    if law == "linear":  # momentum does not move with the grid: w m stays behind, m = w (rho + r)
         for wall, force, speed in (("west", west, 0.7), ("east", east, -1.1)):
             length = basin.mesh.length[basin.mesh.patch(wall)].sum() * basin.part.thickness
             dense = force / length / basin.speed**2
@@ -399,13 +399,13 @@ def test_a_liquid_that_is_turned_or_seen_from_behind_says_the_same(law, method):
         nodes = {"b": column(law, {side: {"travel": travel, "zone": 0.7}}, 24, side=side)}
         scheme = (
             "upwind" if method == "rodas-4" else "muscl"
-        )  # a Jacobian by differences leans one way where limiters bend
+        )  # a Jacobian by differences is one-sided at kinks of limiters
         case = scene(nodes, {}, 3e-3, {"scheme": scheme, "method": method, "step": 2.5e-5},
                      [f"b.{side}.force", f"b.{side}.power"], every=3e-4, fluid=fluid(law))  # fmt: skip
         result = run(case)
         found.append(np.column_stack([result[f"b.{side}.force"], result[f"b.{side}.power"]]))
     for other in found[1:]:
-        close = 1e-9 if method == "ssp-rk3" else 1e-8  # where iterations and differences for a Jacobian end
+        close = 1e-9 if method == "ssp-rk3" else 1e-8  # accuracy of iterations and difference quotients
         assert other == pytest.approx(found[0], rel=close, abs=close * np.abs(found[0]).max())
 
 
@@ -428,7 +428,7 @@ def test_a_grid_and_a_mesh_of_the_same_rectangles_find_the_same_rates(tmp_path, 
         y[[int(row["y"]) for row in model.tables.walls]] = 0.1, -0.05
         x, z = basin.mesh.centre.T
         deviation = np.array([0.4 * np.cos(5 * x) * np.cos(4 * z), 2e3 * np.sin(3 * x + z), 1e3 * np.cos(4 * x * z)])
-        if law == "linear":  # what is along faces is a mean on grids and from behind the face on meshes
+        if law == "linear":  # tangential flow at faces: a mean on grids, upwind on meshes
             deviation[2 if one == "west" else 1] = 0.0
         basin.states_of(y)[:] = basin.area_ratios(y) * deviation
         basin.states_of(y)[0] += basin.density * (basin.area_ratios(y) - 1.0)
@@ -470,7 +470,7 @@ def test_the_ledger_of_energy_has_the_work_of_the_wall_and_its_step_part_falls_w
 
 @pytest.mark.parametrize("side", ["east", "south"])
 def test_what_law_linear_loses_beside_a_wall_stands_by_its_name_and_a_height_lifts_nothing(side):
-    """Even compression: p = c^2 r does work, and w (c^2 r^2 - m^2) / (2 rho) is lost, m = w (rho + r)."""
+    """Uniform compression: p = c^2 r does work, and w (c^2 r^2 - m^2) / (2 rho) is lost, with m = w (rho + r)."""
     travel, lost = smooth_ramp(0.0, 1.0, 0.0, -0.2 if side == "east" else 0.2, 401), []
     times = np.linspace(0.0, 1.0, 2001)
     x = 2.0 - 0.2 * np.array([smooth_step(t, 0.0, 1.0) for t in times])
@@ -481,7 +481,7 @@ def test_what_law_linear_loses_beside_a_wall_stands_by_its_name_and_a_height_lif
         pond = column("linear", {side: {"travel": travel}}, side=side, wave_speed=50.0, elevation=height)
         numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5}
         found = energy(scene({"b": pond}, {}, 1.0, numerics, every=0.1))
-        assert found.supplied[f"b.{side}"][-1] == pytest.approx(work, rel=1e-3)  # but for its waves
+        assert found.supplied[f"b.{side}"][-1] == pytest.approx(work, rel=1e-3)  # except for waves
         assert found.law[f"b.{side}"][-1] == pytest.approx(beside, rel=6e-3)
         assert sum(found.scheme.values())[-1] < 0.02 * abs(found.law[f"b.{side}"][-1])
         lost.append([found.stored["b"][-1], found.law[f"b.{side}"][-1]])

@@ -1,4 +1,4 @@
-"""Walls of basins that move: closed forms, geometric conservation, force and power, bodies, limits, restatements."""
+"""Moving walls of basins: closed forms, geometric conservation, force and power, bodies, limits, equivalent cases."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ STEPPED = {"scheme": "muscl", "limiter": "minmod", "method": "ssp-rk2"}
 
 
 def flume(patches, cells=50, wide=2, length=2.0, side="east", level=1.0, physics="free-surface", **more):
-    """A basin 2 m long along the way in which the wall on a side moves, 1 m wide."""
+    """Return a basin 2 m long in the direction of the wall on a side, and 1 m wide."""
     along = side in SIDES[:2]
     size, many = ([length, 1.0], [cells, wide]) if along else ([1.0, length], [wide, cells])
     return {
@@ -33,7 +33,7 @@ def flume(patches, cells=50, wide=2, length=2.0, side="east", level=1.0, physics
 
 
 def moved(case, until):
-    """(model, state) at a time."""
+    """Return (model, state) at a time."""
     model = build(load(case))
     return model, advance(model, State(case["numerics"].get("start", 0.0), model.start.copy()), until)
 
@@ -55,7 +55,7 @@ def test_homologous_expansion_is_exact_to_round_off_under_every_method(method, s
     model, state = moved(scene(nodes, {}, 1.0, {**STEPPED, "method": method, "step": 5e-3}), 1.0)
     basin = model.basins[0]
     found, x = basin.deviations(state.y), (basin.mesh.centre[:, 0 if side == "east" else 1]) * (1.0 + rate)
-    close = 1e-10 if method == "rodas-4" else 1e-13  # Rosenbrock methods step by differences for a Jacobian
+    close = 1e-10 if method == "rodas-4" else 1e-13  # Rosenbrock methods have a Jacobian by differences
     assert 1.0 + found[0] == pytest.approx(1.0 / (1.0 + rate), abs=close)
     flow = found[1 if side == "east" else 2] / (1.0 + found[0])
     assert flow == pytest.approx(rate * x / (1.0 + rate), abs=close)
@@ -72,7 +72,7 @@ def test_a_wall_that_is_pushed_in_sends_out_the_exact_shock_and_does_its_work(si
     depth = brentq(lambda h: (h - 1.0) * math.sqrt(0.5 * GRAVITY * (h + 1.0) / h) - speed, 1.0, 3.0)
     force = 0.5 * RHO * GRAVITY * depth**2
     result = run(case)
-    close = 1e-3 if scheme == "upwind" else 1e-4  # a wall that starts at once leaves some of its start behind
+    close = 1e-3 if scheme == "upwind" else 1e-4  # error of the sudden start of the wall
     assert result["b.lid.force"][-1] == pytest.approx(force, rel=close)
     assert result["b.lid.power"][-1] == pytest.approx(force * speed, rel=close)
     assert result["b.lid.travel"][-1] == pytest.approx(sign * speed * 0.3, rel=1e-13)
@@ -116,7 +116,7 @@ def test_a_free_piston_on_a_spring_swings_at_the_root_of_the_cotangent_law(metho
     assert errors[1] < 4e-3
 
 
-# what is carried, and what rides ----------
+# scalars, and walls on masses ----------
 
 
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
@@ -150,7 +150,7 @@ def test_what_is_even_stays_even_and_amounts_and_mass_are_kept_between_walls_tha
 @pytest.mark.parametrize("scheme", ["upwind5", "weno5"])
 @pytest.mark.parametrize("method", ["ssp-rk3", "radau-iia-3"])
 def test_no_water_flows_through_the_walls_of_a_basin_of_one_or_two_cells_across(cells, scheme, method):
-    """Ghost cells of so few cells are no exact mirror images."""
+    """Ghost cells of one or two cells are not exact mirror images."""
     start = {"level": "1 + 0.1 * cos(3 * x) * cos(2 * y)", "u": "0.2 * x", "v": "0.1 * y"}
     nodes = {"b": flume({}, *cells, start=start, scalars={"even": 3.0})}
     case = scene(nodes, {}, 0.1, {"scheme": scheme, "method": method, "step": 0.01}, scalars={"even": {"initial": 3.0}})
@@ -205,7 +205,7 @@ def test_a_light_wall_limits_the_step_where_lambda_dt_says_and_not_before(mass):
     rate = RHO * math.sqrt(GRAVITY) / mass  # rho c h W / M
     push = {"mass": mass, "type": "mass", "initial_velocity": 1e-6}
     ends = {}
-    for factor in (2.45, 2.58):  # of ssp-rk3 2.513
+    for factor in (2.45, 2.58):  # the limit of ssp-rk3 is 2.513
         case = mass_and_spring(
             {"lid": {"side": "east", "body": "lid"}}, push, 1.0, 0.5 * RHO * GRAVITY, n=4,
             numerics={"courant": None, "step": factor / rate, "limiter": "minmod"}, end=400 * factor / rate,
@@ -234,7 +234,7 @@ def test_a_wall_that_uses_up_its_zone_ends_the_run_by_name():
     assert "the wall has no space left at b.lid" in result.reason and "end-stop" in result.reason
 
 
-# a link on a side along which lines move ----------
+# a link at a side along which grid lines move ----------
 
 
 def test_a_tank_that_joins_a_patch_on_a_side_that_stretches_follows_the_depth_and_nothing_is_lost():
@@ -250,7 +250,7 @@ def test_a_tank_that_joins_a_patch_on_a_side_that_stretches_follows_the_depth_an
     assert abs(result.ledger["mass"]["remainder"]) < 1e-9 * 2500.0
 
 
-# restated ----------
+# equivalent cases ----------
 
 
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5", "weno5"])
@@ -277,7 +277,7 @@ def test_a_mass_that_moves_as_a_travel_does_drives_the_water_alike():
     one = run(scene({"b": wall}, {}, 0.5, numerics, ["b.lid.force"], every=0.05))
     two = run(scene({"b": other, "lid": heavy, "ground": {"type": "frame"}}, links, 0.5, numerics, ["b.lid.force"],
                     every=0.05))  # fmt: skip
-    assert two["b.lid.force"][1:] == pytest.approx(one["b.lid.force"][1:], rel=1e-9)  # before, the travel stands
+    assert two["b.lid.force"][1:] == pytest.approx(one["b.lid.force"][1:], rel=1e-9)  # the travel starts at rest
 
 
 # order, energy ----------
@@ -285,7 +285,7 @@ def test_a_mass_that_moves_as_a_travel_does_drives_the_water_alike():
 
 @pytest.mark.parametrize(("scheme", "order"), [("upwind", 1.0), ("muscl", 2.0), ("upwind5", 2.0)])
 def test_waves_of_a_small_swing_come_out_to_the_order_of_the_scheme(scheme, order):
-    """a sin(w t) at the wall: u = a w cos(w t) sin(k x) / sin(k L), from its own start."""
+    """For the travel a sin(w t), u = a w cos(w t) sin(k x) / sin(k L), which is also the start."""
     a, w, length = 1e-5, 2.0, 2.0
     k = w / math.sqrt(GRAVITY)
     errors = []
@@ -326,7 +326,7 @@ def test_the_ledger_of_energy_has_the_work_of_the_wall_and_its_step_part_falls_w
 @pytest.mark.parametrize("side", SIDES)
 @pytest.mark.parametrize("toward", [1.0, -1.0])
 def test_a_body_on_a_prismatic_joint_takes_a_wall_along_as_a_mass_does(side, toward):
-    """The same piston on a spring, once a mass on its axis and once a body that slides either way along it."""
+    """A piston on a spring has equal results as a mass on the axis and as a body that slides either way along it."""
     axis = [0.0, 0.0, 0.0]
     axis[0 if side in ("west", "east") else 1] = toward
     out = 1.0 if side in ("east", "north") else -1.0
@@ -362,5 +362,5 @@ def test_a_driven_body_takes_a_wall_along_as_its_travel_would():
     for probe in probes:
         assert np.array_equal(found[probe], one[probe])
     w = 2.0 * math.pi / 1.5
-    asked = 5.0 * -0.1 * w * w * np.sin(w * found.t) + found["b.lid.force"]  # m a, and what the water presses back
+    asked = 5.0 * -0.1 * w * w * np.sin(w * found.t) + found["b.lid.force"]  # m a, and the force of the water
     assert np.abs(found["board.joint_fx"]) == pytest.approx(np.abs(asked), rel=1e-6, abs=1.0)

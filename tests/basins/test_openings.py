@@ -1,4 +1,4 @@
-"""What passes open sides and given velocities of basins is booked to the patch that it passes."""
+"""Balances of basins: flow through open sides and by given velocities is booked at the patch that it passes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SPEED = math.sqrt(2.2e9 / RHO)
 
 
 def pool(path: str, folder, patches: dict, **more) -> dict:
-    """A basin of 4 m x 2 m."""
+    """Return a basin of 4 m x 2 m."""
     if path != "triangles":
         shape = {"graded": {"grading": [2.0, 1.5]}, "holes": {"holes": [[1.0, 0.5, 1.5, 1.0]]}}.get(path, {})
         return {"type": "basin", "size": list(SIZE), "cells": [32, 16], "patches": patches, **shape, **more}
@@ -59,7 +59,7 @@ def schemes(path: str) -> list[str]:
 @pytest.mark.parametrize("law", ["water", "linear", "log", "table"])
 @pytest.mark.parametrize(("path", "scheme"), [(path, scheme) for path in PATHS for scheme in schemes(path)])
 def test_what_cells_beside_an_open_side_gain_is_booked_to_it(path, scheme, law, tmp_path):
-    """Noise around the middle of one side at a time passes that side alone; noise everywhere passes all."""
+    """Noise near the middle of a side is booked at this side alone; noise everywhere, at all sides."""
     patches = OPEN if law == "water" else IMPEDANCE
     basin = pool(path, tmp_path, patches, **physics(law))
     model = fvsolve.build(fvsolve.load(case(basin, 1.0, scheme, fluid=fluid(law))))
@@ -84,7 +84,7 @@ def test_what_cells_beside_an_open_side_gain_is_booked_to_it(path, scheme, law, 
 
 @pytest.mark.parametrize("path", PATHS)
 def test_a_stream_through_two_open_sides_shows_at_both(path, tmp_path):
-    """1 m3/s comes in by the west and leaves by the east, for 2 s."""
+    """1 m3/s enters at the west side and leaves at the east side for 2 s."""
     patches = {side: OPEN[side] for side in ("west", "east")}
     basin = pool(path, tmp_path, patches, level=1.0, start={"u": 0.5})
     if path == "holes":
@@ -102,7 +102,7 @@ def test_a_stream_through_two_open_sides_shows_at_both(path, tmp_path):
 @pytest.mark.parametrize("law", ["linear", "log", "table"])
 @pytest.mark.parametrize("path", PATHS)
 def test_a_wave_that_meets_nothing_beyond_leaves_half_its_flow_at_either_end(path, law, tmp_path):
-    """rho u A / 2 at the start: nothing comes in from outside; small Mach numbers under `log` and `table`."""
+    """rho u A / 2 at both ends at the start, as no wave enters; Mach numbers under `log` and `table` are small."""
     patches = {side: OPEN[side] for side in ("west", "east")}
     basin = pool(path, tmp_path, patches, **physics(law), start={"u": 0.01})
     if path == "holes":
@@ -119,7 +119,7 @@ def test_a_wave_that_meets_nothing_beyond_leaves_half_its_flow_at_either_end(pat
 @pytest.mark.parametrize("law", ["water", "linear", "log"])
 @pytest.mark.parametrize("path", ["graded", "triangles"])
 def test_ledgers_with_four_open_sides_close(path, law, tmp_path):
-    """A mound leaves by all of them; dye in the water of two."""
+    """A mound leaves through all sides; water also carries a dye."""
     bump = "exp(-4*((x - 1.5)^2 + (y - 0.8)^2))"
     start = {"level": f"1 + 0.2*{bump}", "u": 0.3} if law == "water" else {"pressure": f"1e5*{bump}"}
     basin = pool(path, tmp_path, OPEN, **physics(law), start=start)
@@ -135,7 +135,7 @@ def test_ledgers_with_four_open_sides_close(path, law, tmp_path):
 
 @pytest.mark.parametrize("path", PATHS)
 def test_a_given_velocity_shows_at_the_patches_that_it_passes(path, tmp_path):
-    """0.5 m/s through 2 m x 0.3 m, turned by `period`; it is no water of the network, so its mass is in no ledger."""
+    """0.5 m/s through 2 m x 0.3 m, reversed by `period`; no mass is booked, as the flow is not part of the network."""
     patches = {side: {"side": side} for side in ("west", "east", "north")}
     velocity = {"u": 0.5, "period": 4.0}
     basin = pool(path, tmp_path, patches, physics="transport", velocity=velocity, thickness=0.3)

@@ -1,4 +1,4 @@
-"""A physics of basins is one folder: one from outside is declared, checked, lowered, compiled, run and read."""
+"""Physics of basins from outside: a folder that is declared, checked, lowered, compiled, run and read."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ print(json.dumps(said))
 
 @pytest.fixture(scope="module")
 def said(tmp_path_factory) -> dict:
-    """What a process says of itself in which the belt's folder is registered."""
+    """Results of a process in which the folder of the physics `belt` is registered."""
     folder = tmp_path_factory.mktemp("others") / "belt"
     folder.mkdir()
     for name, text in SOURCES.items():
@@ -160,16 +160,16 @@ def said(tmp_path_factory) -> dict:
 
 
 def test_it_runs_exactly(said):
-    """Euler's steps of Courant number 1 move upwind values by a cell each: to the bit what was there."""
+    """Euler steps of Courant number 1 move upwind values by one cell each, to the bit."""
     assert said["exact"] == [[0.0, 0.5, 1.0, 1.5, 2.0], [0.0, 0.0, 0.0, 0.0, 300.5]]
 
 
 def test_it_is_stepped_implicitly(said):
-    """Upwind rates 2 (T[i - 1] - T[i]) leave a cell's own start, and k cells behind it that of weight (2 t)^k / k!."""
+    """Upwind rates 2 (T[i - 1] - T[i]) weight the start k cells upstream by exp(-2 t) (2 t)^k / k!."""
     times, found = said["implicit"]
     share = [sum((2.0 * t) ** k / factorial(k) * exp(-2.0 * t) for k in (4, 5)) for t in times]
     assert found == approx([300.5 * one for one in share], abs=0.01)
-    assert said["missed"] == 0  # of what its rates hang on, in the pattern
+    assert said["missed"] == 0  # dependences outside the pattern
 
 
 def test_it_is_checked_by_its_own_declaration(said):
@@ -182,7 +182,7 @@ def test_it_is_checked_by_its_own_declaration(said):
 
 
 def test_every_physics_is_a_folder_that_lowers_itself():
-    """Declared in `part.py` of a folder of basins, whose `lower.py` has one class; all keys stand among a basin's."""
+    """Each physics has a folder of basins with `part.py` and `lower.py`, and a basin has all its keys."""
     folders = {path.parent.name for path in (Path(fvsolve.__file__).parent / "basins").glob("*/part.py")}
     assert {one.__module__.split(".")[2] for one in Physics.kinds.values()} == folders
     for one in Physics.kinds.values():
@@ -191,7 +191,7 @@ def test_every_physics_is_a_folder_that_lowers_itself():
         assert issubclass(rows_class(one), BasinRows) and rows_class(one) is not BasinRows
 
 
-@pytest.mark.parametrize("key", ["pressure", "size"])  # of a liquid, of all basins
+@pytest.mark.parametrize("key", ["pressure", "size"])  # keys of liquids and of all basins
 def test_a_key_that_is_there_keeps_its_meaning(key):
     keys = {"__annotations__": {key: Annotated[float, Quantity("time")]}, "__module__": __name__}
     with pytest.raises(FvsolveError, match=f'"clock" declares {key} differently from the existing key of a basin'):

@@ -1,4 +1,4 @@
-"""Basins through case files: both paths of the kernels, boundaries, joins, and scalars in them."""
+"""Basins in case files: kernels on grids and on meshes, boundaries, links, scalars, and patches that fall dry."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ def case(pool: dict, end: float, numerics: dict | None = None, **top) -> dict:
 
 
 def ended(given: dict):
-    """(model, state) of a case at its end."""
+    """Return (model, state) at the end of a case."""
     model = fvsolve.build(fvsolve.load(given))
     return model, fvsolve.advance(model, fvsolve.initial_state(model), given["numerics"]["end"])
 
 
 def triangulated(tmp_path, spacing: float = 0.25) -> dict:
-    """A basin of triangles, the same rectangle."""
+    """Return a basin of triangles in the rectangle of `basin`."""
     points, cells = triangles((4.0, 2.0), spacing)
     write(tmp_path / "t.msh", points, cells.tolist())
     assert len(boundary(cells)) == len(np.unique(boundary(cells), axis=0))
@@ -67,7 +67,7 @@ def test_a_uniform_scalar_stays_uniform_in_sloshing_water(scheme, path, tmp_path
 
 @pytest.mark.parametrize("law", ["linear", "log", "table"])
 def test_first_order_on_a_rectangle_is_the_same_by_both_paths(law, tmp_path):
-    """A rectangle, and the same cells from a file: loops over faces find the rates of loops over rows."""
+    """Loops over faces give the rates of loops over rows, for the same cells from a file."""
     x, y = np.meshgrid(np.linspace(0, 4, 33), np.linspace(0, 2, 17))
     points = np.column_stack([x.ravel(), y.ravel()])
     corner = (np.arange(16)[:, None] * 33 + np.arange(32)).ravel()
@@ -87,7 +87,7 @@ def test_first_order_on_a_rectangle_is_the_same_by_both_paths(law, tmp_path):
         )
         a, b = (model.basins[0] for model in (one, two))
         order = np.lexsort((b.x, b.y))
-        same = two.start.copy()  # means of cells here, values at centres there
+        same = two.start.copy()  # averages of cells, not values at centres
         b.deviations(same)[:, order] = a.deviations(one.start)
         rates = a.deviations(one.rhs(0.0, one.start)), b.deviations(two.rhs(0.0, same))[:, order]
         assert np.allclose(b.x[order], a.x, atol=1e-12) and np.allclose(b.y[order], a.y, atol=1e-12)
@@ -96,7 +96,7 @@ def test_first_order_on_a_rectangle_is_the_same_by_both_paths(law, tmp_path):
 
 
 def test_a_plane_wave_of_a_liquid_is_that_of_a_pipe():
-    """A valve shuts at the end of a channel: pressures at the valve are those of a pipe of the same section."""
+    """A valve opens at the end of a channel: its flow equals that at the end of a pipe of the same section."""
     length, wide, thick = 40.0, 0.4, 0.1
     section = {"size": [length, wide], "cells": [160, 2], "physics": "liquid", "thickness": thick, "pressure": 1e6}
     channel = basin() | section | {"patches": {"end": {"side": "east"}, "far": {"side": "west", "boundary": "open"}}}
@@ -112,14 +112,14 @@ def test_a_plane_wave_of_a_liquid_is_that_of_a_pipe():
     )
     assert there.ok and here.ok
     moved = np.abs(here["tap.flow"]).max()
-    assert moved > 2e-3 and np.abs(there["tap.flow"] - here["tap.flow"]).max() < 0.02 * moved  # one cell late
+    assert moved > 2e-3 and np.abs(there["tap.flow"] - here["tap.flow"]).max() < 0.02 * moved  # delay of a cell
     assert there["tap.flow"][-1] == approx(here["tap.flow"][-1], rel=1e-9)
 
 
 @pytest.mark.parametrize(("boundary", "left"), [({"boundary": "open"}, 0.0), ({"impedance": 3.0 * RHO * SPEED}, 0.5)])
 @pytest.mark.parametrize("holes", [None, [[3.9, 0.0, 4.0, 0.2]]], ids=["grid", "faces"])
 def test_what_a_boundary_sends_back_of_a_wave(boundary, left, holes):
-    """(Z - rho a) / (Z + rho a) of the height of a pulse that runs into it; mass is in the ledger."""
+    """A pulse returns with the factor (Z - rho a) / (Z + rho a), and the mass balance closes."""
     pool = liquid(cells=[320, 10], patches={"far": {"side": "west", **boundary}})
     pool["start"] = {"pressure": "1e5*exp(-12*(x - 1.5)^2)", "u": f"-1e5*exp(-12*(x - 1.5)^2)/{RHO * SPEED}"}
     if holes:
@@ -133,7 +133,7 @@ def test_what_a_boundary_sends_back_of_a_wave(boundary, left, holes):
 
 
 def test_what_leaves_by_an_open_side_is_no_mark():
-    """It is no tank that spills or runs dry."""
+    """Outflow through an open side is not marked as spilling or running dry."""
     pool = water(start=WAVY, patches={"sea": {"side": "east", "boundary": "open"}})
     result = fvsolve.run(case(pool, 2.0))
     assert result.ledger["mass"]["by_node"]["pool.sea"] != 0.0 and result.marks == []
@@ -141,7 +141,7 @@ def test_what_leaves_by_an_open_side_is_no_mark():
 
 @pytest.mark.parametrize("path", ["grid", "holes"])
 def test_what_is_the_same_everywhere_leaves_so_by_open_sides_and_drains(path):
-    """Its ledger is at round-off; other water comes in by the open side only where the flow turns."""
+    """A uniform dye, equal to that beyond an open side, stays uniform, and its balance closes to rounding."""
     patches = {"sea": {"side": "east", "boundary": "open", "scalars": {"dye": 3.0}}, "drain": {"side": "south"}}
     pool = basin(level=0.6, bed="0.1*y + 0.05*x", start={"level": "0.6 + 0.1*cos(pi*x/4)"}, patches=patches)
     pool |= {"holes": HOLE} if path == "holes" else {}
@@ -157,7 +157,7 @@ def test_what_is_the_same_everywhere_leaves_so_by_open_sides_and_drains(path):
     "method, apart", [("radau-iia-5", 1e-6), ("rodas-5p", 1e-6), ("tr-bdf2", 1e-4), ("auto", 1e-6)]
 )
 def test_implicit_steps_carry_scalars_of_water_as_explicit_ones_do(method, apart):
-    """With decay and diffusion, an open side, and a link that brings another value."""
+    """Decay, diffusion, an open side, and a link with another value of the dye."""
     patches = {"sea": {"side": "east", "boundary": "open"}, "in": {"side": "west", "span": [0.5, 1.0]}}
     pool = basin(cells=[8, 4], level=0.6, bed="0.02*x", scalars={"dye": "x"}, patches=patches)
     nodes = {"works": {"type": "inflow", "flow": 0.05, "scalars": {"dye": 9.0}}, "pool": pool}
@@ -174,7 +174,7 @@ def test_implicit_steps_carry_scalars_of_water_as_explicit_ones_do(method, apart
 
 
 def test_a_plug_is_carried_through_a_channel_and_all_of_it_is_booked():
-    """Given velocity 0.5 m/s: what came in at 1 for 2 s stands between 1 m and 2 m of 4 m after 4 s."""
+    """At 0.5 m/s, inflow of value 1 for 2 s is between 1 m and 2 m after 4 s."""
     inlet = {"time": [0.0, 2.0], "value": [1.0, 0.0], "kind": "step"}
     patches = {"in": {"side": "west", "scalars": {"dye": inlet}}, "out": {"side": "east"}}
     pool = basin(physics="transport", velocity={"u": 0.5}, patches=patches, cells=[160, 4])
@@ -218,7 +218,7 @@ def test_decay_and_diffusion_of_a_still_pool_have_their_closed_form():
 
 
 def test_the_ledger_of_each_scalar_is_its_own():
-    """Without patches, too: one is 1 everywhere, the other 3 and decays."""
+    """In a closed basin a scalar keeps its amount, and a second scalar decays to 1 / e of its amount."""
     given = case(water(), 2.0, scalars={"one": {"initial": 1.0}, "other": {"initial": 3.0, "decay": 0.5}})
     ledger = fvsolve.run(given).ledger
     held = 4.0 * 2.0 * RHO
@@ -227,7 +227,7 @@ def test_the_ledger_of_each_scalar_is_its_own():
 
 
 def test_a_basin_under_law_log_is_relieved_into_the_network():
-    """Small waves: the same flow as under law linear, but for the change of density."""
+    """For small waves the flow is that under the law `linear`, except for the change of density."""
     pool = liquid(patches={"out": {"side": "east", "span": [0.5, 1.5]}})
     links = {"tap": valve("pool.out", "out", 1e-3, ramp(0.0, 0.002, 0.0, 1.0))}
     found = []
@@ -258,7 +258,7 @@ def test_implicit_steps_of_a_basin_agree_with_explicit_ones(pool):
 
 
 def test_normal_flow_down_a_slope_has_the_velocity_of_manning():
-    """h = 0.2 m on a slope of 0.01 with n = 0.03: u = h^(2/3) sqrt(S) / n, far from both open ends."""
+    """u = h^(2/3) sqrt(S) / n far from both open ends, with h = 0.2 m, S = 0.01 and n = 0.03."""
     pool = basin(size=[100.0, 2.0], cells=[100, 2], level=-1.0, bed="1 - 0.01*x", manning=0.03)
     pool["start"] = {"level": "1.2 - 0.01*x", "u": 1.0}
     model, state = ended(case(pool, 12.0))
@@ -296,7 +296,7 @@ def test_faults(name):
 
 
 def test_a_patch_that_runs_dry_does_not_shorten_steps():
-    """The flow fades with the water: no step is lost on a drop that ends at zero."""
+    """The flow falls with the depth, so that steps do not shrink at zero drop."""
     pool = basin(level=0.05, cells=[8, 4], patches={"out": {"side": "east"}})
     links = {"tap": valve("pool.out", "out", 0.05)}
     result = fvsolve.run(scene({"pool": pool, "out": reservoir(AMBIENT)}, links, 600.0, STEPS, ["tap.flow"], 10.0))
@@ -308,7 +308,7 @@ BANK = {"cells": [8, 8], "bed": "0.5*y", "patches": {"out": {"side": "east"}}}  
 
 
 def test_a_patch_up_a_bank_stands_at_the_level_of_its_water():
-    """The lake stays at rest to the bit beside a reservoir of its level."""
+    """The head at the patch is the level, and beside a reservoir of this level the mass is constant to the bit."""
     tap = {"tap": valve("pool.out", "sea", 0.05)}
     given = scene({"pool": basin(level=0.5, **BANK), "sea": lake(0.5)}, tap, 0.1, STEPS, ["pool.out.head"])
     result = fvsolve.run(given)
@@ -318,7 +318,7 @@ def test_a_patch_up_a_bank_stands_at_the_level_of_its_water():
 
 @pytest.mark.parametrize("path", ["grid", "holes"])
 def test_a_bank_gives_no_water_that_it_has_not(path):
-    """No cell owes any, and the level falls to where the outlet is dry."""
+    """No depth is negative, and the level falls until the outlet is dry."""
     pool = basin(level=0.5, manning=0.02, **BANK) | ({"holes": [[0.0, 1.0, 1.0, 2.0]]} if path == "holes" else {})
     given = scene(
         {"pool": pool, "outside": reservoir(AMBIENT)}, {"tap": valve("pool.out", "outside", 0.05)}, 60.0, STEPS
@@ -331,7 +331,7 @@ def test_a_bank_gives_no_water_that_it_has_not(path):
 
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
 def test_a_tank_without_friction_drains_to_the_last_film(scheme):
-    """Cells behind the outlet fall dry one after the other: none of it comes back (Torricelli: empty after 409 s)."""
+    """Cells behind the outlet fall dry one after another, and no water returns (Torricelli: empty after 409 s)."""
     pool = {"type": "basin", "size": [4.0, 2.0], "cells": [8, 4], "level": 2.0}
     pool["patches"] = {"out": {"side": "south", "span": [1.0, 3.0]}}
     tap = valve("pool.out", "outside", math.pi * 0.15**2 / 4.0 / math.sqrt(2.0), discharge_coefficient=1.0)

@@ -1,4 +1,4 @@
-"""Reynolds' transport theorem (71), (76), (77) on the cells of a basin whose wall moves, term by term."""
+"""Reynolds' transport theorem (docs/course.md, 71, 76 and 77) in a basin with a moving wall, term by term."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LENGTH, RATE, T, D = 2.0, 0.3, 0.4, 2e-3
 
 
 def run_up(cells: int):
-    """(model, states just before, at and after T) of a wave in a flume whose east wall swings."""
+    """Return (model, states just before, at and after T) of a wave in a flume with an oscillating east wall."""
     travel = {"mean": 0.0, "amplitude": RATE, "period": 2.0}
     basin = {
         "type": "basin", "size": [LENGTH, 1.0], "cells": [cells, 1], "level": 1.0,
@@ -31,14 +31,14 @@ def run_up(cells: int):
 
 
 def held(model, state) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """(lines, contents of the water west of each, depth and velocity at lines inside) : float64[cells + 1], ..."""
+    """Return (grid lines, volume of water west of each line, depth and velocity at inner lines)."""
     depth, flow, _ = model.basins[0].deviations(state.y)[:3]
     depth, n = 1.0 + depth, len(depth)
     lines = np.linspace(0.0, LENGTH + RATE * math.sin(math.pi * state.t), n + 1)
     contents = np.concatenate([[0.0], np.cumsum(depth * np.diff(lines))])
 
     def at_lines(mean):
-        return (7 * (mean[1:-2] + mean[2:-1]) - mean[:-3] - mean[3:]) / 12  # of fourth order, lines 2 to n - 2
+        return (7 * (mean[1:-2] + mean[2:-1]) - mean[:-3] - mean[3:]) / 12  # fourth order, lines 2 to n - 2
 
     return lines, contents, at_lines(depth), at_lines(flow) / at_lines(depth)
 
@@ -56,7 +56,7 @@ def test_the_terms_of_a_volume_up_to_a_line_that_moves(share):
         inside = sum(sign * CubicSpline(*one[:2])(lines[m]) for sign, one in ((1, after), (-1, before))) / (2 * D)
         swept = depth[m - 2] * speed
         flux = depth[m - 2] * velocity[m - 2]
-        assert abs(swept) > 0.05 and abs(inside) > 0.05  # terms that count
+        assert abs(swept) > 0.05 and abs(inside) > 0.05  # not negligible
         errors.append([abs(whole - inside - swept), abs(inside + flux), abs(whole + flux - swept)])  # (71), (76), (77)
     assert max(errors[1]) < 1e-5
     assert errors[1][2] < 0.2 * errors[0][2]

@@ -1,4 +1,4 @@
-"""Links at patches of basins that ride: what rests in a frame rests, and what swings does so as one column has it."""
+"""Links at patches of basins on bodies: rest in accelerated frames, and oscillations like those of a column."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from fvsolve.studies.energy.energy_balance import energy
 
 SOLID = {"type": "body", "mass": 1.0, "inertia": [1.0, 1.0, 1.0]}
 SIZE, CELLS, LEVEL = (2.0, 1.0), (8, 4), 0.4
-BORE, WAY = 0.2, 1.0  # of what joins two basins [m]
+BORE, WAY = 0.2, 1.0  # bore and length of the link [m]
 COLUMN = {"type": "rigid-column", "diameter": BORE}
 PIPE = {"type": "pipe", "diameter": BORE, "wave_speed": 1000.0, "cells": 10}
 FLOW = {"rigid-column": "duct.flow", "pipe": "duct.flow@0"}
@@ -27,12 +27,12 @@ TILT = {"roll": "4 deg", "pitch": "-3 deg", "yaw": "20 deg"}
 
 
 def hull(**joint):
-    """A body whose joint is driven, or holds it."""
+    """Return a body with a driven or fixed joint."""
     return {**SOLID, "joint": joint}
 
 
 def basin(at, side, folder=None, **more):
-    """A basin of SIZE, whose patch `gap` is amid one of its sides; a mesh of triangles where there is a folder."""
+    """Return a basin of SIZE with the patch `gap` in the middle of a side; of triangles if `folder` is given."""
     more = {"level": LEVEL, **more}
     if folder is None:
         span = {"span": [0.25, 0.75]} if side in ("west", "east") else {"span": [0.75, 1.25]}
@@ -50,9 +50,9 @@ def basin(at, side, folder=None, **more):
 
 
 def twins(joint, link, swap=False, turned=False, folder=None, start=None, end=1.0, numerics=None):
-    """Two basins behind each other along x, east of the first joined to west of the second.
+    """Return a case of two basins in line along x, with a link from the east side of `a` to the west side of `b`.
 
-    turned : the second is drawn with its x the other way; start : of a surface over x, y of the body
+    turned : True to reverse the x axis of `b`; start : surface as a function of x and y of the body
     """
     far = SIZE[0] + WAY
     given = [{} if start is None else {"start": {"level": start(f"(x + ({x}))", "y")}} for x in (0.0, far)]
@@ -75,10 +75,10 @@ def spin(rate):
 
 
 SLOWS = 0.3  # [m/s2], along -x
-RATE = 1.0  # [rad/s], about an axis beside both
+RATE = 1.0  # [rad/s], about an axis outside of both basins
 
 
-FRAMES = {  # joint, and the surface that rests in its frame
+FRAMES = {  # (joint, surface at rest in its frame)
     "slows down": (
         {"kind": "prismatic", "axis": [1, 0, 0],
          "travel": {"start": 0.0, "duration": 10.0, "value": [0.0, 50.0 * SLOWS], "exponent": 2}},
@@ -94,7 +94,7 @@ WAYS = {
 
 
 def rests(case, loose=1e-13):
-    """Whether nothing moves from where it starts; states of pipes are in kg/s as well, under 1 m of water."""
+    """Return the model of a case, after a check that its state stays within `loose` of the start."""
     model = fv.build(fv.load(case))
     last = fv.advance(model, fv.initial_state(model), case["numerics"]["end"]).y
     assert np.abs(last - model.start).max() < loose
@@ -114,12 +114,12 @@ def test_basins_that_a_riding_column_joins_rest_where_a_surface_rests_in_their_f
 @pytest.mark.parametrize("link", [COLUMN, PIPE], ids=["column", "pipe"])
 @pytest.mark.parametrize("way", [{}, {"swap": True}, {"turned": True}, {"folder": True}, {"held": False}])
 def test_basins_that_a_riding_link_joins_rest_on_one_level_in_the_world(way, link, tmp_path):
-    """Held aslant by the body, or by their own axes; each holds what makes one surface of both."""
+    """The body or its carrier is tilted; the levels of both basins form one horizontal surface."""
     down = Rotation.from_euler("ZYX", [20, -3, 4], degrees=True).inv().apply([0, 0, -1])
     more = {key: tmp_path if key == "folder" else one for key, one in way.items() if key != "held"}
     case = twins({"kind": "fixed", "attitude": TILT}, link, **more)
     case["nodes"]["b"]["level"] = LEVEL - down[0] / down[2] * (SIZE[0] + WAY)
-    if way == {"held": False}:  # one turn after the other
+    if way == {"held": False}:  # two rotations in succession
         case["nodes"]["frame"] = hull(kind="fixed", attitude=TILT)
         case["nodes"]["hull"]["joint"] = {"kind": "fixed", "on": "frame"}
     model = rests(case, 1e-9)
@@ -127,15 +127,18 @@ def test_basins_that_a_riding_link_joins_rest_on_one_level_in_the_world(way, lin
     assert a == pytest.approx(b, abs=1e-12)
 
 
-HALF, DEEP, HIGH, DUCT, LOSS = 4.0, 1.5, 0.8, 0.6, 3.0  # of a U-tube, one of whose arms is a basin [m]
-WIDE, LONG = 0.3, 4.0  # of that basin, across and along the axis of roll
-AREA, BED = WIDE * LONG, 0.1  # [m2]; of its bed above the tank's bottom [m]
+HALF, DEEP, HIGH, DUCT, LOSS = 4.0, 1.5, 0.8, 0.6, 3.0  # U-tube with a basin as one arm [m]
+WIDE, LONG = 0.3, 4.0  # of this basin, across and along the axis of roll [m]
+AREA, BED = WIDE * LONG, 0.1  # its area [m2]; height of its bed above the bottom of the tank [m]
 SWING = {"mean": 0.0, "amplitude": 0.05, "period": 7.0}
 SWAY = {"mean": 0.0, "amplitude": 0.3, "period": 7.0}
 
 
 def half_u(joint, grid=(1, 1), swap=False, turned=False, later=False, **link):
-    """A basin to port, y = -HALF amid it, and a tank to starboard; turned : the basin's x and y the other way."""
+    """Return a case of a U-tube with a basin to port, about y = -HALF, and a tank to starboard.
+
+    turned : True to reverse the x and y axes of the basin; later : True to list the tank first
+    """
     north = -HALF + 0.5 * WIDE
     at, way = (-0.5 * LONG, north - WIDE, BED - DEEP), {}
     if turned:
@@ -154,7 +157,7 @@ def half_u(joint, grid=(1, 1), swap=False, turned=False, later=False, **link):
 
 
 def rolls(t):
-    """G_y and G_z at the axis, f' and f'' of a hull that rolls."""
+    """Return (G_y, G_z) at the axis [m/s2], f' [rad/s] and f'' [rad/s2] of a rolling hull."""
     w = 2 * math.pi / SWING["period"]
     f = SWING["amplitude"] * math.sin(w * t)
     turn, quicker = SWING["amplitude"] * w * math.cos(w * t), -w * w * f
@@ -162,16 +165,16 @@ def rolls(t):
 
 
 def sways(t):
-    """The same of one that sways."""
+    """Return the values of `rolls` for a hull that sways."""
     w = 2 * math.pi / SWAY["period"]
     return SWAY["amplitude"] * w * w * math.sin(w * t), -GRAVITY, 0.0, 0.0
 
 
 def column_rate(t, state, force):
-    """Of the flow to starboard [m3/s] and the level there: what drives water along the bed, the duct and up the tank.
+    """Rates of the flow to starboard [m3/s] and of the level there, for a column along bed, duct and tank.
 
-    Along a way from r1 to r2 a hull that turns drives by G . (r2 - r1) - f'' (y1 z2 - z1 y2) + f'^2 (r2^2 - r1^2) / 2;
-    the surface in the basin lies at right angles to what it feels.
+    Along a line from r1 to r2 the driving term is G . (r2 - r1) - f'' (y1 z2 - z1 y2) + f'^2 (r2^2 - r1^2) / 2. The
+    surface in the basin is normal to the effective gravity.
     """
     q, level = state
     gy, gz, turn, quicker = force(t)
@@ -202,7 +205,7 @@ QUICK = {"of many cells": {"grid": (2, 4)}, "a pipe": {"type": "pipe", "wave_spe
 @pytest.mark.parametrize("drawn", [*DRAWN, *QUICK])
 @pytest.mark.parametrize("joint", JOINTS)
 def test_a_basin_and_a_tank_swing_as_one_column_of_water_does(joint, drawn):
-    """A basin of one cell is such an arm; one of many, and a pipe, as far as their waves are quick."""
+    """A basin of one cell is equivalent to a column; many cells, or a pipe, are so far as their waves are fast."""
     moves, force = JOINTS[joint]
     result = fv.run(half_u(moves, **(DRAWN | QUICK)[drawn]))
     t = result.t
@@ -257,7 +260,7 @@ FAULTS = {  # text: (keys of nodes, of the link)
 
 
 def changed(case, nodes, link):
-    """A case with other keys, those of None left out; what has a type is another part."""
+    """Return a case with other keys, without those of value None; keys with a type replace a part."""
     for name, keys in nodes.items():
         case["nodes"][name] = keys if "type" in keys else case["nodes"][name] | keys
     case["links"]["duct"] |= link
@@ -284,13 +287,13 @@ def test_what_a_joint_holds_and_energy_are_refused_where_a_link_joins_a_basin_th
         energy(case)
     case["output"]["probes"] = ["hull.joint_fx"]
     with pytest.raises(
-        CaseError, match="the reaction of the flow through a.gap is not modelled .* a probe reads forces of joints"
+        CaseError, match="a probe reads forces of joints, but the reaction of the flow through a.gap is not modelled"
     ):
         fv.build(fv.load(case))
 
 
 def test_a_patch_tells_the_pressure_on_the_bed_amid_its_faces():
-    """In a box that slows down, aslant over a bed that rises: rho g times the surface there over the bed."""
+    """In a decelerated box: rho g times the surface at the faces of the patch minus the bed of the cells behind."""
     joint, _ = FRAMES["slows down"]
     bed = {"bed": "0.1 * x", "start": {"level": f"{LEVEL} + {SLOWS / GRAVITY} * x"}}
     case = twins(joint, COLUMN)
@@ -300,6 +303,6 @@ def test_a_patch_tells_the_pressure_on_the_bed_amid_its_faces():
     case["links"]["duct"] = {**COLUMN, "from": "a.gap", "to": "far", "length": 2.0}
     case["output"]["probes"] = ["a.gap.pressure"]
     case["numerics"]["end"] = 1e-3
-    behind = 0.1 * (SIZE[0] - 0.5 * SIZE[0] / CELLS[0])  # of the bed
+    behind = 0.1 * (SIZE[0] - 0.5 * SIZE[0] / CELLS[0])  # bed of the cells behind
     deep = LEVEL + SLOWS / GRAVITY * SIZE[0] - behind
     assert fv.run(case)["a.gap.pressure"][-1] == pytest.approx(AMBIENT + RHO * GRAVITY * deep, rel=1e-6)

@@ -1,4 +1,4 @@
-"""Liquids in boxes on bodies: at rest in any axes, spun up, seen from axes that turn, pushed, weighed, on springs."""
+"""Liquids in boxes on bodies: rest in any axes, spin-up, rotating axes, acceleration, joint loads, springs."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def sliding(travel, axis=(1, 0, 0), **more):
 
 
 def full(cells=(12, 10), size=(2.0, 1.5), **more):
-    """A closed box full of liquid, between plates 0.1 m apart."""
+    """Return a closed box full of liquid, between plates 0.1 m apart."""
     outline = {} if "mesh" in more else {"size": list(size), "cells": list(cells)}
     return {"type": "basin", "physics": "liquid", "on": "body", **outline, "pressure": REST, "thickness": 0.1, **more}
 
@@ -47,7 +47,7 @@ def case_of(body, basin, end, law="linear", probes=(), **numerics):
 
 
 def after(case, until, start=None):
-    """(basin, its deviations) at a time, from another start if one is given."""
+    """Return (basin, its deviations) at a time, from the states `start` gives if it is not None."""
     model = build(load(case))
     y = model.start.copy()
     if start is not None:
@@ -60,7 +60,7 @@ def steady(rate, span=100.0):
 
 
 def resting(law, phi):
-    """Pressure of what rests over that where phi is 0: -rho phi; K ln(rho / rho0), 1 / rho - 1 / rho0 = phi / K."""
+    """Pressure at rest over that at phi = 0: -rho phi, or K ln(rho / rho0) with 1 / rho - 1 / rho0 = phi / K."""
     if law == "linear":
         return -RHO * phi
     dense = RHO * math.exp((REST - AMBIENT) / STIFF)
@@ -102,7 +102,7 @@ def test_a_box_that_turns_or_slows_steadily_holds_its_liquid_at_rest(how, law, c
         body = sliding({"start": 0.0, "duration": 10.0, "value": [0.0, 0.5 * slows * 100.0], "exponent": 2})
     else:
         body = turning(steady(rate))
-    if how == "leans and turns":  # about an upright axis, the box aslant: W has three parts in its axes
+    if how == "leans and turns":  # vertical axis, tilted box: W has three components in its axes
         more["attitude"] = TILT
 
     def start(basin):
@@ -123,7 +123,7 @@ def test_a_box_that_turns_or_slows_steadily_holds_its_liquid_at_rest(how, law, c
 
 
 def spun(x, y, long, wide):
-    """(u, v) over the rate of turning of what rests in the world as its box turns: curl 2, no flow through walls."""
+    """(u, v) per rate of turning of the box, of liquid at rest in the world: curl 2, no flow through walls."""
     u, v = 2.0 * y - wide, np.zeros_like(x)
     for n in range(1, 200, 2):
         k, part = n * np.pi / wide, 8.0 * wide**2 / (np.pi * n) ** 3
@@ -151,7 +151,7 @@ def test_joukowskys_box_that_begins_to_turn_leaves_its_liquid_behind(law):
 
 
 def ring(r, t, c, width):
-    """What a bump exp(-r^2 / (2 width^2)) of pressure is after a time, by Hankel's transform."""
+    """Pressure at the radius r after a time t of a bump exp(-r^2 / (2 width^2)), by Hankel's transform."""
 
     def part(k):
         return k * width**2 * math.exp(-0.5 * (k * width) ** 2) * j0(k * r) * math.cos(c * k * t)
@@ -161,7 +161,7 @@ def ring(r, t, c, width):
 
 @pytest.mark.parametrize("way", [1, -1])
 def test_a_ring_of_pressure_seen_from_axes_that_turn_is_the_ring_that_stands_still(way):
-    """What rests in the world goes the other way: centrifugal and Coriolis' forces hold it on its circles (65)."""
+    """In rotating axes centrifugal and Coriolis force (docs/course.md, 65) keep liquid at rest on circles."""
     c, rate, end, width, high, away = 60.0, way * 15.0, 0.005, 0.12, 2e-2, 0.25
     bulk = RHO * c**2
     start = {
@@ -173,7 +173,7 @@ def test_a_ring_of_pressure_seen_from_axes_that_turn_is_the_ring_that_stands_sti
         basin = full((n, n), (2.0, 2.0), at=[-1, -1, 0], start=start, wave_speed=c)
         basin, found = after(case_of(turning(steady(rate)), basin, end, "log", courant=0.8), end)
         x, y = basin.x - 1.0, basin.y - 1.0
-        near = np.hypot(x, y) < 0.5  # walls, which do push, are farther than sound goes
+        near = np.hypot(x, y) < 0.5  # waves of the walls do not arrive here
         turned = rate * end
         east, north = math.cos(turned) * x - math.sin(turned) * y, math.sin(turned) * x + math.cos(turned) * y
         far = np.hypot(east - away, north)
@@ -190,7 +190,7 @@ def test_a_ring_of_pressure_seen_from_axes_that_turn_is_the_ring_that_stands_sti
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("along", ["x", "y"])
 def test_a_full_box_that_is_pushed_at_once_rings_as_a_closed_pipe(along, law):
-    """u = F t until the waves from both ends come, which leave what goes with the box, under rho c u of pressure."""
+    """u = F t until waves from both ends arrive; behind them liquid moves with the box, at the pressure rho c u."""
     slows, long, n, c = 2.0, 1.5, 60, 50.0
     body = sliding({"start": 0.0, "duration": 10.0, "value": [0.0, 0.5 * slows * 100.0], "exponent": 2},
                    (1, 0, 0) if along == "x" else (0, 1, 0))  # fmt: skip
@@ -215,13 +215,13 @@ def test_a_full_box_that_is_pushed_at_once_rings_as_a_closed_pipe(along, law):
 
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_a_joint_holds_the_liquid_that_rests_on_its_body(law):
-    """Weight and its moment, and what slows the box down."""
+    """The joint of a tilted box carries the weight of liquid and body, and its moment."""
     held = {**HEAVY, "joint": {"kind": "fixed", "attitude": TILT}}
     probes = [f"body.joint_{what}{axis}" for what in "ft" for axis in "xyz"]
     result = run(case_of(held, full(at=[0.3, -0.2, 0.4]), 0.01, law, probes))
     pose = np.array(load(case_of(held, full(), 0.01, law)).poses["body"].attitude)
     dense = RHO if law == "linear" else RHO * math.exp((REST - AMBIENT) / STIFF)
-    mass = 0.1 * 2.0 * 1.5 * dense  # its middle is as dense as it is at rest
+    mass = 0.1 * 2.0 * 1.5 * dense  # the density in its middle is that at rest
     torque = np.cross(pose @ np.array([1.3, 0.55, 0.4]), [0, 0, GRAVITY * mass])
     for k, axis in enumerate("xyz"):
         force = GRAVITY * (mass + 10.0) if axis == "z" else 0.0
@@ -259,7 +259,7 @@ def cart(mass=100.0, axis=(1, 0, 0), **more):
 
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_a_full_box_on_a_spring_swings_at_the_root_of_the_tangent_law(law):
-    """stiff - M w^2 - m w^2 tan(s) / s = 0, s = w L / (2 c)."""
+    """stiff - M w^2 - m w^2 tan(s) / s = 0, with s = w L / (2 c)."""
     mass, stiff, long, c, dense = 100.0, 4e6, 2.0, 200.0, RHO
     if law == "log":
         dense *= math.exp((REST - AMBIENT) / STIFF)
@@ -304,7 +304,7 @@ def test_a_free_box_on_rails_keeps_its_momentum(law):
 
 
 def slipping(long, wide):
-    """What turns with a box of what it is full of, per mass: polar moment less that of Saint-Venant's torsion [m2]."""
+    """Effective inertia of the liquid per mass [m2]: polar moment minus that of Saint-Venant's torsion."""
     rows = sum(math.tanh(0.5 * n * math.pi * long / wide) / n**5 for n in range(1, 60, 2))
     torsion = wide**2 / 3.0 * (1.0 - 192.0 / math.pi**5 * wide / long * rows)
     return (long**2 + wide**2) / 12.0 - torsion
@@ -330,7 +330,7 @@ def test_an_upright_box_on_a_pin_swings_as_a_pendulum_whose_liquid_slips(law):
 
 @pytest.mark.parametrize("method", ["gauss-4", "rodas-4"])
 def test_implicit_methods_agree_on_a_box_that_is_free_to_turn(method):
-    """Their Jacobian knows what in the box hangs on what, and on its body."""
+    """Implicit methods converge to rk4, so their Jacobian contains the coupling of box and body."""
     body = {**HEAVY, "joint": {"kind": "revolute", "axis": [1, 0, 0], "angle": 0.4, "rate": 3.0}}
     basin = full((5, 4), (1.0, 0.8), at=[-0.2, 0.3, 0.1], attitude={"roll": "70 deg", "yaw": "20 deg"}, wave_speed=60.0)
     errors = []

@@ -1,4 +1,4 @@
-"""Shallow-water kernels on grids: rest, orders over a bed, steady flows, Thacker's bowls, symmetry, friction."""
+"""Kernels of shallow water on grids: rest, orders over a bed, steady flows, Thacker's bowls, symmetry, friction."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NONE = np.zeros(0)
 
 
 class Water:
-    """A grid between walls over a bed given by cell, with its rates and explicit steps."""
+    """Grid between walls over a bed given by cell, with its rates and explicit steps."""
 
     def __init__(self, x, y, bed, level=0.0, scheme="muscl", limiter=VAN_LEER, reflect=NONE):
         self.nx, self.ny = len(x) - 1, len(y) - 1
@@ -54,7 +54,7 @@ class Water:
         return self.plan[0].reshape(self.ny, self.nx) + y[0]
 
     def advance(self, y, end, courant=0.45, most=1.0, watch=None):
-        """SSP-RK2 for `upwind` and `muscl`, else SSP-RK3, to `end`."""
+        """Return the state at `end` by SSP-RK2 for `upwind` and `muscl`, else by SSP-RK3."""
         y, k, t = y.copy(), np.zeros_like(y), 0.0
         while t < end:
             h = min(courant / self.rates(y, k), most, end - t)
@@ -75,7 +75,7 @@ class Water:
 
 
 def graded(n, size, ratio):
-    """Faces whose spacing grows from 1 to `ratio` geometrically."""
+    """Faces with a spacing that grows geometrically from 1 to `ratio`."""
     steps = ratio ** (np.arange(n) / max(n - 1, 1))
     return size * np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum()
 
@@ -89,13 +89,13 @@ def middles(x):
 
 
 def means(function, x):
-    """Means of a function over cells, by Gauss's rule of five points."""
+    """Averages of a function over cells, by Gauss's rule with five points."""
     nodes, weights = np.polynomial.legendre.leggauss(5)
     return sum(0.5 * w * function(middles(x) + 0.5 * np.diff(x) * s) for s, w in zip(nodes, weights, strict=True))
 
 
 def slope(errors):
-    """Order between the last two of errors on cells halved each time."""
+    """Observed order of the last two errors, with cells halved each time."""
     return math.log2(errors[-2] / errors[-1])
 
 
@@ -110,7 +110,7 @@ def test_a_lake_lies_at_rest_around_dry_islands_on_a_graded_grid(scheme):
     k = np.ones((3, 30, 40))
     water.rates(np.zeros_like(k), k)
     assert not k.any() and not water.flow_x.any() and not water.flow_y.any()
-    # the same lake described from another level, so that numbers round: 1000 steps
+    # the lake with another datum, so that numbers are rounded: 1000 steps
     other = Water(x, y, bed, level=-0.1, scheme=scheme)
     state = other.state(np.maximum(0.0 - bed, 0.0))
     h = 0.4 / other.rates(state, k)
@@ -170,7 +170,7 @@ def test_no_depth_falls_below_zero_over_a_random_bed(scheme, courant):
 
 
 def bernoulli(q, energy, bed, fast=False):
-    """Depth of a frictionless steady flow q [m2/s] of total head `energy` over a bed: the slow or the fast root."""
+    """Depth of steady frictionless flow q [m2/s] of total head `energy` [m]; supercritical if `fast` is True."""
     head = energy - bed
     shape = np.arccos(np.clip(1.0 - 27.0 * q * q / (4.0 * G * head**3), -1.0, 1.0))
     return head / 3.0 * (1.0 + 2.0 * np.cos((shape + (4.0 * np.pi if fast else 0.0)) / 3.0))
@@ -183,7 +183,7 @@ def bump(x):
 @pytest.mark.parametrize(("scheme", "low"), [("upwind", 0.9), ("muscl", 1.9), ("upwind5", 4.5), ("weno5", 4.5)])
 @pytest.mark.parametrize("way", ["east", "north"])
 def test_smooth_flow_over_a_bed_keeps_the_order_of_the_scheme(scheme, low, way):
-    """Steady flow by Bernoulli, around the bump, before the waves that the walls send in get there."""
+    """Steady flow by Bernoulli around the bump, before waves from the walls arrive."""
     q, end = 1.0, 1.5
     energy = 1.0 + 0.5 * q * q / G
     errors = []
@@ -218,9 +218,9 @@ def parabola(x):
 
 
 def channel(q, out, jump, x):
-    """Depth of steady flow q over the bump into depth `out`: by Bernoulli; with a jump through the critical depth.
+    """Depth of steady flow q over the bump to the depth `out`, by Bernoulli; with a hydraulic jump if `jump`.
 
-    Goutal and Maurel (1997). The hydraulic jump stands where depths on either side pass Rankine and Hugoniot.
+    Source: Goutal and Maurel (1997). The depths on both sides of the jump obey the Rankine-Hugoniot condition.
     """
     down = out + 0.5 * (q / out) ** 2 / G
     if not jump:
@@ -238,7 +238,7 @@ def channel(q, out, jump, x):
 
 @pytest.mark.parametrize(("q", "out", "jump", "low"), [(4.42, 2.0, False, 1.9), (0.18, 0.33, True, 1.0)])
 def test_flow_over_a_bump_settles_to_bernoulli_and_its_jump(q, out, jump, low):
-    """Flow held at the west and depth at the east; L1 of the depth. Steeper limiters keep ringing at a jump."""
+    """L1 error for given flow at the west and depth at the east; limiters steeper than minmod ring at a jump."""
     errors = []
     for n in (100, 200):
         x = even(n, 25.0)
@@ -258,7 +258,7 @@ def test_flow_over_a_bump_settles_to_bernoulli_and_its_jump(q, out, jump, low):
 
 
 def thacker(kind, x, y, t):
-    """Depth and unit flows in the bowl -H (1 - r^2), H = 0.1 m, and the period (Thacker 1981)."""
+    """Return (depth, unit flow x, unit flow y, period) in the bowl -H (1 - r^2), H = 0.1 m (Thacker 1981)."""
     deep = 0.1
     r2 = x * x + y * y
     if kind == "planar":
@@ -297,7 +297,7 @@ def test_water_swings_in_thackers_bowls_for_three_periods(kind, scheme):
 
 @pytest.mark.parametrize(("law", "coefficient"), [(MANNING, 0.03), (DARCY, 0.05)])
 def test_flow_down_a_slope_nears_the_normal_one(law, coefficient):
-    """U tanh(g S t / U) in the middle of a long channel, U = h^(2/3) sqrt(S) / n or sqrt(8 g h S / f)."""
+    """U tanh(g S t / U) in the middle of a long channel, with U = h^(2/3) sqrt(S) / n or sqrt(8 g h S / f)."""
     tilt, h, end = 0.01, 1.0, 60.0
     x = even(240, 1200.0)
     water = Water(x, np.array([0.0, 1.0]), -tilt * middles(x), level=-20.0)

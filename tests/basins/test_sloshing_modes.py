@@ -1,4 +1,4 @@
-"""Water as linear modes: potential theory by finite elements, frequencies of hulls through the file, rest, faults."""
+"""Water as linear modes: potential theory by finite elements, frequencies of hulls, rest, momentum, energy, faults."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def tank(on="hull", size=(SIDE, 1.0), level=DEPTH, **more):
 
 
 def disc(path, rings=4, around=48):
-    """A mesh of a circle about (0.3, -0.2)."""
+    """Write a mesh of a circle about (0.3, -0.2) and return its name."""
     angles = 2.0 * np.pi * np.arange(around) / around
     points = [(0.3, -0.2, 0.0)]
     for k in range(1, rings + 1):
@@ -52,7 +52,7 @@ def case_of(body, basin, end=1.0, numerics=None, probes=(), links=None, **more):
 
 
 def frequencies(case):
-    """Of what swings about the start [rad/s], rising."""
+    """Frequencies of small oscillations about the start [rad/s], in rising order."""
     values = np.linalg.eigvals(linearise(case).a)
     assert np.abs(values.real).max() < 1e-6 * np.abs(values.imag).max()
     return np.sort(values.imag[values.imag > 0.0])
@@ -72,7 +72,7 @@ def test_masses_heights_and_the_inertia_under_a_lid_are_those_of_potential_flow(
         if turns:
             found = sloshing.lid_inertia(outline, depth, 1.0)[1, 1] + whole * (low + 0.5 * depth) ** 2
             still = math.pi / 4.0 * (0.5 * SIDE) ** 4 if outline.is_round else SIDE**3 / 12.0 * wide
-            found -= GRAVITY * still / square  # gravity on a level surface, which is no part of the truth
+            found -= GRAVITY * still / square  # gravity on a level surface, not part of the reference
             for one in every:
                 arm = one.height + low
                 found += one.mass * (arm * square + GRAVITY) ** 2 / (one.square - square) / square
@@ -88,7 +88,7 @@ def test_water_that_is_held_is_a_disc_of_ice_when_thin_and_a_rod_when_slender():
     assert slender[0, 0] == pytest.approx(math.pi * 400.0**3 / 12.0, rel=1e-4)
     assert thin[2, 2] == slender[2, 2] == 0.0
     square = sloshing.lid_inertia(sloshing.Outline((1.0, 1.0), np.zeros(2), False), 1.0, 1.0)
-    assert np.diag(square) == pytest.approx(1.0 / 6.0 - 0.140577, abs=1e-6)  # less the torsion constant
+    assert np.diag(square) == pytest.approx(1.0 / 6.0 - 0.140577, abs=1e-6)  # minus the torsion constant
 
 
 # through the case file ----------
@@ -115,7 +115,7 @@ def test_a_hull_rolls_at_the_frequencies_of_potential_flow(shape, low, tmp_path)
         return rights - w * w * (own + RHO * added(side, DEPTH, low, w * w, GRAVITY, True, is_round, n=24))
 
     laws = [(law(0.998 * w), abs(law(w)), law(1.002 * w)) for w in found[:5]]
-    met = [a * b < 0.0 and at < min(abs(a), abs(b)) for a, at, b in laws]  # roots, and no poles; others swing across
+    met = [a * b < 0.0 and at < min(abs(a), abs(b)) for a, at, b in laws]  # roots, not poles; some are transverse
     assert sum(met) >= 2 and any(met[:2])
 
 
@@ -139,7 +139,7 @@ def test_in_a_cylinder_that_turns_water_swings_as_in_one_that_does_not(tmp_path)
     turning = {"time": [-100.0, 100.0], "value": [-100.0 * rate, 100.0 * rate]}
     found = frequencies(case_of(hull({"kind": "revolute", "axis": [0, 0, 1], "angle": turning}), basin))
     still = frequencies(case_of(hull({"kind": "fixed"}), basin))
-    assert still[::2] == pytest.approx(still[1::2], rel=1e-9)  # along x and along y alike
+    assert still[::2] == pytest.approx(still[1::2], rel=1e-9)  # equal along x and y
     assert found == pytest.approx(np.sort([*(still[::2] - rate), *(still[::2] + rate)]), rel=1e-9)
 
 
@@ -154,7 +154,7 @@ def test_water_that_is_level_in_a_tank_that_leans_rests(method):
     result = run(case_of(hull({"kind": "fixed", "attitude": lean}), basin, 1.0, {"method": method}, probes))
     model = build(load(case_of(hull({"kind": "fixed", "attitude": lean}), basin, 1.0, {"method": method}, probes)))
     turn = model.case.poses["hull"].attitude @ model.case.nodes["b"].rotation
-    slope = -turn[2, :2]  # of gravity along the bed, over g: a level surface, to first order
+    slope = -turn[2, :2]  # gravity along the bed over g: a level surface to first order
     for place, name in (((0.1, 0.2), probes[0]), ((1.9, 0.9), probes[1])):
         truth = DEPTH + slope @ (np.array(place) - (0.5 * SIDE, 0.5))
         assert np.abs(result[name] - truth).max() < 1e-12
@@ -193,7 +193,7 @@ def test_energy_is_kept_to_the_order_of_the_method():
     assert lost[1] < lost[0] / 12.0 and lost[1] < 1e-3 * max(np.abs(one).max() for one in found.stored.values())
 
 
-# beside the other rungs ----------
+# comparison with cells and frozen water ----------
 
 
 def test_modes_lie_on_cells_where_water_is_shallow_and_waves_small():
@@ -263,11 +263,11 @@ def test_depth_is_level_at_the_start_however_suddenly_its_body_is_let_go():
         ({"on": None}, "nodes.b.sloshing", "applies only to water on a body; give the body as `on = BODY`"),
         ({"holes": [[0, 0, 0.5, 0.25]]}, "nodes.b.sloshing", "modes are known only for boxes and upright cylinders"),
         ({"bed": "0.1 * x"}, "nodes.b.bed", "modes are known only over a flat bed"),
-        ({"bed": 1.0}, "nodes.b.level", "there is no water above the bed, at 1 m"),
-        ({"attitude": {"roll": 0.6}}, "nodes.b.sloshing", "its bed is 34.4 deg off level at the start"),
+        ({"bed": 1.0}, "nodes.b.level", "is not above the bed, at 1 m"),
+        ({"attitude": {"roll": 0.6}}, "nodes.b.sloshing", "the bed is 34.4 deg off level at the start"),
         ({"manning": 0.02}, "nodes.b.manning", "modes have no friction"),
         ({"start": {"u": 0.1}}, "nodes.b.start.u", "modes start from level water at rest"),
-        ({"patches": {"out": {"side": "west", "boundary": "open"}}}, "nodes.b.patches.out.boundary", "closed tanks"),
+        ({"patches": {"out": {"side": "west", "boundary": "open"}}}, "nodes.b.patches.out.boundary", "only with walls"),
     ],
 )
 def test_what_modes_do_not_know_is_named(change, place, said):

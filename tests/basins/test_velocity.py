@@ -1,4 +1,4 @@
-"""Face flows: what names, stream functions and files make of a mesh, against integrals of velocities over faces."""
+"""Face flows of expressions, stream functions and files, against integrals of velocities over faces."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from fvsolve.mesh import read, rectangle
 PI = np.pi
 BUMP = "exp(-50*((x - 0.4)**2 + (y - 0.5)**2))"
 MUSCL = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk3", "courant": 0.5}
-# Of each name: parameters, and the velocities u, v (x, y) they mean, as its source gives them.
+# Name: (parameters, velocities u, v (x, y) as in its source).
 VELOCITIES = {
     "constant": ({"u": 2.0, "v": -3.0}, lambda x, y: (2.0 + 0 * x, -3.0 + 0 * x)),
     "rotation": (
@@ -41,12 +41,12 @@ VELOCITIES = {
 
 @pytest.fixture
 def mixed(tmp_path):
-    """Triangles and quads, none a parallelogram, from (-1, 0.5) to (2, 2.5)."""
+    """Mesh of triangles and quads, without parallelograms, from (-1, 0.5) to (2, 2.5)."""
     return read(write(tmp_path / "shaken.msh", *shaken()))
 
 
 def integral(mesh, velocity):
-    """Flow of u, v (x, y) through every face, by six of Gauss's points."""
+    """Flow of u, v (x, y) through every face, by Gauss's rule with six points."""
     a, b = mesh.points[mesh.ends[:, 0]], mesh.points[mesh.ends[:, 1]]
     total = 0.0
     for at, weight in zip(*np.polynomial.legendre.leggauss(6), strict=True):
@@ -56,7 +56,7 @@ def integral(mesh, velocity):
 
 
 def divergence(mesh, flows):
-    """What leaves every cell."""
+    """Net outflow of every cell."""
     out = np.zeros(len(mesh.cells))
     np.add.at(out, mesh.left, flows)
     inner = mesh.right >= 0
@@ -106,7 +106,7 @@ def test_flows_of_a_grid_want_a_full_rectangle(mixed):
 
 
 def written(path, header, *columns):
-    """A CSV file of columns."""
+    """Write a CSV file of columns and return it as { file }."""
     rows = "\n".join(",".join(map(repr, map(float, row))) for row in zip(*map(np.ravel, columns), strict=True))
     path.write_text(f"{header}\n{rows}\n", encoding="utf-8")
     return {"file": str(path)}
@@ -147,10 +147,10 @@ def test_velocities_that_cannot_be_had_are_refused_with_what_is_wanted(velocity,
     "text, words",
     [
         (None, "No such file"),
-        ("", "is empty; expected a header"),
+        ("", "has no rows; expected a header"),
         ("x,y,u\n0,0,1\n", "line 1: its header is x, y, u; expected x, y, u, v or x, y, psi"),
         ("x,y,psi\n0,0,1\n1,0,b\n", 'line 3: "b" is not a number in column "psi"'),
-        ("x,y,psi\n0,0,1\n1,0,2\n", "2 points; expected at least three"),
+        ("x,y,psi\n0,0,1\n1,0,2\n", "too few points (2); expected at least three"),
         ("x,y,psi\n0,0,1\n1,0,2\n2,0,3\n", "lie on one line"),
         ("x,y,psi\n0,0,1\n1,0,2\n0,1,3\n", "do not enclose 9 of 20 positions of the mesh, the first"),
     ],
@@ -166,7 +166,7 @@ def test_files_that_do_not_do_are_refused_with_the_line(tmp_path, text, words):
 
 @pytest.mark.parametrize("path", ["grid", "faces"])
 def test_steps_follow_a_velocity_that_stands_for_a_moment(path, tmp_path):
-    """A bump swirled forth and back comes home the better the more cells, however steps fall about the turn."""
+    """A bump in a vortex that reverses returns with an error that falls with every refinement."""
     errors = []
     for cells in (24, 28, 32, 36, 40):
         shape = {"size": [1.0, 1.0], "cells": [cells, cells]}
@@ -183,7 +183,7 @@ def test_steps_follow_a_velocity_that_stands_for_a_moment(path, tmp_path):
 
 
 def carrying(velocity, mesh=None, **more) -> dict:
-    """Something carried in a closed basin."""
+    """Return a case of a scalar in a given velocity, in a closed basin."""
     pool = {"type": "basin", "physics": "transport", "velocity": velocity, "scalars": {"dye": "where(x < 1, 1, 0)"}}
     pool |= {"mesh": {"file": str(mesh)}} if mesh else more
     return scene({"pool": pool}, {}, 0.1, MUSCL, [], 0.1) | {"scalars": {"dye": {}}}

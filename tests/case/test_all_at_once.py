@@ -1,4 +1,4 @@
-"""Faults of all sections come at once: of a file with several, just those of files with one each."""
+"""Faults of all sections are reported together: a file with several faults has those of files with one fault each."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from reference.folders import DOCS
 import fvsolve
 
 POINT = {"basin": "pool", "from": [0, 0], "to": [1, 1]}
-ODD: dict[tuple, Any] = {  # path of a key -> what cannot stand there
+ODD: dict[tuple, Any] = {  # path of a key -> invalid value
     ("schema",): 3,
     ("titel",): "x",
     ("gravity",): "9 kg",
@@ -46,7 +46,7 @@ ODD: dict[tuple, Any] = {  # path of a key -> what cannot stand there
 
 
 def whole() -> dict:
-    """A case with something in every section."""
+    """Case with keys in every section."""
     case = placed()
     case["nodes"] |= {"top": {"type": "junction", "on": "main", "at": "2.2 km"},
                       "end": {"type": "tank", "area": 10.0, "level": 5.0, "elevation": 20.0}}  # fmt: skip
@@ -69,7 +69,7 @@ def whole() -> dict:
 
 
 def faults(*paths: tuple) -> set[tuple[str, str]]:
-    """(place, message) of all faults of the case with what cannot stand at some places."""
+    """(place, message) of each fault of the case with the invalid values of the given paths."""
     case = copy.deepcopy(whole())
     for path in paths:
         table: Any = case
@@ -97,9 +97,9 @@ def test_no_fault_hides_or_makes_another(first: tuple) -> None:
 
 def test_faults_that_follow_from_another_are_not_told() -> None:
     case = whole()
-    case["nodes"]["gate"]["type"] = "juncton"  # links, probes, claims and limits name it
-    case["links"]["main"]["diameter"] = "3 kg"  # so do pieces, routes, a limit and elevations
-    case["links"]["tap"]["to"] = "see"  # and nothing else joins the sea
+    case["nodes"]["gate"]["type"] = "juncton"  # links, probes, claims and limits refer to it
+    case["links"]["main"]["diameter"] = "3 kg"  # pieces, routes, a limit and elevations use it
+    case["links"]["tap"]["to"] = "see"  # and no other link joins the sea
     del case["links"]["pump"], case["links"]["safe"]
     with pytest.raises(fvsolve.CaseError) as error:
         fvsolve.load(case)

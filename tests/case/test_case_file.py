@@ -1,4 +1,4 @@
-"""The case file: what it says is what the case holds, and the resolved case says the same again."""
+"""Case file: the case has the values of the file, and the resolved case reads back as an equal case."""
 
 import json
 import pickle
@@ -20,7 +20,7 @@ from fvsolve.case.schema import full_schema, schema_text
 from fvsolve.errors import CaseError
 from fvsolve.parts import KINDS, Friction, Wall
 
-# The example of the design, fluid by numbers.
+# Example of the design, with a user fluid.
 SCENE = """
 schema = 1
 title = "A valve shuts at the end of a 914 m main"
@@ -138,7 +138,7 @@ def test_the_case_is_frozen(scene):
 
 
 def dressed(tmp_path, **changes):
-    """A case that uses nearly every key there is."""
+    """File of a case that uses nearly every key."""
     (tmp_path / "in").mkdir(exist_ok=True)
     (tmp_path / "in" / "stroke.csv").write_text("# measured\nt [ms],opening [%]\n0,100\n500,40\n900,0\n")
     (tmp_path / "stroke.csv").write_text("t [s];demand [l/s]\n0;1\n2;3\n")
@@ -223,7 +223,7 @@ def test_every_form_is_understood(tmp_path):
     assert hole.kind == "orifice" and hole.opening.exponent == 1.5 and hole.characteristic == "equal-percentage"
     assert hole.flow_area() == approx(np.pi / 4 * 0.01**2 / np.sqrt(2.4))
     assert case.elevations_stated and case.elevation("tower") == 3
-    assert case.elevation("lake") == 1  # given by head: level with the far end of its first link
+    assert case.elevation("lake") == 1  # no elevation stated: that at the far end of its first link
     claim = case.expect["at(tower.level, 500 ms)"]
     assert (claim.function, claim.time, claim.value, claim.atol) == ("at", 0.5, 1.5, 1e-3)
     assert case.expect["final(bell.gauge_pressure)"].value == 2e5
@@ -231,7 +231,7 @@ def test_every_form_is_understood(tmp_path):
     assert rig.v.tolist() == approx([5.3e5, 5.4e5, 5.5e5]) and (rig.time, rig.value) == ("t [s]", "p [barg]")
     assert case.compare["nodes.gate.head"].shift == 0.012
     assert case.output.units == {"pressure": "barg", "flow": "l/s", "gauge_pressure": "barg"}
-    assert case.numerics.method == "auto"  # the default where rtol is given
+    assert case.numerics.method == "auto"  # default with rtol
     assert case.output.every == 61.0 / 1000
     assert sorted(case.copies) == ["rig.csv", "stroke-2.csv", "stroke.csv"]
 
@@ -243,7 +243,7 @@ def test_wave_speed_and_cells(tmp_path):
     assert case.wave_speed("stiff") == approx(np.sqrt(1.5e9 / 870))
     assert case.links["main"].cells == round(100 / case.wave_speed("main") / 2e-3)
     alike = load(case, set={"numerics": {"end": 1, "rtol": 1e-6}})
-    assert (alike.links["main"].cells, alike.links["stiff"].cells) == (100, 8)  # of one travel time
+    assert (alike.links["main"].cells, alike.links["stiff"].cells) == (100, 8)  # equal travel times of cells
 
 
 def test_the_resolved_case_says_the_same(tmp_path):
@@ -306,12 +306,12 @@ def test_a_case_goes_through_pickle_and_back(scene):
             "0.5",
             lambda case: case.expect["max(gate.pressure)"].rtol == 0.5,
         ),
-        # a key takes the place of the one it stands for
+        # a key replaces its alternative
         ("numerics.step", "1 ms", lambda case: case.numerics.step == 1e-3 and case.numerics.courant is None),
         ("links.main.wall", "rigid", lambda case: case.links["main"].wave_speed is None),
         ("nodes.lake.pressure", "4 barg", lambda case: case.nodes["lake"].head is None),
         ("links.main.friction.factor", "0.02", lambda case: case.links["main"].friction.roughness is None),
-        # a new part may come in whole
+        # a whole part may be added
         (
             "links.bypass",
             {"type": "orifice", "from": "lake", "to": "gate", "Kv": 1},
@@ -380,7 +380,7 @@ def test_every_size_of_a_valve_passes_the_flow_it_names(size, flow):
 
 
 def test_what_the_schema_refers_to_is_what_it_says_unshared():
-    """Every reference is known, what it stands for is what stood there, and lists in a line are the same lists."""
+    """All references of the schema are defined and expand to the full schema, and its text reads back as the schema."""
     made, defs, unshared = schema(), schema()["$defs"], full_schema()
 
     def expanded(part):
@@ -407,17 +407,17 @@ def test_a_parts_key_is_documented_with_its_unit():
         "type",
         "from",
         "to",
-    ]  # a length or a profile, a diameter or a nominal size, as it likes
+    ]  # not required: one of length and profile, one of diameter and nominal
     assert pipe["properties"]["length"]["description"] == "length along its axis [m]"
     assert made["required"] == ["fluid", "nodes", "numerics"]
 
 
 def test_the_schema_wants_links_but_beside_a_basin_or_a_body():
-    """As `load` does; an editor that reads the schema says no more of the shipped cases than `check`."""
+    """`load` requires links on this condition, so editors report no fault in the shipped cases."""
     made = schema()
     (group,) = made["if"]["properties"]
     excluded = made["if"]["properties"][group]["additionalProperties"]["properties"]["type"]["not"]["enum"]
-    for path in (Path(__file__).parents[1] / "cases").glob("*.toml"):
+    for path in folders.CASES.glob("*.toml"):
         table = tomllib.loads(path.read_text(encoding="utf-8"))
         plain = all(one["type"] not in excluded for one in table[group].values())
         assert {*made["required"], *(made["then"]["required"] if plain else ())} <= {*table}, path.name
@@ -433,7 +433,7 @@ def test_the_page_of_the_case_file_names_every_key_and_its_example_reads():
 
 
 def headings(page: str) -> dict[str, str]:
-    """Heading -> text of a page of the docs; a heading may name several kinds."""
+    """Texts of a page of the docs by heading; a heading may name several kinds."""
     found = re.findall(r"^## (.*?)\n(.*?)(?=^#|\Z)", page, re.DOTALL | re.MULTILINE)
     return {name: text for heading, text in found for name in heading.split(", ")}
 
@@ -480,7 +480,7 @@ def test_the_page_of_the_parts_has_the_defaults():
 
 def test_shipped_cases_point_editors_to_the_schema():
     folder = folders.CASES
-    assert json.loads((folder / "schema.json").read_text()) == schema()  # else: fvsolve schema > cases/schema.json
+    assert json.loads((folder / "schema.json").read_text()) == schema()  # to update: fvsolve schema > cases/schema.json
     for path in folder.glob("*.toml"):
         assert path.read_text(encoding="utf-8").startswith("#:schema schema.json\n"), path.name
 

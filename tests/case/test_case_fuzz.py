@@ -1,4 +1,4 @@
-"""Any file whatever is a case or a CaseError: never another exception; and a case reads back as itself."""
+"""Any file is a case or a CaseError, never another exception, and a resolved case reads back as an equal case."""
 
 import copy
 import tomllib
@@ -22,9 +22,9 @@ DESIGN = {"limits": {"top": {"on": "main", "minimum": "vacuum", "maximum": "20 b
                      "quick": {"on": ["main-2"], "quantity": "velocity", "maximum": 3}},
           "routes": {"way": {"pipes": ["main"]}},
           "expect": {"max(main.head)": {"value": 1, "rtol": 1}}}  # fmt: skip
-SEEDS += [placed(bends=[1800.0], **DESIGN)] * 3  # more is said there than elsewhere
+SEEDS += [placed(bends=[1800.0], **DESIGN)] * 3  # this case has more keys
 SEEDS += [tomllib.loads(path.read_text(encoding="utf-8")) for path in CASES]
-SEEDS = [{**seed, "fluid": SEEDS[0]["fluid"]} for seed in SEEDS]  # CoolProp is not what is tried here
+SEEDS = [{**seed, "fluid": SEEDS[0]["fluid"]} for seed in SEEDS]  # without CoolProp, which is not tested here
 
 WORDS = st.sampled_from(
     """0 bar|-1 barg|3 kg|20 C|1e999 m|5 m|2 m3/h|gate|lake|main|a|valve.flow||.|@
@@ -62,7 +62,7 @@ def places(table, path=()):
 
 @st.composite
 def spoiled(draw):
-    """A valid case with a few keys deleted, replaced, renamed or added."""
+    """Valid case with a few keys deleted, replaced, renamed, added or copied."""
     case = copy.deepcopy(draw(st.sampled_from(SEEDS)))
     for _ in range(draw(st.integers(1, 4))):
         every = list(places(case))

@@ -1,4 +1,4 @@
-"""A key changes what its class says: every kind of key in up to four shipped cases, moved and built anew."""
+"""Each kind of key changes no more of a model than its class states, in up to four shipped cases."""
 
 import copy
 import re
@@ -14,21 +14,21 @@ from fvsolve.case.changes import CLASSES, changes, declaration_of
 from fvsolve.errors import FvsolveError
 from fvsolve.parts.value import SHAPE, Choice
 
-LARGE = ("net3-pump-trip", "adelaide", "bowl", "swirl", "accumulator")  # which take seconds to be built over and over
+LARGE = ("net3-pump-trip", "adelaide", "bowl", "swirl", "accumulator")  # cases that take seconds to build
 NUMBER = re.compile(r"\s*([+-]?[\d._]+(?:[eE][+-]?\d+)?)(\s*\S.*|)")
 HAIR = 1e-4
-# of class `shape`; the shipped case that has them does not show it, a test of its own does
+# keys of class `shape` that do not change the shape of the shipped case; a separate test shows that they can
 ALIKE = {"loss_in", "loss_out"}
 
 
 def raw_case(name: str) -> dict:
-    """A shipped case without what the shortest run does not need."""
+    """Table of a shipped case without expectations and comparisons."""
     table = tomllib.loads((CASES / f"{name}.toml").read_text(encoding="utf-8"))
     return {key: one for key, one in table.items() if key not in ("expect", "compare")}
 
 
 def leaves(table, keys=()):
-    """(keys, value) of all that a case gives; of a list those of its entries."""
+    """(keys, value) of every value of a case, also of the entries of lists."""
     inner = table.items() if isinstance(table, dict) else enumerate(table) if isinstance(table, list) else ()
     for key, one in inner:
         yield from leaves(one, (*keys, key))
@@ -37,7 +37,7 @@ def leaves(table, keys=()):
 
 
 def others(table: dict, keys: tuple, value, far: bool) -> list:
-    """What else a key may say: numbers a hair more, of shapes (or if `far`) much more, other words, other places."""
+    """Other values of a key: slightly greater numbers, for shapes (or if `far`) much greater; other words, places."""
     inner = table
     for key in keys[:-1]:
         inner = inner[key]
@@ -68,7 +68,7 @@ def moved(table: dict, keys: tuple, to) -> dict:
 
 
 def form(model) -> tuple:
-    """Sizes, names and whole numbers of a model."""
+    """Sizes, names and integers of a model."""
     tables = {name: (table.shape, *(table[column].tobytes() for column in whole_columns(table)))
               for name, table in zip(model.tables._fields, model.tables, strict=True)}  # fmt: skip
     tables["integers"] = model.tables.integers.tobytes()
@@ -82,7 +82,7 @@ def whole_columns(table) -> list[str]:
 
 
 def start(model) -> list[bytes]:
-    """Where a run starts from: the state, and pressures and flows of the profile that it deviates from."""
+    """Start of a run as bytes: states, and pressures and flows of the starting profile."""
     tables = model.tables
     flows = [table["flow"].tobytes() for table in (tables.pipes, tables.columns, tables.valves)]
     profile = [profile.tobytes() for _, profile in sorted(model.profiles.items())]
@@ -96,20 +96,20 @@ def found_class(before, after) -> str:
 
 
 def spoken(keys: tuple) -> str:
-    """The path of a key as a setting says it, without places in lists."""
+    """Path of a key as in a setting, without places in lists."""
     return ".".join(f'"{key}"' if re.search(r"\W", key) else key for key in keys if isinstance(key, str))
 
 
 class Trial:
-    """Keys of cases, moved: what is wrong of them, and of those that say `shape` which were seen to change it."""
+    """Trial of changed keys in cases: wrong classes, and for each key of class `shape` if it changed the shape."""
 
     def __init__(self, every: bool) -> None:
-        # every : each kind of key in four cases, of large cases those that no other has; else in one
+        # every : each kind of key in four cases, in large cases only kinds of no other case; otherwise in one case
         self.every, self.wrong, self.done = every, [], set()
-        self.cases: Counter = Counter()  # in which a kind of key was moved
+        self.cases: Counter = Counter()  # number of cases for each kind of key
         self.told: dict[int, bool] = {}
         self.names: dict[int, str] = {}
-        self.values: list = []  # so that no other gets the number of one
+        self.values: list = []  # keeps objects alive, so that their ids stay unique
 
     def case(self, name: str, given: dict | None = None) -> None:
         table = given or raw_case(name)
@@ -143,7 +143,7 @@ class Trial:
                     return
 
     def never(self) -> list[str]:
-        """Keys that say `shape` and never changed one."""
+        """Keys of class `shape` that never changed the shape."""
         return [self.names[key] for key, told in self.told.items() if not told]
 
 
@@ -153,7 +153,7 @@ def beside_their_files(monkeypatch):
 
 
 def test_a_key_changes_no_more_than_it_says_and_each_that_says_shape_does():
-    """Each kind of key in one case; the test below moves it in four."""
+    """Each kind of key in one case; a test below takes four cases."""
     trial = Trial(every=False)
     for path in sorted(CASES.glob("*.toml")):
         if path.stem not in LARGE:
@@ -165,7 +165,7 @@ def test_a_key_changes_no_more_than_it_says_and_each_that_says_shape_does():
 
 SIZE = {"diameter": 0.05, "loss_coefficient": 2.0}
 TRIM = {"opening": [0.0, 0.5, 1.0], "flow_area": [0.0, 0.2, 1.0]}
-OTHERS = scene(  # keys that no shipped case gives
+OTHERS = scene(  # keys of no shipped case
     {
         "lake": {"type": "reservoir", "head": 60.0},
         "a": {"type": "junction", "demand": 2e-3, "required_pressure": 4e5, "minimum_pressure": 1.5e5,
@@ -220,7 +220,7 @@ def test_keys_that_no_shipped_case_gives_change_no_more_than_they_say():
 
 
 def test_losses_alike_are_another_shape_where_a_pipe_joins():
-    """Of a throat with one loss for both ways the place has a closed root; the shipped one is joined by a column."""
+    """With equal losses in both directions the root has a closed form; in the shipped case a column joins the tank."""
     tank = {"type": "tank", "area": 2.0, "level": 3.0, "connection": {"diameter": 0.1, "loss_in": 1.0, "loss_out": 1.5}}
     case = scene({"lake": reservoir(2e5), "tank": tank}, {"main": pipe("lake", "tank", 100.0, 0.1, 1000.0, 4)}, 1.0, {})
     before = fvsolve.build(fvsolve.load(case))
@@ -237,7 +237,7 @@ def test_no_key_of_any_shipped_case_changes_more_than_it_says():
 
 
 def test_what_a_key_changes_depends_on_the_case_where_its_part_says_so():
-    """A length makes cells where a pipe states none; a signal changes what it drives; friction with a past what not."""
+    """Classes depend on stated cells, on the target of a signal, and on unsteady friction."""
     case = fvsolve.load("valve-closure")
     for key, said in {
         "links.valve.area": "profile", "links.main.length": "profile", "links.main.cells": "shape", "title": "value",

@@ -1,4 +1,4 @@
-"""One rule for limits and claims: what may be passed, or what no run can tell, is open, and neither holds."""
+"""Limits and claims have a common rule: a result that the run cannot confirm is open, and open does not hold."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from reference.scenes import area, junction, lake, pipe, ramp, reservoir, scene,
 import fvsolve
 from fvsolve.case.text import write
 
-PARTS = 0.8  # s, about when the trough behind the closure is back: 0.1 s + 600 m / 1000 m/s and some steps
+PARTS = 0.8  # [s], approximate return of the trough behind the closure: 0.1 s + 600 m / 1000 m/s and some steps
 
 
 def marked(opening: float = 0.1, **more) -> dict:
-    """A pipe shut in 0.1 s, whose law knows no cavities: liquid below its vapour pressure is a mark."""
+    """Case of a pipe shut in 0.1 s under a law without cavities, so that pressure below vapour pressure is a mark."""
     nodes = {"lake": lake(20.0, elevation=0.0), "gate": junction(elevation=0.0),
              "air": reservoir(1e5, elevation=0.0)}  # fmt: skip
     links = {"main": pipe("lake", "gate", 300.0, 0.2, 1000.0, 30),
@@ -22,7 +22,7 @@ def marked(opening: float = 0.1, **more) -> dict:
     return scene(nodes, links, 1.2, {}, ["gate.head"], **more)
 
 
-WIDE = {"value": 0.0, "atol": 1e6}  # what any number holds
+WIDE = {"value": 0.0, "atol": 1e6}  # any number is within this
 CLAIMS = ("min(gate.head)", "final(gate.head)", "mean(gate.head)", "min(main.head)", "at(gate.head, 1 s)")
 
 

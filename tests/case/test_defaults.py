@@ -1,4 +1,4 @@
-"""[defaults.pipe]: what pipes are that do not say it themselves; faults stand where they were written, once."""
+"""[defaults.pipe]: values for pipes that do not state a key; a fault is reported once, at its place in the file."""
 
 import pytest
 from reference.scenes import junction, lake, scene
@@ -92,7 +92,7 @@ def test_settings_and_sweeps_reach_them(file):
     moved = load(case, {"links.two.length": 600})
     assert moved.links["two"].length == 600 and moved.links["one"] == case.links["one"]
     stiff = load(case, {"defaults.pipe.wave_speed": 1000}).links["one"]
-    assert stiff.wave_speed == 1000 and stiff.wall is None  # a setting takes the place of its alternative there
+    assert stiff.wave_speed == 1000 and stiff.wall is None  # a setting replaces its alternative in the defaults
     assert load(case, {"links.one.wave_speed": 1100}).links["one"].wall is None
     assert (
         changes(case, "defaults.pipe.cells") == "shape" and changes(case, "defaults.pipe.friction.factor") == "profile"
@@ -109,7 +109,7 @@ def test_settings_and_sweeps_reach_them(file):
     (("7 mm", "7 kg"), "defaults.pipe.wall.thickness", "is a mass; expected a length"),
     (("factor = 0.02", "factr = 0.02"), "defaults.pipe.friction.factr", "unknown key"),
     (("wall = {", "wave_speed = 900\nwall = {"), "defaults.pipe.wall", "wave_speed and wall are given; keep one"),
-    (("[defaults.pipe]", "[defaults.pip]"), "defaults.pip", 'defaults of "pip" are unknown; did you mean "pipe"?'),
+    (("[defaults.pipe]", "[defaults.pip]"), "defaults.pip", '"pip" has no defaults; did you mean "pipe"?'),
 ])  # fmt: skip
 def test_a_fault_is_named_where_it_stands_and_once(file, changed, place, said):
     with pytest.raises(CaseError) as caught:
@@ -127,7 +127,7 @@ def test_the_schema_knows_them():
 
 
 def test_pieces_of_a_pipe_that_is_cut_have_them_once(file):
-    """A loss among defaults is shared by the pieces, not given to each."""
+    """A loss in the defaults is shared among the pieces, not given to each of them."""
     placed = '[nodes.end]\ntype = "junction"\n[nodes.gauge]\ntype = "junction"\non = "one"\nat = "400 m"'
     case = load(file(('[nodes.end]\ntype = "junction"', placed), ("cells = 30", "cells = 30\nminor_loss = 2.0")))
     pieces = [case.links["one-1"], case.links["one-2"]]

@@ -1,4 +1,4 @@
-"""Faults: one bad file per message, with its line, key path, what was found and what was wanted."""
+"""Faults: one bad file for each message, with line, key path, value found and value expected."""
 
 import re
 import tomllib
@@ -215,7 +215,7 @@ BAD = {
         SCENE + RIGID.replace('type = "junction"', 'type = "junction"\ndemand = 0.1\nrequired_pressure = 3e5'),
         "nothing sets its pressure, since its demand is constant above its required_pressure",
     ),
-    # two of a kind
+    # exclusive keys
     "two step settings": (
         add("numerics", "step = 1e-3"),
         "numerics.step: courant and step are given; keep one",
@@ -350,7 +350,7 @@ BAD = {
         add("fluid", 'pressure = "0 bar"'),
         'fluid.pressure: "0 bar" is absolute, a vacuum',
     ),
-    # the fluid: what fluid.py refuses comes with its key
+    # the fluid: errors of fluid.py are reported with their key
     "fluid without density": (swap("density = 998\n", ""), "fluid.density:"),
     "density law": (add("fluid", 'law = "cubic"'), 'fluid.law: no density law named "cubic"'),
     "fluid name": (swap('"user"', '"Watr"'), "line 5: fluid.name: "),
@@ -370,7 +370,7 @@ BAD = {
     "tank without level": (tank("level = 1\n", ""), "nodes.t: level is missing"),
     "level above height": (
         tank("level = 1\n", "level = 3\nheight = 2\n"),
-        "nodes.t.level: 3 m is above its `height` of 2 m",
+        "nodes.t.level: 3 m is above the `height` of 2 m",
     ),
     "negative level": (
         tank("level = 1", "level = -1"),
@@ -415,7 +415,7 @@ BAD = {
     ),
     "empty schedule": (
         opening("{ time = [], value = [] }"),
-        "opening.time: [] is not a list; expected a list of values",
+        "opening.time: [] has no values; expected a list of values",
     ),
     "schedule kind": (
         opening('{ time = [0, 1], value = [1, 0], kind = "cubic" }'),
@@ -464,7 +464,7 @@ BAD = {
     ),
     "schedule file empty": (
         opening('{ file = "empty.csv" }'),
-        "empty.csv is empty; expected a header and rows of numbers",
+        "empty.csv has no rows; expected a header and rows of numbers",
     ),
     "schedule file, one column": (
         opening('{ file = "one.csv" }'),
@@ -631,7 +631,7 @@ BAD = {
         SCENE + '[compare]\n"gate.head" = { fil = "good.csv" }',
         'compare."gate.head".fil: unknown key; did you mean "file"?',
     ),
-    # what was meant
+    # suggestions
     "a closing time": (
         swap("discharge_coefficient = 0.6", "closing_time = 3"),
         'links.valve.closing_time: unknown key; use opening = { start = "1 s", duration = "2 s", value = [1, 0] }',
@@ -775,7 +775,7 @@ CANNOT_START = {
     "unequal heads and no friction": (
         SCENE.replace('"steady", roughness = "0.26 mm"', '"none"').replace('"junction"', '"reservoir"\nhead = 3'),
         {},
-        "line 23: links.main: no steady state: this pipe has no friction",
+        "line 23: links.main: no steady state: it has no friction",
     ),
     "what moves": (
         SCENE.replace("courant = 0.9", 'initial = "equilibrium"').replace('"junction"', '"tank"\nlevel = 1\narea = 1'),

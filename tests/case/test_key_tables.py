@@ -1,4 +1,4 @@
-"""The key tables of docs/parts.md are the declarations: each table as it is made now, each part with one."""
+"""Key tables of docs/parts.md: each equals the declaration of its part, and each part has one."""
 
 import pytest
 from reference.folders import page as page_of
@@ -10,12 +10,12 @@ from fvsolve.parts import KINDS
 
 def test_the_tables_of_the_page_are_those_of_the_declarations():
     text = page_of("parts")
-    assert page(text) == text  # else: python -m fvsolve.case.key_tables docs/parts.md
+    assert page(text) == text  # to update: python -m fvsolve.case.key_tables docs/parts.md
 
 
 def test_every_part_has_a_table_on_the_page_and_every_table_a_row_a_key():
     named = [name for _, name, _ in MARK.findall(page_of("parts"))]
-    assert {*KINDS["nodes"], *KINDS["links"]} - {*named} == {"orifice"}  # a valve by another name
+    assert {*KINDS["nodes"], *KINDS["links"]} - {*named} == {"orifice"}  # a valve under another name
     assert len(named) == len({*named})
     assert [line.split(" | ")[0] for line in key_table("chamber").splitlines()[2:]] == [
         "| `volume`",

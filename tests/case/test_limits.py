@@ -1,4 +1,4 @@
-"""Limits find what was planted, in any unit, direction and order, and say where and when."""
+"""Limits find known exceedances in any unit, direction and order, with place and time."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ JUMP = RHO * SPEED * VELOCITY
 
 
 def shut(turned: bool = False, **more) -> dict:
-    """A lake and a frictionless pipe of two halves, shut at once: pressure +- JUMP, exact at Courant 1."""
+    """Case of a lake and a frictionless pipe in two halves, shut at once: pressure +- JUMP, exact at Courant 1."""
     q = VELOCITY * area(DIAMETER)
     nodes = {"lake": lake(HEAD, elevation=0.0), "middle": junction(elevation=10.0),
              "gate": junction(step(SHUT, q, 0.0), elevation=20.0)}  # fmt: skip
@@ -41,7 +41,7 @@ def test_a_planted_exceedance_is_found_at_its_chainage_and_time(turned: bool) ->
     limits = {"top": {"on": "line", "maximum": "14 bar"}, "vacuum": {"on": "pipes", "minimum": "vacuum"}}
     found = judged(shut(turned, routes=routes, limits=limits))
     top = found["top"]
-    highest = AMBIENT + RHO * GRAVITY * HEAD + JUMP  # at the bottom, but behind the lake's own end, which knows no rise
+    highest = AMBIENT + RHO * GRAVITY * HEAD + JUMP  # at the bottom, except the end at the lake, which has no rise
     assert not top.ok and top.place == "low" and top.unit == "Pa" and top.bound == "maximum"
     assert top.chainage == pytest.approx(5025.0)  # the first cell
     z = 20.0 * 25.0 / LENGTH
@@ -51,13 +51,13 @@ def test_a_planted_exceedance_is_found_at_its_chainage_and_time(turned: bool) ->
     assert found["vacuum"].ok and found["vacuum"].place == "high"
     least = AMBIENT + RHO * GRAVITY * (HEAD - 20.0) - JUMP
     assert found["vacuum"].value == pytest.approx(least, rel=1e-12)
-    assert found["vacuum"].chainage == pytest.approx(6000.0)  # the very end, no cell's middle
+    assert found["vacuum"].chainage == pytest.approx(6000.0)  # end of the pipe, not the middle of a cell
     assert found["vacuum"].elevation == pytest.approx(20.0)
 
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_picture_has_it_where_it_stands_whatever_the_unit_and_however_the_pipe_is_cut(turned: bool) -> None:
-    """Lengths in feet, the pipe cut by a device, the limit on pipes and not on the route: one chainage everywhere."""
+    """Chainages of verdict and picture agree with lengths in feet, a pipe cut by a part, and a limit on pipes."""
     found = []
     for more in ({}, {"tap": {"type": "junction", "on": "low", "at": "250 m"}}):
         case = shut(turned, limits={"top": {"on": ["low", "high"], "maximum": "14 bar"}},
@@ -75,7 +75,7 @@ def test_a_picture_has_it_where_it_stands_whatever_the_unit_and_however_the_pipe
 
 
 def test_among_the_nodes_a_reservoir_is_not_judged() -> None:
-    """Its pressure is given, perhaps at no elevation of its own: here it stands at its head, under no pressure."""
+    """The pressure of a reservoir is given; here its elevation equals its head, so that its pressure head is 0."""
     case = shut(limits={"low": {"on": "nodes", "quantity": "pressure_head", "minimum": "5 m"}})
     case["nodes"]["lake"] = lake(HEAD, elevation=HEAD)
     assert {one["place"] for one in judged(case)["low"].worst} == {"middle", "gate"}
@@ -84,7 +84,7 @@ def test_among_the_nodes_a_reservoir_is_not_judged() -> None:
 
 
 def test_the_same_limit_said_in_other_words_has_the_same_verdict() -> None:
-    level = HEAD + JUMP / (RHO * GRAVITY) - 20.0 - 1.0  # a metre below what the gate meets
+    level = HEAD + JUMP / (RHO * GRAVITY) - 20.0 - 1.0  # 1 m below the greatest pressure head at the gate
     gauge = RHO * GRAVITY * level
     limits = {
         "absolute": {"on": "gate", "maximum": gauge + AMBIENT},
@@ -134,7 +134,7 @@ def test_a_limit_that_is_just_met_holds_and_every_one_of_two_bounds_counts() -> 
 @pytest.mark.parametrize("method", ["rk4", "gauss-4", "rodas-4"])
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_no_row_is_needed_to_find_it(method: str, law: str) -> None:
-    """A limit looks at every step: one row at the end has the verdict of a thousand, which tell little more."""
+    """Limits use every step, so the verdict with one output row is nearly that with a thousand rows."""
     limits = {"top": {"on": "high", "maximum": 1.0e6}, "valve": {"on": "gate", "quantity": "head", "minimum": 30.0}}
     verdicts = []
     for every in (4.0, 0.004):
@@ -150,7 +150,7 @@ def test_no_row_is_needed_to_find_it(method: str, law: str) -> None:
 
 @pytest.mark.parametrize("method", ["rodas-5p", "dormand-prince", "radau-iia-9", "auto"])
 def test_what_lies_between_long_steps_is_judged_by_rows(method: str) -> None:
-    """Two tanks swing about 2.5 m through a column at rtol 1e-3, some steps a period: the top of the swing is 3 m."""
+    """Two tanks oscillate about 2.5 m through a column at rtol 1e-3, in few steps per period, up to a level of 3 m."""
     column = {"type": "rigid-column", "from": "a", "to": "b", "length": 100.0, "diameter": 0.5}
     tanks = {name: {"type": "tank", "area": 2.0, "level": level} for name, level in (("a", 3.0), ("b", 2.0))}
     found = fvsolve.run({
@@ -186,7 +186,7 @@ def test_a_run_that_stops_passes_no_limit(fvs, tmp_path) -> None:
 
 
 def test_where_numbers_are_not_to_be_trusted_no_limit_holds(fvs, tmp_path, monkeypatch) -> None:
-    """Below the vapour pressure at every place: one line, the first place first, and a limit is open or fails."""
+    """Pressure below vapour pressure everywhere: one message with the first place, and limits that are open or fail."""
     monkeypatch.chdir(tmp_path)
     limits = {"top": {"on": "pipes", "maximum": "100 bar"}, "low": {"on": "pipes", "maximum": "5 bar"}}
     case = shut(limits=limits)
@@ -215,11 +215,11 @@ def test_what_goes_on_after_the_end_is_noted_and_nothing_is_sized_by_it(fvs, tmp
         status == 1
         and "OPEN, because nodes.gate.demand: continues to 30.1 s, after the end of the run at 4 s: " in text
     )
-    held = {"nodes.gate.demand": {"time": [0.0, 30.0], "value": [flow, flow]}}  # goes on, but changes nothing
+    held = {"nodes.gate.demand": {"time": [0.0, 30.0], "value": [flow, flow]}}  # continues without change
     assert [one for one in fvsolve.run(case, set=held).warnings if one.kind == "end"] == []
     status, text, _ = fvs("size", "scene.toml", "--vary", "nodes.gate.demand.duration=0.1 s,30 s", "--goal", "minimum")
     assert status == 0 and "open: nodes.gate.demand: continues to 30.1 s" in text
-    value = float(text.split("holds all limits: ")[1].split(" s;")[0])
+    value = float(text.split("satisfies all limits: ")[1].split(" s;")[0])
     assert 1.0 < value < 4.0 - SHUT and "open" in text
 
 
@@ -253,14 +253,14 @@ def test_expect_reaches_whole_pipes_and_routes() -> None:
     ("limit", "place", "told"),
     [
         ({"on": "hihg", "maximum": 1e6}, "on", 'did you mean "high"'),
-        ({"on": "high"}, "", "bound is missing; expected one of minimum, maximum, class_fraction"),
+        ({"on": "high"}, "", "bound is missing; expected at least one of minimum, maximum, class_fraction"),
         ({"maximum": 1e6}, "", "on is missing"),
         ({"on": "high", "maximum": "3 m/s"}, "maximum", "is a velocity; expected a pressure"),
         ({"on": "high", "quantity": "gas_volume", "maximum": 1.0}, "quantity", "high has no"),
         ({"on": "high", "minimum": 2e6, "maximum": 1e6}, "minimum", "is not below maximum"),
         ({"on": "high", "quantity": "velocity", "minimum": "vacuum"}, "minimum", "is a pressure; expected a velocity"),
         ({"on": "high", "minimum": "vaccum"}, "minimum", 'did you mean "vacuum"'),
-        ({"on": "high", "class_fraction": 1.0}, "class_fraction", "has no pressure class"),
+        ({"on": "high", "class_fraction": 1.0}, "class_fraction", "no pressure class is given for"),
         ({"on": [], "maximum": 1e6}, "on", "is not a name"),
         ({"on": "nodes", "quantity": "level", "maximum": 2.0}, "quantity", "no node has"),
         ({"on": "high", "top": 2.0, "maximum": 1e6}, "top", "unknown key"),

@@ -1,4 +1,4 @@
-"""A limit at vapour pressure fails where a cavity opens, though no pressure is below it; NaN never holds."""
+"""A limit at vapour pressure fails where a cavity opens, though no pressure is lower; NaN satisfies no limit."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ from fvsolve.studies.calibrate import calibrate
 from fvsolve.studies.closure_optimisation import optimise
 from fvsolve.studies.sizing import size
 
-BOILS = 2300.0  # Pa, of the scenes' water
-BELOW = (BOILS - AMBIENT) / (RHO * GRAVITY)  # its head below the pipe
+BOILS = 2300.0  # [Pa], vapour pressure of the water in reference/scenes.py
+BELOW = (BOILS - AMBIENT) / (RHO * GRAVITY)  # [m], head of the vapour pressure
 LEAST = {
     "pressure": BOILS,
     "gauge_pressure": BOILS - AMBIENT,
     "head": -12.0,
     "pressure_head": -12.0,
-}  # no head is -12 m
+}  # no head is as low as -12 m
 
 
 def parting(limits: dict, turned: bool = False, opening: float = 0.1, **more) -> dict:
-    """A pipe shut in 0.1 s: 5 m/s by 1000 m/s are 510 m, and the column parts at the gate when the wave is back."""
+    """Case of a pipe shut in 0.1 s: 5 m/s times a / g is 510 m, and the column separates at the gate after 2 L / a."""
     nodes = {"lake": lake(20.0, elevation=0.0), "gate": junction(elevation=0.0),
              "air": reservoir(1e5, elevation=0.0)}  # fmt: skip
     ends = ("gate", "lake") if turned else ("lake", "gate")
@@ -69,7 +69,7 @@ def test_it_holds_where_none_opens(quantity: str) -> None:
         "on": "gate",
         "quantity": "pressure",
         "minimum": 1.5 * BOILS,
-    }  # a bound above vapour is compared by its number
+    }  # above vapour pressure, numbers are compared
     (found,) = fvsolve.run(parting({"a": above})).verdicts
     assert found.limit == 1.5 * BOILS and found.state == "fails"
 
@@ -86,11 +86,11 @@ def test_the_vapour_line_is_drawn_where_cavities_are_followed(tmp_path) -> None:
     assert any(f"<v>{one.lines['vapour line'][0]:.6g}"[:10] in text for text in sheets)
 
 
-# what is not a number -----------------------------------------------------------------------------------------------
+# values that are not numbers ----------------------------------------------------------------------------------------
 
 
 def weightless(**more) -> dict:
-    """No gravity, so no heads: they are not numbers all along, while pressures are."""
+    """Case without gravity, in which heads are not numbers but pressures are."""
     nodes = {"lake": reservoir(3e5), "gate": junction(), "air": reservoir(1e5)}
     links = {"main": pipe("lake", "gate", 300.0, 0.2, 1000.0, 6),
              "tap": valve("gate", "air", 0.02 * area(0.2), ramp(0.1, 0.5, 1.0, 0.0))}  # fmt: skip
@@ -100,7 +100,7 @@ def weightless(**more) -> dict:
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("bounds", [{"minimum": 1e4}, {"maximum": 1e6}, {"minimum": 1e4, "maximum": 1e6}])
 def test_a_value_that_is_no_number_never_holds(wrong: float, bounds: dict) -> None:
-    """In one place of many, in both extremes; the others hold."""
+    """Both extremes of a single place are not numbers; all other places satisfy the limit."""
     model = model_of(weightless(limits={"a": {"on": "main", **bounds}}))
     summary = solve(model, initial_state(model), MemorySink(model))
     limit = model.case.limits["a"]
@@ -144,7 +144,7 @@ def test_cycles_of_no_numbers_last_no_time() -> None:
 
 
 def test_a_size_counts_a_cavity_as_a_failure() -> None:
-    """The quicker the tap shuts, the deeper the trough: the least time is one without a cavity."""
+    """A quicker closure gives a deeper trough; the least closing time is one without cavity."""
     case = parting({"a": {"on": "main", "minimum": "vapor"}})
     found = size(case, "links.tap.opening.duration", "0.1 s", "20 s", rtol=0.2, set={"numerics.end": 3.0})
     assert found.value is not None and found.value > 0.1

@@ -1,4 +1,4 @@
-"""Methods whose tableau stands in a file beside the case: in the case, in a run and its directory, in a chart."""
+"""Methods with a tableau file beside the case: in a case, in a run and its directory, and in a chart."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ HEUN_EULER = "0 |\n1 | 1\n--+----\n  | 1/2 1/2\n  | 1 0"
 
 @pytest.fixture(autouse=True)
 def forgotten():
-    """Methods that a test makes known are its own."""
+    """Restore METHODS after a test."""
     known = dict(METHODS)
     yield
     METHODS.clear()
@@ -36,7 +36,7 @@ def forgotten():
 
 
 def placed(folder, tableau=SSP43, file="ssp43.txt", method="ssp43.txt"):
-    """A case and its method in a folder."""
+    """Case file with its method file in a folder."""
     (folder / file).parent.mkdir(parents=True, exist_ok=True)
     (folder / file).write_text(tableau)
     case = folder / "tanks.toml"
@@ -46,7 +46,7 @@ def placed(folder, tableau=SSP43, file="ssp43.txt", method="ssp43.txt"):
 
 
 def test_a_method_of_a_file_is_that_of_its_tableau(tmp_path):
-    """Relative to the case, wherever the command stands; the same steps as by `tableau`."""
+    """The path is relative to the case, and the steps equal those with `tableau`."""
     run = fvsolve.run(placed(tmp_path, file="methods/ssp43.txt", method="methods/ssp43.txt"))
     METHODS.pop("ssp43")
     fvsolve.tableau("by-hand", SSP43)
@@ -86,7 +86,7 @@ def test_what_a_file_lacks_is_a_fault_of_the_key(tmp_path, file, tableau, method
 
 def test_two_files_of_one_name_are_not_one_method(tmp_path):
     fvsolve.load(placed(tmp_path / "one"))
-    fvsolve.load(placed(tmp_path / "copy"))  # of the same tableau
+    fvsolve.load(placed(tmp_path / "copy"))  # with an equal tableau
     with pytest.raises(CaseError, match="another method already.*rename"):
         fvsolve.load(placed(tmp_path / "two", HEUN_EULER))
 
@@ -101,7 +101,7 @@ def test_a_chart_prints_a_line_that_the_case_accepts(tmp_path, inside):
     file.parent.mkdir()
     file.write_text(SSP43)
     made = chart(case, methods=[method_name(str(file))], rtol=[1e-3, 1e-5])
-    point = next(one for one in made.points if one.setting.method == "ssp43")  # which is cheapest hangs on the clock
+    point = next(one for one in made.points if one.setting.method == "ssp43")  # the cheapest depends on measured times
     (line,) = (one for one in _target_setting(1e-2, point, fvsolve.load(case)).toml_lines() if one.startswith("method"))
     assert line == f'method = "{"methods/ssp43.txt" if inside else file}"'
     METHODS.pop("ssp43")

@@ -1,4 +1,4 @@
-"""Faults of bodies, of what rides on them and of walls, found before a run begins."""
+"""Faults of bodies, of parts on bodies and of moving walls, found before a run."""
 
 from __future__ import annotations
 

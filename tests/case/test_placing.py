@@ -1,4 +1,4 @@
-"""What is placed by chainage stands where a pipe cut by hand has it."""
+"""Placed parts have the positions of a pipe that is cut by hand."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LENGTH = 3000.0
 
 
 def line(nodes: dict, links: dict, **more) -> dict:
-    """A lake, what joins it to a gate, and a valve that throttles."""
+    """Case of a lake, given nodes and links up to a gate, and a valve that closes to 20 %."""
     nodes = {"lake": lake(110.0, elevation=30.0), "gate": junction(elevation=20.0),
              "sea": reservoir(2e5, elevation=20.0)} | nodes  # fmt: skip
     links = links | {"tap": valve("gate", "sea", 0.02 * area(DIAMETER), step(0.5, 1.0, 0.2))}
@@ -30,7 +30,7 @@ def main(**more) -> dict:
 
 
 def part(start: str, end: str, low: float, high: float) -> dict:
-    """The same pipe between two chainages, as one would write it."""
+    """Piece of the pipe between two chainages, as written by hand."""
     inner = [x for x in HILL["chainage"] if low < x < high]
     z = np.interp([low, *inner, high], HILL["chainage"], HILL["elevation"]).tolist()
     share = (high - low) / LENGTH
@@ -112,7 +112,7 @@ def test_keys_of_the_whole_and_of_its_pieces_can_be_set() -> None:
     assert [row["ok"] for row in found.rows] == [True, True]
 
 
-STANDS = {"half": 1003.0, "top": 1020.0, "hole": 2951.0, "safe": 3997.5}  # none where cells of the whole meet
+STANDS = {"half": 1003.0, "top": 1020.0, "hole": 2951.0, "safe": 3997.5}  # not at faces of the whole pipe
 RESTATED = {
     "as it is": {},
     "by cell_time": {"cells": None},
@@ -126,7 +126,7 @@ RESTATED = {
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("change", RESTATED.values(), ids=RESTATED)
 def test_every_part_stands_where_it_was_put(change: dict, turned: bool, unit: str) -> None:
-    """However the pipe is drawn and cut into cells, each piece has the length between its parts."""
+    """Each piece has the length between its parts, for any direction, unit and number of cells."""
     case = placed(turned)
     main = case["links"]["main"] = {
         key: one for key, one in (case["links"]["main"] | change).items() if one is not None
@@ -149,7 +149,7 @@ def test_every_part_stands_where_it_was_put(change: dict, turned: bool, unit: st
 
 
 def test_steps_are_hardly_shorter_where_parts_stand_between_cells() -> None:
-    """Pieces longer than a few cells have cells of nearly their size."""
+    """Pieces longer than a few cells have cells of nearly the given size."""
     near = placed()
     near["links"]["half"]["at"], near["links"]["hole"]["at"], near["links"]["safe"]["at"] = 1523.0, 2951.0, 3489.0
     found = [link for link in fvsolve.load(near).links.values() if link.kind == "pipe"]
@@ -198,8 +198,8 @@ def test_probes_count_along_the_whole_pipe() -> None:
         (("half", "on", "mian"), 'links.half.on: no pipe named "mian"; did you mean "main"?'),
         (("half", "on", None), "links.half: `at` is 1500.0, but `on` is missing"),
         (("half", "at", None), "links.half: `at` is missing; expected the chainage along main"),
-        (("half", "from", "lake"), "links.half.from: `on` and `at` place it on a pipe, so it starts there"),
-        (("hole", "at", 1500.0), "links.half.at: hole has the same place; join the part to it, or change `at`"),
+        (("half", "from", "lake"), "links.half.from: `on` and `at` place this link on a pipe, where it starts"),
+        (("hole", "at", 1500.0), "links.half.at: hole has the same place; join half to hole, or change `at`"),
         (("main", "diameter", -1.0), "links.main.diameter: -1.0 is out of range"),
         (("main", "friction", {"model": "steady"}), "links.main.friction"),
     ],
@@ -221,7 +221,7 @@ def test_what_lies_in_the_middle_of_a_cell_goes_to_the_same_face_from_either_end
     said = {key: one for key, one in main(cells=cells).items() if key != "profile"}
     for k in range(cells):
         at = (k + 0.5) * LENGTH / cells
-        if abs(at - 0.5 * LENGTH) < 1.0:  # there is no nearer one
+        if abs(at - 0.5 * LENGTH) < 1.0:  # both faces are equally near
             continue
         lengths = []
         for turned in (False, True):
@@ -236,13 +236,13 @@ def test_what_lies_in_the_middle_of_a_cell_goes_to_the_same_face_from_either_end
     ("change", "told"),
     [
         (lambda case: case["links"].update({"main-2": valve("gate", "sea", 1e-4)}), "main-2"),
-        (lambda case: case["nodes"].update({"hole-at": junction(elevation=20.0)}), "hole joins main at a place"),
+        (lambda case: case["nodes"].update({"hole-at": junction(elevation=20.0)}), "hole joins main at a new node"),
         (
             lambda case: case.update(routes={"main": {"pipes": ["main"]}}),
             "main is cut, and its pieces form a route of that name",
         ),
         (lambda case: case["links"]["main"].update(pieces={"main-9": {"cells": 3}}), "main has no piece of that name"),
-        (lambda case: case["links"]["main"].update(pieces=3), "3 is not a table; expected tables"),
+        (lambda case: case["links"]["main"].update(pieces=3), "3 is not a table; expected a table"),
         (lambda case: case["links"]["hole"].update(type="laek"), 'unknown type "laek"'),
     ],
 )  # fmt: skip

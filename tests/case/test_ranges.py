@@ -1,15 +1,14 @@
-"""What is legal but beyond what practice knows is noted once, with the unit that was probably meant."""
+"""Valid values outside the usual range give one notice, with the unit that was probably intended."""
 
 import math
 import re
 import tomllib
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from case.test_faults import SCENE
-from reference import scenes
+from reference import folders, scenes
 
 from fvsolve import run
 from fvsolve.case import load
@@ -19,21 +18,21 @@ from fvsolve.errors import listing
 from fvsolve.parts import KINDS
 from fvsolve.run import model_of
 
-CASES = sorted(path for path in Path("cases").glob("*.toml"))
-EXAMPLES = {  # what the docs print of cases
+CASES = sorted(folders.CASES.glob("*.toml"))
+EXAMPLES = {  # TOML blocks in the docs
     f"{page.stem}-{at}": text
-    for page in sorted(Path("docs").glob("*.md"))
+    for page in sorted(folders.DOCS.glob("*.md"))
     for at, text in enumerate(re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL))
 }
 
-SLIPS = {  # settings -> (place, key, value, limit, what the text says)
+SLIPS = {  # settings -> (place, key, value, limit, part of the text)
     "per cent of a class": (
         {"links.main.allowable_pressure": 1e6, "limits.top": {"on": "main", "class_fraction": 100}},
         "limits.top", "class_fraction", 100.0, 3.0, "1 is the class itself",
     ),
     "diameter in mm": ({"links.main.diameter": 304.8}, "links.main", "diameter", 304.8, 14.0, '"304.8 mm"'),
     "diameter with its unit": ({"links.main.diameter": "300 m"}, "links.main", "diameter", 300.0, 14.0, '"300 mm"'),
-    "wider than long": ({"links.main.length": 0.2}, "links.main", "diameter", 0.3048, 0.2, "its length of 0.2 m"),
+    "wider than long": ({"links.main.length": 0.2}, "links.main", "diameter", 0.3048, 0.2, "the length of 0.2 m"),
     "roughness": (
         {"links.main.friction.roughness": "400 mm"},
         "links.main", "friction.roughness", 0.4, 0.05 * 0.3048, '"0.4 mm"',
@@ -125,7 +124,7 @@ def test_examples_of_the_docs_are_within_what_practice_knows(name):
             try:
                 rest = {key: value for key, value in given.items() if key != "type"}
                 said[group] |= {part: kind.model_validate(rest)} if kind else {}
-            except ValueError:  # it names a file or a signal that stands elsewhere
+            except ValueError:  # the example names a file or a signal that it lacks
                 continue
     if isinstance(raw.get("fluid"), dict) and "name" in raw["fluid"]:
         said["fluid"] = FluidSpec.model_validate(raw["fluid"])
@@ -150,7 +149,7 @@ def test_hoses_capillaries_penstocks_and_their_liquids_are_within(settings):
 
 
 def main(flow: float, viscosity: float = 1e-3, density: float = 1000.0, **pipe) -> dict:
-    """A pipe of 0.3 m that a given flow is drawn through."""
+    """Case of a pipe of 0.3 m with a given flow."""
     said = {"cells": 10, "friction": {"model": "quasi-steady", "roughness": 1e-4}, **pipe}
     fluid = {**scenes.WATER, "viscosity": viscosity, "density": density}
     links = {"main": scenes.pipe("lake", "end", 1000.0, 0.3, 1200.0, **said)}
@@ -163,7 +162,7 @@ def noted(case: dict) -> list:
 
 
 def rigid(case: dict) -> dict:
-    """The same flow in a rigid column into a tank."""
+    """Case with a rigid column into a tank in place of the pipe, at equal flow."""
     pipe, flow = case["links"]["main"], case["nodes"]["end"]["demand"]
     kept = {key: pipe[key] for key in ("from", "to", "length", "diameter", "friction")}
     column = {"type": "rigid-column", **kept, "initial_flow": flow}
@@ -227,7 +226,7 @@ def test_loops_without_friction_are_named_once(law):
 
 @pytest.mark.parametrize("other, equal", [("tank", False), ("chamber", False), ("lake", False), ("tank", True)])
 def test_a_column_without_friction_between_two_vessels_is_no_loop(other, equal):
-    """It is a swing, from rest where heads differ: a 50 m column between a lake and a tank by w^2 = g A / (L F)."""
+    """Unequal heads start an oscillation: a 50 m column between a lake and a tank has w^2 = g A / (L F)."""
     height, head = 0.0 if equal else 1.0, 101325.0 + 1000.0 * 9.80665 * (31.0 if not equal else 30.0)
     end = {"tank": scenes.tank(0.2, 30.0 + height), "chamber": scenes.chamber(1.0, head), "lake": scenes.lake(31.0)}
     column = {"type": "rigid-column", "from": "lake", "to": "end", "length": 50.0, "diameter": 0.3,
@@ -261,7 +260,7 @@ def test_check_summary_and_resolved_case_hold_the_fluid():
 
 
 def ladder(pipes: int) -> dict:
-    """A row of pipes, the seventh of them narrower than the others."""
+    """Case of pipes in a row; the seventh is narrower, and the ninth has a higher wave speed."""
     nodes = {"lake": scenes.lake(50.0)} | {f"n{k}": scenes.junction(0.01 if k == pipes else None)
                                            for k in range(1, pipes + 1)}  # fmt: skip
     friction = {"model": "quasi-steady", "roughness": 1e-4}

@@ -1,4 +1,4 @@
-"""What cannot be stepped as asked is said at once, with what can: in the file, by --set and in integrate."""
+"""Steps that are not possible are refused with the possible settings: in the file, by --set and in integrate."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ def test_what_is_left_out_is_filled_in(numerics, found):
 
 
 def joined(volume: float, **numerics) -> dict:
-    """A liquid between two plates that a valve joins to a chamber, which flows already at the start."""
+    """Case of a basin of liquid joined to a chamber by a valve, with flow at the start."""
     pool = {"type": "basin", "size": [4.0, 2.0], "cells": [16, 8], "physics": "liquid", "pressure": 2e6,
             "thickness": 0.1, "patches": {"out": {"side": "east"}}}  # fmt: skip
     nodes = {"pool": pool, "pot": chamber(volume, 1e6)}

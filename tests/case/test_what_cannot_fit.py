@@ -1,4 +1,4 @@
-"""What cannot advance, or cannot fit into memory or on disk, is refused before it starts; what takes long is told."""
+"""Runs that cannot advance, or do not fit into memory or on disk, are refused at once; long runs are announced."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_what_fits_is_let_alone(settings):
 
 
 def test_a_table_larger_than_the_disk_is_refused_by_its_place(tmp_path, monkeypatch):
-    monkeypatch.setattr("shutil.disk_usage", lambda path: type("Usage", (), {"free": 1000})())  # the system's, not ours
+    monkeypatch.setattr("shutil.disk_usage", lambda path: type("Usage", (), {"free": 1000})())  # of the system
     with pytest.raises(RunError, match=r"run: history\.csv needs at least 2 kB, but 1 kB are free"):
         fvsolve.run(branched(fields=0), out=tmp_path / "run")
     assert not (tmp_path / "run" / ".lock").exists()

@@ -1,4 +1,4 @@
-"""`fvsolve chart`: what it prints and writes, and what it refuses."""
+"""`fvsolve chart`: output, files and refused arguments."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def test_a_chart_leaves_table_and_both_pictures_and_says_what_the_default_costs(
     assert (folder / "chart.png").read_bytes()[:4] == b"\x89PNG"
     assert "<svg" in (folder / "chart.svg").read_text()
     lines = list(csv.DictReader((folder / "chart.csv").open()))
-    methods = [line["method"] for line in lines]  # and coarser ones, until one misses the target
+    methods = [line["method"] for line in lines]  # coarser tolerances are added until one of them misses the target
     assert {*methods} == {"auto", "rodas-5p"} and min(methods.count(name) for name in {*methods}) >= 3
     assert "default: auto" in said
     assert "\nmethod = " in said and "\nrtol = " in said

@@ -1,4 +1,4 @@
-"""The command line: tables for people, JSON for programs, messages and exit codes, never a traceback."""
+"""Command line: tables for readers, JSON for programs, messages and exit codes, never a traceback."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def test_a_case_that_cannot_start_says_where(case, fvs):
     for command in ("run", "check"):
         code, out, err = fvs(command, case, "--set", "nodes.gate.type=reservoir", "--set", "nodes.gate.head=1 m")
         assert code == 2 and out == ""
-        assert f"shut.toml: 1 fault\n  line {line}: links.main: no steady state: this pipe has no friction" in err
+        assert f"shut.toml: 1 fault\n  line {line}: links.main: no steady state: it has no friction" in err
     assert not Path("runs").exists()
 
 
@@ -151,7 +151,7 @@ def test_an_earlier_run_is_in_the_way(case, fvs):
     code, _, err = fvs("run", case)
     assert code == 2 and "--force" in err
     assert fvs("run", case, "--force")[0] == 0
-    assert fvs("run", case, "--resume")[0] == 0  # came to its end: nothing to do
+    assert fvs("run", case, "--resume")[0] == 0  # a complete run has nothing to resume
 
 
 def test_a_claim_that_fails_is_exit_code_1(case, fvs):
@@ -257,7 +257,7 @@ def test_ctrl_c_ends_a_run_cleanly_and_resume_goes_on(case):
 
 
 def wait_for_a_checkpoint(path: Path, running: subprocess.Popen) -> None:
-    """Until the checkpoint of the start has been replaced; fails where the process has ended before."""
+    """Wait until the first checkpoint is replaced; fail if the process ends before."""
     first = None
     while first is None or path.stat().st_mtime_ns == first:
         if first is None and path.exists():
@@ -287,7 +287,7 @@ def test_a_case_beside_the_mesh_it_comes_with_is_copied_and_another_mesh_is_kept
 
 
 def test_a_caller_may_put_any_text_stream_in_place_of_standard_output(monkeypatch):
-    """A notebook's has no `reconfigure`, nor has `io.StringIO`."""
+    """Streams of notebooks and `io.StringIO` have no `reconfigure`."""
     from fvsolve.cli import main
 
     monkeypatch.setattr(sys, "argv", ["fvsolve", "--version"])

@@ -1,4 +1,4 @@
-"""`fvsolve energy`: what it prints and writes, its JSON, its faults; and that ordinary runs know nothing of it."""
+"""`fvsolve energy`: output, files, JSON and errors; ordinary runs import none of its modules."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def case(tmp_path):
 
 @pytest.fixture
 def told(monkeypatch, capsys, tmp_path):
-    """Run `fvsolve energy ...` here: (exit code, standard output, standard error)."""
+    """Function that runs `fvsolve energy` in a temporary folder: (exit code, standard output, standard error)."""
     monkeypatch.chdir(tmp_path)
 
     def run(*arguments: str):
@@ -132,7 +132,7 @@ def test_without_a_case_it_says_what_schemes_and_methods_claim(told):
         "upwind": True, "fromm": True, "upwind5": False}  # fmt: skip
     code, out, _ = told("--scheme", "upwind,fromm,upwind5", "--method", "euler,gauss-4")
     assert "create energy at every step size: fromm with euler" in out
-    assert "upwind5: create energy at pipe ends" in out
+    assert "schemes that create energy at pipe ends with every method, up to the gain above: upwind5" in out
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""`fvsolve methods`: one table, one object, one method with its picture; a wrong name is refused."""
+"""`fvsolve methods`: table, JSON, a single method with its picture, and errors."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ASKED = {
 
 @pytest.fixture
 def said(fvs, monkeypatch, tmp_path):
-    """Runs a command in an empty directory; gives exit code, standard output, standard error."""
+    """Function that runs a command in an empty folder: (exit code, standard output, standard error)."""
     monkeypatch.chdir(tmp_path)
     return fvs
 

@@ -1,4 +1,4 @@
-"""Orders are those that theory gives, and `fvsolve order` prints them and says what they are."""
+"""Observed orders of schemes and methods equal the theory, and `fvsolve order` prints and explains them."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_every_method_shows_its_order_in_time_on_one_grid(method, p):
     points = pulses.FINE if p == 4 else pulses.FEW
     case, levels = pulses.case(20, courant=0.4, points=points), 6 if p == 1 else 4
     found = order(case, methods=method, refine="time", levels=levels).plain()
-    assert found["reference"]["kind"] == "finer" and found["measure"] == "step [s]"  # exact only in space and time
+    assert found["reference"]["kind"] == "finer" and found["measure"] == "step [s]"  # exact only if both are refined
     fit = found["fits"]["pressure"]["L2"]
     assert fit["order"] == approx(p, abs=0.15) and abs(fit["order"] - p) <= max(fit["spread"], 0.05)
     assert [row["cells"] for row in found["rows"]] == [20] * levels
@@ -59,7 +59,7 @@ def test_a_kink_shows_twice_that_and_is_called_one(capsys, tmp_path):
     case["nodes"]["gate"] = scenes.junction(scenes.ramp(0.02, 0.02, 0.05, 0.0))
     [found] = studies(capsys, tmp_path, case, "--levels", "6")
     assert found["fits"]["pressure"]["L1"]["order"] == approx(10 / 6, abs=0.1)
-    assert found["fits"]["pressure"]["max"]["order"] == approx(5 / 6, abs=0.2)  # which comes late
+    assert found["fits"]["pressure"]["max"]["order"] == approx(5 / 6, abs=0.2)  # clear only on fine cells
     assert any("kinks" in note for note in found["notes"])
 
 
@@ -125,7 +125,7 @@ def test_the_table_picture_and_sheet_say_the_same(capsys, tmp_path):
     assert code == 0 and 'exact solution "rays"' in shown and "fitted order of" in shown
     code, out, _ = call(capsys, *words, "--json")
     told = json.loads(out)
-    assert told["reused"] == 4  # three rows and what is to be known of the reference
+    assert told["reused"] == 4  # three rows and the check of the reference
     [found] = told["studies"]
     for row in found["rows"]:
         assert f"{row['errors']['pressure']['L1']:.4g}" in shown

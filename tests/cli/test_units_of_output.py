@@ -1,4 +1,4 @@
-"""What a person reads stands in the units of `[output]`: the same numbers as in SI, converted, by every command."""
+"""Printed numbers are in the units of `[output]`: for each command, the SI numbers converted."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ UNITS = {
 
 @pytest.fixture(scope="module")
 def cases(tmp_path_factory):
-    """The same main with a valve that shuts, told in SI and in other units."""
+    """Files of a main with a closing valve, with output in SI and in other units."""
     links = {"main": pipe("top", "gate", 900.0, 0.3, 1200.0, 5),
              "valve": valve("gate", "outfall", 1e-3, ramp(0.5, 2.0, 1.0, 0.0))}  # fmt: skip
     nodes = {"top": lake(45.0), "gate": junction(), "outfall": reservoir("0 barg")}
@@ -44,7 +44,7 @@ ASKED = {
     "size": ("--vary", "links.valve.area=0.0009,0.001", "--goal", "maximum"),
     "sweep": ("--set", "links.main.length=900,950"), "check": ("--set", "numerics.end=2"),
 }  # fmt: skip
-TOLD = [  # command, a number and its unit as both print them, and how many of the one the other is
+TOLD = [  # command, pattern of a printed number and unit, SI unit, other unit, and conversion factor
     ("energy", r"energy \[(?P<unit>.*?)\].*?supplied +top +(?P<number>\S+)", "J", "kJ", 1e-3),
     ("energy", r"energy throughput (?P<number>\S+) (?P<unit>\w+):", "J", "kJ", 1e-3),
     ("energy", r"least margin (?P<number>\S+) (?P<unit>\w+) at", "J", "kJ", 1e-3),
@@ -63,7 +63,7 @@ TOLD = [  # command, a number and its unit as both print them, and how many of t
 
 @pytest.fixture(scope="module")
 def printed(cases):
-    """What each command printed of each, as it is asked for."""
+    """Output of each command by case, which the tests fill."""
     return {}
 
 

@@ -1,4 +1,4 @@
-"""`fvsolve precompile` leaves nothing to compile, and says where it cannot."""
+"""`fvsolve precompile` compiles everything that a run needs, or states the reason why it cannot."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from fvsolve import jit
 
 
 def warm(*words: str, **environment: str):
-    """A process that warms."""
+    """Finished process of `fvsolve precompile`."""
     command = [sys.executable, "-m", "fvsolve", "precompile", *words]
     return subprocess.run(command, env=os.environ | environment, capture_output=True, text=True)
 
 
 @pytest.mark.skipif(not jit.COMPILING, reason="JIT is off")
 def test_what_has_been_warmed_is_compiled_no_more():
-    """What another test compiles meanwhile lies in the same folder: one time in three at least there is nothing."""
+    """At least one of three repetitions compiles nothing; other tests may compile into this folder meanwhile."""
     first, *others = (json.loads(warm("--for", "two-tanks", "--json").stdout) for _ in range(4))
     second = min(others, key=lambda one: one["compiled"])
     assert second["compiled"] == 0 and second["functions"] >= first["functions"] > 20
@@ -30,7 +30,7 @@ def test_what_has_been_warmed_is_compiled_no_more():
     assert json.loads((Path(second["directory"]) / "target.json").read_text())["name"] == second["target"]
     code = "import sys, fvsolve; fvsolve.run('two-tanks.toml', {'output.fields': 0}); print('numba' in sys.modules)"
     told = subprocess.run([sys.executable, "-c", code], cwd=CASES, capture_output=True, text=True, check=True)
-    assert told.stdout == "False\n"  # who never imports numba compiles nothing
+    assert told.stdout == "False\n"  # without numba nothing is compiled
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Pictures of histories: no curve twice, none that stands still, and all of them named."""
+"""Curves in pictures of histories: none twice, none constant, and each of them named."""
 
 import numpy as np
 
@@ -16,8 +16,8 @@ def labels(columns: dict, measured=()) -> tuple[dict, list]:
 def test_pressure_and_head_of_a_place_are_one_curve():
     both = {"gate.pressure": 1e5 + 9.8e3 * WAVE, "gate.head": 3.0 + WAVE, "top.head": OTHER}
     assert labels(both)[0] == {"pressure": ["gate (head alike)"], "head": ["top"]}
-    assert labels(both, ["gate.head"])[0]["head"] == ["gate", "top"]  # held against a measurement
-    moved = both | {"gate.head": 3.0 + WAVE + 1e-3 * OTHER}  # of a place that moves
+    assert labels(both, ["gate.head"])[0]["head"] == ["gate", "top"]  # compared with a measurement
+    moved = both | {"gate.head": 3.0 + WAVE + 1e-3 * OTHER}  # at a place that moves
     assert labels(moved)[0] == {"pressure": ["gate"], "head": ["gate", "top"]}
 
 

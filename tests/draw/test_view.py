@@ -1,4 +1,4 @@
-"""Pictures of networks and basins: what stands on them is what the case has, where it is."""
+"""Pictures of networks and basins show the parts of the case at their positions."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def town(**units) -> dict:
 
 
 def drawn(case, out, field="pressure") -> tuple[NetworkPicture, set[str]]:
-    """A network's sheet and all that stands written on it."""
+    """Picture of a network and all texts on it."""
     from matplotlib.text import Text
 
     run = fvsolve.run(case, out=out)
@@ -51,9 +51,9 @@ def test_a_network_is_drawn_with_its_names_units_and_how_much_heights_are_stretc
     network, said = drawn(town(pressure="psig", length="ft", flow="l/s"), tmp_path / "run")
     assert {*TOWN, "trunk", "lane", "rise"} <= said and {"reservoir", "junction", "valve"} <= said
     assert {"x [ft]", "y [ft]", "z [ft]", "pressure [psig]", "a $town$"} <= said
-    assert any("heights drawn 10 times" in one for one in said)  # 0.4 of 1800 m over 40 m is 18
+    assert any("heights enlarged 10 times" in one for one in said)  # 0.4 * 1800 m / 40 m = 18, rounded down
     psi = 0.45359237 * 9.80665 / 0.0254**2
-    low, high = (1e3 * 9.80665 * h / psi for h in (30.0 - 30.0, 60.0 - 5.0))  # from the works' free end to the mill
+    low, high = (1e3 * 9.80665 * h / psi for h in (30.0 - 30.0, 60.0 - 5.0))  # from 0 at the works to 55 m at the mill
     assert low <= network.limits[0] < network.limits[1] <= high
 
 
@@ -69,7 +69,7 @@ def test_lumped_parts_are_drawn_without_a_field(fvs, tmp_path, monkeypatch):
     code, _, err = fvs("view", "runs/two-tanks", "--field", "head")
     assert code == 2 and "no frames to draw" in err
     fvs("run", "two-tanks", "--no-pictures", "--force")
-    assert not list(tmp_path.rglob("*.png"))  # of the run before
+    assert not list(tmp_path.rglob("*.png"))  # pictures of the run before are deleted
 
 
 def test_numbers_are_told_in_the_units_of_the_output_and_margins_as_differences(fvs, tmp_path, monkeypatch):
@@ -80,7 +80,7 @@ def test_numbers_are_told_in_the_units_of_the_output_and_margins_as_differences(
     assert [one["unit"] for one in found] == ["psig", "psig"]
     for one in found:
         assert f"margin {one['margin']:.6g} psi\n" in said.replace("psi;", "psi\n")
-    assert "at 7874.02 ft, 0 min)" in said and "finished at t = 0.0166667 min" in said  # 2400 m
+    assert "at 7874.02 ft, 0 min)" in said and "finished at t = 0.0166667 min" in said  # 2400 m = 7874.02 ft
     _, said, _ = fvs("check", "pumping-main", "--set", units)
     assert "196.85" in said and " m]" not in said.replace("[min]", "") and "elevation [ft]" in said
     _, said, _ = fvs("check", "two-tanks", "--set", units)
@@ -113,7 +113,7 @@ def test_a_line_is_followed_in_profile_a_level_plan_from_above_and_all_else_asla
     across = Projection("aslant", 3.0)
     ends = across.on_sheet([(0, 0, 0), (5, 0, 0), (0, 5, 0), (0, 0, 2)])
     east, north, up = np.linalg.norm(ends[1:] - ends[0], axis=1) / (5.0, 5.0, 6.0)
-    assert east**2 + north**2 + up**2 == approx(2.0)  # an orthographic picture of three axes (Gauss)
+    assert east**2 + north**2 + up**2 == approx(2.0)  # orthographic projection of three axes (Gauss)
 
 
 def test_every_kind_of_part_has_a_symbol_and_a_new_one_that_of_what_it_is_made_of():
@@ -129,7 +129,7 @@ def test_every_kind_of_part_has_a_symbol_and_a_new_one_that_of_what_it_is_made_o
 
 @pytest.fixture
 def bowl():
-    """A lake at rest in a round bowl of slope 0.1, on 40 x 40 cells over 8 m: its shore is 3 m from the middle."""
+    """Mesh, shore radius [m] and cell size [m] of a lake in a round bowl of slope 0.1, 40 x 40 cells over 8 m."""
     pyvista = pytest.importorskip("pyvista")
     n, radius, slope = 40, 3.0, 0.1
     x, y = np.meshgrid(np.linspace(-4.0, 4.0, n + 1), np.linspace(-4.0, 4.0, n + 1))

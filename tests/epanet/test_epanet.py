@@ -1,4 +1,4 @@
-"""EPANET networks as cases: steady heads and flows against EPANET's own, no drift, and what is said of bad files."""
+"""EPANET networks as cases: steady heads and flows agree with EPANET, nothing drifts, and bad files are explained."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PACKAGE = Path(wntr.__file__).parent
 SHIPPED, BROKEN = PACKAGE / "library" / "networks", PACKAGE / "tests" / "networks_for_testing"
 NETWORKS = [("Net1", 0), ("Net2", 0), ("Net2", 31), ("Net3", 0), ("Net3", 12), ("Net6", 0), ("ky4", 0), ("ky10", 0)]
 
-# Between a pump of constant power that stands at no flow in EPANET and a shut valve: no law says what head is there.
+# Nodes between a shut valve and a pump of constant power without flow in EPANET; no law gives their head.
 DEAD = {"ky10": {"O-Pump-11", "I-RV-4"}}
 
 SMALL = """[TITLE]
@@ -65,7 +65,7 @@ DEMAND MULTIPLIER 1.3
 
 
 def truth(path, hour):
-    """EPANET's own heads [m] and flows [m3/s] at an hour, as tight as it goes."""
+    """Heads [m] and flows [m3/s] of EPANET at an hour, at its least tolerance."""
     network = wntr.network.WaterNetworkModel(str(path))
     network.options.hydraulic.accuracy = 1e-5
     network.options.hydraulic.trials = 200
@@ -78,7 +78,7 @@ def truth(path, hour):
 
 
 def differences(path, hour, where, shortest=0.0):
-    """Greatest differences of heads [m] and of flows (to the largest flow), the case as checked, the names."""
+    """Greatest differences of heads [m] and of flows (over the largest flow), and the imported network."""
     made = import_network(path, hour, shortest=shortest)
     case = where / "net.toml"
     case.write_text(made.text, encoding="utf-8")
@@ -100,12 +100,12 @@ def differences(path, hour, where, shortest=0.0):
 @pytest.mark.parametrize("name, hour", NETWORKS, ids=[f"{name}-{hour}" for name, hour in NETWORKS])
 def test_steady_heads_and_flows_are_epanets(name, hour, tmp_path):
     lost, off, _ = differences(SHIPPED / f"{name}.inp", hour, tmp_path)
-    assert lost < 1e-3 and off < 1e-4  # ten times closer than was asked for
+    assert lost < 1e-3 and off < 1e-4  # [m], [-]
 
 
 @pytest.mark.parametrize("name, hour", [("ky4", 12), ("ky10", 10)])
 def test_tanks_that_epanet_fills_to_their_rim_are_read(name, hour):
-    """Its levels pass the rim by rounding: 31.659582 m in a tank of 31.659576 m."""
+    """Levels of EPANET exceed the rim by rounding: 31.659582 m in a tank of 31.659576 m."""
     case = load(tomllib.loads(import_network(SHIPPED / f"{name}.inp", hour).text))
     assert any(node.level == node.height for node in case.nodes.values() if node.kind == "tank")
 
@@ -126,7 +126,7 @@ def test_every_head_loss_formula_patterns_minor_losses_and_shut_pipes(formula, r
 
 
 def still(made):
-    """The case with tanks as lakes of their level, so that nothing has a cause to move."""
+    """Case with tanks as reservoirs at their level, so that nothing moves."""
     case = tomllib.loads(made.text)
     for name, node in case["nodes"].items():
         if node["type"] == "tank":
@@ -138,7 +138,7 @@ def still(made):
 LINES = [
     ("auto", 0.0),
     ("finite-volume", 3.0),
-]  # numerics.pipe_model, and the shortest pipe that steps of cells can follow [m]
+]  # numerics.pipe_model, and shortest pipe for steps of cells [m]
 
 
 @pytest.mark.parametrize("line, shortest", LINES)
@@ -168,7 +168,7 @@ def test_a_pump_trip_on_net3_moves_nothing_before_and_travels_at_its_wave_speed_
     result = fvsolve.run(case, set=set)
     t = np.asarray(result.t)
     assert all(np.ptp(result[probe][t <= 20.0]) == 0.0 for probe in case["output"]["probes"])
-    arrival = 20.0 + 13868.4 / 1200.0  # along the main from 61 to 123
+    arrival = 20.0 + 13868.4 / 1200.0  # travel time along the main from 61 to 123
     near, far = (np.asarray(result[f"nodes.{node}.head"]) for node in ("61", "123"))
     assert near[0] - near[t <= arrival].min() > 10.0
     assert np.ptp(far[t <= arrival - 0.5]) < 1e-2 and far[0] - far[-1] > 5.0
@@ -228,7 +228,7 @@ LEAKY = "[EMITTERS]\nb 0.7\nc 0.2\n[VALVES]"
 
 
 def written(tmp_path, changes, options=""):
-    """The small network with texts replaced and options added, as a file in a folder of its own."""
+    """File of the small network with replaced texts and added options, in its own folder."""
     path = tmp_path / "in" / "net.inp"
     path.parent.mkdir()
     text = SMALL.format(r=110, formula="H-W")
@@ -243,7 +243,7 @@ def written(tmp_path, changes, options=""):
 @pytest.mark.parametrize("leaks", [{}, {"[VALVES]": LEAKY}], ids=["alone", "emitters"])
 @pytest.mark.parametrize("units, required, least", [("LPS", 40, 5), ("GPM", 66, 8)])
 def test_demands_that_follow_the_pressure_are_parts_that_do(weight, leaks, units, required, least, tmp_path):
-    """Beside emitters EPANET's answer holds the sum of both, and its pressures are in metres of water."""
+    """EPANET reports the sum of demand and emitter flow, and states pressures as heads of water."""
     options = FOLLOWS.format(required=required, least=least) + f"SPECIFIC GRAVITY {weight}\n"
     path = written(tmp_path, {"UNITS LPS": f"UNITS {units}", **leaks}, options)
     lost, off, made = differences(path, 0, tmp_path)
@@ -253,7 +253,7 @@ def test_demands_that_follow_the_pressure_are_parts_that_do(weight, leaks, units
     assert not any("pressure" in what for what, _ in made.notes)
 
 
-BEHIND = {  # what leads to junction d, whose demand gets what is left at no pressure
+BEHIND = {  # links to junction d, whose demand depends on its pressure
     "shut pipe": {"p6 b low": "p8 c d 100 100 110 0 Closed\np6 b low"},
     "shut valve": {"[VALVES]": "[VALVES]\nv1 c d 100 TCV 5 0\n[STATUS]\nv1 CLOSED"},
     "open valve": {"[VALVES]": "[VALVES]\nv1 c d 100 TCV 5 0"},
@@ -268,7 +268,7 @@ def test_a_demand_behind_a_valve_gets_what_its_pressure_allows(way, demand, tmp_
     path = written(tmp_path, changes, FOLLOWS.format(required=40, least=0))
     if demand or not way.startswith("shut"):
         assert differences(path, 0, tmp_path)[0] < 2e-3
-    else:  # nothing says what pressure a place has that is shut off
+    else:  # the pressure behind a shut link is undetermined
         build(load(tomllib.loads(import_network(path).text)))
 
 
@@ -283,7 +283,7 @@ def test_a_pump_of_constant_power_lifts_as_in_epanet_whatever_the_fluid_weighs(w
 @pytest.mark.parametrize("weight, setting", [(0.8, 28), (0.8, 33.6), (0.8, 41), (1.3, 54.6), (1.3, 58), (1.3, 68)])
 @pytest.mark.parametrize("kind", ["PRV", "PSV"])
 def test_a_set_pressure_is_one_of_water_whatever_the_fluid_weighs(kind, weight, setting, tmp_path):
-    """Also where it is above every source, and where the junction that it holds was moved."""
+    """Some settings exceed every source; in the second file the import moves the junction, because a pipe is steep."""
     changes = {"p4 a c 500 150 110 0 Open\n": "", "[VALVES]": f"[VALVES]\nv1 a c 150 {kind} {setting} 2"}
     path = written(tmp_path, changes, f"SPECIFIC GRAVITY {weight}\n")
     assert differences(path, 0, tmp_path)[0] < 5e-3
@@ -336,7 +336,7 @@ def test_a_valve_set_above_every_source_stands_open_or_shut(line, opening, tmp_p
 
 
 def test_a_valve_that_drives_its_flow_uphill_is_listed(tmp_path):
-    """EPANET keeps the drop of a PBV at its setting whichever way it flows: from c to a it then gives what it takes."""
+    """EPANET keeps the drop of a PBV at its setting in both directions, so flow from c to a gains head."""
     path = tmp_path / "in" / "valve.inp"
     path.parent.mkdir()
     text = SMALL.format(r=110, formula="H-W").replace("p4 a c 500 150 110 0 Open\n", "")

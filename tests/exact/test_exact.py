@@ -1,13 +1,11 @@
-"""The named exact solutions, against closed forms, other tracers and SciPy written apart from them."""
+"""Named exact solutions compared with closed forms, with an independent tracer of rays, and with SciPy."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import numpy as np
 import pytest
 from pytest import approx
-from reference import pulses, rays, scenes, vessels
+from reference import folders, pulses, rays, scenes, vessels
 from reference.allievi import relative_drop
 from scipy.integrate import quad, solve_ivp
 
@@ -22,7 +20,7 @@ from fvsolve.studies.reference import initial_values
 
 
 def solved(case):
-    """(case, exact solution)."""
+    """Case and its exact solution."""
     case = load(case)
     return case, exact.solution(case, initial_values(model_of(case)))
 
@@ -35,7 +33,7 @@ def probe(case, name: str):
 
 
 def fork(opening, **numerics) -> dict:
-    """Three pipes that meet; a valve to the outside at one of them."""
+    """Case of three pipes at a junction, with a valve to ambient at the end of one pipe."""
     nodes = {
         "lake": scenes.reservoir(6e5), "fork": scenes.junction(scenes.ramp(0.3, 0.2, 0.01, 0.03)),
         "blind": scenes.junction(), "gate": scenes.junction(), "out": scenes.reservoir(scenes.AMBIENT),
@@ -52,7 +50,7 @@ def fork(opening, **numerics) -> dict:
 
 
 def traced() -> rays.Rays:
-    """The same by the tests' own tracer."""
+    """Solution of the case `fork` by the tracer of the tests."""
     area = 5e-4
     flow = area * np.sqrt(2 * (6e5 - scenes.AMBIENT) / scenes.RHO)
     pipes = {
@@ -91,7 +89,7 @@ def test_cell_averages_of_rays_are_integrals_of_the_other_tracer():
 
 
 def test_averages_next_to_a_front_are_exact():
-    """A jump of demand by dq sends a jump of pressure by rho a dq / A; a cell it cuts holds a share of it."""
+    """A jump of demand by dq causes a pressure jump of rho a dq / A; a cell that the front cuts has a share of it."""
     case, found = solved(pulses.front(end=0.07))
     edges = np.linspace(0.0, 100.0, 8)  # the front is at 100 m - 1000 m/s (0.07 s - 0.02 s) = 50 m, within a cell
     pressure, _ = found.averages("main", edges, 0.07)
@@ -106,7 +104,7 @@ def test_a_pulse_is_mirrored_as_images_say():
     told = [pulses.pressure(37.0, s) for s in t]
     assert found.probe(probe(case, "main.pressure@0.37"), t) == approx(
         told, abs=0.05
-    )  # of 127 kPa: the samples of the pulse
+    )  # of 127 kPa: error of the samples of the pulse
 
 
 def test_a_closing_valve_is_allievis():
@@ -121,7 +119,7 @@ def test_a_closing_valve_is_allievis():
 
 
 def test_elevations_and_a_start_that_is_no_equilibrium_are_traced():
-    """A pipe at rest between unequal heads: the flow climbs in steps of 2 g H A / a, each lasting L / a at its ends."""
+    """From rest, with a linear head between unequal heads, the flow grows as g H A t / L and the heads stay."""
     nodes = {"high": scenes.lake(30.0, elevation=10.0), "low": scenes.lake(20.0, elevation=0.0)}
     links = {"main": scenes.pipe("high", "low", 100.0, 0.5, 1000.0, 20)}
     numerics = {**scenes.SMOOTH, "initial": "rest"}
@@ -134,7 +132,7 @@ def test_elevations_and_a_start_that_is_no_equilibrium_are_traced():
     assert run.rows[:, 1] == approx(found.probe(probe(case, "main.flow@0.5"), run.rows[:, 0]), abs=1e-5)
 
 
-# lumped -----------------------------------------------------------------------------------------------------------
+# lumped parts -----------------------------------------------------------------------------------------------------
 
 
 def test_a_draining_tank_is_torricellis():
@@ -164,7 +162,7 @@ def test_two_tanks_level_as_the_closed_form_says():
 
 
 def column(initial: float | None, drop: float, factor: float, valve: bool) -> dict:
-    """A rigid column between two lakes, with a Darcy factor or a valve that opens and half shuts."""
+    """Case of a rigid column between two reservoirs, with a Darcy factor or a valve that opens and half closes."""
     end = "gate" if valve else "low"
     nodes = {"high": scenes.reservoir(3e5), "low": scenes.reservoir(3e5 - drop)}
     friction = {"model": "steady", "factor": factor} if factor else scenes.NO_FRICTION
@@ -279,7 +277,7 @@ def test_a_mass_on_springs_is_that_of_scipy(damping):
     assert found.probe(probe(case, "body.position"), t) == approx(rests, abs=1e-14)
 
 
-# what they share --------------------------------------------------------------------------------------------------
+# shared functions -------------------------------------------------------------------------------------------------
 
 SCHEDULES = [
     0.4, {"time": [0.1, 0.2, 0.5], "value": [0.1, 0.7, 0.3]}, scenes.ramp(0.1, 0.3, 1.0, 0.2, 1.7),
@@ -361,7 +359,7 @@ def test_settings_that_leave_no_exact_solution_take_it_out():
         load("cases/gradual-closure.toml", {**friction, "exact.name": "rays"})
 
 
-SHIPPED = sorted(path.name for path in Path("cases").glob("*.toml"))
+SHIPPED = sorted(path.name for path in folders.CASES.glob("*.toml"))
 
 
 @pytest.mark.parametrize("name", exact.NAMES)
@@ -377,7 +375,7 @@ def test_any_solution_on_any_scene_either_holds_or_is_refused_part_by_part(file,
 
 
 def beside(name: str) -> dict:
-    """A scene that a solution would hold for, but for one link that is not where it should be."""
+    """Case that a solution would support except for one link in a wrong place."""
     held = {"a": scenes.reservoir(3e5), "b": scenes.reservoir(2e5)}
     if name == "column":
         main = {"type": "rigid-column", "from": "a", "to": "b", "length": 9.0, "diameter": 0.1}

@@ -1,4 +1,4 @@
-"""Density laws: each answers every question, and as no other does; against quadrature and one another."""
+"""Density laws: all implement every function, differ from each other, and agree with quadrature."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from fvsolve.kernels import density as kernels
 from fvsolve.kernels import dtypes as rec
 
 AMBIENT, GRAVITY, REFERENCE = 98000.0, 9.81, 2e5
-GIVEN = {"mixture": {"air_fraction": 0.004}}  # what a law needs beside its name
+GIVEN = {"mixture": {"air_fraction": 0.004}}  # further keys of a law
 PRESSURES = [3e4, 1e5, 2e5, 7e5, 4e6, 3e7]
 DENSE = [name for name, law in LAWS.items() if issubclass(law, DenseLaw)]
 QUESTIONS = {name: one for name, one in vars(kernels).items()
@@ -27,13 +27,13 @@ QUESTIONS = {name: one for name, one in vars(kernels).items()
 
 @cache
 def law(name: str):
-    """A law of water at 20 degC and 2 bar."""
+    """Law of water at 20 degC and 2 bar."""
     fluid = properties("Water", 293.15, REFERENCE, law=name, **GIVEN.get(name, {}))
     return LAWS[name](fluid, AMBIENT, GRAVITY)
 
 
 def a_pipe(of) -> np.void:
-    """A pipe in which waves run at 1100 m/s."""
+    """Row of a pipe with a wave speed of 1100 m/s."""
     row = np.zeros(1, rec.PIPE)[0]
     row["area"], row["speed"], row["compliance"] = 0.02, 1100.0, of.compliance(1100.0)
     row["admittance"] = row["area"] / row["speed"]
@@ -41,7 +41,7 @@ def a_pipe(of) -> np.void:
 
 
 def integral(f, low: float, high: float) -> float:
-    """Of f over pressure, in ln p, where gas is smooth; a table has kinks of its third derivative."""
+    """Integral of f over pressure in ln p, where gas is smooth; a table has kinks of its third derivative."""
     return quad(
         lambda x: math.exp(x) * f(math.exp(x)), math.log(low), math.log(high), epsabs=0, epsrel=1e-11, limit=2000
     )[0]
@@ -84,7 +84,7 @@ def test_enthalpy_is_the_integral_of_specific_volume(name):
     one = law(name)
     for p in PRESSURES:
         found = integral(lambda q: 1.0 / float(one.density(q)), min(p, REFERENCE), max(p, REFERENCE))
-        assert abs(one.enthalpy(p)) == approx(found, rel=5e-9, abs=1e-12)  # a table is fine to 1e-9
+        assert abs(one.enthalpy(p)) == approx(found, rel=5e-9, abs=1e-12)  # a table has an error of 1e-9
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -93,7 +93,7 @@ def test_what_a_pipe_holds_leads_back_to_its_pressure(name):
     row, p = a_pipe(one), np.array(PRESSURES)
     m = one.density(p) * one.area(row, p)
     row["center"], profile = 0, one.density(np.full(6, REFERENCE)) * row["area"]
-    if one.linear:  # whose flows see one density: what is squeezed is m' = A p' / c^2
+    if one.linear:  # its flows have one density: m' = A p' / c^2
         m = profile + row["area"] * (p - REFERENCE) / row["speed"] ** 2
     found = one.cell_pressure(row, np.full(6, REFERENCE), profile, (m - profile) * row["speed"])
     assert found == approx(p, rel=1e-6 if one.linear else 1e-10)
@@ -128,7 +128,7 @@ def test_the_compiled_questions_agree_with_quadrature(name):
 
 
 def answers(name: str, code: int | None = None) -> dict[str, np.ndarray]:
-    """What each compiled question says, with a law's numbers and perhaps another's code."""
+    """Results of all compiled functions with the numbers of a law, and with the code of another law if given."""
     one = law(name)
     st, row = one.st.copy(), a_pipe(one)
     st["law"] = st["law"] if code is None else code
@@ -145,7 +145,7 @@ def test_each_differs_from_every_other():
     said = {name: answers(name) for name in DENSE}
     for a in DENSE:
         for b in DENSE[: DENSE.index(a)]:
-            for question in set(QUESTIONS) - {"wall_area", "thrust"}:  # which say the wall's
+            for question in set(QUESTIONS) - {"wall_area", "thrust"}:  # properties of the wall
                 assert np.all(said[a][question] != said[b][question]), (a, b, question)
 
 

@@ -1,4 +1,4 @@
-"""The density law `log` against exact solutions; and how far `linear` is from it. Soft fluid: c = 10 m/s."""
+"""Density law `log` compared with exact solutions, and its distance from `linear`. Soft fluid: c = 10 m/s."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ AREA = scenes.area(DIAMETER)
 
 
 def resting_pipe(cells: int, **numerics) -> fvsolve.Model:
-    """A closed pipe at reference pressure with a reservoir far off; only its inside is used."""
+    """Model of a closed pipe at reference pressure with a distant reservoir; only its inside is used."""
     nodes = {"left": reservoir(AMBIENT), "right": junction()}
     links = {"main": stiff_pipe("left", "right", LENGTH, DIAMETER, cells, friction=scenes.NO_FRICTION)}
     case = scene(nodes, links, 10.0, numerics, ["right.pressure"], 0.1, fluid=SOFT)
@@ -36,7 +36,7 @@ def resting_pipe(cells: int, **numerics) -> fvsolve.Model:
 
 
 def fill(state, rho: np.ndarray, flux: np.ndarray) -> None:
-    """Put cell averages of density and mass flux into the two deviation waves of the only pipe."""
+    """Set the two deviation waves of the only pipe to cell averages of density and mass flux."""
     n = len(rho)
     dense, flow = C * AREA * (rho - 1000.0), AREA * flux
     state.y[:n], state.y[n : 2 * n] = (dense + flow) / 2, (dense - flow) / 2
@@ -58,7 +58,7 @@ STATES = {
 
 
 def riemann_run(name: str, cells: int, scheme: str, method: str = "ssp-rk3"):
-    """Cell centres, found and exact (density, flux) of a Riemann problem at the middle of the pipe."""
+    """Places, computed and exact (density, flux), and solution of a Riemann problem at the middle of the pipe."""
     left, right = {**STATES, **STRONG}[name]
     model = resting_pipe(cells, scheme=scheme, method=method, courant=0.5)
     state = fvsolve.initial_state(model)
@@ -67,7 +67,7 @@ def riemann_run(name: str, cells: int, scheme: str, method: str = "ssp-rk3"):
     fill(state, rho, rho * np.where(half, left[1], right[1]))
     state = fvsolve.advance(model, state, END)
     x = (np.arange(cells) + 0.5) * LENGTH / cells
-    inner = (x > 22) & (x < 78)  # the wall and the reservoir have answered outside
+    inner = (x > 22) & (x < 78)  # reflections of the wall and the reservoir are outside
     riemann = Riemann(EXACT, left, right)
     sampled = []
     for place in x[inner]:
@@ -101,7 +101,7 @@ STRONG = {
 
 @pytest.mark.parametrize("name", STRONG)
 def test_riemann_problem_converges_to_the_exact_profile(name):
-    """Waves strong enough for fans wider than smeared jumps, and for shocks that steepen."""
+    """The waves are strong enough for fans wider than smeared jumps, and for shocks that steepen."""
     errors = []
     for cells in (400, 800):
         _, found, exact, _ = riemann_run(name, cells, "muscl")
@@ -111,7 +111,7 @@ def test_riemann_problem_converges_to_the_exact_profile(name):
 
 
 def stopped_run(velocity: float, law: str, cells: int, scheme: str):
-    """A stream that meets a dead end, until shortly before the lake answers."""
+    """Run of a stream that stops at a dead end, until shortly before the lake's reflection."""
     nodes = {"lake": reservoir(3 * AMBIENT), "gate": junction()}
     main = stiff_pipe("lake", "gate", LENGTH, DIAMETER, cells, friction=scenes.NO_FRICTION)
     main["initial_flow"] = velocity * AREA
@@ -122,7 +122,7 @@ def stopped_run(velocity: float, law: str, cells: int, scheme: str):
 
 
 def stopped(velocity: float, law: str, cells: int = 200, scheme: str = "muscl"):
-    """Pressure and velocity before, and the pressures of the plateau at the gate."""
+    """Pressure and velocity before the stop, and pressures of the plateau at the gate."""
     result = stopped_run(velocity, law, cells, scheme)
     before = result["main.pressure@0.5"][0], result["main.velocity@0.5"][0]
     return before, result["gate.pressure"][(result.t > 4.0) & (result.t < 8.0)]
@@ -140,9 +140,9 @@ def test_a_stopped_stream_rises_by_the_exact_shock(mach):
 
 @pytest.mark.parametrize("mach", [0.02, 0.05])
 def test_the_gate_feels_the_whole_shock_from_the_first_instant_and_no_more(mach):
-    """Row and extremes: a node closes by its own law, not by the linear one (off by 3 v / 4 c).
+    """The first row and the extreme have the exact shock, which differs from that of the linear law by 3 v / 4 c.
 
-    The first instant is exact; while the shock then forms over ten cells, every scheme swings by 0.22 v / c.
+    The first row is exact; while the shock forms over ten cells, every scheme oscillates by 0.22 v / c.
     """
     result = stopped_run(mach * C, "log", 200, "muscl")
     p, u = result["main.pressure@0.5"][0], result["main.velocity@0.5"][0]
@@ -171,7 +171,7 @@ def test_linear_is_classical_water_hammer_at_any_velocity():
 
 
 def test_a_stream_leaves_the_lake_with_the_lake_s_stagnation_enthalpy():
-    """`h = -(beta / rho_0) exp(-(p - p_0) / beta)`, so that dh = dp / rho; nothing is lost on the way in."""
+    """With h = -(beta / rho_0) exp(-(p - p_0) / beta), so that dh = dp / rho, the entrance causes no loss."""
     result = stopped_run(0.1 * C, "log", 50, "muscl")
     p, u = result["main.pressure@0.5"][0], result["main.velocity@0.5"][0]
 
@@ -182,7 +182,7 @@ def test_a_stream_leaves_the_lake_with_the_lake_s_stagnation_enthalpy():
 
 
 def simple_wave_error(cells: int, scheme: str, height: float = 2.0) -> float:
-    """L1 error of density after a simple wave has gone 33 m, about half way to its breaking."""
+    """Sum of the relative L1 errors of density and flux after a simple wave of 33 m, half way to its breaking."""
     width, centre, end = 5.0, 27.0, 3.0
 
     def velocity(x):
@@ -210,7 +210,7 @@ def test_a_smooth_simple_wave_is_followed_at_the_order_of_the_scheme(scheme, ord
 
 
 def test_a_simple_wave_leaves_the_other_family_alone():
-    """Behind the wave nothing is left: what a wrong sign in the invariants would send back."""
+    """No deviation remains behind the wave; a wrong sign in the invariants would cause one."""
     width, centre = 5.0, 27.0
 
     def velocity(x):
@@ -261,7 +261,7 @@ def test_under_the_table_law_a_stopped_stream_rises_along_the_isentrope_of_coolp
 
 @pytest.mark.parametrize("law", [{"law": "log"}, {"law": "mixture", "air_fraction": 0.01}])
 def test_a_valve_through_which_nothing_flows_is_solved_to_the_rounding_of_pressures(law):
-    """A chamber behind a valve in equilibrium with a flowing main: its drop is rounding, and so would be its flow."""
+    """A chamber behind a valve is in equilibrium with a flowing main; the rounding of its drop causes no flow."""
     rough = {"friction": {"model": "quasi-steady", "roughness": 1e-4}}
     nodes = {
         "hill": lake(60.0), "low": lake(40.0), "top": junction(elevation=48.0), "fork": junction(elevation=5.0),
@@ -282,7 +282,7 @@ def test_a_valve_through_which_nothing_flows_is_solved_to_the_rounding_of_pressu
 
 @pytest.mark.parametrize("where", ["inflow", "demand"])
 def test_flows_that_are_given_are_volumes_at_the_reference_density(where):
-    """At 2000 bar, where water is 1.095 times as dense, exp(2000 bar / 2.2 GPa), a pipe reads fewer litres."""
+    """At 2000 bar water is 1.095 = exp(2000 bar / 2.2 GPa) times as dense, and a pipe has less volume flow."""
     flow, end, high = 1e-3, 0.5, 2e8 + AMBIENT
     fluid = scenes.WATER | {"law": "log", "pressure": AMBIENT}
     given = {"type": "inflow", "flow": flow} if where == "inflow" else junction(-flow)
@@ -297,7 +297,7 @@ def test_flows_that_are_given_are_volumes_at_the_reference_density(where):
 @pytest.mark.parametrize("heads", [(60.0, 58.0), (58.0, 60.0), (60.0, 59.99)])
 @pytest.mark.parametrize("length, diameter", [(30.0, 0.5), (2.0, 2.0), (1.0, 0.05), (500.0, 1.5)])
 def test_a_short_wide_pipe_starts_with_its_friction_and_the_jet_that_leaves_it(law, heads, length, diameter):
-    """f L / D v^2 / 2 + v^2 / 2 = g dH: that the jet takes more than friction, or all but all, does not matter."""
+    """f L / D v^2 / 2 + v^2 / 2 = g dH, also if the jet takes more than friction, or nearly everything."""
     fluid = {**scenes.WATER, "law": "log"} if law == "log" else {"name": "Water", "law": "table"}
     factor = 0.011
     friction = {"model": "quasi-steady", "factor": factor}

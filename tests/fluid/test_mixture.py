@@ -1,4 +1,4 @@
-"""The density law `mixture`, liquid with free gas and vapour, against quadrature, closed forms and SciPy."""
+"""Density law `mixture`, liquid with free gas and vapour, compared with quadrature, closed forms and SciPy."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ NONE = np.zeros(0)
 
 
 def settings(**keys):
-    """The record that kernels read, of oil with what `keys` mix into it."""
+    """Record that kernels read, for oil with the mixture of `keys`."""
     fluid = properties(**{**OIL, "temperature": 293.15, "pressure": ATM, "law": "mixture", **keys})
     made = np.zeros(1, rec.SETTINGS)
     MixtureLaw.lower(fluid, made[0], [])
@@ -45,7 +45,7 @@ def walled(compliance: float):
 
 
 def integral(f, low: float, high: float, st) -> float:
-    """Of f over pressure, in ln(p - floor), by quad at 1e-13."""
+    """Integral of f over pressure, in ln(p - floor), by quad at 1e-13."""
     floor = st["floor"]
     ends = math.log(low - floor), math.log(high - floor)
     kink = [math.log(st["saturation"])] if ends[0] < math.log(st["saturation"]) < ends[1] else None
@@ -63,7 +63,7 @@ def test_mass_and_head_lead_back_to_their_pressure_over_nine_decades(keys, compl
         m, _ = law.mass_of_pressure(st, NONE, pipe, p)
         there = law.pressure_of_mass(st, NONE, pipe, m)
         assert law.mass_of_pressure(st, NONE, pipe, there)[0] == approx(m, rel=1e-15)
-        assert there - st["floor"] == approx(x, rel=1e-11, abs=1e-6)  # what 1e-16 of the mass is worth in liquid
+        assert there - st["floor"] == approx(x, rel=1e-11, abs=1e-6)  # abs: rounding of the mass by 1e-16 in liquid
         h = law.enthalpy(st, NONE, p)
         assert law.enthalpy(st, NONE, law.pressure_of_enthalpy(st, NONE, h)) == approx(h, rel=1e-14, abs=1e-12)
         dense = math.log(law.density(st, NONE, p) / st["rho"])
@@ -107,7 +107,7 @@ def test_the_riemann_integral_of_isothermal_gas_in_liquid_has_a_closed_form():
 
 @pytest.mark.parametrize("keys", MIXTURES.values(), ids=MIXTURES)
 def test_the_bulk_modulus_is_that_of_liquid_and_gas_in_series(keys):
-    """1 / K_eff = (1 - g) / K_l + g / (n p), g the gas's share of the volume, and what dissolves."""
+    """1 / K_eff = (1 - g) / K_l + g / (n p) and the part that dissolves, with g the gas fraction of the volume."""
     st, floor = settings(**keys), keys.get("vapor_pressure", 0.0)
     oil = AirOil(870.0, 1.6e9, keys["air_fraction"], keys.get("gas_exponent", 1.0),
                  keys.get("saturation_pressure", math.inf), floor=floor)  # fmt: skip
@@ -121,7 +121,7 @@ def test_the_bulk_modulus_is_that_of_liquid_and_gas_in_series(keys):
 
 
 def test_a_bubbly_liquid_has_woods_speed_of_sound_two_orders_below_the_liquids():
-    """1 / c^2 = rho (g / p + (1 - g) / K) (Wood 1930), and at 1 atm exactly `air_fraction` of the volume is gas."""
+    """1 / c^2 = rho (g / p + (1 - g) / K) (Wood 1930); at 1 atm the gas fraction is exactly `air_fraction`."""
     st = settings(air_fraction=0.01)
     assert law.density(st, NONE, ATM) == approx(0.99 * 870.0, rel=1e-14)
     c = law.local_speed(st, NONE, walled(0.0), ATM)
@@ -139,7 +139,7 @@ def test_gas_that_has_dissolved_leaves_the_bare_liquid():
 
 
 def main(fluid: dict, cells: int = 24) -> dict:
-    """A main behind a valve that closes part of the way, and a chamber at its end."""
+    """Case of a main before a valve that closes in part, with a chamber at its end."""
     nodes = {"lake": reservoir(2e6), "gate": junction(), "pot": chamber(1e-3), "out": reservoir(5e5)}
     links = {"main": pipe("lake", "gate", 60.0, 0.05, 1200.0, cells, friction={"model": "steady", "factor": 0.03})}
     links["tap"] = valve("gate", "out", 2e-4, ramp(0.02, 0.05, 1.0, 0.3))
@@ -157,7 +157,7 @@ def test_without_air_it_is_the_log_law_to_the_bit():
 
 
 def test_a_little_air_is_the_log_law_but_for_the_strain():
-    """The liquid's volume is linear in pressure: dp / K = 3e-3 softer than the log law's at the most."""
+    """The volume of the liquid is linear in pressure, at most dp / K = 3e-3 softer than under the log law."""
     log = fvsolve.run(main({**OIL, "vapor_pressure": 1.0, "law": "log"}))
     thin = fvsolve.run(main({**OIL, "vapor_pressure": 1.0, "law": "mixture", "air_fraction": 1e-9}))
     assert thin["gate.pressure"] == approx(log["gate.pressure"], rel=3e-3)
@@ -165,7 +165,7 @@ def test_a_little_air_is_the_log_law_but_for_the_strain():
 
 @pytest.mark.parametrize("keys", [MIXTURES[k] for k in ("one per cent", "adiabatic", "dissolving")])
 def test_ledgers_of_mass_and_energy_close_with_air_in_pipes_and_chambers(keys):
-    """All that is missing the scheme takes: it falls with the cells, steps take none of it, the law none at all."""
+    """The energy remainder is that of the scheme and falls with the cells; steps and law cause none."""
     fluid = {**OIL, "law": "mixture", **keys}
     result = fvsolve.run(main(fluid))
     assert result.ok and abs(result.ledger["mass"]["relative"]) < 1e-13

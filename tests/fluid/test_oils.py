@@ -1,4 +1,4 @@
-"""Hydraulic oils by name: the standards that fix them, and a measured oil's own tables."""
+"""Hydraulic oils by name, compared with the standards that define them and with tables of a measured oil."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ C = 273.15
 
 @pytest.mark.parametrize("grade", [32, 46, 68])
 def test_an_oil_has_its_grade_at_40_degC_and_viscosity_index_100(grade):
-    """ISO 3448: the mid-point at 40 degC. ASTM D2270: at index 100 it is H of the viscosity at 100 degC."""
+    """ISO 3448 gives the viscosity at 40 degC; at index 100 it is H of ASTM D2270 for the viscosity at 100 degC."""
     oil = properties(f"ISO VG {grade}", 40 + C, ATM)
     assert 1e6 * oil.viscosity / oil.density == approx(grade, rel=1e-12)
     hot = properties(f"ISO VG {grade}", 100 + C, ATM)
@@ -29,7 +29,7 @@ def test_an_oil_has_its_grade_at_40_degC_and_viscosity_index_100(grade):
 
 
 def test_walthers_line_through_two_points_meets_a_measured_oil():
-    """An HLP 32, mu = 17.02 mPa s exp(5.428 (50 - t) / (94.72 + t)): within 3 % from 20 to 80 degC, 11 % at 0 degC."""
+    """An HLP 32 with mu = 17.02 mPa s exp(5.428 (50 - t) / (94.72 + t)): 3 % from 20 to 80 degC, 12 % at 0 degC."""
 
     def measured(t):
         return 1e6 * 1.702e-2 * math.exp(5.428 * (50 - t) / (94.72 + t)) / density(t)
@@ -55,7 +55,7 @@ def test_density_follows_the_measured_oil_and_the_petroleum_tables():
 
 
 def test_the_bulk_modulus_is_isentropic_rises_with_pressure_and_falls_with_temperature():
-    """K_T = rho / (drho/dp) by differences; K_s / K_T = cp / cv = 1 + T a^2 K_T / (rho cp)."""
+    """K_T = rho / (drho/dp) by differences; K_s / K_T = cp / cv = 1 / (1 - T a^2 K_T / (rho cp))."""
     t, p, step = 40 + C, 100e5, 1e5
     high, low = (properties("ISO VG 46", t, p + s).density for s in (step, -step))
     isothermal = 2 * step / math.log(high / low)
@@ -69,7 +69,7 @@ def test_the_bulk_modulus_is_isentropic_rises_with_pressure_and_falls_with_tempe
     for grade in OILS:
         k = [properties(grade, t + C, p).bulk_modulus for t, p in ((20, 1e5), (20, 2e7), (60, 1e5))]
         assert k[1] > 1.1 * k[0] and k[2] < 0.95 * k[0]
-        assert 1.4e9 < k[2] < k[0] < 1.9e9  # what handbooks give for mineral oil
+        assert 1.4e9 < k[2] < k[0] < 1.9e9  # range of handbooks for mineral oil
 
 
 def test_an_oil_goes_by_the_spellings_of_the_field():

@@ -1,1 +1,1 @@
-"""The same said in another way has the same answer; a part alone, whatever its neighbours, keeps what it is given."""
+"""Invariance of results under equivalent descriptions of a case, and tests of single parts between any neighbours."""

@@ -1,4 +1,4 @@
-"""The same mechanism said in another way: each takes a case and gives one. Knows the keys; knows no answer."""
+"""Equivalent descriptions of a mechanism; each function returns a changed copy of a case."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from scipy.spatial.transform import Rotation
 
 from invariance.result_comparison import Told
 
-AXIAL = ("w", "joint_t", "angular_momentum_")  # vectors that a mirror turns about
+AXIAL = ("w", "joint_t", "angular_momentum_")  # axial vectors; POLAR: polar vectors
 POLAR = ("", "v", "a", "joint_f", "momentum_")
 
 
 def part(probe: str) -> tuple[str, str, str]:
-    """(part, vector, axis) of a probe that is one along an axis of the world; the vector is "-" of any other."""
+    """(part, vector, axis) of a probe of a vector component along a world axis; (probe, "-", "") of other probes."""
     name, _, what = probe.rpartition(".")
     found = (what[:-1], what[-1:])
     return (
@@ -25,13 +25,13 @@ def part(probe: str) -> tuple[str, str, str]:
 
 
 def otherwise(case: dict) -> dict:
-    """Parts in the reverse order: bodies before those that they hang on."""
+    """Case with its parts in reverse order, so that bodies precede their carriers."""
     said = copy.deepcopy(case)
     return said | {table: dict(reversed(said[table].items())) for table in ("nodes", "links")}
 
 
 def later(value: Any, wait: float) -> Any:
-    """All schedules at a later time, harmonic ones by their phase."""
+    """Value with all schedules delayed by `wait`, harmonic schedules by their phase."""
     if not isinstance(value, dict):
         return value
     if "period" in value:
@@ -63,7 +63,7 @@ TEXT = {
 
 
 def in_other_units(value: Any, key: str = "", kind: str = "") -> Any:
-    """Every quantity that has a unit in `TEXT` is said in that; of waves mean, amplitude and period."""
+    """Tables with every quantity of `TEXT` as text with a unit; of waves the mean, amplitude and period."""
     if isinstance(value, dict):
         kind = value.get("kind", kind)
         if "period" in value:
@@ -89,7 +89,11 @@ def said(value: Any, key: str) -> Any:
 
 
 def swapped(case: dict) -> dict:
-    """Links between points are drawn from their other end; a bushing has no damping, which `from` sees."""
+    """Case with exchanged ends of links between points.
+
+    The damping of a bushing acts in the axes of the `from` body, so bushings of the tests have no translational
+    damping.
+    """
     other = copy.deepcopy(case)
     for link in other["links"].values():
         if link["type"] in ("spring", "damper", "end-stop", "pin", "bushing", "force") and "from" in link:
@@ -106,7 +110,10 @@ def negative(value: Any) -> Any:
 
 
 def reversed_axes(case: dict) -> dict:
-    """Axes point the other way, and what is counted along them is negative; a pin's has no sense."""
+    """Case with reversed axes of joints and forces, and the opposite sign of values along them.
+
+    The sense of the axis of a pin has no effect.
+    """
     other = copy.deepcopy(case)
     for node in other["nodes"].values():
         joint = node.get("joint", {})
@@ -121,7 +128,7 @@ def reversed_axes(case: dict) -> dict:
 
 
 def rotation(given: dict | None) -> np.ndarray:
-    """An attitude by roll, pitch and yaw, or by a matrix."""
+    """Rotation matrix of an attitude given by roll, pitch and yaw, or by a matrix."""
     given = given or {}
     if "matrix" in given:
         return np.array(given["matrix"])
@@ -129,7 +136,7 @@ def rotation(given: dict | None) -> np.ndarray:
 
 
 def each_attitude(case: dict):
-    """Tables that have an attitude, or may: joints and what rides."""
+    """Yield the tables that may contain an attitude: joints, and basins on bodies."""
     for node in case["nodes"].values():
         if "joint" in node:
             yield node["joint"]
@@ -150,7 +157,7 @@ FORMS = {
 
 
 def attitudes(case: dict, form: str) -> dict:
-    """Every attitude in that form, which SciPy gives."""
+    """Case with every attitude in the form `form`, converted by SciPy."""
     other = copy.deepcopy(case)
     for table in each_attitude(other):
         if table.get("attitude"):
@@ -159,7 +166,7 @@ def attitudes(case: dict, form: str) -> dict:
 
 
 def grounded(case: dict):
-    """Joints that hang on the world, or on a point of a frame."""
+    """Yield the joints whose carrier is the world or a frame."""
     frames = [name for name, node in case["nodes"].items() if node["type"] == "frame"]
     for node in case["nodes"].values():
         if "joint" in node and node["joint"].get("on", "").split(".")[0] in ("", *frames):
@@ -167,7 +174,7 @@ def grounded(case: dict):
 
 
 def turned(case: dict, angle: float) -> dict:
-    """All of it turned about the vertical."""
+    """Case turned about the vertical axis by `angle` [rad]."""
     other, turn = copy.deepcopy(case), Rotation.from_euler("Z", angle).as_matrix()
 
     def spun(vector):
@@ -185,7 +192,7 @@ def turned(case: dict, angle: float) -> dict:
 
 
 def as_turned(one: Told, angle: float):
-    """What the other should show of a probe: vectors are turned."""
+    """Function that returns the expected values of a probe in the turned case, with turned vectors."""
     turn = Rotation.from_euler("Z", angle).as_matrix()
 
     def change(probe, values):
@@ -198,7 +205,7 @@ def as_turned(one: Told, angle: float):
 
 
 def shifted(case: dict, by: list[float]) -> dict:
-    """All of it elsewhere."""
+    """Case displaced by the vector `by` [m]."""
     other = copy.deepcopy(case)
 
     def there(place):
@@ -214,7 +221,10 @@ def shifted(case: dict, by: list[float]) -> dict:
 
 
 def mirrored(case: dict, axis: int) -> dict:
-    """All of it in a mirror across x (0) or y (1): polar vectors change there, axial ones elsewhere."""
+    """Case mirrored across x (axis 0) or y (axis 1).
+
+    Polar vectors change their sign along the axis, axial vectors across it.
+    """
     other, mirror = copy.deepcopy(case), np.eye(3)
     mirror[axis, axis] = -1.0
 
@@ -231,7 +241,7 @@ def mirrored(case: dict, axis: int) -> dict:
             node["centre_of_mass"] = polar(node["centre_of_mass"])
         if np.ndim(node.get("inertia")) == 2:
             node["inertia"] = (mirror @ node["inertia"] @ mirror).tolist()
-        if node["type"] == "basin" and "on" in node:  # drawn from its other corner
+        if node["type"] == "basin" and "on" in node:  # the mirror exchanges its corners
             corner = rotation(node.get("attitude")) @ (np.eye(3)[axis] * node["size"][axis])
             node["at"] = (np.array(node["at"]) + corner).tolist()
         if "at" in node:
@@ -254,7 +264,7 @@ def mirrored(case: dict, axis: int) -> dict:
 
 
 def in_mirror(probe: str, axis: int, sizes: dict) -> str:
-    """Points of a basin as the mirror has them."""
+    """Probe at the mirrored point of a basin."""
     what, _, place = probe.partition("@")
     name = what.partition(".")[0]
     if name not in sizes or not place:
@@ -265,7 +275,7 @@ def in_mirror(probe: str, axis: int, sizes: dict) -> str:
 
 
 def as_mirrored(axis: int):
-    """What the other should show of a probe."""
+    """Function that returns the expected values of a probe in the mirrored case."""
 
     def change(probe, values):
         _, vector, along = part(probe)
@@ -278,7 +288,7 @@ def as_mirrored(axis: int):
 
 
 def split(case: dict, name: str) -> dict:
-    """A body in two: a third of its mass, points and all, and the rest fixed to it at an angle."""
+    """Case with a body divided into a third of its mass with all points, and the rest on a fixed joint at an angle."""
     other, whole = copy.deepcopy(case), case["nodes"][name]
     inertia = np.array(whole["inertia"])
     inertia = np.diag(inertia) if inertia.ndim == 1 else inertia

@@ -1,20 +1,20 @@
-"""The same network said in another way: each takes a case and gives one. Knows the keys; knows no answer."""
+"""Equivalent descriptions of a network; each function returns a changed copy of a case."""
 
 from __future__ import annotations
 
 import copy
 from typing import Any
 
-STRAIGHT = ("pipe", "valve", "orifice", "rigid-column")  # the same both ways
+STRAIGHT = ("pipe", "valve", "orifice", "rigid-column")  # symmetric kinds
 
 
 def changed(case: dict, table: str, **keys: Any) -> dict:
-    """A copy with other keys in one of its tables."""
+    """Case with changed keys in one of its tables."""
     return {**copy.deepcopy(case), table: {**copy.deepcopy(case[table]), **keys}}
 
 
 def renamed(case: dict, call) -> dict:
-    """Every part has another name."""
+    """Case with the name call(name) for every part."""
     said = copy.deepcopy(case)
     said["nodes"] = {call(name): node for name, node in said["nodes"].items()}
     said["links"] = {call(name): link for name, link in said["links"].items()}
@@ -30,13 +30,13 @@ def called(probe: str, call) -> str:
 
 
 def reordered(case: dict, nodes: list[str], links: list[str]) -> dict:
-    """Its parts stand in another order in the file."""
+    """Case with its nodes and links in the given order."""
     said = copy.deepcopy(case)
     return {**said, "nodes": {n: said["nodes"][n] for n in nodes}, "links": {n: said["links"][n] for n in links}}
 
 
 def swapped(case: dict, chosen: set[str]) -> dict:
-    """Some links are drawn from their other end; so are the probes along them."""
+    """Case with exchanged ends of the chosen links, and with the corresponding probes along them."""
     said = copy.deepcopy(case)
     for name in chosen:
         link = said["links"][name]
@@ -57,7 +57,7 @@ def from_other_end(probe: str, case: dict, chosen: set[str]) -> str:
 
 
 def raised(case: dict, height: float) -> dict:
-    """Everything stands higher."""
+    """Case with all elevations and heads raised by `height` [m]."""
     said = copy.deepcopy(case)
     for node in said["nodes"].values():
         node["elevation"] = node.get("elevation", 0.0) + height
@@ -70,7 +70,7 @@ def raised(case: dict, height: float) -> dict:
 
 
 def straight(case: dict) -> dict:
-    """No pipe has a profile."""
+    """Case without elevation profiles."""
     said = copy.deepcopy(case)
     for link in said["links"].values():
         link.pop("profile", None)
@@ -85,7 +85,7 @@ TEXT = {
 
 
 def in_other_units(value: Any, key: str = "") -> Any:
-    """Every quantity that has a unit in `TEXT` is said in that; of schedules the values."""
+    """Value with every quantity of `TEXT` as text with a unit, also the values of schedules."""
     if isinstance(value, dict) and key in TEXT and "value" in value:
         return {**value, "value": [in_other_units(one, key) for one in value["value"]]}
     if isinstance(value, dict):
@@ -99,7 +99,7 @@ def in_other_units(value: Any, key: str = "") -> Any:
 
 
 def twice(case: dict, place: str) -> dict:
-    """Two copies, and a valve that is shut between them."""
+    """Case with two copies of the network and a shut valve between them."""
     said, other = copy.deepcopy(case), renamed(case, lambda name: f"{name}-too")
     shut = {"type": "valve", "from": place, "to": f"{place}-too", "area": 0.01, "opening": 0.0}
     said["nodes"] |= other["nodes"]
@@ -109,14 +109,14 @@ def twice(case: dict, place: str) -> dict:
 
 
 def later(case: dict, wait: float) -> dict:
-    """It starts at another time, and so does all that happens."""
+    """Case with its start, end and schedules delayed by `wait` [s]."""
     said = shifted(copy.deepcopy(case), wait)
     said["numerics"] |= {"start": wait, "end": case["numerics"]["end"] + wait}
     return said
 
 
 def shifted(value: Any, wait: float) -> Any:
-    """Schedules at a later time."""
+    """Value with schedules delayed by `wait` [s]."""
     if isinstance(value, dict) and "value" in value:
         return {
             **value,
@@ -126,7 +126,10 @@ def shifted(value: Any, wait: float) -> Any:
 
 
 def denser(case: dict, times: float) -> dict:
-    """Fluid, air and all pressures weigh more; volumes, heads and times do not."""
+    """Case with density, stiffness, viscosity and all pressures multiplied by `times`.
+
+    Volumes, heads and times do not change.
+    """
     said = copy.deepcopy(case)
     fluid = said["fluid"]
     fluid["pressure"] = 101325.0
@@ -140,13 +143,13 @@ def denser(case: dict, times: float) -> dict:
         for key in ("set_pressure", "overpressure", "cracking_pressure", "band"):
             if key in link:
                 link[key] *= times
-        if "coefficient" in link:  # of a leak, over the root of the pressure
+        if "coefficient" in link:  # coefficient of a leak per root of pressure
             link["coefficient"] /= times**0.5
     return said
 
 
 def drawn_backwards(case: dict) -> dict:
-    """What junctions give is brought by inflows of the opposite sign."""
+    """Case with every junction with a demand replaced by an inflow of opposite sign."""
     said = copy.deepcopy(case)
     for name, node in said["nodes"].items():
         if node["type"] == "junction" and "demand" in node:

@@ -1,4 +1,4 @@
-"""Scenes with things that move: mechanisms, walls, frames, tanks, columns. Knows the keys; knows no answer."""
+"""Cases with moving parts: mechanisms, moving walls, basin frames, tanks on bodies and moving networks."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ END = 0.4
 
 
 def stepped(method: str, step: float) -> dict:
-    """Numerics: the method by its own step, or by its tolerance."""
+    """Keys of `numerics` for a method at step `step`, or at its tolerance if it has one."""
     return {"scheme": "muscl", "method": method, **(METHODS[method] or {"step": step})}
 
 
 def seen(*names: str) -> list[str]:
-    """Vectors of bodies and points: places, velocities and accelerations."""
+    """Probes of position, velocity and acceleration of bodies and points."""
     return [f"{name}.{one}{axis}" for name in names for one in ("", "v", "a") for axis in "xyz"]
 
 
 def machine(method: str = "rk4", law: str = "linear", **more) -> dict:
-    """A tree with every kind of joint, a free body, and every kind of link between points."""
+    """Case of a tree with joints of every kind, a free body, and links of every kind except pins."""
     wave = {"mean": 0.1, "amplitude": 0.2, "period": 0.9, "phase": 0.4}
     nodes = {
         "world": {"type": "frame", "points": {"foot": [0.1, -0.2, 0.3], "lug": [0.5, 0.1, -0.6], "hook": [1.0,
@@ -95,7 +95,7 @@ def machine(method: str = "rk4", law: str = "linear", **more) -> dict:
 
 
 def loop(method: str = "rk4", **more) -> dict:
-    """A parallelogram of three bars in a plane aslant, closed by a pin, on a spring."""
+    """Case of a parallelogram of three bars in an inclined plane, closed by a pin, with a spring."""
     bar = {
         "mass": 2.0,
         "inertia": [1 / 6, 1 / 6, 0.01],
@@ -129,7 +129,7 @@ def loop(method: str = "rk4", **more) -> dict:
 
 
 def piston(method: str = "rk4", law: str = "", by: str = "mass", **more) -> dict:
-    """A basin of water, or of a liquid under a law, whose east wall a mass or a body on a spring takes along."""
+    """Case of a basin of water or liquid whose east wall moves with a sprung mass or body."""
     rest = 0.5 * RHO * GRAVITY * 0.5
     pool = {"type": "basin", "size": [1.0, 0.5], "cells": [8, 2], "patches": {"lid": {"side": "east", "body": "lid"}}}
     if law:
@@ -157,7 +157,7 @@ def piston(method: str = "rk4", law: str = "", by: str = "mass", **more) -> dict
 
 
 def flume(method: str = "rk4", **more) -> dict:
-    """A basin whose west wall a schedule moves, its zone ending within, and a valve on its side."""
+    """Case of a basin with a scheduled motion of its west wall, a wall zone inside the basin, and a valve at a side."""
     swing = {"mean": 0.0, "amplitude": 0.05, "period": 1.1, "phase": 0.3}
     patches = {"paddle": {"side": "west", "travel": swing, "zone": 0.5}, "gate": {"side": "south"}}
     pool = {"type": "basin", "size": [1.5, 0.5], "cells": [12, 3], "level": 1.0, "patches": patches,
@@ -180,7 +180,7 @@ ROCK = {"mean": 0.02, "amplitude": 0.05, "period": 1.3, "phase": 0.5}
 
 
 def carried(method: str = "rk4", **more) -> dict:
-    """A basin on a body that is driven about an axis aslant, on another that is driven along a line."""
+    """Case of a basin on a body with a driven inclined hinge, whose carrier has a driven slider."""
     nodes = {
         "cart": body(5.0, [1, 1, 1], {"kind": "prismatic", "axis": [0.6, 0.8, 0], "travel": {**ROCK, "period": 0.9}}),
         "cradle": body(5.0, [1, 1, 1], {"kind": "revolute", "on": "cart", "at": [0.2, 0.1, 0.5], "axis": [0.36,
@@ -193,7 +193,7 @@ def carried(method: str = "rk4", **more) -> dict:
 
 
 def full(method: str = "rk4", law: str = "linear", free: bool = False, **more) -> dict:
-    """A box full of liquid, aslant on a body that is driven about an axis aslant, or hangs on it and swings."""
+    """Case of a box full of liquid, inclined on a body with an inclined hinge, driven or free."""
     turns = {"angle": 0.3, "rate": 1.5} if free else {"angle": {**ROCK, "period": 0.3}}
     nodes = {
         "cradle": body(9.0, [1, 1, 1], {"kind": "revolute", "at": [0.2, 0.1, 0.5], "axis": [0.36, 0.48, 0.8], **turns}),
@@ -213,7 +213,7 @@ def full(method: str = "rk4", law: str = "linear", free: bool = False, **more) -
 
 
 def rocking(method: str = "rk4", sloshing: str = "cells", **more) -> dict:
-    """A basin that moves its body, which hangs on a ball and on springs."""
+    """Case of a basin that moves its body, which hangs on a ball joint and two springs."""
     hull = body(
         400.0, [300.0, 400.0, 500.0], {"kind": "ball", "at": [0.1, 0.2, 1.0], "attitude": {"roll": 0.05,
             "pitch": -0.03, "yaw": 0.4},
@@ -237,7 +237,7 @@ def rocking(method: str = "rk4", sloshing: str = "cells", **more) -> dict:
 
 
 def u_tube(method: str = "rk4", free: bool = True, **more) -> dict:
-    """Two tanks and a rigid column between them on a hull that rolls, of itself or as a schedule has it."""
+    """Case of two tanks and a rigid column between them on a hull that rolls, free or by a schedule."""
     roll = {"angle": 0.15, "rate": -0.02} if free else {"angle": ROCK}
     nodes = {
         "hull": body(60e3, [4e5, 8e5, 8e5], {"kind": "revolute", "axis": [1, 0, 0], **roll}, centre_of_mass=[0,
@@ -258,7 +258,7 @@ def u_tube(method: str = "rk4", free: bool = True, **more) -> dict:
 
 
 def hose(method: str = "rk4", law: str = "linear", **more) -> dict:
-    """A pipe on a rig that is driven, from a reservoir through a valve to a chamber."""
+    """Case of a pipe on a driven body, from a reservoir through a valve to a chamber."""
     nodes = {
         "rig": body(1.0, [1, 1, 1], {"kind": "revolute", "axis": [0, 0.6, 0.8], "angle": {**ROCK, "period": 0.5}}),
         "open": {"type": "reservoir", "pressure": 5e5, "on": "rig", "at": [0, 0, 0.2]},

@@ -1,4 +1,4 @@
-"""One part of every kind that `fvsolve.parts` knows, drawn with random keys. Knows the keys; knows no answer."""
+"""Strategies for one part of most kinds with random keys, for hypothesis."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ CONNECTION = {"connection": st.fixed_dictionaries(
 def of(
     kind: str, keys: dict | None = None, maybe: dict | None = None, **tables: st.SearchStrategy
 ) -> st.SearchStrategy:
-    """A table of that kind; what `tables` draw is merged into it."""
+    """Strategy for tables of a kind of part, merged with the tables that `tables` draw."""
     plain = st.fixed_dictionaries({"type": st.just(kind), **(keys or {})}, optional=maybe or {})
     return st.builds(
         lambda one, *more: one | {k: v for table in more for k, v in table.items()}, plain, *tables.values()
@@ -44,7 +44,7 @@ def of(
 
 
 def disc(one: dict) -> dict:
-    """A disc that takes its time says what opens it fully."""
+    """Table with an overpressure, if the valve has a disc with a lag or a mass, or is a relief valve."""
     moves = "time_constant" in one or "natural_frequency" in one
     return one | ({"overpressure": 2e4} if moves or one["type"] == "relief-valve" else {})
 

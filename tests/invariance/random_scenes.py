@@ -1,4 +1,4 @@
-"""Scenes drawn by hypothesis: networks, settings, basins."""
+"""Strategies for random networks and their settings, for hypothesis."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from reference.scenes import WATER, chamber, inflow, junction, lake, pipe, ramp,
 
 
 def between(low: float, high: float) -> st.SearchStrategy[float]:
-    """Numbers as a person writes them."""
+    """Strategy for numbers with four significant digits."""
     return st.floats(low, high).map(lambda x: float(f"{x:.4g}"))
 
 
@@ -36,7 +36,7 @@ FRICTIONS = [
 
 @st.composite
 def numerics(draw) -> dict:
-    """Any scheme with an explicit method by Courant number, an implicit one by its own step, or one by its error."""
+    """Strategy for settings: any scheme, with explicit or implicit steps by Courant number, or with error control."""
     given = {"scheme": draw(st.sampled_from(SCHEMES))}
     if given["scheme"] == "muscl":
         given["limiter"] = draw(st.sampled_from(LIMITERS))
@@ -49,18 +49,18 @@ def numerics(draw) -> dict:
 
 
 def shuffled(names, seed: int) -> list[str]:
-    """Names in an order that a seed decides."""
+    """Names in a random order of the seed."""
     return random.Random(seed).sample(list(names), len(names))
 
 
 def some_of(names: list[str], seed: int) -> set[str]:
-    """At least one name, chosen by a seed."""
+    """At least one name, chosen by the seed."""
     order = shuffled(names, seed)
     return set(order[: 1 + seed % len(order)])
 
 
 def pipes(start: str, end: str) -> st.SearchStrategy[dict]:
-    """Of one to eight cells."""
+    """Strategy for pipes of one to eight cells with friction."""
     return st.builds(
         pipe, st.just(start), st.just(end), between(50.0, 300.0), between(0.1, 0.4), between(800.0, 1300.0),
         st.integers(1, 8), friction=st.sampled_from(FRICTIONS[1:]), minor_loss=st.sampled_from([0.0, 1.5]),
@@ -68,7 +68,7 @@ def pipes(start: str, end: str) -> st.SearchStrategy[dict]:
 
 
 def openings() -> st.SearchStrategy:
-    """Open, part open, shutting to the end or in part, in a jump or on a ramp."""
+    """Strategy for openings of a valve: constant, with a ramp, or with a jump."""
     moved = st.builds(ramp, between(0.1, 0.6), between(0.02, 0.5), between(0.3, 1.0), st.sampled_from([0.0, 0.2]))
     return st.one_of(
         st.just(1.0), between(0.1, 1.0), moved, st.builds(step, between(0.1, 0.6), st.just(1.0), between(0.1, 0.9))
@@ -76,7 +76,7 @@ def openings() -> st.SearchStrategy:
 
 
 def nodes(hilly: bool) -> st.SearchStrategy[dict]:
-    """One of the places within a network."""
+    """Strategy for nodes inside a network."""
     high = {"elevation": between(-5.0, 8.0)} if hilly else {}
     drawn_off = st.one_of(
         st.none(), between(0.0, 5e-3), st.builds(step, between(0.1, 0.6), st.just(0.0), between(0.0, 5e-3))
@@ -93,7 +93,7 @@ def nodes(hilly: bool) -> st.SearchStrategy[dict]:
 
 
 def vessel(volume: float, gas: float, **more) -> dict:
-    """An air vessel."""
+    """Table of an air vessel."""
     return {"type": "accumulator", "volume": volume, "gas_volume": gas, **more}
 
 
@@ -103,7 +103,7 @@ MOVING = st.fixed_dictionaries({"time_constant": between(0.02, 0.5)})
 
 @st.composite
 def across(draw, start: str, end: str) -> dict:
-    """A link between two places of the fluid."""
+    """Strategy for a link between two places of the network."""
     ends = {"from": start, "to": end}
     length, flow, head = draw(between(10.0, 100.0)), draw(between(5e-3, 3e-2)), draw(between(5.0, 40.0))
     area, pressure = draw(between(1e-4, 3e-3)), draw(between(2e5, 6e5))
@@ -122,7 +122,10 @@ def across(draw, start: str, end: str) -> dict:
 
 @st.composite
 def networks(draw, laws=tuple(FLUIDS), settings_of=None) -> dict:
-    """A lake above, a reservoir below, one to four places on pipes between, a way through, and a link or two across."""
+    """Strategy for networks with a high lake, a low reservoir and one to four nodes on pipes between them.
+
+    A valve joins a node to the reservoir; up to two links join random places, and a leak is optional.
+    """
     hilly = draw(st.booleans())
     foot = {"elevation": 0.0} if hilly else {}
     places = {"high": lake(draw(between(30.0, 60.0)), **foot), "low": reservoir(draw(between(1.5e5, 3e5)), **foot)}
@@ -155,7 +158,10 @@ def networks(draw, laws=tuple(FLUIDS), settings_of=None) -> dict:
 
 @st.composite
 def profiles(draw, length: float, low: float, high: float) -> dict:
-    """A line with one point off the straight one, not too steep; lengths are exact where they are added up."""
+    """Strategy for elevation profiles with one point off the straight line, less steep than the pipe.
+
+    Chainages are exact in binary where they are added.
+    """
     at, off, begin = (
         draw(between(0.3, 0.7)) * length,
         draw(between(-0.1, 0.1)) * length,
@@ -166,7 +172,7 @@ def profiles(draw, length: float, low: float, high: float) -> dict:
 
 
 def probes(places: dict, links: dict) -> list[str]:
-    """All that there is to see."""
+    """Probes of pressures, flows and levels of all parts."""
     found = [f"nodes.{name}.pressure" for name in places] + [f"links.{name}.flow" for name in links]
     found += [f"nodes.{name}.level" for name, one in places.items() if one["type"] == "tank"]
     for name, one in links.items():

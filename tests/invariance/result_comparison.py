@@ -1,4 +1,4 @@
-"""What a scene tells, and how far two tellings are apart. Knows results; knows no scene."""
+"""Outcomes of runs for the comparison of equivalent cases, and their differences."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fvsolve.model.model_facts import cost_notices
 
 @dataclass
 class Told:
-    """How it ended ("refused" where it did not begin), and the rows of every probe."""
+    """Outcome of a run: reason of its end, or "refused" if it did not start, and the rows of every probe."""
 
     ended: str
     t: np.ndarray
@@ -23,17 +23,17 @@ class Told:
 
 
 REFUSALS = ("above every source", "no steady state")
-# Of a kind, what a step errs by: rounding may decide which steps of Newton are taken in parts, as runs say.
+# Relative error of a step: rounding may decide which steps Newton's method divides (summary key `parted`).
 IN_PARTS = 1e-3
 SCENES = {"built": 0, "dear": 0}
-FAIR, FIRST = 0.25, 2  # share of dear scenes, beside the first ones, above which a claim fails (0 of 550 were dear)
+FAIR, FIRST = 0.25, 2  # allowed share of costly cases, and number allowed in addition (0 of 550 were costly)
 
 
 def told(source, **more) -> Told:
-    """Run a scene, which may be refused in the words of `REFUSALS`; any other error is one.
+    """Outcome of a run; CaseErrors with the words of `REFUSALS` count as "refused", all others are raised.
 
-    One whose explicit steps follow something far quicker than waves is not run: that may take hours, as `check` says.
-    Hypothesis draws another in its place; a scene that is not drawn fails, and so does a claim if many are dear.
+    Cases with explicit steps much shorter than those of waves (notice `cost`) are not run, because they may take hours.
+    Hypothesis draws another case instead. The test fails if many cases are costly.
     """
     try:
         model = fvsolve.build(fvsolve.load(source)) if isinstance(source, dict) else source
@@ -58,9 +58,9 @@ def kind_of(name: str) -> str:
 def alike(
     one: Told, other: Told, within: float = 0.0, name: Callable[[str], str] = str, change=None, later=0.0
 ) -> None:
-    """The same end and the same rows, to the bit or `within` the greatest value of their kind.
+    """Assert that two runs have equal ends and rows, to the bit or `within` the greatest value of each quantity.
 
-    name(probe) is what the other calls it; change(probe, values) what the other should show of the one.
+    name(probe) : name of the probe in the second run; change(probe, values) : expected values there
     """
     assert other.ended == one.ended
     assert len(other.t) == len(one.t)

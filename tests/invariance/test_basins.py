@@ -1,6 +1,6 @@
-"""A basin seen in a mirror, or turned, tells the same: cells and faces are the same, counted from the other side.
+"""A mirrored or turned basin gives the mirrored or turned results.
 
-To the bit where a formula names what is the same number in both; else to round-off, which slopes that limit may grow.
+The results agree to rounding, which limited slopes may increase; a repeated run agrees to the bit.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import fvsolve
 from invariance.random_scenes import between
 from invariance.result_comparison import alike, told
 
-LENGTH, WIDTH = 8.0, 4.0  # exact in binary, as the points of probes are
+LENGTH, WIDTH = 8.0, 4.0  # exact in binary, like the points of probes
 POINTS = [(1.25, 0.75), (4.0, 2.0), (6.5, 3.25)]
 SIDES = {
     "x": {"west": "east", "east": "west", "south": "south", "north": "north"},
@@ -28,18 +28,18 @@ HUMP = "exp(-2*((({x}) - {a})^2 + (({y}) - {b})^2))"
 
 
 def at(mirror: str, x: float, y: float) -> tuple[float, float]:
-    """A point of the basin as the other has it."""
+    """Point of the mirrored or turned basin that corresponds to (x, y)."""
     return {"x": (LENGTH - x, y), "y": (x, WIDTH - y), "turned": (y, x), "": (x, y)}[mirror]
 
 
 def formula(mirror: str, height: float, a: float, b: float) -> str:
-    """A hump at (a, b) of the basin."""
+    """Formula of a hump at the point that corresponds to (a, b)."""
     x, y = {"x": (f"{LENGTH} - x", "y"), "y": ("x", f"{WIDTH} - y"), "turned": ("y", "x"), "": ("x", "y")}[mirror]
     return f"{height}*" + HUMP.format(x=x, y=y, a=a, b=b)
 
 
 def basin(mirror: str, drawing: dict) -> dict:
-    """The basin of a drawing as it is (mirror ""), or in a mirror, drained by a valve through one side."""
+    """Case of a drawn basin, mirrored, turned or unchanged (mirror ""), drained by a valve at one side."""
     numerics, cells = drawing["numerics"], drawing["cells"]
     side = drawing["side"] if not mirror else SIDES[mirror][drawing["side"]]
     turn = (lambda pair: pair[::-1]) if mirror == "turned" else list
@@ -71,7 +71,7 @@ def basin(mirror: str, drawing: dict) -> dict:
 
 @st.composite
 def basins(draw) -> dict:
-    """What a basin and its mirror images share."""
+    """Strategy for the settings that a basin and its mirror images share."""
     physics = draw(st.sampled_from(["free-surface", "liquid"]))
     settings = draw(st.sampled_from([
         {"method": "ssp-rk3", "courant": 0.5}, {"method": "ssp-rk2", "courant": 0.4}, {"method": "rk4", "courant": 0.5},
@@ -85,7 +85,7 @@ def basins(draw) -> dict:
         "side": draw(st.sampled_from(["west", "east", "south", "north"])),
         "height": draw(between(0.05, 0.3)),
         "hump": [draw(between(1.0, 7.0)), draw(between(1.0, 3.0))],
-        "bed": draw(st.sampled_from([0.0, 0.3, 1.2])),  # flat, covered, an island
+        "bed": draw(st.sampled_from([0.0, 0.3, 1.2])),  # flat, submerged hump, island
         "end": 1.0 if physics == "free-surface" else 0.05,
     }
 
@@ -94,7 +94,7 @@ def basins(draw) -> dict:
 @examples(10)
 @given(drawing=basins())
 def test_in_a_mirror_or_turned(mirror, drawing):
-    """Formulas are evaluated at mirrored points, which rounds: to round-off."""
+    """A mirrored or turned basin agrees to rounding, because formulas are evaluated at mirrored points."""
     one = told(basin("", drawing))
     assert one.ended == "finished"
     assert max(np.ptp(values) for values in one.rows.values()) > 0.0
@@ -120,7 +120,7 @@ def test_in_a_mirror_or_turned(mirror, drawing):
 @examples(10)
 @given(drawing=basins(), frames=st.integers(1, 7))
 def test_again_and_with_frames(drawing, frames):
-    """The same arithmetic: the same bits, by a model that has run too."""
+    """Field frames and earlier runs of the model do not change a bit."""
     case = basin("", drawing)
     one = told(case)
     case["output"]["fields"] = frames

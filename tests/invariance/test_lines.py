@@ -1,7 +1,7 @@
-"""Networks of delay lines said in another way tell the same, as those of cells do (`test_networks`).
+"""Equivalent descriptions of networks of delay lines give equal results, as in `test_networks` for cells.
 
-Where what is rounded decides whether a jump is kept as one, or smoothed over a step, the two are answers that differ by
-such a jump, a quarter of `numerics.delay_tolerance` of the greatest: it is asked to be small.
+Rounding may decide if a jump is kept or smoothed over a step. The results then differ by such a jump, at most a quarter
+of `numerics.delay_tolerance` times the greatest jump, so the tests use a small tolerance.
 """
 
 from __future__ import annotations
@@ -18,36 +18,39 @@ from invariance.result_comparison import alike, told
 from invariance.test_networks import EXPERIMENTAL, near
 
 pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)
-SMALL = 1e-9  # accuracy: jumps are kept down to a quarter of it
-# Of jumps that arrive at a valve at once rounding decides which changes its flow by how much, and so what of a step is
-# a jump. Ends of steps agree to 1e-12; rows between them differed by 2.3e-8 where lengths and speeds are round numbers.
+SMALL = 1e-9  # delay_tolerance; smaller jumps than a quarter of it are smoothed
+# If several jumps arrive at a valve at once, rounding decides how the change of flow is divided among them, and which
+# part is a jump. Ends of steps agree to 1e-12; rows between them differed by 2.3e-8 with round lengths and speeds.
 BETWEEN_STEPS = 1e-7
 
 
 def nearly(case: dict) -> float:
-    """How far rows of two equivalent_networks may be apart."""
+    """Allowed difference between rows of equivalent networks, over the greatest value of the quantity."""
     return max(10.0 * near(case), BETWEEN_STEPS)
 
 
 def followed(case: dict, line: str) -> dict:
-    """All pipes as lines, or as `auto` finds them."""
+    """Case with delay lines for all pipes, or with the choice of `auto`."""
     return equivalent.changed(
         case, "numerics", pipe_model=line, delay_tolerance=SMALL if line == "delay-line" else 1e-2
     )
 
 
 def lines(*ways: str) -> st.SearchStrategy[dict]:
-    """Networks under the law that lines know, some of whose pipes are shorter than a step."""
+    """Strategy for networks under the linear law with delay lines, some shorter than a step."""
     return st.builds(followed, networks(laws=("linear",)), st.sampled_from(ways or ("delay-line", "auto")))
 
 
 def given_steps() -> st.SearchStrategy[dict]:
-    """Without error control: it sees nothing of what is read between steps, and rounding decides which these are."""
+    """Strategy for networks without error control.
+
+    Errors of interpolation between steps do not enter the error estimate, so rounding would decide where steps end.
+    """
     return lines("delay-line").filter(lambda case: "rtol" not in case["numerics"])
 
 
 def told_lines(case: dict):
-    """What a scene tells, refused where friction is too much for a line of a single step."""
+    """Outcome of a run, or None if a delay line is not possible."""
     try:
         return told(case)
     except fvsolve.CaseError as error:
@@ -57,7 +60,7 @@ def told_lines(case: dict):
 
 
 def same(one, other, *how, **more) -> None:
-    """Both are refused, or tell the same."""
+    """Assert that both runs are refused, or that they agree."""
     assert (one is None) == (other is None)
     if one is not None:
         alike(one, other, *how, **more)
@@ -77,7 +80,7 @@ def test_run_again(case):
 @examples(4)
 @given(case=lines())
 def test_other_rows(case):
-    """Common ones agree to the bit."""
+    """Common rows agree to the bit."""
     few = told_lines(equivalent.changed(case, "output", every=1 / 16))
     many = told_lines(equivalent.changed(case, "output", every=1 / 64))
     assert (few is None) == (many is None)

@@ -1,9 +1,10 @@
-"""What moves, said in another way, tells the same: to the bit where the arithmetic is the same, else to round-off.
+"""Equivalent descriptions of moving parts give equal results, to the bit for equal arithmetic, else to rounding.
 
-Rosenbrock methods solve one linear system a stage with a Jacobian by one-sided differences, and Newton does not bring
-it right: in a mirror forward differences are backward ones, and what was rounded is 1e-8 of an entry. So they agree to
-`BY_DIFFERENCES` (4e-5 is found of a liquid's power, 1e-5 of flows, 1e-6 of basins, 1e-7 of bodies), which is below
-what a step of these scenes errs by. Implicit methods, whose Newton iterates, agree to round-off.
+Rosenbrock methods solve one linear system per stage, with a Jacobian by one-sided differences that no iteration
+corrects. In a mirror, forward differences become backward differences, and rounding changes an entry by 1e-8. These
+methods agree to `BY_DIFFERENCES`, which is below the error of a step in these cases. The differences found are 4e-5
+for the power of a liquid, 1e-5 for flows, 1e-6 for basins and 1e-7 for bodies. Implicit methods with Newton iterations
+agree to rounding.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ from invariance import equivalent_mechanisms as equivalent
 from invariance.moving import METHODS, SCENES, machine, piston, stepped
 from invariance.result_comparison import Told, alike, told
 
-EXPERIMENTAL = "ignore:First-class function type feature is experimental"  # numba says so where it compiles
-pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # of numbers that are none
+EXPERIMENTAL = "ignore:First-class function type feature is experimental"  # warning of numba while it compiles
+pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # other warnings fail, such as of NaN values
 ROUND, BY_DIFFERENCES = 1e-9, 1e-4
 EACH = ["rk4", "gauss-4", "rodas-4"]
 EXPLICIT, IMPLICIT = ["ssp-rk3", "rk4", "dormand-prince"], ["gauss-4", "implicit-midpoint", "radau-iia-5"]
@@ -37,20 +38,20 @@ SWINGS = (".rate", ".angle", ".travel")
 
 @cache
 def first(name: str, method: str) -> Told:
-    """A scene as it is drawn."""
+    """Outcome of the unchanged case, which must finish and must move."""
     shown = told(SCENES[name](method))
     assert shown.ended == "finished" and max(np.ptp(values) for values in shown.rows.values()) > 0.0
     return shown
 
 
 def near(method: str) -> float:
-    """How far apart the same in other words may be, over the greatest value of the quantity."""
+    """Allowed difference between equivalent cases, over the greatest value of the quantity."""
     return {"rodas-4": BY_DIFFERENCES, "dormand-prince": 1e-5}.get(method, ROUND)
 
 
 @pytest.mark.parametrize("name, method", MIXED)
 def test_run_again_and_with_frames(name, method):
-    """The same arithmetic: the same bits, by a model that has run too."""
+    """Field frames and earlier runs of the model do not change a bit."""
     case = SCENES[name](method)
     case["output"]["fields"] = 3
     model = fvsolve.build(fvsolve.load(case))
@@ -60,14 +61,14 @@ def test_run_again_and_with_frames(name, method):
 
 @pytest.mark.parametrize("name, method", MIXED)
 def test_broken_off_and_resumed(name, method):
-    """To the bit, ledgers too."""
+    """An interrupted and resumed run agrees with the whole run to the bit, in its final state and ledgers."""
     case = SCENES[name](method)
     case["output"]["fields"] = 0
     model = fvsolve.build(fvsolve.load(case))
     early = 0.3 * case["numerics"]["end"]
 
     def late(t, seconds, steps):
-        run.budget = 1.0  # steps until it is called again
+        run.budget = 1.0  # steps until the next call
         if t > early:
             raise KeyboardInterrupt
 
@@ -84,14 +85,14 @@ def test_broken_off_and_resumed(name, method):
 
 @pytest.mark.parametrize("name, method", MIXED)
 def test_parts_in_the_reverse_order(name, method):
-    """A body stands before the one that it hangs on, a wall's mass before its basin."""
+    """A body may precede its carrier in the file, and the mass of a moving wall its basin."""
     alike(first(name, method), told(equivalent.otherwise(SCENES[name](method))), near(method))
 
 
 @pytest.mark.parametrize("method", EACH)
 @pytest.mark.parametrize("name", SCENES)
 def test_at_a_later_time(name, method):
-    """Times are rounded by their size, and what drives a joint is differenced over them."""
+    """A delay changes results by rounding of times only, which enters differences of driven joints."""
     alike(
         first(name, method),
         told(equivalent.at_a_later_time(SCENES[name](method), 64.0)),
@@ -102,7 +103,7 @@ def test_at_a_later_time(name, method):
 
 @pytest.mark.parametrize("name", SCENES)
 def test_other_rows(name):
-    """Rows are read between steps and do not shorten them."""
+    """More rows do not change the common rows, because rows are interpolated between steps."""
     case = SCENES[name]()
     case["output"]["every"] /= 2.0
     many, few = told(case), first(name, "rk4")
@@ -114,7 +115,7 @@ def test_other_rows(name):
 @pytest.mark.parametrize("method", EACH)
 @pytest.mark.parametrize("name", SCENES)
 def test_other_units(name, method):
-    """The factors of units round once."""
+    """Conversion of units changes results by rounding only."""
     case = SCENES[name](method)
     other = case | {table: equivalent.in_other_units(case[table]) for table in ("nodes", "links")}
     assert other != case
@@ -154,7 +155,7 @@ def test_turned_about_the_vertical(name, method):
 
 
 def spatial(one: Told) -> Told:
-    """Without vectors of which single components are probes: to turn them all three are needed."""
+    """Outcome without probes of single vector components, because a rotation needs all three."""
     whole = {probe: values for probe, values in one.rows.items() if equivalent.part(probe)[1] == "-"
              or all(f"{probe[:-1]}{axis}" in one.rows for axis in "xyz")}  # fmt: skip
     return Told(one.ended, one.t, whole, one.result)
@@ -164,7 +165,7 @@ def spatial(one: Told) -> Told:
 @pytest.mark.parametrize("method", EACH)
 @pytest.mark.parametrize("name", IN_SPACE)
 def test_in_a_mirror(name, method, axis):
-    """Basins are drawn from their other corner: nothing may hang on where that is."""
+    """A mirrored case gives mirrored results; a basin is then drawn from another corner."""
     case = SCENES[name](method)
     sizes = {one: node["size"] for one, node in case["nodes"].items() if node["type"] == "basin"}
     alike(first(name, method), told(equivalent.mirrored(case, axis)), near(method),
@@ -173,7 +174,10 @@ def test_in_a_mirror(name, method, axis):
 
 @pytest.mark.parametrize("name", IN_SPACE)
 def test_far_away(name):
-    """Accelerations are found about a point of the tree; of moments about the origin of the world those are others."""
+    """A displacement of the whole case changes positions only.
+
+    Angular momenta about the origin of the world do change, and are left out.
+    """
     by = {"x": 3000.0, "y": -4000.0}
     one = first(name, "rk4")
     rows = {probe: values for probe, values in one.rows.items() if "angular_momentum" not in probe}
@@ -195,11 +199,14 @@ def test_attitudes_in_another_form(name, form):
 @pytest.mark.parametrize("method", EACH)
 @pytest.mark.parametrize("part", ["base", "arm", "slider", "wrist", "plate", "kite"])
 def test_a_body_in_two_that_are_fixed_to_each_other(part, method):
-    """What a joint takes is of both; of the body alone are only its own energy and momenta."""
+    """A body divided into two fixed bodies moves as the whole body.
+
+    Kinetic energy and momenta of the body itself do change, and are left out.
+    """
     own = (".kinetic_energy", *(f".angular_momentum_{axis}" for axis in "xyz"))
     one = first("machine", method)
     rows = {probe: values for probe, values in one.rows.items() if not probe.endswith(own)}
-    if part == "kite":  # the place of a free body in its states is that of its centre of mass: so is its velocity
+    if part == "kite":  # states of a free body refer to its centre of mass
         rows = {probe: values for probe, values in rows.items() if not probe.startswith("kite.momentum")}
     alike(Told(one.ended, one.t, rows, one.result), told(equivalent.split(machine(method), part)), near(method))
 
@@ -213,7 +220,7 @@ def test_a_wall_of_a_mass_is_that_of_a_body_on_a_prismatic_joint(law, method):
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("law", ["linear", "log", "mixture"])
 def test_a_mass_on_a_cylinder_is_a_body_on_a_prismatic_joint(law, method):
-    """On the axis of masses, and along one aslant in space without weight."""
+    """A mass on the axis moves as a body on an inclined prismatic joint without gravity."""
     cylinder = {"type": "cylinder", "stroke": 0.5, "area_A": 1e-3, "area_B": 7e-4, "dead_volume_A": 1e-4,
         "dead_volume_B": 2e-4,
                 "viscous_friction": 30.0, "closed_length": 0.1, "initial_pressure_A": 3e6,
@@ -268,7 +275,7 @@ def test_what_drives_a_joint_in_other_words(way, method):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_slider_that_is_driven_by_a_power_or_by_its_table(method):
-    """x = (1 - t / 2)^2, as a ramp of exponent 2 and as a smooth table: its slope is right to (0.01 s)^2."""
+    """A ramp x = (1 - t / 2)^2 and its smooth table drive a slider equally, with slope errors of order (0.01 s)^2."""
     found, times = [], np.linspace(-1.0, 3.0, 401)
     for travel in ({"start": 0.0, "duration": 2.0, "value": [1.0, 0.0], "exponent": 2},
                    {"time": times.tolist(), "value": ((1.0 - times / 2.0) ** 2).tolist(),

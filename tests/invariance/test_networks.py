@@ -1,8 +1,7 @@
-"""A network said in another way tells the same: to the bit where the arithmetic is the same, else to round-off.
+"""Equivalent descriptions of a network give equal results, to the bit for the same arithmetic, otherwise to rounding.
 
-Round-off is `ROUND` of the greatest value of a quantity: steps by Courant number are the same steps, a thousand of them
-(1e-11 is found). Under error control a step may be taken or refused by what was rounded: the two are then two answers
-within the tolerance.
+Rounding is `ROUND` times the greatest value of a quantity, for about a thousand equal steps by Courant number (1e-11 is
+found). Under error control rounding may decide if a step is accepted; the results then agree within the tolerance.
 """
 
 from __future__ import annotations
@@ -22,16 +21,16 @@ from invariance import equivalent_networks as equivalent
 from invariance.random_scenes import IMPLICIT, SEEDS, networks, shuffled, some_of
 from invariance.result_comparison import IN_PARTS, alike, told
 
-EXPERIMENTAL = "ignore:First-class function type feature is experimental"  # numba says so where it compiles
-pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # of numbers that are none
+EXPERIMENTAL = "ignore:First-class function type feature is experimental"  # warning of numba while it compiles
+pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # other warnings fail, such as of NaN values
 ROUND = 1e-9
 
 
 def near(case: dict) -> float:
-    """How far apart the same in other words may be, over the greatest value of the quantity.
+    """Allowed difference between equivalent cases, over the greatest value of the quantity.
 
-    An implicit step with weno5 may have two roots, apart by what it errs by, and rounding chooses (one seen: both are
-    right to 5e-12, and 1.4e-6 apart).
+    An implicit step with weno5 may have two solutions, which differ by the error of a step, and rounding selects one.
+    In one example both residuals are 5e-12 and the solutions differ by 1.4e-6.
     """
     if case["numerics"]["scheme"] == "weno5" and case["numerics"]["method"] in IMPLICIT:
         return IN_PARTS
@@ -41,7 +40,7 @@ def near(case: dict) -> float:
 @examples(6)
 @given(case=networks())
 def test_run_again(case):
-    """The same arithmetic: the same bits, by a model of its own and by one that has run."""
+    """A second run agrees to the bit, with a new model or with a used model."""
     first = told(case)
     alike(first, told(case))
     if first.result:
@@ -53,13 +52,13 @@ def test_run_again(case):
 @examples(6)
 @given(case=networks())
 def test_other_rows(case):
-    """Rows are read between steps and do not shorten them: common ones agree to the bit, as 1/32 s is exact."""
+    """Common rows agree to the bit, because rows are interpolated between steps and 1/32 s is exact in binary."""
     few = told(equivalent.changed(case, "output", every=1 / 16))
     many = told(equivalent.changed(case, "output", every=1 / 64))
     assert few.ended == many.ended
     assert set(few.t) <= set(many.t)
     for name, values in few.rows.items():
-        found = dict(zip(many.t, many.rows[name], strict=True))  # of two rows at one time the later
+        found = dict(zip(many.t, many.rows[name], strict=True))  # the later of two rows at one time
         wanted = dict(zip(few.t, values, strict=True))
         assert {t: found[t] for t in wanted} == wanted
 
@@ -73,7 +72,7 @@ def test_other_frames(case, frames):
 @examples(6)
 @given(case=networks())
 def test_other_names(case):
-    """Names are indices in the order of the file: nothing but they changes, also where they sort otherwise."""
+    """Names have no effect, even if they change the alphabetical order."""
 
     def call(name):
         return f"{'zyxw'[len(name) % 4]}{name[::-1]}"
@@ -88,7 +87,7 @@ def test_other_names(case):
 @examples(6)
 @given(case=networks(), seed=SEEDS)
 def test_other_order(case, seed):
-    """Sums over the links of a place are taken in another order."""
+    """The order of parts changes sums over the links of a place by rounding only."""
     nodes, links = shuffled(case["nodes"], seed), shuffled(case["links"], seed)
     alike(told(case), told(equivalent.reordered(case, nodes, links)), near(case))
 
@@ -96,7 +95,7 @@ def test_other_order(case, seed):
 @examples(6)
 @given(case=networks(), seed=SEEDS)
 def test_links_drawn_from_the_other_end(case, seed):
-    """Cells and faces are the same, counted from the other end: fluxes change sign."""
+    """Reversed links give the same results with the opposite sign of flows."""
     able = [name for name, link in case["links"].items() if link["type"] in equivalent.STRAIGHT]
     chosen = some_of(able, seed)
 
@@ -112,14 +111,14 @@ def test_links_drawn_from_the_other_end(case, seed):
 @examples(6)
 @given(case=networks(), height=st.sampled_from([16.0, 1000.0, -3.7]))
 def test_everything_higher(case, height):
-    """Only differences of elevation drive; these are rounded by the height."""
+    """A common height changes results by rounding only."""
     alike(told(case), told(equivalent.raised(case, height)), near(case))
 
 
 @examples(6)
 @given(case=networks(laws=("linear",)))
 def test_without_profiles(case):
-    """Under the linear law flows, and pressures at nodes, do not know of them; along pipes the weight below is all."""
+    """Under the linear law a profile changes only pressures along its pipe, by the weight of the fluid."""
     weight, links = WATER["density"] * GRAVITY, case["links"]
 
     def change(probe, values):
@@ -136,28 +135,28 @@ def test_without_profiles(case):
 @examples(6)
 @given(case=networks())
 def test_limits_and_points_that_are_watched_change_nothing(case):
-    """What is followed for its extremes alone is read off states, never written into them."""
+    """Design limits do not change a bit of the results."""
     limits = {"any": {"on": "pipes", "maximum": "1 GPa"},
               "quick": {"on": "pipes", "quantity": "velocity", "maximum": 1e3},
               "push": {"on": "pipes", "quantity": "force", "maximum": "1 GN"}}  # fmt: skip
     watched = told(case | {"limits": limits})
     alike(told(case), watched)
     if watched.result and watched.result.ok:
-        allowed = {"holds", "open"} if watched.result.marks else {"holds"}  # open below the pressure of vapour
+        allowed = {"holds", "open"} if watched.result.marks else {"holds"}  # open below vapour pressure
         assert {one.state for one in watched.result.verdicts} <= allowed
 
 
 @examples(6)
 @given(case=networks())
 def test_other_units(case):
-    """The factors of units round once."""
+    """Conversion of units changes results by rounding only."""
     alike(told(case), told(equivalent.in_other_units(case)), near(case))
 
 
 @examples(6)
 @given(case=networks())
 def test_two_copies_with_a_shut_valve_between(case):
-    """Norms over twice as many states and systems of twice the size round otherwise."""
+    """Two copies of a network give the same results, except for rounding in norms and larger systems."""
     one = told(case)
     both = told(equivalent.twice(case, "n0"))
     alike(one, both, near(case))
@@ -167,14 +166,14 @@ def test_two_copies_with_a_shut_valve_between(case):
 @examples(6)
 @given(case=networks(), wait=st.sampled_from([64.0, 1000.0]))
 def test_at_a_later_time(case, wait):
-    """Times are rounded by their size, and with them lengths of steps and what schedules say."""
+    """A delay changes results by rounding of times, which enters steps and schedules."""
     alike(told(case), told(equivalent.later(case, wait)), 1e3 * near(case), later=wait)
 
 
 @examples(6)
 @given(case=networks(laws=("linear", "log")))
 def test_a_denser_fluid(case):
-    """Twice the density, stiffness, viscosity and pressures: twice the pressures. A factor of two rounds nothing."""
+    """Twice the density, stiffness, viscosity and pressures give twice the pressures and equal flows."""
 
     def twice(probe, values):
         return 2.0 * values if ".pressure" in probe else values
@@ -190,7 +189,7 @@ def test_a_denser_fluid(case):
 @examples(6)
 @given(case=networks())
 def test_a_demand_is_an_inflow_backwards(case):
-    """The same junction by another name."""
+    """A negative inflow equals a demand at a junction to the bit."""
     assume(any("demand" in node for node in case["nodes"].values()))
     alike(told(case), told(equivalent.drawn_backwards(case)))
 
@@ -198,7 +197,7 @@ def test_a_demand_is_an_inflow_backwards(case):
 @examples(6)
 @given(case=networks())
 def test_the_resolved_file(case):
-    """Every default said, every number printed to its last digit."""
+    """The resolved file, with all defaults and digits, gives the same run to the bit."""
     try:
         resolved = tomllib.loads(fvsolve.load(case).resolved())
     except fvsolve.CaseError:
@@ -209,7 +208,7 @@ def test_the_resolved_file(case):
 @examples(6)
 @given(case=networks())
 def test_a_file_and_settings(case, tmp_path_factory):
-    """What the file says otherwise and `set` puts right."""
+    """Overrides with `set` replace wrong values in the file and give the same run to the bit."""
     wrong = equivalent.changed(case, "numerics", end=77.0)
     wrong["links"]["p0"] |= {"length": 1.0, "cells": 1}
     path = tmp_path_factory.mktemp("said") / "case.toml"

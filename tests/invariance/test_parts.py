@@ -1,4 +1,4 @@
-"""Any part between any neighbours: it starts or is refused by name, its ledger closes, and what is at rest stays."""
+"""Any part between any neighbours starts or is refused with its name, closes its ledger, and stays at rest."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from invariance.parts import LINKS, NODES
 from invariance.random_scenes import numerics, probes
 from invariance.result_comparison import told
 
-EXPERIMENTAL = "ignore:First-class function type feature is experimental"  # numba says so where it compiles
-pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # of numbers that are none
+EXPERIMENTAL = "ignore:First-class function type feature is experimental"  # warning of numba while it compiles
+pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # other warnings fail, such as of NaN values
 ELSEWHERE = {
     "basin", "mass", "frame", "body", "cylinder", "damper", "end-stop", "force", "spring", "spool-valve", "torque",
     "pin", "bushing",
@@ -36,7 +36,10 @@ def test_every_kind_of_part_is_here_or_in_a_scene_of_its_own():
 
 @st.composite
 def neighbours(draw, stiff: bool) -> tuple[dict, dict]:
-    """A lake on either side, and behind a pipe, or a valve, what the part is joined to; stiff vessels if wanted."""
+    """Strategy for a lake on each side of the part, each with a neighbour behind a pipe or a valve.
+
+    stiff : neighbours may be chambers and accumulators, and a valve may replace a pipe
+    """
     places, links = {"up": lake(HEAD), "down": lake(HEAD)}, {}
     for side, end in (("up", "a"), ("down", "b")):
         places[end] = draw(st.sampled_from(NEIGHBOURS if stiff else NEIGHBOURS[:2]))
@@ -57,9 +60,10 @@ def made(places: dict, links: dict, settings: dict, end: float = 1.0) -> dict:
 
 @st.composite
 def joined(draw, table: str, part: dict, settings: dict) -> tuple[dict, dict]:
-    """The part between its neighbours: a link from a to b, a node that a pipe and a pipe or a valve join to them.
+    """Strategy for a part between its neighbours, as (nodes, links).
 
-    Where a valve joins a vessel at rest it is stiff, and explicit steps are short (docs/where-methods-fail.md).
+    A link joins nodes a and b; a node is joined to them by a pipe and by a pipe or a valve. A vessel at rest behind a
+    valve is stiff and would need short explicit steps (docs/where-methods-fail.md), so explicit methods get pipes only.
     """
     stiff = settings["method"] not in METHODS or not METHODS[settings["method"]].explicit
     places, links = draw(neighbours(stiff))
@@ -81,7 +85,7 @@ PARTS = [("links", kind) for kind in LINKS] + [("nodes", kind) for kind in NODES
 @examples(4)
 @given(data=st.data(), settings=numerics())
 def test_driven_one_way_then_the_other_the_ledger_closes(table, kind, data, settings):
-    """The lake above falls below the other one, and rises; what is not refused runs to its end."""
+    """The mass ledger closes and the run finishes while the upper lake falls below the lower lake and rises again."""
     part = data.draw((LINKS if table == "links" else NODES)[kind])
     places, links = data.draw(joined(table, part, settings))
     places["up"] = lake(data.draw(st.sampled_from([
@@ -101,9 +105,10 @@ def test_driven_one_way_then_the_other_the_ledger_closes(table, kind, data, sett
 @examples(4)
 @given(data=st.data(), settings=numerics())
 def test_at_rest_it_stays_at_rest(table, kind, data, settings):
-    """Equal heads all round, and a part that neither gives nor takes: no flow anywhere, and no pressure moves.
+    """With equal heads on all sides and an inactive part, no flow starts and no pressure changes.
 
-    Under a tolerance a pressure may err by that (of 3 bar), and by its root what a valve at no drop lets through.
+    Under a tolerance pressures may err by this tolerance times 3 bar. The flow of a valve at zero drop may err by its
+    root.
     """
     part = data.draw((LINKS if table == "links" else NODES)[kind])
     still = {

@@ -1,4 +1,4 @@
-"""What is solved by Newton at places without storage depends on what joins them, and on nothing else in the scene."""
+"""Rates of places without storage, solved by Newton's method, depend only on the parts that join them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ STEADY = {"model": "steady", "factor": 0.02}
 
 
 def town(name: str, size: float) -> tuple[dict, dict]:
-    """From the one lake: two places that a valve joins, and a third behind a pipe. At rest: starts are solved whole."""
+    """Nodes and links from a common lake: two places joined by a valve, and a third behind a pipe.
+
+    All flows are zero at the start, because a steady state is solved for the whole scene.
+    """
     a, b, c, d, e = "lake", *(f"{name}-{one}" for one in "bcde")
     nodes = {a: lake(40.0), b: junction(), c: junction(), d: junction(), e: lake(40.0)}
     links = {
@@ -32,7 +35,7 @@ def town(name: str, size: float) -> tuple[dict, dict]:
 
 @pytest.mark.parametrize("law", FLUIDS)
 def test_rates_of_one_town_do_not_hang_on_another_by_one_bit(law):
-    """Random states, those of the other up to three times as far off: its Newton needs more iterations."""
+    """States of the second town deviate up to three times as much, so Newton's method needs more iterations there."""
 
     def built(*towns):
         nodes = {name: node for one in towns for name, node in one[0].items()}

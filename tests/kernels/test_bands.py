@@ -1,4 +1,4 @@
-"""A piece of the right-hand side may be given a band of rows: a handle whose tables are slices."""
+"""Functions of the right-hand side give equal bits for a band of rows, by a handle whose tables are slices."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from fvsolve.kernels.rhs_assembly import PHASES
 from fvsolve.kernels.table_handle import make_handle
 from fvsolve.model import RunData
 
-BANDED = ("answer", "rates")  # phases in which pipes write nothing that another reads
-ENDS = 4  # numbers that a pipe offers
+BANDED = ("answer", "rates")  # phases in which no pipe writes values that another pipe reads
+ENDS = 4  # numbers of a pipe in `out` for its ends
 
 
 def handles(slate: RunData, cuts: list[int]) -> list[np.ndarray]:
-    """A handle for each band of pipes between cuts, with scratch of its own."""
+    """Handle of each band of pipes between cuts, with its own scratch, and the arrays that it needs."""
     tables, functions = slate.model.tables, slate.model.functions
     found = []
     for first, last in zip(cuts, cuts[1:], strict=False):
@@ -27,14 +27,14 @@ def handles(slate: RunData, cuts: list[int]) -> list[np.ndarray]:
         own = tables._replace(pipes=tables.pipes[first:last], layout=layout)
         written = slate.written._replace(scratch=slate.written.scratch.copy())
         made = (*own, *written, functions.calls, functions.hooks)
-        found.append((make_handle(made), made))  # what a handle opens must live as long
+        found.append((make_handle(made), made))  # the arrays of a handle must exist as long as it does
     return found
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("cuts", [[0, 4, 9], [0, 1, 2, 9]])
 def test_bands_of_pipes_give_the_bits_of_all(law, cuts):
-    """In turn, backwards and in threads."""
+    """Bands run in order, in reverse order and in threads."""
     path = CASES / "streeter-nine-pipes.toml"
     model = fvsolve.build(fvsolve.load(path, {"fluid.law": law}))
     y = model.start + 0.1 * model.scale * np.random.default_rng(3).normal(size=model.y_size)

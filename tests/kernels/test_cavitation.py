@@ -1,4 +1,4 @@
-"""Cavities as conserved mass: at a wall and inside a pipe against closed forms, and on the Adelaide rig."""
+"""Cavities as conserved mass, compared with closed forms at a wall and inside a pipe, and with the Adelaide rig."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ BELOW = WATER["vapor_pressure"] - AMBIENT  # gauge pressure of a cavity
 
 
 def durations(t: np.ndarray, p: np.ndarray, level: float) -> np.ndarray:
-    """Times at which a pressure crosses a level, after the first rise."""
+    """Times at which a pressure crosses a level."""
     high = p > level
     return t[1:][high[1:] != high[:-1]]
 
@@ -38,9 +38,9 @@ def adelaide():
 
 
 def test_the_rig_s_plateau_cavities_and_second_pulse_are_met(adelaide):
-    """Measured by Bergant and Simpson (1999): plateau to 3 %, durations to 5 %, the second pulse's peak to 10 %.
+    """Measured by Bergant and Simpson (1999): plateau to 3 %, durations to 5 %, peak of the second pulse to 10 %.
 
-    The mean of that pulse is 12 % below the middle of the range measured: a goal of 10 % that is missed.
+    The mean of that pulse is 12 % below the middle of the measured range; the goal of 10 % is missed.
     """
     t, p = adelaide.t, adelaide["gate.gauge_pressure"]
     rise, down, up, again, last = durations(t, p, 900.0)[[0, 1, 2, 3, 4]]
@@ -66,14 +66,14 @@ def test_the_summary_says_where_a_cavity_was_and_doubts_nothing(adelaide):
 
 
 def wall(v0: float, cells: int, end: float, **numerics) -> dict:
-    """A lake and a wall from which all the liquid starts to run at v0."""
+    """Case of a lake and a wall, away from which all the liquid flows at v0 at the start [m/s]."""
     nodes = {"wall": junction(), "lake": reservoir(START)}
     links = {"main": pipe("wall", "lake", LENGTH, 0.1, SPEED, cells)}
     return scene(nodes, links, end, PLAIN | numerics, ["wall.gauge_pressure"], 1e-3, fluid=WATER)
 
 
 def parted(case: dict, v: np.ndarray) -> tuple[fvsolve.Model, fvsolve.State]:
-    """A model and a state in which its only pipe flows at v [m/s], cell by cell."""
+    """Model and state in which the only pipe has the velocities v of its cells [m/s]."""
     model = fvsolve.build(fvsolve.load(case))
     state, row = fvsolve.initial_state(model), model.tables.pipes[0]
     n = row["cells"]
@@ -83,7 +83,7 @@ def parted(case: dict, v: np.ndarray) -> tuple[fvsolve.Model, fvsolve.State]:
 
 
 def followed(model, state, times) -> tuple[np.ndarray, np.ndarray, float]:
-    """(pressures of the first node, volumes of gas and vapour in the pipe, greatest remainder of mass, relative)."""
+    """Pressures of the first node, and volumes of gas and vapour in the pipe, at given times."""
     row, profile = model.tables.pipes[0], model.tables.profile
     n, pressures, volumes = row["cells"], [], []
     for t in times:
@@ -97,7 +97,7 @@ def followed(model, state, times) -> tuple[np.ndarray, np.ndarray, float]:
 
 @pytest.mark.parametrize("v0", [1.3, 2.05])
 def test_a_cavity_at_a_wall_lasts_as_long_as_in_closed_form(v0):
-    """Duration to 1 %, greatest length to 2 %, height of the blow that ends it to 2 % of it."""
+    """Duration to 1 %, greatest volume to 2 %, and pressure after the collapse to 2 %."""
     lasts, size, back = cavity(v0, DROP, 1000.0, SPEED, LENGTH)
     model, state = parted(wall(v0, 100, 3.0), np.full(100, v0))
     times = np.arange(1e-3, lasts + 0.15, 1e-3)
@@ -136,7 +136,7 @@ def test_a_cavity_inside_a_pipe_is_two_walls_back_to_back():
 
 
 def network(fluid: dict = WATER, **numerics) -> dict:
-    """Three pipes over a hill, a valve in mid-line, and a valve that shuts at the end."""
+    """Case of three pipes over a hill, with a valve between two of them and a valve that closes at the end."""
     nodes = {
         "lake": lake(30.0, elevation=0.0),
         "hill": junction(elevation=15.0),
@@ -167,7 +167,7 @@ def test_cavities_at_a_summit_and_between_valves_keep_all_mass():
 
 @pytest.mark.parametrize("cell_time", [1e-3, 3e-3, 4e-3, 6e-3])
 def test_a_node_whose_balance_has_a_kink_is_closed_at_every_resolution(cell_time):
-    """An inflow stops below a hill: at 4 ms Newton went to and fro about the kink, without end."""
+    """An inflow stops below a hill; with cells of 4 ms Newton's method once alternated about the kink without end."""
     rub = {"model": "quasi-steady", "roughness": 1e-4}
     nodes = {
         "src": {"type": "inflow", "flow": scenes.ramp(0.05, 0.02, 6e-3, 0.0), "elevation": 0.0},
@@ -198,7 +198,7 @@ def test_a_chamber_that_empties_into_a_cavity_keeps_all_mass():
 
 
 def test_what_bounds_the_step_is_of_its_own_state_alone_and_no_table_is_written():
-    """A chamber softens as it empties: its greatest rate there, and after one at the start again, is the same."""
+    """A chamber softens as it empties; its greatest rate is equal in a repeated evaluation, after other states."""
     case = network()
     case["nodes"]["pot"] = {"type": "chamber", "volume": 2e-3, "elevation": 15.0}
     case["links"]["neck"] = valve("hill", "pot", 1e-4)
@@ -231,7 +231,7 @@ UNIT = {"nodes": {}, "links": {"gate": {"type": "turbine", "from": "v", "to": "r
 
 @pytest.mark.parametrize("beside", [THROAT, UNIT], ids=["throat", "turbine"])
 def test_where_no_cavity_is_near_following_cavities_changes_nothing(beside) -> None:
-    """A flow through a throat that turns, a turbine that shuts: the root of their node lay beyond its start."""
+    """Results with and without cavitation agree for a throat with reversing flow and for a turbine that closes."""
     nodes = {
         "lake": lake(500.0, elevation=480.0), "v": junction(elevation=392.0),
         "river": lake(395.0, elevation=390.0),
@@ -281,7 +281,7 @@ def test_schemes_that_reach_over_the_edge_of_a_cavity_are_refused():
 
 
 def test_few_cells_for_a_cavity_are_a_note_with_the_error_they_make():
-    """4 % at 100 cells behind a stop without friction, as measured there; none from 200 on, none without cavities."""
+    """The notice states 4.1 % at 100 cells; there is none from 200 cells on, and none without cavities."""
     for cells, expected in ((100, 1), (199, 1), (200, 0)):
         model = fvsolve.build(fvsolve.load(wall(1.3, cells, 3.0)))
         said = [one for one in model.warnings if one.kind == "cells"]
@@ -296,7 +296,7 @@ def test_few_cells_for_a_cavity_are_a_note_with_the_error_they_make():
 
 @pytest.mark.parametrize("cells", [25, 50])
 def test_the_error_that_the_note_says_is_that_behind_a_stop(cells):
-    """The column is stopped, comes back and parts: its cavity against the closed form, within half of the error."""
+    """A stopped column returns and separates; its cavity is too short by 0.5 to 1.5 times the stated error."""
     v0, back = 1.3, 2.0 * LENGTH / SPEED
     nodes = {"lake": reservoir(START), "gate": junction()}
     case = scene(nodes, {"main": pipe("lake", "gate", LENGTH, 0.1, SPEED, cells)}, 3.0, PLAIN, fluid=WATER)
@@ -313,7 +313,7 @@ def test_the_error_that_the_note_says_is_that_behind_a_stop(cells):
 
 
 def test_a_line_over_a_summit_parts_there_and_meets_as_by_characteristics():
-    """One cavity at the summit of one pipe: when it opens, how large it is, when and how hard it shuts."""
+    """Time, place, volume and collapse of the cavity agree, and the heads at five times."""
     rows, events = summit.line(reaches=480, end=40.0)
     (opens, _, where), (meets, _, _) = events
     assert where == summit.SUMMIT
@@ -330,7 +330,7 @@ def test_a_line_over_a_summit_parts_there_and_meets_as_by_characteristics():
 
 
 def test_cavitation_alone_brings_what_it_needs_and_a_scene_that_says_otherwise_is_told_so_at_once():
-    """Law, air, scheme, method and Courant number; what is said stands."""
+    """Cavitation sets law, air, scheme, method and Courant number, unless the case states them."""
     gate = {"lake": lake(20.0), "gate": junction({"time": [0.0, 0.05], "value": [0.02, 0.0], "kind": "step"})}
     case = scene(gate, {"main": pipe("lake", "gate", LENGTH, 0.1, SPEED, 20)}, 0.3, {}, ["gate.pressure"])
     case["fluid"] = scenes.WATER | {"cavitation": True}
@@ -347,7 +347,7 @@ def test_cavitation_alone_brings_what_it_needs_and_a_scene_that_says_otherwise_i
 
 
 def upstream_gate(cells: int, end: float) -> dict:
-    """A gate at the head of a main with friction shuts at once."""
+    """Case of a gate at the upstream end of a main with friction, which closes at once."""
     nodes = {"lake": lake(30.0, elevation=0.0), "gate": junction(elevation=0.0), "far": lake(25.0, elevation=0.0)}
     shut = {"time": [0.0, 0.5], "value": [1.0, 0.0], "kind": "step"}
     links = {"valve": {"type": "valve", "from": "lake", "to": "gate", "diameter": 0.2, "loss_coefficient": 0.5,
@@ -358,7 +358,7 @@ def upstream_gate(cells: int, end: float) -> dict:
 
 
 def test_a_cavity_at_an_end_is_not_squeezed_by_what_the_pipe_loses_at_the_start():
-    """The head at the gate stays at that of vapour until the column is back; it rose for a twentieth of that before."""
+    """The head at the gate stays near that of vapour until the column returns."""
     vapor = (WATER["vapor_pressure"] - AMBIENT) / (WATER["density"] * 9.80665)
     truth = column_separation.behind_a_gate(30.0, 25.0, 600.0, 0.2, 1100.0, 0.02, 0.5, 0.5, vapor, 200, 6.0)
     shuts = truth[(truth[:, 0] > 1.0) & (truth[:, 2] == 0.0)][0, 0]
@@ -369,7 +369,7 @@ def test_a_cavity_at_an_end_is_not_squeezed_by_what_the_pipe_loses_at_the_start(
 
 
 def test_no_cell_of_a_cavity_gives_more_than_it_holds():
-    """A cavity over three cells at a shut gate: by what a face was thought to have one of them held less than none."""
+    """In a cavity over three cells at a closed gate, no cell loses more mass than it contains."""
     run = fvsolve.run(upstream_gate(600, 2.9))
     assert run.ok, run.reason
     (found,) = run.summary["cavities"]

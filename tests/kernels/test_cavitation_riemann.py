@@ -1,4 +1,4 @@
-"""Cavities in one pipe against exact Riemann problems of the liquid-gas law, in which c falls from 97 to 0.6 m/s."""
+"""Cavities in one pipe compared with exact Riemann problems of the mixture law, in which c falls from 97 to 0.6 m/s."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SOFT = {
     "pressure": AMBIENT, "law": "mixture", "air_fraction": AIR, "cavitation": True,
 }  # fmt: skip
 EXACT = Mixture(1000.0, 1e7, AMBIENT, FLOOR, AIR / (1 - AIR) * (AMBIENT - FLOOR), 0.0, scenes.area(DIAMETER))
-FOAM = EXACT.floor + EXACT.gas  # half gas, about
+FOAM = EXACT.floor + EXACT.gas  # about half gas
 STATES = {  # pressure [Pa] and velocity [m/s] on the left and on the right
     "two liquids part and a cavity opens": ((START, -5.0), (START, 5.0)),
     "a cavity is shut from both sides": ((FOAM, 5.0), (FOAM, -5.0)),
@@ -40,7 +40,7 @@ def resting_pipe(cells: int, fluid: dict = SOFT, speed: float | None = None, **n
 
 @pytest.mark.parametrize("compliance", [0.0, 2e-10, 1e-8])
 def test_the_law_is_convex_so_that_waves_are_shocks_or_fans_and_nothing_else(compliance):
-    """d^2(1/m)/dF^2 > 0: m c rises with pressure from a near vacuum to the liquid."""
+    """d^2(1/m)/dF^2 > 0: m c rises with pressure from near vacuum to liquid."""
     law = Mixture(1000.0, 2e9, AMBIENT, FLOOR, 1e-2, compliance)
     p = FLOOR + np.geomspace(1e-6, 1e8, 4000)
     assert np.all(np.diff(law.m(p) * law.c(p)) > 0.0)
@@ -58,7 +58,7 @@ WATER = {**SOFT, "density": 998.2, "bulk_modulus": 2.18e9, "air_fraction": 1e-3}
 
 @pytest.mark.parametrize("fluid, speed, near", [(SOFT, None, 1e-9), (WATER, None, 1e-9), (WATER, 1319.0, 2e-5)])
 def test_the_state_between_the_waves_is_the_exact_one(fluid, speed, near):
-    """Two hundred pairs of liquid and foam: velocity to 1e-9, in an elastic wall (nearly a closed form) to 2e-5."""
+    """Velocities between 200 pairs of liquid and foam: to 1e-9, in an elastic wall (nearly closed form) to 2e-5."""
     tables = resting_pipe(4, fluid, speed, scheme="upwind", method="euler").tables
     st, floats, pipe = tables.settings[0], tables.floats, tables.pipes[0]
     gas = fluid["air_fraction"] / (1 - fluid["air_fraction"]) * (AMBIENT - FLOOR)
@@ -85,7 +85,7 @@ def test_the_flux_at_a_face_is_that_of_the_exact_solution_on_its_ray():
 
 
 def riemann_run(name: str, cells: int, scheme: str, end: float):
-    """(x, masses found and exact) of the inner part of the pipe at the end, where nothing came from its ends."""
+    """Places, computed and exact masses of the inner pipe at the end, where no wave from its ends arrived."""
     left, right = STATES[name]
     model = resting_pipe(cells, scheme=scheme, limiter="minmod", method="ssp-rk3", courant=0.5)
     state = fvsolve.initial_state(model)
@@ -107,7 +107,7 @@ def riemann_run(name: str, cells: int, scheme: str, end: float):
 
 @pytest.mark.parametrize("name", STATES)
 def test_a_riemann_problem_converges_to_the_exact_profile(name):
-    """L1 error of the mass over its spread; shocks and fans' edges allow order one at most."""
+    """L1 error of the mass over its spread; shocks and edges of fans allow order one at most."""
     errors = []
     for cells in (200, 400, 800):
         _, found, exact = riemann_run(name, cells, "muscl", 0.2)

@@ -1,4 +1,4 @@
-"""Hazen-Williams: its power against Decimal's, its mean over a cell against quadrature, and its signs to the bit."""
+"""Hazen-Williams friction: power compared with Decimal, mean over a cell with quadrature, and signs to the bit."""
 
 from decimal import Decimal, localcontext
 
@@ -14,7 +14,7 @@ FLOWS = [*2.0 ** np.random.default_rng(5).uniform(-490.0, 490.0, 300), *np.linsp
 
 
 def exact(flow: float) -> Decimal:
-    """|M|^0.852 M in 50 digits."""
+    """|M|^0.852 M to 50 digits."""
     with localcontext() as context:
         context.prec = 50
         size = abs(Decimal(float(flow)))
@@ -40,7 +40,7 @@ def test_the_drag_is_odd_to_the_bit():
 
 
 def rubbed(flows, leans, loss=0.0, rough=1.0):
-    """Mean drag over cells of these flows at their middles, and half the difference of their ends."""
+    """Mean drag over cells with these flows at their middles; leans : half differences of the flows at their ends."""
     forward, backward = np.array(flows, dtype=float), np.zeros(len(flows))
     dr, dl = np.array(leans, dtype=float), np.zeros(len(flows))
     before = dr.copy()
@@ -52,7 +52,7 @@ def rubbed(flows, leans, loss=0.0, rough=1.0):
 
 
 def test_a_cell_of_one_flow_has_the_drag_of_that_flow_to_the_bit_at_any_place_of_a_pipe():
-    """Steady states rest on it: vectors of cells, the last ones and one alone round alike."""
+    """Vectors of cells, the last cells and a single cell round alike, so that steady states stay."""
     for n in (1, 3, 4, 7, 47):
         flow = 7.3 * 1.9 ** np.arange(n)
         alone = [drag(FRICTION_HAZEN, 0.3, 1.7, 0.0, 1.0, m) for m in flow]
@@ -68,7 +68,7 @@ def test_the_mean_over_a_cell_is_fourth_order_in_its_slope():
 
 
 def test_where_the_flow_turns_within_a_cell_the_mean_is_within_3_percent_of_the_greatest_drag_there():
-    """Two points are within 2.4."""
+    """Two points are within 2.4 %."""
     for m in np.linspace(-1.5, 1.5, 13):
         wanted = quad(lambda x, m=m: abs(m + x) ** 0.852 * (m + x), -1, 1, epsabs=1e-14, limit=200)[0] / 2
         assert abs(rubbed([m], [1.0])[0] - wanted) < 0.03 * (abs(m) + 1) ** 1.852

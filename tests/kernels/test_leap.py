@@ -1,4 +1,4 @@
-"""A whole step of upwind and Euler in one pass gives the bits that rates, sum and record give one by one."""
+"""Fused steps of upwind and Euler give the bits that rates, sum and record give one after the other."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ CLOCK = ("ended", "seconds", "seconds_setup", "seconds_total", "cost")
 
 
 def fork(end=4.0, every=0.05, fields=3, **numerics) -> dict:
-    """Three pipes, one of a single cell, and a valve that shuts: low pressures behind it, rows between steps."""
+    """Case of three pipes, one of a single cell, and a valve that closes: low pressures, rows between steps."""
     nodes = {"lake": lake(60.0), "fork": junction(), "dead": junction(ramp(0.3, 0.1, 0.0, 0.02)), "gate": junction()}
     links = {
         "main": pipe("lake", "fork", 1200.0, 0.5, 1000.0, 1300, **RUBBED),
@@ -106,7 +106,7 @@ def test_only_upwind_and_euler_leap_and_only_pipes(case, allowed):
 
 
 def test_scenes_with_events_are_stepped_one_by_one_and_end():
-    """A leap that an event cut short stood still for ever."""
+    """A fused step that an event cut short once repeated without end."""
     plain = {"numerics.scheme": "upwind", "numerics.method": "euler", "numerics.courant": 1.0}
     case = CASES / "relief-on-closed-main.toml"
     result = fvsolve.run(case, set=plain)

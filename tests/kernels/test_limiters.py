@@ -1,4 +1,4 @@
-"""Every limiter is its own in every kernel that takes one; a code that is none says so."""
+"""Limiters differ from each other in every kernel that uses one; an unknown code gives nan."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ CELLS, NONE = 40, 99
 
 
 def waves(count: int) -> list[np.ndarray]:
-    """Rows of cells, steep enough to be limited and smooth enough not to be always."""
+    """Rows of cells that are steep enough to be limited in some places, and smooth in others."""
     x = np.linspace(0.0, 6.0, CELLS)
     return [2.0 + np.sin(x + k) + 0.1 * np.cos(9.0 * x + k) for k in range(count)]
 
@@ -45,7 +45,7 @@ def one_face(code: int) -> np.ndarray:
 
 
 def carried(code: int) -> np.ndarray:
-    """Rates of what a grid's water carries, whirled about."""
+    """Rates of a scalar in the water of a grid with random flows."""
     n = 8
     rng, rate = np.random.default_rng(4), np.zeros(n * n)
     flows, c, outside = rng.normal(size=2 * n * (n + 1)), rng.random(n * n), rng.random(4 * n)
@@ -105,7 +105,7 @@ def test_a_code_that_is_no_limiter_gives_nan_and_never_another(kernel):
 
 
 def test_a_pair_of_halves_is_two_slopes():
-    """One division for both."""
+    """One division gives both half slopes."""
     a, b, c, d = (row - 2.0 for row in waves(4))
     for limiter in (limiters.minmod, limiters.van_leer, limiters.monotonized_central):
         for four in zip(a, b, c, d, strict=True):

@@ -1,4 +1,4 @@
-"""Trees of bodies against pinocchio: accelerations, mass matrix, energies, through the program's own rates."""
+"""Trees of bodies compared with pinocchio: accelerations, mass matrix and energies, from fvsolve's own rates."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_forward_dynamics_of_random_trees_are_those_of_pinocchio(many, first, se
 
 
 def branch(tree: dict, on: str | None = None) -> dict:
-    """The same, what hangs on a body right behind it."""
+    """Bodies of a tree in an order in which those on a body follow directly after it."""
     found = {}
     for name, one in tree.items():
         if one["joint"].get("on") == on:
@@ -57,7 +57,7 @@ def branch(tree: dict, on: str | None = None) -> dict:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_random_trees_on_springs_balance_where_pinocchio_has_their_gravity(seed):
-    """g(q) + k q = 0, the spring of each joint at k times what it is at."""
+    """g(q) + k q = 0, with the stiffness k of the spring in each joint."""
     rng = np.random.default_rng([9, seed])
     bodies = branch(random_tree(rng, 8, "revolute", ("revolute", "prismatic")))
     for one in bodies.values():
@@ -77,8 +77,8 @@ def test_random_trees_on_springs_balance_where_pinocchio_has_their_gravity(seed)
 
 @pytest.mark.parametrize("seed", range(3))
 def test_the_mass_matrix_of_random_trees_is_that_of_pinocchio(seed):
-    """M = L'L with L from the kernels, entries between freedoms of which neither hangs on the other zero."""
-    bodies = branch(random_tree(np.random.default_rng([8, seed]), 8, "ball"))  # pinocchio's wants it in this order
+    """M = L'L with L from the kernels; entries between freedoms on different branches are zero."""
+    bodies = branch(random_tree(np.random.default_rng([8, seed]), 8, "ball"))  # the matrix of pinocchio has this order
     model = model_of(bodies)
     pin, peer, data, q, _, rows = pinocchio_of(bodies, GRAVITY)
     truth = pin.crba(peer, data, q)
@@ -94,7 +94,7 @@ def test_the_mass_matrix_of_random_trees_is_that_of_pinocchio(seed):
 
 
 def test_a_wall_beside_a_tree_leaves_its_mass_matrix_at_the_state_that_is_asked_for():
-    """A slider that takes a wall along, and a pendulum on it: M_12 = -m l cos(a)."""
+    """A slider that moves a wall, and a pendulum on it: M_12 = -m l cos(a)."""
     slider = {"type": "body", "mass": 5.0, "inertia": [1, 1, 1], "joint": {"kind": "prismatic", "axis": [1, 0, 0]}}
     hinge = {"kind": "revolute", "axis": [0, 1, 0], "on": "slider"}
     bob = {"type": "body", "mass": 2.0, "inertia": [0, 0, 0], "centre_of_mass": [0, 0, -0.7], "joint": hinge}
@@ -126,7 +126,7 @@ def test_energies_and_momenta_of_random_trees_are_those_of_pinocchio(seed):
 
 
 def test_power_of_a_tree_is_that_of_its_weight():
-    """d/dt of v' M v / 2 = v . weight: what Coriolis' terms take adds up to nothing (M' - 2 C is skew)."""
+    """d/dt of v' M v / 2 = v . weight: Coriolis' terms have no power (M' - 2 C is skew)."""
     bodies = random_tree(np.random.default_rng(9), 10, "free")
     model = model_of(bodies)
     accounts = Accounts(RunData(model))

@@ -1,4 +1,4 @@
-"""Nodes that only shut valves reach take the pressure of equal small leaks, whenever and however these shut."""
+"""Nodes behind closed valves take the pressure of equal small leaks, at any time and for any way of closing."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SHUT = 1.1
 
 
 def shutting(ways: list[tuple[str, str]], ends=None, law: str = "linear") -> fvsolve.Result:
-    """Lakes A, B, C at 50, 40, 30 m and junctions X, Y, whose valves shut after 1 s, at `ends` if they differ."""
+    """Run of lakes A, B, C at 50, 40, 30 m and junctions X, Y, whose valves close after 1 s, at `ends` if given [s]."""
     nodes = {"A": lake(50.0), "B": lake(40.0), "C": lake(30.0), "X": junction(), "Y": junction()}
     used = {name for way in ways for name in way}
     ends = ends or [SHUT] * len(ways)
@@ -76,7 +76,7 @@ def test_a_demand_behind_shut_valves_stops_the_run_by_name():
 
 
 def column_and_valve(opening: dict, **numerics) -> fvsolve.Result:
-    """10 m of rigid column from a lake at 50 m to a valve that opens to one at 40 m."""
+    """Run of a rigid column of 10 m from a lake at 50 m to a valve with a schedule, before a lake at 40 m."""
     nodes = {"A": lake(50.0), "B": lake(40.0), "X": junction()}
     column = {"type": "rigid-column", "from": "A", "to": "X", "length": 10.0, "diameter": 0.1}
     links = {"main": column, "tap": valve("X", "B", 0.61e-3, opening)}
@@ -86,7 +86,7 @@ def column_and_valve(opening: dict, **numerics) -> fvsolve.Result:
 
 @pytest.mark.parametrize("numerics", [{}, {"step": 1e-3, "method": "rk4"}], ids=["default", "fixed step"])
 def test_a_valve_shuts_on_a_rigid_column_at_the_head_that_stops_it(numerics):
-    """Near the end q = F s with s^2 = dP - (L / A) F' s in kg/s and Pa: 52.478 m in X, then the lake's 50."""
+    """Near the end q = F s with s^2 = dP - (L / A) F' s in kg/s and Pa: 52.478 m in X, then 50 m as in the lake."""
     result = column_and_valve(ramp(0.5, 0.5, 1.0, 0.0), **numerics)
     assert result.ok, result.reason
     assert not result.marks
@@ -103,7 +103,7 @@ def test_a_valve_shuts_on_a_rigid_column_at_the_head_that_stops_it(numerics):
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("method", ["dormand-prince", "rodas-5p", "radau-iia-5"])
 def test_a_valve_does_so_beside_an_ideal_check_valve_that_is_shut(method, law, turned):
-    """That one is none until an event opens it: the valve leads the column all the same, and nothing opens."""
+    """An ideal check valve acts only after an event: the valve controls the column, and no event occurs."""
     nodes = {"A": lake(50.0), "B": lake(40.0), "X": junction()}
     column = {"type": "rigid-column", "from": "A", "to": "X", "length": 10.0, "diameter": 0.1}
     links = {"main": column, "tap": valve("X", "B", 0.61e-3, ramp(0.5, 0.5, 1.0, 0.0))}
@@ -134,7 +134,7 @@ def test_no_ramp_of_a_valve_on_a_rigid_column_stalls_the_run(ends, exponent):
 
 
 def test_a_rigid_column_starts_from_rest_when_its_valve_opens_again():
-    """Open, q' = (g A / L)(10 m - q^2 / (2 g (Cd A)^2)): a tanh from when it opens, here by a jump."""
+    """q' = (g A / L)(10 m - q^2 / (2 g (Cd A)^2)) gives a tanh from the time of the opening, here a jump."""
     opening = {"time": [0.4, 0.5, 1.0], "value": [1.0, 0.0, 1.0], "kind": "step"}
     result = column_and_valve(opening)
     assert result.ok, result.reason

@@ -1,4 +1,4 @@
-"""Plane meshes: Green's and Euler's theorems, both ways to mesh a rectangle, order that does not matter."""
+"""Plane meshes: Green's and Euler's theorems, two ways to mesh a rectangle, independence of the order of points."""
 
 import math
 
@@ -17,7 +17,7 @@ EPS = np.finfo(float).eps
 
 @pytest.fixture
 def meshes(tmp_path):
-    """name -> (mesh, area of the domain, holes in it)."""
+    """Meshes by name : (mesh, area of the domain [m2], number of holes)."""
     triangles, mixed = (
         read(write(tmp_path / f"{name}.msh", *made)) for name, made in (("t", delaunay()), ("m", shaken()))
     )
@@ -35,7 +35,7 @@ KINDS = ["rectangle", "graded", "corner", "ring", "triangles", "mixed"]
 
 
 def around(mesh, of_face):
-    """The sum over the faces of each cell of what flows out of it."""
+    """Sum of the outflow over the faces of each cell."""
     out = np.zeros((len(mesh.cells), *of_face.shape[1:]))
     np.add.at(out, mesh.left, of_face)
     np.subtract.at(out, mesh.right[: mesh.inner], of_face[: mesh.inner])
@@ -53,7 +53,7 @@ def test_cells_fill_the_domain_and_close(meshes, kind):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_greens_theorem_gives_areas_and_centroids(meshes, kind):
-    """By faces alone: areas from div (x, 0), first moments from div (x^2/2, 0) and div (0, y^2/2) by Simpson's rule."""
+    """From faces: areas by div (x, 0), first moments by div (x^2/2, 0) and div (0, y^2/2) with Simpson's rule."""
     mesh, _, _ = meshes[kind]
     flux = (mesh.middle * (1.0, 0.0) * mesh.normal).sum(1) * mesh.length
     reach = np.abs(mesh.points).max()
@@ -101,7 +101,7 @@ def test_the_same_rectangle_from_a_file(tmp_path):
     groups = {name: made.ends[made.patch(name)] for name in ("in", "out")}
     back = read(write(tmp_path / "r.msh", made.points, corner_lists(made), groups))
     assert back.grid is None and back.patches == made.patches == ("in", "out", "wall")
-    order = np.lexsort(back.centre.T)  # cells of a file are numbered anew
+    order = np.lexsort(back.centre.T)  # cells of a file are renumbered
     for name in ("cells", "area", "centre"):
         assert np.array_equal(getattr(back, name)[order], getattr(made, name)), name
     assert np.array_equal(back.points, made.points) and sets(back) == sets(made)
@@ -142,9 +142,9 @@ def test_patches_and_holes_of_a_rectangle():
     )
     assert mesh.patches == ("in", "top", "out", "wall") and mesh.grid.index[3, 3] == -1
     assert mesh.middle[mesh.patch("in")].tolist() == [[1.0, 0.75], [1.0, 1.25]]
-    assert mesh.middle[mesh.patch("top")][:, 0].tolist() == [1.25, 1.75, 2.25]  # what the hole leaves of the side
+    assert mesh.middle[mesh.patch("top")][:, 0].tolist() == [1.25, 1.75, 2.25]  # the part of the side without the hole
     assert mesh.middle[mesh.patch("out")].tolist() == [[4.0, 0.25], [4.0, 0.75]]
-    assert mesh.length[mesh.inner :].sum() == 10.0  # a corner cut out leaves the girth
+    assert mesh.length[mesh.inner :].sum() == 10.0  # the perimeter does not change with a corner cut out
     with pytest.raises(ValueError):
         mesh.patch("outlet")
 
@@ -157,13 +157,13 @@ def test_decimals_near_a_line_mean_it():
 def test_notes_tell_what_the_file_leaves_unsaid(tmp_path):
     plain = read(write(tmp_path / "plain.msh", [*SQUARE, (7, 7)], [TWO[0], TWO[1][::-1]]))
     assert plain.notes == (
-        "1 of 7 points in the file belong to no cell: ignored",
+        "points in the file that belong to no cell: 1 of 7, ignored",
         "1 of 2 cells: cell 1 at (1.5, 0.5) m were clockwise: reversed",
-        'the file contains no named group of lines: all 6 boundary faces are "wall"',
+        'the file contains no named group of lines: the patch of all 6 boundary faces is "wall"',
     )
     some = read(write(tmp_path / "some.msh", SQUARE, TWO, {"in": [0, 3], "": [2, 5]}))
     assert some.patches == ("in", "wall")
-    assert some.notes == ('5 of 6 boundary faces are in no group: they are "wall"',)
+    assert some.notes == ('boundary faces in no group: 5 of 6; their patch is "wall"',)
     every = {"wall": [[0, 1], [1, 2], [5, 4], [4, 3]], "ends": [[0, 3], [2, 5]]}
     full = read(write(tmp_path / "full.msh", SQUARE, TWO, every))
     assert full.notes == () and full.patches == ("ends", "wall")
@@ -190,7 +190,7 @@ def test_the_unit_of_a_file(tmp_path):
 
 
 def test_formats_say_the_same(tmp_path):
-    (tmp_path / "four.msh").write_text(MSH4)  # by Gmsh's manual, with gaps between the numbers of points
+    (tmp_path / "four.msh").write_text(MSH4)  # format of Gmsh's manual, with gaps between the numbers of points
     four = read(tmp_path / "four.msh")
     groups = {"in": [0, 3], "out": [2, 5]}
     two = read(write(tmp_path / "two.msh", SQUARE, TWO, groups))

@@ -1,4 +1,4 @@
-"""Bad meshes one by one: each has its message, with the cell."""
+"""Faulty meshes: each fault has its message, with the cell."""
 
 import math
 
@@ -65,7 +65,7 @@ def test_all_faults_at_once():
 
 GRID = dict(points=SQUARE, cells=TWO)
 HANGING = dict(points=[*SQUARE, (1, 0.5)], cells=[[0, 1, 4, 3], [1, 2, 6], [2, 5, 6], [5, 4, 6]])
-TWICE = [*SQUARE, (1, 0), (1, 1)]  # the line between the squares once more
+TWICE = [*SQUARE, (1, 0), (1, 1)]  # second copy of the line between the squares
 BAD_FILES = {
     "cells: 1 of 2 cells: cell 1 at (1.55, 0.3) m have coincident corners": dict(
         points=[*SQUARE[:2], (2, 0), (0, 1), (1, 1), (1.6, 0.6)], cells=[TWO[0], [1, 2, 5, 5]]
@@ -82,21 +82,21 @@ BAD_FILES = {
     "(4 such faces): cell 0 at (0.5, 0.5) m and cell 1 at (0.5, 0.5) m and cell 2 at": dict(
         points=SQUARE, cells=[TWO[0]] * 3
     ),
-    "boundary: at 1 places faces have the corner of another cell between their ends: cell 3 at (0.5, 0.5) m": HANGING,
-    "boundary: at 1 places faces coincide but are not connected: cell 0 at (0.5, 0.5) m and cell 1": dict(
+    "boundary: at 1 place faces have the corner of another cell between their ends: cell 3 at (0.5, 0.5) m": HANGING,
+    "boundary: at 1 place faces coincide but are not connected: cell 0 at (0.5, 0.5) m and cell 1": dict(
         points=TWICE, cells=[TWO[0], [6, 2, 5, 7]]
     ),
     "cells: they are in 2 pieces that share no face: 2 with cell 1 at (0.5, 0.5) m, 1 with cell 0 at": dict(
         points=[*SQUARE, (5, 0), (6, 0), (6, 1)], cells=[[6, 7, 8], *TWO]
     ),
-    "groups.in: 1 of 1 lines are not boundary faces: the line from (1, 0) m to (1, 1) m lies between": dict(
+    "groups.in: lines that are not boundary faces: 1 of 1; the line from (1, 0) m to (1, 1) m lies between": dict(
         **GRID, groups={"in": [1, 4]}
     ),
-    "groups.in: 1 of 2 lines are not boundary faces: the line from (0, 0) m to (1, 1) m is not a side": dict(
+    "groups.in: lines that are not boundary faces: 1 of 2; the line from (0, 0) m to (1, 1) m is not a side": dict(
         **GRID, groups={"in": [[0, 3], [0, 4]]}
     ),
     "a line ends at a point that belongs to no cell": dict(points=[*SQUARE, (9, 9)], cells=TWO, groups={"in": [0, 6]}),
-    'groups.out: shares 1 faces with "in", the face from (0, 1) m to (0, 0) m': dict(
+    'groups.out: faces shared with "in": 1, the face from (0, 1) m to (0, 0) m': dict(
         **GRID, groups={"in": [0, 3], "out": [[3, 0], [0, 1]]}
     ),
     "points: z runs from 0 to 0.2 m, above the middle of this range in cell 1; expected a mesh in one plane": dict(
@@ -106,7 +106,7 @@ BAD_FILES = {
     "cells: there are no two-dimensional cells (2 line); expected triangle and quad": dict(
         points=SQUARE, cells=[], groups={"in": [[0, 1], [1, 2]]}
     ),
-    "points: 1 of 6 have invalid coordinates (not a number, or too large), first point 5": dict(
+    "points: 1 of 6 has invalid coordinates (not a number, or too large), first point 5": dict(
         points=[*SQUARE[:5], (math.nan, 1)], cells=TWO
     ),
 }
@@ -122,7 +122,7 @@ def test_bad_files(tmp_path, message):
 
 
 def test_a_boundary_that_crosses_itself(tmp_path):
-    """A strip of quads that turns round and runs through its own beginning."""
+    """A strip of quads turns round and crosses its own beginning."""
     ring = [(r * math.cos(w), r * math.sin(w)) for w in np.arange(9) * 0.9 for r in (1.0, 2.0)]
     cells = [[2 * k, 2 * k + 1, 2 * k + 3, 2 * k + 2] for k in range(8)]
     with pytest.raises(MeshError, match=r"places faces cross each other: cell \d at .* and cell \d at"):
@@ -131,13 +131,13 @@ def test_a_boundary_that_crosses_itself(tmp_path):
 
 
 def test_a_thin_wall_may_be_named(tmp_path, monkeypatch):
-    points = [*SQUARE, (0, 2), (1, 2), (2, 2), (1, 0)]  # two above two, the lower ones parted
+    points = [*SQUARE, (0, 2), (1, 2), (2, 2), (1, 0)]  # two cells above two, the lower two separate
     cells = [[0, 1, 4, 3], [9, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]]
     mesh = read(write(tmp_path / "wall.msh", points, cells, {"baffle": [1, 4]}))
     assert mesh.length[mesh.patch("baffle")].tolist() == [1.0] and mesh.inner == 3
-    with pytest.raises(MeshError, match="at 1 places faces coincide .* a group that marks it as a thin wall"):
+    with pytest.raises(MeshError, match="at 1 place faces coincide .* a group that marks it as a thin wall"):
         read(write(tmp_path / "none.msh", points, cells))
-    monkeypatch.setattr(contact, "BLOCK", 1)  # far into a long boundary
+    monkeypatch.setattr(contact, "BLOCK", 1)  # as for a long boundary
     assert read(tmp_path / "wall.msh").inner == 3
     with pytest.raises(MeshError, match="at 1 or more places faces coincide"):
         read(tmp_path / "none.msh")

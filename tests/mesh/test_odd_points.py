@@ -1,4 +1,4 @@
-"""Points that no mesh has: so far off that distances overflow, and none at all."""
+"""Points outside a mesh: just outside, so far away that distances overflow, infinite, and nan."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Delay lines: what travels unchanged is exact at any step, friction is that of telegraphers, and nothing is lost."""
+"""Delay lines: exact waves without friction at any step, friction of the telegrapher's equations, closed balances."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ METHODS = {
 
 
 def known(found, probe):
-    """Times and values of a probe, the last of two rows at a jump."""
+    """Times and values of a probe, with the last of two rows at a jump."""
     last = np.append(np.diff(found.t) > 0.0, True)
     return found.t[last], found[probe][last]
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_an_instant_stop_is_exact_at_any_step(method):
-    """A square wave at the gate, at rest in the middle every other quarter, under every method and step control."""
+    """After an instantaneous stop the pressure is an exact square wave, for every method and step control."""
     found = fvsolve.run(main(numerics={"method": method, **METHODS[method]}))
     assert found.reason == "finished" and found.ledger["mass"]["relative"] < 1e-14
     t, p = known(found, "gate.pressure")
@@ -62,7 +62,7 @@ def test_an_instant_stop_is_exact_at_any_step(method):
 
 @pytest.mark.parametrize("method", ["euler", "rk4", "gauss-4", "dormand-prince"])
 def test_jumps_pass_a_fork_at_their_own_time(method):
-    """Characteristics at Courant 1, with 0.1 s a cell, are exact; 25 reflections reach the lake, fork and dead ends."""
+    """Jumps in a fork agree with characteristics at Courant number 1, which are exact with cells of 0.1 s."""
     truth = fvsolve.run(fork({"scheme": "upwind", "method": "euler", "courant": 1.0}, every=0.1))
     found = fvsolve.run(
         fork({"pipe_model": "delay-line", "delay_tolerance": 1e-6, "method": method, **METHODS[method]}, every=0.05)
@@ -75,7 +75,10 @@ def test_jumps_pass_a_fork_at_their_own_time(method):
 
 
 def telegrapher(omega: float, drag: float) -> complex:
-    """p / M at the end of a pipe from a reservoir, M into the pipe: s + drag in place of s in the momentum balance."""
+    """p / M at the end of a pipe from a reservoir, with M into the pipe, by the telegrapher's equations [Pa s/kg].
+
+    s + drag replaces s in the momentum balance.
+    """
     s = 1j * omega
     gamma = np.sqrt(s * (s + drag)) / SPEED
     return (s + drag) / (AREA * gamma) * np.tanh(gamma * LENGTH)
@@ -85,7 +88,7 @@ def telegrapher(omega: float, drag: float) -> complex:
     ({"model": "steady", "factor": 0.2}, 2.0), ({"model": "hazen-williams", "coefficient": 40}, 1.852),
 ])  # fmt: skip
 def test_friction_is_that_of_telegraphers(friction, exponent):
-    """A demand that swings a little about a flow: response at two periods, twice as near by half the accuracy."""
+    """The response to a small oscillation of demand converges to that of the telegrapher's equations."""
     mean, swing, errors = 0.05, 1e-5, []
     for accuracy in (0.05, 0.0125):
         worst = 0.0
@@ -107,7 +110,7 @@ def test_friction_is_that_of_telegraphers(friction, exponent):
 
 
 def test_what_a_line_holds_is_what_travels_in_it():
-    """The state by mass balance, beside the integral of both waves along the line."""
+    """The mass in a line by its balance equals the integral of both waves along the line."""
     smooth = {"time": [0.0, 0.2, 0.9, 9.0], "value": [FLOW, FLOW, 0.2 * FLOW, 0.2 * FLOW], "kind": "smooth"}
     case = main(
         4.3, {"method": "dormand-prince", "rtol": 1e-7}, smooth, friction={"model": "steady", "factor": 0.05}, cells=400
@@ -123,7 +126,7 @@ def test_what_a_line_holds_is_what_travels_in_it():
 
 
 def test_envelopes_are_taken_along_the_line():
-    """Of two waves that meet in the middle neither end feels the sum."""
+    """The envelope contains the sum of two waves in the middle of a line, which does not occur at its ends."""
     nodes = {"a": {"type": "junction", "demand": {"time": [0.0, 0.5], "value": [0.0, -FLOW], "kind": "step"}},
              "b": {"type": "junction", "demand": {"time": [0.0, 0.5], "value": [0.0, -FLOW], "kind": "step"}},
              "lake": {"type": "reservoir", "pressure": 6e6}}  # fmt: skip
@@ -142,7 +145,7 @@ SLOW = {"time": (0.2 + 0.4 * S).tolist(), "value": (FLOW * (1.0 - S**3 * (10.0 -
 
 
 def short(line: str, **numerics) -> dict:
-    """A stub of 3 m and one of 5 m between longer pipes, one of them at a valve; a demand that stops in 0.2 s."""
+    """Case with stubs of 3 m and 5 m between longer pipes, a valve at a stub, and a demand that stops within 0.4 s."""
     nodes = {"lake": {"type": "reservoir", "pressure": 6e5}, "a": {"type": "junction"}, "b": {"type": "junction"},
              "c": {"type": "junction"}, "sink": {"type": "reservoir", "pressure": 1e5},
              "gate": {"type": "junction", "demand": SLOW}}  # fmt: skip
@@ -160,7 +163,7 @@ def short(line: str, **numerics) -> dict:
 
 
 def test_lines_shorter_than_a_step_know_each_other():
-    """Beside cells of 2.5 ms and true lengths; the error is that of the bound, and falls with the step's square."""
+    """Lines shorter than a step agree with cells of 2.5 ms; the error decreases with the square of the step."""
     truth, errors = fvsolve.run(short("finite-volume", scheme="upwind5", method="rk4", courant=0.8)), []
     for step in (0.02, 0.01):
         found = fvsolve.run(short("delay-line", method="euler", step=step))
@@ -173,7 +176,7 @@ def test_lines_shorter_than_a_step_know_each_other():
 
 @pytest.mark.parametrize("method", ["euler", "rk4", "gauss-4", "rodas-5p"])
 def test_stores_beside_lines_are_as_beside_cells(method):
-    """A chamber and a tank at both ends of lines, through a valve, under explicit, implicit and Rosenbrock methods."""
+    """A chamber and a tank at the ends of lines follow the solution with cells, under all kinds of methods."""
     nodes = {"lake": {"type": "reservoir", "pressure": 6e5}, "mid": {"type": "chamber", "volume": 0.5},
              "end": {"type": "junction"}, "pool": {"type": "tank", "area": 0.2, "level": 10.0}}  # fmt: skip
     shut = {"start": 0.2, "duration": 0.6, "value": [1.0, 0.2]}
@@ -191,7 +194,7 @@ def test_stores_beside_lines_are_as_beside_cells(method):
 
 
 def vessel(method: str, step: float, end: float = 3.0, volume: float = 20.0, cells: int = 2) -> dict:
-    """A demand that stops at once between a lake and a chamber, at no multiple of a step."""
+    """Case of a demand that stops at once between a lake and a chamber, at a time within a step."""
     stop = {"time": [0.0, 0.0503], "value": [FLOW, 0.0], "kind": "step"}
     nodes = {"lake": {"type": "reservoir", "pressure": 6e6}, "v": {"type": "chamber", "volume": volume},
              "a": {"type": "junction", "demand": stop}}  # fmt: skip
@@ -202,7 +205,10 @@ def vessel(method: str, step: float, end: float = 3.0, volume: float = 20.0, cel
 
 @pytest.mark.parametrize("method", ["rk4", "ssp-rk2", "trapezoid"])
 def test_what_a_jump_brings_a_store_within_a_step_is_not_lost(method):
-    """Beside steps twenty times as short; what stages alone see of jumps would be a tenth of a step's flow astray."""
+    """A chamber receives a jump within a step as with steps twenty times shorter.
+
+    Without the correction between stages the error would be a tenth of the flow of a step.
+    """
     truth = known(fvsolve.run(vessel("rk4", 5e-4)), "v.pressure")[1]
     errors = []
     for step in (0.02, 0.01):
@@ -213,7 +219,7 @@ def test_what_a_jump_brings_a_store_within_a_step_is_not_lost(method):
 
 
 def case_of(name: str) -> dict:
-    """A line that is broken off: with friction, jumps, a short stub and error control, or given steps."""
+    """Case to interrupt: with friction and given steps, with short lines, or with error control."""
     if name == "fork":
         return fork(
             {"pipe_model": "delay-line", "method": "rk4", "step": 0.013}, friction={"model": "steady", "factor": 0.02}
@@ -227,7 +233,7 @@ def case_of(name: str) -> dict:
 
 @pytest.mark.parametrize("name", ["fork", "short", "controlled"])
 def test_broken_off_and_resumed(name):
-    """To the bit, ledgers and envelopes too: what is on its way is remembered."""
+    """An interrupted and resumed run agrees with the whole run to the bit: final state, ledgers and envelopes."""
     case = case_of(name)
     model, early = fvsolve.build(fvsolve.load(case)), 0.4 * case["numerics"]["end"]
 
@@ -248,7 +254,7 @@ def test_broken_off_and_resumed(name):
 
 
 def test_advanced_in_pieces():
-    """A controller's loop: the state it hands on carries the past."""
+    """States from `advance` contain the wave history, so a loop of short advances gives the exact wave."""
     model = fvsolve.build(fvsolve.load(main(numerics={"step": 0.01})))
     state = fvsolve.initial_state(model)
     for until in np.arange(0.25, 3.01, 0.25):
@@ -259,7 +265,7 @@ def test_advanced_in_pieces():
 
 
 def test_more_steps_than_were_foreseen():
-    """Error control takes far shorter steps than lines are cut for: the past makes room."""
+    """The storage for past waves grows if error control takes much shorter steps than expected."""
     case = main(
         3.0,
         {"method": "bogacki-shampine", "rtol": 1e-10},
@@ -288,7 +294,7 @@ def test_other_rows_do_not_change_it():
 
 
 def test_at_rest_nothing_moves():
-    """Not by one bit, with friction and slopes."""
+    """Without an event the pressure of a line with friction does not change by a bit."""
     for friction in ({"model": "steady", "factor": 0.02}, {"model": "quasi-steady", "roughness": 1e-4},
                      {"model": "hazen-williams", "coefficient": 120}):  # fmt: skip
         found = fvsolve.run(main(3.0, demand=FLOW, friction=friction))
@@ -296,7 +302,7 @@ def test_at_rest_nothing_moves():
 
 
 def test_random_networks_do_not_grow():
-    """Lossless ones for fifty travel times, short stubs among them: no pressure beyond what jumps add up to."""
+    """Pressures in frictionless random networks with short stubs do not grow in 12 s."""
     random = np.random.default_rng(7)
     for _ in range(12):
         many = int(random.integers(3, 7))
@@ -317,7 +323,7 @@ def test_random_networks_do_not_grow():
 
 @pytest.mark.parametrize("control", [{"courant": 0.9, "method": "rk4"}, {"rtol": 1e-5, "method": "rodas-5p"}])
 def test_what_a_store_is_given_is_taken_from_its_own_line(control):
-    """Beside a lake, whose supply is booked by the method alone, and a line shorter than a step."""
+    """The mass ledger closes at a chamber next to a delay line and a lake, by Courant number and by tolerance."""
     case = vessel("rk4", 0.01)
     del case["numerics"]["step"]
     found = fvsolve.run(case | {"numerics": case["numerics"] | control})
@@ -325,7 +331,7 @@ def test_what_a_store_is_given_is_taken_from_its_own_line(control):
 
 
 def test_jumps_that_find_no_room_are_told(monkeypatch):
-    """Two of each wave are kept, where some hundred live."""
+    """A notice reports jumps that do not fit into the storage, here of two jumps per wave."""
     monkeypatch.setattr(delay_history, "LEAST_JUMPS", 2)
     monkeypatch.setattr(delay_history, "TOTAL_JUMPS", 2)
     found = fvsolve.run(fork({"pipe_model": "delay-line", "delay_tolerance": 1e-6, "method": "euler", "step": 0.04}))
@@ -335,7 +341,7 @@ def test_jumps_that_find_no_room_are_told(monkeypatch):
 
 
 def test_auto_takes_cells_where_a_line_is_too_rough():
-    """Of a short and of a long pipe under friction, by the stated bound; check says which and why."""
+    """`auto` selects cells for a pipe with too much friction and lines for others; `checks` states bound and reason."""
     case = fork({"pipe_model": "auto", "method": "rk4", "courant": 0.9, "delay_tolerance": 1e-3})
     case["links"]["down"]["friction"] = {"model": "steady", "factor": 0.5}
     found = fvsolve.build(fvsolve.load(case)).checks["pipes"]
@@ -388,7 +394,10 @@ def test_what_knows_no_lines_says_so():
 
 
 def test_lines_are_linearised_as_cells_up_to_a_frequency_that_is_told():
-    """What the lake gives back of a wave, exp(-2 s tau), to twice a hundredth up to there, and not far above."""
+    """The linearised cells of a line reflect a wave with the error 0.02 up to the stated frequency.
+
+    The exact reflection by the lake is exp(-2 s tau) with the opposite sign of pressure.
+    """
     case = main(1.0, demand=FLOW, cells=60)
     case["links"]["main"]["pipe_model"] = "delay-line"
     found = studies.linearise(case, inputs=["gate.demand"], outputs=["gate.pressure"])
@@ -397,7 +406,7 @@ def test_lines_are_linearised_as_cells_up_to_a_frequency_that_is_told():
     def off(frequency: float) -> float:
         s = 2j * np.pi * frequency
         inside = np.linalg.solve(s * np.eye(len(found.states)) - found.a, found.b)
-        pressure = (found.c @ inside + found.d)[0, 0] / -RHO * AREA / SPEED  # per wave of a flow into the pipe
+        pressure = (found.c @ inside + found.d)[0, 0] / -RHO * AREA / SPEED  # per Joukowsky jump of the flow
         return abs((pressure - 1.0) / (pressure + 1.0) + np.exp(-2.0 * s * TRAVEL))
 
     assert max(off(told * share) for share in (0.3, 0.61, 0.97)) < 0.02 < off(2.0 * told)
@@ -422,7 +431,7 @@ def test_a_line_of_the_case_is_a_rung():
 
 
 def test_stops_are_the_same_said_otherwise():
-    """In other units, at a later time, and by key of the pipe in place of the case."""
+    """Units, a later start, and the key of the pipe instead of the case give the same run."""
     one = fvsolve.run(main(3.0))
     other = main(3.0, {"step": "40 ms"})
     other["numerics"].pop("pipe_model")
@@ -435,7 +444,10 @@ def test_stops_are_the_same_said_otherwise():
 
 
 def test_a_start_from_rest_drives_every_part_of_a_pipe():
-    """Which one lump in its middle would not: a line is refused by name, and auto takes cells."""
+    """A start from rest with a pressure difference excludes a delay line, because friction acts at single points.
+
+    The key `delay-line` is a fault with the name of the pipe, and `auto` selects cells.
+    """
     nodes = {"high": {"type": "reservoir", "pressure": 6e6}, "low": {"type": "reservoir", "pressure": 5e6}}
     links = {"one": pipe("high", "low")}
     case = scene(nodes, links, 1.0, {"initial": "rest", "pipe_model": "delay-line"}, ["one.flow"], 0.05)
@@ -446,7 +458,7 @@ def test_a_start_from_rest_drives_every_part_of_a_pipe():
 
 
 def test_steps_by_tolerance_beside_cells_of_a_quicker_pipe():
-    """A stub shorter than a step, and cells that are quicker still: lines are cut for the steps that are taken."""
+    """Lines shorter than a step agree with cells, next to a pipe with fast cells under error control."""
     case = short("delay-line", method="dormand-prince", rtol=1e-7)
     case["links"]["up"] |= {"pipe_model": "finite-volume", "cells": 400}
     case["numerics"]["scheme"] = "upwind5"

@@ -1,4 +1,4 @@
-"""The energy norm in which growth is measured: springs between bodies, motions that store nothing, moving chambers."""
+"""Energy norm of states: springs between bodies, idle motions, and moving chambers."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MASS, DAMPING = 10.0, 1000.0
 
 
 def pair(stiffness, hold=0.0):
-    """Two masses, a spring and a damper between them, and a spring that holds the first to a frame."""
+    """Case of two masses with a spring and a damper between them, and an optional spring from a frame to the first."""
     nodes = {name: {"type": "mass", "mass": MASS} for name in "ab"}
     links = {"spring": {"type": "spring", "from": "a", "to": "b", "stiffness": stiffness},
              "damper": {"type": "damper", "from": "a", "to": "b", "damping": DAMPING}}  # fmt: skip
@@ -32,9 +32,9 @@ def pair(stiffness, hold=0.0):
 
 
 def by_hand(stiffness, method, steps=1000):
-    """The greatest safe step of the relative motion in its energy norm, all powers looked at."""
+    """Greatest step of the relative motion at which no power of the step matrix exceeds 1000 in the energy norm [s]."""
     omega, rate = math.sqrt(2 * stiffness / MASS), 2 * DAMPING / MASS
-    j = np.array([[0.0, omega], [-omega, -rate]])  # of sqrt(k / 2) (x_b - x_a) and sqrt(m / 4) (v_b - v_a)
+    j = np.array([[0.0, omega], [-omega, -rate]])  # states sqrt(k / 2) (x_b - x_a), sqrt(m / 4) (v_b - v_a)
     coefficients = [float(x) for x in stability_function(method_named(method)).numerator.coefficients]
     low, high = 0.0, 10.0 / omega
     while high - low > 1e-6 * high:
@@ -50,7 +50,7 @@ def by_hand(stiffness, method, steps=1000):
 
 
 def system_of(case, method, at=None, steps=1000):
-    """The linear system of a case in its energy norm."""
+    """Growth of the linearised system of a case in its energy norm."""
     state = operating_point(case, at=at)
     return DenseGrowth(method_named(method), energy_form(state.model, state.y).seen(linearise_at(state).a), steps)
 
@@ -73,7 +73,7 @@ def test_two_free_masses_are_measured_as_predicted_and_no_implicit_step_of_their
 
 @pytest.mark.parametrize("push", [0.0, 30.0])
 def test_energy_changes_by_its_slope_along_the_flow_1(push):
-    """dV/dt = dV/dx f(x, u) of two masses on springs: what a force gives less what the damper takes, at any state."""
+    """dV/dt = dV/dx f(x, u) is the power of the force minus that of the damper, at any state of two sprung masses."""
     case = pair(1e4, 2e3)
     case["links"]["push"] = {"type": "force", "to": "b", "force": push}
     model = operating_point(case).model
@@ -118,7 +118,7 @@ def test_an_idle_state_that_moves_what_has_energy_gets_the_least_weight():
 
 
 def test_the_greatest_growth_is_found_at_every_power_of_a_small_system():
-    """An oscillator in a norm that is not its own: growth of Euler's steps swings as it rises."""
+    """The predicted limit covers all powers of a step, also in a norm in which the growth oscillates."""
     e, steps = np.array([[0.0, 1.0], [-40.0, 0.0]]), 300
     found = predicted_limit(DenseGrowth(method_named("euler"), e, steps)).step
 

@@ -1,4 +1,4 @@
-"""Bodies under `equilibrium` stand where their forces balance: closed forms, SciPy on potentials written by hand."""
+"""Starts with `initial = "equilibrium"` against closed forms and against SciPy on potentials and forces."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def angles(model) -> list[float]:
 
 
 def hinged(on: str | None = None, angle: float = 0.0, length: float = 1.0, mass: float = 3.0, **more) -> dict:
-    """A rod along x that turns about -y, so that a positive angle lifts it."""
+    """Rod along x on a hinge about -y, so that a positive angle lifts it."""
     joint = {"kind": "revolute", "axis": [0, -1, 0], "angle": angle, **({} if on is None else {"on": on})}
     moment = mass * length**2 / 12.0
     return body(mass, [1e-3 * moment, moment, moment], joint, centre_of_mass=[0.5 * length, 0, 0],
@@ -48,11 +48,11 @@ def spring(first: str, second: str, stiffness: float, length: float = 0.0, **mor
     return {"type": "spring", "from": first, "to": second, "stiffness": stiffness, "free_length": length, **more}
 
 
-# places ---------------------------------------------------------------------------------------------------------
+# positions ------------------------------------------------------------------------------------------------------
 
 
 def test_a_beam_on_rubber_sags_by_the_closed_form():
-    """m g (L / 2) cos a = -h sin a, of a bushing whose torque is h sin a from what is stated."""
+    """A beam on a bushing sags by m g (L / 2) cos a = -h sin a, with the torque h sin a of the bushing."""
     nodes = {"wall": CEILING, "beam": hinged()}
     links = {"rubber": {"type": "bushing", "from": "wall.a", "to": "beam", "rotational_stiffness": 40.0}}
     model = built(balanced(nodes, links))
@@ -67,7 +67,7 @@ def arm_on_springs(first: float = 0.3, second: float = -0.4) -> tuple[dict, dict
 
 
 def slope_of_arm(q) -> list[float]:
-    """d/dq of m g z and k (l - l0)^2 / 2, by hand."""
+    """Gradient over the angles of the potential m g z + k (l - l0)^2 / 2 of the arm [N m]."""
     a, b = q
     e, f = np.array([math.cos(a), math.sin(a)]), np.array([math.cos(a + b), math.sin(a + b)])
     de, df = np.array([-e[1], e[0]]), np.array([-f[1], f[0]])
@@ -86,7 +86,7 @@ def test_two_links_on_two_springs_stand_where_the_slope_of_their_potential_vanis
 
 
 def four_bar(angle: float = -1.0, axis: int = 1) -> tuple[dict, dict]:
-    """Three rods that hang between two points 1.2 m apart, the last end pinned; the file says them nearly closed."""
+    """Three rods between two points 1.2 m apart, closed by a pin; the stated angles are rounded."""
     lengths = 0.6, 0.8, 0.7
     a = angle
     start = np.array([lengths[0] * math.cos(a), lengths[0] * math.sin(a)])
@@ -130,14 +130,14 @@ def test_a_rod_on_a_ball_joint_points_along_its_weight_and_what_pulls_it():
     model = built(balanced({"rod": rod}, links))
     resultant = pull - [0, 0, 2.0 * GRAVITY]
     assert -model.case.poses["rod"].attitude[:, 2] == approx(resultant / np.linalg.norm(resultant), abs=1e-13)
-    # nothing turns it about itself, so the way there is the shortest: about an axis at right angles to both
+    # no torque about the rod, so the rotation is the shortest, about an axis normal to the resultant
     turn = model.case.poses["rod"].attitude @ model.case.as_stated.poses["rod"].attitude.T
     axis = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
     assert axis @ resultant == approx(0.0, abs=0.05 * np.linalg.norm(axis) * np.linalg.norm(resultant))
 
 
 def raft(kind: str, load=(0.0, 0.0), **joint) -> tuple[dict, dict]:
-    """A free plate on four springs that are far longer than it sinks, or on four bushings."""
+    """Free plate on four bushings, or on four springs that are much longer than its displacement."""
     corners = {"a": [1, 0.5, 0], "b": [1, -0.5, 0], "c": [-1, 0.5, 0], "d": [-1, -0.5, 0]}
     below = -1000.0 if kind == "spring" else 0.0
     plate = body(20.0, [3, 7, 9], {"kind": "free", **joint}, centre_of_mass=[*load, 0.0], points=corners)
@@ -157,12 +157,12 @@ def test_a_free_plate_sinks_by_its_weight_over_its_springs(kind):
 
 
 def test_a_plate_with_its_mass_off_centre_tilts_as_well():
-    """On bushings k at (x_i, y_i): sum of k (c - r) = 0 and moments, in the plane x z by SciPy."""
+    """A plate on bushings with an eccentric mass is in balance of forces and moments in the plane x z, by SciPy."""
     model = built(balanced(*raft("bushing", load=(0.3, 0.0))))
     pose = model.case.poses["plate"]
 
     def left(q):
-        x, z, a = q  # place of the origin, pitch
+        x, z, a = q  # position of the origin, pitch
         c, s = math.cos(a), math.sin(a)
         points = [np.array([x + c * p, z - s * p]) for p in (1.0, -1.0)]
         pulls = [-1000.0 * (one - [p, 0.0]) for one, p in zip(points, (1.0, -1.0), strict=True)]
@@ -178,7 +178,7 @@ def test_a_plate_with_its_mass_off_centre_tilts_as_well():
 
 @pytest.mark.parametrize("attitude", [(0.0, 0.0, 0.0), (3.0, 0.2, 0.1), (-1.5, 1.2, 0.4)])
 def test_a_plate_on_four_ropes_hangs_at_its_least_potential_from_wherever_it_is_let_go(attitude):
-    """m g z_c + sum of k (l - l0)^2 / 2, whose slope in all six directions SciPy finds to be none."""
+    """A plate on four springs is at the minimum of m g z_c + sum of k (l - l0)^2 / 2 over six freedoms, by SciPy."""
     corners = np.array([[1, 0.5, 0], [1, -0.5, 0], [-1, 0.5, 0], [-1, -0.5, 0]])
     hooks = np.array([[1.3, 0.7, 3.0], [1.1, -0.9, 2.6], [-1.2, 0.6, 3.2], [-0.9, -0.7, 2.8]])
     centre = np.array([0.2, 0.1, -0.05])
@@ -235,7 +235,7 @@ def test_a_boom_stands_where_the_pressures_of_its_cylinder_carry_it():
 
 
 def hull(sloshing: str, off: float = 0.6, angle: float = 0.0, cells: int = 40, **tank) -> dict:
-    """A hull of 4 t that rolls about its origin, its centre of mass 0.5 m below, and a tank off its middle."""
+    """Hull of 4 t that rolls about its origin, with its centre of mass 0.5 m below and a tank off its middle."""
     ship = body(4000.0, [4000, 9000, 9000], {"kind": "revolute", "axis": [1, 0, 0], "angle": angle},
                 centre_of_mass=[0, 0, -0.5])  # fmt: skip
     basin = {"type": "basin", "physics": "free-surface", "on": "hull", "at": [0, off, -0.3], "sloshing": sloshing,
@@ -252,12 +252,12 @@ def test_a_hull_with_frozen_water_off_its_middle_heels_by_the_closed_form():
 
 
 def test_a_hull_with_free_water_heels_further_and_its_water_lies_level():
-    """Centre of gravity of a wedge on a box of cells: what was level turns in the tank as the tank turns back."""
+    """A hull with free water has the heel at which the moments of a level surface and of the hull balance."""
     model = built(balanced(hull("cells", 0.3), probes=["hull.angle"]))
     y = -0.8 + (np.arange(40) + 0.5) * 0.04
 
     def left(heel):
-        depth = 0.4 - y * math.tan(heel)  # columns along the normal, level in the world
+        depth = 0.4 - y * math.tan(heel)  # depths normal to the bed, with a level surface in the world
         mass = RHO * 0.04 * depth
         away, up = 0.3 + y, -0.3 + 0.5 * depth
         arm = away * math.cos(heel) - up * math.sin(heel)
@@ -272,7 +272,7 @@ def test_a_hull_with_free_water_heels_further_and_its_water_lies_level():
 
 
 def test_the_modes_of_a_tank_heel_a_hull_as_springs_do_and_nearly_as_its_cells():
-    """Each mode hangs down by m g sin / k, at its own height; three of them have all but 1 % of a free surface."""
+    """Sloshing modes increase the heel of a hull as the cells do, within 5 %."""
     cells, modes = (angles(built(balanced(hull(kind, 0.3))))[0] for kind in ("cells", "modes"))
     frozen = angles(built(balanced(hull("frozen", 0.3))))[0]
     assert modes < frozen and modes - frozen == approx(cells - frozen, rel=0.05)
@@ -288,12 +288,13 @@ def test_a_tank_on_two_sides_and_its_duct_do_not_move_where_their_levels_agree()
     assert result["hull.angle"] == approx(0.0, abs=1e-12) and result["duct.flow"] == approx(0.0, abs=1e-9)
     nodes["hull"]["centre_of_mass"] = [0, 0.05, -1.1]
     with pytest.raises(
-        CaseError, match="expects that nothing moves, but rigid column duct: an unbalanced 4777 Pa drives its flow"
+        CaseError,
+        match="expects that nothing moves, but rigid column duct: an unbalanced pressure of 4777 Pa drives its flow",
     ):
         built(balanced(nodes, {"duct": duct}))
 
 
-# what follows ---------------------------------------------------------------------------------------------------
+# stability in time ----------------------------------------------------------------------------------------------
 
 SCENES = {
     "arm": lambda: arm_on_springs(),
@@ -316,7 +317,7 @@ def test_what_stands_in_balance_stays(scene, method):
 
 
 def by_hand(nodes: dict, model) -> dict:
-    """The scene with the angles that were found, said by hand."""
+    """Nodes with the positions of the equilibrium as stated values."""
     again = {name: {**node} for name, node in nodes.items()}
     for name, node in model.case.equilibrium_nodes.items():
         joint = again[name]["joint"]
@@ -349,7 +350,7 @@ def test_a_balance_is_the_same_scene_with_the_found_places_written_by_hand(scene
     assert np.max(np.abs(other.rhs(0.0, other.start)), initial=0.0) < 1e-9
 
 
-# said another way -----------------------------------------------------------------------------------------------
+# equivalent cases -----------------------------------------------------------------------------------------------
 
 
 def test_the_order_of_a_file_its_axes_and_where_the_search_begins_do_not_matter():
@@ -388,7 +389,7 @@ def test_units_and_a_mirrored_scene_say_the_same():
     assert angles(built(balanced(mirrored, links))) == approx(truth, abs=1e-12)
 
 
-# what holds, and what does not ----------------------------------------------------------------------------------
+# stability of chambers, and faults ------------------------------------------------------------------------------
 
 
 def test_a_boom_on_shut_chambers_stays_where_it_is_stated_and_what_hangs_on_it_settles():
@@ -422,7 +423,7 @@ def test_a_pendulum_that_stands_stays_and_is_told_so():
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("shut", [True, False])
 def test_shut_oil_holds_a_boom_that_open_valves_do_not(shut, law):
-    """Pushed from in front, its lever grows as it lifts: at a pressure that stays it falls or rises on."""
+    """A boom is stable on closed chambers and unstable on constant pressures, as the lever grows with the angle."""
     crane, lug = Crane(), np.array([0.5, -0.25])
 
     def lever(a):
@@ -457,14 +458,16 @@ def test_oil_that_is_shut_in_is_the_spring_of_both_chambers(law):
 def test_what_nothing_holds_finds_no_balance_and_is_named():
     with pytest.raises(CaseError) as told:
         built(balanced({"stone": body(2.0, [1, 1, 1], {"kind": "free"})}))
-    assert 'nodes.stone: "equilibrium" finds no position where its forces balance: 19.61 N remain' in str(told.value)
-    assert "support it by a spring" in str(told.value)
+    assert 'nodes.stone: "equilibrium" finds no position where the forces on stone balance: 19.61 N remain' in str(
+        told.value
+    )
+    assert "add a spring" in str(told.value)
 
 
 def test_a_hull_that_would_turn_over_with_its_water_is_a_fault():
     nodes = hull("cells", 0.1, 0.2, 10)
     nodes["hull"]["centre_of_mass"] = [0, 0, 0.8]
-    with pytest.raises(CaseError, match="nodes.pool: in the equilibrium found it is turned over"):
+    with pytest.raises(CaseError, match="nodes.pool: in the equilibrium found pool is turned over"):
         built(balanced(nodes))
 
 
@@ -492,7 +495,7 @@ def test_bushings_and_preloads_count_from_what_is_stated():
     model = built(balanced({"top": nodes["top"], **rod}, rubber, ["rod.angle", "rubber.torque"]))
     angle, torque = model.observe(fvsolve.initial_state(model))
     assert torque == approx(GRAVITY * math.cos(angle), rel=1e-12) and angle == approx(-math.atan(GRAVITY / 30.0))
-    assert model.tables.bushings["energy"] == approx([2.0 * 30.0 * math.sin(0.5 * angle) ** 2], rel=1e-12)  # of t = 0
+    assert model.tables.bushings["energy"] == approx([2.0 * 30.0 * math.sin(0.5 * angle) ** 2], rel=1e-12)  # at t = 0
 
 
 def test_a_mass_on_an_axis_goes_to_where_its_spring_holds_what_pushes_it():
@@ -535,7 +538,7 @@ def test_studies_refine_no_cells_of_water_that_has_none(sloshing):
 
 
 def test_a_hull_swings_about_the_heel_that_was_found():
-    """w^2 = g sqrt((M z)^2 + (m y)^2) / J about its own axis, wherever the frozen water is."""
+    """w^2 = g sqrt((M z)^2 + (m y)^2) / J about the axis of the hull, with frozen water at any place."""
     model = built(balanced(hull("frozen", 0.6), probes=["hull.angle"]))
     mass = RHO * 1.6 * 0.4
     inertia = 4000.0 + 4000.0 * 0.25 + mass * (1.6**2 + 0.4**2) / 12.0 + mass * (0.6**2 + 0.1**2)

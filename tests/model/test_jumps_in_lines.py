@@ -1,4 +1,4 @@
-"""Jumps in delay lines beside characteristics at Courant 1: short lines, devices, pulses, friction."""
+"""Jumps in delay lines against characteristics at Courant number 1: short lines, devices, pulses and friction."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def line(one: str, other: str, length: float, bore: float = 0.3, **keys) -> dict
 
 
 def in_cells(case: dict, size: float) -> dict:
-    """The same by characteristics, cells of this length [m]."""
+    """Case with characteristics at Courant number 1 in cells of length `size` [m]."""
     links = {name: link | {"cells": round(link["length"] / size)} if link["type"] == "pipe" else link
              for name, link in case["links"].items()}  # fmt: skip
     kept = {key: value for key, value in case["numerics"].items() if key in ("end", "start")}
@@ -37,7 +37,7 @@ def same_extremes(found: fvsolve.Result, truth: fvsolve.Result, share: float) ->
 
 
 def stub(length: float, numerics: dict, end: float = 4.0) -> dict:
-    """A valve shuts at once at the end of a short narrow pipe behind a long one."""
+    """Case of a valve that shuts at once at the end of a short narrow pipe behind a long pipe."""
     nodes = {"lake": lake(50.0), "j": junction(), "gate": junction(), "out": {"type": "reservoir", "pressure": AMBIENT}}
     links = {"main": line("lake", "j", 1000.0), "short": line("j", "gate", length, 0.15),
              "v": valve("gate", "out", 0.00061, {"time": [0.0, 0.5], "value": [1.0, 0.0], "kind": "step"})}  # fmt: skip
@@ -47,7 +47,7 @@ def stub(length: float, numerics: dict, end: float = 4.0) -> dict:
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("length", [2.0, 8.0])
 def test_a_jump_takes_its_time_in_a_line_shorter_than_a_step(method, length):
-    """Gate at 160.23 m after the closure (Joukowsky in the short pipe), -63.54 m when the lake answers."""
+    """A jump in a line shorter than a step reaches the exact head of 160.23 m, and all extremes of characteristics."""
     case = stub(length, {"method": method, **METHODS[method]})
     found, truth = fvsolve.run(case), fvsolve.run(in_cells(case, length))
     assert found.extremes["gate.head"].maximum == pytest.approx(160.229, abs=0.01)
@@ -56,7 +56,7 @@ def test_a_jump_takes_its_time_in_a_line_shorter_than_a_step(method, length):
 
 
 def test_three_short_lines_and_a_step_longer_than_all():
-    """Pipes of 2 to 4 m under steps of 0.1 s, drawn either way."""
+    """Pipes of 2 to 4 m under steps of 0.1 s have the extremes of characteristics."""
     case = stub(2.0, {"method": "euler", "step": 0.1}, 2.0)
     case["nodes"]["k"] = junction()
     case["links"]["main"]["length"] = 4.0
@@ -78,7 +78,7 @@ DEVICES = {
 
 
 def beside(device: str, numerics: dict, before: float, after: float) -> dict:
-    """A demand changes at once 100 m from a device that acts at once."""
+    """Case of a demand that changes at once, 100 m from an instantaneous device."""
     link, head = DEVICES[device]
     nodes = {"side": lake(head), "r": lake(50.0), "n": junction(), "m": junction(step(0.5, before, after))}
     links = {"device": link, "p": line("n", "m", 100.0), "p2": line("m", "r", 370.0)}
@@ -90,7 +90,10 @@ def beside(device: str, numerics: dict, before: float, after: float) -> dict:
 @pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("method", METHODS)
 def test_a_device_acts_before_what_a_jump_brings_it_is_noted(device, method):
-    """Beside cells of 2 m, which make a ramp of the jump: a disc bursts at its pressure there, and at once here."""
+    """Devices switch at the arrival of a jump, with the events and extremes of cells of 2 m.
+
+    Cells change the jump to a ramp, so a disc bursts there at its burst pressure; with lines it bursts at once.
+    """
     demand = (0.04, 0.0) if device in ("relief-valve", "rupture-disc") else (0.0, 0.04)
     case = beside(device, {"method": method, **METHODS[method]}, *demand)
     found, truth = fvsolve.run(case), fvsolve.run(in_cells(case, 2.0))
@@ -105,17 +108,17 @@ def test_a_device_acts_before_what_a_jump_brings_it_is_noted(device, method):
 
 
 def test_a_device_behind_a_short_line():
-    """Which a jump reaches within the step."""
+    """A jump reaches a check valve through a line shorter than a step, with the extremes of characteristics."""
     case = beside("check-valve", {"method": "euler", "step": 0.013}, 0.0, 0.04)
     case["nodes"]["q"] = junction()
     case["links"]["p"]["to"] = "q"
     case["links"]["stub"] = line("q", "m", 4.0)
     for one in (case, turned(case)):
-        same_extremes(fvsolve.run(one), fvsolve.run(in_cells(case, 4.0)), 3e-3)
+        same_extremes(fvsolve.run(one), fvsolve.run(in_cells(one, 4.0)), 3e-3)
 
 
 def pulse(numerics: dict, end: float = 1.9) -> dict:
-    """A demand stops for 3 ms and starts again."""
+    """Case of a demand that stops for 3 ms."""
     demand = {"time": [0.0, 0.5, 0.503], "value": [0.05, 0.0, 0.05], "kind": "step"}
     nodes = {"lake": lake(50.0), "j": junction(demand), "d": junction()}
     links = {"one": line("lake", "j", 1000.0), "two": line("j", "d", 313.7)}
@@ -135,11 +138,11 @@ def test_a_pulse_shorter_than_a_step_is_seen_wherever_it_passes(method):
     envelope = RHO * 9.80665 * 2.0 * rise
     assert np.max(found.envelope["two"]["max_pressure"]) - np.min(
         found.envelope["two"]["min_pressure"]
-    ) == pytest.approx(envelope, rel=1e-6)  # by the dead end it meets itself
+    ) == pytest.approx(envelope, rel=1e-6)  # the pulse overlaps its reflection at the dead end
 
 
 def test_pulses_that_meet_between_two_places_of_a_line():
-    """From both ends of a pipe that is told at two places; twice the height of either where they meet."""
+    """The envelope contains the sum of two pulses that cross inside a line with two stored places."""
 
     def stop(t):
         return {"time": [0.0, t, t + 0.002], "value": [0.0, -0.05, 0.0], "kind": "step"}  # fmt: skip
@@ -151,13 +154,13 @@ def test_pulses_that_meet_between_two_places_of_a_line():
     )
     rise = RHO * SPEED * 0.05 / (np.pi / 4 * 0.3**2)
     greatest = np.max(found.envelope["one"]["max_pressure"]) - np.min(found.envelope["one"]["min_pressure"])
-    assert greatest == pytest.approx(1.5 * rise, rel=1e-6)  # the second divides between two pipes
+    assert greatest == pytest.approx(1.5 * rise, rel=1e-6)  # the second pulse divides between two pipes
 
 
 def test_a_small_jump_leaves_its_line_though_fewer_jumps_are_on_their_way_than_before():
-    """Forty jumps reach the lake within the step before; the small one, 6e-5 of their sum, reaches a shut disc alone.
+    """A small jump, 6e-5 of the sum of all, reaches a shut disc after forty jumps have left through the lake.
 
-    The bound of jumps that end a step is proportional to the number on their way: it must not fall in between.
+    The threshold for jumps at the end of a step is proportional to their number; the decrease must not lose a jump.
     """
     at, many = np.concatenate([[0.0], 0.5 + 1e-4 * np.arange(40)]), 0.05 * np.linspace(1.0, 0.0, 41)
     small = 6e-5 * 0.05
@@ -175,7 +178,7 @@ def test_a_small_jump_leaves_its_line_though_fewer_jumps_are_on_their_way_than_b
 
 @pytest.mark.parametrize("method", METHODS)
 def test_nothing_arrives_before_its_jump(method):
-    """With friction: the flow at the lake is that of the start until 2 s, and what is left of it after."""
+    """With friction the flow at the lake is constant until the jump arrives at 2 s, then that of characteristics."""
     nodes = {"lake": lake(50.0), "gate": junction(), "out": {"type": "reservoir", "pressure": AMBIENT}}
     friction = {"model": "steady", "factor": 0.01}
     links = {"main": line("lake", "gate", 1000.0, friction=friction, minor_loss=100.0),
@@ -192,7 +195,7 @@ def test_nothing_arrives_before_its_jump(method):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_an_air_valve_lets_air_in_as_a_jump_arrives(method):
-    """Pressure stays at ambient where the wave would bring it to -123 m."""
+    """An air valve opens as a jump arrives and keeps ambient pressure, where the wave alone would give -123 m."""
     nodes = {"lake": lake(20.0), "n": {"type": "air-valve", "inlet": 0.1, "outlet": 0.05},
              "m": junction(step(0.5, 0.0, 0.1))}  # fmt: skip
     links = {"p": line("n", "m", 100.0), "p2": line("lake", "n", 400.0)}
@@ -219,7 +222,7 @@ def test_auto_takes_cells_where_a_force_is_asked_for():
 
 @pytest.mark.parametrize(("length", "ramp", "step"), [(9.0, 0.02, 0.01), (901.3, 0.005, 0.002)])
 def test_a_ramp_too_quick_for_the_steps_is_told(length, ramp, step):
-    """As `lines` in `warnings`, by more than it is off beside cells; `auto` takes cells."""
+    """A ramp too fast for the steps gives a notice of kind `lines`, and `auto` selects cells."""
     case = stub(2.0, {"method": "euler", "step": step}, 2.5)
     del case["links"]["short"], case["nodes"]["j"]
     case["links"]["main"] |= {"to": "gate", "length": length}

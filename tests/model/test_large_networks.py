@@ -1,4 +1,4 @@
-"""What is read and built of a network grows as its pipes do: counted in lines of Python, never in seconds."""
+"""Linear growth of the work of reading and building a network with its pipes, counted in executed lines of Python."""
 
 import sys
 from pathlib import Path
@@ -14,7 +14,7 @@ HAZEN = {"model": "hazen-williams", "coefficient": 110.0}
 
 
 def ladder(rungs: int, line: str) -> dict:
-    """Two rows of junctions with a lake at the start of each, joined across: three pipes a rung."""
+    """Case of two rows of junctions, each behind a lake, with cross connections: three pipes per rung."""
     nodes = {f"{side}{k}": junction(1e-4, elevation=0.0) for k in range(rungs) for side in "ab"}
     nodes |= {"lake-a": lake(60.0), "lake-b": lake(60.0)}
     links = {}
@@ -27,7 +27,7 @@ def ladder(rungs: int, line: str) -> dict:
 
 
 def effort(rungs: int, line: str) -> int:
-    """Lines of Python that the package goes through to read, build and check such a network."""
+    """Number of lines of the package that are executed to read and build a network."""
     count = 0
 
     def watch(frame, event, _):
@@ -49,13 +49,13 @@ def effort(rungs: int, line: str) -> int:
 
 @pytest.mark.parametrize("line", ["finite-volume", "delay-line"])
 def test_four_times_the_pipes_take_less_than_four_times_the_work(line):
-    effort(5, line)  # what is done once
+    effort(5, line)  # caches
     few, many = effort(12, line), effort(48, line)
-    assert many < 3.8 * few  # what grows as pairs of pipes do brings 3.95 and more
+    assert many < 3.8 * few  # work proportional to pairs of pipes gives 3.95 and more
 
 
 def test_a_ladder_of_like_halves_flows_alike_in_both():
-    """A system so large that it is solved as a sparse one."""
+    """A symmetric ladder with a large sparse system has no cross flow."""
     model = fvsolve.build(fvsolve.load(ladder(120, "finite-volume")))
     flow = dict(zip([p.name for p in model.pipes], model.tables.pipes["flow"], strict=True))
     rho = model.case.properties.density

@@ -1,4 +1,4 @@
-"""A model shows what it is made of; its rhs is pure; advancing it in pieces is running it."""
+"""Models: pure right-hand side, state names, Jacobian, advances with inputs, and compiled against plain Python."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ WATER = {"name": "user", "density": 1000.0, "bulk_modulus": 2.2e9, "viscosity": 
 
 
 def scene(law: str = "linear", scheme: str = "muscl", **numerics) -> dict:
-    """Lake, pipe, chamber, two valves in series, tank, rigid column: one of each kind of state."""
+    """Case of a lake, a pipe, a chamber, two valves in series, a tank and a rigid column, with states of each kind."""
     return {
         "fluid": {**WATER, "law": law},
         "nodes": {
@@ -56,7 +56,7 @@ def test_the_rhs_is_pure(law):
 
 
 def test_states_have_names_and_the_jacobian_is_the_slope_of_the_rhs():
-    model = fvsolve.build(fvsolve.load(scene(scheme="upwind5")))  # a limiter has no slope at rest
+    model = fvsolve.build(fvsolve.load(scene(scheme="upwind5")))  # a limiter is not differentiable at rest
     assert len(model.state_names) == model.y_size == 2 * 9 + 3
     assert {"main.forward[0]", "main.backward[8]", "pot.mass", "pond.mass", "drain.flow"} <= set(model.state_names)
     y = np.zeros(model.y_size)
@@ -122,7 +122,7 @@ def test_advance_refuses_inputs_out_of_range(name, value, said):
 
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_a_reservoir_held_by_head_or_by_pressure_is_one_that_says_so(law):
-    """The head of the lake under `log` is not proportional to its pressure; either way it may be held by both."""
+    """A reservoir held at a head or pressure by an input equals a reservoir with this head as its schedule."""
     given = scene(law)
     held = fvsolve.build(fvsolve.load(given))
     start = fvsolve.initial_state(held)
@@ -136,7 +136,7 @@ def test_a_reservoir_held_by_head_or_by_pressure_is_one_that_says_so(law):
 
 
 def lake_pressure(law: str, head: float) -> float:
-    """Pressure at datum of a reservoir of that head [Pa]."""
+    """Pressure at datum of a reservoir with a given head [Pa]."""
     beta, ambient, weight = 2.2e9, 101325.0, 1000.0 * 9.80665
     if law == "linear":
         return ambient + weight * head
@@ -156,7 +156,7 @@ print(json.dumps({"reason": result.reason, "t": list(result.t),
 @pytest.mark.parametrize("law, scheme", [("linear", "muscl"), ("linear", "upwind5"), ("log", "weno5")])
 def test_compiled_and_plain_python_agree(law, scheme):
     case = scene(law, scheme)
-    case["numerics"]["end"] = 0.35  # the valve stands from 0.3 s on
+    case["numerics"]["end"] = 0.35  # the valve is constant from 0.3 s on
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run([sys.executable, "-c", PLAIN], input=json.dumps(case), env=environment, capture_output=True,
                           text=True, check=True)  # fmt: skip

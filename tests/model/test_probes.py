@@ -1,4 +1,4 @@
-"""What a probe along a pipe reads: the same whichever way the pipe is drawn, exact for polynomials."""
+"""Probes along a pipe: independent of the direction of the pipe, and exact for polynomials."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ PLACES = (0.05, 0.1, 0.15, 0.3, 0.37, 0.45, 0.5, 0.6, 0.65, 0.7, 0.9, 0.95)
 @pytest.mark.parametrize("degree", [1, 2, 3, 4])
 @pytest.mark.parametrize("n", [7, 8, 10, 30])
 def test_a_place_is_read_with_the_same_weights_from_either_end(degree, n):
-    """Also where n times the fraction misses a face or a centre by a rounding."""
+    """The weights of a place are equal from both ends and exact for polynomials.
+
+    They do not depend on rounding of n times the fraction at a face or a centre.
+    """
     for k in range(1, 4 * n):
         there, back = (cells_around(k / (4 * n) * n, degree, n), cells_around((1.0 - k / (4 * n)) * n, degree, n))
         assert there[0] == n - back[0] - back[1].size
@@ -31,7 +34,7 @@ def test_a_place_is_read_with_the_same_weights_from_either_end(degree, n):
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_pipe_drawn_the_other_way_reads_the_same(scheme, law):
-    """On faces, centres and between; flow turns its sign with the direction, to rounding."""
+    """A reversed pipe gives the same pressures and opposite flows, to rounding, at faces, centres and between."""
     nodes = {"lake": reservoir(6e5), "gate": junction(), "sink": reservoir(2e5)}
     shuts = {"start": 0.0, "duration": 0.02, "value": [1.0, 0.3]}
     friction = {"model": "quasi-steady", "roughness": 1e-4}

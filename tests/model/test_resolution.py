@@ -1,4 +1,4 @@
-"""Pipes with too few cells get a notice, whatever the scheme; those with enough do not."""
+"""Notices for pipes with too few cells, for every scheme."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def opening(duration: float) -> dict:
 
 
 def told(case, settings: dict | None = None) -> list:
-    """Notices of cells."""
+    """Notices on numbers of cells and on costs."""
     return [one for one in model_of(load(case, settings or {})).warnings if one.key == "cells" or one.kind == "cost"]
 
 
@@ -46,7 +46,7 @@ def test_cells_without_a_notice_give_peaks_to_a_tenth(duration: float) -> None:
 
 @pytest.mark.parametrize("cells", range(1, 9))
 def test_a_closure_that_few_cells_flatten_is_noted(cells: int) -> None:
-    """These err by up to 40 %, and with a single cell every claim of the case holds."""
+    """A closure on one to eight cells gives a notice; its peaks err by up to 40 %."""
     (note,) = told("valve-closure", {"links.main.cells": cells})
     assert (
         note.value == cells and f"links.main.cells = {OTHER_CELLS}" in note.text and "links.valve.opening" in note.text
@@ -101,7 +101,7 @@ def test_no_shipped_case_has_too_few_cells() -> None:
 
 
 def station(at: float | str = 20.0, **more) -> dict:
-    """A check valve behind a pump, a main with a vessel on it, a tank on a hill."""
+    """Case of a check valve behind a pump, a main with a vessel, and a reservoir on a hill."""
     nodes = {"sump": lake(5.0, elevation=0.0), "out": junction(elevation=0.0), "top": lake(60.0, elevation=50.0),
              "vessel": {"type": "accumulator", "volume": 5.0, "gas_volume": 2.0, "on": "main", "at": at}}  # fmt: skip
     rub = {"model": "quasi-steady", "roughness": 1e-4}

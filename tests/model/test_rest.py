@@ -1,4 +1,4 @@
-"""Where nothing happens nothing moves; what comes in, goes out or stays; the rhs is pure."""
+"""Networks at rest or in steady flow do not change, mass balances close, and the right-hand side is pure."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ SCHEMES = ["upwind", "muscl", "upwind5", "weno5", "central", "fromm", "linear-up
 
 
 def town(friction: dict, numerics: dict, end: float = 60.0, demand=0.02, law: str = "linear") -> dict:
-    """A loop with slopes, a demand, valves, a rigid column, a tank fed as it feeds, and still tanks."""
+    """Case of a loop with slopes, a demand, valves, a rigid column, still tanks and a tank with balanced flows."""
     nodes = {
         "hill": lake(60.0),
         "low": lake(40.0),
         "a": junction(elevation=12.3),
         "b": junction(demand, elevation=31.7),
         "c": junction(elevation=-4.1),
-        "middle": tank(100.0, 10.0, elevation=40.0),  # the lakes stand 10 m above and below its surface
+        "middle": tank(100.0, 10.0, elevation=40.0),  # the lakes are 10 m above and below its level
         "out": reservoir(AMBIENT, elevation=5.0),
         "still": tank(20.0, 3.0, elevation=20.0),
         "one": tank(3.0, 5.0, elevation=30.1),
@@ -63,7 +63,7 @@ def moved(result, name: str) -> float:
 
 
 def still_probes(result) -> tuple[list[str], list[str]]:
-    """Probes of pipes and junctions, and the others."""
+    """Names of the probes of pipes and junctions, and names of all others."""
     names = [str(p) for p in result.probes]
     pipes = [n for n in names if "@" in n or n.split(".")[0] in "abc"]
     return pipes, [n for n in names if n not in pipes]
@@ -75,12 +75,12 @@ def still_probes(result) -> tuple[list[str], list[str]]:
 )
 def test_a_looped_network_without_an_event_does_not_move_by_one_bit(scheme, friction):
     result = fvsolve.run(town(friction, {"scheme": scheme}))
-    assert result.reason == "finished"  # linear-upwind is beyond its limit: nothing moves all the same
+    assert result.reason == "finished"  # linear-upwind is beyond its limit
     pipes, others = still_probes(result)
     assert len(pipes) == 45
     assert {n: moved(result, n) for n in pipes if moved(result, n) != 0.0} == {}
     assert max(moved(result, n) for n in others) <= 1e-12
-    assert abs(result["ab.flow@0.31"][0]) > 1e-3  # it does flow
+    assert abs(result["ab.flow@0.31"][0]) > 1e-3  # steady flow
     assert np.all(result["shut.flow"] == 0.0)
     assert abs(result.ledger["mass"]["relative"]) < 1e-12
 
@@ -96,7 +96,10 @@ def test_other_friction_laws_do_not_move_it_either(scheme, friction):
 
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
 def test_nor_does_the_log_law_move_the_pipes(scheme):
-    """Under it the lakes no longer stand alike about the middle tank: it and its two pipes do move."""
+    """Under the law `log` the pipes do not change, except the two pipes at the tank.
+
+    The lakes are not symmetric about this tank under the law `log`, so its level changes slowly.
+    """
     result = fvsolve.run(town(ROUGH, {"scheme": scheme}, law="log"))
     names = [n for n in still_probes(result)[0] if n.split(".")[0] not in ("in", "on")]
     assert {n: moved(result, n) for n in names if moved(result, n) != 0.0} == {}
@@ -120,7 +123,7 @@ def test_no_method_moves_it(method):
 
 
 def pond(law: str, friction: dict, scheme: str = "muscl") -> dict:
-    """Equal heads everywhere (sums that are exact in binary), any elevations, wave speeds and loops."""
+    """Case of equal heads that are exact in binary, with various elevations, wave speeds and loops."""
     nodes = {
         "lake": lake(47.25),
         "pool": tank(50.0, 6.25, elevation=41.0),
@@ -174,7 +177,7 @@ def test_every_way_of_starting_finds_the_pond_at_rest(initial):
 
 
 def busy(law: str, scheme: str) -> dict:
-    """The town with a burst at `b`."""
+    """Case of the town with a burst at `b`."""
     case = town(ROUGH, {"scheme": scheme}, 20.0, step(1.0, 0.02, 0.06), law)
     case["output"]["every"] = 0.5
     return case
@@ -196,7 +199,7 @@ def test_what_the_ledger_says_flowed_out_is_the_demand():
     links = {"main": pipe("lake", "gate", 500.0, 0.3, 1000.0, 20)}
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.9}
     result = fvsolve.run(scene(nodes, links, 5.0, numerics, ["gate.pressure"]))
-    gate = result.ledger["mass"]["nodes"]["gate"]  # the lake takes some of it back, as waves come and go
+    gate = result.ledger["mass"]["nodes"]["gate"]  # waves also return mass to the lake
     assert gate == {"inflow": 0.0, "outflow": pytest.approx(1000.0 * (0.05 + 4 * 0.01), rel=1e-9)}
 
 
@@ -215,7 +218,7 @@ def test_the_rhs_is_pure(law):
 
 
 def test_a_symmetric_network_stays_symmetric():
-    """Two equal branches, one laid against its direction, see the same pressures."""
+    """Two equal branches of opposite direction have equal pressures."""
     nodes = {"lake": reservoir(1e6), "fork": junction()}
     nodes |= {n: junction(step(0.2, 0.03, 0.0)) for n in ("left", "right")}
     links = {
@@ -230,7 +233,7 @@ def test_a_symmetric_network_stays_symmetric():
 
 
 def test_a_long_run_rounds_its_ledger_once():
-    """Two hundred thousand equal steps: plain sums would be off by 1e-11 of what is stored."""
+    """The ledger of 200 000 equal steps has rounding errors below 1e-13; plain sums would have 1e-11."""
     nodes = {"spring": {"type": "inflow", "flow": 0.01}, "pond": tank(1.0, 0.2)}
     links = {"main": pipe("spring", "pond", 10.0, 0.1, 1000.0, 10)}
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.9}
@@ -264,7 +267,7 @@ def test_a_jump_at_the_very_end_has_two_rows():
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5"])
 def test_from_rest_a_pipe_between_two_lakes_starts_as_one_body_whichever_way_it_is_drawn(law, scheme):
-    """dq/dt = g A dH / L at first, all along; friction brakes it later."""
+    """A frictionless pipe starts with dq/dt = g A dH / L at all places."""
     area = np.pi / 4 * 0.3**2
     for ways in (("high", "low"), ("low", "high")):
         nodes = {"high": lake(50.0), "low": lake(40.0)}

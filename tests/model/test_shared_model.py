@@ -1,4 +1,4 @@
-"""A model is what was built and no more: runs share it, one after another or at once."""
+"""A model is read-only, and several runs share it one after another or at once."""
 
 import hashlib
 import subprocess
@@ -16,7 +16,7 @@ from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
 from fvsolve.steppers import loop_indices
 from fvsolve.studies.outcome import outcome
 
-SCENES = {  # waves in pipes; flags and marks of devices; cells of a basin, and what it works in; scalars in one; Newton
+SCENES = {  # pipes; flags and marks of devices; cells and work arrays of a basin; scalars; Newton's method
     "nine pipes": ("streeter-nine-pipes", {"numerics.end": 5.0}),
     "nine pipes, log": ("streeter-nine-pipes", {"numerics.end": 0.5, "fluid.law": "log"}),
     "check valve": ("check-valve-slam", {}),
@@ -36,13 +36,13 @@ def built(scene: str) -> Model:
 
 
 def bits(model: Model) -> str:
-    """All bytes of a model's arrays, and of what implicit steps read of its Jacobian."""
+    """Hash of the bytes of all arrays of a model, including the structure of its Jacobian."""
     arrays = (*model.tables, model.scale, model.start, *model.profiles.values(), model.structure.shape)
     return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()
 
 
 def written(run) -> list[np.ndarray]:
-    """What a run has to show: its rows, its last state, and all that it wrote but its room to work in."""
+    """Rows, final state, event flags, marks, envelopes and extremes of a run."""
     slate = run.run_data
     return [run.rows, run.y, slate.armed, slate.marks, slate.envelope, slate.extremes]
 
@@ -53,7 +53,7 @@ def same(one: list[np.ndarray], other: list[np.ndarray]) -> bool:
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_a_run_leaves_its_model_as_it_was(scene):
-    """To the last byte; of a second run nothing shows that there was a first."""
+    """A run does not change a byte of its model, and a second run gives equal results."""
     model = built(scene)
     before = bits(model)
     first = written(outcome(model))
@@ -73,7 +73,7 @@ def test_nobody_writes_into_a_model():
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_runs_of_one_model_at_once_are_the_runs_alone(scene):
-    """Three threads let go together: two with the whole run, one from another state, which would show in the others."""
+    """Three threads with one model, one from another state, give the results of single runs."""
     model = built(scene)
     moved = model.start + 1e-3 * model.scale
     alone = [written(outcome(model)), written(outcome(model, y=moved))]
@@ -94,7 +94,7 @@ def test_runs_of_one_model_at_once_are_the_runs_alone(scene):
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_runs_of_one_model_step_by_step_in_turn_are_the_runs_alone(scene):
-    """Of every two steps in a row one is the other run's."""
+    """Two runs of one model with alternating steps give the states of single runs."""
     model, states = built(scene), []
     moved = model.start + 1e-3 * model.scale
     for loops in ([begun(model, model.start)], [begun(model, moved)], [begun(model, y) for y in (model.start, moved)]):
@@ -107,7 +107,7 @@ def test_runs_of_one_model_step_by_step_in_turn_are_the_runs_alone(scene):
 
 
 def begun(model: Model, y: np.ndarray) -> RunLoop:
-    """A run from a state at the start, before its first step."""
+    """Time loop from a state at the start time, before its first step."""
     loop = RunLoop(model)
     loop.now[:] = y
     loop.loop_state[loop_indices.T] = model.case.numerics.start
@@ -116,7 +116,7 @@ def begun(model: Model, y: np.ndarray) -> RunLoop:
 
 
 def test_threads_that_ask_for_compiled_code_at_once_get_it():
-    """In a process that has made none: both build and run, and come to the same."""
+    """Two threads of a new process compile at once and give equal results."""
     code = """
 import sys, threading, fvsolve
 together, found = threading.Barrier(2), {}

@@ -1,4 +1,4 @@
-"""Shut chambers without a stated pressure hold what stands on them: pressures by sums of forces, and nothing moves."""
+"""Closed chambers without a stated pressure carry their load: pressures by balances of forces, without motion."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ A, B = 12e-4, 8e-4
 MASS = {"type": "mass", "mass": 1000.0, "initial_position": 0.1}
 POOL = {"type": "basin", "size": [2.0, 1.0], "cells": [10, 5], "level": 1.0,
         "patches": {"east": {"side": "east", "body": "load"}}}  # fmt: skip
-WATER_FORCE = 0.5 * RHO * GRAVITY  # of water 1 m deep on a wall 1 m wide, outward
+WATER_FORCE = 0.5 * RHO * GRAVITY  # thrust of water 1 m deep on a wall 1 m wide [N]
 
 
 def jack(rod: str = "load", case: str = "ground", **more) -> dict:
@@ -32,7 +32,7 @@ def standing(load: float, initial: str = "steady", law: str = "linear", nodes=()
 
 
 def held(case: dict) -> tuple[dict[str, float], float]:
-    """Pressures of the start, and how far masses move."""
+    """Initial pressures of both chambers [Pa], and displacement of the mass [m]."""
     case["output"] |= {"probes": ["lift.A.pressure", "lift.B.pressure", "load.position"]}
     run = fvsolve.run(case)
     return {side: run[f"lift.{side}.pressure"][0] for side in "AB"}, float(np.ptp(run["load.position"]))

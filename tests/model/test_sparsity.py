@@ -1,4 +1,4 @@
-"""The pattern of a model holds every slope that its rhs has; by it, differences find them all and keep mass."""
+"""The Jacobian pattern contains all slopes of the rates; coloured differences find them and conserve mass."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from fvsolve.steppers.structure import KINDS, Structure
 
 CASES = sorted(folders.CASES.glob("*.toml"))
 SCHEMES = ["upwind", "linear-upwind", "fromm", "central", "upwind3", "upwind5", "muscl", "weno5"]
-TIMES = (0.0, 0.7, 2.3, 3.5)  # of random networks: valves open, half shut, all but shut, shut
+TIMES = (0.0, 0.7, 2.3, 3.5)  # [s]; valves of random networks are open, half shut, nearly shut, shut
 
 
 def rates(model, t: float, y: np.ndarray) -> np.ndarray:
-    """dydt and the ledger : float64[n + ledger]."""
+    """Rates of all states and of the mass ledger : float64[n + ledger]."""
     dydt, out = model.evaluate(t, y)
     at = model.layout["supply"]
     return np.concatenate((dydt, out[at : at + model.ledgers]))
@@ -40,9 +40,9 @@ def random_state(model, rng) -> np.ndarray:
 
 
 def stray(model, t: float, y: np.ndarray) -> float:
-    """Greatest change of a rate by a state that its pattern has not, over the greatest by one that it has."""
+    """Greatest change of a rate by a state outside the pattern, over the greatest change by a state inside it."""
     states = np.arange(model.y_size)
-    if states.size > 2000:  # of a basin a sample
+    if states.size > 2000:  # sample of the states of a basin
         states = np.random.default_rng(states.size).choice(states, 100, replace=False)
     pattern, base = jacobian_pattern(model)[:, states].toarray(), rates(model, t, y)
     change = np.empty(pattern.shape)
@@ -51,7 +51,7 @@ def stray(model, t: float, y: np.ndarray) -> float:
         moved[j] += 1e-2 * model.scale[j]
         change[:, k] = np.abs(rates(model, t, moved) - base)
     known = np.max(change * pattern, axis=1)
-    rounding = 1e-10 * np.max(known)  # for rates that nothing moves
+    rounding = 1e-10 * np.max(known)  # for rates that do not change
     return float(np.max(np.max(change * ~pattern, axis=1) / np.maximum(known, rounding)))
 
 
@@ -99,7 +99,7 @@ def test_scalars_that_decay_spread_and_pass_the_boundary_keep_to_their_pattern(p
 
 
 def test_a_pipe_couples_no_more_than_its_scheme_reads():
-    """Upwind: a cell of either wave reads itself, the one it comes from and, with friction, its other wave."""
+    """With `upwind` a cell depends on itself, its upstream cell and, with friction or at ends, on its opposite wave."""
     counts = []
     for friction in (NO_FRICTION, {"model": "steady", "factor": 0.02}):
         links = {"p": pipe("a", "b", 90.0, 0.2, 1000.0, 9, friction=friction)}
@@ -107,8 +107,8 @@ def test_a_pipe_couples_no_more_than_its_scheme_reads():
             fvsolve.build(fvsolve.load(scene({"a": lake(30.0), "b": lake(30.0)}, links, 1.0, SHARP)))
         )
         counts.append(found[:18].nnz)
-        assert found[18:].toarray().sum() == 2  # what each lake gives: its own edge cell
-    assert counts == [18 + 16 + 2, 18 + 16 + 18]  # itself, the one it comes from; its other wave at ends, or everywhere
+        assert found[18:].toarray().sum() == 2  # supply of each lake: its edge cell
+    assert counts == [18 + 16 + 2, 18 + 16 + 18]  # cell and upstream cell; opposite wave at ends, or everywhere
 
 
 # differences ----------------------------------------------------------------------------------------------------
@@ -116,7 +116,7 @@ def test_a_pipe_couples_no_more_than_its_scheme_reads():
 
 @functools.cache
 def compiled_differences():
-    """The function as a stepper compiles it: against the declared type of a rhs, which comes by its address."""
+    """Function `differences`, compiled as in a stepper for a right-hand side given by its address."""
     if not COMPILING:
         return lambda calls, *others: differences(*calls, *others)
     from fvsolve.steppers.signatures import rhs_at
@@ -130,7 +130,7 @@ def compiled_differences():
 
 
 def slopes(model, t: float, y: np.ndarray, structure: Structure) -> np.ndarray:
-    """d(dydt, supply)/dy : float64[n + nodes, n], by the compiled differences."""
+    """Jacobian d(dydt, supply)/dy by compiled differences : float64[n + nodes, n]."""
     n, m, at = model.y_size, len(model.node_names), int(model.layout["supply"])
     slate = RunData(model)
     f, out = slate.evaluate(t, y, np.inf)
@@ -160,7 +160,7 @@ def test_differences_by_color_are_those_state_by_state(law, scheme):
 @pytest.mark.parametrize("scheme", ["upwind", "upwind5", "muscl"])
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_what_slopes_store_is_what_they_supply(law, scheme):
-    """Weighted by the mass that states stand for, the slopes of all rates add up to those of the supplies."""
+    """Slopes of the rates, weighted with the mass per state, add up to the slopes of the supplies."""
     for seed in (0, 2):  # with friction and without
         model, rng = random_model(seed, scheme, law), np.random.default_rng(seed)
         n, weight = model.y_size, masses(model)
@@ -175,7 +175,10 @@ def test_what_slopes_store_is_what_they_supply(law, scheme):
 
 @pytest.mark.parametrize("law, scheme", [("linear", "upwind"), ("linear", "central"), ("log", "upwind5")])
 def test_every_kind_solves_steps_of_a_microsecond_and_of_minutes(law, scheme):
-    """Without exchanges of rows as well: 1e-7 is far below what Newton needs, at a Courant number of 1e5."""
+    """All kinds of linear algebra solve with the error 1e-7 from Courant numbers far below 1 to about 1e5.
+
+    Newton's method needs much less, and the sparse kind does not exchange rows.
+    """
     model, rng = random_model(3, scheme, law), np.random.default_rng(3)
     n, pattern = model.y_size, jacobian_pattern(model)
     entry = (pattern.indices, np.repeat(np.arange(n), np.diff(pattern.indptr)))
@@ -194,7 +197,7 @@ def test_every_kind_solves_steps_of_a_microsecond_and_of_minutes(law, scheme):
 
 
 def masses(model) -> np.ndarray:
-    """kg that a unit of each state stands for: waves dx / speed, stored masses 1, flows of columns none."""
+    """Mass per unit of each state [kg]: dx / speed for waves, 1 for stored masses, 0 for flows of columns."""
     found = np.zeros(model.y_size)
     for row in model.tables.pipes:
         found[row["y"] : row["y"] + 2 * row["cells"]] = row["dx"] / row["speed"]

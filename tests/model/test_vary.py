@@ -1,4 +1,4 @@
-"""A model with keys changed is, to the bit, that of a fresh reading; of a run before nothing is left."""
+"""A model with changed keys by `vary` equals to the bit a model from a new reading, without traces of earlier runs."""
 
 import copy
 import pickle
@@ -20,7 +20,7 @@ def beside_their_files(monkeypatch):
 
 
 def said(model) -> dict[str, bytes]:
-    """All that a model holds, as bytes."""
+    """Contents of a model as bytes."""
     tables = {name: table.tobytes() for name, table in zip(model.tables._fields, model.tables, strict=True)}
     arrays = {"scale": model.scale, "start": model.start, "profiles": np.concatenate([[0.0], *model.profiles.values()])}
     words = (model.breaks, model.step_max, model.shapes, model.state_names, model.node_names, model.link_names,
@@ -31,7 +31,7 @@ def said(model) -> dict[str, bytes]:
 
 
 def told(make) -> tuple:
-    """What comes of making a model: what it holds, or what is wrong, line by line."""
+    """Outcome of making a model: its contents, or its faults line by line."""
     try:
         return "made", said(make())
     except CaseError as error:
@@ -41,7 +41,7 @@ def told(make) -> tuple:
 
 
 def settings(table: dict, keys: tuple, to) -> dict:
-    """One key set, or where it lies in a list the whole list."""
+    """Override of a single key, or of the whole list that contains it."""
     words = tuple(key for key in keys if isinstance(key, str))
     if words == keys:
         return {spoken(keys): to}
@@ -58,9 +58,10 @@ def settings(table: dict, keys: tuple, to) -> dict:
 
 
 def compare(name: str, table: dict, done: set, every: bool, turn: int = 0) -> list[str]:
-    """Keys of a case with other results by `vary` than by a fresh reading; of each kind one, of all cases or of each.
+    """Overrides for which `vary` differs from a new reading.
 
-    turn : with `every`, which third of the kinds of keys this case moves
+    One key of each kind is tested: of all cases together, or of each case with `every`.
+    turn : with `every`, number that selects a third of the kinds of keys
     """
     model, wrong = fvsolve.build(fvsolve.load(table)), []
     for keys, _ in leaves(table):
@@ -92,7 +93,7 @@ NAMES = [path.stem for path in sorted(CASES.glob("*.toml")) if path.stem not in 
 
 @pytest.mark.parametrize("turn, name", enumerate(NAMES), ids=NAMES)
 def test_every_key_of_every_shipped_case_gives_the_model_of_a_fresh_reading(turn, name):
-    """Every third kind of key of each case, in turn."""
+    """A third of the kinds of keys of each case, in rotation, gives the model of a new reading."""
     assert compare(name, raw_case(name), set(), every=True, turn=turn) == []
 
 
@@ -106,7 +107,7 @@ MOVES = [
 
 
 def test_runs_one_after_another_leave_nothing_to_each_other():
-    """Each of them, forth and back, is a fresh run to the bit: rows, extremes, envelopes, ledgers, notices."""
+    """A sequence of variants gives runs equal to the bit to new runs: rows and summaries except times."""
     model = fvsolve.build(fvsolve.load("valve-closure", SMALL))
     before = said(model)
     for move in (*MOVES, *reversed(MOVES)):
@@ -137,7 +138,7 @@ def test_variants_of_one_model_with_unsteady_friction_do_not_share_its_states():
 
 
 def test_sizes_of_restrictions_are_written_into_the_tables_that_were_there(monkeypatch):
-    """Of one alone or several, laminar or not; a stem or a kind of law that is other asks for tables of its own."""
+    """`vary` writes new sizes of restrictions into copied tables, and builds new tables for other changes."""
     table = raw_case("valve-closure")
     table["nodes"]["sump"] = {"type": "reservoir", "pressure": "0 barg"}
     table["links"]["hole"] = {"type": "orifice", "from": "gate", "to": "sump", "diameter": "1 mm"}
@@ -161,7 +162,7 @@ def test_sizes_of_restrictions_are_written_into_the_tables_that_were_there(monke
 
 
 def test_what_files_and_signals_say_is_read_again(tmp_path):
-    """A file may have changed since the model was made, as it may between two runs."""
+    """`vary` reads files and signals again, because a file may have changed since the model was built."""
     closing = tmp_path / "closing.csv"
     closing.write_text("t [s],opening [-]\n0,1\n1,1\n1.5,0\n")
     table = raw_case("valve-closure")

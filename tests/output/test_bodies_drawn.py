@@ -1,4 +1,4 @@
-"""Frames of bodies and of basins that ride on them lie where these are."""
+"""Positions of bodies, and of basins on bodies, in field frames."""
 
 from __future__ import annotations
 

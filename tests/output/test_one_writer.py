@@ -1,4 +1,4 @@
-"""One run writes to a folder at a time, one study likewise; a lock goes with the process that held it."""
+"""A folder has at most one writer, a run or a study; its lock ends with the process."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ fvsolve.run(sys.argv[1], out=sys.argv[2], progress=wait)
 
 @pytest.fixture
 def running(tmp_path):
-    """A run that waits in its folder, in a process of its own: (folder, process)."""
+    """Folder and process of a run that waits in its first call of `progress`."""
     case = tmp_path / "case.toml"
     case.write_text(fvsolve.load(still(), {"numerics.step": "1 us", "numerics.method": "rk4"}).resolved())
     (tmp_path / "wait.py").write_text(WAITING)
@@ -77,4 +77,4 @@ def test_studies_share_no_folder(tmp_path):
         sweep(still(), vary, out=tmp_path)
     assert len(sweep(still(), vary, out=tmp_path).rows) == 2
     written = {path.name for path in tmp_path.iterdir()}
-    assert written - {"sweep.parquet"} == {"points.jsonl", "sweep.csv"}  # the other where pyarrow is there
+    assert written - {"sweep.parquet"} == {"points.jsonl", "sweep.csv"}  # sweep.parquet needs pyarrow

@@ -1,4 +1,4 @@
-"""What a run leaves on disk reads back to the last bit, opens elsewhere, and is never lost by accident."""
+"""Files of a run read back to the last bit, open in other programs, and are not overwritten by accident."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_frames_read_back_through_meshio(folder):
     assert [t for t, _ in frames] == pytest.approx(np.linspace(0.0, 1.0, len(frames)))
     assert len(frames) >= 5
     mesh = meshio.read(frames[-1][1])
-    assert mesh.cells_dict["line"].shape == (55, 2) and len(mesh.points) == 56  # a tree of pipes that meet
+    assert mesh.cells_dict["line"].shape == (55, 2) and len(mesh.points) == 56  # a tree of connected pipes
     data = mesh.cell_data_dict
     assert {"pressure", "head", "velocity", "flow", "min_pressure", "max_pressure"} <= data.keys()
     pressure = data["pressure"]["line"]
@@ -235,7 +235,7 @@ def test_stated_positions_are_used():
 
 
 def test_where_a_pipe_is_cut_its_place_is_that_along_the_pipe():
-    """A vessel by chainage leaves a plan of stated positions as it is."""
+    """A junction at a chainage does not change a plan with stated positions."""
     case = {
         "schema": 1, "fluid": {"name": "Water"}, "numerics": {"end": 1.0},
         "nodes": {"a": {"type": "reservoir", "head": 20.0, "elevation": 0.0, "position": [100.0, 0.0]},
@@ -268,4 +268,4 @@ def test_a_network_is_laid_out_alike_every_time_with_no_two_nodes_in_one_place(c
 
 def test_parallel_links_bend_apart():
     bends = network_layout.link_bends(network({"x": ("a", "b"), "y": ("b", "a"), "z": ("b", "c")}).links)
-    assert bends["z"] == 0.0 and bends["x"] == bends["y"] != 0.0  # seen from their own starts
+    assert bends["z"] == 0.0 and bends["x"] == bends["y"] != 0.0  # x and y start at opposite ends

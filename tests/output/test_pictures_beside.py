@@ -1,4 +1,4 @@
-"""Pictures drawn beside a run are those drawn after it; however the second process ends, nothing is lost."""
+"""Pictures that a second process draws equal those drawn after the run; none is lost if that process fails."""
 
 from __future__ import annotations
 

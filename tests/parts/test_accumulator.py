@@ -1,4 +1,4 @@
-"""Gas over fluid against closed forms, energy integrals and SciPy: bladders, air vessels, losses by direction."""
+"""Accumulators and air vessels against closed forms, energy integrals and SciPy, with losses by direction."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from fvsolve.studies.energy.energy_balance import energy
 TIGHT = {"method": "dormand-prince", "rtol": 1e-11}
 LENGTH, DIAMETER, BORE = 20.0, 0.1, area(0.1)
 P0, GAS, N = 6e5, 0.05, 1.3
-INERTIA = RHO * LENGTH / BORE  # of the column, dp = INERTIA dq/dt
+INERTIA = RHO * LENGTH / BORE  # inertance of the column, dp = INERTIA dq/dt
 
 
 def vessel(**more) -> dict:
@@ -27,7 +27,7 @@ def vessel(**more) -> dict:
 
 
 def swing(flow: float, end: float, numerics=TIGHT, law="linear", probes=("a.gas_pressure", "c.flow"), **more) -> dict:
-    """A rigid column between a reservoir and a vessel, which starts with a flow."""
+    """Return a case of a rigid column between a reservoir and an accumulator, with the initial flow `flow` [m3/s]."""
     links = {"c": {"type": "rigid-column", "from": "lake", "to": "a", "length": LENGTH, "diameter": DIAMETER,
                    "initial_flow": flow}}  # fmt: skip
     nodes = {"lake": reservoir(P0), "a": vessel(**more)}
@@ -40,7 +40,7 @@ def model_of(case):
 
 @pytest.mark.parametrize("law, near", [("linear", 1e-7), ("log", 1e-3)])
 def test_a_small_oscillation_has_its_closed_period(law, near):
-    """omega^2 = n p0 A / (rho L V0); under `log` the fluid in the vessel gives way too."""
+    """omega^2 = n p0 A / (rho L V0); under `log` the compressible fluid changes omega by less than 1e-3."""
     model = model_of(swing(0.0, 1.0, law=law))
     found = np.linalg.eigvals(model.jacobian(0.0, np.zeros(2))).imag.max()
     assert found == pytest.approx(math.sqrt(N * P0 / (INERTIA * GAS)), rel=near)
@@ -48,7 +48,7 @@ def test_a_small_oscillation_has_its_closed_period(law, near):
 
 @pytest.mark.parametrize("n", [1.0, 1.2, 1.4])
 def test_a_large_oscillation_turns_where_its_energy_is_gas_energy(n):
-    """INERTIA q0^2 / 2 is the work on the gas less that of the reservoir, in both extremes."""
+    """At both extremes INERTIA q0^2 / 2 equals the work on the gas minus the work of the reservoir."""
     q0 = 0.05
     result = fvsolve.run(swing(q0, 5.0, exponent=n) | {"output": {"every": 0.001, "probes": ["a.gas_pressure"]}})
 
@@ -59,11 +59,11 @@ def test_a_large_oscillation_turns_where_its_energy_is_gas_energy(n):
     turns = [brentq(left, 1e-3, GAS, xtol=1e-15), brentq(left, GAS, 1.0, xtol=1e-15)]
     extremes = [P0 * (GAS / volume) ** n for volume in turns]
     greatest, least = result["a.gas_pressure"].max(), result["a.gas_pressure"].min()
-    assert (greatest, least) == pytest.approx(extremes, rel=2e-6)  # of rows every millisecond
+    assert (greatest, least) == pytest.approx(extremes, rel=2e-6)  # error of rows every millisecond
 
 
 def test_losses_by_direction_follow_scipy():
-    """dp = K rho v |v| / 2 on the throat, K_in and K_out; SciPy at 1e-12 without the laminar width at zero."""
+    """The throat loses dp = K rho v |v| / 2 with K_in or K_out, as in SciPy without transition flow."""
     k_in, k_out, throat = 2.0, 9.0, area(0.05)
     connection = {"diameter": 0.05, "loss_in": k_in, "loss_out": k_out}
     result = fvsolve.run(swing(0.04, 6.0, connection=connection))
@@ -80,7 +80,7 @@ def test_losses_by_direction_follow_scipy():
 
 
 def filled(law: str, q: float = 1e-3, end: float = 40.0, **more) -> dict:
-    """An inflow into a vessel, against whatever its pressure is."""
+    """Return a case of a constant inflow `q` [m3/s] into an accumulator."""
     nodes = {"in": {"type": "inflow", "flow": q}, "a": vessel(initial_pressure=P0, **more)}
     links = {"gap": {"type": "valve", "from": "in", "to": "a", "area": 1e-3}}
     return scene(nodes, links, end, TIGHT, ("a.pressure", "a.gas_volume"), 1.0, fluid=WATER | {"law": law})
@@ -94,7 +94,7 @@ def test_filling_squeezes_the_gas_by_its_law(n):
 
 
 def test_under_log_the_fluid_in_the_vessel_is_squeezed_too():
-    """rho(p) (room - V) is the mass that was there and came in."""
+    """Fluid mass: rho(p) (vessel volume - gas volume) equals the initial mass plus the inflow."""
     result = fvsolve.run(filled("log"))
     beta = WATER["bulk_modulus"]
 
@@ -111,7 +111,7 @@ def test_under_log_the_fluid_in_the_vessel_is_squeezed_too():
 
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_a_bladder_empties_and_fills_again_where_its_precharge_says(law):
-    """Below the precharge the neck bears the pressure; both switches are events, and SciPy goes the same way."""
+    """Below the precharge the neck takes up the pressure; both switches are events, and the flow follows SciPy."""
     case = swing(-0.04, 2.5, law=law, gas_volume=None, precharge=5e5, probes=["a.pressure", "c.flow", "a.gas_volume"])
     del case["nodes"]["a"]["gas_volume"]
     result = fvsolve.run(case)
@@ -128,7 +128,7 @@ def test_a_bladder_empties_and_fills_again_where_its_precharge_says(law):
     texts = [event["what"] for event in result.summary["events"]]
     assert texts[:2] == ["is empty", "holds fluid again"] and len(texts) in (2, 3)
     first, last = (event["time"] for event in result.summary["events"][:2])
-    away = (law == "linear") | (result.t < first) | (result.t > last)  # a bounce of 5 ms, other under another law
+    away = (law == "linear") | (result.t < first) | (result.t > last)  # the bounce of 5 ms depends on the law
     assert result["c.flow"][away] == pytest.approx(exact.y[0][away], abs=0.04 * (1e-6 if law == "linear" else 3e-3))
 
 
@@ -142,11 +142,11 @@ def test_nothing_moves_while_nothing_changes():
 
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_its_energy_closes_and_it_gives_no_more_than_it_had(law):
-    """The gas gives back what it took; the throat dissipates; a port at the reservoir sees a passive network."""
+    """The energy balance closes, dissipation never decreases, and the network is passive at its port."""
     connection = {"diameter": 0.05, "loss_in": 2.0, "loss_out": 9.0}
     for more in ({"exponent": 1.0}, {"connection": connection}):
         one = energy(swing(0.04, 3.0, {"method": "gauss-6", "step": 1e-3}, law, **more), port="lake")
-        column = sum(loss[-1] for loss in one.law.values())  # what is no energy of this law in a rigid column
+        column = sum(loss[-1] for loss in one.law.values())  # law loss of the rigid column
         assert abs(one.numerical_remainder[-1] - column) < 1e-9 * one.throughput and one.port.passive
         at_start = one.at_start.get("a", one.at_start.get("a.inside"))
         assert at_start > 0.0
@@ -154,7 +154,7 @@ def test_its_energy_closes_and_it_gives_no_more_than_it_had(law):
 
 
 def test_its_energy_at_the_start_is_what_it_can_give():
-    """Isothermal gas down to ambient: p0 V0 ln(p0 / pa) less the work against ambient."""
+    """Available energy of isothermal gas: p0 V0 ln(p0 / pa) minus the work against ambient pressure."""
     from fvsolve.model.available_energy import available_energy
 
     model = model_of(swing(0.0, 1.0, exponent=1.0, volume=1.0))
@@ -178,7 +178,7 @@ def test_an_empty_start_is_said():
 
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_a_precharge_above_the_line_is_kept_until_the_line_exceeds_it(law):
-    """Full of gas, its bladder stands in the neck, as stiff as fluid; then the line presses it in, as SciPy has it."""
+    """A full bladder leaves the neck, as stiff as its fluid, until the line exceeds the precharge, as in SciPy."""
     case = swing(0.0, 2.0, law=law, probes=["a.pressure", "c.flow", "a.gas_volume", "a.gas_pressure"])
     case["nodes"]["a"] = {"type": "accumulator", "volume": 0.1, "precharge": 9e5, "exponent": N}
     case["nodes"]["lake"] = reservoir({"time": [0.0, 0.5, 1.0], "value": [P0, P0, 12e5]})
@@ -198,7 +198,7 @@ def test_a_precharge_above_the_line_is_kept_until_the_line_exceeds_it(law):
     stands = result.t < event["time"]
     assert (result["a.gas_volume"][stands] == 0.1).all() and result["a.pressure"][stands].max() < 9e5
     assert result["a.gas_pressure"] == pytest.approx(9e5 * (0.1 / result["a.gas_volume"]) ** N, rel=1e-12)
-    if law == "linear":  # under the other the vessel's fluid is squeezed too
+    if law == "linear":  # under `log` the fluid in the vessel is compressed too
         assert result["c.flow"] == pytest.approx(exact.y[0], abs=1e-6 * exact.y[0].max())
 
 
@@ -226,7 +226,7 @@ def test_what_is_wrong_with_an_accumulator_is_said(wrong, said):
 
 @pytest.mark.parametrize("precharge, switches, law", [(4.01e5, 3, "linear"), (4.01e5, 3, "log"), (7e5, 2, "linear")])
 def test_a_check_valve_beside_an_empty_bladder_opens_once(precharge, switches, law):
-    """Where n^2 70 m is the lift of 28 m: what the neck alone holds is nothing, and what goes in comes out."""
+    """The check valve opens where n^2 70 m reaches the lift of 28 m; afterwards its flow equals the outflow."""
     curve = {"flow": [0.0, 0.04, 0.06], "head": [70.0, 60.0, 45.0]}
     speed = {"time": [1.0, 1.5, 5.0, 6.0], "value": [1.0, 0.3, 0.3, 1.0]}
     links = {"p": {"type": "pump", "from": "s", "to": "a", "curve": curve, "speed": speed, "check_valve": True},
@@ -236,7 +236,7 @@ def test_a_check_valve_beside_an_empty_bladder_opens_once(precharge, switches, l
     result = fvsolve.run(case)
     events = result.summary["events"]
     times = [event["time"] for event in events if event["what"] == "check valve opens"]
-    assert times == pytest.approx([5.0 + (math.sqrt(0.4) - 0.3) / 0.7], abs=1e-5)  # it is reluctant by 1 Pa
+    assert times == pytest.approx([5.0 + (math.sqrt(0.4) - 0.3) / 0.7], abs=1e-5)  # it opens at a drop of 1 Pa
     assert len(events) == switches
     late = result.t > times[0] + 5e-4
     assert np.count_nonzero(late) > 5
@@ -244,7 +244,7 @@ def test_a_check_valve_beside_an_empty_bladder_opens_once(precharge, switches, l
 
 
 def crowding() -> dict:
-    """Euler steps of 1 s over bladders that empty every millisecond: each step would be cut for ever."""
+    """Return a case of Euler steps of 1 s on bladders that empty every millisecond, so that events cut each step."""
     nodes = {
         name: {"type": "accumulator", "volume": volume, "precharge": 487697.8989862603, "initial_pressure": pressure}
         for name, volume, pressure in (
@@ -261,7 +261,7 @@ def crowding() -> dict:
 def test_events_that_crowd_within_one_step_are_bounded_and_named():
     result = fvsolve.run(crowding())
     ended = [said in result.reason for said in ("a opens and shuts without end", "way.flow has grown to")]
-    assert not result.ok and any(ended)  # whichever is seen first: the step is also far beyond what Euler holds
+    assert not result.ok and any(ended)  # either reason: the step also exceeds Euler's limit
     events = [event["time"] for event in result.summary["events"]]
     assert len(events) < 5000 and 1.0 < events[-1] < 3.0
 
@@ -270,7 +270,7 @@ def test_events_that_crowd_are_counted_on_in_a_run_that_is_resumed():
     model = fvsolve.build(fvsolve.load(crowding()))
 
     def late(t, seconds, steps):
-        run.budget = 2.0  # steps until it is called again
+        run.budget = 2.0  # steps until the next call
         if len(run.loop.recent_events) > 10:
             raise KeyboardInterrupt
 

@@ -1,4 +1,4 @@
-"""Air valves against the textbook's four regimes by SciPy, choked filling in closed form, and a plain junction."""
+"""Air valves against SciPy, a closed form and a plain junction, with staged outflow; pressure-dependent demand."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TIGHT = {"method": "dormand-prince", "rtol": 1e-10}
 
 
 def drained(inlet=0.05, outlet=0.05, low=AMBIENT - 0.6e5, end=6.0, numerics=TIGHT, law="linear", flow=0.05, **more):
-    """A gate shuts before an air valve, and a rigid column runs on from there."""
+    """Return a case of a gate that shuts before an air valve, from which a rigid column flows on."""
     nodes = {"lake": reservoir(2e5), "v": {"type": "air-valve", "inlet": inlet, "outlet": outlet, **more}}
     nodes["low"] = reservoir(low)
     column = {"type": "rigid-column", "from": "v", "to": "low", "length": LENGTH, "diameter": DIAMETER}
@@ -33,7 +33,7 @@ def drained(inlet=0.05, outlet=0.05, low=AMBIENT - 0.6e5, end=6.0, numerics=TIGH
 
 
 def test_choked_air_comes_in_at_its_closed_rate():
-    """m grows by Cd A pa sqrt(1.4 / (R T)) (2 / 2.4)^3 while p < 0.528 pa, and p V = m R T throughout."""
+    """dm/dt = Cd A pa sqrt(1.4 / (R T)) (2 / 2.4)^3 while p < 0.528 pa, and p V = m R T at all times."""
     result = fvsolve.run(drained(inlet=0.01, low=AMBIENT - 0.9e5, end=2.0))
     p, volume, mass = (result[f"v.air_{name}"] for name in ("pressure", "volume", "mass"))
     assert p * volume == pytest.approx(mass * HEAT, rel=1e-12)
@@ -48,7 +48,7 @@ RETURN = {"time": [0.0, 2.0, 3.0], "value": [0.4e5, 0.4e5, 6e5]}
 
 
 def test_near_ambient_pressure_alone_its_flow_is_not_the_textbooks():
-    """Beyond SMALL to rounding; within, less than 0.18 sqrt(SMALL) off the root, the greatest that the quintic is."""
+    """Flow of the textbook for x = 1 - p/pa > SMALL; below, at most 0.18 sqrt(2 SMALL) less than sqrt(2 x)."""
     from fvsolve.parts.air_valve.law import orifice_flow
 
     for r in (0.2, 0.5283, 0.53, 0.9, 1.0 - 1.01 * SMALL):
@@ -62,10 +62,10 @@ RETURN = {"time": [0.0, 2.0, 3.0], "value": [0.4e5, 0.4e5, 6e5]}
 
 
 def off_scipy(law, beta=2.2e9) -> tuple[float, int]:
-    """Greatest difference of air mass, flow and pressure to SciPy's, of their own size; and how many steps.
+    """Return (greatest relative difference from SciPy of air mass, air pressure and flow, number of steps).
 
-    Drawn in, subsonic; squeezed by a column that comes back, and blown out, choked at last. The throat between fluid
-    and air is 30 inlets wide, of loss 1.
+    Air enters at subsonic speed; the returning column compresses it and blows it out, at last choked. The throat
+    between fluid and air has 30 times the diameter of the inlet and loss coefficient 1.
     """
     inlet, outlet = 0.04, 0.02
     case = drained(inlet, outlet, RETURN, law=law)
@@ -91,7 +91,7 @@ def off_scipy(law, beta=2.2e9) -> tuple[float, int]:
 
 
 def test_subsonic_in_and_out_and_choked_out_follow_scipy():
-    """To what all local errors amount to: rtol a step."""
+    """The difference is below the sum of all local errors, rtol times the number of steps."""
     off, steps = off_scipy("linear")
     assert off < TIGHT["rtol"] * steps
 
@@ -110,7 +110,7 @@ def test_it_opens_and_shuts_once_a_swing_and_its_ledger_is_closed():
 
 
 def test_it_opens_again_from_the_very_volume_at_which_it_shut():
-    """Beside a pump's shut check valve nothing moves its fluid meanwhile."""
+    """Beside the shut check valve of a pump, its fluid volume is constant while it is shut."""
     curve = {"flow": [0.0, 0.04, 0.06], "head": [70.0, 60.0, 45.0]}
     friction = {"model": "quasi-steady", "roughness": 1e-4}
     links = {"p": {"type": "pump", "from": "s", "to": "a", "curve": curve, "rated_speed": 150.0, "inertia": 0.1,
@@ -127,7 +127,7 @@ def test_it_opens_again_from_the_very_volume_at_which_it_shut():
 
 @pytest.mark.parametrize("numerics", [{"method": "euler", "step": 0.001}, {"method": "rk4", "step": 0.01}])
 def test_fixed_explicit_steps_open_it_once(numerics):
-    """A body of the size that such valves have gives a chamber no quicker than the steps: no chatter where it opens."""
+    """A chamber of the usual size of air valves responds no faster than the steps, so the valve does not chatter."""
     found, true = (fvsolve.run(drained(0.05, 0.05, numerics=own)) for own in (numerics, TIGHT))
     assert found.ok and [event["what"] for event in found.summary["events"]] == ["opens"]
     assert found["v.air_mass"][-1] == pytest.approx(true["v.air_mass"][-1], rel=numerics["step"])
@@ -201,7 +201,7 @@ def test_what_is_wrong_with_an_air_valve_is_said(wrong, said):
 
 
 def test_a_demand_follows_the_pressure_between_none_and_all():
-    """Wagner's form with a valve before it, in all three ranges."""
+    """Demand by Wagner's formula behind a valve, in all three ranges of pressure."""
     from scipy.optimize import brentq
 
     for given, want in ((5e5, 0.002), (2e5, 0.002), (1.2e5, 0.002)):
@@ -224,7 +224,7 @@ def test_a_demand_follows_the_pressure_between_none_and_all():
 @pytest.mark.parametrize(
     "wrong, said",
     [
-        ({"required_pressure": 1e5}, "is not above the pressure of no flow"),
+        ({"required_pressure": 1e5}, "at which no demand is supplied"),
         ({"required_pressure": 3e5, "minimum_pressure": 0.9e5}, "is below ambient"),
         ({"required_pressure": 3e5, "demand": -1.0}, "never negative"),
         ({"minimum_pressure": 2e5}, "has no effect without `required_pressure`"),
@@ -248,10 +248,11 @@ def staged(law="linear", beta=2.2e9, numerics=TIGHT, **more):
 
 
 def by_stages(case, speed: float | None = None):
-    """(what is off by: air, its pressure, flow of the column; time of throttling, SciPy's; the run): see `off_scipy`.
+    """Return (greatest relative difference from SciPy, (time of throttling, SciPy's time), result); see `off_scipy`.
 
-    In by the inlet; out by the wide bore and the automatic one until 4 kPa, or until the column comes at a speed while
-    its air is 10 Pa above ambient, then by the small one and that.
+    Air leaves through the outlet and the automatic bore until its gauge pressure is 4 kPa. With `speed` [m/s] given,
+    this phase ends when the column arrives at that speed, with the air 10 Pa above ambient. Then air leaves through the
+    throttled outlet and the automatic bore.
     """
     result = fvsolve.run(case)
     t, times = np.asarray(result.t), {e["what"]: e["time"] for e in reversed(result.summary["events"])}
@@ -294,7 +295,7 @@ def test_its_three_stages_follow_scipy_and_it_throttles_when_scipy_says():
 
 
 def test_by_velocity_it_throttles_when_scipy_says_the_fluid_comes_so_quickly():
-    """At 0.35 m/s the air is above ambient by then; at 0.01 m/s it throttles as soon as its air is."""
+    """At 0.35 m/s the velocity triggers throttling; at 0.01 m/s the air pressure does, because it rises later."""
     for speed in (0.35, 0.01):
         off, (found, true), result = by_stages(staged(switch=None, switch_velocity=speed), speed)
         near = TIGHT["rtol"] * result.summary["steps"]

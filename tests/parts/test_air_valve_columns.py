@@ -1,4 +1,4 @@
-"""Rigid columns that meet at an air valve, against SciPy: one flow while it is shut, two over a pocket of air."""
+"""Rigid columns at an air valve against SciPy: one flow while it is shut, two flows while it contains air."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def low(pressure=LOW):
 
 
 def summit(numerics=CLOSE, end=6.0, law="linear", high=FALL, probes=PROBES, nodes=None, links=None):
-    """A column up to an air valve and one down again; what is at their ends may be told otherwise."""
+    """Return a case of two rigid columns at an air valve; `nodes` adds nodes, `links` replaces the columns."""
     nodes = {"high": low(high), "v": AIR_VALVE, "low": low()} | (nodes or {})
     links = {"one": column("high", "v"), "two": column("v", "low", 80.0)} if links is None else links
     return scene(nodes, links, end, numerics, probes, fluid=WATER | {"law": law})
@@ -60,7 +60,11 @@ def times(result, place="v"):
 
 
 class Truth:
-    """Columns (length, diameter, pressure(t) at the far end, all on level 0), flows into the summit, from t = 0 on."""
+    """Reference by SciPy of columns that join at an air valve, from t = 0.
+
+    columns : (length [m], diameter [m], pressure(t) [Pa] at the far end at elevation 0)
+    start : initial mass flows into the summit [kg/s]; breaks, end : kinks of the pressures and end [s]
+    """
 
     def __init__(self, columns, start, breaks, end):
         self.columns = columns
@@ -71,7 +75,7 @@ class Truth:
         self.follow(np.array([*start, 0.0, held]), [*breaks, end])
 
     def drives(self, t, flows):
-        """Pressure at the summit that would hold each column's flow [Pa]."""
+        """Return for each column the pressure at the summit at which its flow stays constant [Pa]."""
         lost = [FACTOR * length / d * m * abs(m) / (2 * RHO * area(d) ** 2)
                 for (length, d, _), m in zip(self.columns, flows, strict=True)]  # fmt: skip
         return np.array([p(t) for *_, p in self.columns]) - RHO * GRAVITY * HEIGHT - lost
@@ -125,7 +129,7 @@ def fallen(t):
 
 
 def flow_through(lengths, drop):
-    """Of one column after the other [kg/s]."""
+    """Steady mass flow through columns in series at a pressure drop [kg/s]."""
     return math.sqrt(drop * 2 * RHO * AREA**2 * DIAMETER / (FACTOR * sum(lengths)))
 
 
@@ -136,7 +140,7 @@ def truth(second=80.0, end=6.0):
 
 
 def apart(result, exact, names=("one.flow", "two.flow"), signs=(1, -1)):
-    """Greatest difference of flows to SciPy's over the greatest of them, away from where they jump."""
+    """Return the greatest relative differences from SciPy of flows and of air mass, at rows away from events."""
     t = np.asarray(result.t)
     rows = np.all([np.abs(t - when) > 0.011 for _, when in exact.events], axis=0)
     found = exact.at(t[rows])
@@ -148,7 +152,7 @@ def apart(result, exact, names=("one.flow", "two.flow"), signs=(1, -1)):
 
 @pytest.mark.parametrize("method", ["auto", "dormand-prince", "radau-iia-5", "rodas-5p"])
 def test_it_opens_where_the_joined_columns_would_part_and_joins_them_again(method):
-    """Rest to the bit until 1 s; the times of both events, flows and air met; momentum kept where they meet."""
+    """Constant to the bit until 1 s; then event times, flows and air mass follow SciPy, with impact."""
     exact, result = truth(), fvsolve.run(summit({"method": method, "rtol": 1e-8}))
     assert result.ok and [what for what, _ in times(result)] == ["opens", "shuts"] == [what for what, _ in exact.events]
     for (_, found), (_, true) in zip(times(result), exact.events, strict=True):
@@ -195,7 +199,7 @@ def test_three_columns_are_one_flow_and_three():
 
 
 def test_a_second_air_valve_that_stays_shut_is_but_a_joint():
-    """Two rigid places at once: beyond the summit one column of 80 m and one of 30 m are one of 110 m."""
+    """Columns of 80 m and 30 m at a shut air valve are equivalent to a column of 110 m."""
     nodes = {"w": {**AIR_VALVE, "elevation": 4.0}}
     links = {"one": column("high", "v"), "two": column("v", "w", 80.0), "three": column("w", "low", 30.0)}
     result, exact = fvsolve.run(summit(nodes=nodes, links=links)), truth(110.0)
@@ -235,7 +239,7 @@ def test_drawn_the_other_way_it_is_the_same_to_rounding():
 
 
 def test_its_energy_closes_and_what_the_impact_took_is_booked():
-    """M2 L / (2 rho A) of the flows lost, half the square of what met over the sum of A / L (Carnot)."""
+    """Impact loss (Carnot): M^2 / (2 rho sum(A / L)), with M the net mass flow into the summit before the impact."""
     exact, found = truth(), energy(summit({"method": "dormand-prince", "rtol": 1e-8}), port="low")
     assert abs(found.relative) < 1e-10 and found.port.passive
     met = exact.pieces[next(k for k, one in enumerate(exact.pieces) if one.t_max >= exact.events[1][1])]
@@ -245,7 +249,7 @@ def test_its_energy_closes_and_what_the_impact_took_is_booked():
 
 
 class Kept:
-    """A sink that keeps checkpoints and the last row."""
+    """Sink that keeps checkpoints, the last row and the summary."""
 
     def __init__(self):
         self.states, self.last, self.summary = [], None, None
@@ -288,7 +292,7 @@ def test_advance_in_a_loop_is_the_run():
 
 @pytest.mark.parametrize("opening", [step(1.0, 1, 0), ramp(1.0, 0.5, 1, 0)])
 def test_a_valve_beyond_it_that_shuts_stops_both_columns_and_lets_no_air_in(opening):
-    """The valve leads both as it would lead one of their length together."""
+    """The valve stops two columns as it stops a single column of their total length."""
     nodes = {"g": junction(elevation=0.0)}
     links = {"one": column("high", "v"), "two": column("v", "g", 80.0), "k": gate("g", "low", 0.01, opening)}
     probes = ["one.flow", "two.flow", "g.pressure", "v.pressure"]
@@ -315,7 +319,7 @@ def test_a_valve_before_it_that_shuts_lets_the_column_beyond_run_on_over_air(ope
 
 
 def test_a_gate_that_jumps_shut_beside_it_leaves_the_column_to_the_air():
-    """It stopped the run; and where the column runs at it, it stands at once, as anywhere."""
+    """A column that flows away from the gate runs on over air; a column that flows towards it stops at once."""
     away = {"k": gate("high", "v", 0.01, step(1.0, 1, 0)), "one": column("v", "low", 80.0)}
     result = fvsolve.run(summit(end=3.0, high=3e5, links=away, probes=["one.flow", "v.pressure"]))
     assert result.ok and times(result) == [("opens", 1.0)] and result["one.flow"][-1] > 0.05
@@ -326,7 +330,7 @@ def test_a_gate_that_jumps_shut_beside_it_leaves_the_column_to_the_air():
 
 
 def test_at_the_end_of_one_column_it_fills_and_drains_it():
-    """Nothing flows until the pressure there is below ambient, and then the column falls away from it."""
+    """The flow is zero until the pressure at the valve is below ambient; then the column drains from it."""
     drop = {"time": [0.0, 1.0, 2.0], "value": [2e5, 2e5, 0.9e5]}
     case = summit(end=4.0, high=drop, links={"one": column("high", "v")}, probes=["one.flow", "v.pressure"])
     del case["nodes"]["low"]
@@ -338,7 +342,7 @@ def test_at_the_end_of_one_column_it_fills_and_drains_it():
 
 
 def test_a_column_that_a_valve_shuts_against_higher_pressure_runs_on_to_the_end():
-    """Of two flows that a shutting valve allows it is the one that was there: SciPy's, of the column's momentum."""
+    """Of two flows that a closing valve permits, the run keeps the flow of before, given by SciPy from the momentum."""
     shut, opening = 2.5, {"time": [0.0, 2.0, 2.5], "value": [1.0, 1.0, 0.0]}
     nodes = {"high": low(FALL), "v": junction(elevation=HEIGHT), "t": tank(1.0, 6.0, elevation=0.0)}
     links = {"one": column("high", "v"), "k": gate("v", "t", 0.01, opening)}
@@ -364,8 +368,10 @@ def test_a_column_that_a_valve_shuts_against_higher_pressure_runs_on_to_the_end(
 
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_where_a_valve_all_but_shuts_its_ledger_closes_under_linearly_implicit_steps(law):
-    """Newton at its end begins with what it would let through, not with the flow of the start: it then ended early,
-    2e-6 of the contents short under log, or not at all."""
+    """The mass balance closes, because Newton's method starts from the flow that the valve would pass.
+
+    From the initial flow it stopped early, with an error of 2e-6 of the contents under `log`, or did not converge.
+    """
     opening = {"time": [0.0, 1.0, 1.5, 3.0, 3.5], "value": [1.0, 1.0, 0.0, 0.0, 1.0]}
     nodes = {"g": junction(elevation=0.0)}
     links = {"k": gate("high", "g", 0.01, opening), "one": column("g", "v"), "two": column("v", "low", 80.0)}
@@ -376,7 +382,7 @@ def test_where_a_valve_all_but_shuts_its_ledger_closes_under_linearly_implicit_s
 
 @pytest.mark.parametrize("opening", [step(1.0, 1, 0), ramp(1.0, 0.5, 1, 0)])
 def test_two_columns_at_a_junction_whose_last_valve_shuts_flow_on_as_one(opening):
-    """It stopped the run: "the demand cannot be supplied"."""
+    """The columns reach the steady flow of one column, without the fault "the demand cannot be supplied"."""
     nodes = {"j": junction(elevation=HEIGHT), "side": low(2e5)}
     links = {"one": column("high", "j"), "two": column("j", "low", 80.0), "k": gate("j", "side", 0.01, opening)}
     case = summit(end=20.0, high=3.2e5, nodes=nodes, links=links, probes=["one.flow", "two.flow"])
@@ -411,7 +417,7 @@ def test_a_valve_from_it_to_where_columns_alone_lead_on_is_refused_by_name():
 
 
 def test_a_valve_or_pump_between_columns_that_nothing_holds_is_refused_by_name():
-    """It took no part: the columns ran on through a valve all but shut, and every ledger closed."""
+    """Without this fault the columns flow through a nearly closed valve, and all balances close."""
     lifts = {"type": "pump", "from": "v", "to": "j", "curve": {"flow": [0.1], "head": [10.0]}}
     for part in (gate("v", "j", 0.05), lifts):
         links = {"one": column("high", "v"), "k": part, "two": column("j", "low")}

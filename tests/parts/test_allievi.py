@@ -1,4 +1,4 @@
-"""A valve that closes or opens in its own time, against Allievi's recursion and exact ray tracing."""
+"""Closing and opening valves against Allievi's recursion and exact ray tracing."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ SCHEDULES = {
 
 
 def opening(schedule: dict, t: float) -> float:
-    """The schedule evaluated by its definition in design.md section 4."""
+    """Value of a schedule at time t [s]: a linear table, or a ramp with an exponent."""
     if "time" in schedule:
         return float(np.interp(t, schedule["time"], schedule["value"]))
     s = min(max((t - schedule["start"]) / schedule["duration"], 0.0), 1.0)
@@ -41,7 +41,7 @@ def opening(schedule: dict, t: float) -> float:
 
 
 def flow_area(velocity: float, schedule: dict) -> float:
-    """Cd A of the open valve that passes `velocity` at the first opening [m2]."""
+    """Product Cd A of the fully open valve, which passes `velocity` [m/s] at its initial opening [m2]."""
     return velocity * scenes.area(DIAMETER) / math.sqrt(2 * DROP / RHO) / opening(schedule, -1.0)
 
 

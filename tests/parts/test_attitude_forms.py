@@ -1,4 +1,4 @@
-"""An attitude may be said in several forms: each is what SciPy says, and what does not fit is named."""
+"""Forms of an attitude in a case file against SciPy, and the faults of forms that are wrong or disagree."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def test_typed_digits_are_no_fault_but_said():
         ("matrix", "is not exactly a rotation: R'R differs from the identity by 4.4e-05; the nearest rotation is used")
     ]
     assert_allclose(one.rotation, Rotation.from_euler("z", np.arctan2(0.5, 0.866)).as_matrix(), rtol=0, atol=1e-15)
-    one = read(matrix=typed, yaw="30.01 deg")  # of atan(0.5 / 0.866) = 30.00073 deg
+    one = read(matrix=typed, yaw="30.01 deg")  # the matrix has atan(0.5 / 0.866) = 30.00073 deg
     assert notes(one)[1] == (
         "matrix",
         "is 0.00927 deg from the attitude that roll, pitch, yaw give; the latter is used",
@@ -129,7 +129,7 @@ BAD = {
     "key": ({"rol": 1}, {"rol": 'did you mean "roll"?'}),
     "key of others": ({"quaternion": [1, 0, 0, 0]}, {"quaternion": "use euler_parameters = [eta, e1, e2, e3]"}),
     "not finite": ({"euler_parameters": [float("nan"), 0, 0, 0]}, {"euler_parameters.0": "not finite"}),
-    "no form that can be read": (  # and what can be read is held against nothing
+    "no form that can be read": (  # the forms that can be read are not compared
         {"pitch": "x", "yaw": "90 deg", "matrix": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]},
         {"pitch": "not a number"},
     ),
@@ -156,7 +156,7 @@ def test_what_does_not_fit_is_named(what):
 
 
 def test_a_case_has_its_notes_and_faults_with_their_places():
-    """Of a body's joint, whose attitude lies two tables below the part."""
+    """The key path of the attitude of a joint names both tables below the part."""
     body = {"type": "body", "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "joint": {"attitude": {"axis": [0, 0, 2]}}}
     case = scene({"arm": body}, {}, 1.0, {"method": "rk4", "step": 0.1})
     with pytest.raises(CaseError) as found:

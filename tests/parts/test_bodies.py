@@ -1,4 +1,4 @@
-"""Bodies in space against closed forms, Lagrange by hand and SciPy; what nature keeps is kept to the method's order."""
+"""Bodies in space against closed forms, Lagrange's equations and SciPy, with conserved quantities and orders."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def run(case, **more):
 
 
 def falls(t, values) -> np.ndarray:
-    """Times at which a smooth series falls through zero."""
+    """Times at which a smooth series crosses zero downwards."""
     series = CubicSpline(t, values)
     return np.array([one for one in series.roots(extrapolate=False) if series.derivative()(one) < 0.0])
 
@@ -38,7 +38,7 @@ def falls(t, values) -> np.ndarray:
 
 
 def test_a_pendulum_swings_by_the_elliptic_integral():
-    """T = 4 sqrt(l / g) K(sin^2(angle / 2)), a large swing."""
+    """T = 4 sqrt(l / g) K(sin^2(angle / 2)) of a swing with a large amplitude `angle`."""
     length, angle = 0.7, 2.0
     result = run(bodies({"arm": pendulum(angle, length)}, 10.0, ["arm.angle"], every=1e-3))
     period = 4.0 * math.sqrt(length / GRAVITY) * ellipk(math.sin(angle / 2.0) ** 2)
@@ -58,7 +58,7 @@ def test_a_pendulum_shows_the_order_of_its_method():
 
 
 def test_a_double_pendulum_moves_as_lagrange_by_hand():
-    """Two rods of length l with their masses in the middle, angles of each to the vertical."""
+    """Two rods of length l with mass m in the middle; a and b are their angles to the vertical."""
     m, l, inertia = 1.5, 0.8, 0.09  # noqa: E741
     rod = {"inertia": [inertia, inertia, 0.0], "centre_of_mass": [0, 0, -l / 2], "points": {"end": [0, 0, -l]}}
     upper = body(m, **rod, joint={"kind": "revolute", "axis": [0, 1, 0], "angle": 1.2})
@@ -79,7 +79,7 @@ def test_a_double_pendulum_moves_as_lagrange_by_hand():
 
 
 def test_a_slider_on_a_turning_arm_feels_coriolis_and_centrifugal_terms():
-    """r'' = r w^2 - g sin-free: the axis turns about z, which gravity does not feel; L = (I + m r^2) w is kept."""
+    """r'' = r w^2, and (I + m r^2) w is constant, because the arm turns about the vertical."""
     arm = body(1.0, [0.0, 0.0, 0.0], {"kind": "revolute", "axis": [0, 0, 1], "rate": 2.0})
     bead = body(0.5, [0, 0, 0], {"kind": "prismatic", "on": "arm", "axis": [1, 0, 0], "travel": 0.3})
     arm["inertia"] = [0.2, 0.2, 0.2]
@@ -107,13 +107,13 @@ def drift(method: str, step: float) -> float:
 
 
 def test_a_tumbling_body_keeps_energy_and_momentum_to_the_order_of_its_method():
-    """The middle axis, which is not stable: the body turns over. rk4 drifts as h^5, of which energy sees h^5 too."""
+    """Rotation about the middle axis is unstable, so the body turns over; the drift by rk4 falls as h^4 or faster."""
     coarse, fine = drift("rk4", 0.04), drift("rk4", 0.02)
     assert coarse < 1e-5 and coarse / fine > 14.0
 
 
 def test_gauss_methods_keep_energy_and_momentum_of_a_tumbling_body_to_rounding():
-    """Quadratic invariants both, wherever the centre of mass lies in the body's axes: it stays at the origin here."""
+    """Kinetic energy and angular momentum are quadratic invariants; the centre of mass is at rest."""
     joint = {"kind": "free", "rate": TUMBLING["rate"], "at": [-0.2, 0.1, -0.3]}
     case = {
         **bodies({"stone": {**STONE, "joint": joint}}, 8.0, TURNS, every=0.04, method="gauss-4", step=0.02),
@@ -147,7 +147,11 @@ def test_a_tumbling_body_turns_as_euler_and_poisson_have_it():
 
 
 def test_a_top_precesses_steadily():
-    """A ball joint, spin s about z of its own axes, centre at height l: m g l = (J3 s + J3 w c) w - J1' w^2 c."""
+    """Steady precession on a ball joint: m g l = J3 (s + w c) w - J1' w^2 c.
+
+    s is the spin about the z axis of the top, w the rate of precession and c the cosine of the tilt. l is the distance
+    of the centre of mass from the joint, and J1' = J1 + m l^2.
+    """
     m, l, tilt, w, j1, j3 = 0.5, 0.1, 0.6, 1.7, 2e-3, 1e-3  # noqa: E741
     about = j1 + m * l * l
     spin = (m * GRAVITY * l + (about - j3) * w * w * math.cos(tilt)) / (j3 * w)
@@ -166,7 +170,10 @@ SHARES = ("relative", "coriolis", "transversal", "centripetal")
 
 
 def test_the_terms_of_65_are_those_of_motion_seen_from_the_axes_that_move():
-    """Of a point on the third body of a random chain: relative by differences of its place in the second's axes."""
+    """Terms of equation (65) of docs/course.md for a point on the third body of a chain, in the axes of the second.
+
+    The relative velocity and acceleration are finite differences of the position in the axes of the second body.
+    """
     rng = np.random.default_rng(5)
     tree = random_tree(rng, 3, "free")
     tree["b1"]["joint"]["on"], tree["b2"]["joint"]["on"] = "b0", "b1"
@@ -227,11 +234,11 @@ def test_the_spring_of_a_joint_pulls_its_angle_or_travel_back_to_0(method):
     assert result["arm.angle"] == approx(truth, abs=1e-6)
     assert result["sled.travel"] == approx(0.2 * np.cos(20.0 * result.t), abs=1e-7)
     ledger = energy(case)
-    assert ledger.stored["sled"] == approx(0.0, abs=1e-6)  # swings between its two forms
+    assert ledger.stored["sled"] == approx(0.0, abs=1e-6)  # kinetic plus elastic energy is constant
     assert abs(ledger.step[-1]) < 1e-6 and abs(ledger.remainder[-1]) < 1e-6
 
 
-# pushes -----------------------------------------------------------------------------------------------------
+# force elements ---------------------------------------------------------------------------------------------
 
 
 def held(links: dict, nodes: dict, end: float, probes, **numerics):
@@ -274,7 +281,7 @@ def test_a_crane_on_shut_chambers_does_not_move_by_one_bit(law):
 
 @pytest.mark.parametrize("stated", [("B",), ("A",), ()])
 def test_shut_chambers_that_state_no_pressure_hold_what_stands_on_them(stated):
-    """Plugged, and behind a valve that is shut; of what is stated the crane's balance by hand gives the other."""
+    """The balance of the crane gives the pressure that is not stated; a valve closes chamber A, a plug chamber B."""
     crane = Crane()
     pressures = {"initial_pressure_A": crane.p_a, "initial_pressure_B": crane.p_b}
     links = crane.links()
@@ -307,7 +314,7 @@ def test_a_locked_cylinder_swings_at_the_root_of_its_spring_and_never_creeps(law
     case = crane.case(4.0, ["boom.angle"], law, 2e-4, {"rate": 1e-4})
     result = run(case)
     times = falls(result.t, result["boom.angle"])
-    tilting = crane.mass * GRAVITY * crane.length / 2.0 * crane.lever / crane.distance  # the lever grows as it sinks
+    tilting = crane.mass * GRAVITY * crane.length / 2.0 * crane.lever / crane.distance  # the lever grows on sinking
     stiffness = crane.spring(law) * crane.lever**2 + tilting
     assert 2 * math.pi / np.mean(np.diff(times)) == approx(math.sqrt(stiffness / crane.inertia), rel=1e-4)
     early, late = result["boom.angle"][:4000], result["boom.angle"][-4000:]
@@ -317,7 +324,7 @@ def test_a_locked_cylinder_swings_at_the_root_of_its_spring_and_never_creeps(law
 
 
 def test_a_long_swing_of_a_locked_cylinder_loses_no_oil_by_steps():
-    """A shut chamber holds its mass to the last bit, however coarse the steps: what stands on it cannot sink."""
+    """A closed chamber keeps its mass to the bit at coarse steps, so its load cannot sink."""
     case = Crane().case(2.0, ["lift.A.pressure"], "log", joint={"rate": 0.05}, method="rk4", step=5e-3)
     model = fvsolve.build(fvsolve.load(case))
     state = fvsolve.advance(model, fvsolve.initial_state(model), 2.0)
@@ -326,7 +333,7 @@ def test_a_long_swing_of_a_locked_cylinder_loses_no_oil_by_steps():
 
 
 def test_a_boom_lifted_through_valves_follows_scipy():
-    """Pressures as states of the truth, d p = beta / V (q - A dx/dt); x the length of the line less the start's."""
+    """Reference: dp/dt = beta / V (q - A dx/dt), with x the change of the length of the cylinder since the start."""
     crane, beta, rho, share = Crane(), OIL["bulk_modulus"], OIL["density"], 2e-6
     supply, sump = 25e6, 1e5
     nodes = {**crane.nodes(), "pump": {"type": "reservoir", "pressure": supply},
@@ -364,7 +371,7 @@ def test_a_boom_lifted_through_valves_follows_scipy():
 
 
 def test_an_end_stop_between_points_throws_back_without_loss():
-    """A bob that falls onto an elastic stop: it comes back to where it was let go."""
+    """A body that falls on an elastic stop returns to its initial height at the time of the closed form."""
     drop = body(2.0, [0, 0, 0], {"kind": "prismatic", "axis": [0, 0, 1], "travel": 1.0})
     links = {"stop": {"type": "end-stop", "from": "ground.low", "to": "drop", "stiffness": 1e5, "minimum": 0.75}}
     result = run(held(links, {"drop": drop}, 1.0, ["drop.travel", "stop.force"], every=1e-3))
@@ -377,11 +384,11 @@ def test_an_end_stop_between_points_throws_back_without_loss():
 
 # loops ------------------------------------------------------------------------------------------------------
 
-CRANK, COUPLER = (2.0, 1.0), (3.0, 1.5)  # mass and length
+CRANK, COUPLER = (2.0, 1.0), (3.0, 1.5)  # mass [kg] and length [m]
 
 
 def parallelogram(angle: float = 1.0, rate: float = 0.0, **pin) -> tuple[dict, dict]:
-    """Two cranks that hang, a coupler between their ends that stays level."""
+    """Return nodes and links of two hanging cranks with a level coupler between their ends, closed by a pin."""
     (m, a), (n, b), (s, c) = CRANK, COUPLER, (math.sin(angle), math.cos(angle))
 
     def rod(mass, length, joint):
@@ -397,7 +404,7 @@ def parallelogram(angle: float = 1.0, rate: float = 0.0, **pin) -> tuple[dict, d
 
 
 def swing(angle: float, end: float) -> float:
-    """The angle of the parallelogram after `end` seconds: a pendulum with w^2 = (m + n) g a / (2/3 m a^2 + n a^2)."""
+    """Angle of the parallelogram after `end` [s]: a pendulum with w^2 = (m + n) g a / (2/3 m a^2 + n a^2)."""
     (m, a), (n, _) = CRANK, COUPLER
     w2 = (m + n) * GRAVITY * a / (2.0 / 3.0 * m * a * a + n * a * a)
     return solve_ivp(lambda t, y: [y[1], -w2 * math.sin(y[0])], (0, end), [angle, 0], rtol=1e-12, atol=1e-13).y[0, -1]
@@ -424,7 +431,7 @@ def test_a_loop_converges_at_the_order_of_its_method():
 
 @pytest.mark.parametrize("share, fails", [(0.95, False), (1.03, True)])
 def test_the_pull_of_a_pin_is_a_rate_that_steps_must_bear(share, fails):
-    """RK4 ends at pull h = 2.785, a double real root: predicted, then run."""
+    """RK4 is unstable where stabilisation times step exceeds 2.785, its limit on the negative real axis."""
     nodes, links = parallelogram(0.3, stabilisation=share * 2.785 / 2e-3)
     model = fvsolve.build(fvsolve.load(bodies(nodes, 2.0, ["loop.gap"], links, method="rk4", step=2e-3)))
     result = fvsolve.run(model)
@@ -432,7 +439,7 @@ def test_the_pull_of_a_pin_is_a_rate_that_steps_must_bear(share, fails):
 
 
 def test_a_slider_crank_moves_as_its_closed_form():
-    """A crank that turns at a given rate with no weight: x = a cos q + sqrt(b^2 - a^2 sin^2 q), kept by energy."""
+    """x = a cos q + sqrt(b^2 - a^2 sin^2 q); without gravity the kinetic energy is constant."""
     a, b, q, w = 0.3, 1.0, 0.5, 4.0
     tilt = math.asin(a * math.sin(q) / b)
     lean = a * w * math.cos(q) / (b * math.cos(tilt))
@@ -453,7 +460,7 @@ def test_a_slider_crank_moves_as_its_closed_form():
     assert result["piston.travel"] == approx(x, abs=1e-7)
     per = -a * np.sin(angle) - a * a * np.sin(angle) * np.cos(angle) / np.sqrt(b * b - (a * np.sin(angle)) ** 2)
     energy_of = 0.5 * result["crank.rate"] ** 2 * (0.1 + 0.5 * per**2)
-    assert energy_of == approx(energy_of[0], rel=2e-5)  # the rod of a milligram has its share
+    assert energy_of == approx(energy_of[0], rel=2e-5)  # difference by the rod of 1 mg
 
 
 def test_a_linkage_in_balance_does_not_move_by_one_bit():
@@ -473,7 +480,7 @@ def test_a_linkage_in_balance_does_not_move_by_one_bit():
 
 
 def test_a_pendulum_on_a_driven_cart_feels_its_acceleration():
-    """q'' l = -g sin q - a cos q, with the cart's x = A sin(w t + p); the force that drives it is F = d(p_x)/dt."""
+    """l q'' = -g sin q + a cos q, with a the acceleration of the cart; the joint force is the sum of m a."""
     swing, period, phase, l = 0.3, 1.3, 0.4, 0.7  # noqa: E741
     w = 2.0 * math.pi / period
     wave = {"mean": 0.1, "amplitude": swing, "period": period, "phase": phase}
@@ -495,7 +502,7 @@ def test_a_pendulum_on_a_driven_cart_feels_its_acceleration():
 
 
 def test_a_crank_that_is_driven_gives_its_torque():
-    """About a vertical axis nothing but J alpha asks for a torque."""
+    """About a vertical axis the torque of the joint is J d2(angle)/dt2."""
     wave = {"mean": 0.0, "amplitude": 1.0, "period": 2.0}
     crank = body(1.0, [0.3, 0.3, 0.4], {"kind": "revolute", "axis": [0, 0, 1], "angle": wave})
     crank["centre_of_mass"] = [0.5, 0, 0]
@@ -516,7 +523,7 @@ def test_what_drives_a_joint_may_not_jump_nor_its_rate(driven):
 
 
 def test_a_body_on_a_bushing_swings_by_its_stiffnesses_and_fades_by_its_damping():
-    """m x'' = -k x - d x', and about z, where a turn by q is eps = sin(q / 2): J q'' = -K sin q - D q'."""
+    """m x'' = -k x - d x' along x, and J q'' = -K sin q - D q' about z."""
     m, k, d, j, turn_k, turn_d = 2.0, 300.0, 1.5, 0.4, 50.0, 0.2
     block = body(m, [j, j, j], {"kind": "free", "velocity": [0.5, 0, 0], "rate": [0, 0, 12.0]})
     links = {"rubber": {"type": "bushing", "from": "ground.top", "to": "block", "stiffness": k, "damping": d,
@@ -549,7 +556,7 @@ def test_a_bushing_between_two_free_bodies_keeps_their_momenta():
 
 
 def machine() -> dict:
-    """A damped tree with a spring, a damper and a force, of which one joint is driven."""
+    """Return a case of a damped tree of bodies with a driven joint and all kinds of force elements in space."""
     upper = pendulum(0.8, damping=0.3)
     lower = {**pendulum(-0.4), "joint": {"kind": "revolute", "on": "arm.bob", "axis": [0.6, 0.8, 0], "angle": 0.2}}
     lower["inertia"] = [0.1, 0.2, 0.3]
@@ -596,7 +603,7 @@ def test_what_the_ledger_of_bodies_forgets_is_what_remains(kind, place, monkeypa
     assert abs(lost) > 1e-3 and abs(remains) == approx(abs(lost), rel=1e-4)
 
 
-# said otherwise ---------------------------------------------------------------------------------------------
+# equivalent cases, methods and runs -------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("method", ["radau-iia-5", "rodas-5p", "auto", "implicit-midpoint"])
@@ -699,7 +706,7 @@ def test_a_run_broken_off_and_resumed_is_the_unbroken_one(method, step, tmp_path
 
 
 def test_linearised_a_locked_crane_swings_at_its_frequency_and_fails_where_predicted():
-    """Eigenvalues of the whole right-hand side, and the step at which RK4 grows: 2.83 / w, by `stability` and run."""
+    """Eigenvalues are +-i w, and the step limit of RK4 is sqrt(8) / w, predicted and measured."""
     crane = Crane()
     case = crane.case(0.5, [], "log", joint={"rate": 1e-6}, method="rk4", step=1e-3)
     values = np.linalg.eigvals(linearise(case).a)
@@ -742,7 +749,7 @@ def test_a_tree_far_from_the_origin_moves_as_one_near_it():
 
 
 def test_the_crane_that_is_shipped_moves_as_scipy_has_it():
-    """Boom and load as a double pendulum in the plane, pressures as states; orifices of the spool by their root."""
+    """Reference in the plane: double pendulum, chamber pressures as states, orifice law in the spool valve."""
     beta, rho, share = 1.2e9, 870.0, 8e-6
     bore, ring = math.pi / 4 * 0.125**2, math.pi / 4 * (0.125**2 - 0.07**2)
     result = fvsolve.run("cases/crane.toml", set={"numerics.end": 6.0})
@@ -788,7 +795,10 @@ def test_the_crane_that_is_shipped_moves_as_scipy_has_it():
 
 
 def bennett(axis: bool) -> dict:
-    """Bennett's linkage, links a and b twists of sin(alpha) / a = sin(beta) / b: four hinges in space that move."""
+    """Return a case of Bennett's linkage: four hinges in space that can move, as sin(alpha) / a = sin(beta) / b.
+
+    alpha and beta are the twists of the links a and b. `axis` gives the pin an axis.
+    """
     a, b, alpha = 1.0, 1.5, math.radians(30.0)
     beta = math.asin(b / a * math.sin(alpha))
     one = 1.0
@@ -814,7 +824,7 @@ def test_bennetts_linkage_moves_as_its_half_angles_have_it_and_a_ball_there_is_r
     sines, cosines = np.sin(one / 2.0) * np.sin(two / 2.0), np.cos(one / 2.0) * np.cos(two / 2.0)
     assert sines == approx(ratio * cosines, abs=1e-7)
     gap = np.array([result["three.end.x"] + 1.5, result["three.end.y"], result["three.end.z"]])
-    assert np.abs(gap).max() < 1e-8  # along its axis too, where no row holds it
+    assert np.abs(gap).max() < 1e-8  # also along the axis of the pin, without a constraint
     with pytest.raises(
         fvsolve.errors.CaseError, match="in some direction joints or other pins already prevent its opening"
     ):

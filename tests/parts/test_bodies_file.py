@@ -1,4 +1,4 @@
-"""What a case may say of bodies, and what it gets told where it says something else: all at once, with the place."""
+"""Faults and notices of bodies, joints and links between points in a case file, all at once and with their places."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ BAD = {
     "products that are not symmetric": (arm(inertia=[[1, 0.2, 0], [0, 1, 0], [0, 0, 1]]), "is not symmetric"),
     "a matrix of no body": (arm(inertia=[[1, 2, 0], [2, 1, 0], [0, 0, 1]]), "principal moment of -1 kg m2"),
     "inertia of nothing": (
-        {**arm(), "b": body(1, [1, 0, 1], hinge(on="arm.bob"))}, "nodes.b.inertia: its inertia is 0",
+        {**arm(), "b": body(1, [1, 0, 1], hinge(on="arm.bob"))}, "nodes.b.inertia: the inertia of the body is 0",
     ),
     "a joint without axis": (arm(joint={"kind": "revolute"}), "nodes.arm.joint: axis is missing"),
     "an axis of zeros": (arm(joint=hinge(axis=[0, 0, 0])), "nodes.arm.joint.axis: is all zeros"),
@@ -119,7 +119,9 @@ def test_a_link_between_points_gets_its_message(name):
 def test_a_loop_that_is_not_closed_is_told_by_how_much_and_one_held_twice_by_which_pin():
     nodes, links = parallelogram()
     nodes["two"]["joint"]["at"] = [1.6, 0, 0]
-    assert "links.loop: two.end and coupler.end lie 0.1 m apart across its axis at the start" in told(nodes, links)
+    assert "links.loop: two.end and coupler.end lie 0.1 m apart across the axis of the pin at the start" in told(
+        nodes, links
+    )
     nodes, links = parallelogram()
     del links["loop"]["axis"]
     text = "links.loop: this pin is redundant: in some direction joints or other pins already prevent its opening"
@@ -148,7 +150,7 @@ def test_all_that_is_wrong_is_said_at_once():
 
 
 def test_a_body_at_fault_is_no_fault_of_what_names_it():
-    """Bodies that hang on it or on its points, links between points, what rides on it, probes."""
+    """Bodies on it or on its points, links between points, tanks and basins on it, and probes add no faults."""
     nodes = {
         **arm(mass=0), "b": body(1, [1, 1, 1], hinge(on="arm.bob")), "c": body(1, [1, 1, 1], hinge(on="arm")),
         **{one: {"type": "tank", "on": "arm", "at": [0, y, 1], "area": 1.0, "level": 1.0} for one, y in (("p",
@@ -259,7 +261,7 @@ TOLD = """all.toml: 11 faults
   line 33: nodes.c.joint.attitude.matrix: is not a rotation: R'R differs from the identity by 3; expected orthogonal columns of length 1
   line 39: nodes.pool.on: "boon" is not a node; expected a body: a, arm, b, boom, c; did you mean "boom"?
   line 40: nodes.pool.elevation: the node is on boon; give its position as `at`, in the axes of that body
-  line 46: nodes.flume.patches.lid.travel: moves 1.5 m inward, but its zone is only 1 m wide; expected less travel, or a wider zone
+  line 46: nodes.flume.patches.lid.travel: moves the wall 1.5 m inward in a zone 1 m wide; expected less travel, or a wider zone
   line 50: links.lift.stroke: the piston starts at 3 m (ground.far minus ground.lug); expected 0 to 1 m
   line 58: links.s.to: no place named "boom.eye"; places are a, arm, b, boom, c, flume.lid, ground, ground.far, ground.lug, lift.A, lift.B; did you mean "boom"?"""  # noqa: E501
 

@@ -1,4 +1,4 @@
-"""Materials, classes and restraint of pipes: what a name stands for is what its page prints, and says so."""
+"""Materials, pressure classes and restraint of pipes: values equal those of the sources, which the case names."""
 
 import math
 
@@ -20,7 +20,7 @@ SLR = [
     (500, 532, 9.0, 7.5, 30), (600, 635, 9.9, 8.7, 30), (700, 738, 10.8, 8.8, 25), (800, 842, 11.7, 9.6, 25),
     (900, 945, 12.6, 10.6, 25), (1000, 1048, 13.5, 11.6, 25),
 ]  # fmt: skip
-BEARS = {100: 64, 150: 64, 200: 62, 250: 54, 300: 49, 350: 45}  # bar, K9; Aquaflo, ductile iron pipe
+BEARS = {100: 64, 150: 64, 200: 62, 250: 54, 300: 49, 350: 45}  # pressures of K9 [bar]; Aquaflo, ductile iron pipe
 
 
 def main(**more) -> dict:
@@ -37,7 +37,7 @@ def read(defaults=None, **more):
 def test_walls_of_ductile_iron_are_those_that_a_maker_prints(size, outer, nine, preferred, number):
     for name, wall in (("K9", nine), (f"C{number}", preferred)):
         found = class_size(name, f"DN{size}", "ductile-iron")
-        assert 1e3 * found.thickness == approx(wall, abs=0.101)  # two tables of one decimal
+        assert 1e3 * found.thickness == approx(wall, abs=0.101)  # both tables have one decimal
         assert 1e3 * found.diameter == approx(outer - 2e3 * found.thickness)
 
 
@@ -65,7 +65,10 @@ def test_polyethylene_by_its_ratio_and_by_its_pressure(material, name, ratio, ba
 
 
 def lame(ratio: float, nu: float, held: str) -> float:
-    """Restraint factor of a thick cylinder, from Lame's stresses at its bore; ratio : D/e, pressure and modulus 1."""
+    """Restraint factor of a thick cylinder, from Lame's stresses at its bore for a pressure and a modulus of 1.
+
+    ratio : D / e [-]; nu : Poisson's ratio [-]; held : restraint
+    """
     a, b = 0.5 * ratio, 0.5 * ratio + 1.0
     hoop, radial, closed = (b * b + a * a) / (b * b - a * a), -1.0, a * a / (b * b - a * a)
     axial = {"joints": 0.0, "upstream": closed, "anchored": nu * (hoop + radial)}[held]
@@ -105,7 +108,7 @@ def test_every_figure_names_the_page_it_was_read_on():
             assert figure.least <= figure.used <= figure.greatest
             assert figure.sources and all(SOURCES[one] in figure.description for one in figure.sources)
             assert key not in material.missing_keys
-    assert materials()["PE100"].figures["youngs_modulus"].used == 1.3e9  # the greatest
+    assert materials()["PE100"].figures["youngs_modulus"].used == 1.3e9  # the greatest of the sources
 
 
 def test_the_pipe_says_whose_figures_it_has_and_reads_back():

@@ -1,4 +1,4 @@
-"""Chambers and orifices against closed forms and SciPy, through the end of filling in finite time."""
+"""Chambers and orifices against closed forms and SciPy, also beyond the finite time of filling."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ P0, VOLUME, HOLE = 1e6, 0.5, 1e-6
 @pytest.mark.parametrize("supply", [5e6, 2e5], ids=["filling", "emptying"])
 @pytest.mark.parametrize("numerics, near", [(CLOSE, 1e-6), ({}, 1e-5)], ids=["tight", "default"])
 def test_a_chamber_fills_in_finite_time_and_rests(supply, numerics, near):
-    """`near` is what the drop at the start allows: the default tolerance is 1e-6 a step."""
+    """The pressure error is at most `near` times the initial drop; the default tolerance is 1e-6 per step."""
     nodes = {"pump": reservoir(supply), "pot": chamber(VOLUME, P0)}
     slope = BETA / VOLUME * HOLE * math.sqrt(2 / RHO)
     filled = 2 * math.sqrt(abs(supply - P0)) / slope
@@ -46,7 +46,7 @@ def test_a_chamber_fills_in_finite_time_and_rests(supply, numerics, near):
 def test_two_chambers_level_in_finite_time_and_rest():
     volumes, pressures = (0.3, 0.7), (4e6, 1e6)
     nodes = {"a": chamber(volumes[0], pressures[0]), "b": chamber(volumes[1], pressures[1])}
-    nodes["tap"] = reservoir(1e6)  # something must fix the pressure; its valve stays shut
+    nodes["tap"] = reservoir(1e6)  # a given pressure is required; its valve stays shut
     links = {"gap": valve("a", "b", HOLE), "shut": valve("b", "tap", HOLE, 0.0)}
     result = fvsolve.run(scene(nodes, links, 70.0, CLOSE, ["a.pressure", "b.pressure"], 0.1))
     drop = vessels.chambers_levelling(volumes, BETA, HOLE, RHO, 3e6, result.t)
@@ -61,7 +61,7 @@ def orifice(k: float, drop):
 
 
 def test_chambers_and_orifices_agree_with_scipy_to_ten_digits():
-    """Supply, hole, chamber, closing hole, chamber, two holes out: no drop comes near zero."""
+    """Supply, orifice, chamber, closing valve, chamber and two outlets, with all drops far from zero."""
     nodes = {
         "pump": reservoir(8e6),
         "a": chamber(0.02, 5e6),
@@ -92,7 +92,7 @@ def test_chambers_and_orifices_agree_with_scipy_to_ten_digits():
 
 
 def test_a_chamber_turned_round_by_its_supply_agrees_with_scipy():
-    """A pump that rises and falls in straight lines: the drop changes sign and the root meets its kink."""
+    """The supply pressure changes linearly and reverses the drop, through the singularity of the square root at 0."""
     times, pressures = [0.0, 2.0, 6.0, 10.0], [2e6, 4e6, 1e6, 1e6]
     pump = {"time": times, "value": pressures, "kind": "linear"}
     nodes = {"pump": reservoir(pump), "pot": chamber(VOLUME, 2.1e6)}
@@ -118,7 +118,7 @@ def test_a_chamber_without_a_stated_pressure_starts_in_equilibrium():
 
 
 def test_a_chamber_on_a_pipe_swings_as_mass_on_a_spring():
-    """A pipe with a spring at its end: `w tan(w L / a) = A a / V`, about `w^2 = A beta / (rho L V)`."""
+    """Frequency of a pipe with a spring at its end: w tan(w L / a) = A a / V, about w^2 = A beta / (rho L V)."""
     length, diameter, volume, speed = 2.0, 0.05, 0.5, 1483.2396974191
     nodes = {"lake": reservoir(2e6), "pot": chamber(volume, 2.1e6)}
     links = {"neck": pipe("lake", "pot", length, diameter, speed, 10, initial_flow=0.0)}

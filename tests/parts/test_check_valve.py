@@ -1,4 +1,4 @@
-"""Check valves: when they shut in closed form, scenes that could chatter, a disc that shuts late against SciPy."""
+"""Check valves: closing times in closed form, arrangements that could chatter, slow discs against SciPy."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def check(start, end, flow_area=0.02, **more):
 
 
 def column(numerics):
-    """A rigid column that a reservoir pushes through a check valve until the reservoir falls at 1 s."""
+    """Return a case of a rigid column behind a check valve, whose reservoir pressure falls at 1 s."""
     nodes = {"pump": reservoir({"time": [0.0, 1.0], "value": [3e5, 1e5], "kind": "step"}), "a": junction()}
     nodes["town"] = reservoir(2e5)
     links = {"check": check("pump", "a"),
@@ -50,8 +50,8 @@ def column(numerics):
 
 
 def column_shuts():
-    """dM/dt = (A / L)(dP - M^2 / G) from sqrt(G 1e5): then M = sqrt(G D) tan(...), zero at this time."""
-    g = 2.0 * RHO * 0.02**2  # before and behind alike, the drop is 1e5 Pa
+    """Time [s] at which the flow is zero, by dM/dt = (A / L) (dP - M^2 / G), with M^2 = G 1e5 Pa at 1 s."""
+    g = 2.0 * RHO * 0.02**2  # drops of 1e5 Pa and -1e5 Pa before and after 1 s
     return 1.0 + math.pi / 4.0 * math.sqrt(g / 1e5) * 20.0 / area(0.2)
 
 
@@ -63,7 +63,7 @@ def test_the_time_of_shutting_converges_with_the_order_of_the_method(method, ord
         (event,) = result.summary["events"]
         errors.append(abs(event["time"] - column_shuts()))
         after = result["check.flow"][result.t > event["time"]]
-        assert event["what"] == "shuts" and not after.any()  # exactly none
+        assert event["what"] == "shuts" and not after.any()  # exactly zero
     assert math.log2(errors[0] / errors[2]) / 2.0 == pytest.approx(order, abs=0.4)
 
 
@@ -74,7 +74,7 @@ def test_under_error_control_it_shuts_on_time():
 
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_at_a_jump_it_stops_the_flow_at_once(law):
-    """The reservoir falls by more than Z M0: the flow is gone within the step, and Joukowsky's head behind it."""
+    """The reservoir falls by more than Z M0: the flow stops within the step, and the pressure behind falls by Z M0."""
     nodes = {"pump": reservoir({"time": [0.0, 0.1], "value": [6e5, 1e5], "kind": "step"}), "a": junction()}
     nodes["town"] = reservoir(5.9e5)
     links = {"check": check("pump", "a", 0.005), "main": pipe("a", "town", 100.0, 0.3, 1000.0, 20)}
@@ -89,7 +89,7 @@ def test_at_a_jump_it_stops_the_flow_at_once(law):
 
 
 def test_what_a_jump_shuts_and_opens_is_listed_once():
-    """A check valve and a pump's own stand beside one lake that falls at 1 s and is back at 2 s; at the start, none."""
+    """Each jump of the lake gives one event of the check valve and one of the check valve of the pump."""
     fall = reservoir({"time": [0.0, 1.0, 2.0], "value": [3e5, 1e5, 3e5], "kind": "step"})
     nodes = {"pump": fall, "a": junction(), "b": junction(), "town": reservoir(2e5)}
     links = {"check": check("pump", "a"), "tap": valve("a", "town", 0.01), "way": valve("b", "town", 0.01),
@@ -142,7 +142,7 @@ def test_hard_scenes_end_with_few_events_and_no_flow_backwards(name, law, numeri
 
 
 def test_a_stretch_depends_on_its_state_and_on_nothing_that_ran_before():
-    """A pipe swings behind an ideal check valve: shut in the middle of the stretch, it may still be so at its end."""
+    """Results of `advance` and `rhs` with an ideal check valve do not depend on earlier calls."""
     nodes = {"lake": reservoir(3e5), "near": junction(), "end": junction(), "sink": reservoir(1e5)}
     links = {
         "one": check("lake", "near", 0.01),
@@ -168,7 +168,7 @@ def test_at_rest_it_rests(name):
 
 @pytest.mark.parametrize("head, shut", [(58.0, False), (30.0, True)])
 def test_steady_states_find_which_are_shut(head, shut):
-    """Two ways to a town that a lake feeds too: the check valve of the lower pump is shut, the other open."""
+    """The check valve of the lower lake is shut at a head of 30 m and open at 58 m; that of the higher lake is open."""
     nodes = {"low": lake(head), "high": lake(60.0), "a": junction(), "b": junction(), "town": junction(0.02)}
     nodes["lake"] = lake(45.0)
     links = {"one": check("low", "a"), "two": check("high", "b")}
@@ -182,7 +182,7 @@ def test_steady_states_find_which_are_shut(head, shut):
 
 @functools.cache
 def slam():
-    """(t, (lift, mass flow, pressure behind), events) of the shipped case until 4.5 s."""
+    """Return (t, (lift, mass flow, pressure behind), events) of the shipped case until 4.5 s, by `discs.slam`."""
     weight, z = RHO * GRAVITY, 1200.0 / area(0.3)
     head = lambda t: 101325.0 + weight * np.interp(t, [0.5, 1.0], [30.3, 10.0])  # noqa: E731
     g, far = 2.0 * RHO * (0.61 * 0.05) ** 2, 101325.0 + weight * 30.0
@@ -196,7 +196,7 @@ def test_a_disc_that_shuts_late_slams_as_waves_and_its_own_equation_say():
     assert found[: len(events)] == pytest.approx([e[0] for e in events], abs=1e-4)
     before, after = result.t < slammed - 0.05, (result.t > slammed + 1e-3) & (result.t < 5.0)
     assert result["check.opening"][before] == pytest.approx(np.interp(result.t, t, x)[before], abs=5e-4)
-    assert result["check.flow"][before] == pytest.approx(np.interp(result.t, t, m)[before], abs=0.1)  # l/s
+    assert result["check.flow"][before] == pytest.approx(np.interp(result.t, t, m)[before], abs=0.1)  # [l/s]
     assert result["check.flow"].min() < -1.0 and not result["check.flow"][after].any()
 
 
@@ -204,9 +204,10 @@ def test_a_disc_that_shuts_late_slams_as_waves_and_its_own_equation_say():
                                                    ("trapezoid", 1.0, 7e-3), ("alexander-2", 2.0, 7e-3),
                                                    ("gauss-4", 2.0, 2e-3)])  # fmt: skip
 def test_a_disc_that_slams_within_a_given_implicit_step_is_led_to_its_seat(method, courant, near):
-    """In so long a step its lift has a solution near zero, one far below it, and, as it grows, the latter alone.
+    """A long implicit step in which the disc shuts ends with the lift 0.
 
-    The step that ends where it shuts jumps across that: Newton found none there, or left the lift at -0.08.
+    The equation of the lift has a solution near zero and one far below it, and in longer steps only the latter.
+    Newton's method failed in the step that ends at the closing, or left the lift at -0.08.
     """
     numerics = {"numerics.method": method, "numerics.courant": courant, "links.main.cells": 60}
     model = fvsolve.build(fvsolve.load(CASES / "check-valve-slam.toml", set=numerics))
@@ -220,7 +221,7 @@ def test_a_disc_that_slams_within_a_given_implicit_step_is_led_to_its_seat(metho
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9])
 def test_a_disc_that_slams_on_a_rigid_column_stops_it_dead_and_opens_again(rtol):
-    """Drawn by its own drop it shuts in no time on a column that still flows; it leaves its seat where heads say."""
+    """The disc shuts on a flowing column, and leaves its seat at a head of 20 m plus the cracking pressure."""
     head = {"time": [1.0, 3.0, 8.0, 10.0], "value": [22.0, 5.0, 5.0, 30.0]}
     links = {"cv": check("up", "a", 0.0122, cracking_pressure=2e3, overpressure=4e4, time_constant=0.4),
              "c": {"type": "rigid-column", "from": "a", "to": "o", "length": 300.0, "diameter": 0.2,
@@ -250,7 +251,10 @@ METHODS = {
 
 
 def held_column(kind, after, disc, numerics):
-    """Under a drop that rises by 24 kPa a second from below zero until 9 s; `kind` before a column, or `after` it."""
+    """Return (case, name of the valve) with a drop that rises by 24 kPa/s until 9 s.
+
+    The valve of type `kind` is before a rigid column, or behind it if `after` is True.
+    """
     drop = {"time": [4.0, 9.0, 9.5], "value": [1.9e5, 3.1e5, 3.1e5]}
     part = {"type": kind, "area": 0.01, "discharge_coefficient": 0.61, "overpressure": 1e4, **disc}
     part |= {"cracking_pressure": 2e3} if kind == "check-valve" else {"set_pressure": 3.02e5}
@@ -292,7 +296,7 @@ def assert_leaves(case, name, disc, felt):
 @pytest.mark.parametrize("disc", [LAG, SWING])
 @pytest.mark.parametrize("method", METHODS)
 def test_a_disc_and_the_column_that_it_holds_leave_its_seat_as_their_equations_say(method, disc):
-    """Both start as powers of time, and exchange what they have at a rate that starts at infinity."""
+    """Lift and flow start as powers of time, and the rate of their coupling is infinite at first."""
     assert_leaves(*held_column("check-valve", False, disc, METHODS[method]), disc, "drop")
 
 
@@ -304,7 +308,7 @@ def test_so_do_a_disc_behind_its_column_and_a_relief_valve(kind, after, felt, di
 
 
 def test_advance_stops_a_column_dead_as_a_run_does():
-    """What a slam leaves of its flow is gone when the disc leaves its seat again."""
+    """The slam removes the remaining flow also in `advance`: the flow after the next opening is that of a run."""
     case, name = held_column("check-valve", False, LAG, METHODS["sharp"])
     case["nodes"]["up"]["pressure"] = {"time": [0.5, 2.0, 4.0, 9.0], "value": [3.1e5, 1.9e5, 1.9e5, 3.1e5]}
     model = fvsolve.build(fvsolve.load(case))
@@ -318,14 +322,14 @@ def test_advance_stops_a_column_dead_as_a_run_does():
 
 @pytest.mark.parametrize("after", [False, True])
 def test_so_they_do_in_a_fluid_that_is_all_but_stiff(after):
-    """Under `log`, 1000 times stiffer than water."""
+    """The density law `log` with 1000 times the bulk modulus of water gives the results of the linear law."""
     case, name = held_column("check-valve", after, LAG, METHODS["explicit"])
     case["fluid"] = {**case["fluid"], "law": "log", "bulk_modulus": 2.2e12}
     assert_leaves(case, name, LAG, "drop")
 
 
 def slamming(disc, rho=RHO) -> float:
-    """When the disc of `held_column` meets its seat, by SciPy under the linear law, as the far end rises past it."""
+    """Time [s] at which the disc of `slammed` shuts, by SciPy under the linear law."""
     return slamming_of(tuple(disc.items()), rho)
 
 
@@ -359,7 +363,7 @@ def slamming_of(disc, rho):
 
 
 def slammed(disc, law, numerics, end):
-    """A run of the same scene."""
+    """Return (result, name of the valve) for the valve of `held_column` under a rising downstream pressure."""
     case, name = held_column("check-valve", False, disc, numerics)
     case["nodes"] |= {
         "up": reservoir(3.3e5),
@@ -376,7 +380,7 @@ def slammed(disc, law, numerics, end):
 @pytest.mark.parametrize("numerics", [METHODS["auto"], METHODS["radau"], METHODS["explicit"],
                                       {"method": "rk4", "step": 2e-4}])  # fmt: skip
 def test_a_column_that_slams_its_disc_shut_is_followed_under_every_law(numerics, disc, law):
-    """Drops of a thousand bar, where density is an exponential of pressure; linear and it differ by p / K before."""
+    """At drops of 1000 bar density is exponential in pressure; before, it differs by p / K from the linear law."""
     result, name = slammed(disc, law, numerics, 10.0)
     shuts, leaves = result.summary["events"]
     start, (_, flow) = leaving(disc, "drop")
@@ -396,12 +400,12 @@ def test_a_column_that_slams_its_disc_shut_is_followed_under_every_law(numerics,
     ),
 )
 def test_steps_of_given_length_do_not_leap_over_a_slam(method, step, law, disc):
-    """The lift ends as (time left)^(1/3) or ^(2/3), and drives what drives it: such a step is taken in parts."""
+    """The lift ends as the power 1/3 or 2/3 of the time left, so the step that contains the slam is divided."""
     result, _ = slammed(disc, law, {"method": method, "step": step}, 3.6)
     (shuts,) = result.summary["events"]
     assert result.ok and shuts["what"] == "is shut"
     assert shuts["time"] == pytest.approx(slamming(disc, result.summary["fluid"]["density"]), rel=3e-5)
-    (limit,) = [row for row in result.summary["warnings"] if row["kind"] != "end"]  # the lake falls beyond it
+    (limit,) = [row for row in result.summary["warnings"] if row["kind"] != "end"]  # schedules continue after the end
     assert (limit["kind"], limit["ok"]) == ("step-limit", True) and "rigid column" in limit["text"]
 
 
@@ -449,14 +453,14 @@ DEAD_ENDS = {
 @pytest.mark.parametrize("twice", [False, True])
 @pytest.mark.parametrize("name", DEAD_ENDS)
 def test_before_a_valve_that_shuts_it_comes_to_rest(name, twice, turned, law):
-    """Behind it lie a plain junction and a valve that shuts: nothing flows any more, and nothing opens and shuts."""
+    """Between check valves and a closed valve at a plain junction the flow stops and events end."""
     tap = valve("m", "sink", 0.01, ramp(0.1, 0.1, 1.0, 0.0))
     nodes = {"lake": reservoir(3e5), "x": junction(), "m": junction(), "sink": reservoir(2e5)}
     links = {"one": DEAD_ENDS[name], "tap": tap}
     if twice:
         links["two"] = DEAD_ENDS[name]
     ends = ("lake", "x")
-    if turned:  # the pipe lies behind the check valve, whose valve that shuts lies before it
+    if turned:  # the pipe is behind the check valve, and the valve that shuts before it
         links = {k: {**link, "from": "m", "to": "x"} for k, link in links.items() if k != "tap"}
         links["tap"], ends = valve("lake", "m", 0.01, ramp(0.1, 0.1, 1.0, 0.0)), ("x", "sink")
     links["way"] = pipe(*ends, 50.0, 0.2, 1000.0, 10, friction=FRICTION)
@@ -470,7 +474,7 @@ def test_before_a_valve_that_shuts_it_comes_to_rest(name, twice, turned, law):
 
 @pytest.mark.parametrize("beside", ["tank", "reservoir"])
 def test_liquid_that_does_not_part_shuts_it_when_the_law_without_cavities_does(beside):
-    """`cavitation = true` changes no instant of a check valve beside a tank, at one and the same scheme."""
+    """Without cavities, `cavitation = true` changes event times by less than the travel time of a cell."""
     ground = {"elevation": 0.0}
     ends = {"tank": {"type": "tank", "area": 0.5, "level": 15.0}, "reservoir": {"type": "reservoir", "head": 15.0}}
     nodes = {"lake": {"type": "reservoir", "head": 20.0, **ground}, "a": junction(**ground), "j": junction(**ground)}

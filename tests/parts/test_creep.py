@@ -1,4 +1,4 @@
-"""Walls that creep: against the Laplace transform of a line, by every kind of method; energy, mass and promises."""
+"""Walls that creep: waves against Laplace transforms by every kind of method; energy, mass and faults."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ELEMENTS = {"compliance": [1e-10, 2e-10, 3e-10], "time": [0.05, 0.5, 3.0]}
 
 
 def line(cells: int = 50, kind: str = "smooth", end: float = 4.0, creep=ELEMENTS, **numerics) -> dict:
-    """A plastic line between a reservoir and a flow that stops."""
+    """Return a case of a plastic pipe between a reservoir and a demand that stops."""
     s = np.linspace(0.0, 1.0, 400)
     stop = 1.0 - s**5 * (126 - 420 * s + 540 * s**2 - 315 * s**3 + 70 * s**4)
     demand = {"time": (START + 0.4 * s).tolist(), "value": (FLOW * stop).tolist(), "kind": "smooth"}
@@ -40,7 +40,7 @@ def line(cells: int = 50, kind: str = "smooth", end: float = 4.0, creep=ELEMENTS
 
 
 def solved(case: dict):
-    """(run, values of the exact solution by probe and time, Joukowsky jump [Pa], travel time [s])."""
+    """Return (run, function (k, t) of the exact value of probe k, Joukowsky jump [Pa], travel time [s])."""
     model = fvsolve.build(fvsolve.load({**case, "exact": {"name": "creeping-line"}}))
     truth = exact.solution(model.case, initial_values(model))
     speed = model.case.wave_speed("main")
@@ -49,7 +49,7 @@ def solved(case: dict):
 
 
 def error(*given, **more) -> float:
-    """Greatest error of the pressure at the gate in Joukowsky jumps, of a jump away from its fronts."""
+    """Greatest pressure error at the gate over the Joukowsky jump; for a sudden closure, away from wave fronts."""
     run, probe, jump, travel = solved(line(*given, **more))
     phase = ((run.t - START) / travel + 1.0) % 2.0 - 1.0
     far = np.abs(phase) > (0.1 if "step" in given else -1.0)
@@ -125,14 +125,14 @@ def test_no_rate_depends_on_a_state_that_its_pattern_has_not(scheme, law):
 
 
 def told(cells: int, law: str) -> dict:
-    """A line that falls, so that what swells its bore stores height too."""
+    """Return a case of a falling line, in which swelling of the bore also stores potential energy."""
     case = line(cells, end=2.0)
     case["nodes"]["gate"]["elevation"], case["fluid"]["law"] = -30.0, law
     return case
 
 
 def test_its_energy_is_booked_and_never_made():
-    """The remainder falls with the order of the scheme: what elements store and take is all there is."""
+    """The remainder falls with the order of the scheme, so stored and dissipated energies are complete."""
     found = []
     for cells in (30, 60):
         found.append(energy(told(cells, "linear")))
@@ -142,7 +142,7 @@ def test_its_energy_is_booked_and_never_made():
 
 
 def test_under_other_laws_too_and_what_a_law_leaves_has_a_line_of_its_own():
-    """Liquid of the reference density in the grown bore: off by p / K of what passes; the rest falls with the cells."""
+    """The law loss belongs to liquid of reference density in the wider bore; the scheme loss falls with the cells."""
     linear, *other = [energy(told(cells, law)) for cells, law in ((60, "linear"), (30, "log"), (60, "log"))]
     taken = np.array(other[1].dissipated["main creep"])
     assert taken[-1] == approx(linear.dissipated["main creep"][-1], rel=0.02) and np.all(np.diff(taken) >= 0.0)
@@ -159,7 +159,7 @@ def test_what_the_wall_holds_is_part_of_what_could_be_had(law):
     held = [energy(case | {"fluid": case["fluid"] | {"law": law}}).at_start["main"] for case in cases]
     volume, elastic = area(BORE) * LENGTH, 1e6 - 101325.0
     if law == "log":
-        elastic -= 0.5 * WATER["density"] * (FLOW / area(BORE)) ** 2  # the height of its velocity
+        elastic -= 0.5 * WATER["density"] * (FLOW / area(BORE)) ** 2  # dynamic pressure
     more = 0.5 * volume * elastic**2 * BORE / WALL * sum(ELEMENTS["compliance"])
     assert held[0] - held[1] == approx(more, rel=1e-5 if law == "log" else 1e-6)
 
@@ -180,7 +180,7 @@ def test_its_port_is_the_impedance_of_the_exact_line_and_passive():
     root = np.sqrt(swelling)
     exact_z = WATER["density"] * speed / area(BORE) / root * np.tanh(s * LENGTH / speed * root)
     assert found.transfer(s) == approx(exact_z, rel=1e-4)
-    assert found.verdict.positive_real is not False and not found.verdict.dips  # at rest and far up it takes nothing
+    assert found.verdict.positive_real is not False and not found.verdict.dips  # lossless at frequencies 0 and inf
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
@@ -208,7 +208,7 @@ def test_a_wall_of_no_elements_has_no_state_and_elements_that_give_nothing_chang
 
 
 @pytest.mark.parametrize(("change", "words"), [
-    (lambda case: case.update(scalars={"salt": {}}), "takes up liquid, into which scalars are not followed"),
+    (lambda case: case.update(scalars={"salt": {}}), "takes up liquid, whose scalars are not computed"),
     (lambda case: case["links"]["main"].update(pipe_model="delay-line"),
      '"delay-line" is not possible .* its wall creeps in every cell'),
     (lambda case: case["links"]["main"].update(lining={"youngs_modulus": 2e10, "thickness": 0.004}),

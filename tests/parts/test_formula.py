@@ -1,4 +1,4 @@
-"""Formulas of x and y: arithmetic of floats as mathematics has it, and a fault by name for everything else."""
+"""Formulas of x and y: values as in mathematics, and faults that name every unsupported form."""
 
 from __future__ import annotations
 
@@ -108,9 +108,9 @@ NOWHERE = {
     "min(1/x, 5)": ": 1/x divides by zero at x = 0 m",
     "0/x": "divides by zero",
     "log(x)": "is the logarithm of zero at x = 0 m",
-    "1 + sqrt(y)": r": sqrt\(y\) is not a number at x = 3.5 m",
-    "y^0.5": "is not a number at x = 3.5 m, y = -0.5 m",
-    "where(x < 2, 1/y, log(y))": r": log\(y\) is not a number at x = 3.5 m",
+    "1 + sqrt(y)": r": sqrt\(y\) is not finite at x = 3.5 m",
+    "y^0.5": "is not finite at x = 3.5 m, y = -0.5 m",
+    "where(x < 2, 1/y, log(y))": r": log\(y\) is not finite at x = 3.5 m",
 }
 
 
@@ -120,7 +120,7 @@ def test_overflow_division_by_zero_and_no_number_are_named_with_part_and_place(t
         values(text)
 
 
-WAYS = {  # every key that takes formulas, at fault only where it is taken: in cells, at corners, in middles of faces
+WAYS = {  # every key that takes formulas, with a fault only at the points of this key: cells, corners or face middles
     "bed": {"bed": "1/(x - 0.125)"},
     "start.level": {"start": {"level": "max(1, 2, 1/(x - 0.125))"}},
     "start.u": {"start": {"u": "1/(x - 0.125)"}},

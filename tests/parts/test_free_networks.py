@@ -1,4 +1,4 @@
-"""Networks that move their bodies: a free hull with its U-tube, a cart with one, against (70) and what is conserved."""
+"""Networks that move their bodies, against Lagrange's equations (docs/course.md, 70) and conserved quantities."""
 
 import numpy as np
 import pytest
@@ -15,13 +15,13 @@ from fvsolve.model.build import build
 from fvsolve.solve import initial_state
 from fvsolve.studies.energy.energy_balance import energy
 
-MASS, LOW, TURN = 60e3, 0.8, 4e5  # of the hull: its mass [kg], how low that lies [m], inertia about it [kg m2]
+MASS, LOW, TURN = 60e3, 0.8, 4e5  # hull: mass [kg], depth of its centre [m], inertia about it [kg m2]
 START = 0.15  # angle [rad]
 BODY = {"type": "body", "mass": MASS, "inertia": [TURN, 2 * TURN, 2 * TURN], "centre_of_mass": [0, 0, -LOW]}
 
 
 def free(**drawn):
-    """The U-tube on a hull that rolls as it likes."""
+    """Return a case of the U-tube on a hull that rolls freely."""
     case = u_tube(**{"minor_loss": 0.0, **drawn})
     axis = case["nodes"]["hull"]["joint"]["axis"]
     case["nodes"]["hull"] = {**BODY, "inertia": [TURN] * 3, "joint": {"kind": "revolute", "axis": axis, "angle": START}}
@@ -30,7 +30,10 @@ def free(**drawn):
 
 
 def hull_and_water():
-    """(angle'', z'') by (70) at (angle, angle', z, z'): what flows in the arms has no inertia of its own."""
+    """Return a function of (angle, angle', z, z') for (angle'', z'') by Lagrange's equations (docs/course.md, 70).
+
+    The flow relative to the arms has no kinetic energy.
+    """
     sp = pytest.importorskip("sympy", reason="derives Lagrange's equations")
     t, s = sp.symbols("t s")
     angle, z = sp.Function("angle")(t), sp.Function("z")(t)
@@ -94,7 +97,7 @@ def test_a_cart_with_a_u_tube_on_rails_keeps_the_momentum_of_the_whole():
     case["output"]["probes"] += ["hull.vy"]
     run = fv.run(case)
     water = RHO * (TANK * (2 * LEVEL + 0.3) + area(BORE) * 9.5)
-    momentum = (MASS + water) * run["hull.vy"] - RHO * run["duct.flow"] * 2 * HALF  # it runs towards -y
+    momentum = (MASS + water) * run["hull.vy"] - RHO * run["duct.flow"] * 2 * HALF  # the duct runs towards -y
     assert np.ptp(run["hull.vy"]) > 1e-3
     assert momentum == pytest.approx(momentum[0], rel=1e-8)
 
@@ -104,7 +107,7 @@ ROUTE = [[1.0, 1.0, -2.0], [-1.0, 0.5, -2.5]]
 
 
 def line_inertia(mass, a, b):
-    """Inertia about the origin of a line of even mass."""
+    """Inertia about the origin of a line of uniform mass from a to b : float64[3, 3]."""
     middle, half = 0.5 * (a + b), 0.5 * (b - a)
     return mass * (apart(middle) + apart(half) / 3.0)
 
@@ -114,14 +117,14 @@ def apart(r):
 
 
 def oblique(joint, **body):
-    """The U-tube drawn aslant, on a hull with this joint."""
+    """Return a case of the U-tube along an oblique route, on a hull with the joint `joint`."""
     case = u_tube(minor_loss=0.0, route=ROUTE, length=9.0, diameter=WIDE)
     case["nodes"]["hull"] = {**BODY, "inertia": OWN.tolist(), **body, "joint": joint}
     for name, at in OBLIQUE.items():
         case["nodes"][name] |= {"at": at, "area": 3.0, "level": 2.0}
     what = ["eta", "eps_x", "eps_y", "eps_z", "wx", "wy", "wz"]
     case["output"]["probes"] = ["duct.flow", "port.level", "starboard.level", *(f"hull.{one}" for one in what)]
-    case["numerics"]["end"] = 6.0  # before starboard is empty
+    case["numerics"]["end"] = 6.0  # before the tank starboard is empty
     return case
 
 
@@ -130,7 +133,10 @@ BALL = {"kind": "ball", "attitude": {"roll": 0.1, "pitch": -0.05, "yaw": 0.4}, "
 
 
 def of_all(case, run):
-    """Rows over t: kinetic and all energy, momentum, angular momentum about the origin, weight and its torque there."""
+    """Return totals over time: kinetic energy, total energy, momentum, angular momentum, weight, torque against it.
+
+    Angular momentum and torque are about the origin; each row has 12 numbers.
+    """
     duct, foot = case["links"]["duct"], {name: np.array(at) for name, at in OBLIQUE.items()}
     way = [foot[duct["from"]], *map(np.array, ROUTE if duct["from"] == "port" else ROUTE[::-1]), foot[duct["to"]]]
     lengths = [float(np.linalg.norm(b - a)) for a, b in zip(way, way[1:], strict=False)]
@@ -178,7 +184,7 @@ def test_what_a_joint_holds_is_the_rate_of_all_momentum_less_the_weight(joint):
     case["output"]["every"] = step = 0.02
     run = fv.run(case)
     found = of_all(case, run)
-    rate = (8 * (found[3:-1] - found[1:-3]) - (found[4:] - found[:-4]))[:, 2:8] / (12 * step)  # of fourth order
+    rate = (8 * (found[3:-1] - found[1:-3]) - (found[4:] - found[:-4]))[:, 2:8] / (12 * step)  # fourth order
     rate[:, 2] += found[2:-2, 8]
     rate[:, 3:] += found[2:-2, 9:]
     size = np.max(np.abs(rate))
@@ -206,7 +212,7 @@ BETA = WATER["bulk_modulus"]
 
 
 def cart(law="linear", cells=20, mass=CART, **numerics):
-    """A sprung cart that carries a pipe between two chambers, pushed at the start."""
+    """Return a case of a moving cart on a spring that carries a pipe between two chambers."""
 
     def chamber(x):
         return {"type": "chamber", "volume": VOLUME, "initial_pressure": AMBIENT, "on": "cart", "at": [x, 0, 0]}
@@ -229,9 +235,10 @@ def cart(law="linear", cells=20, mass=CART, **numerics):
 
 
 def out_of_tune(w):
-    """K - M w^2 - rho A w^2 (2 B / k) sin(k L / 2): u + v = v B cos(k x) of a pipe in a cart that moves at v.
+    """Frequency equation K - M w^2 - 2 rho A w^2 (B / k) sin(k L / 2), zero at the frequencies of the cart.
 
-    Chambers take p' = beta A u / V, and are carried as mass. Shut, it would be K - M w^2 - 2 rho c A w tan(w L / 2 c).
+    In a cart of velocity v the fluid has the relative velocity u, with u + v = v B cos(k x). The chambers have p' =
+    beta A u / V and are part of M. With closed ends it would be K - M w^2 - 2 rho c A w tan(w L / (2 c)).
     """
     k, yields = w / FAST, BETA * area(0.1) / (VOLUME * RHO * FAST**2)
     sine, cosine = np.sin(k * LONG / 2), np.cos(k * LONG / 2)
@@ -259,7 +266,10 @@ RAILS = {"kind": "prismatic", "axis": [1, 0, 0], "travel": 0.0, "rate": 0.2}
 
 
 def rig(joint, law="linear", tanks=False, cells=8, gravity=1e-12, **numerics):
-    """Two pipes with a valve that shuts between, columns to tanks or chambers at the ends, all aslant on one body."""
+    """Return a case of an oblique network on one body: two pipes with a valve that shuts between them.
+
+    Rigid columns join the pipes to chambers, or to tanks if `tanks` is True.
+    """
 
     def store(at, level, pressure):
         if tanks:
@@ -295,10 +305,10 @@ def rig(joint, law="linear", tanks=False, cells=8, gravity=1e-12, **numerics):
 
 
 def momenta(model, t, y):
-    """Momentum, and angular momentum about the world's origin, of a body and all that rides on it, from a state."""
+    """Momentum and angular momentum about the origin of the world, of a body with its network : float64[6]."""
     out, tables, found = model.evaluate(t, y)[1], model.tables, np.zeros(6)
     row, linear = out[int(model.layout["body"]) :], model.case.law.linear
-    turn, place, speed, spin = row[:9].reshape(3, 3), row[9:12], row[12:15], row[15:18]  # as `mechanism.room` says
+    turn, place, speed, spin = row[:9].reshape(3, 3), row[9:12], row[12:15], row[15:18]  # see `mechanism.body_layout`
 
     def add(momentum, r, own=0.0):
         found[:3] += momentum
@@ -339,7 +349,7 @@ def momenta(model, t, y):
 
 
 def drift(case):
-    """(greatest change of momenta over a run, their size at the start)."""
+    """Return (greatest change of the momenta in a run, momenta at the start)."""
     model = build(fv.load(case))
     state = initial_state(model)
     first, most = momenta(model, state.t, state.y), np.zeros(6)
@@ -365,7 +375,7 @@ def test_a_rig_in_free_flight_keeps_all_momenta_to_the_order_of_steps_and_cells(
     straight, spun = ([np.max(most[part]) for most, _ in found] for part in (slice(0, 3), slice(3, 6)))
     size = np.linalg.norm(found[0][1][3:])
     assert straight[1] < 0.1 * straight[0] < 1e-8 * np.linalg.norm(found[0][1][:3])
-    assert spun[2] < 0.4 * spun[1] < 1e-8 * size  # what faces carry is what cells hold to second order
+    assert spun[2] < 0.4 * spun[1] < 1e-8 * size  # fluxes of faces equal momenta of cells to second order
 
 
 @pytest.mark.parametrize("tanks", [False, True])
@@ -387,13 +397,13 @@ def test_a_light_body_with_a_pipe_is_stepped_as_its_waves_brake_it():
         case["nodes"][name] = {"type": "junction", "on": "cart", "at": case["nodes"][name]["at"]}
     case["nodes"]["still"] = {**case["nodes"]["a"], "type": "reservoir", "pressure": AMBIENT}
     case["links"]["leak"] = {"type": "orifice", "from": "still", "to": "a", "area": 1e-6, "discharge_coefficient": 0.6}
-    brakes = 2 * RHO * FAST * area(0.1) / 2.0  # rho c A at both ends over its mass [1/s]
+    brakes = 2 * RHO * FAST * area(0.1) / 2.0  # rho c A of both ends over the mass [1/s]
     model = build(fv.load(case))
     assert model.evaluate(0.0, model.start)[1][rec.RATE] == pytest.approx(brakes, rel=0.2)
     assert np.max(np.abs(fv.run(case)["cart.vx"])) < 0.1001
     case["numerics"] |= {"courant": None, "step": 3.0 / brakes}
     case["numerics"].pop("courant")
-    assert not fv.run(case).ok  # beyond 2.785
+    assert not fv.run(case).ok  # beyond the limit of rk4, 2.785
 
 
 def test_a_duct_most_of_which_is_a_pipe_is_the_rigid_column_that_it_was(truth):
@@ -415,8 +425,8 @@ def test_a_duct_most_of_which_is_a_pipe_is_the_rigid_column_that_it_was(truth):
 
 
 @pytest.mark.parametrize(("change", "place", "text"), [
-    ({"nodes": {"port": {"height": 2.0}}}, "nodes.port.height", "the reaction of its flow"),
-    ({"nodes": {"port": {"area": {"level": [0, 1], "area": [1, 2]}}}}, "nodes.port.area", "one area"),
+    ({"nodes": {"port": {"height": 2.0}}}, "nodes.port.height", "the reaction of this flow"),
+    ({"nodes": {"port": {"area": {"level": [0, 1], "area": [1, 2]}}}}, "nodes.port.area", "a constant area"),
 ])  # fmt: skip
 def test_what_a_free_body_does_not_feel_is_refused_by_name(change, place, text):
     case = free()
@@ -429,14 +439,14 @@ def test_what_a_free_body_does_not_feel_is_refused_by_name(change, place, text):
 def test_a_pipe_at_a_tank_of_a_free_body_and_a_column_led_by_a_valve_are_refused_by_name():
     case = free()
     case["links"]["duct"] |= {"type": "pipe", "wave_speed": 1000.0}
-    assert "expected a rigid-column between" in said(case)["links.duct"]
+    assert "expected a rigid-column at the tank" in said(case)["links.duct"]
     case = free()
     case["nodes"]["mouth"] = {"type": "junction", "on": "hull", "at": [0, HALF, -DEPTH]}
     case["links"]["duct"][next(key for key in ("from", "to") if case["links"]["duct"][key] == "port")] = "mouth"
     case["links"]["gate"] = {"type": "valve", "from": "port", "to": "mouth", "area": 0.1, "discharge_coefficient": 1.0}
     found = said(case)
     assert "neither the flow of a valve nor the tank has inertia" in found["links.gate"]
-    assert "at mouth it joins only valves and columns" in found["links.duct"]
+    assert "at mouth this column joins only valves and columns" in found["links.duct"]
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])

@@ -23,7 +23,7 @@ STATIC = RHO * GRAVITY * HEAD
 
 
 def wylie(opening, cells: int, friction=None, end: float = 4.3, **numerics) -> dict:
-    """The single pipe of Wylie and Streeter with a valve to the air."""
+    """Return a case of the single pipe of Wylie and Streeter with a valve to the air."""
     friction = friction or {"model": "steady", "factor": FACTOR}
     nodes = {"lake": lake(HEAD), "gate": junction(), "air": reservoir(AMBIENT)}
     links = {
@@ -104,7 +104,7 @@ def test_a_minor_loss_is_counted_on_the_velocity_head():
 
 
 def head_error(cells: int, shut: dict, opening, model: str = "steady") -> float:
-    """Greatest distance of the valve pressure from the characteristics, over the Joukowsky jump."""
+    """Greatest difference of the valve pressure from the characteristics, over the Joukowsky jump."""
     result = fvsolve.run(wylie(shut, cells, {"model": model, "factor": FACTOR}))
     t, exact = reference(opening).richardson(400, 4.4)
     at = np.interp(np.asarray(result.t), t, exact)
@@ -134,13 +134,13 @@ def test_the_closure_with_hazen_williams_follows_the_fine_characteristics():
 
 
 def peaks(t: np.ndarray, p: np.ndarray, halves: int) -> np.ndarray:
-    """Pressure half way through each half period after the closure at 0.5 s."""
+    """Pressures in the middle of each half period after the closure at 0.5 s."""
     return np.array([np.interp(0.5 + (k + 0.5) * 2 * LENGTH / SPEED, t, p) for k in range(halves)])
 
 
 @pytest.mark.parametrize("scheme", ["muscl", "weno5", "upwind5"])
 def test_peaks_decay_as_the_fine_characteristics_say(scheme):
-    factor = 0.3  # strong, so that the decay is plain
+    factor = 0.3  # large, for a clear decay
     friction = {"model": "quasi-steady", "factor": factor}
     case = wylie(step(0.5, 1.0, 0.0), 600, friction, end=12.0, scheme=scheme, method="ssp-rk3")
     result = fvsolve.run(case)
@@ -155,7 +155,7 @@ def test_peaks_decay_as_the_fine_characteristics_say(scheme):
 def damped_mode(cells: int, scheme: str, method: str) -> float:
     """L1 error of the first mode of a laminar pipe between a reservoir and a dead end, after 1.3 periods.
 
-    With `k = 32 nu / D^2` it turns at `w^2 = (pi a / 2 L)^2 - k^2 / 4` and falls as `exp(-k t / 2)`.
+    Its frequency w is given by w^2 = (pi a / 2 L)^2 - k^2 / 4, its decay by exp(-k t / 2), with k = 32 nu / D^2.
     """
     length, diameter, nu = 100.0, 0.02, 1e-4
     k = 32 * nu / diameter**2
@@ -174,7 +174,7 @@ def damped_mode(cells: int, scheme: str, method: str) -> float:
     cosine = np.diff(np.sin(kappa * edges)) / (kappa * np.diff(edges))
 
     def waves(t: float) -> np.ndarray:
-        """Exact averages of the two waves, from pressure `a m'` ~ sin and mass flow ~ cos."""
+        """Exact averages of both waves, from pressure a m' ~ sin(kappa x) and mass flow ~ cos(kappa x)."""
         decay, scale = math.exp(-k * t / 2), 1e-4
         am = scale * decay * (math.cos(omega * t) + k / (2 * omega) * math.sin(omega * t))
         flow = -scale * decay * omega0 / omega * math.sin(omega * t)
@@ -192,7 +192,7 @@ def test_a_laminar_mode_decays_exactly_at_the_order_of_the_scheme(scheme, order)
 
 
 def test_flow_from_quasi_steady_friction_settles_on_the_colebrook_flow():
-    """Long after a partial opening the flow is the one its own friction factor gives."""
+    """Long after a partial opening the flow balances head and losses by the friction factor of `fluids`."""
     from fluids.friction import friction_factor
 
     friction = {"model": "quasi-steady", "roughness": 1e-3}
@@ -226,9 +226,9 @@ NINE = [  # Streeter and Wylie 1967: from, to, length [m], diameter [mm], Hazen-
 
 
 def test_the_nine_pipes_of_streeter_and_wylie_follow_the_characteristics():
-    """Every length is a whole number of metres and every wave speed 1200 m/s: one metre is an exact grid."""
+    """All lengths are whole metres and all wave speeds 1200 m/s, so a grid of 1 m is exact for the characteristics."""
     supply, shut = AMBIENT + RHO * GRAVITY * 191.0, 0.5
-    per_metre = 10.67 * RHO * GRAVITY  # of q^1.852 / (C^1.852 D^4.8704)
+    per_metre = 10.67 * RHO * GRAVITY  # factor of q^1.852 / (C^1.852 D^4.8704)
     lines = [
         Line(a, b, float(x), d / 1000, per_metre / (c**1.852 * (d / 1000) ** 4.8704 * RHO**1.852))
         for a, b, x, d, c in NINE
@@ -260,7 +260,7 @@ def test_the_nine_pipes_of_streeter_and_wylie_follow_the_characteristics():
 
 
 def test_a_friction_factor_is_that_of_the_wall_alone():
-    """Not the minor loss: none where there is no friction, and the given one beside any loss."""
+    """The reported factor excludes the minor loss and is None without friction."""
     nodes = {"a": lake(10.0), "b": lake(9.0)}
     found = []
     for friction in ({"model": "none"}, {"model": "steady", "factor": 0.02}):

@@ -1,4 +1,4 @@
-"""A frictionless pipe shut in no time: `dp = rho a v`, a square wave of period `4 L / a`."""
+"""Sudden closure of a frictionless pipe: dp = rho a v, a square wave of period 4 L / a."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PLACES = {"gate.pressure": 1.0, "main.pressure@0.5": 0.5, "main.pressure@0.21": 
 
 
 def shut_pipe(velocity: float, how: str, every: float = 0.01, turned: bool = False, **numerics) -> tuple[dict, float]:
-    """The case, the jump `rho a v` and the time it starts."""
+    """Return (case, jump rho a v [Pa]) of a flow that stops by `how`: initial_flow, demand or valve."""
     jump = RHO * SPEED * velocity
     supply = 2 * AMBIENT + 2 * jump
     q = velocity * scenes.area(DIAMETER)
@@ -41,7 +41,7 @@ def shut_pipe(velocity: float, how: str, every: float = 0.01, turned: bool = Fal
 
 
 def square_wave(t: np.ndarray, fraction: float, shut: float) -> tuple[np.ndarray, np.ndarray]:
-    """The wave over its jump, and the time to the nearest front [s]."""
+    """Return (square wave over its jump [-], time to the nearest front [s])."""
     period = 2 * LENGTH / SPEED
     value, distance = np.zeros_like(t), np.full_like(t, np.inf)
     for k in range(math.ceil(END / period) + 1):
@@ -53,7 +53,7 @@ def square_wave(t: np.ndarray, fraction: float, shut: float) -> tuple[np.ndarray
 
 
 def worst(result, jump: float, shut: float, turned: bool = False) -> float:
-    """Greatest distance from the square wave over the jump, three steps clear of fronts (a probe blends)."""
+    """Greatest difference from the square wave over the jump, three steps away from fronts (probes interpolate)."""
     t, errors = np.asarray(result.t), []
     for name in result.probes:
         fraction = 1.0 if "@" not in str(name) else float(str(name).split("@")[1])
@@ -93,7 +93,7 @@ def test_extremes_are_the_jump_up_and_down():
     supply = 2 * AMBIENT + 2 * jump
     least, t_least, greatest, t_greatest = fvsolve.run(case).extremes["gate.pressure"]
     assert [least, greatest] == pytest.approx([supply - jump, supply + jump], abs=1e-10 * jump)
-    for time, side in ((t_least, -1.0), (t_greatest, 1.0)):  # somewhere on a plateau of its own sign
+    for time, side in ((t_least, -1.0), (t_greatest, 1.0)):  # on a plateau of this sign
         assert square_wave(np.array([time + 1e-9]), 1.0, SHUT)[0][0] == side
 
 

@@ -1,4 +1,4 @@
-"""Pipes that meet: series, branches, dead ends, lengths that share no step; and no mode that grows."""
+"""Junctions of pipes: series, branches, dead ends, arbitrary lengths and valves, without growing modes."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ SUPPLY = 1e6
 
 
 def network(pipes: dict[str, tuple], demand: dict, end: float, numerics: dict, probes, every=0.01) -> dict:
-    """`pipes`: name -> (from, to, length, diameter, wave speed, cells); `lake` is a reservoir."""
+    """Return a case of pipes: name -> (from, to, length, diameter, wave speed, cells); `lake` is a reservoir."""
     places = {p for row in pipes.values() for p in row[:2]}
     nodes = {p: reservoir(SUPPLY) if p == "lake" else junction(demand.get(p)) for p in sorted(places)}
     return scene(nodes, {n: pipe(*row) for n, row in pipes.items()}, end, numerics, probes, every)
 
 
 def traced(pipes: dict[str, tuple], flows: dict[str, float], demand: dict) -> rays.Rays:
-    """The exact solution of the same network, from stated starting flows."""
+    """Exact solution of the case of `network` by ray tracing, from given initial flows."""
     laid = {n: rays.Pipe(*row[:5], flows.get(n, 0.0), SUPPLY) for n, row in pipes.items()}
     return rays.Rays(RHO, laid, {"lake": rays.held(SUPPLY)}, demand)
 
 
 def clear_of_jumps(exact: rays.Rays, place: str, t: np.ndarray, width: float, size: float) -> np.ndarray:
-    """Samples with no sudden change of the exact pressure of a node within `width` [s] of them."""
+    """Mask of times at which the exact pressure of a node varies by less than `size` [Pa] within `width` [s]."""
     shifts = np.linspace(-width, width, 21)
     around = np.array([[exact.pressure(place, float(s + d)) for d in shifts] for s in t])
     return np.ptp(around, axis=1) < size
@@ -117,7 +117,7 @@ def test_smooth_events_in_lengths_that_share_no_step_converge_fast():
 
 
 def scatter(cells: int, scheme: str, numerics: dict) -> float:
-    """L1 error of a bump that has met a junction of three pipes, over the bump."""
+    """L1 error of a bump after a junction of three pipes, relative to the bump."""
     rows = [
         ("blind0", "tee", 100.0, 0.3, 1000.0),
         ("tee", "blind1", 120.0, 0.2, 1200.0),
@@ -125,7 +125,7 @@ def scatter(cells: int, scheme: str, numerics: dict) -> float:
     ]
     pipes = {f"p{i}": (*row, cells) for i, row in enumerate(rows)}
     case = network(pipes, {}, 1.0, {"scheme": scheme, **numerics}, ["tee.pressure"])
-    case["nodes"]["blind1"] = reservoir(SUPPLY)  # something must fix the pressure
+    case["nodes"]["blind1"] = reservoir(SUPPLY)  # a given pressure is required
     model = fvsolve.build(fvsolve.load(case))
     state = fvsolve.initial_state(model)
     width, centre, end = 9.0, 55.0, 0.09
@@ -133,9 +133,9 @@ def scatter(cells: int, scheme: str, numerics: dict) -> float:
     state = fvsolve.advance(model, state, end)
     back, passed = scattered([row[4] / scenes.area(row[3]) for row in rows])
     exact = np.zeros(6 * cells)
-    # the wave reaches the tee at x = L; r = A p / (2 c) ... each wave is p over its impedance
+    # the bump reaches the tee at x = L; a wave is pressure over impedance
     z = [row[4] / scenes.area(row[3]) for row in rows]
-    at = centre + rows[0][4] * end - rows[0][2]  # how far past the tee, in the first pipe's lengths
+    at = centre + rows[0][4] * end - rows[0][2]  # distance beyond the tee, in the first pipe [m]
     edges = [np.linspace(0, row[2], cells + 1) for row in rows]
     exact[cells : 2 * cells] = back * gaussian_averages(rows[0][2] - edges[0][::-1], at, width)[::-1]
     for i in (1, 2):
@@ -178,7 +178,7 @@ def test_a_dead_end_doubles_a_wave():
 
 
 def test_a_valve_between_pipes_reflects_and_passes_what_its_equation_says():
-    """Exact at Courant 1: the drop over the valve solves `p1 - p2 - 2 Z m = (m / K)^2` at every step."""
+    """At Courant number 1 the flow solves p1 - p2 - 2 Z m = (m / K)^2 at every step."""
     d, a, flow_area, dt = 0.3, 1000.0, 0.01, 0.005
     nodes = {"lake": reservoir(SUPPLY), "a": junction(), "b": junction(), "sea": reservoir(0.5 * SUPPLY)}
     links = {
@@ -190,7 +190,7 @@ def test_a_valve_between_pipes_reflects_and_passes_what_its_equation_says():
     z, k = a / scenes.area(d), flow_area * math.sqrt(2 * RHO)
     drop, b = 0.5 * SUPPLY, 2 * z * k
     root = (-b + math.sqrt(b * b + 4 * drop)) / 2
-    first = (result.t > 0.06) & (result.t < 0.24)  # before the reservoirs answer
+    first = (result.t > 0.06) & (result.t < 0.24)  # before reflections return
     assert result["gap.flow"][first] == pytest.approx(k * root / RHO, rel=1e-12)
     assert result["a.pressure"][first] == pytest.approx(SUPPLY - z * k * root, rel=1e-12)
     assert result["b.pressure"][first] == pytest.approx(0.5 * SUPPLY + z * k * root, rel=1e-12)
@@ -221,7 +221,7 @@ def test_valves_in_series_act_as_one_of_their_summed_drops():
 
 
 def growth(case: dict) -> float:
-    """Greatest real part of the spectrum times the travel time of the shortest cell."""
+    """Greatest real part of the eigenvalues times the least travel time of a cell."""
     model = fvsolve.build(fvsolve.load(case))
     state = fvsolve.initial_state(model)
     spectrum = np.linalg.eigvals(jacobian(model, state))
@@ -230,7 +230,7 @@ def growth(case: dict) -> float:
 
 
 def jacobian(model, state) -> np.ndarray:
-    """Of the rhs, by differences that are exact for a linear rhs and close for a valve."""
+    """Jacobian of the rates by differences, which are exact for linear rates."""
     base, size = model.rhs(state.t, state.y), 1e-3
     columns = []
     for i in range(len(state.y)):
@@ -244,9 +244,9 @@ LINEAR = ["upwind", "linear-upwind", "fromm", "central", "upwind3", "upwind5"]
 
 
 def ended(cells: int, reflection: float, scheme: str) -> dict:
-    """A pipe from a reservoir to an end that reflects pressure by `reflection`, from -1 (fixed) to 1 (blind).
+    """Return a case of a pipe whose end reflects pressure by `reflection`, from -1 (fixed) to 1 (dead end).
 
-    Between them a valve that passes flow: its slope `2 dp / M` against the pipe's impedance.
+    For values between, an open valve has the ratio of its slope 2 dp / M to the impedance of the pipe.
     """
     d, a = 0.3, 1000.0
     z = a / scenes.area(d)
@@ -298,7 +298,7 @@ def test_no_mode_grows_in_random_networks(scheme):
 
 
 def random_network(rng: np.random.Generator, dt: float) -> tuple[dict, dict, rays.Rays]:
-    """Nodes, links and exact solution of five pipes, one of them closing a loop, with events on the step."""
+    """Return (nodes, links, exact solution) of five random pipes with a loop, and events at multiples of the step."""
     rows: dict[str, tuple] = {}
     for k in range(5):
         start = f"n{rng.integers(0, k + 1)}" if k < 4 else "n4"
@@ -341,7 +341,7 @@ def test_random_networks_with_loops_and_outlets_are_exact_at_courant_one(seed):
     case = scene(nodes, links, 100 * dt, SHARP, [f"{p}.pressure" for p in places] + ["out.flow"], dt)
     result = fvsolve.run(case)
     t = np.asarray(result.t)
-    late = np.append(np.diff(t) > 0, True)  # of two rows at a jump the later one
+    late = np.append(np.diff(t) > 0, True)  # the later of two rows at a jump
     for place in places:
         wanted = np.array([exact.pressure(place, round(s / dt) * dt) for s in t[late]])
         assert np.max(np.abs(result[f"{place}.pressure"][late] - wanted)) < 1e-9 * SUPPLY, place
@@ -367,7 +367,7 @@ def test_noise_in_short_frictionless_pipes_does_not_grow_in_a_long_run(scheme):
 
 @pytest.mark.parametrize("seed", range(15))
 def test_every_valve_of_a_random_bunch_obeys_its_law_and_every_junction_balances(seed):
-    """Three junctions between given pressures and a pipe, valves that move and shut in between."""
+    """Moving valves join three junctions to given pressures and a pipe."""
     rng = np.random.default_rng(seed)
     nodes = {"r0": reservoir(1e6), "r1": reservoir(float(rng.uniform(2e5, 2e6))), "r2": reservoir(4e5)}
     nodes |= {f"j{i}": junction(float(rng.choice([0.0, 1e-3]))) for i in range(3)}
@@ -378,7 +378,7 @@ def test_every_valve_of_a_random_bunch_obeys_its_law_and_every_junction_balances
         way = way if rng.random() < 0.5 else way[::-1]
         areas[f"v{k}"] = float(rng.uniform(1e-4, 5e-3))
         before, after = float(rng.uniform(0.1, 1.0)), float(rng.choice([0.0, 1.0, rng.uniform(0, 1)]))
-        after = after if k != 2 else 0.5  # one way out stays open for the demands
+        after = after if k != 2 else 0.5  # an outlet stays open for the demands
         links[f"v{k}"] = valve(*way, areas[f"v{k}"], ramp(0.1, 0.3, before, after))
     probes = [f"{n}.pressure" for n in nodes] + [f"{n}.flow" for n in areas] + ["main.flow@1"]
     result = fvsolve.run(scene(nodes, links, 0.8, SMOOTH, probes, 0.01))
@@ -392,7 +392,7 @@ def test_every_valve_of_a_random_bunch_obeys_its_law_and_every_junction_balances
         opening = v1 + (v0 - v1) * (1 - moved)
         drop = result[f"{link['from']}.pressure"] - result[f"{link['to']}.pressure"]
         law = flow_area * opening * np.sign(drop) * np.sqrt(2 * np.abs(drop) / RHO)
-        clear = (np.abs(drop) > 1.0) | (opening == 0)  # below, the laminar part and round-off of the drop
+        clear = (np.abs(drop) > 1.0) | (opening == 0)  # below: laminar flow, and rounding of the drop
         assert result[f"{name}.flow"][clear] == pytest.approx(law[clear], rel=1e-8, abs=1e-11), name
         total[link["from"]] -= result[f"{name}.flow"]
         total[link["to"]] += result[f"{name}.flow"]

@@ -1,4 +1,4 @@
-"""Leaks against closed forms: draining by any power, none backwards, between pipes and in networks."""
+"""Leaks against closed forms: drainage by any power of the pressure, no reverse flow, at pipes and in networks."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def leak(start: str, coefficient: float, exponent: float = 0.5, **more) -> dict:
 
 @pytest.mark.parametrize("n", [0.5, 1.0, 1.5])
 def test_a_tank_drains_by_the_power_of_its_level(n):
-    """A dz/dt = -C (rho g z)^n : z^(1-n) falls linearly, at n = 1 z falls exponentially."""
+    """A dz/dt = -C (rho g z)^n: z^(1 - n) falls linearly, and for n = 1 z falls exponentially."""
     section, level, end = 2.0, 3.0, 60.0
     c = 0.02 / (RHO * GRAVITY * level) ** n
     nodes = {"t": tank(section, level)}
@@ -36,7 +36,7 @@ def test_a_tank_drains_by_the_power_of_its_level(n):
 
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_the_steady_state_in_a_line_is_that_of_both_laws(law):
-    """What a valve brings into a dead end is what leaks there, at the elevation of the place."""
+    """The flow of a valve into a dead end equals the leakage there, with the elevation of the place."""
     nodes = {"lake": lake(60.0), "a": junction(elevation=10.0), "b": junction(elevation=12.0)}
     nodes["lake"]["elevation"] = 10.0
     links = {"gap": valve("lake", "a", 1e-3), "line": pipe("a", "b", 100.0, 0.1, 1000.0, 10), "hole": leak("b", 2e-6)}
@@ -53,7 +53,7 @@ def test_the_steady_state_in_a_line_is_that_of_both_laws(law):
 
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_nothing_comes_back_through_a_leak(law):
-    """Below ambient pressure its flow is exactly zero, and it flows again above; the mass ledger is closed."""
+    """Leakage is exactly zero below ambient pressure and follows its law above; the mass balance closes."""
     fall = {"time": [0.0, 1.0, 2.0, 3.0], "value": [2e5, 0.5e5, 0.5e5, 2e5]}
     nodes = {"lake": reservoir(fall), "b": junction()}
     links = {"line": pipe("lake", "b", 10.0, 0.1, 1000.0, 10), "hole": leak("b", 1e-6)}
@@ -80,7 +80,7 @@ def test_its_slope_is_bounded_without_a_jump_and_that_of_its_flow(n):
 
 @pytest.mark.parametrize("n", [0.3, 0.5, 1.0, 1.18, 2.0, 3.0])
 def test_newton_finds_its_balance_with_a_line_from_anywhere(n):
-    """c - Y p = M(p) from every side of the bends, made for a known root; and the drop that it tells gives its flow."""
+    """Newton's method finds the known root of c - Y p = M(p) from any start, and `emitter_drop` inverts the flow."""
     law, rng = np.array([n, 0.0, 1e5, 1e300]), np.random.default_rng(0)
     for _ in range(300):
         g, y, root = 10.0 ** rng.uniform(-9, -2), 10.0 ** rng.uniform(-7, -2), rng.choice([-3.0, 0.5, 7.0, 12.0, 4e4])
@@ -98,7 +98,7 @@ def test_newton_finds_its_balance_with_a_line_from_anywhere(n):
 
 
 def test_a_line_sucks_at_a_leak_and_the_run_goes_on():
-    """A sudden closure takes the pressure below ambient and back; the hole takes what its law says, or nothing."""
+    """A sudden closure takes the pressure below ambient and back; leakage follows its law, or is zero."""
     shut = {"time": [0.0, 0.5], "value": [1.0, 0.0], "kind": "step"}
     nodes = {"lake": reservoir(6e5), "gate": junction(), "low": reservoir(AMBIENT)}
     links = {"line": pipe("lake", "gate", 600.0, 0.1, 1000.0, 60), "hole": leak("gate", 6e-6)}
@@ -114,7 +114,7 @@ def test_a_line_sucks_at_a_leak_and_the_run_goes_on():
 
 
 def test_two_leaks_on_one_junction_share_what_a_valve_brings():
-    """A cluster of three laws, held by nothing but them."""
+    """Pressure of a junction at which only a valve and two leaks balance."""
     nodes = {"lake": reservoir(AMBIENT + 4e5), "a": junction()}
     links = {"gap": valve("lake", "a", 1e-4), "one": leak("a", 1e-6), "two": leak("a", 1e-9, 1.2)}
     model = fvsolve.build(fvsolve.load(scene(nodes, links, 1.0, {"step": 0.1}, ["a.pressure", "gap.flow"])))
@@ -155,7 +155,7 @@ def test_what_is_wrong_with_a_leak_is_said(wrong, said):
 
 @pytest.mark.parametrize("stated", [{}, {"position": [0.0, 0.0]}])
 def test_a_leak_is_drawn_where_it_drains(stated, tmp_path):
-    """It owns the place that it drains to, of which no other part speaks."""
+    """Fields are written although no other part names the outlet of the leak."""
     nodes = {"a": lake(40.0, **stated), "j": junction(**stated)}
     links = {"main": pipe("a", "j", 100.0, 0.1, 1000.0, 5), "hole": leak("j", 1e-6)}
     result = fvsolve.run(scene(nodes, links, 0.5, {}, ["hole.flow"], 0.1, output={"every": 0.1, "fields": 2}),

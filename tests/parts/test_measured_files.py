@@ -1,4 +1,4 @@
-"""What stands in a CSV file is what is read, or the file is refused with the line: separators, commas, units, bytes."""
+"""CSV files: values are read as written, or the fault names the line; separators, commas, units, encodings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Cylinders, masses and what pushes them, against closed forms and SciPy."""
+"""Cylinders, masses and force elements on an axis, against closed forms and SciPy."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LAWS = ("linear", "log")
 
 
 def run(jack: Jack, end: float, nodes: dict | None = None, links: dict | None = None, probes=(), rows=400, **more):
-    """A jack with what is added to it, its four states and `probes` recorded."""
+    """Return the result of a cylinder `jack` with further parts, with its four states and `probes`."""
     numerics = {**CLOSE, **more}
     case = scene({**jack.nodes(), **(nodes or {})}, {**jack.links(), **(links or {})}, end, numerics,
                  [*PROBES, *probes], end / rows, fluid=jack.fluid())  # fmt: skip
@@ -34,7 +34,7 @@ def states(result) -> np.ndarray:
 
 
 def crossings(t, values) -> np.ndarray:
-    """Times at which a smooth series rises through zero."""
+    """Times at which a smooth series crosses zero upwards."""
     roots = CubicSpline(t, values).roots(extrapolate=False)
     slope = CubicSpline(t, values).derivative()
     return np.array([root for root in roots if slope(root) > 0])
@@ -61,7 +61,7 @@ def test_a_closed_cylinder_of_a_real_fluid_swings_by_its_isentropic_modulus():
 
 
 def test_a_closed_cylinder_keeps_the_exact_period_of_its_log_law():
-    """p = p0 - beta ln(V / V0), swings of a tenth of the stroke: 6 % off the small ones; period by quadrature."""
+    """p = p0 - beta ln(V / V0); the period of large oscillations is computed by quadrature."""
     jack = Jack(pressures=(60e6, 60e6 * 12 / 8), v=22.0, dead=(2e-5, 2e-5), stroke=0.2)
     period, low, high = jack.closed_period()
     small = 2 * math.pi / math.sqrt(jack.hydraulic_spring() / jack.mass)
@@ -84,7 +84,7 @@ CUTS = ([0.0, 0.004, 0.012, 0.02, 0.03], [0.6, 0.6, -0.5, -0.5, 0.1])
 
 
 def edge_flows(jack: Jack, area: float, cuts=CUTS):
-    """Mass flows into A and B through a spool whose position is linear between `cuts`."""
+    """Return a function (t, p_A, p_B) for mass flows into A and B; the spool position is linear between `cuts`."""
 
     def through(share, p_up, p_down):
         return valve_flow(area, share, p_up, p_down, jack.density(max(p_up, p_down)))
@@ -101,7 +101,7 @@ def edge_flows(jack: Jack, area: float, cuts=CUTS):
 @pytest.mark.parametrize("method, rtol", [("dormand-prince", 1e-11), ("radau-iia-5", 1e-10)])
 @pytest.mark.parametrize("law", LAWS)
 def test_a_servo_cylinder_follows_the_trajectory_of_scipy(law, method, rtol):
-    """Spool, leak, friction, spring, damper and a force that ramps: pressures to 1e-9 of 100 bar."""
+    """Spool valve, leakage, friction, spring, damper and a force ramp: pressures within 1e-9 of 100 bar."""
     jack = Jack(law, pressures=(60e5, 80e5), leakage=2e-13, friction=300.0, stiffness=4e4, free=0.08, damping=150.0)
     cuts = [0.002, 0.01]
     push = {"type": "force", "to": "load", "force": {"time": cuts, "value": [0.0, -900.0]}}
@@ -135,7 +135,7 @@ def test_a_cylinder_open_to_the_air_on_both_sides_does_not_move_by_one_bit(law, 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_a_piston_in_balance_does_not_move_by_one_bit(law):
-    """Pressures that balance over unlike areas, a spring under load, a spool at rest."""
+    """Equilibrium of pressures on unequal areas, a loaded spring and a closed spool valve."""
     jack = Jack(law, stiffness=5e4, free=0.05, extra={"initial_pressure_A": AMBIENT + 60e5 + 2500 / 12e-4})
     jack.pressures = (0.0, AMBIENT + 90e5)
     result = run(jack, 0.5, SUPPLY, {"spool": spool(1e-5, 0.0)}, initial="equilibrium")
@@ -153,7 +153,7 @@ def test_what_moves_is_said_and_equilibrium_refuses_it():
 
 
 def test_chambers_without_a_stated_pressure_are_in_equilibrium_or_at_ambient():
-    """Between shut edges the pressure of equal small leaks: half the supply, as in any servo valve at rest."""
+    """Behind closed edges the pressure is that of equal small leaks: the mean of supply and return."""
     jack = Jack("linear")
     links = jack.links()
     del links["cyl"]["initial_pressure_A"], links["cyl"]["initial_pressure_B"]
@@ -164,7 +164,7 @@ def test_chambers_without_a_stated_pressure_are_in_equilibrium_or_at_ambient():
 
 
 def test_power_is_balanced_across_the_piston_and_its_ports():
-    """Kinetic + spring (82) + fluid energy changes by port power beta (exp(p / beta) - 1) q less what is damped."""
+    """Kinetic, spring and fluid energy change by the port power beta (exp(p / beta) - 1) q minus damping."""
     jack = Jack(pressures=(60e5, 80e5), leakage=2e-13, friction=300.0, stiffness=4e4, free=0.08, damping=150.0)
     result = run(jack, 0.02, SUPPLY, {"spool": spool(1e-5, 0.6)}, ["spool.flow_A", "spool.flow_B"], rows=4000)
     p_a, p_b, x, v = states(result)
@@ -194,7 +194,7 @@ def test_a_closed_cylinder_on_a_spring_keeps_its_energy():
 
 @pytest.mark.parametrize("law", LAWS)
 def test_rod_and_case_feel_equal_and_opposite_forces(law):
-    """A cylinder between two free masses: momentum is kept to round-off, and so is mass with volumes that move."""
+    """A cylinder between two free masses keeps their momentum and its fluid mass to rounding."""
     jack = Jack(law, pressures=(90e5, 20e5), friction=50.0)
     nodes = {"ground": {"type": "mass", "mass": 35.0, "initial_velocity": 0.2}}
     result = run(jack, 0.05, nodes, {}, ["ground.velocity", "ground.position", "cyl.position", "cyl.velocity"])
@@ -242,7 +242,7 @@ SWINGS = {
 
 @pytest.mark.parametrize("kind", SWINGS)
 def test_a_spool_opens_one_pair_of_edges_on_each_side_of_zero(kind):
-    """Flows follow the position's positive and negative parts, and each crossing of zero is a step boundary."""
+    """Flows follow the positive and the negative part of the position; each zero crossing is a step boundary."""
     nodes = {"P": reservoir(5e6), "T": reservoir(1e5), "A": reservoir(3e6), "B": reservoir(2e6)}
     ports = {port: port for port in "PTAB"}
     links = {"spool": {"type": "spool-valve", "ports": ports, "area": 1e-4, "position": SWINGS[kind]}}
@@ -278,7 +278,7 @@ def test_a_spool_opens_one_pair_of_edges_on_each_side_of_zero(kind):
 
 
 def test_leakage_levels_a_locked_cylinder_by_its_exponential():
-    """Both ports shut and the rod on a frame: dp falls as exp(-leakage (beta/V_A + beta/V_B) t)."""
+    """With closed ports and a fixed rod, dp falls as exp(-leakage (beta / V_A + beta / V_B) t)."""
     jack = Jack("linear", pressures=(60e5, 20e5), leakage=1e-12)
     nodes = {"ground": {"type": "frame"}, "load": {"type": "frame", "initial_position": 0.1}}
     case = scene(nodes, jack.links(), 0.5, CLOSE, PROBES[:2], 0.01, fluid=jack.fluid())
@@ -290,7 +290,7 @@ def test_leakage_levels_a_locked_cylinder_by_its_exponential():
 
 
 def bodies(links: dict, end: float, probes, rows=1000, load=None, **numerics):
-    """A mass of 2 kg and a frame without any fluid around."""
+    """Return the result of a mass of 2 kg and a fixed frame with `links`, without fluid."""
     nodes = {"wall": {"type": "frame"}, "load": {"type": "mass", "mass": 2.0, **(load or {})}}
     return fvsolve.run(scene(nodes, links, end, {**CLOSE, **numerics}, probes, end / rows))
 
@@ -299,7 +299,7 @@ def bodies(links: dict, end: float, probes, rows=1000, load=None, **numerics):
     "given", [{}, {"free_length": 0.3}, {"preload": 50.0}], ids=["plain", "free length", "preload"]
 )
 def test_a_mass_on_a_spring_swings_about_where_the_spring_is_slack(given):
-    """F = -k x (81) and k x^2 / 2 (82)."""
+    """Force -k x and energy k x^2 / 2 of a spring (docs/course.md, 81 and 82)."""
     spring = {"type": "spring", "from": "wall", "to": "load", "stiffness": 800.0, **given}
     probes = ["load.position", "load.velocity", "spring.force"]
     result = bodies({"spring": spring}, 2.0, probes, load={"initial_position": 0.1, "initial_velocity": 0.5})
@@ -325,7 +325,7 @@ def test_a_damper_brakes_by_its_exponential_and_a_force_speeds_up():
 @pytest.mark.parametrize("side", [1.0, -1.0], ids=["maximum", "minimum"])
 @pytest.mark.parametrize("damping", [0.0, 400.0], ids=["elastic", "damped"])
 def test_an_end_stop_throws_a_mass_back_and_never_holds_it(damping, side):
-    """Half a swing in touch, from x = 0.1 at v0; with damping until the contact would pull."""
+    """Contact from x = 0.1 at v0 lasts half a period, or with damping until the contact force would pull."""
     key, m, k, v0 = ("maximum" if side > 0 else "minimum"), 2.0, 5e5, 3.0
     stop = {"type": "end-stop", "from": "wall", "to": "load", "stiffness": k, "damping": damping, key: 0.1 * side}
     result = bodies({"stop": stop}, 0.1, ["load.velocity", "load.position", "stop.force"], 20000,
@@ -342,7 +342,7 @@ def test_an_end_stop_throws_a_mass_back_and_never_holds_it(damping, side):
 
 
 def test_a_mass_that_rests_on_a_stop_stays():
-    """Pressed onto a stop by a force: it sinks in until the stop carries it, and that is a start at rest."""
+    """The mass starts where the force of the compressed stop balances the load."""
     links = {"stop": {"type": "end-stop", "from": "wall", "to": "load", "stiffness": 1e6, "damping": 1e3,
                       "minimum": 0.1},
              "push": {"type": "force", "to": "load", "force": -250.0}}  # fmt: skip

@@ -1,4 +1,4 @@
-"""Cylinders, bodies and spools in a case file: what is read, and one bad file per message."""
+"""Cylinders, masses and spool valves in a case file: values as read, and a bad file for each message."""
 
 from __future__ import annotations
 
@@ -224,7 +224,7 @@ def test_a_bad_file_gets_its_message(name, tmp_path):
 
 
 def test_what_has_no_masses_loads_none_of_their_kernels(tmp_path):
-    """Neither imported nor compiled, and no state."""
+    """A case without masses does not import `mass_dynamics` and has no states of masses."""
     import subprocess
     import sys
 

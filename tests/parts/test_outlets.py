@@ -1,6 +1,6 @@
-"""Leaks, and demands that follow the pressure, where they shut, open, give all or less: what has left is what flowed.
+"""Leaks and pressure-dependent demands that open and close: the outflow of the mass balance is the integral of the law.
 
-Truth is the law itself, integrated by SciPy.
+The reference is the law, integrated by SciPy.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from fvsolve.studies.energy.energy_balance import energy
 
 ADAPTIVE = ("auto", "rodas-5p", "rodas-4", "radau-iia-5", "esdirk-4", "tr-bdf2", "dormand-prince", "bogacki-shampine")
 FIXED = ("rk4", "implicit-euler", "trapezoid", "implicit-midpoint")
-FOOT = 10.0  # above which the power holds, below it a cubic [Pa]
+FOOT = 10.0  # the law is a power above this drop and a cubic polynomial below [Pa]
 GAP = 0.01  # Cd A of the valve before a demand [m2]
 NEED = {"minimum_pressure": AMBIENT + 2e4, "required_pressure": AMBIENT + 4e4, "demand_exponent": 0.5}
 
 
 def power(x: float, n: float, span: float) -> float:
-    """(x / span)^n with its cubic foot."""
+    """(x / span)^n, with a cubic polynomial below FOOT."""
     if x >= FOOT:
         return (x / span) ** n
     s = max(x, 0.0) / FOOT
@@ -33,7 +33,7 @@ def power(x: float, n: float, span: float) -> float:
 
 
 def behind(gauge: float, law, least: float) -> float:
-    """Flow [m3/s] through a valve to a way out that opens at `least`, from a place at `gauge` [Pa]."""
+    """Flow [m3/s] from a place at `gauge` [Pa] through a valve to an outlet that opens at `least` [Pa]."""
     if gauge <= least:
         return 0.0
     p = brentq(lambda p: GAP * np.sqrt(2 * (gauge - p) / RHO) - law(p), least, gauge, xtol=1e-13, rtol=1e-15)
@@ -63,7 +63,7 @@ SOFT = WATER | {"bulk_modulus": 3e5}
 
 @functools.cache
 def left(outlet: str) -> float:
-    """What leaves a soft ball of 1 m3 that is filled and emptied by turns [kg]: dp/dt = K / V (fill - flow)."""
+    """Outflow [kg] of a soft chamber of 1 m3 with the inflow FILLS: dp/dt = K / V (inflow - outflow)."""
     law, y = LAWS[outlet], [5e4, 0.0]
     for start, end, fill in zip(TURNS, TURNS[1:], FILLS, strict=False):
         found = solve_ivp(lambda t, y, fill=fill: [3e5 * (fill - law(y[0])), law(y[0])], (start, end), y,
@@ -73,7 +73,7 @@ def left(outlet: str) -> float:
 
 
 def ball(outlet: str, numerics: dict, law: str = "linear") -> dict:
-    """That ball."""
+    """Return a case of the chamber of `left`."""
     nodes = {
         "mouth": inflow({"time": TURNS[:-1], "value": FILLS, "kind": "step"}),
         "ball": chamber(1.0, AMBIENT + 5e4), "town": junction(0.02, **NEED),
@@ -87,7 +87,7 @@ def ball(outlet: str, numerics: dict, law: str = "linear") -> dict:
 
 PAIRS = [
     (outlet, method) for outlet in LAWS for method in (*ADAPTIVE, *FIXED)
-    if outlet == "leak" or method not in ("dormand-prince", "bogacki-shampine")  # held by what stands behind the valve
+    if outlet == "leak" or method not in ("dormand-prince", "bogacki-shampine")  # limited by the node behind the valve
 ]  # fmt: skip
 
 
@@ -96,10 +96,10 @@ def test_a_way_out_of_a_soft_place_takes_nothing_in_and_lets_out_what_its_law_sa
     numerics = {"method": method, "step": 0.005} if method in FIXED else {"method": method}
     result = fvsolve.run(ball(outlet, numerics))
     way = result.ledger["mass"]["nodes"][f"{OUTSIDE[outlet]}.outside"]
-    near = 1e-4 if method == "implicit-euler" else 3e-5  # as the ball's own pressure is
+    near = 1e-4 if method == "implicit-euler" else 3e-5  # accuracy of the pressure
     assert way["outflow"] == pytest.approx(left(outlet), rel=near)
     assert way.get("inflow", 0.0) == 0.0
-    assert abs(result.ledger["mass"]["relative"]) < 1e-10  # of Rosenbrock methods, whose slopes round by differences
+    assert abs(result.ledger["mass"]["relative"]) < 1e-10  # bound of Rosenbrock methods, with slopes by differences
 
 
 @pytest.mark.parametrize("method", ["auto", "radau-iia-5", "rodas-4", "rk4"])
@@ -118,7 +118,7 @@ def test_its_energy_ledger_closes_over_steps_that_end_at_a_bend(method):
     assert relative < 1e-5
 
 
-SWINGS = [0.0, 10.0, 20.0, 30.0], [1e5, -0.5e5, 0.7e5, -0.2e5]  # of a source [s], [Pa]
+SWINGS = [0.0, 10.0, 20.0, 30.0], [1e5, -0.5e5, 0.7e5, -0.2e5]  # of a source: times [s], gauge pressures [Pa]
 TINY = 1e-6
 STATELESS = {
     "leak": (lambda gauge: leaks(gauge, TINY), 0.0, (0.0, FOOT)), "demand": (takes, 2e4, (2e4, 2e4 + FOOT, 4e4)),
@@ -127,7 +127,7 @@ STATELESS = {
 
 @functools.cache
 def passed(outlet: str) -> float:
-    """What leaves behind a valve from a source whose pressure swings [kg], between the bends of its law."""
+    """Outflow [kg] behind a valve from a source of varying pressure, integrated between the kinks of the law."""
     law, least, bends = STATELESS[outlet]
     edges = [p + RHO / 2 * (law(p) / GAP) ** 2 for p in bends]
     total = 0.0

@@ -1,4 +1,4 @@
-"""The worked example of docs/a-part-from-nothing.md, run as it stands there from a package that is not ours."""
+"""Worked example of docs/a-part-from-nothing.md, run as printed from a package outside fvsolve."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ RESISTANCE, LOSS, AREA, LEVEL = 2e6, 4e8, 2.0, 20.0
 
 @pytest.fixture(scope="module")
 def home(tmp_path_factory) -> Path:
-    """A folder with the scene and an installed package `mill`, which offers the runner."""
+    """Folder with the case and an installed package `mill` that provides the part `runner`."""
     top = tmp_path_factory.mktemp("mill")
     package = top / "mill" / "runner"
     package.mkdir(parents=True)
@@ -46,7 +46,7 @@ def home(tmp_path_factory) -> Path:
 
 
 def python(home: Path, *arguments: str, **environment: str) -> str:
-    """What a process prints that has the package; it must succeed."""
+    """Standard output of a Python process that can import the package; the process must succeed."""
     paths = [str(home), str(Path(fvsolve.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])]
     known = os.environ | {"PYTHONPATH": os.pathsep.join(paths), "MPLBACKEND": "Agg"} | environment
     done = subprocess.run([sys.executable, *arguments], cwd=home, env=known, capture_output=True, text=True)
@@ -59,7 +59,7 @@ def command(home: Path, *words: str, **environment: str) -> str:
 
 
 def flow(level: float, weight: float) -> float:
-    """The root of resistance q + loss q^2 = rho g level."""
+    """Root of resistance q + loss q^2 = rho g level."""
     return (-RESISTANCE + np.sqrt(RESISTANCE**2 + 4.0 * LOSS * weight * level)) / (2.0 * LOSS)
 
 
@@ -95,7 +95,7 @@ VALVE = {"type": "valve", "from": "upper", "to": "lower", "discharge_coefficient
 
 
 def test_its_shaft_takes_its_share(home):
-    """efficiency loss |q|^3 over the run, against SciPy's quadrature of the falling level."""
+    """Energy at the shaft: integral of efficiency loss |q|^3 over the run, by SciPy for the falling level."""
     found = json.loads(command(home, "energy", "mill.toml", "--json"))
     weight = fvsolve.load({**tomllib.loads(BLOCKS["mill.toml"]), "links": {"wheel": VALVE}})
     weight = weight.properties.density * weight.gravity
@@ -140,7 +140,7 @@ for law, method in itertools.product(("linear", "log", "table", "mixture"), ("rk
 
 
 def test_drawn_from_the_other_end_it_carries_as_much_the_other_way(home):
-    """Between pipes, while the flow turns: to rounding, by Rosenbrock steps to that of a Jacobian by differences."""
+    """Between pipes with reversing flow, both runs agree to rounding; `rodas-4` to that of difference quotients."""
     rows = [row.split() for row in python(home, "-c", REVERSED).splitlines()]
     assert len(rows) == 12
     for law, method, apart in rows:
@@ -160,7 +160,7 @@ def test_an_edit_of_its_law_counts_and_a_second_start_compiles_nothing(home):
     assert compiled() == 0
     text = law.read_text(encoding="utf-8")
     edited = text.replace("return copysign(0.5 *", "return copysign(0.25 *")
-    try:  # a text that no cache has
+    try:  # this text is in no cache
         law.write_text(f"{edited}\n# {uuid.uuid4()}\n", encoding="utf-8")
         assert compiled() > 0
         assert least() > first + 1.0  # half the flow
@@ -171,7 +171,7 @@ def test_an_edit_of_its_law_counts_and_a_second_start_compiles_nothing(home):
 
 
 def test_a_folder_can_be_named(home):
-    """By a variable of the environment, and in Python."""
+    """The folder of a part is given by FVSOLVE_PARTS or by `register_part`."""
     bare = home / "alone"
     bare.mkdir()
     (bare / "mill.toml").write_text(BLOCKS["mill.toml"], encoding="utf-8")

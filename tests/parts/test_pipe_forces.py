@@ -1,4 +1,4 @@
-"""The force on a leg of pipe is what the momentum of its fluid loses: Joukowsky's, and what ends and wall bear."""
+"""Forces on legs of a pipe: the momentum that their fluid loses, against Joukowsky and the forces on ends and wall."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ UNSTEADY = {"model": "unsteady", "roughness": 1e-4}
 
 
 def shut(turned: bool = False, **more) -> dict:
-    """A line of 840 m with a bend at 600 m that a demand stops at once; exact by cells of Courant 1."""
+    """Return a case of 840 m of pipe with a bend at 600 m, whose demand stops at once; exact at Courant number 1."""
     q = VELOCITY * area(DIAMETER)
     nodes = {"lake": reservoir(20 * AMBIENT), "gate": junction(step(SHUT, q, 0.0))}
     one = pipe("lake", "gate", 840.0, DIAMETER, SPEED, 42, bends=[600.0], initial_flow=q)
@@ -31,7 +31,7 @@ def shut(turned: bool = False, **more) -> dict:
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_joukowskys_force_on_a_bend_is_exact(turned: bool) -> None:
-    """rho a v A on the leg behind the gate while the front runs along it, l / a, then on the one before."""
+    """rho a v A on the leg at the gate while the front runs along it, and then on the leg before it."""
     found = fvsolve.run(shut(turned))
     low, high = (found[name] * (-1 if turned else 1) for name in found.probes)
     t = np.asarray(found.t)
@@ -61,7 +61,7 @@ def throttled(law: str, friction: dict, **numerics) -> dict:
 @pytest.mark.parametrize("method", ["rk4", "gauss-4", "rodas-4"])
 @pytest.mark.parametrize(("law", "friction"), [("linear", ROUGH), ("linear", UNSTEADY), ("log", ROUGH)])
 def test_the_ledger_of_momentum_closes(law: str, friction: dict, method: str) -> None:
-    """The probe, and d/dt of the momentum in the cells by the model's own rates."""
+    """The probe equals minus the rate of the momentum in the cells, from the rates of the model."""
     case = fvsolve.load(throttled(law, friction, method=method))
     model = build(case)
     state = fvsolve.advance(model, initial_state(model), 0.62)
@@ -75,7 +75,7 @@ def test_the_ledger_of_momentum_closes(law: str, friction: dict, method: str) ->
 
 
 def test_ends_and_wall_bear_what_the_momentum_loses() -> None:
-    """Under the linear law A (p_to - p_from), less that of the start, and what the wall brakes more than then."""
+    """Under the law `linear` the force is the change of A (p_to - p_from) plus wall friction since the start."""
     case, cells = throttled("linear", ROUGH), [(k + 0.5) / 10 for k in range(10)]
     case["output"]["probes"] += [f"main-2.pressure@{x}" for x in (0, 1)] + [f"main-2.flow@{x}" for x in cells]
     found = fvsolve.run(case)

@@ -1,4 +1,4 @@
-"""Pumps: operating points, affinity, series and parallel, zero change, other laws; against closed forms."""
+"""Pumps against closed forms: operating points, affinity laws, series, parallel, constant states, density laws."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def main(start: str, end: str, cells: int = 10, **more) -> dict:
 
 
 def rising(lift: float = 30.0, end: float = 5.0, numerics=None, probes=("pump.flow", "pump.head"), **pump_keys) -> dict:
-    """A pump from a sump at head 0 through a main to a lake at head `lift`."""
+    """Return a case of a pump from a sump at head 0 m through a main to a lake at head `lift` [m]."""
     nodes = {"sump": lake(0.0), "out": junction(), "top": lake(lift)}
     links = {"pump": pump("sump", "out", **pump_keys), "main": main("out", "top")}
     return scene(nodes, links, end, numerics or {}, probes)
@@ -54,7 +54,7 @@ CURVES = [
 
 @pytest.mark.parametrize("lift", [20.0, 59.9, 60.0, 70.0])
 def test_a_straight_curve_of_three_points_has_a_slope_at_no_flow(lift):
-    """Its head is zero at 0.6 m3/s, where the parabola of its end begins, b' = 100 / 1.2; reverse flow adds b' q^2."""
+    """The parabola from zero head at 0.6 m3/s has b' = 100 / 1.2; reverse flow adds b' q^2 to the straight line."""
     found = fvsolve.build(fvsolve.load(rising(lift, curve={"flow": [0.0, 0.1, 0.2], "head": [60.0, 50.0, 40.0]})))
     q = system(lambda q: 60.0 - 100.0 * q + (100.0 / 1.2 * q * q if q < 0.0 else 0.0), lift)
     assert found.tables.valves[0]["flow"] / RHO == approx(q, rel=1e-9, abs=1e-12)
@@ -113,13 +113,13 @@ def test_nothing_moves_by_a_bit_while_nothing_changes(law, curve):
     assert result.ok and not result.summary["marks"]
     for name in case["output"]["probes"]:
         assert np.ptp(result[name]) == 0.0
-    jet = 0.0 if law == "linear" else 1.0 / (2.0 * GRAVITY * (math.pi / 4 * BORE**2) ** 2)  # its v^2 / 2 g is lost
+    jet = 0.0 if law == "linear" else 1.0 / (2.0 * GRAVITY * (math.pi / 4 * BORE**2) ** 2)  # v^2 / 2 g is lost
     f = CURVES[0 if curve is ONE else 2][1]
     assert result["pump.flow"][0] == approx(system(lambda q: f(q) - jet * q * q), rel=1e-9 if law == "linear" else 2e-4)
 
 
 def test_slow_change_of_speed_follows_operating_points():
-    """A short rigid way: flows at every speed are those of curve and system."""
+    """Between two lakes the flow at every speed follows from the curve and the lift."""
     nodes = {"sump": lake(0.0), "top": lake(20.0)}
     speed = {"time": [0.0, 1.0], "value": [1.0, 0.8]}
     case = scene(nodes, {"pump": pump("sump", "top", curve=ONE, speed=speed)}, 1.0, {"step": 0.05, "method": "rk4"},
@@ -132,7 +132,7 @@ def test_slow_change_of_speed_follows_operating_points():
 
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_elevations_are_lifted_too(law):
-    """From a sump 3 m below to a tank 25 m above: heads alone count, at every elevation of the pump."""
+    """The flow depends on heads alone, not on the elevation of the pump."""
     flows = []
     for height in (-5.0, 4.0):
         nodes = {
@@ -153,7 +153,7 @@ def test_elevations_are_lifted_too(law):
 
 
 def test_a_pump_starts_from_rest_behind_its_check_valve():
-    """It opens once n^2 66.7 m exceeds the lift, and ends where curve and system meet."""
+    """The check valve opens when n^2 66.7 m exceeds the lift; the flow ends at the operating point."""
     speed = {"time": [1.0, 2.0], "value": [0.0, 1.0]}
     case = rising(30.0, 60.0, {"initial": "rest"}, curve=ONE, speed=speed, check_valve=True)
     result = fvsolve.run(case)

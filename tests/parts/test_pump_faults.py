@@ -1,4 +1,4 @@
-"""What a pump refuses, and how it says so."""
+"""Faults and notices of pumps in a case."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ FOUND = [
     ({"curve": {"flow": [0.0, 0.1], "head": [50.0, 50.0]}}, "the head must fall as the flow rises"),
     ({"curve": {"flow": [0.0, 0.1, 0.1], "head": [50.0, 40.0, 30.0]}}, "flows out of order: 0.1 comes after 0.1"),
     ({"curve": {"flow": [0.0], "head": [50.0]}}, "a single point must have a flow and a head above 0"),
-    ({"curve": {"flow": [], "head": []}}, "is not a list; expected a list of values"),
+    ({"curve": {"flow": [], "head": []}}, "has no values; expected a list of values"),
     ({"curve": {"flow": [0.0, 0.1], "head": [50.0]}}, "1 values for 2 flows"),
     ({"curve": {"coefficients": [50.0]}}, "fall to 0 at some flow"),
     ({"curve": {"coefficients": [50.0, 100.0, -5000.0]}}, "the head rises at a flow of 0 m3/s"),
@@ -38,7 +38,7 @@ FOUND = [
     ({"curve": ONE, "inertia": 2.0, "rated_speed": 150.0, "trip": -1.0}, "-1 s lies before the start at 0 s"),
     ({"curve": ONE, "speed": -1.0}, "speed: -1.0 is out of range"),
     ({"curve": ONE, "efficiency": 1.2}, "efficiency: 1.2 is out of range"),
-    ({"curve": ONE, "efficiency": {"flow": [0.0], "efficiency": [0.0]}}, "expected a value above 0 at a flow above 0"),
+    ({"curve": ONE, "efficiency": {"flow": [0.0], "efficiency": [0.0]}}, "no value above 0 at a flow above 0"),
     ({"curve": ONE, "efficiency": 0.8, "shaft_power": {"flow": [0.1], "power": [1e4]}}, "keep one"),
     ({"curve": ONE, "check_valve": 1}, "check_valve: 1 is neither true nor false"),
     ({"suter": {"rated_flow": 0.1, "rated_head": 50.0}}, "table, or head and torque, is missing"),
@@ -66,13 +66,13 @@ def test_faults_of_torques():
     motor = {"motor": {"type": "torque", "to": "pump.shaft", "torque": 1.0}}
     assert "pump.shaft has no inertia" in faults(motor, curve=ONE)
     held = {"curve": ONE, "inertia": 2.0, "rated_speed": 150.0, "trip": step(0.5, 0.0, 1.0)["time"][1]}
-    assert "is held by its motor until it trips" in faults(motor, **held)
+    assert "is held at its speed until the trip" in faults(motor, **held)
     wet = {"motor": {"type": "torque", "to": "out", "torque": 1.0}}
     assert "a hydraulic place, and this port of a torque needs a rotational or spatial place" in faults(wet, curve=ONE)
 
 
 def rounded(by: float) -> dict:
-    """A table of Suter form whose ends differ."""
+    """Return keys of a pump with a Suter table whose ends differ by `by`."""
     x = np.linspace(0.0, 2.0 * np.pi, 9)
     head, torque = 0.5 - np.cos(x), 0.4 - np.cos(x)
     head[-1] += by
@@ -109,7 +109,7 @@ def test_a_pump_drawn_backwards_is_asked_about_and_one_that_lifts_is_not():
     ((key, text),) = notes(down, "sump", "out", curve={"flow": [0.02], "head": [10.0]})
     assert key == "from" and "m lower" in text
     assert notes({**down, "top": lake(70.0)}, "sump", "out", curve={"flow": [0.02], "head": [10.0]}) == []  # a booster
-    assert notes(WATERS, "out", "sump", curve=ONE, speed=0.0) == []  # it stands
+    assert notes(WATERS, "out", "sump", curve=ONE, speed=0.0) == []  # at rest
 
 
 @pytest.mark.parametrize("flow, unit", [(20.0, "l/s"), (2000.0, "m3/h"), (20000.0, "l/min")])
@@ -128,7 +128,7 @@ def test_a_rated_flow_that_hardly_moves_in_the_pipes_beside_it_is_asked_about(fl
 @pytest.mark.parametrize(
     ("keys", "says"),
     [
-        ({"inertia": 1.5e4}, '"15000 kg cm2"'),  # 1.5 kg m2, which power and speed let expect to a factor of 2
+        ({"inertia": 1.5e4}, '"15000 kg cm2"'),  # power and speed give 1.5 kg m2 to a factor of 2
         ({"inertia": 0.0015}, "1.84 kg m2 is usual for 6.538e+04 W at 1480 rpm"),
         ({"inertia": 1.5}, None),
         ({"inertia": 15.0}, None),  # a flywheel

@@ -1,4 +1,4 @@
-"""Pumps in networks that change: every row obeys their curves; check valves do not chatter."""
+"""Pumps in networks that change: flows and heads lie on their curves, and check valves do not chatter."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CURVES = [
 
 
 def random_scene(seed: int) -> dict:
-    """Lakes and pipes joined by pumps, whose speeds go to zero and back, and a valve that shuts and opens."""
+    """Return a case of random pumps with random speeds between lakes, with a pipe and a valve that closes and opens."""
     rng = np.random.default_rng(seed)
     many = int(rng.integers(1, 4))
     nodes = {"sump": lake(0.0), "top": lake(float(rng.uniform(-10.0, 70.0))), "end": junction(), "out": junction()}
@@ -64,7 +64,7 @@ def test_flows_and_heads_lie_on_the_curves(seed, law):
 
 
 def test_two_pumps_in_parallel_of_which_one_is_too_weak_stand_as_a_steady_state():
-    """The check valve of the weak one is shut from the start; it opens once the strong one stops."""
+    """The check valve of the weak pump is shut at the start and opens after the strong pump stops."""
     strong, weak = {"flow": [0.1], "head": [50.0]}, {"flow": [0.05], "head": [20.0]}
     speed = {"time": [1.0, 2.0], "value": [1.0, 0.0]}
     links = {

@@ -1,4 +1,4 @@
-"""Curves with a Suter table joined to them, inertia that is estimated, pumps that start; against SciPy at 1e-12."""
+"""Curves with a joined Suter table, estimated inertia and starting pumps, against SciPy at 1e-12."""
 
 from __future__ import annotations
 
@@ -28,7 +28,10 @@ def suter(table, n, v):
 
 
 def turned_back():
-    """WH of the table, from the shut-off head of the curve on never less as the flow turns back, all at rated speed."""
+    """WH of the table, joined to the shut-off head of the curve.
+
+    At rated speed the head does not fall as the reverse flow rises.
+    """
     values, lack = RADIAL[0].copy(), 4.0 / 3.0 - RADIAL[0][44]
     for k in range(44, 21, -1):
         values[k] += lack * (1.0 - (44 - k) / 22)
@@ -42,7 +45,7 @@ BACK = turned_back()
 
 
 def head(n, q):
-    """4/3 of its head at no flow, none at twice its flow; beyond, the table of specific speed 24, the nearest 25."""
+    """Head [m]: HEAD / 3 (4 n^2 - v^2) from zero to twice the rated flow, elsewhere by the table `radial-25`."""
     v = q / FLOW
     if n > 0.0 and 0.0 <= v <= 2.0 * n:
         return HEAD / 3.0 * (4.0 * n * n - v * v)
@@ -57,7 +60,7 @@ POWERS = np.maximum((1.0 + FLOWS**2) * [suter(RADIAL[1], 1.0, v) for v in FLOWS]
 
 
 def torque(n, q):
-    """By the table, but not less than the efficiency at the rated point has it; straight lines over the curve."""
+    """Torque [N m] by the table; on the curve at least that of the rated efficiency, with linear interpolation."""
     v = q / FLOW
     if n > 0.0 and 0.0 <= v <= 2.0 * n:
         return TORQUE * n * n * np.interp(v / n, FLOWS, POWERS)
@@ -69,8 +72,8 @@ def test_a_table_goes_round_is_one_at_the_rated_point_and_resists_where_the_pump
     wh, wb = (np.array(row) for row in SUTER_TABLES[name])
     assert len(wh) == len(wb) == 89 and wh[0] == wh[-1] and wb[0] == wb[-1]
     assert 2.0 * wh[55] == 2.0 * wb[55] == approx(1.0)
-    assert (wh[44:56] > 0.0).all() and (wb[44:56] > 0.0).all()  # a pump lifts and brakes
-    assert wh[22] > 0.0 > wh[66] and wb[22] > 0.0 > wb[66]  # a standing one resists, and is driven, either way
+    assert (wh[44:56] > 0.0).all() and (wb[44:56] > 0.0).all()  # head and torque of a pump are positive
+    assert wh[22] > 0.0 > wh[66] and wb[22] > 0.0 > wb[66]  # at rest it resists both flows and is driven by them
     steps = np.abs(np.diff(wh)).max(), np.abs(np.diff(wb)).max()
     assert max(steps) < 0.4
 
@@ -93,7 +96,7 @@ METHODS = {
 
 @pytest.mark.parametrize("numerics, near", METHODS.values(), ids=METHODS)
 def test_a_curve_joined_to_its_table_follows_scipy_into_turbining(numerics, near):
-    """The steady state is the curve's to the bit; corners of the table bound what any method can reach."""
+    """The steady state equals that of the curve to the bit; kinks of the table limit the accuracy of all methods."""
     lift, end = 30.0, 10.0
     result = fvsolve.run(column(lift, end, ["pump.speed", "pump.flow", "pump.head"], numerics, **SHAFT, trip=1.0))
     alone = fvsolve.run(column(lift, 0.5, ["pump.flow", "pump.head"], numerics, curve=CURVE))
@@ -156,7 +159,7 @@ def test_energy_is_never_made_while_it_runs_down_and_back():
 
 
 def test_without_an_inertia_it_is_estimated_and_said():
-    """62.3 kW less a fifth at 1432 rpm; a given one is silent."""
+    """The estimate from 61.3 kW at 1432 rpm gives a notice; a given inertia gives none."""
     keys = {key: value for key, value in SHAFT.items() if key != "inertia"}
     power, speed = TORQUE * OMEGA / 1e3, OMEGA * 30.0 / math.pi / 1e3
     expected = 0.03768 * (power / speed**3) ** 0.9556 + 0.0043 * (power / speed) ** 1.48
@@ -170,7 +173,7 @@ def test_without_an_inertia_it_is_estimated_and_said():
 
 @pytest.mark.parametrize("numerics", [one for one, _ in METHODS.values()], ids=METHODS)
 def test_a_pump_starts_against_a_rigid_column_behind_its_check_valve(numerics):
-    """At rest until n^2 66.7 m exceeds the lift; from there one ODE, to SciPy's 1e-12."""
+    """Zero flow until n^2 66.7 m exceeds the lift; then the equation of the column, integrated by SciPy."""
     lift, end = 30.0, 8.0
     schedule = {"start": 1.0, "duration": 2.0, "value": [0.0, 1.0]}
     keys = {"curve": CURVE, "rated_speed": OMEGA, "speed": schedule, "check_valve": True}

@@ -1,4 +1,4 @@
-"""Pumps that trip: run-down of the shaft, columns, pipes, four quadrants, energy; against SciPy at 1e-12."""
+"""Pump trips: run-down of the shaft, rigid columns, pipes, four quadrants and energy, against SciPy at 1e-12."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ WH, WB = (np.array(row) for row in SUTER_TABLES["radial-35"])
 
 
 def head(n, q):
-    """The one-point curve: 4/3 of its head at no flow, none at twice its flow; a parabola backwards too."""
+    """Head [m] of the one-point curve, 50 / 3 (4 n^2 - v |v|) with v = q / 0.1, also for reverse flow."""
     return 50.0 / 3.0 * (4.0 * n * n - q * abs(q) / 0.01)
 
 
 def torque(n, q):
-    """Linear in the flow up to four times the rated one, n^2 (2 + q / (n q_rated)) / 3; held beyond and backwards."""
+    """Torque [N m]: T_R n^2 (2 + u) / 3 with u = q / (n q_R) limited to 0 to 4; zero if n is not positive."""
     return TORQUE * n * n * (2.0 + min(max(q / (n * 0.1), 0.0), 4.0)) / 3.0 if n > 0.0 else 0.0
 
 
@@ -53,7 +53,7 @@ def column(lift: float, end: float, probes, numerics=None, **keys) -> dict:
 
 
 def column_truth(lift, n0, q0, trip, end, head=head, torque=torque, check=False):
-    """(t, n, q) of pump, rigid column and lakes after a trip, by SciPy."""
+    """Return SciPy's solution (n, q) of pump, rigid column and lakes after a trip."""
     loss = FACTOR * LENGTH / BORE / (2.0 * GRAVITY * SECTION**2)
 
     def rate(t, y):
@@ -73,7 +73,7 @@ def operating_flow(lift, f=lambda q: head(1.0, q)):
 
 
 def test_a_lone_shaft_runs_down_as_one_over_time():
-    """At no flow the torque is T0 n^2: 1 / n = 1 + T0 (t - trip) / (J omega)."""
+    """At no flow the torque is T0 n^2, so 1 / n = 1 + T0 (t - trip) / (J omega)."""
     nodes = {"sump": lake(0.0), "top": lake(100.0)}
     keys = {**SHAFT, "trip": 1.0, "check_valve": True}
     result = fvsolve.run(scene(nodes, {"pump": pump("sump", "top", **keys)}, 10.0, TIGHT, ["pump.speed", "pump.flow"]))
@@ -106,7 +106,7 @@ def test_pump_column_and_lakes_follow_scipy(check):
 
 
 def test_four_quadrants_follow_scipy_into_turbining():
-    """The table is straight between its values, so its corners bound what any method can reach."""
+    """Kinks of the table, which is linear between its values, limit the accuracy of all methods."""
     lift, end = 30.0, 12.0
     result = fvsolve.run(column(lift, end, ["pump.speed", "pump.flow", "pump.head"], **FOUR, trip=1.0))
     heads = lambda n, q: 50.0 * suter(WH, n, q)  # noqa: E731
@@ -115,7 +115,7 @@ def test_four_quadrants_follow_scipy_into_turbining():
     truth = column_truth(lift, 1.0, q0, 1.0, end, heads, lambda n, q: TORQUE * suter(WB, n, q))
     after = result.t > 1.0
     n, q = truth.sol(result.t[after])
-    assert n[-1] < -0.8 and q[-1] < -0.04  # it turns and flows backwards
+    assert n[-1] < -0.8 and q[-1] < -0.04  # reverse speed and flow
     assert result["pump.speed"][after] == approx(n, abs=1e-7)
     assert result["pump.flow"][after] == approx(q, abs=1e-8)
     assert not result.summary["marks"]
@@ -126,7 +126,7 @@ def test_the_published_table_is_the_rated_point_where_it_should_be():
     assert suter(WH, 1.0, 0.1) == approx(1.0) and suter(WB, 1.0, 0.1) == approx(1.0)
 
 
-SPEED, FAR = 1000.0, 1000.0  # of waves, and how far the lake lies
+SPEED, FAR = 1000.0, 1000.0  # wave speed [m/s] and length of the main [m]
 
 
 def line(lift: float, end: float, numerics, probes, cells: int = 100, **keys) -> dict:
@@ -136,7 +136,7 @@ def line(lift: float, end: float, numerics, probes, cells: int = 100, **keys) ->
 
 
 def test_a_pump_that_stops_at_once_makes_the_joukowsky_drop():
-    """Against a C- line from the lake: -b q|q| = lift + (a / g A) (q - q0), exact at Courant 1."""
+    """At Courant number 1 exactly -b q |q| = lift + (a / g A) (q - q0), the characteristic from the lake."""
     lift, rise = 40.0, SPEED / (GRAVITY * SECTION)
     case = line(lift, 2.9, SHARP, ["out.head", "pump.flow"], curve=ONE, speed=step(1.0, 1.0, 0.0))
     result = fvsolve.run(case)
@@ -146,11 +146,11 @@ def test_a_pump_that_stops_at_once_makes_the_joukowsky_drop():
     assert result["pump.flow"][during] == approx(q, rel=1e-10)
     assert result["out.head"][during] == approx(head(0.0, q), rel=1e-10)
     shut = fvsolve.run(line(lift, 2.9, SHARP, ["out.head"], curve=ONE, speed=step(1.0, 1.0, 0.0), check_valve=True))
-    assert shut["out.head"][during] == approx(result["out.head"][during], rel=1e-10)  # q > 0: nothing to shut yet
+    assert shut["out.head"][during] == approx(result["out.head"][during], rel=1e-10)  # q > 0: it stays open
 
 
 def test_trip_against_a_pipe_follows_its_characteristic():
-    """Until the wave is back from the lake H = lift + (a / g A) (q - q0), so that the shaft is one ODE."""
+    """H = lift + (a / g A) (q - q0) until the reflection returns from the lake, so one equation gives the speed."""
     lift, rise = 40.0, SPEED / (GRAVITY * SECTION)
     numerics = {"scheme": "upwind5", "method": "rk4", "courant": 0.8}
     result = fvsolve.run(line(lift, 2.9, numerics, ["pump.speed", "out.head"], 200, **SHAFT, trip=1.0))
@@ -158,9 +158,9 @@ def test_trip_against_a_pipe_follows_its_characteristic():
     flow = lambda n: brentq(lambda q: head(n, q) - lift - rise * (q - q0), -1.0, 1.0, xtol=1e-15)  # noqa: E731
     rate = lambda t, y: [-torque(y[0], flow(y[0])) / (INERTIA * OMEGA)]  # noqa: E731
     truth = solve_ivp(rate, (1.0, 2.9), [1.0], method="DOP853", rtol=1e-12, atol=1e-14, dense_output=True)
-    after = (result.t > 1.0) & (result.t < 2.8)  # later, forerunners of the wave that comes back
+    after = (result.t > 1.0) & (result.t < 2.8)  # later, precursors of the reflection
     n = truth.sol(result.t[after])[0]
-    assert result["pump.speed"][after] == approx(n, rel=1e-7)  # its torque has a corner, at four times the rated flow
+    assert result["pump.speed"][after] == approx(n, rel=1e-7)  # kink of the torque at four times the rated flow
     assert result["out.head"][after] == approx([head(one, flow(one)) for one in n], abs=1e-6)
 
 
@@ -178,7 +178,7 @@ def test_order_of_a_method_is_kept_across_the_trip():
 
 
 def test_given_torques_turn_the_shaft():
-    """Balanced at the start nothing moves by a bit; then the torque falls away as a trip does."""
+    """The balancing torque keeps the speed to the bit; without torque the speed falls as after a trip."""
     q0 = operating_flow(30.0)
     balance = torque(1.0, q0)
     case = column(30.0, 3.0, ["pump.speed", "pump.flow"], **SHAFT)
@@ -193,7 +193,7 @@ def test_given_torques_turn_the_shaft():
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("check", [False, True])
 def test_energy_ledger_of_a_trip_closes(law, check):
-    """What the motor gave, less what the shaft, the water and the lakes hold, is what pump and main have lost."""
+    """The energy balance closes; work of the motor and kinetic energy of the shaft equal their formulas."""
     numerics = {"scheme": "upwind5", "method": "rk4", "courant": 0.8}
     case = line(40.0, 6.0, numerics, ["pump.flow"], 40, **SHAFT, trip=1.0, check_valve=check)
     case["fluid"] = {**case["fluid"], "law": law}
@@ -215,7 +215,7 @@ def test_energy_ledger_without_pipes_closes_with_the_step():
 
 
 def test_a_study_holds_the_motor_as_it_is():
-    """A trip to come is no part of a state: the shaft's pole is 0 before it, and after it that of its torque."""
+    """A later trip is no part of the linearised system: the shaft has rate 0, after the trip that of its torque."""
     case = column(30.0, 3.0, ["pump.speed"], **SHAFT, trip=1.0)
     start, found = linearise(case), linearise(case, at=2.0)
     k = start.states.index("pump.speed")
@@ -237,7 +237,7 @@ def test_torque_is_an_input():
 
 
 def test_every_dependence_of_a_tripped_pump_is_in_the_pattern():
-    """Differences of the right-hand side about a state after the trip, column by column."""
+    """Differences of the rates after the trip are zero outside the Jacobian pattern."""
     from fvsolve.model.jacobian_pattern import jacobian_pattern
 
     model = fvsolve.build(fvsolve.load(line(40.0, 3.0, {}, ["pump.flow"], 6, **SHAFT, trip=0.0)))
@@ -262,7 +262,7 @@ def test_implicit_steps_follow_scipy_too():
 
 
 def test_a_pump_that_runs_down_forward_until_its_check_valve_shuts_is_a_note_and_no_mark():
-    """In forward flow beyond the last flow, shut at 4.05 s; without a check valve a mark."""
+    """Forward flow beyond the curve until the check valve shuts gives a notice; without a check valve, a mark."""
     result = fvsolve.run(column(30.0, 6.0, ["pump.flow"], **SHAFT, trip=1.0, check_valve=True))
     assert [event["what"] for event in result.summary["events"]] == ["check valve shuts"]
     assert result.marks == [] and result.ok

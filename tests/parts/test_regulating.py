@@ -1,4 +1,4 @@
-"""Valves that regulate: SciPy at 1e-12 through their stops, steady states of networks by their laws and by EPANET."""
+"""Regulating valves: motion through both stops against SciPy, steady states of random networks, rigid columns."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def regulating(kind, start, end, given, **more):
 
 
 def filled(rest, numerics):
-    """A chamber that a pressure-reducing valve fills while its outlet opens and all but shuts, down to `rest`."""
+    """Return a case of a chamber behind a pressure-reducing valve, whose outlet opens and then closes to `rest`."""
     nodes = {"lake": reservoir(1e6), "pot": chamber(2.0), "end": reservoir(1e5)}
     opening = {"time": [1.0, 2.0, 4.0, 5.0], "value": [0.6, 1.0, 1.0, rest]}
     links = {"prv": regulating("pressure-reducing", "lake", "pot", SET, area=6e-4, discharge_coefficient=1.0),
@@ -74,7 +74,7 @@ def test_it_follows_scipy_through_both_stops(method):
 
 
 def network(seed: int, count: int) -> dict:
-    """A random net of two lakes with some valves of all three kinds in it."""
+    """Return a case of a random network of two lakes with `count` regulating valves of random kinds."""
     rng, n = np.random.default_rng(seed), 12
     demands = (0.0, 0.0, 0.005, 0.01)
     nodes = {f"n{i}": junction(float(rng.choice(demands)), elevation=float(rng.uniform(0, 20))) for i in range(n)}
@@ -95,7 +95,7 @@ def network(seed: int, count: int) -> dict:
 
 
 def standing(case, model, name) -> str:
-    """As what a valve of a solved net stands, "" where its law does not hold."""
+    """Mode of a valve in a solved network: active, open or shut; an empty text if its law does not hold."""
     link, row = case["links"][name], model.tables.valves[model.valve_names.index(name)]
     nodes = model.checks["nodes"]
     m, g = float(row["flow"]), float(row["conductance"])
@@ -115,7 +115,7 @@ def standing(case, model, name) -> str:
 
 
 def hangs_on_valves(case) -> float:
-    """What is drawn where only valves that regulate lead to [m3/s]."""
+    """Demand at nodes that only regulating valves join to a lake [m3/s]."""
     names, links = list(case["nodes"]), case["links"].values()
     pairs = [(names.index(x["from"]), names.index(x["to"])) for x in links if x["type"] == "pipe"]
     label = union(len(names), pairs)
@@ -126,9 +126,10 @@ def hangs_on_valves(case) -> float:
 
 @pytest.mark.parametrize("count, refused", [(1, [27]), (3, []), (6, [38])])
 def test_every_valve_of_a_random_net_obeys_its_law(count, refused):
-    """Of the two that are refused one draws 0.04 m3/s through a valve set to 0.0194, one through valves that are shut.
+    """The mode of every valve obeys its law, except in two networks, which are refused.
 
-    Of all 3^6 ways in which the valves of seeds 17 and 30 can stand, one or two are a steady state; they are found.
+    The first demands 0.04 m3/s through a valve set to 0.0194 m3/s, the second through closed valves. Of all 3^6
+    combinations of modes in the networks of seeds 17 and 30, one or two are steady states, and the solver finds them.
     """
     seen = set()
     for seed in range(40):
@@ -200,18 +201,18 @@ COLUMN = {"type": "rigid-column", "length": 50.0, "diameter": 0.1,
 
 
 def lag_of(kind, after):
-    """Long where it senses the far side, which its flow does not mend."""
+    """Time constant [s]: large if the valve senses the pressure of a reservoir, which its flow does not change."""
     return 0.3 if after == (kind == "pressure-sustaining") else 30.0
 
 
 def far_ends(kind, start, end):
-    """(before, behind) a valve and its column, one of them from `start` to `end` in two seconds."""
+    """Return (upstream, downstream) pressure of the reservoirs, one of them a ramp from `start` to `end` in 2 s."""
     moves = {"time": [2.0, 4.0], "value": [start, end]}
     return (8e5, moves) if kind == "pressure-reducing" else (moves, 1e5)
 
 
 def held_column(kind, after, ends, law, numerics):
-    """A valve, set to 5 bar, beside the column it alone holds; `after` it, or before."""
+    """Return (case, name of the valve) of a valve set to 5 bar before a rigid column, or `after` it."""
     part = {"type": kind, "area": 0.01, "discharge_coefficient": 0.61, "set_pressure": 5e5}
     part["time_constant"] = lag_of(kind, after)
     first, second = (COLUMN, part) if after else (part, COLUMN)
@@ -222,7 +223,7 @@ def held_column(kind, after, ends, law, numerics):
 
 
 def equations(kind, after, ends):
-    """(source, lifted, G, stroke, inertia, friction) as `reference.stems` wants them."""
+    """Return (source, lifted, G, stroke, inertia, friction) for `reference.stems`."""
     bore = math.pi * 0.05**2
     up, down = (lambda t, p=p: np.interp(t, p["time"], p["value"]) if isinstance(p, dict) else p for p in ends)
 
@@ -240,13 +241,13 @@ def opening_ends(kind):
 
 @functools.cache
 def leaving(kind, after, at):
-    """Lift and mass flow at the times `at` while the valve leaves its seat, by SciPy."""
+    """Lift and mass flow at the times `at` while the valve opens, by SciPy."""
     return stems.leaves_with_column(*equations(kind, after, opening_ends(kind)), 8.0 / 3.0, [4.0], at)
 
 
 @functools.cache
 def shutting(kind, after):
-    """Time at which the valve meets its seat, by SciPy."""
+    """Time at which the valve shuts, by SciPy [s]."""
     return stems.shuts_with_column(*equations(kind, after, shutting_ends(kind)), 2.0)
 
 
@@ -261,7 +262,7 @@ def shutting_ends(kind):
 @pytest.mark.parametrize("kind", ["pressure-reducing", "pressure-sustaining"])
 @pytest.mark.parametrize("after", [False, True])
 def test_it_leaves_its_seat_with_the_column_that_it_holds_as_their_equations_say(kind, after, law, numerics):
-    """Both start as s^2, and exchange what they have at a rate that starts at infinity, beyond any given step's."""
+    """Lift and flow start as the square of time, and the rate of their coupling is infinite at first."""
     case, name = held_column(kind, after, opening_ends(kind), law, numerics)
     result, at = fvsolve.run(case), (2.8, 3.0, 3.2, 4.0, 6.0)
     lift, flow = leaving(kind, after, at)
@@ -278,7 +279,7 @@ def test_it_leaves_its_seat_with_the_column_that_it_holds_as_their_equations_say
                                       {"method": "rk4", "step": 1e-3}])  # fmt: skip
 @pytest.mark.parametrize("kind", ["pressure-reducing", "pressure-sustaining"])
 def test_it_comes_to_its_seat_with_the_column_that_it_holds(kind, numerics):
-    """Ever faster they exchange what they have, until both stand: nothing is left to be stopped dead."""
+    """Lift and flow reach zero together, so no flow remains when the valve shuts."""
     after = kind == "pressure-sustaining"
     case, name = held_column(kind, after, shutting_ends(kind), "linear", numerics)
     result = fvsolve.run(case)

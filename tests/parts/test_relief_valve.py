@@ -1,4 +1,4 @@
-"""Relief valves: a plateau in closed form, SciPy at 1e-12 with either disc, their start, and bad input."""
+"""Relief valves: a plateau in closed form, both kinds of disc against SciPy at 1e-12, reverse flow, starts, faults."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def relief(start, end, flow_area, set_pressure=SET, overpressure=SPAN, **more):
 
 
 def filled(numerics=TIGHT, **disc):
-    """A chamber that is filled through a valve for a while, with a relief valve on it."""
+    """Return a case of a chamber with a relief valve, filled through a valve from 0.5 s to 7 s."""
     nodes = {"pump": reservoir(1.2e6), "pot": chamber(2.0, 3e5), "sump": reservoir(1e5)}
     opening = {"time": [0.5, 1.0, 6.0, 7.0], "value": [0.0, 1.0, 1.0, 0.0]}
     links = {"in": valve("pump", "pot", 5e-4, opening), "out": valve("pot", "sump", 1e-4),
@@ -40,7 +40,7 @@ def through(area, drop):
 
 
 def pot(t, p, x):
-    """dp/dt of that chamber at a lift x."""
+    """Pressure rate [Pa/s] of the chamber of `filled` at a lift x."""
     opening = np.interp(t, [0.5, 1.0, 6.0, 7.0], [0.0, 1.0, 1.0, 0.0])
     q = through(5e-4 * opening, 1.2e6 - p) - through(1e-4, p - 1e5) - through(RELIEF * min(max(x, 0), 1), p - 1e5)
     return BETA / 2.0 * q
@@ -84,7 +84,7 @@ def test_without_a_disc_it_is_the_pressure_alone_that_lifts_it():
 
 
 def main(numerics, law="linear", **more):
-    """A frictionless main whose gate shuts, with a relief valve at its end."""
+    """Return a case of a frictionless main with a gate that shuts and a relief valve at its end."""
     nodes = {"lake": reservoir(6e5), "end": junction(), "out": reservoir(1e5)}
     gate = {"start": 0.1, "duration": 0.2, "value": [1.0, 0.0]}
     links = {"main": pipe("lake", "end", 1000.0, 0.3, 1000.0, 50), "gate": valve("end", "out", 0.004, gate),
@@ -109,7 +109,7 @@ def test_the_surge_ends_where_the_characteristic_meets_the_valve(set_pressure, o
 
 
 def test_a_gate_that_shuts_at_once_lifts_it_to_where_it_stays():
-    """Shut, the pressure would open it fully; fully open, it would shut it: it comes to rest between, in few events."""
+    """Neither the closed nor the fully open valve is in balance; it reaches a lift between, in few events."""
     case = main(SMOOTH, flow_area=0.02)
     case["links"]["gate"]["opening"] = {"time": [0.0, 0.1], "value": [1.0, 0.0], "kind": "step"}
     result = fvsolve.run(case)
@@ -122,12 +122,12 @@ def test_other_laws_lift_it_alike(law, near):
     assert ours == pytest.approx(plain, rel=near) and ours != plain
 
 
-Z = 1000.0 / (math.pi / 4 * 0.1**2)  # of a main [Pa s/kg]
-TURN, SLOPE = 4.0, 5e4  # of the lake above: it falls by so much a second, and from then on rises
+Z = 1000.0 / (math.pi / 4 * 0.1**2)  # impedance of a main [Pa s/kg]
+TURN, SLOPE = 4.0, 5e4  # the upper lake falls by SLOPE [Pa/s] until TURN [s], then rises
 
 
 def backwards(flow_area, law="linear"):
-    """A relief valve between two long mains; the lake above falls below the one beyond, and rises again."""
+    """Return a case of a relief valve between long mains; the upper lake falls below the lower lake and rises again."""
     falls = {"time": [0.0, 1.0, TURN, 7.0], "value": [3e5, 3e5, 3e5 - SLOPE * (TURN - 1.0), 3e5]}
     nodes = {"up": reservoir(falls), "a": junction(), "b": junction(), "down": reservoir(2.4e5)}
     links = {"to-a": pipe("up", "a", 5000.0, 0.1, 1000.0, 100), "from-b": pipe("b", "down", 5000.0, 0.1, 1000.0, 100),
@@ -137,21 +137,21 @@ def backwards(flow_area, law="linear"):
 
 
 def seen(flow_area):
-    """Times at which it leaves full opening, shuts, opens and is full again, by what meets at a and b.
+    """Times at which the valve leaves full opening, shuts, opens and is fully open, by the characteristics.
 
-    Backwards, M(x) raises p_a: of two lifts with x = (p_a(x) - set) / span it keeps the greater; it shuts where that
-    ends, and opens where the pressure without flow has come back.
+    Reverse flow M(x) raises p_a. Of two lifts with x = (p_a(x) - set) / span the valve keeps the greater. It shuts
+    where this lift ceases to exist, and opens where the pressure without flow has returned.
     """
     g = 2.0 * RHO * flow_area**2
     first = math.sqrt(g * 6e4)
 
-    def flow(x, fall):  # M |M| = x^2 G (drop - 2 Z (M - first)), below zero
+    def flow(x, fall):  # M |M| = x^2 G (drop - 2 Z (M - first)) for M < 0
         free, gx = 2.0 * fall - 6e4 - 2.0 * Z * first, 2.0 * Z * g * x * x
         return -2.0 * x * x * g * free / (gx + math.sqrt(gx * gx + 4.0 * x * x * g * free)) if x > 0.0 else 0.0
 
     over = lambda x, fall: (3e5 - 2.0 * fall + Z * (first - flow(x, fall)) - 1.5e5) / 2e4 - x  # noqa: E731
     x = np.linspace(0.0, 1.0, 2001)
-    least = 3e4 + Z * first  # where nothing drives it
+    least = 3e4 + Z * first  # zero driving pressure
     greatest = lambda fall: max(over(one, fall) for one in x)  # noqa: E731
     full = brentq(lambda fall: over(1.0, fall), least, 1.5e5, xtol=1e-3)
     empty = brentq(lambda fall: over(0.0, fall), least, 1.5e5, xtol=1e-3)
@@ -163,7 +163,7 @@ def seen(flow_area):
 @pytest.mark.parametrize("law, near", [("linear", 1e-3), ("log", 3e-3), ("mixture", 3e-3)])
 @pytest.mark.parametrize("flow_area", [1e-5, 2e-5, 4e-5])
 def test_flow_that_comes_back_holds_it_open_until_it_falls_shut(flow_area, law, near):
-    """A small one follows the pressure both ways; a greater one, lifted by its own backward flow, snaps."""
+    """A small valve follows the pressure both ways; a larger valve, which its reverse flow lifts, shuts suddenly."""
     result = fvsolve.run(backwards(flow_area, law))
     events = result.summary["events"]
     assert result.ok
@@ -174,7 +174,7 @@ def test_flow_that_comes_back_holds_it_open_until_it_falls_shut(flow_area, law, 
 
 @pytest.mark.parametrize("scheme", ["upwind3", "linear-upwind", "muscl"])
 def test_steps_of_a_lake_drive_it_both_ways_to_the_end(scheme):
-    """Its equation with the nodes had no root backwards where Newton sought one, and ran off."""
+    """Sudden changes of the head reverse the flow, and Newton's method converges throughout."""
     heads = {"time": [0.0, 0.3, 0.7], "value": [30.0, 12.0, 35.0], "kind": "step"}
     nodes = {"up": lake(heads), "down": lake(20.0), "a": junction(), "b": junction()}
     main = lambda start, end: pipe(start, end, 60.0, 0.1, 1000.0, 4, friction=ROUGH)  # noqa: E731
@@ -185,7 +185,7 @@ def test_steps_of_a_lake_drive_it_both_ways_to_the_end(scheme):
 
 
 def test_order_is_not_lost_at_a_located_switch():
-    """With the gate's kinks on steps, rk4 converges at fourth order through the event of the valve's opening."""
+    """With the kinks of the gate at steps, rk4 has order 4 through the event of the opening."""
     case = filled({"method": "rk4", "step": 0.1})
     fine = fvsolve.run(case, set={"numerics.step": 0.1 / 32})
     errors = [abs(fvsolve.run(case, set={"numerics.step": h})["pot.pressure"][-1] - fine["pot.pressure"][-1])

@@ -1,4 +1,4 @@
-"""Networks on bodies: U-tubes that roll, pipes that are turned and accelerated, against closed forms and (70)."""
+"""Moving networks: rolling U-tubes, turned and accelerated pipes, against closed forms and (70) of docs/course.md."""
 
 import meshio
 import numpy as np
@@ -11,19 +11,19 @@ from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.output.fields import read_series
 from fvsolve.studies.energy.energy_balance import energy
 
-HALF, DEPTH, LEVEL = 4.0, 1.5, 0.8  # of a U-tube: between its arms, of its duct below the axis, of water above that [m]
-TANK, BORE, LOSS = 1.2, 0.6, 3.0  # [m2], [m]
+HALF, DEPTH, LEVEL = 4.0, 1.5, 0.8  # half distance of arms, depth of the duct, level above the duct [m]
+TANK, BORE, LOSS = 1.2, 0.6, 3.0  # area of tanks [m2], bore of the duct [m], loss [-]
 ROLL = {"mean": 0.0, "amplitude": 0.05, "period": 7.0}  # [rad], [s]
 SOLID = {"mass": 1.0, "inertia": [1.0, 1.0, 1.0]}
 
 
 def hull(**joint):
-    """A body whose joint is driven."""
+    """Return a body with a driven joint."""
     return {"type": "body", **SOLID, "joint": joint}
 
 
 def u_tube(turned=False, swap=False, angle=ROLL, **column):
-    """A U-tube on a body that rolls; `turned`: drawn with its bow along y."""
+    """Return a case of a U-tube on a rolling body; `turned` puts its bow along y, `swap` reverses the duct."""
 
     def named(x, y, z):
         return [-y, x, z] if turned else [x, y, z]
@@ -42,16 +42,16 @@ def u_tube(turned=False, swap=False, angle=ROLL, **column):
 
 
 def roll(t):
-    """Angle of the hull, its rate and acceleration."""
+    """Angle [rad], rate [rad/s] and acceleration [rad/s2] of the hull."""
     w = 2 * np.pi / ROLL["period"]
     return ROLL["amplitude"] * np.array([np.sin(w * t), w * np.cos(w * t), -w * w * np.sin(w * t)])
 
 
 def lagrange():
-    """Rate of the flow q from starboard to port, by (70): f(angle, rate, acceleration, z, q), z the rise at port.
+    """Return a function (angle, rate, acceleration, z, q) for dq/dt by Lagrange's equation (docs/course.md, 70).
 
-    What is in the tanks counts as columns along their middle, whose own flow has no inertia: their share of q2 is
-    left out of the kinetic energy, as the model has it.
+    q is the flow from starboard to port [m3/s], z the rise at port [m]. Water in the tanks counts as columns along
+    their axes. The kinetic energy of their relative flow, in q^2, is left out as in the model.
     """
     sp = pytest.importorskip("sympy", reason="derives Lagrange's equation")
     t, s = sp.symbols("t s")
@@ -60,7 +60,7 @@ def lagrange():
     q = TANK * z.diff(t)
 
     def along(place, tangent, size, low, high, own):
-        """(kinetic, potential) energy over density of water that slides at q along a way, in a hull that rolls."""
+        """Return (kinetic, potential) energy over density of water that flows along a line in the rolling hull."""
         turn = sp.Matrix([[sp.cos(angle), -sp.sin(angle)], [sp.sin(angle), sp.cos(angle)]])
         where = turn * sp.Matrix(place)
         drag = where.diff(t)
@@ -85,7 +85,7 @@ def lagrange():
     return lambda a, b, c, x, q: TANK * free(a, b, c, x, q / TANK) - LOSS / (2 * 2 * HALF * area(BORE)) * abs(q) * q
 
 
-WAYS = {  # the same hull in other words: (law, keys of u_tube, of numerics)
+WAYS = {  # equivalent cases: (density law, keys of u_tube, keys of numerics)
     "as drawn": ("linear", {}, {}),
     "the duct to starboard": ("linear", {"swap": True}, {}),
     "bow along y": ("linear", {"turned": True}, {}),
@@ -122,7 +122,7 @@ LONG, PRESSURE = 20.0, 5e5
 
 
 def line(near, far, joint, law="linear", from_="open", cells=40, length=LONG, **numerics):
-    """A frictionless pipe on a driven body, from a reservoir to a dead end."""
+    """Return a case of a frictionless pipe on a driven body, from a reservoir to a dead end."""
     nodes = {"rig": hull(**joint), "open": {"type": "reservoir", "pressure": PRESSURE, "on": "rig", "at": near},
              "shut": {"type": "junction", "on": "rig", "at": far}}  # fmt: skip
     ends = {"from": "open", "to": "shut"} if from_ == "open" else {"from": "shut", "to": "open"}
@@ -140,11 +140,11 @@ def test_a_pipe_that_slows_down_has_the_wave_of_the_closed_form_at_its_dead_end(
     joint = {"kind": "prismatic", "axis": [1, 0, 0],
              "travel": {"start": 0, "duration": 10, "value": [0, 0.5 * a * 100], "exponent": 2}}  # fmt: skip
     run = fv.run(line([0, 0, 0], [LONG, 0, 0], joint, law, from_, scheme=scheme))
-    beats = run.t * 1000.0 / LONG  # the wave from the open end is back after two, of four that it all takes
+    beats = run.t * 1000.0 / LONG  # period 4; the wave from the open end returns at 2
     truth = RHO * a * LONG * (1.0 - np.abs(1.0 - beats % 4.0 / 2.0)) * 2.0
     off = np.abs(run["shut.pressure"] - PRESSURE - truth) / (RHO * a * LONG)
     assert np.max(off[beats < 4.0]) < 0.03  # at its kinks
-    assert np.max(off[beats < 1.5]) < (1e-7 if law == "linear" else 2.5e-4)  # under p it is p / K denser
+    assert np.max(off[beats < 1.5]) < (1e-7 if law == "linear" else 2.5e-4)  # density rises by p / K
 
 
 @pytest.mark.parametrize("from_", ["open", "shut"])
@@ -154,7 +154,7 @@ def test_a_pipe_that_turns_is_pressed_outward_by_the_squares_of_radii(inner, law
     w = 1.2
     joint = {"kind": "revolute", "axis": [0, 0, 1], "angle": {"time": [0, 60], "value": [0, 60 * w]}}
     run = fv.run(line([inner, 0, 0], [inner + LONG, 0, 0], joint, law, from_))
-    periods = slice(0, 801)  # four of 4 L / c: what swings about the pressure at rest has no mean over these
+    periods = slice(0, 801)  # four periods of 4 L / c, over which oscillations have the mean 0
     rise = np.trapezoid(run["shut.pressure"][periods] - PRESSURE, run.t[periods]) / run.t[800]
     assert rise == pytest.approx(
         RHO * w**2 * ((inner + LONG) ** 2 - inner**2) / 2, rel=1e-3 if law == "linear" else 3e-3
@@ -162,7 +162,7 @@ def test_a_pipe_that_turns_is_pressed_outward_by_the_squares_of_radii(inner, law
 
 
 def tilted(law, rides):
-    """A network of pipes, a column and a valve on a body at an angle, or drawn as it then stands."""
+    """Return a case of a network on a tilted body, or with the elevations that it then has if `rides` is False."""
     angle = 0.5
     places = {"top": [0, 0, 12.0], "tee": [9.0, 2.0, 3.0], "low": [-4.0, 1.0, -5.0], "end": [-4.0, 1.0, -5.0],
               "far": [15.0, 0, 4.0]}  # fmt: skip
@@ -213,7 +213,7 @@ def test_a_u_tube_laid_over_settles_level(law):
     case["fluid"], case["numerics"] = {**WATER, "law": law}, {"end": 3000.0, "method": "radau-iia-5", "rtol": 1e-8}
     case["output"]["every"] = 100.0
     run = fv.run(case)
-    rise = run["starboard.level"][-1] - run["port.level"][-1]  # port goes up with y
+    rise = run["starboard.level"][-1] - run["port.level"][-1]  # port, at positive y, rises
     assert rise == pytest.approx(2 * HALF * np.tan(angle), rel=2e-3)
 
 
@@ -226,7 +226,7 @@ def test_rolling_like_a_pendulum_as_long_as_its_lever_moves_no_water():
 
 
 def ring(**joint):
-    """A column round a square on a body, between two places that are one."""
+    """Return a case of a rigid column around a square on a body, between two reservoirs at one point."""
     ends = {one: {"type": "reservoir", "pressure": 1e5, "on": "rig", "at": [1, 0.5, 0]} for one in ("a", "b")}
     way = {"type": "rigid-column", "from": "a", "to": "b", "length": 8.0, "diameter": 0.1,
            "route": [[3, 0.5, 0], [3, 2.5, 0], [1, 2.5, 0]]}  # fmt: skip
@@ -237,12 +237,12 @@ def ring(**joint):
 def test_fluid_round_a_way_stays_behind_when_its_body_begins_to_turn(along):
     run = fv.run(ring(kind="revolute", axis=list(along), angle=ROLL))
     turns = roll(run.t)[1] - roll(0.0)[1]
-    truth = -area(0.1) / 8.0 * 2.0 * 4.0 * along[2] * turns  # its circulation stays: v L + 2 S W
+    truth = -area(0.1) / 8.0 * 2.0 * 4.0 * along[2] * turns  # constant circulation v L + 2 S W
     assert run["way.flow"] == pytest.approx(truth, abs=1e-8 * area(0.1) + 1e-7 * np.max(np.abs(truth)))
 
 
 def cut(law, **valve):
-    """The U-tube with a valve at starboard, or with a place in the middle of its duct."""
+    """Return a case of the U-tube with a valve between the tank starboard and its duct."""
     case = u_tube(minor_loss=0.0)
     case["fluid"] = {**WATER, "law": law}
     case["nodes"]["beside"] = {"type": "junction", "on": "hull", "at": [0, -HALF, -DEPTH]}
@@ -287,7 +287,7 @@ def test_two_columns_that_meet_at_a_shut_valve_are_one(law):
 
 
 def said(case):
-    """Faults of a case, place and text."""
+    """Return the faults of a case: place -> message."""
     with pytest.raises(CaseError) as caught:
         fv.load(case)
     return {fault.place: fault.message for fault in caught.value.faults}
@@ -334,7 +334,7 @@ def test_steps_that_are_taken_whole_feel_the_body_too():
     joint = {"kind": "prismatic", "axis": [1, 0, 0],
              "travel": {"start": 0, "duration": 10, "value": [0, 100.0], "exponent": 2}}  # fmt: skip
     case = line([0, 0, 0], [LONG, 0, 0], joint, scheme="upwind", method="euler")
-    case["output"]["every"] = 0.04  # so that many steps lie between
+    case["output"]["every"] = 0.04  # many steps between rows
     run = fv.run(case)
     assert run["shut.pressure"][1] - PRESSURE == pytest.approx(RHO * 2.0 * LONG * 2.0, rel=0.1)
 
@@ -343,7 +343,10 @@ def test_steps_that_are_taken_whole_feel_the_body_too():
 
 
 def water_energy(angle, spin, rise, flow):
-    """Kinetic and potential energy of the U-tube's water [J], flow [m3/s] from starboard to port, `rise` at port."""
+    """Kinetic plus potential energy of the water in the U-tube [J].
+
+    flow : from starboard to port [m3/s]; rise : of the level at port [m]
+    """
     c, s = np.cos(angle), np.sin(angle)
     whole = np.zeros_like(angle)
     ends = (-HALF, LEVEL - rise), (HALF, LEVEL + rise)
@@ -352,7 +355,7 @@ def water_energy(angle, spin, rise, flow):
     for mass, (y, z), (u, w) in parts:
         square = (y * y + y * u + u * u + z * z + z * w + w * w) / 3.0
         whole = whole + mass * (0.5 * spin**2 * square + GRAVITY * (s * 0.5 * (y + u) + c * 0.5 * (z + w)))
-    swept = 2 * HALF * DEPTH + HALF * (ends[0][1] + ends[1][1])  # of r x dr from surface to surface
+    swept = 2 * HALF * DEPTH + HALF * (ends[0][1] + ends[1][1])  # integral of r x dr between the surfaces
     return whole + RHO * flow * spin * swept + 0.5 * RHO * flow**2 * 2 * HALF / area(BORE)
 
 
@@ -365,7 +368,7 @@ def test_the_energy_of_a_u_tube_that_rolls_is_the_work_of_its_drive_less_frictio
         found = energy(fv.load(case))
         losses.append(abs(found.step[-1]))
         assert abs(found.law.get("duct", [0.0])[-1]) < (1e-9 if law == "linear" else 1e-5) * found.throughput
-    assert losses[1] < 0.1 * losses[0] < 2e-6 * found.throughput  # of fourth order
+    assert losses[1] < 0.1 * losses[0] < 2e-6 * found.throughput  # fourth order
     truth = solve_ivp(lambda t, y: [y[1] / TANK, rate(*roll(t), *y)], (0, 20), [0.0, 0.0], t_eval=found.t, rtol=1e-11,
                       atol=1e-12, method="DOP853")  # fmt: skip
     held = water_energy(*roll(found.t)[:2], *truth.y)
@@ -412,8 +415,8 @@ def test_water_that_flows_from_a_place_which_moves_brings_what_moving_it_takes()
     assert steps[1] < 0.1 * steps[0] or steps[0] < 1e-9 * found.throughput
 
 
-UNFELT = {  # what bodies would not feel: change of the U-tube, place of the fault, words
-    "a valve at a tank": (lambda: cut("linear"), "links.gate", "rigid-column between"),
+UNFELT = {  # no reaction on bodies is modelled: function that returns the case, place of the fault, text
+    "a valve at a tank": (lambda: cut("linear"), "links.gate", "rigid-column at the tank"),
     "what spills": (lambda: with_tank(height=3.0), "nodes.port.height", "not modelled"),
 }
 
@@ -438,7 +441,7 @@ def test_energy_and_joints_of_what_bodies_would_not_feel_are_refused_by_name(wha
 
 
 def test_a_tank_that_falls_ends_the_run_by_name():
-    slows = {"start": 0, "duration": 40, "value": [0, 8000.0], "exponent": 2}  # by 10 m/s2, going up
+    slows = {"start": 0, "duration": 40, "value": [0, 8000.0], "exponent": 2}  # upward, slowing by 10 m/s2
     case = u_tube()
     case["nodes"]["hull"]["joint"] = {"kind": "prismatic", "axis": [0, 0, 1], "travel": slows}
     run = fv.run(case)

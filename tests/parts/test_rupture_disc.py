@@ -1,4 +1,4 @@
-"""Rupture discs: when they burst and what they let out, in closed form; ledgers and resumed runs."""
+"""Rupture discs: time of bursting and outflow in closed form, balances and resumed runs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def disc(start: str, burst: float = BURST, **more) -> dict:
 
 
 def filled(numerics: dict, law: str = "linear", **more) -> dict:
-    """A tank that a steady inflow fills from 3 m, and a disc at its foot."""
+    """Return a case of a tank with a rupture disc, which a constant inflow fills from 3 m."""
     nodes = {"in": {"type": "inflow", "flow": FILL}, "t": tank(SECTION, 3.0)}
     links = {"throat": valve("in", "t", 0.05), "disc": disc("t", **more)}
     if "to" in more:
@@ -31,7 +31,7 @@ def filled(numerics: dict, law: str = "linear", **more) -> dict:
 
 
 def emptied(level: float) -> float:
-    """Time since it burst: A dz/dt = Q - c sqrt(z), so with s = sqrt(z) A 2 s ds / (Q - c s) = dt."""
+    """Time since the burst [s]: A dz/dt = Q - c sqrt(z), so with s = sqrt(z), dt = 2 A s ds / (Q - c s)."""
     c = CDA * math.sqrt(2.0 * GRAVITY)
 
     def past(s):
@@ -67,7 +67,7 @@ def test_it_bursts_when_the_level_says_and_lets_out_what_the_root_says(numerics,
 @pytest.mark.parametrize("law", ["linear", "log", "mixture"])
 @pytest.mark.parametrize("turned", [False, True], ids=["along", "against"])
 def test_a_wave_bursts_it_as_it_arrives_and_the_line_gives_what_its_impedance_says(law, turned):
-    """A gate shuts at once; L / a later rho a v is at the disc, where p = 2 F - Z q meets rho / 2 (q / CdA)^2."""
+    """The jump rho a v arrives after L / a; then p = 5e5 + rho a v - Z q / 2 = ambient + rho / 2 (q / CdA)^2."""
     v, speed, bore = 1.0, 1000.0, 0.2
     ends = ("gate", "far") if turned else ("far", "gate")
     nodes = {"lake": reservoir(5e5), "far": junction(), "gate": junction({"time": [0.0, 0.1],
@@ -80,7 +80,7 @@ def test_a_wave_bursts_it_as_it_arrives_and_the_line_gives_what_its_impedance_sa
     (event,) = result.summary["events"]
     assert event["time"] == pytest.approx(0.2, abs=6e-3)
     jump, z = RHO * speed * v, RHO * speed / area(bore)
-    k, head = RHO / (2.0 * CDA**2), 5e5 + jump - AMBIENT  # on both sides a line: p = 5e5 + jump - Z q / 2
+    k, head = RHO / (2.0 * CDA**2), 5e5 + jump - AMBIENT  # pipes on both sides: p = 5e5 + jump - Z q / 2
     q = (-0.5 * z + math.sqrt(0.25 * z**2 + 4.0 * k * head)) / (2.0 * k)
     near = 1e-9 if law == "linear" else 0.03
     after = (np.asarray(result.t) > 0.22) & (np.asarray(result.t) < 0.36)
@@ -90,7 +90,7 @@ def test_a_wave_bursts_it_as_it_arrives_and_the_line_gives_what_its_impedance_sa
 
 
 def test_nothing_comes_back_from_ambient_and_its_energy_closes():
-    """The level of a lake bursts it, and then draws its place below ambient."""
+    """The pressure of a lake bursts the disc and then falls below ambient."""
     nodes = {"lake": reservoir({"time": [0.0, 1.0, 3.0, 4.0], "value": [1.2e5, 2e5, 0.6e5, 1.5e5]}), "b": junction()}
     links = {"line": pipe("lake", "b", 10.0, 0.1, 1000.0, 10), "disc": disc("b", 5e4)}
     case = scene(nodes, links, 4.0, {"method": "dormand-prince", "rtol": 1e-7}, ["disc.flow", "b.pressure"])
@@ -121,7 +121,7 @@ def test_placed_by_chainage_it_stands_off_the_pipe():
 
 @pytest.mark.parametrize(
     "wrong, said",
-    [({"burst_pressure": -1.0}, "out of range"), ({"burst_pressure": 2e4}, "would burst the disc; raise this pressure"),
+    [({"burst_pressure": -1.0}, "out of range"), ({"burst_pressure": 2e4}, "would burst the disc; raise `burst_"),
      ({"from": "nowhere"}, "nowhere"), ({"area": None}, "needs area or diameter")],
 )  # fmt: skip
 def test_what_is_wrong_with_a_disc_is_said(wrong, said):

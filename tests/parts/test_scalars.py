@@ -1,4 +1,4 @@
-"""Scalars in the network: shifted, split, mixed, spread, decayed and stored as closed forms say, and booked."""
+"""Scalars in networks: transport, division, mixing, diffusion, decay and storage in closed form, with balances."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ import fvsolve
 from fvsolve.errors import CaseError
 
 MUSCL = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.9}
-SPEED, BORE, SLOW = 1.0, 0.1, 20.0  # of the flow [m/s], of pipes [m], of waves [m/s], so that steps are few
+SPEED, BORE, SLOW = 1.0, 0.1, 20.0  # flow [m/s], bore of pipes [m], waves [m/s] (slow, for few steps)
 FLOW = SPEED * area(BORE)
 
 
@@ -43,7 +43,7 @@ def inflow(flow, **dye) -> dict:
 
 
 def given(**dye) -> dict:
-    """A reservoir at the pressure at which pipes have their stated area."""
+    """Return a reservoir at the pressure at which pipes have their stated area."""
     return reservoir(AMBIENT, **({"scalars": dye} if dye else {}))
 
 
@@ -56,14 +56,14 @@ def case_of(nodes, links, end, numerics=None, probes=(), **dye) -> dict:
 
 
 def at_end(case: dict) -> tuple:
-    """(model, fields of the last state)."""
+    """Return (model, fields of the last state)."""
     model = fvsolve.build(fvsolve.load(case))
     state = fvsolve.advance(model, fvsolve.initial_state(model), case["numerics"]["end"])
     return model, model.fields(state.y, model.evaluate(state.t, state.y)[1])
 
 
 def through(cells: int, **numerics) -> float:
-    """L1 error of a smooth front that has come through two pipes and the junction between them."""
+    """L1 error of a smooth front after two pipes and the junction between them."""
     nodes = {"lake": given(dye=smooth_ramp(0.5, 5.0, 0.0, 1.0)), "mid": junction(), "tap": junction(FLOW)}
     links = {"a": line("lake", "mid", 5.0, cells), "b": line("mid", "tap", 5.0, cells)}
     _, found = at_end(case_of(nodes, links, 7.5, numerics))
@@ -94,7 +94,7 @@ def test_a_sharp_plug_stays_between_what_was_given(limiter):
     for probe in probes:
         low, _, high, _ = result.extremes[probe]
         assert 0.2 - 1e-12 < low and high < 0.9 + 1e-12
-    assert result.extremes["tap.dye"].maximum > 0.85  # and it does arrive
+    assert result.extremes["tap.dye"].maximum > 0.85  # the plug arrives
 
 
 def test_a_plug_splits_by_mass():
@@ -103,7 +103,7 @@ def test_a_plug_splits_by_mass():
     links = {
         "trunk": line("lake", "fork", 2.0, 20),
         "left": line("fork", "few", 1.0, 20),
-        "right": line("many", "fork", 3.0, 20),  # drawn against its flow
+        "right": line("many", "fork", 3.0, 20),  # defined against its flow
     }
     book = fvsolve.run(case_of(nodes, links, 40.0)).ledger["dye"]
     assert book["by_node"]["lake"] == approx(2.0 * 2.0 * RHO * FLOW, rel=1e-12)
@@ -119,11 +119,11 @@ def test_streams_mix_by_mass():
     result = fvsolve.run(case)
     assert result["join.dye"][-1] == approx(30.0, rel=1e-12)
     assert result["c.dye@1"][-1] == approx(30.0, rel=1e-9)
-    assert result["sea.dye"][-1] == 20.0  # what would come back from it
+    assert result["sea.dye"][-1] == 20.0  # the value of flow from it
 
 
 def test_nodes_without_volume_pass_on_at_once_in_the_order_of_the_flow():
-    """Written down against the flow, with a stream that joins half way."""
+    """Values follow the flow, although parts are listed against it and a second stream joins."""
     nodes = {"lake": reservoir(AMBIENT + 3e4, scalars={"dye": 1.0}), "d": junction(), "c": junction(),
              "b": inflow(0.5 * FLOW, dye=3.0), "sea": given()}  # fmt: skip
     links = {"v4": valve("d", "sea", 0.01), "v3": valve("c", "d", 0.01), "v2": valve("d", "b", 0.01),
@@ -139,7 +139,7 @@ def test_nodes_without_volume_pass_on_at_once_in_the_order_of_the_flow():
 
 
 def test_what_a_pump_turns_round_without_volume_is_mixed_too():
-    """Two streams and a pump between two nodes: two balances by mass."""
+    """Two streams, and a pump that circulates between two nodes: values solve two balances by mass."""
     nodes = {"one": inflow(0.002, dye=1.0), "two": inflow(0.001, dye=4.0), "sea": given()}
     curve = {"flow": [0.0, 0.01, 0.02], "head": [10.0, 8.0, 3.0]}
     links = {"back": {"type": "pump", "from": "two", "to": "one", "curve": curve}, "v": valve("one", "two", 0.002),
@@ -155,7 +155,7 @@ def test_what_a_pump_turns_round_without_volume_is_mixed_too():
 
 
 def ogata_banks(x, t, d):
-    """Inlet held at 1 from t = 0 on, semi-infinite (Ogata and Banks 1961)."""
+    """Value in a semi-infinite pipe with the inlet at 1 from t = 0 on (Ogata and Banks 1961)."""
     width = 2.0 * math.sqrt(d * t)
     back = np.exp(SPEED * x / d) * erfc((x + SPEED * t) / width)
     return 0.5 * (erfc((x - SPEED * t) / width) + back)
@@ -173,7 +173,7 @@ def test_diffusion_behind_a_held_inlet_is_that_of_ogata_and_banks():
 
 
 def test_diffusion_alone_through_a_junction_is_a_straight_line():
-    """No flow: between two given values, in the end, a line across both pipes, whose cells differ."""
+    """Without flow the final profile between two given values is linear across pipes with different cells."""
     nodes = {"left": given(dye=1.0), "mid": junction(), "right": given(dye=0.0)}
     links = {"a": line("left", "mid", 1.0, 5), "b": line("mid", "right", 1.0, 20)}
     _, found = at_end(case_of(nodes, links, 60.0, diffusivity=0.2))
@@ -191,7 +191,7 @@ def test_what_stands_decays_exponentially_towards_ambient():
 
 
 def test_decay_on_the_way_is_that_of_the_time_it_takes():
-    """A pipe that loses heat: c(x) = ambient + (c0 - ambient) exp(-decay x / v)."""
+    """Heat loss of a pipe: c(x) = ambient + (c0 - ambient) exp(-decay x / v)."""
     nodes = {"lake": given(dye=60.0), "tap": junction(FLOW)}
     errors = []
     for cells in (50, 100):
@@ -202,7 +202,7 @@ def test_decay_on_the_way_is_that_of_the_time_it_takes():
 
 
 def test_a_stirred_chamber_follows_what_comes_in():
-    """c' = q / V (c_in - c), without a pipe."""
+    """c' = q / V (c_in - c) in a stirred chamber without pipes."""
     nodes = {"feed": inflow(1e-3, dye=4.0), "box": chamber(0.02, scalars={"dye": 1.0}), "sea": given()}
     links = {"in": valve("feed", "box", 1e-4), "out": valve("box", "sea", 1e-4)}
     case = case_of(nodes, links, 60.0, {"method": "dormand-prince"}, ["box.dye", "box.pressure"])
@@ -222,7 +222,7 @@ def test_a_tank_that_fills_holds_the_mean_of_what_came_and_spills_what_it_holds(
     filled = 0.5 * result["pool.level"]
     mean = (0.5 * 1.0 + (filled - 0.5) * 2.0) / filled
     assert filling.sum() > 20 and result["pool.dye"][filling] == approx(mean[filling], rel=1e-9)
-    late = result.t > 20.5  # full from 20 s on: stirred
+    late = result.t > 20.5  # full and stirred from 20 s on
     since = result.t[late] - 20.0
     full = (0.5 + 0.2 * 2.0) / 0.7
     assert result["pool.dye"][late] == approx(2.0 - (2.0 - full) * np.exp(-0.01 / 0.7 * since), rel=1e-3)
@@ -242,7 +242,7 @@ def test_a_dry_tank_passes_on_what_comes_and_what_is_made_up_and_keeps_none():
             3.0 - 2.0 * (result["pool.level"][result.t <= emptied] / 0.2) ** (feed / (draw - feed)), rel=1e-5
         )
         assert result["drain.dye"][-1] == approx((feed * 3.0 + (draw - feed) * 9.0) / draw, rel=1e-12)
-        assert abs(result.ledger["dye"]["final"]) < 1e-3  # of 20 kg: amount and mass each end with their step's error
+        assert abs(result.ledger["dye"]["final"]) < 1e-3  # of 20 kg: amount and mass have errors of steps
         assert result.ledger["dye"]["relative"] < 1e-12
 
 
@@ -263,8 +263,8 @@ def hammer(scheme: str, friction: dict, **dye) -> dict:
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5", "upwind5", "central"])
 @pytest.mark.parametrize("model", ["quasi-steady", "unsteady"])
 def test_a_uniform_value_stays_uniform_through_water_hammer(scheme, model):
-    """The masses of cells swing by 5e-4 and flows turn; what is carried follows them to round-off."""
-    case = copy.deepcopy(hammer(scheme, {"model": model, "roughness": 1e-4}, initial=0.0))  # far from its bounds
+    """Masses of cells vary by 5e-4 and flows reverse, but a uniform value stays uniform to rounding."""
+    case = copy.deepcopy(hammer(scheme, {"model": model, "roughness": 1e-4}, initial=0.0))  # 0.7 is inside the bounds
     case["scalars"]["other"] = {"initial": 0.0}
     for part in (
         *(case["nodes"][name] for name in ("lake", "box")),
@@ -344,7 +344,7 @@ def test_a_run_interrupted_and_resumed_is_the_unbroken_one_ledger_too(tmp_path, 
 
 
 def test_implicit_steps_carry_it_to_the_same_place_and_close_the_book():
-    """A front that turns in a branched scene, by steps that the waves do not hold; losses booked state by state."""
+    """Implicit steps beyond the limit of waves give the values of explicit steps, with reversing flow and decay."""
     case = hammer("upwind", {"model": "quasi-steady", "roughness": 1e-4}, initial=0.2, decay=0.1, diffusivity=0.01)
     case["nodes"] = {**HAMMER, "lake": reservoir(5e5, scalars={"dye": 1.0})}
     ends = []
@@ -376,7 +376,7 @@ def test_a_controller_sets_what_flows_in_also_beyond_what_the_case_says():
 FAULTS = [
     (("scalars", "pressure"), {}, '"pressure" is a reserved name'),
     (("nodes", "lake", "scalars"), {"dya": 1.0}, 'no scalar named "dya"; did you mean "dye"?'),
-    (("nodes", "tap", "scalars"), {"dye": 1.0}, "a junction has no value of a scalar"),
+    (("nodes", "tap", "scalars"), {"dye": 1.0}, "a junction has no scalar values"),
     (("nodes", "pool", "scalars"), {"dye": {"time": [0, 1], "value": [0, 1]}}, "not a schedule"),
     (("links", "a", "scalars"), {"dye": "much"}, '"much" is not a number'),
     (

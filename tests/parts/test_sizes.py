@@ -1,4 +1,4 @@
-"""Nominal pipe sizes and fittings by name: printed tables, the package fluids, and what the file may say."""
+"""Nominal pipe sizes and fittings against printed tables and the package `fluids`, and faults of names."""
 
 from __future__ import annotations
 
@@ -61,14 +61,14 @@ def test_fittings_lose_what_crane_prints(name):
 
 
 def line(**keys) -> dict:
-    """A short line between two reservoirs, without friction but for what its fittings lose."""
+    """Return a case of a short rigid column between two reservoirs, with losses by its fittings only."""
     column = {"type": "rigid-column", "from": "up", "to": "down", "length": 5.0, **keys}
     nodes = {"up": reservoir(AMBIENT + 2e4), "down": reservoir(AMBIENT)}
     return scene(nodes, {"line": column}, 0.1, {}, ["line.flow"], 0.05)
 
 
 def test_a_line_with_fittings_carries_what_their_losses_let_through(tmp_path):
-    """q = A sqrt(2 dp / (rho K)); the resolved case says the numbers and runs again."""
+    """q = A sqrt(2 dp / (rho K)); the resolved case contains the numbers and gives the same flow."""
     case = line(nominal="DN100", fittings=["entrance", "elbow-90", "elbow-90", "globe-valve"], minor_loss=1.0)
     result = fvsolve.run(case, out=tmp_path / "out")
     d = pipe_bore("DN100", "40")[0]

@@ -1,4 +1,4 @@
-"""Check valves by their deceleration curve: slams of columns at even deceleration, and Joukowsky's jump in a main."""
+"""Check valves with a deceleration curve: slams of evenly decelerated columns, and Joukowsky's jump in a main."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ TIGHT = {"method": "dormand-prince", "rtol": 1e-10}
 
 
 def slamming(start: str, end: str, **more) -> dict:
-    """Of next to no loss."""
+    """Return a check valve with a deceleration curve and a negligible loss."""
     return {"type": "check-valve", "from": start, "to": end, "diameter": BORE, "loss_coefficient": 1e-7,
             "deceleration": {"rate": RATES, "reverse_velocity": VELOCITIES}, **more}  # fmt: skip
 
 
 def column(rate: float, numerics: dict, law: str = "linear", against: bool = False, first: float = 1.5) -> dict:
-    """A rigid column of 1.5 m/s at first that its ends slow down evenly."""
+    """Return a case of a rigid column with the velocity `first` [m/s], which its ends decelerate by `rate` [m/s2]."""
     nodes = {"up": reservoir(3e5), "mid": junction(), "town": reservoir(3e5 + rate * RHO * LENGTH)}
     way = {"type": "rigid-column", "from": "mid", "to": "town", "length": LENGTH, "diameter": BORE,
            "friction": {"model": "none"}, "initial_flow": first * area(BORE)}  # fmt: skip
@@ -38,7 +38,7 @@ def times(result) -> dict[str, float]:
 
 @pytest.mark.parametrize("rate", [0.3, 0.5, 1.1, 2.0, 4.0, 6.0, 9.0])
 def test_on_a_column_that_slows_down_evenly_it_returns_its_curve(rate):
-    """It slows down for v0 / d until it turns, and for v / d until it slams, v of the curve, at its ends held."""
+    """The flow reverses after v0 / d; the valve shuts v / d later, with v of the curve, constant beyond its ends."""
     result = fvsolve.run(column(rate, TIGHT))
     at = times(result)
     slam = rate * (at["shuts"] - at["flow reverses"])
@@ -63,7 +63,7 @@ def test_so_it_does_by_every_method_and_law_however_the_column_is_drawn(law, num
 
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_in_a_main_joukowskys_jump_follows_its_slam(law):
-    """A pressure falls by rho a d a second, so v by d; nothing comes back from the far end yet."""
+    """The pressure falls by rho a d per second, so the velocity by d, until reflections return from the far end."""
     v, d, speed = 0.3, 1.5, 1000.0
     fall = {"time": [0.0, 0.1, 0.6], "value": [9e5, 9e5, 9e5 - 0.5 * RHO * speed * d]}
     nodes = {"up": reservoir(fall), "mid": junction(), "town": junction(v * area(BORE))}
@@ -93,7 +93,7 @@ def test_resumed_it_is_the_unbroken_run_to_the_bit(tmp_path, end):
 
 @pytest.mark.parametrize(
     "wrong, said",
-    [({"time_constant": 0.1, "overpressure": 1e3}, "define how it shuts"),
+    [({"time_constant": 0.1, "overpressure": 1e3}, "define how the valve shuts"),
      ({"deceleration": {"rate": [1.0, 2.0], "reverse_velocity": [0.1]}}, "1 values for 2 rates"),
      ({"deceleration": {"rate": [2.0, 1.0], "reverse_velocity": [0.1, 0.2]}}, "rates"),
      ({"deceleration": {"rate": [1.0]}}, "reverse_velocity is missing"),

@@ -1,4 +1,4 @@
-"""Surge-anticipating valves against the same opening given as a schedule, and drained tanks in closed form."""
+"""Surge-anticipating valves against valves that follow the same opening by schedule, and tanks in closed form."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def anticipating(start: str, flow_area: float = 2e-3, **more) -> dict:
 
 
 def main(links: dict, numerics: dict, law: str = "linear", turned: bool = False, end: float = 7.0, **more) -> dict:
-    """A main from a reservoir that falls and rises again, to a town behind a valve; the device at its middle."""
+    """Return a case of a main from a reservoir that falls and rises to a valve, with `links` at its middle."""
     ends = ("mid", "up") if turned else ("up", "mid")
     nodes = {
         "up": reservoir(FALL),
@@ -68,7 +68,7 @@ LUMPED = [{"method": "dormand-prince", "rtol": 1e-11}, {"method": "radau-iia-5",
 
 
 def vessel(numerics: dict, law: str = "linear", end: float = 6.0, fill: float = 0.0, flow_area=0.01, **more) -> dict:
-    """A tank with the device at its foot, to ambient, and an inflow."""
+    """Return a case of a tank with an inflow and the valve from its foot to ambient."""
     nodes = {"in": {"type": "inflow", "flow": fill}, "t": tank(SECTION, LEVEL)}
     links = {"throat": valve("in", "t", 0.05), "sav": anticipating("t", flow_area, **more)}
     probes = ["t.level", "sav.flow", "sav.opening"]
@@ -78,7 +78,7 @@ def vessel(numerics: dict, law: str = "linear", end: float = 6.0, fill: float = 
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("numerics", LUMPED, ids=lambda one: one["method"])
 def test_tripped_it_drains_a_tank_by_the_integral_of_its_opening(numerics, law):
-    """2 A (sqrt z0 - sqrt z) = CdA sqrt(2 g) times the integral of x."""
+    """2 A (sqrt z0 - sqrt z) = CdA sqrt(2 g) times the integral of the opening."""
     result = fvsolve.run(vessel(numerics, law, trip=0.7))
     times = np.cumsum([0.7, OPENS, HOLD, SHUTS])
     assert [event["time"] for event in result.summary["events"]] == pytest.approx(times, abs=1e-11)
@@ -93,7 +93,7 @@ def test_tripped_it_drains_a_tank_by_the_integral_of_its_opening(numerics, law):
 
 
 def test_a_high_pressure_opens_it_for_as_long_as_it_lasts_whatever_hold_says():
-    """A steady inflow fills the tank to high_set, again and again; SciPy's events, one cycle after the other."""
+    """A constant inflow fills the tank to high_set repeatedly; the event times of a cycle follow SciPy."""
     high = LEVEL + 0.5
     result = fvsolve.run(vessel(LUMPED[0], end=60.0, fill=FILL, high_set=AMBIENT + RHO * GRAVITY * high))
     what, times = zip(*((event["what"], event["time"]) for event in result.summary["events"]), strict=True)
@@ -102,7 +102,7 @@ def test_a_high_pressure_opens_it_for_as_long_as_it_lasts_whatever_hold_says():
     c, now, z = 0.01 * math.sqrt(2.0 * GRAVITY), times[0], high
 
     def piece(opening, end, falls=True):
-        """On from `now` until the level passes high_set, or to `end`."""
+        """Return (time, level) at which the level passes high_set, or at `end`, from `now` on."""
         passes = lambda t, y: y[0] - high  # noqa: E731
         passes.terminal, passes.direction = True, -1.0 if falls else 1.0
         rate = lambda t, y: [(FILL - c * opening(t) * math.sqrt(y[0])) / SECTION]  # noqa: E731
@@ -110,7 +110,7 @@ def test_a_high_pressure_opens_it_for_as_long_as_it_lasts_whatever_hold_says():
         return found.t[-1], found.y[0, -1]
 
     passed, _ = piece(lambda t: (t - times[0]) / OPENS, times[0] + OPENS)
-    assert passed < times[1]  # it has fallen by then: fully open, it begins to shut at once
+    assert passed < times[1]  # below high_set again: at full opening it begins to shut at once
     passes = solve_ivp(lambda t, y: [(FILL - c * (t - now) / OPENS * math.sqrt(y[0])) / SECTION], (now, now + OPENS),
                        [z], rtol=1e-12, atol=1e-13)  # fmt: skip
     z, now = passes.y[0, -1], now + OPENS
@@ -120,7 +120,7 @@ def test_a_high_pressure_opens_it_for_as_long_as_it_lasts_whatever_hold_says():
 
 
 def test_shut_it_waits_for_a_pressure_above_low_set_before_it_opens_again():
-    """The tank it drains stays below low_set: one cycle, and no second one."""
+    """The pressure at the drained tank stays below low_set, so the valve opens only once."""
     result = fvsolve.run(vessel(LUMPED[0], end=12.0, fill=1e-3, low_set=AMBIENT + RHO * GRAVITY * (LEVEL + 0.1)))
     assert result.summary["events"] == []
     assert "only after the pressure has exceeded low_set" in str(result.summary["warnings"])

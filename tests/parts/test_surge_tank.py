@@ -1,4 +1,4 @@
-"""Tanks with a connection: mass oscillation with friction and a throttle, turn by turn against its closed form."""
+"""Tanks with a connection: extremes of a mass oscillation with friction and throttle against the closed form."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ TIGHT = {"method": "dormand-prince", "rtol": 1e-11}
 
 
 def turns(z: float, flow: float, losses: tuple[float, float], count: int) -> list[float]:
-    """Levels from the lake's at which the flow turns: d(q^2)/dz = -k (z + c q |q|) in closed form (Forchheimer 1913).
+    """Levels above the lake at which the flow reverses: d(q^2)/dz = -k (z + c q |q|) (Forchheimer 1913).
 
-    q^2 = 1 / (k c^2) -+ z / c + C exp(-+ k c z), the upper sign while the tank fills; losses : K into it and out of it
+    q^2 = 1 / (k c^2) -+ z / c + C exp(-+ k c z), with the upper sign while the tank fills.
+    losses : loss coefficients K into the tank and out of it
     """
     bore, throat = area(DIAMETER), area(THROAT)
     k = 2 * GRAVITY * bore * SHAFT / LENGTH
@@ -52,7 +53,7 @@ def swing(losses: tuple[float, float], numerics: dict = TIGHT, law: str = "linea
 
 @pytest.mark.parametrize("losses", [(1.0, 1.5), (4.0, 0.5)])
 def test_the_turns_of_a_mass_oscillation_are_the_closed_ones(losses):
-    """To the laminar width of the throttle at each turn and the rows beside it."""
+    """The extremes agree to the transition flow of the throttle and the interval of rows."""
     result = fvsolve.run(swing(losses))
     level = result["t.level"]
     slope = np.diff(level)
@@ -88,7 +89,7 @@ def test_a_tank_behind_a_pipe_starts_at_rest_and_stays():
 
 
 def test_marks_and_what_moves_name_the_tank_itself():
-    """What lies below its bottom asks an empty tank for more."""
+    """Marks, notices and moving parts name the tank, without its inner node; an outlet below its bottom drains it."""
     nodes = {"t": {"type": "tank", "area": 1.0, "level": 0.5,
                    "connection": {"diameter": 0.2, "loss_in": 1.0, "loss_out": 1.0}}, "air": lake(-0.5)}  # fmt: skip
     result = fvsolve.run(scene(nodes, {"hole": valve("t", "air", 0.02)}, 40.0, {}, ["t.level"]))

@@ -1,4 +1,4 @@
-"""Tanks that drain, level and turn round, against closed forms, through their end in finite time."""
+"""Tanks that drain, equalise and reverse their flow against closed forms, also beyond finite times of emptying."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ import fvsolve
 CLOSE = {"method": "dormand-prince", "rtol": 1e-9}
 OUTLET = 0.01
 NU = 1e-6
-# settings, and how near the level must be [m]; the default tolerance is 1e-6 of the deviation a step
+# (numerics, tolerance of the level [m]); the default tolerance is 1e-6 of the deviation per step
 SETTINGS = [(CLOSE, 1e-6), ({}, 1e-5), ({"method": "rk4", "step": 0.02}, 1e-6)]
 
 
 def laminar_flow(flow_area: float) -> float:
-    """Flow at Reynolds 10 through a hole of the area that `scenes.valve` gives it [m3/s]."""
+    """Flow at Reynolds number 10 through a valve of `scenes.valve` [m3/s]."""
     diameter = math.sqrt(4 / math.pi * flow_area / 0.61)
     return 10.0 * NU * diameter * math.pi / 4
 
@@ -76,7 +76,7 @@ def test_two_tanks_level_in_finite_time_and_rest(levels, numerics, near):
 
 @pytest.mark.parametrize("numerics, drop", [(CLOSE, 0.0), ({}, 1e-7)], ids=["tight", "default"])
 def test_levelled_tanks_stay_within_the_laminar_width_and_do_not_chatter(numerics, drop):
-    """Or, by default, within the tolerance of their levels, 1e-6 of 0.1 m. Fixed explicit steps cannot promise this."""
+    """By default within the tolerance of the levels, 1e-6 of 0.1 m; fixed explicit steps do not ensure this."""
     nodes = {"one": tank(2.0, 1.5), "two": tank(3.0, 1.0), "air": reservoir(AMBIENT)}
     links = {"gap": valve("one", "two", 0.02), "shut": valve("two", "air", 0.01, 0.0)}
     end = 2 * math.sqrt(0.5) / (0.02 * math.sqrt(2 * GRAVITY) * (1 / 2.0 + 1 / 3.0)) + 60.0
@@ -91,7 +91,7 @@ def test_a_drained_tank_stays_within_the_laminar_width_and_does_not_chatter():
 
 
 def test_a_tank_whose_outfall_rises_and_falls_turns_the_flow_round():
-    """Made so that the root of the drop is `S cos(w t)`, hence the level `h0 - K S sin(w t) / w`."""
+    """The outfall is chosen so that the root of the drop is S cos(w t) and the level h0 - K S sin(w t) / w."""
     section, level, root, period = 4.0, 3.0, 0.8, 240.0
     speed, w = OUTLET * math.sqrt(2 * GRAVITY) / section, 2 * math.pi / period
 
@@ -109,7 +109,7 @@ def test_a_tank_whose_outfall_rises_and_falls_turns_the_flow_round():
     now = np.asarray(result.t)
     assert result["hole.flow"].min() < 0 < result["hole.flow"].max()
     assert result["basin.level"] == pytest.approx(level_at(now), abs=1e-6)
-    turned = np.abs(np.cos(w * now)) > 0.05  # the root magnifies the table's error where the drop is nil
+    turned = np.abs(np.cos(w * now)) > 0.05  # near zero drop the root amplifies errors of the table
     exact = speed * section * root * np.cos(w * now)
     assert result["hole.flow"][turned] == pytest.approx(exact[turned], abs=1e-6)
 
@@ -136,7 +136,7 @@ def test_an_outfall_that_goes_up_and_down_in_straight_lines_agrees_with_scipy():
 
 
 def test_running_dry_is_marked_when_and_where_it_happens():
-    """The outfall lies below the bottom, so water is still asked for at level 0."""
+    """The outfall is below the bottom of the tank, so outflow continues at level 0."""
     section, level, below = 2.0, 1.5, 2.0
     nodes = {"basin": tank(section, level, elevation=10.0), "air": reservoir(AMBIENT, elevation=10.0 - below)}
     links = {"hole": valve("basin", "air", OUTLET)}
@@ -165,7 +165,7 @@ def test_a_tank_filled_above_its_height_spills_and_the_ledger_has_it(numerics):
 
 
 def test_a_tank_through_a_pipe_swings_with_the_period_of_mass_oscillation():
-    """Rigid column, no friction: `w^2 = g A / (L A_tank)` about the reservoir's level."""
+    """Rigid column without friction: w^2 = g A / (L A_tank), about the level of the reservoir."""
     length, diameter, section = 200.0, 0.4, 0.5
     nodes = {"lake": lake(10.0), "surge": tank(section, 10.5)}
     column = {"type": "rigid-column", "from": "lake", "to": "surge", "length": length, "diameter": diameter}
@@ -179,7 +179,7 @@ def test_a_tank_through_a_pipe_swings_with_the_period_of_mass_oscillation():
 
 
 def test_a_rigid_column_behind_a_valve_that_opens_at_once_starts_as_a_hyperbolic_tangent():
-    """`L / (g A) q' = H - (q / K)^2`: q = q1 tanh((t - 1) / T + artanh 0.2), T = L q1 / (g A H)."""
+    """L / (g A) q' = H - (q / K)^2, so q = q1 tanh((t - 1) / T + artanh 0.2) with T = L q1 / (g A H)."""
     length, diameter, head = 1000.0, 0.3, 20.0
     nodes = {"lake": lake(head), "gate": scenes.junction(), "air": reservoir(AMBIENT)}
     column = {"type": "rigid-column", "from": "lake", "to": "gate", "length": length, "diameter": diameter}
@@ -206,8 +206,11 @@ def test_a_rigid_column_behind_a_valve_that_opens_at_once_starts_as_a_hyperbolic
     ids=["tight", "rk4", "ssp"],
 )
 def test_a_valve_that_shuts_brings_a_rigid_column_to_rest_and_the_run_goes_on(numerics, near):
-    """With q = tau s, tau the opening: `tau s' = tau_s + g A / L (H - (f L / D / A^2 + 1 / K^2 tau^2) q^2 / 2 g)`,
-    so the flow falls to nothing together with the opening, at a head that stays finite."""
+    """The flow falls to zero with the opening tau, at a finite head.
+
+    With q = tau s, and tau the time until the closing [s], the reference solves
+    tau s' = s + g A / L (H - (f L / (D A^2) tau^2 + 1 / K^2) s^2 / (2 g)).
+    """
     length, diameter, head, factor, start, shut = 100.0, 0.2, 60.0, 0.02, 2.0, 3.0
     nodes = {"lake": lake(head), "gate": scenes.junction(), "air": reservoir(AMBIENT)}
     column = {"type": "rigid-column", "from": "lake", "to": "gate", "length": length, "diameter": diameter}

@@ -1,6 +1,6 @@
-"""Turbines by hill charts: steady points, load rejection, runaway, folds, energy; against SciPy and closed forms.
+"""Turbines with hill charts: steady points, load rejection, runaway, folded curves, energy; against SciPy.
 
-LINE has Q11 = x (1.2 - 0.008 n11) and T11 = x (1800 - 18 n11), which straight lines hold exactly.
+LINE has Q11 = x (1.2 - 0.008 n11) and T11 = x (1800 - 18 n11), which linear interpolation reproduces exactly.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def turbine(**more) -> dict:
 
 
 def plant(numerics, end=20.0, conduit=None, every=0.5, **keys) -> dict:
-    """Lake, conduit, turbine, lake; the conduit a rigid column."""
+    """Return a case of lake, conduit, turbine and lake; the conduit is a rigid column unless given."""
     column = {"type": "rigid-column", "length": LENGTH, "diameter": BORE, "friction": dict(NO_FRICTION)}
     nodes = {"up": lake(HEAD), "mid": junction(), "low": lake(0.0)}
     links = {"way": {**(conduit or column), "from": "up", "to": "mid"}, "unit": turbine(**keys)}
@@ -49,7 +49,7 @@ def plant(numerics, end=20.0, conduit=None, every=0.5, **keys) -> dict:
 
 
 def direct(head: float, **keys) -> dict:
-    """Lake, turbine, lake."""
+    """Return a case of a turbine between two lakes."""
     unit = {**turbine(**keys), "from": "up"}
     probes = [*PROBES, "unit.power", "unit.opening"]
     return scene({"up": lake(head), "low": lake(0.0)}, {"unit": unit}, 1.0, {"method": "rk4", "step": 0.1}, probes, 0.5)
@@ -61,7 +61,7 @@ def head_of(x, q, omega):
 
 
 def rejection(times):
-    """(flow, speed) of column and shaft after the generator has let go at 1 s, by SciPy."""
+    """Return (flow, speed) of column and shaft at `times` after a load rejection at 1 s, by SciPy."""
 
     def rate(t, y):
         q, omega = y
@@ -95,14 +95,14 @@ def test_a_rejected_load_with_a_column_is_its_two_equations(method):
 
 
 def test_the_ledger_of_energy_closes_with_the_step():
-    """What the lake gives, less what the generator got while it held the shaft, is kept or lost in the turbine."""
+    """The energy balance closes; energy of the shaft and work at the generator equal their formulas."""
     found = energy(plant(TIGHT, inertia=INERTIA, trip=1.0, opening=VANES))
     assert found.ok and found.relative < 1e-10
     assert min(np.diff(found.dissipated["unit turbine"])) > 0.0
     speed = rejection([2.0, 5.0, 8.0, 20.0])[1, -1]
     assert found.stored["unit"][-1] == approx(0.5 * INERTIA * (speed**2 - OMEGA**2), rel=1e-8)
     torque = D**3 * 0.8 * (PUSH * HEAD - BRAKE * 375.0 * D * math.sqrt(HEAD))
-    assert found.supplied["unit"][-1] == approx(-torque * OMEGA, rel=1e-9)  # of one second
+    assert found.supplied["unit"][-1] == approx(-torque * OMEGA, rel=1e-9)  # during 1 s
 
 
 CHART = [
@@ -125,7 +125,7 @@ def test_a_point_of_the_chart_is_what_the_turbine_does(curve, point):
 
 
 def test_between_openings_flow_at_an_angle_is_straight_in_the_opening():
-    """LINE is one curve of n11 and Q11 / x, and so it stays at any opening, down to shut vanes."""
+    """Q11 / x of LINE is one function of n11 at every opening, down to closed vanes."""
     for x in (1.0, 0.7, 0.4, 0.1, 1e-3):
         flow = fvsolve.run(direct(HEAD, opening=x))["unit.flow"][-1]
         assert flow == approx(x * D * D * (ALPHA * math.sqrt(HEAD) - BETA * 375.0 * D), rel=1e-12)
@@ -134,7 +134,7 @@ def test_between_openings_flow_at_an_angle_is_straight_in_the_opening():
 
 
 def test_it_runs_away_to_where_it_has_no_torque():
-    """n11 = PUSH / BRAKE = 100."""
+    """Runaway at zero torque: n11 = PUSH / BRAKE = 100."""
     case = direct(HEAD, inertia=200.0, trip=0.0, opening=0.7)
     case["numerics"] = {"end": 30.0, **TIGHT}
     found = fvsolve.run(case)
@@ -143,7 +143,7 @@ def test_it_runs_away_to_where_it_has_no_torque():
 
 
 def test_faster_than_that_it_brakes_and_torques_turn_it():
-    """A motor on its shaft holds it at n11 = 110, where T11 = -180 x."""
+    """A torque on the shaft keeps n11 = 110, where T11 = -180 x."""
     omega = 110.0 * math.sqrt(HEAD) / D / RPM
     torque = D**3 * HEAD * 0.7 * 180.0
     case = direct(HEAD, inertia=200.0, speed=omega, opening=0.7)
@@ -163,7 +163,7 @@ def test_vanes_that_shut_at_once_are_joukowsky():
     assert rise == approx(np.full(len(rise), RHO * 1000.0 * found["unit.flow"][0] / area(BORE)), rel=1e-12)
 
 
-# A pump-turbine whose n11 folds: distance and T11 over the angle of Q11 / 0.8 and n11 / 85.
+# Pump-turbine with a folded curve: distance and T11 over the angle of Q11 / 0.8 and n11 / 85.
 FOLD = {"diameter": 3.0, "speed": 264.0 / RPM, "inertia": 3e5, "trip": 1.0}
 
 
@@ -191,7 +191,7 @@ def folds(points: int, numerics, conduit=None) -> fvsolve.Result:
 
 
 def test_through_its_folds_a_pump_turbine_is_its_equations_to_second_order_in_its_points():
-    """It swings between branches of its S for good: runaway lies where n11 falls with Q11."""
+    """The oscillation between branches is permanent, because runaway lies where n11 falls with Q11."""
 
     def state(q, omega):
         n, u = omega * RPM * 3.0 / 85.0, q / 9.0 / 0.8
@@ -225,7 +225,7 @@ FLUIDS = {
 
 @pytest.mark.parametrize("law", FLUIDS)
 def test_behind_a_pipe_it_swings_through_them_under_every_law(law):
-    """Half the step moves its first swings by little."""
+    """Half the step changes the flow of the first oscillations by less than 2e-3."""
     way = pipe("up", "mid", 500.0, math.sqrt(48.0 / math.pi), 1000.0, 20, friction=NO_FRICTION)
 
     def run(courant):
@@ -253,7 +253,7 @@ def test_an_s_between_given_pressures_starts_at_the_greatest_flow_and_is_noted()
 
 
 def test_said_another_way_it_is_the_same(tmp_path):
-    """Curves and points in other orders, other units, columns of a file."""
+    """Equivalent input: other orders of curves and points, other units, and a file."""
     numerics = {"method": "rk4", "step": 0.05}
     first = fvsolve.run(plant(numerics, 4.0, inertia=INERTIA, trip=1.0, opening=VANES, hill_chart=CHART))
     turned = [{k: v[::-1] if isinstance(v, list) else v for k, v in one.items()} for one in CHART[::-1]]
@@ -273,18 +273,18 @@ def test_said_another_way_it_is_the_same(tmp_path):
 
 
 def test_it_starts_from_rest_and_leaves_its_chart_once():
-    """Until it turns, and then again without flow, it is where its chart says nothing; one note says so."""
+    """At rest, and later without flow, the turbine is outside its chart; a single notice reports it."""
     keys = {"hill_chart": CHART, "opening": {"time": [0.0, 5.0], "value": [0.0, 0.9]}, "speed": 0.0, "inertia": INERTIA}
     found = fvsolve.run(plant({"method": "radau-iia-5", "rtol": 1e-7}, 60.0, trip=0.0, **keys))
     (said,) = [one for one in found.warnings if one.kind == "range"]
-    assert (said.place, said.key) == ("links.unit", "hill_chart") and "unit: it leaves its hill chart at" in said.text
+    assert (said.place, said.key) == ("links.unit", "hill_chart") and "unit: leaves its hill chart at" in said.text
     assert found["unit.speed"][0] == 0.0 and not found.marks
     assert found["unit.head"][-1] == approx(HEAD, rel=1e-3)
     assert abs(found["unit.torque"][-1]) < 1e-3 * max(found["unit.torque"])
 
 
 def test_behind_shut_vanes_its_water_brakes_it():
-    """T = T11 D^3 (N D / n11)^2: 1 / omega rises evenly."""
+    """T = T11 D^3 (N D / n11)^2, so 1 / omega rises linearly."""
     chart = [*LINE, {"opening": 0, "unit_speed": [70], "unit_flow": [0], "unit_torque": [-30]}]
     case = direct(HEAD, inertia=200.0, trip=0.0, opening=0.0, hill_chart=chart)
     case["numerics"] = {"end": 30.0, **TIGHT}

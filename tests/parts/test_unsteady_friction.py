@@ -1,4 +1,4 @@
-"""Unsteady friction against the exact laminar line, printed weighting functions, its energy and a plateau's bound."""
+"""Unsteady friction against the exact laminar line and printed weighting functions; its energy, and a first plateau."""
 
 from __future__ import annotations
 
@@ -24,11 +24,14 @@ from fvsolve.studies.reference import initial_values
 
 FOOT = 0.3048
 NUMBERS = (0.005, 0.05)  # nu L / (a R^2)
-START, DURATION = 0.1, 0.4  # of the smooth closure, in travel times of the line, which are seconds
+START, DURATION = 0.1, 0.4  # smooth closure, in travel times of the line [s]
 
 
 def line(number: float, cells: int, kind: str = "smooth", end: float = 4.0, reynolds: float = 500.0, **more) -> dict:
-    """A line of one second between a reservoir and a flow that stops, at a viscosity number and a Reynolds number."""
+    """Return a case of a line with a travel time of 1 s between a reservoir and a demand that stops.
+
+    number : nu L / (a R^2); reynolds : Reynolds number at the start
+    """
     d, rho = 0.02, WATER["density"]
     mu = number / 1.0 * (d / 2) ** 2 * rho
     flow = area(d) * reynolds * mu / (rho * d)
@@ -48,24 +51,24 @@ def line(number: float, cells: int, kind: str = "smooth", end: float = 4.0, reyn
 
 @functools.cache
 def joukowsky(number: float, reynolds: float = 500.0) -> float:
-    """rho a v of `line` [Pa]."""
+    """Joukowsky jump rho a v of `line` [Pa]."""
     return WATER["density"] * 1000.0 * reynolds * number * 0.01**2 / 0.02
 
 
 def solved(case: dict):
-    """(run, values of the exact solution by probe and time, exact solution) of a case."""
+    """Return (run, function (k, t) of the exact value of probe k, exact solution) of a case."""
     model = fvsolve.build(fvsolve.load({**case, "exact": {"name": "laminar-line"}}))
     truth = exact.solution(model.case, initial_values(model))
     return fvsolve.run(model), lambda k, t: truth.probe(model.probes[k], t), truth
 
 
 def errors(number: float, cells: int, kind: str):
-    """(times, error of the pressure at the gate in Joukowsky jumps)."""
+    """Return (times, error of the pressure at the gate over the Joukowsky jump)."""
     run, probe, _ = solved(line(number, cells, kind))
     return run.t, (run["gate.pressure"] - probe(0, run.t)) / joukowsky(number)
 
 
-# what is approximated -----------------------------------------------------------------------------------------------
+# weighting functions ------------------------------------------------------------------------------------------------
 
 
 def test_the_transform_of_zielkes_function_is_his_sum_over_the_zeros_of_a_bessel_function():
@@ -74,7 +77,7 @@ def test_the_transform_of_zielkes_function_is_his_sum_over_the_zeros_of_a_bessel
 
 
 def printed(weighting: str, tau: np.ndarray, reynolds: float, roughness: float) -> np.ndarray:
-    """W(tau) as the papers print it: Zielke's series below tau = 0.02, his five exponentials above."""
+    """W(tau) as the papers print it; Zielke's is a series below tau = 0.02 and five exponentials above."""
     if weighting == "zielke":
         powers = (0.282095, -1.25, 1.057855, 0.9375, 0.396696, -0.351563)
         early = sum(c * tau ** (0.5 * (k - 1)) for k, c in enumerate(powers))
@@ -107,7 +110,7 @@ def test_a_sum_of_exponentials_is_the_printed_function_over_all_times_that_are_r
 def test_a_wave_of_any_frequency_that_cells_resolve_meets_the_friction_within_the_accuracy(accuracy):
     for weighting, transform in (("zielke", unsteady_terms.zielke), ("vardy-brown", None)):
         m, n, highest = unsteady_terms.terms(weighting, 1e5, 0.0, 1e-6, 1e-2, accuracy)
-        s = 1j * np.geomspace(100.0, highest, 500)  # from the span of the run on
+        s = 1j * np.geomspace(100.0, highest, 500)  # from 1 / span of the run
         if transform is None:
             a, b = unsteady_terms.vardy_brown(1e5, 0.0)
             value = a * np.sqrt(np.pi / (s + b))
@@ -143,7 +146,7 @@ def test_the_exact_line_is_that_of_another_inversion(number):
 
 
 def test_the_first_plateau_rises_as_boundary_layers_do():
-    """Just after a jump sqrt(I0 / I2) is 1 + 1/x + O(1/x^2): the pressure is 1 + 2 sqrt(tau / pi) of Joukowsky's."""
+    """Early after a jump sqrt(I0 / I2) = 1 + 1/x + O(1/x^2): the pressure is 1 + 2 sqrt(tau / pi) Joukowsky jumps."""
     for t in (1e-6, 1e-4):
         assert laminar.jump(0.05, t) - 1.0 == approx(
             2.0 * math.sqrt(0.05 * t / math.pi), rel=20.0 * math.sqrt(0.05 * t)
@@ -167,7 +170,7 @@ def test_a_smooth_closure_is_within_1e_4_of_the_jump_everywhere(number):
 
 @pytest.mark.parametrize("number", NUMBERS)
 def test_a_sudden_closure_is_within_1e_4_of_the_jump_away_from_fronts(number):
-    """Fronts pass the gate at 2, 4, ... seconds after the closure; 0.1 s around them are left out."""
+    """Fronts pass the gate every 2 s after the closure; errors within 0.1 s of them are left out."""
     t, error = errors(number, 400, "step")
     phase = (t - START + 1.0) % 2.0 - 1.0
     assert np.max(np.abs(error[np.abs(phase) > 0.1])) < 1e-4
@@ -202,7 +205,7 @@ def test_under_other_laws_it_is_the_same_but_for_what_density_changes(law):
     fluid = {**case["fluid"], "bulk_modulus": 1e9, "law": "log"}
     if law == "table":
         fluid = {"name": "Water", "temperature": 293.15, "law": "table"}
-        case = line(0.005, 60, end=1.5)  # the line of its size, of water
+        case = line(0.005, 60, end=1.5)  # a line of this size with water
     linear = fvsolve.run({**case, "fluid": {**fluid, "law": "linear"}})
     other = fvsolve.run({**case, "fluid": {**fluid, "law": law}})
     jump = float(np.ptp(linear["gate.pressure"]))
@@ -210,7 +213,7 @@ def test_under_other_laws_it_is_the_same_but_for_what_density_changes(law):
 
 
 def test_its_port_is_the_impedance_of_the_exact_line_and_passive():
-    """Z tanh(G L) of the linearised cells, and a real part that is nowhere negative."""
+    """Impedance Z tanh(G L) of the linearised cells, with a real part that is never negative."""
     found = response(line(0.02, 40), "gate")
     s = 1j * np.array([0.2, 0.7, 1.5, 2.3])
     root = np.sqrt(laminar.inertia(s / 0.02))
@@ -228,7 +231,10 @@ def test_a_rigid_column_in_its_place_has_no_memory():
 
 
 def test_a_main_keeps_to_the_first_plateau_and_converges_from_one_side():
-    """Joukowsky on 45.116 m and the friction head make 326 ft; peers find 353 to 590, more as their step halves."""
+    """Heads stay below 326 ft, the sum of 45.116 m, Joukowsky's jump and the friction head.
+
+    Other programs give 353 ft to 590 ft, and more with half the step.
+    """
     heads = []
     for cells in (25, 50, 100, 200):
         keys = {"links.main.cells": cells, "links.main.friction": {"model": "unsteady", "roughness": "0.26 mm"}}
@@ -240,12 +246,12 @@ def test_a_main_keeps_to_the_first_plateau_and_converges_from_one_side():
     assert np.all(steps > 0.0) and np.all(steps[1:] < steps[:-1])
 
 
-# states, energy, promises -------------------------------------------------------------------------------------------
+# states, energy, faults ---------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_its_energy_is_booked(law):
-    """The remainder falls with the order of the scheme: what the memory stores and takes is all there is."""
+    """The remainder falls with the order of the scheme, so stored and dissipated energies are complete."""
     found = []
     for cells in (30, 60):
         case = line(0.02, cells, end=2.0)
@@ -255,7 +261,7 @@ def test_its_energy_is_booked(law):
 
 
 def test_what_it_remembers_of_the_start_is_part_of_what_could_be_had():
-    """A line let go from a steady flow: the energy that steady friction does not take was in the memory."""
+    """Relaxation terms of a steady laminar flow add 1/3 of its kinetic energy to the available energy."""
     case = line(0.05, 10, "step", end=1.0)
     with_, without = case, line(0.05, 10, "step", end=1.0)
     without["links"]["main"]["friction"] = {"model": "quasi-steady", "roughness": 0.0}
@@ -263,7 +269,7 @@ def test_what_it_remembers_of_the_start_is_part_of_what_could_be_had():
     model = fvsolve.build(fvsolve.load(case))
     row = model.tables.pipes[0]
     kinetic = 0.5 * row["flow"] ** 2 * 1000.0 / (WATER["density"] * row["area"])
-    assert more == approx(kinetic / 3.0, rel=0.01)  # the parabola holds 4/3 of the energy of its mean
+    assert more == approx(kinetic / 3.0, rel=0.01)  # a parabola has 4/3 of the energy of its mean
 
 
 def test_without_an_event_no_bit_moves():

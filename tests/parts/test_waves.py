@@ -1,4 +1,4 @@
-"""Schedules that swing: values and both slopes against the formula, what they drive against its integral, faults."""
+"""Harmonic schedules: values and both derivatives against the formula, integrals of a flow, and faults."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Independent truth for the tests: closed forms and exact constructions. Imports nothing of fvsolve."""
+"""Reference solutions for the tests: closed forms, exact constructions and independent numerical solutions."""

@@ -1,4 +1,4 @@
-"""Oil with air from the physics, and a drive filled with it: pressures as states. Knows SciPy; knows no fvsolve."""
+"""Density law of oil with air, and trajectories with pressures as states, by SciPy and independent of fvsolve."""
 
 from __future__ import annotations
 
@@ -13,7 +13,11 @@ ATM = 101325.0
 
 @dataclass
 class AirOil:
-    """A mass of liquid takes v = (1 - (p - p_ref) / K) / rho, its gas a v_atm (p_atm / p)^(1/n) / (1 - a) at 1 atm."""
+    """Specific volume of liquid, (1 - (p - p_ref) / K) / rho per mass, with its free gas.
+
+    The gas occupies a v_atm (p_atm / p)^(1/n) / (1 - a) per mass of liquid, with v_atm the volume of the liquid at 1
+    atm.
+    """
 
     rho: float = 870.0
     modulus: float = 1.6e9
@@ -27,7 +31,10 @@ class AirOil:
         return 1.0 - (p - self.reference) / self.modulus
 
     def gas(self, p):
-        """Free gas over the liquid's volume at the reference pressure; SciPy's trial steps may leave its pressures."""
+        """Volume of free gas over that of the liquid at the reference pressure [-].
+
+        Pressures are limited from below, because trial steps of SciPy may leave the valid range.
+        """
         x, atm, end = max(p - self.floor, 1e-3), ATM - self.floor, self.saturation - self.floor
         left = (1.0 - x / end) / (1.0 - atm / end) if x < end else 0.0
         return self.fraction / (1.0 - self.fraction) * self.liquid(ATM) * (atm / x) ** (1.0 / self.exponent) * left
@@ -43,12 +50,12 @@ class AirOil:
 
 
 def orifice(area: float, up: float, down: float, oil: AirOil) -> float:
-    """Mass flow [kg/s] at the density upstream, effective area [m2]."""
+    """Mass flow through an orifice of effective area `area` [m2] at the upstream density [kg/s]."""
     return math.copysign(area * math.sqrt(2.0 * oil.density(max(up, down)) * abs(up - down)), up - down)
 
 
 def follow(rates, start, times, atol, breaks=(), step=np.inf):
-    """A trajectory by SciPy's DOP853 at 1e-12, restarted at `breaks` : float64[n, times]."""
+    """Trajectory float64[n, times] by SciPy's DOP853 with rtol 1e-12, restarted at `breaks`."""
     y, found = np.array(start, dtype=float), np.empty((len(start), len(times)))
     edges = [times[0], *breaks, times[-1]]
     for low, high in zip(edges, edges[1:], strict=False):

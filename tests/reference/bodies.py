@@ -1,4 +1,4 @@
-"""Scenes of bodies in space as cases. Knows the keys; knows no answer. All SI."""
+"""Cases with bodies in space, in SI units."""
 
 from __future__ import annotations
 
@@ -13,18 +13,21 @@ CLOSE = {"method": "dormand-prince", "rtol": 1e-10}
 
 
 def bodies(nodes: dict, end: float, probes=(), links: dict | None = None, every: float = 0.01, **more: Any) -> dict:
-    """A case of bodies; `more` are numerics."""
+    """Case of bodies; `more` are keys of `numerics`."""
     return scene(nodes, links or {}, end, more or CLOSE, probes, every)
 
 
 def pendulum(angle: float = 1.0, length: float = 0.7, mass: float = 2.0, **joint: Any) -> dict:
-    """A point mass on a rod that turns about y; angle 0 hangs."""
+    """Point mass on a massless rod that turns about y; the rod hangs vertically at angle 0."""
     hinge = {"kind": "revolute", "axis": [0, 1, 0], "angle": angle, **joint}
     return body(mass, [0, 0, 0], hinge, centre_of_mass=[0, 0, -length], points={"bob": [0, 0, -length]})
 
 
 class Crane:
-    """A boom of mass m and length L, held near its pivot by a cylinder from below; angle 0 is level, 1 lifts it."""
+    """Boom of mass m and length L, supported near its pivot by a cylinder from below.
+
+    The boom is horizontal at angle 0, and a positive angle lifts it.
+    """
 
     mass, length, gyration = 120.0, 1.0, 10.0
     areas, dead, stroke, x = (1e-3, 6e-4), (1e-4, 1e-4), 0.3, 0.1
@@ -45,12 +48,15 @@ class Crane:
 
     @property
     def p_a(self) -> float:
-        """That holds it."""
+        """Pressure in chamber A that supports the boom [Pa]."""
         force = self.mass * GRAVITY * self.length / 2.0 / self.lever
         return AMBIENT + (force + self.areas[1] * (self.p_b - AMBIENT)) / self.areas[0]
 
     def spring(self, law: str = "log") -> float:
-        """Of both chambers [N/m]; under `linear` a volume that shrinks holds fluid that is none the denser."""
+        """Stiffness of the fluid in both chambers [N/m].
+
+        Under the law `linear`, dp = -(beta + p') dV / V in a closed volume, with p' the gauge pressure.
+        """
         volumes = self.dead[0] + self.areas[0] * self.x, self.dead[1] + self.areas[1] * (self.stroke - self.x)
         beta, total = OIL["bulk_modulus"], 0.0
         for area, volume, pressure in zip(self.areas, volumes, (self.p_a, self.p_b), strict=True):

@@ -1,4 +1,4 @@
-"""Flow of air through the bores of an air valve, from the textbook. Knows NumPy; knows no fvsolve."""
+"""Flow of air through the bores of an air valve by textbook formulas."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from reference.scenes import AMBIENT, area
 
 HEAT = 287.05 * 293.15
 SMALL = (
-    1e-3  # of the pressure upstream: below it the root of a difference is the odd quintic that joins it twice smooth
+    1e-3  # relative to upstream pressure: below it an odd quintic replaces the root, with two continuous derivatives
 )
 QUINTIC = np.linalg.solve([[1, 1, 1], [1, 3, 5], [0, 6, 20]], [1.0, 0.5, -0.25])
 
 
 def softened(x: float) -> float:
-    """sqrt(x), or the quintic, over sqrt(x)."""
+    """Ratio of the softened root to sqrt(x): 1 from SMALL on, the odd quintic over sqrt(x) below."""
     s = x / SMALL
     return 1.0 if s >= 1.0 else float(QUINTIC @ [s, s**3, s**5]) / math.sqrt(s) if s > 0.0 else 0.0
 
 
 def bores(p: float, inlet: float, outlet: float, soft=softened) -> float:
-    """Mass flow of air into a chamber at p: subsonic and choked, in and out (Wylie and Streeter 1993, 7-4) [kg/s]."""
+    """Mass flow of air into a chamber at p, subsonic or choked, in or out (Wylie and Streeter 1993, 7-4) [kg/s]."""
     root = math.sqrt(HEAT)
     if p <= AMBIENT:
         size, r, sign = 0.6 * area(inlet) * AMBIENT / root, p / AMBIENT, 1.0

@@ -1,4 +1,4 @@
-"""A headless Chromium that is on this machine, driven by Playwright. Knows no page."""
+"""Headless Chromium of this computer, controlled by Playwright."""
 
 import contextlib
 import glob
@@ -8,18 +8,18 @@ import shutil
 import pytest
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
-OWN = "~/.cache/ms-playwright/chromium-*/chrome-linux*/chrome"  # where Playwright keeps its own
+OWN = "~/.cache/ms-playwright/chromium-*/chrome-linux*/chrome"  # folder of the browsers that Playwright installs
 
 
 def chromium() -> str | None:
-    """Where it is, None where there is none."""
+    """Path of an installed Chromium, or None."""
     found = [shutil.which(name) for name in NAMES] + sorted(glob.glob(os.path.expanduser(OWN)))
     return next((one for one in found if one), None)
 
 
 @contextlib.contextmanager
 def browser():
-    """A browser; the test skips where there is none."""
+    """Yield a started browser; skip the test if Playwright or Chromium is missing."""
     playwright = pytest.importorskip("playwright.sync_api", reason="no Playwright here to drive a browser")
     if (where := chromium()) is None:
         pytest.skip("no Chromium here: chromium, google-chrome or Playwright's own")
@@ -30,7 +30,7 @@ def browser():
 
 
 def opened(started, path, width: int, height: int = 1000, **settings):
-    """A page once its figures are drawn, and all it said and asked for: (page, console and errors, requests)."""
+    """Page after its figures are drawn, with its console messages and errors, and the addresses that it requested."""
     page = started.new_page(viewport={"width": width, "height": height}, **settings)
     said, asked = [], []
     page.on("console", lambda one: said.append(one.text))

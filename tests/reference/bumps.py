@@ -1,4 +1,4 @@
-"""Smooth bumps with exact cell averages, and what a junction makes of them. Knows no grid but its edges."""
+"""Smooth bumps with exact cell averages, and the reflection and transmission of a wave at a junction."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def gaussian_averages(edges: Array, centre: float, width: float) -> Array:
 
 
 def scattered(impedances: list[float]) -> tuple[float, list[float]]:
-    """Pressure reflected into the first pipe, and passed on to the others, of a unit wave from the first."""
+    """Pressure reflected into the first pipe and pressures transmitted to the others, for a unit wave in the first."""
     admittance = [1 / z for z in impedances]
     passed = 2 * admittance[0] / sum(admittance)
     return passed - 1, [passed] * (len(impedances) - 1)

@@ -1,4 +1,4 @@
-"""Scalars carried over a rectangle by the kernels themselves: arrays in the order they want, and explicit steps."""
+"""Advection and diffusion of scalars on a rectangle by the kernels of fvsolve and explicit steps in NumPy."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NONE = np.zeros(0)
 
 
 class Carried:
-    """A rectangle, the flows in it, and rates of a scalar by a scheme."""
+    """Rectangle with given flows through its faces, and the rates of a scalar by a scheme."""
 
     def __init__(
         self, scheme, mesh, flow_x, flow_y, outside=0.0, bounds=(-np.inf, np.inf), depth=NONE, diffusivity=0.0
@@ -49,7 +49,10 @@ class Carried:
         return rate
 
     def run(self, s, end, courant, method="ssp-rk3", factor=lambda t: 1.0):
-        """Values at `end`, by steps of the Courant number with the greatest rate, diffusion's own among them."""
+        """Values at time `end`, by equal steps of a Courant number.
+
+        The Courant number refers to the sum of the greatest rates of advection and of diffusion.
+        """
         quick = self.fastest + 2.0 * self.diffusivity * (self.kx.max() ** 2 + self.ky.max() ** 2)
         steps = int(np.ceil(end * quick / courant))
         h = end / steps
@@ -72,13 +75,13 @@ class Carried:
 
 
 def carried(scheme, cells, velocity, size=(1.0, 1.0), grading=(1.0, 1.0), **more) -> Carried:
-    """By a velocity as `face_flows` takes it."""
+    """Rectangle with the flows of a velocity, given in the form that `face_flows` reads."""
     mesh = rectangle(size, (cells, cells) if np.isscalar(cells) else cells, grading=grading)
     return Carried(scheme, mesh, *grid_flows(mesh, face_flows(mesh, velocity)), **more)
 
 
 def means(mesh, f, points=4):
-    """float64[n]: means of f(x, y) over the cells of a rectangle, by Gauss's points."""
+    """Means of f(x, y) over the cells of a rectangle by Gauss quadrature : float64[n]."""
     at, weight = np.polynomial.legendre.leggauss(points)
     mid = [0.5 * (line[1:] + line[:-1]) for line in (mesh.grid.x, mesh.grid.y)]
     wide = [np.diff(line) for line in (mesh.grid.x, mesh.grid.y)]
@@ -91,7 +94,10 @@ def means(mesh, f, points=4):
 
 
 def enters(come, excess, slender, diffusivity, outside, depth, s):
-    """What comes in through a face with a flow, and by diffusion; slender : half the cell's width over the face's."""
+    """Inflow of a scalar through a boundary face by advection and diffusion.
+
+    slender : half the width of the cell over the length of the face
+    """
     own = s / max(depth, advection.THIN)
     if come > 0.0:
         return come * outside + excess + diffusivity * depth / slender * (outside - own)
@@ -99,10 +105,11 @@ def enters(come, excess, slender, diffusivity, outside, depth, s):
 
 
 def ring_rates(nx, ny, kx, ky, diffusivity, factor, flow_x, flow_y, depth, outside, ax, ay, s, ring):
-    """What comes in through every face of the boundary, float64[ring], carried and by diffusion [m2/s times a value].
+    """Inflow through every face of the boundary by advection and diffusion : ring float64[ring] [m2/s times value].
 
-    ax, ay : the excesses that `add_fifth_order` leaves, work[n:] in the order of flow_x and then of flow_y;
-    empty for the others, and gone where the diffusion was given the same work. The sum is that of rates times areas.
+    ax, ay : excesses that `add_fifth_order` leaves in work[n:], in the order of flow_x and then of flow_y. They are
+    empty for all other schemes, and lost if the diffusion uses this work array. The sum of `ring` is the sum of rates
+    times areas.
     """
     m, last = nx + 1, ny * nx
     diffusivity = diffusivity if depth.size == 0 else 0.0

@@ -1,7 +1,7 @@
-"""Method of characteristics at Courant 1 with friction, for the tests. Knows the linear law only.
+"""Method of characteristics with friction at Courant number 1, for the linear density law.
 
-Along `dx/dt = +-a`: `d(P +- Z M)/dt = -+ a F(M)`, friction force per length `F` [N/m] over the flow area,
-taken by the trapezoid with the new value iterated: second order. `richardson` combines two of them.
+Along `dx/dt = +-a`, `d(P +- Z M)/dt = -+ a F(M)` with the friction gradient `F` [Pa/m]. The trapezoidal rule
+integrates F and the new value is iterated, which gives second order. `richardson` extrapolates two solutions.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def hazen_williams(coefficient: float, diameter: float, density: float) -> Calla
 
 @dataclass(frozen=True)
 class ValvePipe:
-    """Reservoir, pipe, valve to a fixed pressure. `flow_area` is Cd A [m2] as a function of time."""
+    """Reservoir, pipe and valve to a fixed pressure; `flow_area` is Cd A [m2] as a function of time."""
 
     length: float
     diameter: float
@@ -61,7 +61,7 @@ class ValvePipe:
         return (low + high) / 2
 
     def valve_pressure(self, reaches: int, end: float) -> tuple[Array, Array]:
-        """Times of the steps and the pressure before the valve at them [Pa]."""
+        """Times of the steps [s] and pressure before the valve at these times [Pa]."""
         z = self.wave_speed / (math.pi / 4 * self.diameter**2)
         dx = self.length / reaches
         dt, steps = dx / self.wave_speed, round(end * self.wave_speed / dx)
@@ -93,7 +93,7 @@ class ValvePipe:
         return (incoming - p) / z, p
 
     def richardson(self, reaches: int, end: float) -> tuple[Array, Array]:
-        """The extrapolation of `reaches` and twice as many, at the steps of the coarser."""
+        """Times and Richardson extrapolation from `reaches` and 2 `reaches`, at the steps of the coarser solution."""
         t, coarse = self.valve_pressure(reaches, end)
         _, fine = self.valve_pressure(2 * reaches, end)
         return t, (4 * fine[::2][: len(t)] - coarse) / 3

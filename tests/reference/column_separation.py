@@ -1,8 +1,8 @@
-"""A column of liquid that parts from a wall: Joukowsky's cavity at vapour pressure, in closed form.
+"""Column separation at a wall: Joukowsky's vapour cavity in closed form.
 
-A frictionless pipe of length L between a reservoir at p0 and a wall; all of it flows from the wall at v0 and at p0, so
-a cavity opens at the wall at once. The column leaves it at v0 - (2 k - 1) D after k - 1 returns of the wave, each
-2 L / a, D = (p0 - pv) / (rho a); it is back when these have added up to nothing.
+A frictionless pipe of length L connects a reservoir at p0 with a wall. The fluid starts at p0 and flows away from the
+wall at v0, so a cavity opens at the wall at once. Its rate of growth is v0 - (2 k - 1) D after k - 1 returns of the
+wave. Each return lasts 2 L / a, and D = (p0 - pv) / (rho a). The cavity closes when the growths add up to zero.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ G = 9.80665
 
 
 def cavity(v0: float, drop: float, rho: float, a: float, length: float) -> tuple[float, float, float]:
-    """(duration [s], greatest length [m], velocity of the return [m/s]) of a cavity; drop = p0 - pv [Pa]."""
+    """Duration [s], greatest length [m] and return velocity [m/s] of a cavity; drop = p0 - pv [Pa]."""
     step, turn = drop / (rho * a), 2.0 * length / a
     size, greatest, k = 0.0, 0.0, 1
     while True:
@@ -29,8 +29,11 @@ def cavity(v0: float, drop: float, rho: float, a: float, length: float) -> tuple
 
 def behind_a_gate(lake: float, far: float, length: float, diameter: float, a: float, factor: float, loss: float,
                   shut: float, least: float, reaches: int, end: float) -> np.ndarray:  # fmt: skip
-    """Rows of time, head at the gate [m] and cavity there [m3], by characteristics at Courant 1: a lake, a gate that
-    shuts at once, a pipe with friction, another lake; `least` is the head of vapour."""
+    """Rows of time [s], head [m] and cavity volume [m3] at a gate, by characteristics at Courant number 1.
+
+    The gate between a lake and a pipe with friction shuts at once at `shut`; the pipe ends at another lake. `least` is
+    the vapour head.
+    """
     area, step = 0.25 * math.pi * diameter**2, length / reaches / a
     b, r = a / (G * area), factor * length / reaches / (2.0 * G * diameter * area**2)
     k = loss / (2.0 * G * area**2)
@@ -46,7 +49,7 @@ def behind_a_gate(lake: float, far: float, length: float, diameter: float, a: fl
         if n * step <= shut:
             q[0] = (math.sqrt(b * b + 4.0 * k * (lake - down[0])) - b) / (2.0 * k)
         elif hole > 0.0 or down[0] < least:
-            q[0] = (least - down[0]) / b  # the flow that leaves the cavity
+            q[0] = (least - down[0]) / b  # flow from the cavity into the pipe
             hole = max(hole + step * q[0], 0.0)
             q[0] = q[0] if hole > 0.0 else 0.0
         head[0] = down[0] + b * q[0]

@@ -1,7 +1,8 @@
-"""A line whose wall creeps and whose flow stops at once, by another road than fvsolve.exact: mpmath inverts it whole.
+"""Pressure at the end of a line with a creeping wall after an instantaneous stop, by Laplace inversion with mpmath.
 
-Pressure at the shut end over that of Joukowsky; time in travel times L / a; elements (G, tau) of G = c D rho a^2 J / e
-and tau to that time: the transform is tanh(s sqrt(C)) / (s sqrt(C)), C = 1 + sum of G / (1 + tau s), Covas et al. 2005.
+The result is relative to Joukowsky's jump and independent of fvsolve.exact. Times are in travel times L / a. The
+elements are pairs (G, tau) with G = c D rho a^2 J / e and tau in travel times. The transform is
+tanh(s sqrt(C)) / (s sqrt(C)) with C = 1 + sum of G / (1 + tau s) (Covas et al. 2005).
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import mpmath
 
 
 def jump(elements, t: float) -> float:
-    """Pressure at the end of a line whose flow stops at once at t = 0, away from the fronts at 2, 4, ..."""
+    """Pressure at the end of a line whose flow stops at once at t = 0, away from the fronts at 2, 4, ... [-]."""
 
     def passage(s, k):
         taken = sum((share / (1 + tau * s) for share, tau in elements), mpmath.mpf(0))

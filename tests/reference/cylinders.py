@@ -1,4 +1,4 @@
-"""A cylinder with its load, from the physics: pressures, not masses, as states. Knows SciPy; knows no fvsolve."""
+"""Hydraulic cylinder with its load, integrated by SciPy with pressures as states and independent of fvsolve."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ AMBIENT, RHO, BETA, MU = 101325.0, 870.0, 1.2e9, 0.028
 
 
 def valve_flow(area: float, share: float, p_up: float, p_down: float, rho: float, coefficient: float = 0.61) -> float:
-    """Mass flow [kg/s] of q = share Cd A sqrt(2 dp / rho); below Reynolds 10 of the full area as docs/parts.md says."""
+    """Mass flow [kg/s] by q = share Cd A sqrt(2 dp / rho), and by the polynomial of docs/parts.md in transition flow.
+
+    Transition flow is below Reynolds number 10 of the full area.
+    """
     size = 2.0 * rho * (coefficient * area * share) ** 2 * abs(p_up - p_down)
     slow = 10.0 * math.pi / 4.0 * math.sqrt(4.0 * area / math.pi) * MU
     x = size / slow**2
@@ -22,7 +25,10 @@ def valve_flow(area: float, share: float, p_up: float, p_down: float, rho: float
 
 @dataclass
 class Jack:
-    """A cylinder between a frame at 0 and a mass, with spring, damper, force, leak; SI, law `linear` or `log`."""
+    """Cylinder between a frame at 0 and a mass, with spring, damper, force and leak, in SI units.
+
+    law : `linear` or `log`
+    """
 
     law: str = "log"
     mass: float = 20.0
@@ -37,7 +43,7 @@ class Jack:
     stiffness: float = 0.0
     free: float = 0.0
     damping: float = 0.0
-    extra: dict = field(default_factory=dict)  # keys of the cylinder beside these
+    extra: dict = field(default_factory=dict)  # further keys of the cylinder
 
     def volumes(self, x: float) -> tuple[float, float]:
         return self.dead[0] + self.areas[0] * x, self.dead[1] + self.areas[1] * (self.stroke - x)
@@ -46,14 +52,17 @@ class Jack:
         return RHO * math.exp((p - AMBIENT) / BETA) if self.law == "log" else RHO
 
     def hydraulic_spring(self) -> float:
-        """k_h = A_A^2 beta / V_A + A_B^2 beta / V_B [N/m]."""
+        """Stiffness k_h = A_A^2 beta / V_A + A_B^2 beta / V_B [N/m]."""
         return sum(a**2 * BETA / v for a, v in zip(self.areas, self.volumes(self.x), strict=True))
 
     def thrust(self, p_a: float, p_b: float) -> float:
         return self.areas[0] * (p_a - AMBIENT) - self.areas[1] * (p_b - AMBIENT)
 
     def rates(self, t, y, flows, push):
-        """d/dt of (p_A, p_B, x, v); flows(t, p_A, p_B) are mass flows into A and B, push(t, x, v) other forces."""
+        """Rates of (p_A, p_B, x, v).
+
+        flows(t, p_A, p_B) : mass flows into A and B [kg/s]; push(t, x, v) : further forces [N]
+        """
         p_a, p_b, x, v = y
         volumes = self.volumes(x)
         leak = self.leakage * (p_a - p_b) * self.density(max(p_a, p_b))
@@ -65,9 +74,9 @@ class Jack:
         return [*rise, v, (force + push(t, x, v)) / self.mass]
 
     def trajectory(self, times, flows=lambda t, a, b: (0.0, 0.0), push=lambda t, x, v: 0.0, breaks=()):
-        """(p_A, p_B, x, v) at times, float64[4, n]: SciPy's DOP853 at 1e-12, restarted at `breaks`.
+        """(p_A, p_B, x, v) at times : float64[4, n], by SciPy's DOP853 with rtol 1e-12, restarted at `breaks`.
 
-        The steps are kept short: longer ones leap over the moment in which an edge that opens is laminar.
+        The steps are short, because longer steps jump over the short laminar flow of an edge that opens.
         """
         y = np.array([*self.pressures, self.x, self.v])
         found, edges = np.empty((4, len(times))), [times[0], *breaks, times[-1]]
@@ -80,9 +89,10 @@ class Jack:
         return found
 
     def closed_period(self) -> tuple[float, float, float]:
-        """(period [s], least and greatest x) with shut ports under `log`: T = 2 int dx / sqrt(2 (W(x) + E0) / m).
+        """Period [s], least and greatest x [m] of free swings with shut ports under the law `log`.
 
-        Force A_A (p_A0 - beta ln(V_A / V_A0) - p_amb) - ...; W is its integral, in closed form.
+        T = 2 int dx / sqrt(2 (W(x) + E0) / m). W is the integral in closed form of the force of both chambers,
+        A_A (p_A0 - beta ln(V_A / V_A0) - p_amb) for chamber A.
         """
         volumes = self.volumes(self.x)
 
@@ -113,7 +123,7 @@ class Jack:
         return brentq(lambda x: work(x) + energy, self.x + side * reach / 1.5, self.x + side * reach, xtol=1e-17)
 
     def fluid_energy(self, x, p_a, p_b):
-        """V (beta (exp(p / beta) - 1) - p) of both chambers, p from ambient [J] (design.md, Ledgers)."""
+        """Energy V (beta (exp(p / beta) - 1) - p) of both chambers, p above ambient [J] (design.md, Ledgers)."""
         total = 0.0
         for v, p in zip(self.volumes(x), (p_a - AMBIENT, p_b - AMBIENT), strict=True):
             total = total + v * (BETA * np.expm1(p / BETA) - p)

@@ -1,4 +1,4 @@
-"""Scenes of delay lines, and what characteristics at Courant 1 say of them. Knows keys; knows no kernel."""
+"""Cases with delay lines, and solutions by characteristics at Courant number 1."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from reference.scenes import RHO, scene
 
 SPEED, BORE, LENGTH, FLOW = 1200.0, 0.3, 900.0, 0.03
 AREA = np.pi / 4 * BORE**2
-JUMP = RHO * SPEED * FLOW / AREA  # Joukowsky's [Pa]
-TRAVEL = LENGTH / SPEED  # 0.75 s
+JUMP = RHO * SPEED * FLOW / AREA  # Joukowsky jump [Pa]
+TRAVEL = LENGTH / SPEED  # 0.75 [s]
 STEPS = {"step": 0.04}
 
 
 def pipe(one: str, other: str, length: float = LENGTH, **keys) -> dict:
-    """A pipe; without friction if nothing is said."""
+    """Pipe, by default frictionless."""
     return {"type": "pipe", "from": one, "to": other, "length": length, "diameter": BORE, "wave_speed": SPEED,
             "friction": {"model": "none"}, "cells": 8, **keys}  # fmt: skip
 
@@ -23,7 +23,7 @@ STOP = {"time": [0.0, 0.5], "value": [FLOW, 0.0], "kind": "step"}
 
 
 def main(end: float = 8.0, numerics: dict | None = None, demand=STOP, every: float = 0.05, probes=(), **keys) -> dict:
-    """A lake, a pipe and a demand that stops."""
+    """Case of a lake, a pipe and a demand that stops."""
     nodes = {"lake": {"type": "reservoir", "pressure": 6e6}, "gate": {"type": "junction", "demand": demand}}
     probes = ["gate.pressure", "main.flow@0", "main.pressure@0.5", "main.pressure@0.3", *probes]
     numerics = {"method": "euler", "pipe_model": "delay-line", **(STEPS if numerics is None else numerics)}
@@ -31,7 +31,7 @@ def main(end: float = 8.0, numerics: dict | None = None, demand=STOP, every: flo
 
 
 def fork(numerics: dict, end: float = 6.0, every: float = 0.05, **keys) -> dict:
-    """Three pipes whose travel times are 0.5, 0.3 and 0.2 s, a lake, a dead end and a demand that stops."""
+    """Case of three pipes with travel times of 0.5, 0.3 and 0.2 s, a lake, a dead end and a demand that stops."""
     nodes = {
         "lake": {"type": "reservoir", "pressure": 6e6},
         "fork": {"type": "junction"}, "dead": {"type": "junction"},
@@ -49,19 +49,21 @@ def fork(numerics: dict, end: float = 6.0, every: float = 0.05, **keys) -> dict:
 
 
 def turned(case: dict) -> dict:
-    """Every pipe drawn the other way."""
-    for link in case["links"].values():
-        if link["type"] == "pipe":
-            link["from"], link["to"] = link["to"], link["from"]
-    return case
+    """Copy of a case with `from` and `to` of every pipe exchanged."""
+    ends = {"from": "to", "to": "from"}
+    links = {
+        name: {ends.get(key, key): value for key, value in link.items()} if link["type"] == "pipe" else link
+        for name, link in case["links"].items()
+    }
+    return {**case, "links": links}
 
 
 def square(t, first: float, period: float) -> np.ndarray:
-    """1 and -1 in turn from `first` on, each for half a period; 0 before."""
+    """Square wave that alternates between 1 and -1 from `first` on, with half a period each; 0 before `first`."""
     return np.where(t < first, 0.0, np.where(np.floor((t - first) / (0.5 * period) + 1e-9) % 2 == 0, 1.0, -1.0))
 
 
 def beside_jumps(t, first: float, spacing: float) -> np.ndarray:
-    """Which times are none of jumps at first + k spacing."""
+    """True at times that differ from all times of jumps, first + k spacing."""
     share = (t - first) / spacing
     return np.abs(share - np.round(share)) > 1e-6

@@ -1,4 +1,4 @@
-"""Valves that act by themselves, by SciPy at 1e-12 and by waves on a frictionless pipe. Knows no fvsolve."""
+"""Lifted valves: ordinary differential equations by SciPy, and waves on a frictionless pipe."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ TIGHT = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-12, "dense_output": True}
 
 
 def stopped(rates, push, start, kinks, t):
-    """(states over t of y' = rates(t, y, held), times of its events) where the lift y[1] stays between 0 and 1.
+    """States at t of y' = rates(t, y, held) with the lift y[1] between stops at 0 and 1, and the times of events.
 
-    rates(t, y, held) : list, with the lift's own rates zero while held; push(t, y) : what lifts it. Its speed y[2],
-    where there is one, is lost at a stop. Solved piece by piece between kinks and events.
+    rates(t, y, held) : list, with the rates of the lift zero while held; push(t, y) : drive of the lift. An optional
+    speed y[2] becomes zero at a stop. The solution is computed piece by piece between kinks and events.
     """
     y, now, held = np.array(start, float), t[0], 0
     if y[1] <= 0.0 and push(now, y) <= 0.0:
@@ -47,10 +47,11 @@ def stopped(rates, push, start, kinks, t):
 
 
 def slam(source, g, impedance, delay, far, span, time, t_end, kinks):
-    """(t, lift, mass flow, pressure behind) of a check valve with a slow disc before a frictionless pipe.
+    """Times, rows [lift, mass flow, downstream pressure] and events of a check valve with a slow disc before a pipe.
 
-    source(t) : pressure before it [Pa]; far : that at the other end of the pipe, whose waves come back after `delay`;
-    p_behind = p0 + Z (M - M0) + w, w(t) = -(p' + Z M')(t - delay); M |M| = G x^2 (source - p_behind).
+    The pipe is frictionless. source(t) : upstream pressure [Pa]; far : pressure at the far end of the pipe [Pa], whose
+    waves return after `delay` [s]. The downstream pressure is p_behind = p0 + Z (M - M0) + w with
+    w(t) = -(p' + Z M')(t - delay), and M |M| = G x^2 (source - p_behind).
     """
     first = math.sqrt(g * (source(0.0) - far))
     pieces: list = []
@@ -107,11 +108,13 @@ def slam(source, g, impedance, delay, far, span, time, t_end, kinks):
 
 
 def leaves_with_column(source, kink, g, beyond, span, disc, inertia, friction, felt, at):
-    """(time at which, [lift, mass flow] at times `at`) of a disc that leaves its seat with the rigid column it holds.
+    """Start time, and [lift, mass flow] at times `at`, of a disc that opens for the rigid column that it blocks.
 
-    inertia dM/dt = source(t) - M |M| / (G x^2) - friction M |M|, and what lifts the disc `beyond` its first opening is
-    that drop or, with felt == "source", the source. disc : {"time_constant"} or {"natural_frequency", "damping_ratio"}.
-    Both start as powers of the time s since it leaves: x = a s^n, M = a s^n sqrt(G beyond), at s = 1e-4 here.
+    inertia dM/dt = source(t) - M |M| / (G x^2) - friction M |M|. The lifting pressure minus `beyond` drives the disc.
+    It
+    is the drop or, with felt == "source", the source.
+    disc : {"time_constant"} or {"natural_frequency", "damping_ratio"}
+    Lift and flow start as powers of the time s since the start: x = a s^n, M = a s^n sqrt(G beyond), at s = 1e-4.
     """
     start, s = brentq(lambda t: source(t) - beyond, kink - 1.0, kink, xtol=1e-15), 1e-4
     rise, root = (source(start + 1e-3) - source(start)) / 1e-3, math.sqrt(g * beyond)

@@ -1,4 +1,4 @@
-"""Where the shipped cases and the pages lie: said once, so that no test counts the folders above it."""
+"""Folders of the shipped cases and of the documentation pages."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 
 def page(name: str) -> str:
-    """The text of docs/NAME.md."""
+    """Text of docs/NAME.md."""
     return (DOCS / f"{name}.md").read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""A network small enough to run at will, whose pipes fork: what tests of output, of damage and of refusals share."""
+"""Small case of a branched network, for tests of output, of damaged files and of refused cases."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PIPE = {
 
 
 def branched(fields: int = 5, **top) -> dict:
-    """A main that forks into a dead end and a valve that shuts between 0.1 and 0.2 s."""
+    """Case of a main that forks into a dead end and a valve that shuts between 0.1 and 0.2 s."""
     nodes = {
         "lake": {"type": "reservoir", "head": 60.0, "elevation": 40.0},
         "fork": {"type": "junction", "elevation": 10.0},

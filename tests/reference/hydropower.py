@@ -1,7 +1,7 @@
-"""The plant of cases/hydropower.toml by the method of characteristics, and the formula of its hill chart.
+"""Plant of cases/hydropower.toml by the method of characteristics, and the formula of its hill chart.
 
-Imports no module of fvsolve. `python tests/reference/hydropower.py chart` writes the points of the chart; without an
-argument it prints the reference values of the case.
+The module imports nothing from fvsolve. `python tests/reference/hydropower.py chart` writes the points of the chart;
+without an argument it prints the reference values of the case.
 """
 
 from __future__ import annotations
@@ -17,23 +17,23 @@ TUNNEL, TUNNEL_BORE, TUNNEL_FACTOR, SHAFT = 2000.0, 4.0, 0.014, 150.0
 LENGTH, BORE, SPEED_OF_SOUND, FACTOR = 330.0, 3.0, 1100.0, 0.012
 RUNNER, INERTIA, TURNS, TRIP = 2.0, 200e3, 1000.0 / 3.0, 2.0
 VANES = ([2.2, 7.2, 15.2], [0.8, 0.3, 0.0])
-BEST, FULL = 70.0, 0.9  # n11 at the best efficiency, Q11 there with open vanes
-TORQUE = RHO * GRAVITY * 30.0 / (pi * BEST)  # T11 of an efficiency of 1 at the best n11 and Q11 = 1
+BEST, FULL = 70.0, 0.9  # n11 at the best efficiency, and Q11 at this n11 with open vanes
+TORQUE = RHO * GRAVITY * 30.0 / (pi * BEST)  # T11 at efficiency 1, the best n11 and Q11 = 1
 
 
 def unit_flow(x, n11):
-    """Q11 = 0.9 x sqrt(1.3 - 0.3 (n11 / 70)^2)."""
+    """Unit flow Q11 = 0.9 x sqrt(1.3 - 0.3 (n11 / 70)^2) [m^(1/2)/s]."""
     return FULL * x * np.sqrt(1.3 - 0.3 * (n11 / BEST) ** 2)
 
 
 def unit_torque(q11, n11):
-    """T11: what the guided flow brings, less friction of the disc and swirl away from Q11 = 0.7."""
+    """Unit torque T11 [N/m3]: torque of the guided flow minus disc friction and swirl losses away from Q11 = 0.7."""
     nu = n11 / BEST
     return TORQUE * (q11 * (1.84 - 0.88 * nu) - 0.02 * nu**2 - 0.12 * (q11 - 0.7) ** 2 * q11)
 
 
 def chart() -> str:
-    """Points of the formula as the case's CSV file has them."""
+    """Points of the formula in the format of the CSV file of the case."""
     rows = ["opening,unit_speed [rpm m^(1/2)],unit_flow [m^(1/2)/s],unit_torque [N/m3]"]
     rows.append(f"0,{BEST:g},0,{unit_torque(0.0, BEST):.6g}")
     for x in np.arange(1, 11) / 10:
@@ -44,12 +44,12 @@ def chart() -> str:
 
 
 def head_of(x, q, turns):
-    """Net head [m] of a flow [m3/s] that drives, by the formula solved for it."""
+    """Net head of a positive flow q [m3/s] by the formula solved for the head [m]."""
     return ((q / (FULL * x * RUNNER**2)) ** 2 + 0.3 * (turns * RUNNER / BEST) ** 2) / 1.3
 
 
 def torque_of(x, q, turns, head):
-    """On the shaft [N m]."""
+    """Torque on the shaft [N m]."""
     if x <= 0.0:
         return RUNNER**3 * -0.02 * TORQUE * (turns * RUNNER / BEST) ** 2
     root = sqrt(head)
@@ -57,7 +57,7 @@ def torque_of(x, q, turns, head):
 
 
 def net_flow(x, turns, arriving, wave):
-    """Flow at which the formula takes `arriving` - wave q [m]; 0 through shut vanes."""
+    """Flow at which the head of the formula is `arriving` - wave q [m3/s]; 0 with shut vanes."""
     if x <= 0.0:
         return 0.0
     a = 1.0 / (1.3 * (FULL * x * RUNNER**2) ** 2)
@@ -66,7 +66,7 @@ def net_flow(x, turns, arriving, wave):
 
 
 def steady():
-    """(flow, level of the shaft, head before the turbine) at the start."""
+    """Flow [m3/s], level of the shaft [m] and head before the turbine [m] at the start."""
     area, bore = pi / 4 * TUNNEL_BORE**2, pi / 4 * BORE**2
     tunnel = TUNNEL_FACTOR * TUNNEL / TUNNEL_BORE / (2 * GRAVITY * area**2)
     penstock = FACTOR * LENGTH / BORE / (2 * GRAVITY * bore**2)
@@ -79,7 +79,7 @@ def steady():
 
 
 def plant(reaches: int, end: float):
-    """t, head before the turbine [m], flow [m3/s], speed [rpm], level of the shaft [m] : float64[n] each."""
+    """Time [s], head before the turbine [m], flow [m3/s], speed [rpm] and level of the shaft [m] : float64[n] each."""
     area, bore = pi / 4 * TUNNEL_BORE**2, pi / 4 * BORE**2
     q0, level, before = steady()
     step = LENGTH / SPEED_OF_SOUND / reaches

@@ -1,6 +1,7 @@
-"""Exact flow of a liquid along CoolProp's isentrope, `dp / drho = a^2`. Knows no grid and no table.
+"""Exact flow of a liquid along an isentrope of CoolProp, `dp / drho = a^2`.
 
-Rarefactions: `u` changes by the integral of `dp / (rho a)`. Shocks: `(u_1 - u_2)^2 = (p_1 - p_2) (1/rho_2 - 1/rho_1)`.
+In rarefactions `u` changes by the integral of `dp / (rho a)`.
+Shocks obey `(u_1 - u_2)^2 = (p_1 - p_2) (1/rho_2 - 1/rho_1)`.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from scipy.optimize import brentq
 
 
 class Isentrope:
-    """The liquid `name` through a state, between two pressures [Pa]: polynomials through 80 of CoolProp's states."""
+    """Isentrope of the liquid `name` between two pressures [Pa], by Chebyshev polynomials of degree 80."""
 
     def __init__(self, name: str, temperature: float, pressure: float, low: float, high: float) -> None:
         state = AbstractState("HEOS", name)
@@ -36,7 +37,7 @@ class Isentrope:
         return brentq(lambda p: self.rho(p) - rho, self.low, self.high, xtol=1e-6, rtol=1e-15)
 
     def behind(self, p: float, p_ahead: float) -> float:
-        """Velocity a wave to the right gives the fluid when it takes it from `p_ahead` to `p` [m/s]."""
+        """Velocity of the fluid behind a wave to the right into fluid at rest, from pressure `p_ahead` to `p` [m/s]."""
         if p > p_ahead:
             return math.sqrt((p - p_ahead) * (1 / self.rho(p_ahead) - 1 / self.rho(p)))
         return self.w(p) - self.w(p_ahead)
@@ -44,20 +45,20 @@ class Isentrope:
 
 @dataclass(frozen=True)
 class Riemann:
-    """Two uniform states that meet at x = 0 at t = 0."""
+    """Riemann problem of two uniform states that touch at x = 0 at t = 0."""
 
     fluid: Isentrope
     left: tuple[float, float]  # pressure [Pa], velocity [m/s]
     right: tuple[float, float]
 
     def middle(self) -> tuple[float, float]:
-        """Pressure and velocity between the two waves."""
+        """Pressure [Pa] and velocity [m/s] between the two waves."""
         f, (pl, ul), (pr, ur) = self.fluid, self.left, self.right
         p = brentq(lambda p: ul - ur - f.behind(p, pl) - f.behind(p, pr), f.low, f.high, xtol=1e-6, rtol=1e-15)
         return p, ul - f.behind(p, pl)
 
     def at(self, rays: np.ndarray) -> np.ndarray:
-        """Density and mass flow density on rays x / t : float64[2, n]."""
+        """Density [kg/m3] and mass flow density [kg/(m2 s)] on rays x / t : float64[2, n]."""
         p, u = self.middle()
         found = [
             self._wave(*self.right, p, u, ray, 1.0) if ray > u else self._wave(*self.left, p, u, ray, -1.0)
@@ -67,7 +68,7 @@ class Riemann:
         return np.array([rho, rho * np.array(found)[:, 1]])
 
     def _wave(self, p0, u0, p, u, ray, way) -> tuple[float, float]:
-        """Pressure and velocity on a ray that lies on the side that a wave runs to, east (way 1) or west."""
+        """Pressure and velocity on a ray on the side of the right wave (way 1) or of the left wave (way -1)."""
         f = self.fluid
         if p > p0:
             speed = f.rho(p) * f.behind(p, p0) / (f.rho(p) - f.rho(p0))

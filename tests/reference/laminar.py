@@ -1,8 +1,8 @@
-"""A laminar line that is shut, by another road than fvsolve.exact: Zielke's sum over Bessel zeros, Euler's summation.
+"""Pressure at the end of a laminar line after a stop, by Zielke's sum over Bessel zeros and Euler summation.
 
-Pressure at the shut end over that of Joukowsky, for a flow that goes from 1 to 0; time in travel times L / a; `number`
-is nu L / (a R^2). With s to that time and u = s / number, momentum is s M (1 + 8/u + 4 W(u)) = -p_x, and W(u) is the
-sum of 1 / (u + j^2) over the zeros j of J_2 (Zielke 1968).
+The result is relative to Joukowsky's jump, for a flow from 1 to 0, and independent of fvsolve.exact. Times are in
+travel times L / a; `number` is nu L / (a R^2). With s in this time and u = s / number, the momentum balance is
+s M (1 + 8/u + 4 W(u)) = -p_x. W(u) is the sum of 1 / (u + j^2) over the zeros j of J_2 (Zielke 1968).
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ def zeros() -> np.ndarray:
 
 
 def inertia(u: np.ndarray) -> np.ndarray:
-    """1 + 8/u + 4 W(u); the zeros beyond the last are (k + 3/4) pi, and their sum an integral."""
+    """Factor 1 + 8/u + 4 W(u), with an integral for the sum over the zeros beyond the last, near (k + 3/4) pi."""
     root = np.sqrt(u)
     rest = np.arctan(root / ((ZEROS + 1.25) * np.pi)) / (np.pi * root)
     return 1.0 + 8.0 / u + 4.0 * ((1.0 / (u[..., None] + zeros())).sum(axis=-1) + rest)
 
 
 def euler(transform, t: float, terms: int = 60) -> float:
-    """f(t) from its transform: Fourier series, the tail by Euler's binomial mean (Abate and Whitt 1995)."""
+    """f(t) from its transform by a Fourier series with Euler's binomial mean of the tail (Abate and Whitt 1995)."""
     a, more = 24.0, 14
     k = np.arange(terms + more + 1)
     s = (a + 2j * np.pi * k) / (2.0 * t)
@@ -40,7 +40,7 @@ def euler(transform, t: float, terms: int = 60) -> float:
 
 
 def jump(number: float, t: float) -> float:
-    """Pressure at the end of a line whose flow stops at once at t = 0, away from the fronts at 2, 4, ..."""
+    """Pressure at the end of a line whose flow stops at once at t = 0, away from the fronts at 2, 4, ... [-]."""
     total, k = 0.0, 0
     while 2.0 * k < t:
         late = t - 2.0 * k
@@ -56,17 +56,17 @@ def jump(number: float, t: float) -> float:
 
 
 def ninth(place: np.ndarray) -> np.ndarray:
-    """Slope of the polynomial of ninth degree that goes from 0 to 1 with four flat derivatives at both ends."""
+    """Slope of the polynomial of degree nine from 0 to 1 with four zero derivatives at both ends."""
     return 630.0 * (place * (1.0 - place)) ** 4
 
 
 def smooth(number: float, start: float, duration: float, t: float) -> float:
-    """Pressure at the end of a line whose flow stops along that polynomial, an integral over jumps."""
+    """Pressure at the end of a line whose flow stops along the polynomial of `ninth`, as an integral over jumps [-]."""
     found, places, weights = 0.0, *np.polynomial.legendre.leggauss(36)
     fronts = [t - start - 2.0 * k for k in range(int(t / 2.0) + 1)]
     cuts = np.unique(np.clip([0.0, duration, *fronts, *[f - 0.02 * duration for f in fronts]], 0.0, duration))
     for low, high in zip(cuts[:-1], cuts[1:], strict=True):
-        v = 0.5 * (1.0 + places)  # squeezed towards the later end, where jumps have just come
+        v = 0.5 * (1.0 + places)  # denser nodes near `high`, where the age of a jump is small
         sigma, w = high - (high - low) * v**2, (high - low) * v * weights
         age = t - start - sigma
         here = age > 0.0

@@ -1,4 +1,4 @@
-"""Lines of Python on a page, behind `>>>`, and whether they print what stands below them. Knows Markdown."""
+"""Python examples of a Markdown page, and a comparison of their output with the text below them."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import re
 
 
 def python_of(text: str) -> str:
-    """The blocks of Python of a page, or of a part of one, in a row."""
+    """Python blocks of a page or of a part of a page, joined by line breaks."""
     return "\n".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL))
 
 
 def printed_otherwise(python: str) -> str:
-    """What was printed in place of what stands there; empty if all of it was. `...` stands for anything."""
+    """Report of doctest on output that differs from the page, empty without differences; `...` matches any text."""
     said: list[str] = []
     block = doctest.DocTestParser().get_doctest(python, {}, "page", None, 0)
     doctest.DocTestRunner(optionflags=doctest.ELLIPSIS).run(block, out=said.append)

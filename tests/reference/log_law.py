@@ -1,6 +1,6 @@
-"""Exact flow in a stiff pipe under `p = p_ref + beta ln(rho / rho_ref)`. Knows no grid.
+"""Exact flow in a stiff pipe under the density law `p = p_ref + beta ln(rho / rho_ref)`.
 
-`c = sqrt(beta / rho)`; `u - 2 c` is carried along `u + c`, and `u + 2 c` along `u - c`. Shocks obey
+`c = sqrt(beta / rho)`; `u - 2 c` is constant along `u + c`, and `u + 2 c` along `u - c`. Shocks obey
 `(u_1 - u_2)^2 = (p_1 - p_2) (1/rho_2 - 1/rho_1)` (Rankine-Hugoniot for mass and momentum).
 """
 
@@ -32,7 +32,7 @@ class LogFluid:
         return np.sqrt(self.bulk_modulus / self.rho(p))
 
     def behind(self, p: float, p_ahead: float) -> float:
-        """Velocity a wave to the right gives the fluid when it takes it from `p_ahead` to `p` [m/s]."""
+        """Velocity of the fluid behind a wave to the right into fluid at rest, from pressure `p_ahead` to `p` [m/s]."""
         if p > p_ahead:
             return math.sqrt((p - p_ahead) * (1 / self.rho(p_ahead) - 1 / self.rho(p)))
         return 2 * (self.c(p_ahead) - self.c(p))
@@ -42,21 +42,21 @@ class LogFluid:
         return self.rho(p) * self.behind(p, p_ahead) / (self.rho(p) - self.rho(p_ahead))
 
     def stopped(self, p: float, u: float) -> float:
-        """Pressure when a stream of `u` meets a wall, from the shock it sends back [Pa]."""
+        """Pressure behind the shock that a wall reflects into a stream of velocity `u` [Pa]."""
         most = p + 10 * self.rho(p) * self.c(p) * abs(u) + 1.0
         return brentq(lambda q: self.behind(q, p) - u, p, most, xtol=1e-12 * most, rtol=1e-14)
 
 
 @dataclass(frozen=True)
 class Riemann:
-    """Two uniform states that meet at x = 0 at t = 0."""
+    """Riemann problem of two uniform states that touch at x = 0 at t = 0."""
 
     fluid: LogFluid
     left: tuple[float, float]  # pressure [Pa], velocity [m/s]
     right: tuple[float, float]
 
     def middle(self) -> tuple[float, float]:
-        """Pressure and velocity between the two waves."""
+        """Pressure [Pa] and velocity [m/s] between the two waves."""
         (pl, ul), (pr, ur) = self.left, self.right
 
         def gap(p: float) -> float:
@@ -67,9 +67,9 @@ class Riemann:
         return p, ul - self.fluid.behind(p, pl)
 
     def at(self, xi: float) -> tuple[float, float]:
-        """Pressure and velocity on the ray x / t = xi."""
+        """Pressure [Pa] and velocity [m/s] on the ray x / t = xi."""
         p, u = self.middle()
-        if xi < u:  # mirror, so that the wave in question always goes right
+        if xi < u:  # mirrored, so that the wave always travels to the right
             q, v = self._wave(-self.left[1], self.left[0], -u, p, -xi)
             return q, -v
         return self._wave(self.right[1], self.right[0], u, p, xi)
@@ -82,18 +82,18 @@ class Riemann:
             return p0, u0
         if xi <= tail:
             return p, u
-        c = (u0 + 2 * self.fluid.c(p0)) - xi  # u + 2c is the same throughout, u + c = xi
+        c = (u0 + 2 * self.fluid.c(p0)) - xi  # u + 2c is uniform in the fan, and u + c = xi
         return float(self.fluid.p(self.fluid.bulk_modulus / c**2)), xi - c
 
 
 @dataclass(frozen=True)
 class SimpleWave:
-    """A smooth wave to the right into rest: `u + 2 c` the same everywhere, each value goes at `u + c`."""
+    """Smooth wave to the right into fluid at rest: `u + 2 c` is uniform, and each value travels at `u + c`."""
 
     fluid: LogFluid
-    ahead: float  # pressure of the rest ahead [Pa]
+    ahead: float  # pressure of the fluid at rest ahead [Pa]
     velocity: Callable[[Array], Array]  # u(x) at t = 0
-    slope: Callable[[Array], Array]  # its derivative
+    slope: Callable[[Array], Array]  # derivative of the velocity
 
     def averages(self, edges: Array, t: float) -> tuple[Array, Array]:
         """Cell averages of density [kg/m3] and mass flux [kg/(m2 s)] at time t."""

@@ -1,4 +1,4 @@
-"""Small meshes and the files that hold them, and what of a mesh does not depend on order."""
+"""Small meshes and mesh files, and descriptions of a mesh that are independent of the order of its cells."""
 
 import math
 
@@ -13,7 +13,10 @@ TWO = [[0, 1, 4, 3], [1, 2, 5, 4]]
 
 
 def write(path, points, cells, groups=None, **options):
-    """A file of cells (lists of three or four points) and named lines, group 0 for lines without a name."""
+    """Write a mesh file of cells (lists of three or four points) and named lines, and return its path.
+
+    Lines without a name are in group 0.
+    """
     groups = groups or {}
     points = np.asarray(points, float)
     points = np.column_stack([points, np.zeros((len(points), 3 - points.shape[1]))])
@@ -38,13 +41,16 @@ def corner_lists(mesh):
 
 
 def delaunay(seed=3, count=60):
-    """Random points of the unit square with its corners, and their triangles."""
+    """Random points in the unit square with its corners, and their Delaunay triangles."""
     points = np.vstack([[(0, 0), (1, 0), (0, 1), (1, 1)], np.random.default_rng(seed).random((count, 2))])
     return points, Delaunay(points).simplices
 
 
 def shaken(seed=5):
-    """A 6 x 5 grid whose inner points are moved: quads, none a parallelogram, every third cut into triangles."""
+    """Points and cells of a 6 x 5 grid with displaced inner points.
+
+    The cells are quadrilaterals that are not parallelograms; every third is cut into two triangles.
+    """
     mesh = rectangle((3.0, 2.0), (6, 5), origin=(-1.0, 0.5))
     points = mesh.points.copy()
     inside = (points > points.min(0) + 1e-9).all(1) & (points < points.max(0) - 1e-9).all(1)
@@ -54,7 +60,7 @@ def shaken(seed=5):
 
 
 def sets(mesh):
-    """Cells and faces by their places alone."""
+    """Sorted lists of cells and of faces, described by their positions."""
     cells = sorted(zip(*mesh.centre.round(12).T, mesh.area.round(12), strict=True))
     beyond = np.where(mesh.right >= 0, 0, mesh.right)
     turn = np.where(mesh.right < 0, 1.0, np.sign(mesh.normal @ (1.0, math.pi)))[:, None]

@@ -1,8 +1,8 @@
-"""Exact Riemann problems of a pipe that holds liquid, free gas and vapour. SciPy alone; knows no grid and no kernel.
+"""Exact Riemann problems of a pipe with liquid, free gas and vapour, by SciPy and independent of fvsolve.
 
 rho_ref / rho = 1 - (p - p_ref) / beta + gas / (p - floor), A = A_ref (1 + compliance (p - p_ref)); m = rho A,
-F = integral of A dp. Shocks by Rankine-Hugoniot, [v]^2 = [F] [-1 / m]; rarefactions by quadrature of dp / (rho c)
-over ln(p - floor), in which it is smooth though c falls by orders.
+F = integral of A dp. Shocks obey Rankine-Hugoniot, [v]^2 = [F] [-1 / m]. Rarefactions are quadratures of dp / (rho c)
+over ln(p - floor), in which the integrand is smooth although c decreases by orders of magnitude.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class Mixture:
     bulk_modulus: float
     pressure: float
     floor: float
-    gas: float  # volume of the gas over the liquid's times its pressure [Pa]
+    gas: float  # gas volume over liquid volume, times gas pressure [Pa]
     compliance: float = 0.0
     area: float = 1.0
 
@@ -40,12 +40,12 @@ class Mixture:
         return self.area * (over + 0.5 * self.compliance * over**2)
 
     def c(self, p):
-        """sqrt(A dp / dm)."""
+        """Wave speed sqrt(A dp / dm) [m/s]."""
         fall = (1.0 / self.bulk_modulus + self.gas / (p - self.floor) ** 2) * self.rho(p) / self.density
         return np.sqrt(1.0 / (self.rho(p) * (fall + self.compliance * self.area / self.swollen(p))))
 
     def void(self, p):
-        """Share of the gas in the volume."""
+        """Volume fraction of the gas [-]."""
         return self.gas / (p - self.floor) * self.rho(p) / self.density
 
     def p(self, m: float) -> float:
@@ -55,19 +55,19 @@ class Mixture:
         return self.floor + math.exp(brentq(gap, -60.0, math.log(0.5 * self.bulk_modulus), xtol=1e-13, rtol=1e-15))
 
     def thinned(self, p_low: float, p_high: float) -> float:
-        """Integral of dp / (rho c) [m/s] over panels an eighth wide in ln(p - floor)."""
+        """Riemann integral of dp / (rho c) [m/s], over panels of width 1/8 in ln(p - floor)."""
         low, high = np.log(p_low - self.floor), np.log(p_high - self.floor)
         return float(np.sum(self.panels(np.linspace(low, high, 2 + int(8.0 * (high - low))))))
 
     def panels(self, edges: np.ndarray) -> np.ndarray:
-        """The same between edges in ln(p - floor), by Gauss' twenty points each."""
+        """Integrals of dp / (rho c) [m/s] between edges in ln(p - floor), with 20 Gauss points each."""
         half = 0.5 * np.diff(edges)
         x = np.exp(0.5 * (edges[1:] + edges[:-1])[:, None] + half[:, None] * NODES)
         p = self.floor + x
         return (x / (self.rho(p) * self.c(p))) @ WEIGHTS * half
 
     def behind(self, p: float, p_ahead: float) -> float:
-        """Velocity a wave to the right gives what it takes from `p_ahead` to `p` [m/s]."""
+        """Velocity of the fluid behind a wave to the right into fluid at rest, from pressure `p_ahead` to `p` [m/s]."""
         if p > p_ahead:
             thin = 1.0 / self.m(p_ahead) - 1.0 / self.m(p)
             return math.sqrt((self.force(p) - self.force(p_ahead)) * thin)
@@ -76,14 +76,14 @@ class Mixture:
 
 @dataclass(frozen=True)
 class Riemann:
-    """Two uniform states that meet at x = 0 at t = 0."""
+    """Riemann problem of two uniform states that touch at x = 0 at t = 0."""
 
     law: Mixture
     left: tuple[float, float]  # pressure [Pa], velocity [m/s]
     right: tuple[float, float]
 
     def middle(self) -> tuple[float, float]:
-        """Pressure and velocity between the two waves, bisected over the logarithm of the gas pressure."""
+        """Pressure [Pa] and velocity [m/s] between the two waves, by root finding in ln(p - floor)."""
         (pl, ul), (pr, ur) = self.left, self.right
 
         def gap(s: float) -> float:
@@ -95,7 +95,7 @@ class Riemann:
         return p, ul - self.law.behind(p, pl)
 
     def solution(self):
-        """(p, v) as a function of the ray x / t, its fans tabulated."""
+        """Function of the ray x / t that returns (p, v), with tabulated fans."""
         p, u = self.middle()
         to_right = self._wave(self.right, p, u)
         to_left = self._wave((self.left[0], -self.left[1]), p, -u)

@@ -1,7 +1,8 @@
-"""Characteristics at Courant 1 over a network whose lengths are whole numbers of reaches. Linear law only.
+"""Method of characteristics at Courant number 1 over a network whose lengths are multiples of a reach.
 
-One reservoir, junctions, one valve to a fixed pressure; friction `k |M|^(n-1) M` [Pa/m], by the trapezoid.
-The steady start is found by the gradient method of Todini and Pilati (1988).
+The network has a reservoir, junctions and a valve to a fixed pressure, under the linear density law. Friction is
+`k |M|^(n-1) M` [Pa/m], integrated by the trapezoidal rule. The steady start is computed by the gradient method of
+Todini and Pilati (1988).
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Line:
-    """A pipe: from, to, length [m], diameter [m], friction coefficient k for the mass flow [kg/s]."""
+    """Pipe with start and end node, length [m], diameter [m] and friction coefficient k for the mass flow [kg/s]."""
 
     start: str
     end: str
@@ -28,7 +29,10 @@ class Line:
 
 @dataclass(frozen=True)
 class Network:
-    """Pressures are counted at one level; `reservoir` has `supply` [Pa], `gate` the valve to `outside`."""
+    """Network with the pressure `supply` [Pa] at `reservoir`, and a valve to the pressure `outside` [Pa] at `gate`.
+
+    All nodes have the same elevation.
+    """
 
     lines: list[Line]
     exponent: float
@@ -40,7 +44,7 @@ class Network:
     outside: float
 
     def steady(self, demand: float) -> tuple[dict[str, float], Array]:
-        """Pressures [Pa] and mass flows [kg/s] when the gate takes `demand` [kg/s]."""
+        """Pressures of the nodes [Pa] and mass flows of the pipes [kg/s] for an outflow `demand` [kg/s] at the gate."""
         names = sorted({n for a in self.lines for n in (a.start, a.end)} - {self.reservoir})
         to = np.zeros((len(self.lines), len(names)))
         fixed = np.zeros(len(self.lines))
@@ -64,7 +68,10 @@ class Network:
         return dict(zip(names, p, strict=True)), m
 
     def gate_pressure(self, demand: float, opening: Callable[[float], float], reach: float, end: float):
-        """Times and pressure at the gate when its valve, steady at `demand`, follows `opening` from t = 0."""
+        """Times [s] and pressure at the gate [Pa] for a valve that follows `opening` from t = 0.
+
+        The start is steady with the outflow `demand` [kg/s].
+        """
         pressures, flows = self.steady(demand)
         pressures[self.reservoir] = self.supply
         counts = [round(a.length / reach) for a in self.lines]
@@ -83,7 +90,7 @@ class Network:
         half, plus, minus = k * reach / 2, np.empty_like(p), np.empty_like(p)
         for n in range(1, steps + 1):
             loss = half * np.abs(m) ** power * m
-            plus[1:] = (p + z * m - loss)[:-1]  # what arrives from the left, and from the right
+            plus[1:] = (p + z * m - loss)[:-1]  # characteristics from the left and from the right
             minus[:-1] = (p - z * m + loss)[1:]
             guess = m
             for _ in range(3):
@@ -111,6 +118,6 @@ class Network:
         return dt * np.arange(steps + 1), found
 
     def _ends(self, node: str, first: Array) -> tuple[list[int], list[int]]:
-        """Points where pipes end at a node, and where they begin."""
+        """Indices of the points at which pipes end at a node, and at which pipes start there."""
         ins = [first[i + 1] - 1 for i, a in enumerate(self.lines) if a.end == node]
         return ins, [first[i] for i, a in enumerate(self.lines) if a.start == node]

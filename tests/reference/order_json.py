@@ -1,4 +1,4 @@
-"""`fvsolve order` as a person or a program calls it. Knows the command line; knows no case."""
+"""Calls of `fvsolve order` from the command line, and its JSON output."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fvsolve.cli import main
 
 
 def call(capsys, *words: str) -> tuple[int, str, str]:
-    """Exit code and what stands on standard output and error."""
+    """Exit code, standard output and standard error of `fvsolve order` with the arguments `words`."""
     old, sys.argv = sys.argv, ["fvsolve", "order", *words]
     try:
         main()
@@ -25,7 +25,7 @@ def call(capsys, *words: str) -> tuple[int, str, str]:
 
 
 def studies(capsys, folder: Path, case: dict, *words: str) -> list[dict]:
-    """What `--json` says of a case given as a dict."""
+    """Studies in the output of `--json`, for a case given as a dict."""
     path = folder / "case.toml"
     path.write_text(text.write(case), encoding="utf-8")
     code, out, err = call(capsys, str(path), "--out", str(folder / "out"), "--json", *words)

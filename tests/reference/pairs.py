@@ -1,4 +1,4 @@
-"""Few rows in which every two values of two different lists meet, in place of a full product."""
+"""Pairwise combinations: few rows that contain every pair of values of two lists, instead of a full product."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from itertools import combinations, product
 
 
 def pairs(*lists) -> list[tuple]:
-    """Rows of one value of each list; each pair of values of two lists stands in some row. Deterministic and greedy."""
+    """Rows with one value of each list; each pair of values of two lists occurs in a row. Deterministic and greedy."""
     left: set = set()
     for i, j in combinations(range(len(lists)), 2):
         left.update(((i, a), (j, b)) for a, b in product(indices(lists[i]), indices(lists[j])))

@@ -1,15 +1,15 @@
-"""Words on the pages of a PDF as Chromium writes it, and how far down they stand. Knows no page of ours."""
+"""Text on the pages of a PDF file written by Chromium, with its distance from the top edge."""
 
 import re
 import zlib
 
 import numpy as np
 
-MM = 72.0 / 25.4  # points
+MM = 72.0 / 25.4  # points per millimetre
 
 
 def pages(pdf: bytes) -> list[list[tuple[float, str]]]:
-    """Of every page its pieces of text with their distances from its upper edge [mm]."""
+    """Pieces of text of each page with their distances from the top edge [mm]."""
     objects = {int(one[1]): one[2] for one in re.finditer(rb"\n(\d+) 0 obj\n(.*?)\nendobj", pdf, re.S)}
     fonts: dict[int, dict[int, str]] = {}
     found = []
@@ -28,13 +28,13 @@ def pages(pdf: bytes) -> list[list[tuple[float, str]]]:
 
 
 def stream(objects: dict[int, bytes], at: int) -> str:
-    """The text of an object's stream."""
+    """Decompressed text of the stream of an object."""
     packed = objects[at].partition(b"stream\n")[2]
     return zlib.decompressobj().decompress(packed).decode("latin1")
 
 
 def letters(table: str) -> dict[int, str]:
-    """Glyph -> letter of a ToUnicode table."""
+    """Letters of the glyphs of a ToUnicode table : glyph -> letter."""
     found = {}
     for block in re.findall(r"beginbfchar(.*?)endbfchar", table, re.S):
         found |= {int(a, 16): chr(int(b[:4], 16)) for a, b in re.findall(r"<(\w+)> <(\w+)>", block)}
@@ -45,7 +45,7 @@ def letters(table: str) -> dict[int, str]:
 
 
 def pieces(text: str, fonts: dict[str, dict[int, str]]) -> list[tuple[float, str]]:
-    """(height of its base line [point], words) of each BT ... ET."""
+    """Height of the base line [point] and text of each BT ... ET block."""
     found, stack, at, font, words, place = [], [], np.eye(3), {}, "", np.eye(3)
     operands: list[str] = []
     for token in text.split():
@@ -73,5 +73,5 @@ def pieces(text: str, fonts: dict[str, dict[int, str]]) -> list[tuple[float, str
 
 
 def matrix(operands: list[str]) -> np.ndarray:
-    """[a b 0; c d 0; e f 1] of six numbers."""
+    """Matrix [a b 0; c d 0; e f 1] of six numbers."""
     return np.array([*map(float, operands[-6:])]).reshape(3, 2) @ np.eye(2, 3) + np.diag([0.0, 0.0, 1.0])

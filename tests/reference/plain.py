@@ -1,4 +1,4 @@
-"""Meshes that tests and cases are run on, made without a mesher. Knows points and triangles; knows no physics."""
+"""Meshes of triangles for tests and cases, made without a mesh generator."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ Box = tuple[float, float, float, float]
 
 
 def triangles(size: Sequence[float], spacing: float, holes: Sequence[Box] = ()) -> tuple[np.ndarray, np.ndarray]:
-    """(points float64[p, 2], triangles int[n, 3], anticlockwise) of a rectangle with rectangular holes [m].
+    """Points float64[p, 2] and anticlockwise triangles int[n, 3] of a rectangle with rectangular holes [m].
 
-    Edges of the rectangle and of the holes are divided evenly; inside lie points of a lattice of equal triangles.
+    Edges of the rectangle and of the holes are divided evenly; the inner points form a lattice of equilateral
+    triangles.
     """
     outlines = [(0.0, 0.0, *size), *holes]
     edge = np.unique(np.round(np.concatenate([around(box, spacing) for box in outlines]), 9), axis=0)
@@ -40,7 +41,7 @@ def triangles(size: Sequence[float], spacing: float, holes: Sequence[Box] = ()) 
 
 
 def around(box: Box, spacing: float) -> np.ndarray:
-    """Points along the edges of a box, about `spacing` apart."""
+    """Points along the edges of a box at a distance of about `spacing`."""
     x = np.linspace(box[0], box[2], max(2, round((box[2] - box[0]) / spacing) + 1))
     y = np.linspace(box[1], box[3], max(2, round((box[3] - box[1]) / spacing) + 1))
     rows = [np.column_stack([x, np.full(x.size, at)]) for at in (box[1], box[3])]
@@ -49,20 +50,24 @@ def around(box: Box, spacing: float) -> np.ndarray:
 
 
 def inside(points: np.ndarray, box: Box) -> np.ndarray:
-    """Whether points lie within a box, its edge excepted."""
+    """True at points inside a box, without its edge."""
     x, y = points.T
     return (x > box[0] + 1e-9) & (x < box[2] - 1e-9) & (y > box[1] + 1e-9) & (y < box[3] - 1e-9)
 
 
 def boundary(cells: np.ndarray) -> np.ndarray:
-    """Edges that one triangle alone has : int[k, 2]."""
+    """Edges that belong to exactly one triangle : int[k, 2]."""
     edges = np.sort(np.concatenate([cells[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
     found, count = np.unique(edges, axis=0, return_counts=True)
     return found[count == 1]
 
 
 def write_msh(path: Path, points: np.ndarray, cells: np.ndarray, groups: dict[str, Callable]) -> None:
-    """A Gmsh file of triangles; groups : name -> whether a middle (x, y) of the boundary is in it, the first wins."""
+    """Write a Gmsh file of triangles.
+
+    groups : name -> predicate of the midpoints (x, y) of boundary edges; the first group whose predicate is true
+    applies
+    """
     import meshio
 
     lines = boundary(cells)
@@ -83,7 +88,7 @@ BLOCKS = ((18.0, 6.0, 24.0, 12.0), (18.0, 18.0, 24.0, 24.0), (33.0, 12.0, 39.0, 
 
 
 def flood_plain(path: Path) -> None:
-    """The mesh of cases/flooding.toml: 60 m by 30 m with three houses, `breach` in the west, `drain` in the east."""
+    """Write the mesh of cases/flooding.toml: 60 m by 30 m, three houses, west edge `breach`, east edge `drain`."""
     points, cells = triangles((60.0, 30.0), 1.5, BLOCKS)
     groups = {
         "breach": lambda x, y: (x < 1e-6) & (np.abs(y - 15.0) < 3.0),

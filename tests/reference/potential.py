@@ -1,7 +1,7 @@
-"""Water in a tank that swings by little, as potential flow by finite elements. Knows no fvsolve.
+"""Small oscillations of water in a tank as potential flow by finite elements, independent of fvsolve.
 
-Under a free surface phi_z = w^2 phi / g on the mean level, phi_n of the walls as they move; what the water adds to the
-inertia of its tank is the sum of phi phi_n over the walls. The torque that gravity has on still water is left out.
+phi_z = w^2 phi / g holds at the mean level of the free surface, and phi_n is the normal velocity of the walls. The
+added inertia is the integral of phi phi_n over the walls. The gravity torque of still water is omitted.
 """
 
 from __future__ import annotations
@@ -14,16 +14,20 @@ GAUSS = (-1.0 / np.sqrt(3.0), 1.0 / np.sqrt(3.0))
 
 
 def added(side, depth, low, square, gravity, turns, is_round, n=40):
-    """Added inertia over density [m3 or m5]: of a box per its other side, of a cylinder of diameter `side` whole.
+    """Added inertia over density [m3 or m5], extrapolated from two meshes.
 
-    low : height of the bed over the axis that it turns about, square : w^2. Two meshes, extrapolated.
+    The result of a box is per length of its second side; that of a cylinder of diameter `side` is its total.
+    low : height of the bed over the axis of rotation; square : w^2
     """
     coarse, fine = (of_mesh(side, depth, low, square / gravity, turns, is_round, k) for k in (n, 2 * n))
     return (4.0 * fine - coarse) / 3.0 * (np.pi if is_round else 1.0)
 
 
 def of_mesh(side, depth, low, per, turns, is_round, n):
-    """The same by n elements across, of a cylinder over pi and in axes r and z, cos(angle) split off."""
+    """Added inertia over density by n elements across, without extrapolation.
+
+    For a cylinder the result is divided by pi; its axes are r and z, and the factor cos(angle) is separated.
+    """
     wide = 0.5 * side if is_round else side
     many = int(np.clip(n * depth / wide, 8, 3 * n))
     x, z = np.linspace(wide - side if not is_round else 0.0, wide, n + 1), np.linspace(0.0, depth, many + 1)

@@ -1,4 +1,4 @@
-"""Scenes with a smooth pulse of demand on frictionless pipes, for order studies. Knows keys; knows no order."""
+"""Cases with a smooth pulse of demand on frictionless pipes, for order studies."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from reference import scenes
 
 LENGTH, SPEED, DIAMETER, CENTRE, WIDTH, END = 100.0, 1000.0, 0.5, 0.11, 0.02, 0.25
-FINE, FEW = 6001, 2001  # samples of the pulse: few do for orders up to 3
+FINE, FEW = 6001, 2001  # samples of the pulse: FEW are enough for orders up to 3
 
 
 def pulse(t):
@@ -16,13 +16,13 @@ def pulse(t):
 
 
 def table(points: int) -> dict:
-    """The same as samples, whose interpolation is good to 3e-7 of the pulse (FINE) or 3e-6 (FEW)."""
+    """Pulse of demand as a sampled schedule, with interpolation errors of 3e-7 (FINE) or 3e-6 (FEW) of the pulse."""
     t = np.linspace(0.0, END, points)
     return {"time": t.tolist(), "value": pulse(t).tolist(), "kind": "smooth"}
 
 
 def pressure(x: float, t: float) -> float:
-    """Exact pressure by images: the lake at x = 0 mirrors waves with the opposite sign, the gate with the same."""
+    """Exact pressure by images [Pa]: the lake at x = 0 reflects pressure waves with sign -1, the gate with sign 1."""
     z = scenes.RHO * SPEED / scenes.area(DIAMETER)
     total = 0.0
     for k in range(10):
@@ -33,7 +33,7 @@ def pressure(x: float, t: float) -> float:
 
 
 def case(cells: int = 20, exact: bool = True, points: int = FINE, **numerics) -> dict:
-    """Lake, pipe, gate with the pulse of demand."""
+    """Case of a lake, a pipe and a gate with the pulse of demand."""
     stepping = {} if {"step", "rtol"} & numerics.keys() else {"courant": 0.5}
     given = {"scheme": "upwind5", "method": "verner-7", **stepping, **numerics}
     links = {"main": scenes.pipe("lake", "gate", LENGTH, DIAMETER, SPEED, cells)}
@@ -43,7 +43,7 @@ def case(cells: int = 20, exact: bool = True, points: int = FINE, **numerics) ->
 
 
 def front(cells: int = 50, **numerics) -> dict:
-    """The same pipe with a demand that ends at once."""
+    """Case of a lake, a pipe and a gate with a demand that stops at once."""
     given = {"scheme": "upwind", "method": "verner-7", "courant": 0.5, "end": 0.07, **numerics}
     links = {"main": scenes.pipe("lake", "gate", LENGTH, DIAMETER, SPEED, cells)}
     nodes = {"lake": scenes.reservoir(3e5), "gate": scenes.junction(scenes.step(0.02, 0.05, 0.0))}

@@ -1,8 +1,8 @@
-"""The rising main of cases/pump-trip.toml by the method of characteristics. Knows no line of fvsolve.
+"""Rising main of cases/pump-trip.toml by the method of characteristics, independent of fvsolve.
 
-H at the pump is C- : H = CM + B q with the friction of the reach by the trapezoid; its shaft too is stepped by the
-trapezoid, both iterated, its torque that of a table of Suter form. The check valve lets no q below 0 pass, and opens
-where the pump at no flow could lift more.
+At the pump H = CM + B q on the characteristic C-. The trapezoidal rule integrates the friction of a reach and the speed
+of the shaft, with iteration of both. The torque is that of a Suter table. The check valve prevents reverse flow, and
+opens if the pump at zero flow exceeds the head behind the valve.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ SUMP, TOP = 2.0, 70.0
 LENGTH, BORE, SPEED, FACTOR = 1500.0, 0.3, 1000.0, 0.018
 SHUT_OFF, FLOWS, HEADS = 90.0, (0.04, 0.06), (75.0, 58.0)
 OMEGA, INERTIA, EFFICIENCY, TRIP = 1480.0 * math.pi / 30.0, 1.2, 0.78, 1.0
-AMBIENT, GAS, POLYTROPIC = 101325.0, 1.0, 1.2  # of the twin with an air vessel
+AMBIENT, GAS, POLYTROPIC = 101325.0, 1.0, 1.2  # variant with an air vessel
 SECTION = math.pi / 4 * BORE**2
 C = math.log((SHUT_OFF - HEADS[1]) / (SHUT_OFF - HEADS[0])) / math.log(FLOWS[1] / FLOWS[0])
 B = (SHUT_OFF - HEADS[0]) / FLOWS[0] ** C
 LAST = (SHUT_OFF / B) ** (1.0 / C)
 TAIL = C * B * LAST ** (C - 1.0) / (2.0 * LAST)
-# WB of a radial pump of specific speed 25 from no flow to no speed, every pi / 44; fvsolve/parts/pump/suter_tables.py
-# says where from. The pump's own is 11.6.
+# WB of a radial pump of specific speed 25 from zero flow to zero speed, at intervals of pi / 44, with its source in
+# fvsolve/parts/pump/suter_tables.py. The specific speed of this pump is 11.6.
 WB = """
  0.471  0.513  0.555  0.597  0.610  0.621  0.631  0.632  0.618  0.583  0.541  0.500
  0.437  0.373  0.300  0.216  0.131  0.043 -0.033 -0.096 -0.189 -0.319 -0.437
@@ -33,21 +33,21 @@ RATED = RHO * GRAVITY * FLOWS[0] * HEADS[0] / EFFICIENCY / OMEGA
 
 
 def head(n: float, q: float) -> float:
-    """Between no flow and that of no head the power law, beyond both the parabola."""
+    """Head of the pump [m]: power law between zero flow and zero head, parabolas outside."""
     if n <= 0.0 or q >= n * LAST:
         return TAIL * (n * n * LAST**2 - q * q)
     return n * n * SHUT_OFF - B * n ** (2.0 - C) * max(q, 0.0) ** C + TAIL * min(q, 0.0) ** 2
 
 
 def torque(n: float, q: float) -> float:
-    """Of a pump that turns forward and delivers; of no efficiency above that at its rated point."""
+    """Torque at positive speed and flow [N m], large enough that the efficiency is at most that of the rated point."""
     v = q / FLOWS[0]
     by_table = (n * n + v * v) * float(np.interp(math.atan2(v, n), np.linspace(0.0, math.pi / 2, len(WB)), WB))
     return RATED * max(by_table, v * head(n, q) / HEADS[0] / n)
 
 
 def steady() -> float:
-    """Flow at which pump and main meet, by bisection."""
+    """Flow at the intersection of the curves of pump and main [m3/s], by bisection."""
     low, high = 0.0, LAST
     for _ in range(200):
         q = 0.5 * (low + high)
@@ -57,7 +57,7 @@ def steady() -> float:
 
 
 def at_pump(n: float, meet: float, impedance: float) -> tuple[float, float]:
-    """(flow, head) at the pump's outlet where H = meet + impedance q."""
+    """Flow [m3/s] and head [m] at the outlet of the pump with H = meet + impedance q."""
     if SUMP + head(n, 0.0) < meet:
         return 0.0, meet
     low, high = 0.0, 2.0 * LAST
@@ -68,7 +68,7 @@ def at_pump(n: float, meet: float, impedance: float) -> tuple[float, float]:
 
 
 def pump_flow(n: float, lift: float) -> float:
-    """Flow at which the pump lifts so much, 0 where it cannot."""
+    """Flow at which the head of the pump is `lift` [m3/s]; 0 if the pump does not reach this head."""
     low, high = 0.0, 2.0 * LAST
     if head(n, 0.0) <= lift:
         return 0.0
@@ -79,12 +79,15 @@ def pump_flow(n: float, lift: float) -> float:
 
 
 def gas_head(volume: float, first: float) -> float:
-    """Head over the air in the vessel, GAS at first."""
+    """Gauge head of the air in the vessel [m], which is `first` at the volume GAS."""
     return ((AMBIENT + RHO * GRAVITY * first) * (GAS / volume) ** POLYTROPIC - AMBIENT) / (RHO * GRAVITY)
 
 
 def at_vessel(n: float, meet: float, impedance: float, known: float, first: float, dt: float) -> tuple[float, float]:
-    """(flow into the main, head) at a vessel behind the pump; its air is `known` less dt / 2 of what enters."""
+    """Flow into the main [m3/s] and head [m] at a vessel behind the pump.
+
+    The new air volume is `known` minus dt / 2 times the inflow of the vessel.
+    """
     low, high = 1e-3 * GAS, 1e3 * GAS
     for _ in range(60):
         volume = math.sqrt(low * high)
@@ -96,7 +99,10 @@ def at_vessel(n: float, meet: float, impedance: float, known: float, first: floa
 
 
 def run(reaches: int, end: float, vessel: bool = False) -> dict[str, np.ndarray]:
-    """t [s], flow of the main, head and relative speed at the pump at every step, with an air vessel there or not."""
+    """Time [s], flow of the main [m3/s], head [m] and relative speed of the pump at every step.
+
+    With `vessel` an air vessel is behind the pump.
+    """
     dt, impedance = LENGTH / reaches / SPEED, SPEED / (GRAVITY * SECTION)
     drag = FACTOR * dt / (2.0 * BORE * SECTION)  # dq = -drag q |q|
     q = np.full(reaches + 1, steady())

@@ -1,4 +1,4 @@
-"""Random scenes with every part, for claims that hold for any scene. Knows the keys; knows no answer."""
+"""Random networks with many kinds of parts, for claims that hold for any network."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ CLOSING = {"time": [0.0, 1.0, 2.0, 3.0], "value": [1.0, 0.3, 2e-4, 0.0]}
 
 
 def random_network(seed: int, scheme: str = "upwind", law: str = "linear", size: int = 7) -> dict:
-    """A connected network of pipes, valves that shut from 0 to 3 s, rigid columns, vessels and two lakes.
+    """Connected network of pipes, valves that shut from 0 to 3 s, rigid columns, vessels and two lakes.
 
-    Of every three, one is without friction and starts from rest.
+    Networks with `seed` mod 3 equal to 2 are frictionless and start from rest.
     """
     rng, smooth = np.random.default_rng(seed), seed % 3 == 2
     nodes = {"L0": lake(40.0), "L1": lake(35.0)}
@@ -32,7 +32,7 @@ def random_network(seed: int, scheme: str = "upwind", law: str = "linear", size:
             links[f"q{k}"] = random_pipe(rng, a, b, smooth)
         else:
             links[f"v{k}"] = valve(a, b, 1e-3, CLOSING if rng.random() < 0.7 else 1.0)
-    nodes["X"], nodes["Y"] = junction(), junction()  # a column that valves can lead, and one that they cannot
+    nodes["X"], nodes["Y"] = junction(), junction()  # at X valves can control a column, at Y they cannot
     a, d = (str(name) for name in rng.choice(names, 2, replace=False))
     b, c = (str(name) for name in rng.choice(names, 2))
     column = {"type": "rigid-column", "length": 20.0, "diameter": 0.1, "friction": FACTOR}
@@ -46,6 +46,6 @@ def random_network(seed: int, scheme: str = "upwind", law: str = "linear", size:
 
 
 def random_pipe(rng, start: str, end: str, smooth: bool) -> dict:
-    """One to twelve cells, with friction of some kind or none."""
+    """Pipe of one to twelve cells, frictionless if `smooth`, otherwise with one of two friction models."""
     friction = {"model": "none"} if smooth else (FACTOR, ROUGH)[rng.integers(2)]
     return pipe(start, end, 100.0, 0.2, 1000.0, int(rng.integers(1, 13)), friction=friction)

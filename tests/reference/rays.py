@@ -1,9 +1,9 @@
-"""Exact waves in a frictionless network by ray tracing. Knows the linear law only; knows no grid.
+"""Exact waves in a frictionless network by ray tracing, under the linear density law.
 
-Every pipe end brings its node an incoming characteristic `P + Z M` (at `to`) or `P - Z M` (at `from`),
-`Z = a / A`; it is what the other end sent out one travel time before: `2 P_other - incoming_other`.
-The recursion in time ends in the uniform start, so the value at any time is exact, whatever the lengths.
-`P` is the pressure [Pa] counted at one level, `M` the mass flow [kg/s].
+Every pipe end receives an incoming characteristic `P + Z M` (at `to`) or `P - Z M` (at `from`), with
+`Z = a / A`. It equals `2 P_opposite - incoming_opposite` at the opposite end, one travel time earlier.
+The recursion in time ends at the uniform start, so values are exact at all times and for all lengths.
+`P` is the pressure [Pa] at a common elevation, `M` the mass flow [kg/s].
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ Schedule = Callable[[float], float]
 
 
 def held(value: float) -> Schedule:
-    """A schedule that never changes."""
+    """Constant schedule."""
     return lambda t: value
 
 
 def step(time: float, before: float, after: float) -> Schedule:
-    """A schedule that jumps at `time`, right-continuous."""
+    """Schedule that jumps at `time` and is continuous from the right."""
     return lambda t: after if t >= time else before
 
 
 @dataclass(frozen=True)
 class Pipe:
-    """A frictionless pipe, with its volume flow [m3/s] and pressure [Pa] at the start."""
+    """Frictionless pipe with its volume flow [m3/s] and pressure [Pa] at the start."""
 
     start: str
     end: str
@@ -48,7 +48,7 @@ class Pipe:
 
 @dataclass
 class Rays:
-    """A network of pipes, fixed pressures, demands and orifices to a fixed pressure."""
+    """Network of pipes, fixed pressures, demands and orifices to a fixed pressure."""
 
     density: float
     pipes: dict[str, Pipe]
@@ -69,7 +69,7 @@ class Rays:
         return self._known[key]
 
     def inside(self, pipe: str, fraction: float, t: float) -> tuple[float, float]:
-        """Pressure [Pa] and volume flow [m3/s] in a pipe, `fraction` of its length from its start."""
+        """Pressure [Pa] and volume flow [m3/s] in a pipe at a fraction of its length from its start."""
         p = self.pipes[pipe]
         forward = self._sent(pipe, "start", t - fraction * p.travel_time)
         backward = self._sent(pipe, "end", t - (1 - fraction) * p.travel_time)
@@ -93,7 +93,7 @@ class Rays:
         return self._sent(pipe, other, t - self.pipes[pipe].travel_time)
 
     def _sent(self, pipe: str, end: str, t: float) -> float:
-        """The characteristic that leaves a pipe end into the pipe at time t; before 0 the uniform start."""
+        """Characteristic that enters a pipe from an end at time t; before t = 0 that of the uniform start."""
         p = self.pipes[pipe]
         if t < 0:
             sign = 1 if end == "start" else -1

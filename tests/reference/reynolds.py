@@ -1,4 +1,4 @@
-"""Integrals over an interval, a quadrilateral and its sides, and rates by differences: for Reynolds, (71) to (76)."""
+"""Integrals over intervals, quadrilaterals and their sides, and derivatives by differences, for (71) to (76)."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ STEP = 1e-3
 
 
 def rate(of: Callable[[float], np.ndarray], t: float) -> np.ndarray:
-    """A derivative of sixth order in the step."""
+    """Derivative by central differences of sixth order."""
     sides = [of(t + k * STEP) - of(t - k * STEP) for k in (1, 2, 3)]
     return (45 * sides[0] - 9 * sides[1] + sides[2]) / (60 * STEP)
 
 
 def on_interval(of: Callable, a: float, b: float) -> float:
-    """The integral of a function of x."""
+    """Integral of a function of x."""
     x = 0.5 * (b - a) * POINTS + 0.5 * (a + b)
     return 0.5 * (b - a) * float(np.sum(WEIGHTS * of(x)))
 
 
 def inside(of: Callable, corners: np.ndarray) -> float:
-    """The integral of a function of x and y over a quadrilateral : corners float64[4, 2], counter-clockwise."""
+    """Integral of a function of x and y over a quadrilateral; corners : float64[4, 2], counter-clockwise."""
     s, t = np.meshgrid(POINTS, POINTS, indexing="ij")
     shape = np.array([(1 - s) * (1 - t), (1 + s) * (1 - t), (1 + s) * (1 + t), (1 - s) * (1 + t)]) / 4
     along_s = np.array([-(1 - t), 1 - t, 1 + t, -(1 + t)]) / 4
@@ -34,13 +34,16 @@ def inside(of: Callable, corners: np.ndarray) -> float:
 
 
 def around(of: Callable, corners: np.ndarray, speeds: np.ndarray | None = None) -> float:
-    """The integral of (phi v) . n over the sides; of(x, y) -> float64[2, ...], or -> phi with speeds of the corners."""
+    """Integral of (phi v) . n over the sides of a quadrilateral.
+
+    of(x, y) : phi v as float64[2, ...], or phi if `speeds` gives the velocities of the corners
+    """
     total = 0.0
     for k in range(4):
         start, end = corners[k], corners[(k + 1) % 4]
         share = 0.5 * (POINTS + 1)
         x, y = (start[i] + share * (end[i] - start[i]) for i in (0, 1))
-        normal = np.array([end[1] - start[1], start[0] - end[0]])  # outward, as long as the side
+        normal = np.array([end[1] - start[1], start[0] - end[0]])  # outward normal with the length of the side
         carried = of(x, y)
         if speeds is not None:
             carried = carried * (np.outer(speeds[k], 1 - share) + np.outer(speeds[(k + 1) % 4], share))

@@ -1,6 +1,6 @@
-"""Cases as dicts shaped like the file, for the tests. Knows the keys; knows no answer. All SI.
+"""Cases for the tests as dicts with the structure of a case file, in SI units.
 
-What all tests share is read-only, and every case is a copy of its own: a test may write into its case.
+Shared constants are read-only, and every case is a separate copy that a test may change.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ WATER = MappingProxyType(
         "law": "linear",
     }
 )
-SHARP = MappingProxyType({"scheme": "upwind", "method": "euler", "courant": 1.0})  # exact: every cell takes one step
+SHARP = MappingProxyType({"scheme": "upwind", "method": "euler", "courant": 1.0})  # exact: one cell per step
 SMOOTH = MappingProxyType({"scheme": "upwind5", "method": "rk4", "courant": 0.8})
 NO_FRICTION = MappingProxyType({"model": "none"})
 
@@ -35,7 +35,7 @@ def area(diameter: float) -> float:
 def scene(
     nodes: dict, links: dict, end: float, numerics: dict, probes: Any = (), every: float = 0.01, **top: Any
 ) -> dict:
-    """A whole case, which shares nothing with what it is made of; `top` adds or replaces top-level tables."""
+    """Complete case that shares no object with its arguments; `top` adds or replaces top-level tables."""
     case = {
         "schema": 1,
         "ambient_pressure": AMBIENT,
@@ -50,7 +50,7 @@ def scene(
 
 
 def copied(value: Any) -> Any:
-    """Tables and lists that nobody else holds."""
+    """Deep copy of tables and lists."""
     if isinstance(value, Mapping):
         return {key: copied(one) for key, one in value.items()}
     return [copied(one) for one in value] if isinstance(value, list) else value
@@ -92,14 +92,14 @@ def pipe(start: str, end: str, length: float, diameter: float, wave_speed: float
 
 
 def stiff_pipe(start: str, end: str, length: float, diameter: float, cells: int, **more: Any) -> dict:
-    """A pipe whose wave speed is the fluid's sound speed."""
+    """Pipe with a rigid wall, whose wave speed is the speed of sound of the fluid."""
     found = pipe(start, end, length, diameter, 0.0, cells, wall="rigid", **more)
     del found["wave_speed"]
     return found
 
 
 def valve(start: str, end: str, flow_area: float, opening: Any = 1.0, **more: Any) -> dict:
-    """A valve by its effective area Cd A [m2]."""
+    """Valve with the effective area Cd A [m2]."""
     return {
         "type": "valve",
         "from": start,
@@ -120,13 +120,13 @@ def ramp(start: float, duration: float, before: float, after: float, exponent: f
 
 
 def smooth_step(t: float, start: float, duration: float) -> float:
-    """From 0 to 1 by the polynomial whose first four derivatives vanish at both ends."""
+    """Polynomial from 0 to 1 whose first four derivatives vanish at both ends."""
     s = min(max((t - start) / duration, 0.0), 1.0)
     return s**5 * (126 + s * (-420 + s * (540 + s * (-315 + 70 * s))))
 
 
 def smooth_ramp(start: float, duration: float, before: float, after: float, points: int = 1201) -> dict:
-    """`smooth_step` as a table fine enough that its interpolation is exact to about 1e-8."""
+    """Table of `smooth_step` with an interpolation error of about 1e-8."""
     times = [start + duration * i / (points - 1) for i in range(points)]
     values = [before + (after - before) * smooth_step(t, start, duration) for t in times]
     return {"time": times, "value": values, "kind": "smooth"}
@@ -141,6 +141,6 @@ def inflow(flow: Any, **more: Any) -> dict:
 
 
 def still(**top) -> dict:
-    """A pond that fills from a lake: the smallest run there is, without a pipe or a field."""
+    """Case of a tank that fills from a reservoir: the smallest run, without pipes and fields."""
     nodes = {"lake": reservoir(1.5e5), "pond": tank(1.0, 1.0)}
     return scene(nodes, {"gate": valve("lake", "pond", 0.001)}, 1.0, {"rtol": 1e-6}, ["pond.level"], 0.1, **top)

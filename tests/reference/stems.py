@@ -1,4 +1,4 @@
-"""Valves that regulate a pressure beside a rigid column, by SciPy at 1e-11. Knows no fvsolve."""
+"""Regulating valves in series with a rigid column, by SciPy and independent of fvsolve."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 
 def rates_of(source, lifted, g, stroke, inertia, friction):
-    """d/dt of [lift, mass flow]."""
+    """Function that returns the rates of [lift, mass flow]."""
 
     def rates(t, y):
         drop = (y[1] / y[0]) ** 2 / g
@@ -20,15 +20,15 @@ def rates_of(source, lifted, g, stroke, inertia, friction):
 
 
 def leaves_with_column(source, lifted, g, stroke, inertia, friction, start, kinks, at):
-    """[lift, mass flow] at times `at` of a stem that leaves its seat at `start` with the rigid column that it holds.
+    """[lift, mass flow] at times `at` of a stem that opens at `start` for the rigid column that it blocks.
 
-    inertia dM/dt = source(t) - M^2 / (G x^2) - friction M |M|, stroke dx/dt = lifted(t, drop across it). Both start as
-    powers of the time s since then: x = a s^2, M = a s^2 sqrt(G source), at s = 1e-5 here.
+    inertia dM/dt = source(t) - M^2 / (G x^2) - friction M |M|, stroke dx/dt = lifted(t, drop). Lift and flow start as
+    powers of the time s since `start`: x = a s^2, M = a s^2 sqrt(G source), at s = 1e-5.
     """
     s = 1e-5
     drop = source(start + s)
     steep = (lifted(start + s, drop) - lifted(start, source(start))) / s
-    felt = lifted(start, 1.0) - lifted(start, 0.0)  # over the drop
+    felt = lifted(start, 1.0) - lifted(start, 0.0)  # slope over the drop
     root = math.sqrt(g * drop)
     x = 0.5 * steep * s**2 / (stroke + felt * inertia * root)  # stroke x' = steep s - felt inertia root x'
 
@@ -42,7 +42,10 @@ def leaves_with_column(source, lifted, g, stroke, inertia, friction, start, kink
 
 
 def shuts_with_column(source, lifted, g, stroke, inertia, friction, start):
-    """When one that keeps what it senses as set until `start` meets its seat; from a lift of 1e-5 on at one speed."""
+    """Closing time of a stem whose sensed value is the set value until `start` [s].
+
+    The last part of the stroke, from a lift of 1e-5, is extrapolated at constant speed.
+    """
     drop = brentq(lambda drop: lifted(0.0, drop), 1.0, 1e6)
     flow = math.sqrt((source(0.0) - drop) / friction)
     seat = lambda t, y: y[0] - 1e-5  # noqa: E731

@@ -1,4 +1,4 @@
-"""A line over a summit by characteristics at Courant 1, with vapour cavities at its nodes (Wylie, Streeter 1993, 8)."""
+"""Pipeline over a summit with vapour cavities at its nodes, by characteristics (Wylie and Streeter 1993, chapter 8)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ SUMP, TOP, SHUT_OFF, CURVE = 2.0, 60.0, 4.0 / 3.0 * 77.0, 77.0 / 3.0 / 0.15**2  
 
 
 def line(reaches: int, end: float) -> tuple[np.ndarray, list[tuple[float, str, float]]]:
-    """Rows of time, head at the pumps and at the summit, volume of all cavities; and (time, what, where) of events."""
+    """Rows of time [s], heads at the pumps and at the summit [m], volume of all cavities [m3]; and events.
+
+    The second result lists events as (time [s], "parts" or "meets", chainage [m]).
+    """
     step = LENGTH / reaches / SPEED
     x = np.linspace(0.0, LENGTH, reaches + 1)
     pressure = PropsSI("P", "T", 288.15, "Q", 0, "Water") - 101325.0
@@ -20,12 +23,12 @@ def line(reaches: int, end: float) -> tuple[np.ndarray, list[tuple[float, str, f
     b, r = SPEED / (GRAVITY * area), FACTOR * LENGTH / reaches / (2.0 * GRAVITY * DIAMETER * area**2)
     flow = np.sqrt((SUMP + SHUT_OFF - TOP) / (CURVE + r * reaches))
     head = SUMP + SHUT_OFF - CURVE * flow**2 - r * flow**2 * np.arange(reaches + 1)
-    left, right = np.full(reaches + 1, flow), np.full(reaches + 1, flow)  # flow that comes to and that leaves a node
+    left, right = np.full(reaches + 1, flow), np.full(reaches + 1, flow)  # inflow and outflow of a node
     volume, rows, events = np.zeros(reaches + 1), [], []
     inner, middle = slice(1, -1), round(SUMMIT / LENGTH * reaches)
     for k in range(1, round(end / step) + 1):
-        up = head[:-1] + b * right[:-1] - r * right[:-1] * abs(right[:-1])  # C+, to the node after
-        down = head[1:] - b * left[1:] + r * left[1:] * abs(left[1:])  # C-, to the node before
+        up = head[:-1] + b * right[:-1] - r * right[:-1] * abs(right[:-1])  # C+, to the next node
+        down = head[1:] - b * left[1:] + r * left[1:] * abs(left[1:])  # C-, to the previous node
         head = np.concatenate(([0.0], 0.5 * (up[:-1] + down[1:]), [TOP]))
         left, right = np.append(0.0, (up - head[1:]) / b), np.append((head[:-1] - down) / b, 0.0)
         apart = np.zeros(reaches + 1, bool)
@@ -38,7 +41,7 @@ def line(reaches: int, end: float) -> tuple[np.ndarray, list[tuple[float, str, f
         head, left, right = np.where(open_, vapor, head), np.where(open_, to, left), np.where(open_, off, right)
         relative = np.clip(1.0 - (k * step - 2.0) / 20.0, 0.0, 1.0)
         push = SUMP + relative**2 * SHUT_OFF - down[0]
-        right[0] = (np.sqrt(b * b + 4.0 * CURVE * push) - b) / (2.0 * CURVE) if push > 0.0 else 0.0  # a check valve
+        right[0] = (np.sqrt(b * b + 4.0 * CURVE * push) - b) / (2.0 * CURVE) if push > 0.0 else 0.0  # check valve
         head[0], left[-1] = down[0] + b * right[0], (up[-1] - TOP) / b
         rows.append((k * step, head[0], head[middle], volume.sum()))
     return np.array(rows), events

@@ -1,4 +1,4 @@
-"""The references against each other, before anything is measured with them."""
+"""Comparisons of the reference solutions with each other, with quadrature and with integration."""
 
 from __future__ import annotations
 
@@ -224,7 +224,7 @@ def test_steady_flows_of_a_loop_balance_at_every_node_and_around_it():
 
 
 def rusanov(rho: np.ndarray, flux: np.ndarray, dx: float, end: float) -> tuple[np.ndarray, np.ndarray]:
-    """The balance laws themselves by the crudest stable scheme: knows no wave curves and no invariants."""
+    """Density and mass flux of the balance laws by the scheme of Rusanov, without wave curves or invariants."""
     u, t = np.array([rho, flux]), 0.0
     while t < end:
         speed = np.abs(u[1] / u[0]) + np.sqrt(SOFT.bulk_modulus / u[0])

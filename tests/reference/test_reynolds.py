@@ -1,4 +1,4 @@
-"""Reynolds' transport theorem (71) to (76), term by term; and that (73) to (75) speak of the material volume."""
+"""Reynolds' transport theorem, equations (71) to (76), term by term; (73) to (75) hold for the material volume."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from reference.reynolds import around, inside, on_interval, rate
 
 T = 0.3
 CORNERS = np.array([[0.0, 0.0], [2.0, 0.2], [1.8, 1.5], [-0.3, 1.1]])
-SPEEDS = np.array([[0.4, -0.2], [0.7, 0.1], [-0.3, 0.9], [0.2, 0.5]])  # of the corners, from t = 0
+SPEEDS = np.array([[0.4, -0.2], [0.7, 0.1], [-0.3, 0.9], [0.2, 0.5]])  # velocities of the corners
 
 
 def phi(x, y, t):
@@ -19,7 +19,7 @@ def phi(x, y, t):
 
 
 def flow(x, y, t):
-    """A velocity with divergence."""
+    """Velocity field with nonzero divergence."""
     return np.array([0.5 * x - 0.2 * y + 0.1 * t, 0.3 * x * y - 0.4 * np.ones_like(x)])
 
 
@@ -62,10 +62,10 @@ def test_a_volume_that_moves_in_the_plane_71():
 
 @pytest.fixture(scope="module")
 def material() -> float:
-    """d/dt of the content of the volume of matter that is the quadrilateral at T: its points go with the flow."""
+    """Rate of the integral of phi over the material volume that is the quadrilateral at time T."""
 
     def moved(x, y, t):
-        """Points of T at t, and how much larger they are there."""
+        """Positions at time t of points at (x, y) at time T, and the area ratio there."""
         n = x.size
 
         def along(s, z):
@@ -87,7 +87,10 @@ def material() -> float:
 
 
 def test_a_volume_of_matter_72_to_75(material):
-    """Its boundary goes with the flow; a gradient of phi along the flow and its divergence say the same."""
+    """The rate of a material volume is that of (72) to (75).
+
+    The integrand is the divergence of phi v, or the substantial derivative of phi plus phi times the divergence of v.
+    """
     within = inside(lambda x, y: phi_rate(x, y, T), corners(T))
     assert_allclose(material, within + around(lambda x, y: carried(x, y, T), corners(T)), rtol=1e-8)  # (72), (73)
     together = inside(lambda x, y: phi_rate(x, y, T) + spread(x, y), corners(T))
@@ -97,18 +100,18 @@ def test_a_volume_of_matter_72_to_75(material):
 
 
 def spread(x, y):
-    """div (phi v) by differences."""
+    """Divergence of phi v by differences."""
     return rate(lambda h: carried(x + h, y, T)[0] + carried(x, y + h, T)[1], 0.0)
 
 
 def followed(x, y):
-    """D phi / Dt: phi along the path of a point."""
+    """Substantial derivative D phi / Dt, by differences of phi along the path of a point."""
     u, v = flow(x, y, T)
     return rate(lambda h: phi(x + h * u, y + h * v, T + h), 0.0)
 
 
 def test_a_control_volume_that_moves_is_not_the_one_of_matter_73_to_75(material):
-    """They print V_c, which moves as it likes: its d/dt is (71), and another number."""
+    """The rate of a volume V_c with arbitrary motion, printed in (73) to (75), is not that of the material volume."""
     whole = rate(lambda t: inside(lambda x, y: phi(x, y, t), corners(t)), T)
     assert abs(whole - material) > 0.05 * abs(material)
 
@@ -119,6 +122,6 @@ def test_a_volume_that_stands_76(material):
 
 
 def test_areas_of_a_quadrilateral_grow_by_what_its_sides_sweep():
-    """(71) of phi = 1: the geometric conservation law."""
+    """Geometric conservation law: (71) with phi = 1."""
     whole = rate(lambda t: inside(lambda x, y: np.ones_like(x), corners(t)), T)
     assert_allclose(whole, around(lambda x, y: np.ones_like(x), corners(T), SPEEDS), rtol=1e-11)

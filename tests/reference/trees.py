@@ -1,4 +1,4 @@
-"""Trees of rigid bodies, random ones too, as cases and as pinocchio has them. Knows the keys; knows no answer."""
+"""Trees of rigid bodies as cases, random trees, and their models in Pinocchio."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def body(mass: float, inertia: Any, joint: dict, **more: Any) -> dict:
 
 
 def turn(rng) -> np.ndarray:
-    """A random rotation, from a random set of Euler parameters."""
+    """Random rotation matrix, from random Euler parameters."""
     h, a, b, c = (e := rng.standard_normal(4)) / np.linalg.norm(e)
     return np.array([
         [1 - 2 * (b * b + c * c), 2 * (a * b - h * c), 2 * (a * c + h * b)],
@@ -24,11 +24,11 @@ def turn(rng) -> np.ndarray:
 
 
 def random_tree(rng, many: int, first: str = "", kinds=("revolute", "prismatic", "ball")) -> dict[str, dict]:
-    """Bodies b0, b1, ... of a random tree; `first` is the kind of the joint of b0, a random one by default."""
+    """Bodies b0, b1, ... of a random tree; `first` is the kind of joint of b0, by default random."""
     found = {}
     for i in range(many):
         kind = first if i == 0 and first else str(rng.choice(kinds))
-        spread, frame = rng.uniform(0.5, 1.5, 3), turn(rng)  # moments that obey the triangle inequality
+        spread, frame = rng.uniform(0.5, 1.5, 3), turn(rng)  # principal moments obey the triangle inequality
         moments = np.diag(np.sum(spread) - spread) * 0.3
         joint: dict[str, Any] = {"kind": kind, "at": rng.uniform(-1, 1, 3).tolist(),
                                  "attitude": {"matrix": turn(rng).tolist()}}  # fmt: skip
@@ -50,7 +50,7 @@ def random_tree(rng, many: int, first: str = "", kinds=("revolute", "prismatic",
 
 
 def pinocchio_of(bodies: dict[str, dict], gravity: float):
-    """(pinocchio, its model, data, q, v) of bodies in the order of the file, and of each where its rows of v begin."""
+    """(pinocchio, model, data, q, v, first row of v of each body), with bodies in the order of the file."""
     import pinocchio as pin
 
     model, joints, start = pin.Model(), {}, {}
@@ -81,7 +81,7 @@ def pinocchio_of(bodies: dict[str, dict], gravity: float):
             q[j.idx_q], v[j.idx_v] = joint.get("angle", joint.get("travel", 0.0)), joint.get("rate", 0.0)
         elif kind == "ball":
             v[j.idx_v : j.idx_v + 3] = joint.get("rate", [0.0] * 3)
-        else:  # velocities of its origin, in its own axes
+        else:  # velocities of the origin of the body, in its axes
             w = np.array(joint.get("rate", [0.0] * 3))
             v[j.idx_v + 3 : j.idx_v + 6] = w
             v[j.idx_v : j.idx_v + 3] = rotation.T @ np.array(joint.get("velocity", [0.0] * 3)) - np.cross(w, centre)

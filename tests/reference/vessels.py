@@ -1,7 +1,7 @@
-"""Closed forms for tanks and chambers behind an orifice. Knows the linear law only.
+"""Closed forms for tanks and chambers behind an orifice, under the linear density law.
 
-A drop `d` that drives `q = Cd A sqrt(2 d / rho)` and falls by `k q` has a square root linear in time,
-so it ends at the finite time `2 sqrt(d0) / s`; `s` is twice the speed of the square root.
+A drop `d` that drives `q = Cd A sqrt(2 d / rho)` and decreases by `k q` has a root that is linear in time.
+`sqrt(d) = sqrt(d0) - s t / 2`, and the drop is zero from the time `2 sqrt(d0) / s` on.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ GRAVITY = 9.80665
 
 
 def falling_root(start: float, slope: float, t: Array) -> Array:
-    """`d` of `d' = -slope sqrt(d)`, from `start`, zero after its end."""
+    """Solution of `d' = -slope sqrt(d)` from `start`, zero after its end."""
     root = math.sqrt(start) - slope * np.asarray(t, float) / 2
     return np.where(root > 0, root, 0.0) ** 2
 
@@ -32,7 +32,7 @@ def levelling(areas: tuple[float, float], flow_area: float, drop: float, t: Arra
 
 
 def tapered(foot: float, growth: float, flow_area: float, level: float, t: Array) -> Array:
-    """Level of a tank of area `foot + growth h` that drains at its bottom, from its implicit closed form."""
+    """Level of a tank of area `foot + growth h` that drains at its bottom, by its implicit closed form [m]."""
 
     def volume_time(root: float) -> float:
         return 2 * foot * root + 2 / 3 * growth * root**3
@@ -49,7 +49,7 @@ def tapered(foot: float, growth: float, flow_area: float, level: float, t: Array
 
 
 def filling(volume: float, modulus: float, flow_area: float, density: float, drop: float, t: Array) -> Array:
-    """Pressure still missing in a chamber that fills from a fixed pressure through an orifice [Pa]."""
+    """Missing pressure in a chamber that fills from a fixed pressure through an orifice [Pa]."""
     return falling_root(drop, modulus / volume * flow_area * math.sqrt(2 / density), t)
 
 

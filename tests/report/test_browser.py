@@ -1,4 +1,4 @@
-"""The page in a real browser: nothing is fetched, nothing complains, figures are there, the head line moves."""
+"""Report page in a browser: it fetches nothing, reports no error, and shows figures with a moving head line."""
 
 import re
 from itertools import pairwise
@@ -13,7 +13,7 @@ from fvsolve.report.figures import DARK_COLOURS, escape_markup
 from fvsolve.report.report_files import write_report
 
 TITLE = "</script><b>A & B</b> costs $5 and $6"
-HIGH = "far <b>above</b> & $5"  # a limit that no head comes near
+HIGH = "far <b>above</b> & $5"  # a limit far above all heads
 PARTS = ("#section-0", "#history-0", "#history-1")
 
 
@@ -43,7 +43,7 @@ def heads(page) -> list:
 
 
 def until(page, what: str) -> None:
-    """Wait for it; Playwright's own way would evaluate text, which the page forbids."""
+    """Wait until a JavaScript expression is true; the function of Playwright evaluates text, which the page forbids."""
     for _ in range(200):
         if page.evaluate(what):
             return
@@ -100,7 +100,7 @@ def test_paper_holds_whole_figures(report, chromium):
 
 @pytest.mark.parametrize("width", [390, 1000])
 def test_no_name_over_a_section_covers_another(chromium, tmp_path, width):
-    """Of places that come closer and closer towards the end, where names stand before their places; on paper too."""
+    """Places come closer towards the end, where names are left of their places; names never overlap, also on paper."""
     names = [f"place-{k}" for k in range(13)]
     nodes = {name: junction() for name in names} | {names[0]: lake("45 m"), names[-1]: lake("40 m")}
     links = {f"pipe-{k}": pipe(a, b, 20.0 + 480.0 * 0.7**k, 0.3, 1000.0, 2) for k, (a, b) in enumerate(pairwise(names))}
@@ -119,7 +119,7 @@ def test_no_name_over_a_section_covers_another(chromium, tmp_path, width):
 
 @pytest.mark.parametrize("words", [0, 30, 60, 90])
 def test_no_page_of_paper_but_the_last_is_half_empty_and_each_has_title_and_number(report, chromium, words):
-    """However much stands before the figures."""
+    """Up to 1080 words precede the figures."""
     page, _, _ = browser.opened(chromium, report, 1280)
     if int(chromium.version.partition(".")[0]) < 131:
         pytest.skip("this Chromium writes nothing on the margins of pages")
@@ -151,7 +151,7 @@ def test_a_dark_screen_has_a_dark_page_and_paper_stays_light(report, chromium):
 
 
 def colours(page) -> dict[str, str]:
-    """Whether grounds and the first line of a legend are dark or light; that line is lighter on a dark ground."""
+    """`dark` or `light` for the page, a figure and the first line of a legend; a dark page has lighter lines."""
     asked = """() => ({body: getComputedStyle(document.body).backgroundColor,
         paper: getComputedStyle(document.querySelector('#section-0 .main-svg')).backgroundColor,
         legend: document.querySelector('.legend line').getAttribute('stroke')})"""
@@ -169,12 +169,12 @@ def numbers(colour: str) -> list[int]:
 
 
 def legend(page, id: str):
-    """The names over a chart."""
+    """Buttons of the legend above a chart."""
     return page.locator(f".legend:has(+ {id}) button")
 
 
 def legends_are_clear(page) -> None:
-    """No legend covers any of a chart: curves, axes, names of parts."""
+    """Check that no legend covers curves, axes or names of parts of a chart."""
     boxes = page.evaluate("""() => [...document.querySelectorAll('.chart')].map(chart => {
         const box = (one) => { const { top, bottom } = one.getBoundingClientRect(); return [top, bottom]; };
         return { legend: box(chart.previousElementSibling), chart: box(chart),

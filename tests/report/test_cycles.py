@@ -1,4 +1,4 @@
-"""Cycles are counted as the standard counts them, and shares of what a part bears add up."""
+"""Pressure cycles are counted as in ASTM E1049, and the used share of the fatigue strength follows from them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fvsolve.errors import FvsolveError
 from fvsolve.report.cycles import FatigueStrength, count_cycles, cycles
 
 ASTM = np.array([-2, 1, -3, 5, -1, 3, -4, 4, -2], float)  # ASTM E1049-85, figure 6
-RANGES = {3.0: 0.5, 4.0: 1.5, 6.0: 0.5, 8.0: 1.0, 9.0: 0.5}  # and its table
+RANGES = {3.0: 0.5, 4.0: 1.5, 6.0: 0.5, 8.0: 1.0, 9.0: 0.5}  # its table
 
 
 def test_the_standards_example_is_counted_as_its_table_has_it() -> None:
@@ -24,7 +24,7 @@ def test_the_standards_example_is_counted_as_its_table_has_it() -> None:
 
 
 def swung() -> dict:
-    """A pressure that swings 20 times by 2 bar between two reservoirs."""
+    """Case of a valve between two reservoirs, one of which oscillates 20 times by 2 bar."""
     swing = {"mean": 5e5, "amplitude": 1e5, "period": 0.5}
     nodes = {"swung": reservoir(swing), "still": reservoir(4e5)}
     return scene(nodes, {"tap": valve("swung", "still", 1e-4)}, 10.0, {"method": "rk4", "step": 0.01},

@@ -1,4 +1,4 @@
-"""The page of a run: peaks stay, text is text, it asks no network, it says first what is not to be trusted."""
+"""Page of a run: peaks are exact, texts are escaped, nothing is fetched, and unreliable results are stated first."""
 
 import base64
 import copy
@@ -29,7 +29,7 @@ VERDICT = {"name": "class", "ok": False, "place": "main", "chainage": 480.0, "el
 
 
 class Read(HTMLParser):
-    """Tags with attributes, words outside of scripts, and what each script holds."""
+    """HTML reader: tags with attributes, words outside scripts and styles, and text of each script."""
 
     def __init__(self, text: str):
         super().__init__()
@@ -65,13 +65,13 @@ def values(packed: dict) -> np.ndarray:
 
 
 def changed(result, table=None, **summary) -> Result:
-    """The same run with other rows, or other keys of its summary."""
+    """Copy of a result with another table or other keys of its summary."""
     return Result(result.summary | summary, lambda: result._table.copy() if table is None else table,
                   lambda: result.envelope, result.directory)  # fmt: skip
 
 
 def line(end: float, **more) -> dict:
-    """A valve shuts at the end of a main, under a title and words that would be markup."""
+    """Case of a valve that shuts at the end of a main, with markup in title, description and source."""
     nodes = {"top": lake("45 m"), "gate": junction(), "outfall": lake("0 m")}
     links = {"main": pipe("top", "gate", 900.0, 0.3, 1200.0, 40),
              "valve": valve("gate", "outfall", 1e-3, ramp(0.5, 0.05, 1.0, 0.0))}  # fmt: skip
@@ -205,7 +205,7 @@ def test_verdicts_stand_first_those_that_fail_before_others(closure):
     later = read(changed(closure, verdicts=[VERDICT | holds | {"ok": False, "state": "open"}], marks=[mark])).text
     assert "vacuum: from some time on the results are not to be trusted." in later
     unsure = read(changed(closure, verdicts=[VERDICT | holds | {"ok": False, "state": "open", "error": 0.4}])).text
-    assert "open. vacuum: their margins are smaller than the numerical errors" in unsure and "open 0.5 0.4" in unsure
+    assert "open. vacuum: margins are smaller than the numerical errors" in unsure and "open 0.5 0.4" in unsure
     passed = read(changed(closure, verdicts=[VERDICT | {"error": 4.0}])).text
     assert "The limit does not hold. class" in passed and "FAILS 13.5 4" in passed
 
@@ -244,7 +244,7 @@ def test_a_report_of_what_is_no_run_says_what_is_there(closure, tmp_path, monkey
 
 
 def test_a_directory_of_another_version_is_named_with_what_it_lacks(closure, tmp_path):
-    """Whatever field of whatever row it is."""
+    """Each required field is removed in turn, and the error names it."""
     out = tmp_path / "old"
     shutil.copytree(closure.directory, out)
     said, tried = json.loads((out / "summary.json").read_text()) | {"verdicts": [VERDICT]}, 0

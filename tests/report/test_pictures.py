@@ -1,4 +1,4 @@
-"""`fvsolve plot`: what is asked for is drawn, and every name that is none is told at once."""
+"""`fvsolve plot` draws the requested pictures and names all unknown names at once."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A route with a profile and limits in a report: one chainage, through a valve, and what is planted there is shown."""
+"""Route with a profile and limits in a report: one chainage runs through a valve, and exceedances are marked."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ SHUT = 0.3
 
 
 def over_a_hill(**more) -> dict:
-    """A lake, a pipe over a summit, an open valve, a pipe that is drawn the other way round; a flow that stops."""
+    """Case of a lake, a pipe over a summit, an open valve and a reversed pipe; the outflow stops."""
     nodes = {"lake": lake(100.0, elevation=0.0), "a": junction(elevation=20.0), "b": junction(elevation=20.0),
              "gate": junction(step(SHUT, 0.03, 0.0), elevation=30.0)}  # fmt: skip
     links = {"hill": pipe("lake", "a", 500.0, 0.3, 1000.0, 20), "valve": valve("a", "b", 0.05),
@@ -78,7 +78,7 @@ def test_limits_are_lines_and_what_passes_one_is_marked_where_it_is_worst(main):
 
 
 def test_the_axis_follows_heads_profile_and_vapour_line_and_names_limits_far_from_them(main):
-    """Limits within half the range of heads are shown; others are named with an arrow and flatten nothing."""
+    """Limits within half the range of heads are drawn; others have an arrow with a name and do not extend the axis."""
     one = section_of(main, section_paths(main)[0])
     heads = np.concatenate([one.along[name] for name in ("initial_head", "min_head", "max_head")])
     followed = np.concatenate([heads, one.along["elevation"], one.lines["vapour line"]])

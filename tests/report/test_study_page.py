@@ -1,4 +1,4 @@
-"""The page of a study says which protection holds, lays runs over one another, and takes words as words."""
+"""Page of a study: it names the protections that hold, overlays runs and escapes texts."""
 
 import json
 import re
@@ -39,8 +39,10 @@ def test_a_study_is_reported_with_all_its_runs(tmp_path, fvs) -> None:
 
 @pytest.fixture(scope="module")
 def taps(tmp_path_factory):
-    """A study with its page and workbook: a quick closure fails some limits and leaves others open, a slow one goes on
-    after the end."""
+    """Folder of a study with page and workbook: a quick closure fails some limits and leaves others open.
+
+    A slow closure continues after the end of the run.
+    """
     folder, case = tmp_path_factory.mktemp("study"), throttled()
     case["limits"]["deep"] = {"on": "main", "quantity": "head", "minimum": -1e3}
     (folder / "main.toml").write_text(write(case))
@@ -51,13 +53,13 @@ def taps(tmp_path_factory):
 
 
 def boxes(said: str) -> dict[str, str]:
-    """The sentences at the top of a page: the words behind each bold head, tags taken out."""
+    """Sentences at the top of a page by their bold heads, without tags."""
     found = re.findall(r'<div class="word \w+"><strong>(.*?)</strong>(.*?)</div>', said, re.S)
     return {head: re.sub("<[^>]*>", "", rest) for head, rest in found}
 
 
 def test_a_run_stands_under_one_head_and_leads_to_its_own_page(taps) -> None:
-    """A run that fails is not open, also where another of its limits is."""
+    """A run that fails a limit is not listed as open, even if another of its limits is open."""
     said = (taps / "report.html").read_text(encoding="utf-8")
     states = {
         path.name: {one.state for one in fvsolve.open_run(path).verdicts} for path in taps.iterdir() if path.is_dir()

@@ -17,7 +17,7 @@ from fvsolve.report.tables import ReportTable, aligned_texts, value_text
 
 @pytest.fixture(scope="module")
 def fork(tmp_path_factory):
-    """Three pipes in a row, the middle one laid the other way round, a branch off it, and a loop beside it."""
+    """Run of three pipes in a row, the middle one reversed, with a branch and a parallel pipe."""
     nodes = {"high": lake("50 m", elevation=0.0), "a": junction(elevation=10.0), "b": junction(elevation=20.0),
              "low": lake("30 m", elevation=5.0), "end": junction(1e-3, elevation=0.0)}  # fmt: skip
     links = {"first": pipe("high", "a", 400.0, 0.3, 1000.0, 8), "second": pipe("b", "a", 300.0, 0.3, 1000.0, 6),

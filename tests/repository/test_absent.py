@@ -1,4 +1,4 @@
-"""What a scene does not have costs it no state, no table row and no compiled function."""
+"""Parts that a case lacks cost no state, no table row and no compiled function."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ALL = SCALARS | PIPES | MASSES | BODIES | DEVICES | MEMORY | CAVITIES | IMPLICIT
 
 
 def compiled_with(*functions) -> set[str]:
-    """Files of all that numba has to compile for these functions: whatever they name, and what that names."""
+    """Files of all functions that numba compiles for the given functions, directly or through calls."""
     waiting, seen = [getattr(one, "function", one) for one in functions], {}
     while waiting:
         one = getattr(waiting.pop(), "py_func", None) or waiting
@@ -64,7 +64,7 @@ def line(**numerics) -> dict:
 
 @pytest.fixture
 def compiling():
-    """What is compiled can only be told where something is."""
+    """Skip a test if JIT is off, because nothing is compiled then."""
     if not COMPILING:
         pytest.skip("JIT is off")
 
@@ -107,7 +107,7 @@ def test_each_room_is_compiled_where_it_is_used(compiling):
 
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_a_scene_without_pipes_has_the_rates_that_it_has_beside_a_pipe(law):
-    """Two tanks alone, and with a pipe at rest between two equal reservoirs of another part of the scene."""
+    """The second case adds a pipe at rest, from a reservoir to a junction behind a shut valve."""
     alone = tanks() | {"fluid": {**tanks()["fluid"], "law": law}}
     nodes = alone["nodes"] | {"a": reservoir(101325.0 + 9806.65 * 4.0), "b": junction()}
     links = alone["links"] | {
@@ -133,7 +133,7 @@ PATCHES = {"sea": {"side": "east", "boundary": "open"}, "gate": {"side": "west"}
 
 
 def pool(physics: str, links: bool, law: str = "linear", **numerics) -> dict:
-    """A basin with a scalar, where it may have one; alone, or beside links through which it gets nothing."""
+    """Case of a basin, with a dye unless it is a liquid: alone, or with links that carry no flow into it."""
     shape = {"type": "basin", "physics": physics, "size": [2.0, 2.0], "cells": [8, 8]} | POOLS[physics]
     shape |= {} if physics == "transport" else {"patches": PATCHES}
     nodes, joined = {"pool": shape}, {}

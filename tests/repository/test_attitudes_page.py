@@ -1,4 +1,4 @@
-"""docs/attitudes.md: its forms are read, its lines print what stands below them."""
+"""Examples of docs/attitudes.md: attitudes are read, and lines of Python print the output on the page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Benchmarks that call a model's compiled rates from code of their own give what the model gives."""
+"""Benchmarks: their rates agree with the model, their bands contain the errors, and each script has `--quick`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 
 @pytest.fixture(autouse=True)
 def found(monkeypatch):
-    """Modules of benchmarks, in place of folders of tests that have their names; none stays."""
+    """Import modules of benchmarks/ instead of test folders with equal names, and undo this after the test."""
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     names = [path.stem for path in BENCHMARKS.glob("*.py")]
     kept = {name: sys.modules.pop(name) for name in names if name in sys.modules}
@@ -45,7 +45,7 @@ def test_mechanisms_call_rates_in_a_loop():
 
 
 def test_bands_of_delay_lines_hold_what_eight_times_the_resolution_gives():
-    """Every control of steps is among these networks; bands were zero where `courant` was given (`line_bands.py`)."""
+    """Each band is at least the difference to eight times the resolution, for each of the three step controls."""
     import line_bands
 
     found, controls = [], set()
@@ -58,7 +58,7 @@ def test_bands_of_delay_lines_hold_what_eight_times_the_resolution_gives():
 
 
 def test_every_script_has_quick():
-    """`quick.py` runs them by it; a script is started by name, and reads its options by `measure.parser` alone."""
+    """`quick.py` needs the option `--quick`; scripts read their options only through `measure.parser`."""
     import quick
 
     scripts = quick.scripts()

@@ -1,4 +1,4 @@
-"""Every case that is shipped: it runs, what it claims holds, and its mass ledger closes."""
+"""Shipped cases run, satisfy their expectations and close their mass balance."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def test_the_promised_cases_are_there():
 def test_a_shipped_case_keeps_its_claims(path):
     written = tomllib.loads(path.read_text(encoding="utf-8"))
     assert written.get("title") and written.get("expect")
-    assert {"scheme", "method"} <= written["numerics"].keys()  # a change of default must not move it
+    assert {"scheme", "method"} <= written["numerics"].keys()  # a change of a default must not change results
     result = fvsolve.run(path)
     assert result.ok, result.reason
     assert result.expectations
@@ -31,7 +31,7 @@ def test_a_shipped_case_keeps_its_claims(path):
 
 @pytest.mark.parametrize("path", CASES, ids=lambda p: p.stem)
 def test_a_shipped_case_begins(path):
-    """The first hundredth of each case, for the quick tests: mass is kept, and all is finite."""
+    """Short form for the quick tests: the first hundredth of a case conserves mass and gives finite values."""
     case = fvsolve.load(path)
     numerics = case.numerics
     end = numerics.start + 0.01 * (numerics.end - numerics.start)

@@ -1,4 +1,4 @@
-"""No two classes of the package share a name, so that grep leads home."""
+"""No two classes of the package have equal names, so a search finds one definition."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import fvsolve
 
 
 def doubles(sources: dict[str, str]) -> dict[str, list[str]]:
-    """Names of classes that several sources define."""
+    """Names of classes that several sources define, with these sources."""
     homes = defaultdict(list)
     for home, text in sources.items():
         for one in ast.walk(ast.parse(text)):

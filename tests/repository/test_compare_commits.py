@@ -1,4 +1,4 @@
-"""The comparison of two commits finds a single bit, and takes names through the map."""
+"""Comparison of two dumps: a difference of one bit is found, and the map of renamed keys is applied."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SUMMARY = "summary.json"
 
 @pytest.fixture(autouse=True)
 def dumps(monkeypatch):
-    """The module that compares; it does not stay."""
+    """Module compare_dumps, which is removed after the test."""
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     import compare_dumps
 
@@ -23,7 +23,7 @@ def dumps(monkeypatch):
 
 
 def run() -> dict:
-    """A small dump."""
+    """Dump of a small run."""
     return {
         ("start", "dydt"): np.array([[1.0, -0.0], [np.nan, 2.0]]),
         ("history.csv", "gate.pressure [Pa]"): np.array([1e5, 2e5]),
@@ -37,7 +37,7 @@ def run() -> dict:
 
 
 def moved(dump: dict, old: tuple, new: tuple) -> dict:
-    """A dump with another place for a value."""
+    """Copy of a dump with a value at another place."""
     return {new if place == old else place: value for place, value in dump.items()}
 
 
@@ -73,7 +73,7 @@ def test_a_place_that_lacks_is_a_difference_on_either_side(dumps):
 
 
 def test_names_of_the_map_are_equal(dumps):
-    """A key below another, a word of a column, a word of an expression; not a word of the same text elsewhere."""
+    """The map renames a key path, words of a column and of an expression, but not these words under other keys."""
     above = (SUMMARY, "extremes", "gate.pressure")
     new = moved(run(), (*above, "least"), (*above, "minimum"))
     new = moved(new, ("history.csv", "gate.pressure [Pa]"), ("history.csv", "gate.p [Pa]"))

@@ -1,4 +1,4 @@
-"""CONTRIBUTING.md and docs/developing.md: their commands run, and what they name is there."""
+"""CONTRIBUTING.md and docs/developing.md: their commands run, and the files that they name exist."""
 
 import os
 import re
@@ -17,7 +17,7 @@ HEAVY = ("python3 -m venv", ".ci/run", "python tests/")  # installs, or runs man
 
 
 def commands() -> list[str]:
-    """Lines of the shell blocks of both pages, without what explains them."""
+    """Lines of the shell blocks of both pages, without trailing comments."""
     blocks = [block for page in PAGES.values() for block in re.findall(r"```sh\n(.*?)```", page, re.DOTALL)]
     return [line.split("  #")[0].strip() for block in blocks for line in block.splitlines()]
 
@@ -28,7 +28,7 @@ def is_test(command: str) -> bool:
 
 @pytest.fixture
 def beside(tmp_path) -> Path:
-    """A folder with copies of what the commands write into."""
+    """Folder with copies of the files that the commands overwrite."""
     for name in ("docs/parts.md", "cases/schema.json", "pyproject.toml"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         shutil.copy(TOP / name, tmp_path / name)
@@ -37,7 +37,7 @@ def beside(tmp_path) -> Path:
 
 @pytest.mark.parametrize("command", [one for one in commands() if not is_test(one) and not one.startswith(HEAVY)])
 def test_a_command_of_the_pages_does_what_it_says(command, beside):
-    """Those that write the schema and the tables leave both as they were."""
+    """Commands that write the schema and the key tables leave both files unchanged."""
     paths = [str(Path(sys.executable).parent), os.environ["PATH"]]
     known = os.environ | {"PATH": os.pathsep.join(paths), "PYTHONPATH": str(TOP), "MPLBACKEND": "Agg"}
     where = TOP if command.startswith(("lint-imports", "ruff")) else beside
@@ -54,7 +54,7 @@ def test_the_tests_that_the_pages_run_are_there(command):
 
 
 def test_two_tanks_without_jit_are_the_same_bytes(beside):
-    """As the page says of debugging."""
+    """Debugging without JIT writes the bytes of the compiled run, as docs/developing.md states."""
     written = []
     for off in ("0", "1"):
         command = [sys.executable, "-m", "fvsolve", "run", "two-tanks", "--out", f"runs/{off}"]
@@ -66,7 +66,7 @@ def test_two_tanks_without_jit_are_the_same_bytes(beside):
 
 @pytest.mark.parametrize("page", PAGES)
 def test_files_and_names_of_the_pages_are_there(page):
-    """Files in backquotes, as they end; links from where the page stands. A run writes summary.json."""
+    """Each `.py` or `.json` file in backquotes is the end of a path, except summary.json, which a run writes."""
     text = re.sub(r"```.*?```", "", PAGES[page], flags=re.DOTALL)
     there = [f"/{path.as_posix()}" for folder in ("fvsolve", "tests", "cases") for path in (TOP / folder).rglob("*.*")]
     said = {*re.findall(r"`([\w/]+\.(?:py|json))`", text)} - {"summary.json"}
@@ -90,7 +90,7 @@ def test_links_of_every_page_lead_to_files_and_headings(page):
 
 
 def test_the_changelog_has_the_form_of_keep_a_changelog():
-    """https://keepachangelog.com/en/1.1.0/: what is not released first, six kinds of change, a list under each."""
+    """Form of https://keepachangelog.com/en/1.1.0/: unreleased changes first, six kinds of change, a list for each."""
     text = (TOP / "CHANGELOG.md").read_text(encoding="utf-8")
     top, *versions = re.split(r"^## ", text, flags=re.MULTILINE)
     assert top.startswith("# Changelog\n") and "keepachangelog.com" in top and versions[0].startswith("[Unreleased]\n")

@@ -1,4 +1,4 @@
-"""docs/course.md goes through all of the course: what it names is there, its commands run, its Python prints."""
+"""docs/course.md covers the course: its names exist, its commands run and its Python prints the output."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from reference.lines import printed_otherwise, python_of
 TOP = folders.DOCS.parent
 PAGE = folders.page("course")
 EQUATIONS = range(1, 83)
-STATEMENTS = {  # without a number, in sections 2 to 5: words that a heading has
+STATEMENTS = {  # statements without a number, in sections 2 to 5: words of a heading
     "Eigenvalues", "Eigenvectors", "Derivative of a square", "Velocity and angular velocity", "Transposes",
     "Inverse of two by two", "Modules and connections", "Hydraulic", "Translational", "Rotational", "Electrical",
     "Magnetic", "Thermal", "Chemical", "Energy that falls", "resistor", "Connected stable", "Connected passive",
@@ -27,7 +27,7 @@ NOT_YET = "not modelled yet"
 
 @dataclass(frozen=True)
 class Entry:
-    """What the page says of one statement: fields of its list, and its lines of Python."""
+    """Entry of the page for one statement: fields of its list, and its lines of Python."""
 
     section: str
     title: str
@@ -36,7 +36,7 @@ class Entry:
 
     @property
     def numbers(self) -> list[int]:
-        """Those that its heading begins with."""
+        """Numbers of equations at the start of the heading."""
         return [int(one) for one in re.findall(r"\((\d+)\)", re.match(r"(\(\d+\) )*", self.title)[0])]
 
     @property
@@ -59,7 +59,7 @@ ENTRIES = entries()
 
 
 def of(*keys: str) -> list:
-    """Entries that have one of these fields, or Python."""
+    """Test parameters: entries with at least one of these fields, or with Python."""
     some = [one for one in ENTRIES if any(key in one.fields or (key == "python" and one.python) for key in keys)]
     return [pytest.param(one, id=one.title) for one in some]
 
@@ -90,7 +90,7 @@ def test_every_entry_is_of_that_form():
 
 @cache
 def names_in(path: str) -> set[str]:
-    """Functions, classes, their methods and what is assigned at the top of a file."""
+    """Functions, classes, methods and names assigned at the top level of a file."""
     tree, found = ast.parse((TOP / path).read_text(encoding="utf-8")), set()
     for one in tree.body:
         found |= {one.name} if isinstance(one, (ast.FunctionDef, ast.ClassDef)) else set()
@@ -103,7 +103,7 @@ def names_in(path: str) -> set[str]:
 
 @cache
 def words_in(path: str) -> set[str]:
-    """The strings of a file."""
+    """String constants of a file."""
     tree = ast.parse((TOP / path).read_text(encoding="utf-8"))
     return {one.value for one in ast.walk(tree) if isinstance(one, ast.Constant) and isinstance(one.value, str)}
 
@@ -144,5 +144,5 @@ def test_lines_of_python_print_what_stands_below_them(entry):
 
 
 def test_whatever_is_modelled_can_be_seen_to_run():
-    """By a line that a reader may type."""
+    """Each modelled statement has a command or lines of Python that a reader may run."""
     assert [one.title for one in ENTRIES if one.modelled and not one.python and "run" not in one.fields] == []

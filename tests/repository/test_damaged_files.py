@@ -1,4 +1,4 @@
-"""What lies damaged on disk, or does not fit on it, is made anew or named with its place; never a fault of ours."""
+"""Files that are damaged, or do not fit on the disk, are written again or named in an error of the program."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ print(value, sum(twice.numba.stats.cache_hits.values()) if "numba" in sys.module
 
 
 def compiled(folder, *arguments):
-    """(what it printed, standard error) of a process that compiles a function or finds it compiled."""
+    """Printed words and standard error of a process that compiles a function or loads it from the cache."""
     done = subprocess.run([sys.executable, "-c", KEPT, *arguments], capture_output=True, text=True,
                           env=os.environ | {"FVSOLVE_CACHE": str(folder)})  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -95,7 +95,7 @@ def test_a_disk_that_fills_up_is_named_with_the_place_and_the_run_goes_on_later(
 
 @pytest.fixture(scope="module")
 def stopped(tmp_path_factory):
-    """A run that was interrupted half way, and its case."""
+    """Case and output folder of a run that was interrupted half way."""
     case, out = branched(fields=4), tmp_path_factory.mktemp("run") / "out"
     case["numerics"] |= {"step": "0.1 ms"}
     del case["numerics"]["courant"]
@@ -136,7 +136,7 @@ HARM = {
 
 
 def shorter(key: str):
-    """An array cut by one."""
+    """Function that cuts an array of a checkpoint by one element."""
     return lambda kept: {key: np.atleast_1d(kept[key])[:-1]}
 
 

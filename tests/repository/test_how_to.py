@@ -1,4 +1,4 @@
-"""docs/how-to: every page is a job that runs as it stands, and prints what the page shows."""
+"""Pages of docs/how-to run as written and print the output that they show."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from reference.folders import DOCS
 
 PAGES = sorted(path for path in (DOCS / "how-to").glob("*.md") if path.stem != "index")
 BLOCK = re.compile(r"^```(\w*)[ ]?(\S*)\n(.*?)^```", re.DOTALL | re.MULTILINE)
-LIBRARIES = {"epanet-to-report": ("wntr", "plotly", "xlsxwriter"), "plastic-main": ("rainflow",)}  # extras
-FAILS = (0, 1)  # a limit that does not hold is what some pages are about
+LIBRARIES = {"epanet-to-report": ("wntr", "plotly", "xlsxwriter"), "plastic-main": ("rainflow",)}  # optional libraries
+FAILS = (0, 1)  # exit status 1: some pages show a limit that fails
 
 
 def plain(text: str) -> str:
-    """Its lines without what columns and the width of a terminal add."""
+    """Text with single blanks, because columns and the width of the terminal change white space."""
     return re.sub(r"\s+", " ", text)
 
 
@@ -26,8 +26,7 @@ def test_every_page_is_in_the_index():
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
 def test_a_page_does_what_it_says(page, fvs, tmp_path, monkeypatch):
-    """A block with the name of a file goes to its end, commands run in order, and the next block without a language is
-    what they print."""
+    """Append blocks with a file name to the file, run the commands in order, and compare their output with the page."""
     for library in LIBRARIES.get(page.stem, ()):
         pytest.importorskip(library)
     monkeypatch.chdir(tmp_path)

@@ -1,4 +1,4 @@
-"""The case of a drive with air in its oil against SciPy, its swinging, and every study of it."""
+"""Hydraulic drive with air in its oil: motion against SciPy, natural frequency and energy balance."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ ENDS, START = (ATM + 100e5, ATM + 1e5), (ATM + 20e5, ATM + 25e5)
 
 
 def oil(fraction: float = 0.01) -> tuple[AirOil, float]:
-    """The oil of the case and its viscosity [Pa s]."""
+    """Law of the oil of the case, and its viscosity [Pa s]."""
     found = properties("ISO VG 46", 323.15, ATM)
     return AirOil(found.density, found.bulk_modulus, fraction, 1.4), found.viscosity
 
 
 def edge(share: float, up: float, down: float, fluid: AirOil, viscosity: float) -> float:
-    """Mass flow of a sharp edge [kg/s], below Reynolds 10 of the full opening the quintic of docs/parts.md."""
+    """Mass flow of a sharp edge [kg/s]; below Re = 10 of the full opening, the quintic of docs/parts.md."""
     size = 2.0 * fluid.density(max(up, down)) * (HOLE * share) ** 2 * abs(up - down)
     slow = 10.0 * math.pi / 4.0 * math.sqrt(4.0 * 12e-6 / math.pi) * viscosity
     x = size / slow**2
@@ -37,7 +37,7 @@ def edge(share: float, up: float, down: float, fluid: AirOil, viscosity: float) 
 
 
 def rates(t, y, fluid, viscosity):
-    """d/dt of (p_A, p_B, x, v)."""
+    """Rates d/dt of (p_A, p_B, x, v)."""
     p_a, p_b, x, v = y
     s = float(np.interp(t, BREAKS, OPENING))
     feed, drain = (p_a, p_b) if s > 0 else (p_b, p_a)
@@ -59,13 +59,13 @@ def test_the_drive_moves_as_scipy_says():
     truth[:2] = (truth[:2] - ATM) / 1e5
     truth[2] *= 1e3
     probes = ("cyl.A.gauge_pressure", "cyl.B.gauge_pressure", "load.position", "load.velocity")
-    for probe, one, near in zip(probes, truth, (1e-3, 1e-3, 1e-3, 3e-6), strict=True):  # bar, mm, m/s
+    for probe, one, near in zip(probes, truth, (1e-3, 1e-3, 1e-3, 3e-6), strict=True):  # [bar], [bar], [mm], [m/s]
         assert result[probe] == approx(one, abs=near), probe
 
 
 @pytest.fixture(scope="module")
 def truth_behind_the_shut_spool() -> np.ndarray:
-    """SciPy's pressure of chamber B at 103 and 181 ms [Pa], with short steps about where the spool is shut."""
+    """Pressure of chamber B at 103 and 181 ms [Pa] by SciPy, with short steps while the spool is nearly shut."""
     fluid, viscosity = oil()
     apart = np.array([0.0, 5e-6, 1e-5, 2e-5, 5e-5, 1e-4])
     near = np.ravel([(t - apart, t + apart) for t in (102.5e-3, 180e-3)])
@@ -76,14 +76,14 @@ def truth_behind_the_shut_spool() -> np.ndarray:
 
 @pytest.mark.parametrize("method", ["auto", "tsitouras", "verner-7", "rodas-4", "rodas-5p", "radau-iia-5", "esdirk-5"])
 def test_flow_that_turns_laminar_as_the_spool_shuts_is_seen(method, truth_behind_the_shut_spool):
-    """For 15 us, within the last of long steps: five of these methods agreed on a pressure that was 20 Pa off."""
+    """The flow is laminar for 15 us within a long step; five of these methods once agreed on an error of 20 Pa."""
     result = fvsolve.run(CASE, set={"numerics.method": method, "numerics.rtol": 1e-7})
     found = ATM + 1e5 * result["cyl.B.gauge_pressure"][[103, 181]]
     assert found == approx(truth_behind_the_shut_spool, abs=4.0)
 
 
 def test_air_slows_the_swinging_by_the_root_of_the_bulk_modulus():
-    """Shut ports, a small push: omega = sqrt(sum A^2 K_eff / (V m) + k / m)."""
+    """Small oscillation with shut ports: omega = sqrt(sum A^2 K_eff / (V m) + k / m)."""
     for fraction in (0.0, 0.01, 0.05):
         p, bare = ATM + 5e5, properties("ISO VG 46", 323.15, ATM).bulk_modulus
         modulus = oil(fraction)[0].modulus_at(p) if fraction else bare

@@ -1,4 +1,4 @@
-"""Hypothesis draws the same input whatever modules are loaded, and tries inputs that once failed."""
+"""Hypothesis draws equal inputs whatever modules are loaded, and tries failed inputs first."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def drawn() -> list[float]:
 
 
 def load_constants(folder, first: int) -> None:
-    """Load a module that holds 400 numbers which occur nowhere else."""
+    """Load a module with 400 numbers that occur nowhere else."""
     path = folder / f"constants_{first}.py"
     path.write_text("\n".join(f"x{k} = {first + k}.015625" for k in range(400)), encoding="utf-8")
     spec = importlib.util.spec_from_file_location(path.stem, path)
@@ -44,7 +44,7 @@ def test_constants_of_a_module_that_is_loaded_are_not_drawn(tmp_path, monkeypatc
     monkeypatch.setattr(providers, "is_local_module_file", constants_ast.is_local_module_file)
     monkeypatch.setattr(providers, "_local_constants", providers._local_constants | constants_ast.Constants())
     load_constants(tmp_path, 900_000)
-    assert drawn() != before  # hypothesis still draws constants by itself: this test can fail
+    assert drawn() != before  # hypothesis draws constants by default, so this test can fail
 
 
 def test_an_input_that_failed_once_is_tried_first(tmp_path, monkeypatch):

@@ -1,4 +1,4 @@
-"""No module of the package imports, through whatever others and wherever it says so, itself."""
+"""Import rules: no module imports itself through others, and files of parts and basins import only allowed folders."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 
 import fvsolve
 
-FLOORS = {  # room -> role -> rooms that it may import beside files of its own role
+FLOORS = {  # folder -> role -> folders that a file of this role may import besides files of its own role
     "parts": {
         "part": {"parts", "units", "errors", "names", "steppers", "attitude"},
         "law": {"kernels", "jit"},
@@ -27,7 +27,7 @@ FLOORS = {  # room -> role -> rooms that it may import beside files of its own r
 
 
 def circle(arrows: dict[str, set[str]]) -> list[str]:
-    """A circle among arrows; none where they can be put in a row."""
+    """Modules of a circle of imports, or an empty list."""
     try:
         TopologicalSorter(arrows).prepare()
     except CycleError as error:
@@ -49,9 +49,9 @@ def test_a_circle_is_seen(arrows, found):
 
 
 def role(module: str) -> tuple[str, str] | None:
-    """Room and role of a file in the folder of a part, or anywhere in that of basins; None of others.
+    """Folder and role of a file of a part or a basin; None for other files.
 
-    What has none of the others' names declares a part, and of a basin is compiled.
+    Without a prefix of a role, a file of a part declares it and a file of a basin is compiled.
     """
     _, room, *names = module.split(".") + [""]
     if room not in FLOORS or len(names) < (3 if room == "parts" else 2):
@@ -62,7 +62,7 @@ def role(module: str) -> tuple[str, str] | None:
 
 
 def test_each_file_of_a_part_or_a_basin_imports_what_its_floor_may():
-    """A declaration imports no compiled function, a law no declaration, and neither what lowers it."""
+    """A declaration imports no compiled function, a law no declaration, and neither of them a lowering."""
     graph = grimp.build_graph("fvsolve", exclude_type_checking_imports=True, cache_dir=None)
     seen = set()
     for module in sorted(graph.modules):

@@ -1,4 +1,4 @@
-"""The package's njit: an edit in another file is noticed, and a second process starts from the cache."""
+"""`njit` of the package: an edit in another file causes compilation, and a second process loads compiled code."""
 
 import contextlib
 import hashlib
@@ -43,7 +43,7 @@ print(value, 'numba' in sys.modules, 'numba' in sys.modules and sum(loop.numba.s
 
 @pytest.fixture
 def package(tmp_path):
-    """A small copy of the package: jit.py and two files of jitted functions, one calling the other."""
+    """Small copy of the package: jit.py, store.py, and two compiled functions, the second of which calls the first."""
     folder = tmp_path / "fvsolve"
     for room in (folder, folder / "kernels", folder / "steppers"):
         room.mkdir()
@@ -56,9 +56,9 @@ def package(tmp_path):
 
 
 def python(package: Path, code: str, told: str = "", **environment: str) -> list[str]:
-    """Words printed by `code` in a new process with this copy and its own cache; it warns of nothing but `told`."""
+    """Words that `code` prints in a process with this copy and its own cache; only warnings like `told` are allowed."""
     stated = {"FVSOLVE_CACHE": str(package.parent / "cache"), "PYTHONPATH": str(package.parent)}
-    stated["PYTHONDONTWRITEBYTECODE"] = "1"  # Python's own cache sees no edit within a second
+    stated["PYTHONDONTWRITEBYTECODE"] = "1"  # bytecode files do not show an edit within a second
     inherited = {k: v for k, v in os.environ.items() if k != "NUMBA_DISABLE_JIT"}
     done = subprocess.run(
         [sys.executable, "-c", code],
@@ -78,13 +78,13 @@ def test_second_process_needs_no_numba_and_an_edit_elsewhere_is_noticed(package)
     assert python(package, PROBE) == ["18.0", "True", "1"]
     for kept in (package.parent / "cache" / "code").rglob(f"*{store.SUFFIX}"):
         kept.unlink()
-    assert python(package, PROBE) == ["18.0", "True", "0"]  # numba's own cache
+    assert python(package, PROBE) == ["18.0", "True", "0"]  # cache of numba
     assert python(package, PROBE) == ["18.0", "False", "False"]
     assert not list(package.rglob("*.nb?")), "compiled code belongs in the cache folder"
 
 
 def test_python_and_compiled_code_may_call_the_same_function(package):
-    """What compiled code alone has called has no door to Python, and gets one when Python calls it."""
+    """A function that only compiled code has called gets an entry point for Python at its first call from Python."""
     code = """
 from fvsolve.steppers.loop import law, loop
 print(loop(4), len(law.numba.overloads), len(law.numba.within.overloads), law(1.0), len(law.numba.overloads))
@@ -94,7 +94,7 @@ print(loop(4), len(law.numba.overloads), len(law.numba.within.overloads), law(1.
 
 
 def forged(package: Path, **changes) -> Path:
-    """The one file of the store, its head changed, and whole."""
+    """The only file of the store, with changed header and valid checksum."""
     (path,) = (package.parent / "cache" / "code").rglob(f"*{store.SUFFIX}")
     head, _, code = path.read_bytes()[store.DIGEST :].partition(b"\n")
     data = json.dumps(json.loads(head) | changes).encode() + b"\n" + code
@@ -103,7 +103,7 @@ def forged(package: Path, **changes) -> Path:
 
 
 def test_a_store_serves_wherever_it_is_copied_to(package, tmp_path):
-    """Numba's own cache goes by time stamps of sources, so that a copy is worth nothing."""
+    """Stored code is valid in a copy of the package; numba's own cache is not, because it depends on time stamps."""
     assert python(package, PROBE) == ["12.0", "True", "1"]
     elsewhere = tmp_path / "elsewhere"
     shutil.copytree(package, elsewhere / "fvsolve", copy_function=shutil.copyfile)
@@ -217,7 +217,7 @@ def test_only_rooms_that_are_hashed_compile():
 
 
 def test_what_declares_or_lowers_compiles_nothing():
-    """So an edit there leaves compiled code as it is: of parts laws alone are hashed, of basins all that compiles."""
+    """Of parts only laws are hashed, of basins only compiled files; edits elsewhere keep the compiled code."""
     hashed = {path.relative_to(jit.PACKAGE) for path in jit._sources()}
     assert Path("basins/liquid/grid_linear.py") in hashed and Path("basins/basin_scalars.py") in hashed
     assert {path.name[:3] for path in hashed if path.parts[0] == "parts"} == {"law"}
@@ -225,7 +225,7 @@ def test_what_declares_or_lowers_compiles_nothing():
 
 
 def test_a_compiled_function_of_declared_arguments_takes_no_others():
-    """Machine code looks at no type: integers among numbers are turned into these, arrays of another kind refused."""
+    """Machine code does not check types: integers are accepted as numbers, other arrays are refused."""
     if not jit.COMPILING:
         pytest.skip("JIT is off")
     factor, solve, *_ = no_algebra()
@@ -239,7 +239,7 @@ def test_a_compiled_function_of_declared_arguments_takes_no_others():
 
 
 def test_the_second_process_compiles_what_is_then_taken_from_the_store(monkeypatch):
-    """The text that it runs has no fault, and the name by which it is skipped is that of a function in the store."""
+    """The code for the second process runs, and the name that decides to skip it is that of a function in the store."""
     from fvsolve.kernels import compiled_functions
     from fvsolve.steppers import integrator
 

@@ -1,4 +1,4 @@
-"""Every test file and every truth that a page, a case or a comment names is there."""
+"""Each file of tests that a page, a case or a comment names exists."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The list of faults of `tests/planted_faults.py` fits the package as it is."""
+"""Faults of `tests/planted_faults.py` fit the present package."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Public doors take what they can take, and say so of everything else; what they hand out is not to be written into."""
+"""Public functions accept valid arguments and refuse others with a message; returned arrays are read-only."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def test_arrays_of_a_result_are_not_to_be_written_into(tmp_path):
 
 
 class Mine(Exception):
-    """Raised by a caller."""
+    """Exception of a caller."""
 
 
 @pytest.mark.parametrize("error", [Mine, ValueError, StopIteration, FvsolveError, SystemExit])
@@ -154,7 +154,7 @@ PLAIN = {"t": 0.0, "until": 0.0, "y0": [1.0], "source": "valve-closure", "direct
 
 
 def doors(model):
-    """All that is called in `fvsolve` and at a Model, and its arguments."""
+    """Functions of `fvsolve`, methods of Model, and State, by name."""
     names = [name for name in fvsolve.__all__ if not isinstance(getattr(fvsolve, name), type)]
     found = {name: getattr(fvsolve, name) for name in names} | {"State": State}
     at_model = {name: getattr(model, name) for name in dir(model) if name[0] != "_"}
@@ -164,7 +164,7 @@ def doors(model):
 
 NO_DOORS = ("functions", "handle", "picture")
 LINE, FIRST = LineImpedance(1.0, 1.0, 0.5), Transfer([[-1.0]], [1.0], [1.0], 0.0)
-OTHERS = {  # of what functions hand out and studies offer: what is taken
+OTHERS = {  # functions of results and studies, with valid arguments
     "Result.plot": (lambda there: there.result.plot, {"path": None}),
     "Result.plot_envelope": (lambda there: there.result.plot_envelope, {"path": None}),
     "Result.column": (lambda there: there.result.column, {"probe": "gate.pressure"}),
@@ -198,7 +198,7 @@ OTHERS = {  # of what functions hand out and studies offer: what is taken
 }  # fmt: skip
 OTHER = [object(), "", "no\0where", "nowhere/at all", [None], ["a"], [np.nan], np.zeros((2, 3)), {"a": 1}, b"x", np.nan,
          np.inf, -1, 2.5, True, 1 + 1j]  # fmt: skip
-TAKEN = {  # of all these
+TAKEN = {  # values of OTHER that are valid, and the arguments that accept them
     "2.5": "fit.floor advection_limit.courant advection_limits.courant limit_of.courant line_positive_real.shift "
     "line_positive_real.tolerance sweep_positive_real.slope sweep_positive_real.high sweep_positive_real.shift "
     "sweep_positive_real.tolerance state_positive_real.tolerance LineImpedance.z0 LineImpedance.time seen_frequency.h",
@@ -228,7 +228,7 @@ def test_doors_of_results_and_studies_take_what_they_name_and_refuse_all_else(na
                     bad.append(f"{name}: {one} = {given!r} was taken")
             except FvsolveError as error:
                 assert len(str(error)) > 10
-            except Exception as error:  # which none of these is
+            except Exception as error:  # any other exception is a fault
                 bad.append(f"{name}: {one} = {given!r}: {error!r}")
     assert bad == []
     assert not list(tmp_path.iterdir())
@@ -270,7 +270,7 @@ def test_a_study_says_what_is_wrong_with_what_it_is_given():
 
 
 def test_every_door_says_what_it_wants(model, tmp_path, monkeypatch):
-    """Anything at every argument of every door is taken, or refused by a text of ours."""
+    """Each argument of each public function accepts a wrong value or raises an error of fvsolve with a text."""
     monkeypatch.chdir(tmp_path)
     bad = []
     for name, door in doors(model).items():
@@ -287,6 +287,6 @@ def test_every_door_says_what_it_wants(model, tmp_path, monkeypatch):
                     door(**{**there, one.name: given})
                 except FvsolveError as error:
                     assert str(error)
-                except Exception as error:  # which none of these is
+                except Exception as error:  # any other exception is a fault
                     bad.append((name, one.name, given, repr(error)))
     assert bad == []

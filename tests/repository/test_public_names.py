@@ -1,4 +1,4 @@
-"""The public names: few, documented, there, and cheap to import."""
+"""Public names: at most twenty, documented, present and fast to import."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def test_what_a_page_names_can_be_imported_from_where_it_says(page):
 
 
 def importable(room, name):
-    """Whether a room has a name, as itself or as a room of its own."""
+    """True if a package has this attribute or module."""
     if hasattr(import_module(room), name):
         return True
     return find_spec(f"{room}.{name}") is not None

@@ -1,4 +1,4 @@
-"""An older Python is refused with a message that names it, what is needed and what to do."""
+"""An older Python is refused with a message that names it, the required version and the remedy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What objects show at a prompt, in a notebook, as a table and as a picture; names that may stand for files."""
+"""Objects as text, notebook table, frame and picture; shipped cases by name; tableaus from arrays and files."""
 
 from __future__ import annotations
 
@@ -63,12 +63,12 @@ def test_names_in_a_notebook_are_text_and_no_markup():
 
 def test_a_shipped_case_goes_by_its_name_as_on_the_command_line(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / CASE).mkdir()  # a folder is no case
+    (tmp_path / CASE).mkdir()  # a folder is not a case
     assert run(CASE).summary["case"] == CASE
     (tmp_path / CASE).rmdir()
     with pytest.raises(FvsolveError):
         load("no-such-case")
-    (tmp_path / CASE).write_text("schema = 2\n")  # a file of that name is the file
+    (tmp_path / CASE).write_text("schema = 2\n")  # an existing file takes precedence
     with pytest.raises(FvsolveError, match="fault"):
         load(CASE)
 
@@ -79,7 +79,7 @@ def test_a_tableau_from_arrays_is_that_of_its_text():
         made = tableau("shown-array", a, [Fraction(1, 2), Fraction(1, 2)], [0, 1])
         assert np.array_equal(made.a, text.a) and np.array_equal(made.b, text.b) and np.array_equal(made.c, text.c)
         assert (made.order, made.stages) == (text.order, text.stages) == (2, 2)
-    assert tableau("shown-array", [[0, 0], [0.5, 0]], [0.0, 1.0]).order == 2  # c is the sums of rows
+    assert tableau("shown-array", [[0, 0], [0.5, 0]], [0.0, 1.0]).order == 2  # c defaults to the row sums
     pair = tableau("shown-array", [[0, 0], [1, 0]], [[0.5, 0.5], [1.0, 0.0]], [0.0, 1.0])
     assert pair.adaptive and (pair.order, pair.error_order) == (2, 1)
 

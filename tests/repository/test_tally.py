@@ -1,4 +1,4 @@
-"""The tally of the quick tests names what was not run."""
+"""The tally of the quick tests lists schemes, methods, parts, laws, commands and tests that did not run."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from reference import folders
 
 import fvsolve
 
-OTHERS = {"repository", "invariance", "reference"}  # tests of several packages, or of none
+OTHERS = {"repository", "invariance", "reference"}  # tests of several packages or of none
 
 
 def test_every_folder_of_tests_is_a_package_or_one_of_three_others():

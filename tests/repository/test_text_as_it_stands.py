@@ -1,4 +1,4 @@
-"""Text of the user's is never markup: not on pictures, not on the terminal, not in the files of a run."""
+"""Texts of users are never markup: not on pictures, on the terminal or in the files of a run."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_any_title_is_drawn_and_printed_as_it_stands(title, tmp_path, fvs, monke
     monkeypatch.chdir(tmp_path)
     (tmp_path / "case.toml").write_text(fvsolve.load(still(title=title)).resolved(), encoding="utf-8")
     code, out, err = fvs("run", "case.toml")
-    assert code == 0 and "could not be drawn" not in err  # on a first run it says that it compiles
+    assert code == 0 and "could not be drawn" not in err  # a first run reports compilation
     assert title in out or title == STEERS
     assert "\x1b" not in out and "\x07" not in out and "\u202e" not in out
     said = json.loads((tmp_path / "runs" / "case" / "summary.json").read_text())
@@ -76,7 +76,7 @@ def test_units_of_scalars_stand_in_the_files_as_they_are(tmp_path):
 
 
 def test_the_summary_is_there_though_a_picture_fails(tmp_path, fvs, monkeypatch):
-    """The folder takes the picture's name, so that it cannot be put in its place."""
+    """A folder has the name of the picture, so the picture cannot be written."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "case.toml").write_text(fvsolve.load(still(title="A")).resolved())
     (tmp_path / "out" / "fresh-history.png").mkdir(parents=True)
@@ -86,7 +86,7 @@ def test_the_summary_is_there_though_a_picture_fails(tmp_path, fvs, monkeypatch)
     said = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert said["ok"] and said["files"] == ["case.toml", "history.csv", "restart.npz", "summary.json"]
     (tmp_path / "out" / "fresh-history.png").rmdir()
-    assert fvs("run", "case.toml", "--out", "out", "--resume")[0] == 0  # draws what is not there
+    assert fvs("run", "case.toml", "--out", "out", "--resume")[0] == 0  # draws missing pictures
     assert imread(tmp_path / "out" / "history.png").size > 0
 
 

@@ -1,4 +1,4 @@
-"""Names and texts use words of the field: a list of words may not appear, and docstrings begin as sentences do."""
+"""Names and texts of the package: forbidden words do not occur, and docstrings begin with a verb or a noun."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def docstrings(tree: ast.Module):
 
 
 def texts(tree: ast.Module):
-    """String constants with a blank that are no docstrings: messages, help, descriptions."""
+    """String constants with a blank except docstrings: messages, help, descriptions."""
     own = {
         id(node.body[0].value)
         for node in ast.walk(tree)

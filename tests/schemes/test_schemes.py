@@ -1,4 +1,4 @@
-"""What is derived from a scheme's entry: order, reach and what carries it in the plane."""
+"""Properties derived from the entry of a scheme: order, reach, and the scheme for basins."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fvsolve.kernels.limiters import limited
 from fvsolve.model.scheme_codes import CODES, FAMILIES, family
 from fvsolve.schemes import LEAST_CELLS, LIMITED, LINEAR, SCHEMES, Scheme
 
-KNOWN = {  # order, reach, in the plane on rectangles, with cavities
+KNOWN = {  # order, reach, scheme on grids of basins, True if it computes cavities
     "upwind": (1, (1, 0, 0, 1), "upwind", True),
     "linear-upwind": (2, (2, 0, 1, 2), "muscl", False),
     "fromm": (2, (2, 1, 1, 2), "muscl", False),
@@ -39,7 +39,7 @@ def test_facts_of_a_scheme_are_those_of_its_weights(name):
 
 @pytest.mark.parametrize("name", LINEAR)
 def test_weights_are_exact_for_their_degree_and_no_more(name):
-    """Averages of (x - 0.3)^d over cells from -2 to 2, the face at 1."""
+    """Averages of (x - 0.3)^d over the cells [k, k + 1], k = -2 to 2, give the value at the face x = 1."""
     one = LINEAR[name]
     for degree in range(one.degree + 2):
         averages = [((k + 0.7) ** (degree + 1) - (k - 0.3) ** (degree + 1)) / (degree + 1) for k in range(-2, 3)]
@@ -48,13 +48,13 @@ def test_weights_are_exact_for_their_degree_and_no_more(name):
 
 
 def test_a_scheme_is_one_entry():
-    """Kappa = 1/2 of van Leer's family, which nobody has entered."""
+    """The weights of a new scheme, kappa = 1/2 of van Leer's family, give all its properties."""
     one = Scheme("quick-like", weights=tuple(Fraction(w, 8) for w in (0, -1, 6, 3, 0)))
     assert (one.order, tuple(one.reach), one.limited, one.plane) == (2, (2, 1, 1, 2), False, "muscl")
 
 
 def test_shorter_schemes_have_room():
-    """What pipes of fewer cells take is of lower order, and those that need it look at five cells."""
+    """Schemes that read five cells have a scheme of lower order for pipes with fewer cells; others have none."""
     for one in SCHEMES.values():
         assert bool(one.shorter) == (one.degree + 1 >= LEAST_CELLS)
         assert not one.shorter or SCHEMES[one.shorter].order < one.order

@@ -1,4 +1,4 @@
-"""A run that blew up says from when on it is not valid, in place of numbers such as -2e30."""
+"""A run that blows up states the time from which it is not valid, instead of numbers such as -2e30."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import fvsolve
 from fvsolve.case.text import write
 from fvsolve.studies import scenarios
 
-LARGEST = 1e4  # m, which no true head of the scene comes near: it is shut from 2 m/s, 200 m by Joukowsky
+LARGEST = 1e4  # [m], far above true heads: a closure from 2 m/s gives 200 m by Joukowsky
 
 
 def blown(step: float = 0.02, scheme: str = "muscl", **more) -> dict:
-    """A pipe at four times the greatest Courant number, at rest but for its flow until the tap shuts at 0.5 s."""
+    """Case of a pipe in steady flow at Courant number 4 by default, with a valve that shuts from 0.5 s on."""
     nodes = {"lake": lake(50.0, elevation=0.0), "gate": junction(elevation=0.0),
              "air": reservoir(1e5, elevation=0.0)}  # fmt: skip
     links = {"main": pipe("lake", "gate", 300.0, 0.2, 1000.0, 60),
@@ -29,7 +29,7 @@ def blown(step: float = 0.02, scheme: str = "muscl", **more) -> dict:
 
 
 def numbers(value) -> list[float]:
-    """All numbers of plain data."""
+    """All numbers in nested dicts and lists."""
     if isinstance(value, dict):
         return [x for one in value.values() for x in numbers(one)]
     if isinstance(value, list):
@@ -44,13 +44,13 @@ def test_extremes_margins_and_claims_are_no_numbers(step: float, scheme: str) ->
     said = result.summary
     assert not result.ok and said["invalid_from"] is not None and said["invalid_from"] <= said["t"]
     heads = [one for key in ("extremes", "verdicts", "expectations") for one in numbers(said[key])]
-    assert max(map(abs, heads)) <= 1e60  # the claims' own tolerance, and
+    assert max(map(abs, heads)) <= 1e60  # tolerance of the expectations
     assert max(map(abs, numbers({name: one for name, one in said["extremes"].items() if "head" in name}))) < LARGEST
     assert {one.state for one in result.expectations} == {"open"}
     states = {one.name: one.state for one in result.verdicts}
     assert states["top"] == states["low"] == "open"
     assert all(one.margin is None for one in result.verdicts if one.state == "open")
-    assert result.extremes["lake.pressure"].maximum is not None  # which does not move
+    assert result.extremes["lake.pressure"].maximum is not None  # constant pressure
 
 
 def test_all_that_is_printed_says_from_when(fvs, tmp_path, monkeypatch) -> None:

@@ -1,4 +1,4 @@
-"""Kinks and jumps that lie some roundings beside where a stretch or a run begins or ends: no step is that short."""
+"""Kinks and jumps within few rounding errors of a boundary of a run or advance do not cause extremely short steps."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def beside(t: float, roundings: int) -> float:
 
 
 def filling(at: float, kind: str, numerics: dict) -> dict:
-    """A chamber between two valves; what feeds it changes once."""
+    """Case of a chamber between two valves, with one kink or jump of the supply pressure."""
     fed = {"time": [0.0, at], "value": [3e5, 3.1e5], "kind": "step"}
     if kind == "kink":
         fed = {"time": [0.0, at, at + 0.1], "value": [3e5, 3e5, 3.2e5]}
@@ -52,7 +52,7 @@ def test_a_break_beside_a_boundary_is_as_good_as_on_it(kind, numerics):
 
 
 def test_the_loop_of_the_manual_goes_through_a_shipped_drive():
-    """The sums of a thousandth come to rest one rounding beside the corners of the spool's schedule."""
+    """A loop of advances by 1 ms passes the corners of the spool's schedule, one rounding error away from its sums."""
     model = fvsolve.build(fvsolve.load(CASES / "hydraulic-drive.toml"))
     state = fvsolve.initial_state(model)
     while state.t < 0.2:

@@ -1,4 +1,4 @@
-"""Scenes under implicit steps: the same answers, closed ledgers, rest, events, resuming, and any linear algebra."""
+"""Runs with implicit methods: solutions, ledgers, rest, events, resumption and linear algebra."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def said(numerics: dict) -> str:
 
 
 def harbour(**numerics) -> dict:
-    """Pipes, a tank, a chamber and a closing valve."""
+    """Case of pipes, a tank, a chamber and a closing valve."""
     rough = {"friction": {"model": "quasi-steady", "roughness": 2.6e-4}}
     nodes = {"lake": lake(50.0), "fork": junction(), "tower": tank(2.0, 45.0), "pot": chamber(0.01), "sea": lake(0.0)}
     links = {
@@ -49,7 +49,7 @@ def harbour(**numerics) -> dict:
 
 
 def jack(**numerics) -> dict:
-    """A cylinder whose load swings on the oil."""
+    """Case of a cylinder whose load oscillates on the oil."""
     one = Jack(v=0.3, stiffness=4e5, free=0.1, damping=3e3, leakage=1e-12, friction=100.0)
     return scene(one.nodes(), one.links(), 0.02, numerics, ["load.position", "cyl.A.pressure"], 1e-3, fluid=one.fluid())
 
@@ -78,7 +78,7 @@ def test_error_control_ends_where_the_explicit_run_does(build, numerics, explici
 
 @pytest.mark.parametrize("numerics", GIVEN, ids=said)
 def test_given_steps_end_near_it_and_the_ledger_closes(numerics, explicit):
-    near = {"implicit-euler": 0.1, "trapezoid": 0.05}.get(numerics["method"], 0.015)  # of order 1; rings
+    near = {"implicit-euler": 0.1, "trapezoid": 0.05}.get(numerics["method"], 0.015)  # order 1; ringing
     agrees(fvsolve.run(harbour(**numerics)), explicit[harbour], near)
 
 
@@ -101,7 +101,7 @@ def test_a_looped_network_without_an_event_does_not_move_by_one_bit(numerics):
 
 @pytest.mark.parametrize("method", ["radau-iia-5", "alexander-3", "implicit-euler"])
 def test_twenty_travel_times_a_step_is_no_limit_for_implicit_methods(method):
-    """A valve at the end of a pipe closes slowly: the head that the steady loss predicts is there in the end."""
+    """Implicit steps at Courant number 20 end at the steady flow after a slow closure."""
     nodes = {"lake": lake(50.0), "gate": junction(), "sea": lake(0.0)}
     links = {
         "main": pipe("lake", "gate", 500.0, 0.3, 1000.0, 100),
@@ -186,12 +186,12 @@ def test_dead_at_a_random_moment_and_resumed_is_the_unbroken_run(tmp_path, numer
     moment = random.Random(seed).uniform(0.1, 0.7) * whole.t[-1]
     died = subprocess.run([sys.executable, str(tmp_path / "dying.py"), str(file), str(broken), str(moment)])
     assert died.returncode == 9 and moment <= reached(broken) < whole.t[-1]
-    assert fvsolve.run(file, out=broken, resume=True).reason == "finished"  # here: test_resume does it elsewhere
+    assert fvsolve.run(file, out=broken, resume=True).reason == "finished"  # in this process, unlike in test_resume
     same_files(tmp_path / "whole", broken)
 
 
 def reached(folder) -> float:
-    """The time of the last checkpoint [s]."""
+    """Time of the last checkpoint [s], 0 without a checkpoint."""
     try:
         with np.load(folder / "restart.npz") as kept:
             return float(kept["t"])
@@ -200,7 +200,7 @@ def reached(folder) -> float:
 
 
 def busy(numerics: dict) -> dict:
-    """A valve that goes to and fro, so that there is something to step for."""
+    """Case of a valve that opens and closes all the time, so that steps stay short."""
     case = long_run()
     t = 0.5 * np.arange(500)
     opening = {"time": t.tolist(), "value": (0.6 + 0.4 * np.cos(t**2)).tolist()}
@@ -214,7 +214,7 @@ BALL = {  # rtol, method: errors at the end as measured, of the position [m] and
     (1e-4, "auto"): (5.2e-4, 1.7e-2),
     (1e-4, "rodas-5p"): (4.4e-5, 1.6e-5),
     (1e-4, "radau-iia-5"): (6.5e-5, 6.3e-4),
-    (1e-4, "radau-iia-9"): (8.6e-5, 1.6e-3),  # its steps end on rows
+    (1e-4, "radau-iia-9"): (8.6e-5, 1.6e-3),  # its steps end at rows
     (1e-4, "esdirk-4"): (8.5e-4, 6.3e-3),
     (1e-6, "dormand-prince"): (3.1e-5, 6.2e-4),
     (1e-6, "auto"): (3.1e-5, 6.2e-4),
@@ -227,7 +227,10 @@ BALL = {  # rtol, method: errors at the end as measured, of the position [m] and
 
 @pytest.mark.parametrize("rtol, method", BALL)
 def test_a_ball_on_a_damped_stop_bounces_as_solve_ivp_says(rtol, method):
-    """The force of the dashpot sets in with a jump, which differences must not take for a slope."""
+    """A ball on a damped stop follows free flight and SciPy's contact.
+
+    The force of the damper starts with a jump, which difference quotients must not treat as a slope.
+    """
     nodes = {"ground": {"type": "frame"}, "ball": {"type": "mass", "mass": 2.0, "initial_position": 0.1}}
     nodes["ball"]["initial_velocity"] = -1.0
     links = {
@@ -237,7 +240,7 @@ def test_a_ball_on_a_damped_stop_bounces_as_solve_ivp_says(rtol, method):
     case = scene(nodes, links, 0.5, {"method": method, "rtol": rtol}, ["ball.position", "ball.velocity"], 0.01)
     result = fvsolve.run(case)
     x, v, t = 0.1, -1.0, 0.0
-    while True:  # flight to the stop, then contact until it would pull, by its own solution
+    while True:  # flight to the stop, then contact until its force would pull
         down = (v + math.sqrt(v * v + 20.0 * x)) / 10.0
         if t + down > 0.5:
             left = 0.5 - t
@@ -251,11 +254,11 @@ def test_a_ball_on_a_damped_stop_bounces_as_solve_ivp_says(rtol, method):
         t, (x, v) = t + contact.t[-1], contact.y[:, -1]
     of_x, of_v = BALL[rtol, method]
     assert result["ball.position"][-1] == pytest.approx(x, abs=1.5 * of_x)
-    assert result["ball.velocity"][-1] == pytest.approx(v, abs=max(1.5 * of_v, rtol))  # that of rodas-5p is luck
+    assert result["ball.velocity"][-1] == pytest.approx(v, abs=max(1.5 * of_v, rtol))  # rodas-5p is accurate by chance
 
 
 def released(_, s):
-    """Force of the stop [N / 2 kg]; it never pulls."""
+    """Force of the stop over the mass of 2 kg [N/kg], with an offset of 1e-9; its zero ends the contact."""
     return 5e4 * -s[0] - 30.0 * s[1] + 1e-9
 
 
@@ -281,12 +284,15 @@ def test_a_scene_without_a_state_runs_as_any_other(numerics):
 
 
 UNDAMPED = {"links.cyl.viscous_friction": 0.0, "links.damper.damping": 1.0, "output.fields": 0}
-SHUT = 0.155  # when the spool of `cylinder-servo` shuts for good [s]
+SHUT = 0.155  # time of the last closure of the spool valve of `cylinder-servo` [s]
 
 
 @pytest.fixture(scope="module")
 def set_free() -> tuple[float, float]:
-    """Position [m] and velocity [m/s] of the load where the spool shuts: SciPy's Radau over the last millisecond."""
+    """Position [m] and velocity [m/s] of the load when the spool valve shuts.
+
+    SciPy's Radau integrates the last millisecond.
+    """
     numerics = {"numerics.method": "radau-iia-5", "numerics.rtol": 1e-12}
     model = fvsolve.build(fvsolve.load("cylinder-servo", {**UNDAMPED, **numerics}))
     before, scale = fvsolve.advance(model, fvsolve.initial_state(model), SHUT - 1e-3), model.scale
@@ -298,7 +304,10 @@ def set_free() -> tuple[float, float]:
 @pytest.mark.parametrize("method", ["radau-iia-5", "radau-iia-9"])
 @pytest.mark.parametrize("rtol", [1e-6, 1e-7, 1e-8, 1e-9, 1e-10])
 def test_no_step_passes_what_a_valve_sets_free_as_it_shuts(method, rtol, set_free):
-    """All stages of a step to that moment may lie before it and know nothing: 7e-6 m/s was lost at any tolerance."""
+    """The step to the closure of a spool valve includes the effect of the closure on the load.
+
+    All stages of this step may be earlier than the closure; the velocity then was wrong by 7e-6 m/s at any tolerance.
+    """
     settings = {"numerics.method": method, "numerics.rtol": rtol, "numerics.end": SHUT}
     model = fvsolve.build(fvsolve.load("cylinder-servo", {**UNDAMPED, **settings}))
     found = fvsolve.advance(model, fvsolve.initial_state(model), SHUT).y[2:4]

@@ -1,4 +1,4 @@
-"""What the mass ledger says: gross, by node, one-sided, and as much as has flowed, under every family of methods."""
+"""Mass ledger: gross amounts, amounts by node, and accuracy, for every family of methods."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def drains(section: float, bore: float, numerics: dict, level: float = 3.0, end:
 
 @pytest.mark.parametrize("method", ["auto", "rodas-5p", "rodas-4", "radau-iia-5", "esdirk-4", "rk4"])
 def test_a_tank_that_runs_empty_makes_up_no_water(method):
-    near = {"rk4": 5e-6, "rodas-5p": 2e-6}.get(method, 2e-7)  # of steps of 0.25 s; few at rtol 1e-6; more of them
+    near = {"rk4": 5e-6, "rodas-5p": 2e-6}.get(method, 2e-7)  # steps of 0.25 s; few steps; more steps
     for section in (0.5, 1.0, 2.0, 3.0, 5.0):
         for bore in (0.05, 0.08, 0.1):
             result = drains(section, bore, settings(method, 0.25))
@@ -68,7 +68,7 @@ def test_what_spills_and_what_is_made_up_are_rows_of_their_own(method):
 
 @pytest.mark.parametrize("method", [*ADAPTIVE, *FIXED])
 def test_a_dry_tank_fills_again_and_a_full_one_empties(method):
-    """Triangles of 20 l/s, each of which brings or takes 500 l: the tank of 300 l spills and runs dry by turns."""
+    """A tank of 300 l under triangular flows of 500 l in turn spills and runs dry by exact amounts."""
     times = [0.0, *np.arange(25.0, 400.0, 50.0).tolist(), 400.0]
     flow = {"time": times, "value": [0.0, *(4 * [0.02, -0.02]), 0.0]}
     nodes = {"mouth": {"type": "inflow", "flow": flow}, "vat": tank(1.0, 0.1, height=0.3)}
@@ -80,7 +80,10 @@ def test_a_dry_tank_fills_again_and_a_full_one_empties(method):
 
 @pytest.mark.parametrize("method", [*ADAPTIVE, *FIXED])
 def test_what_swings_to_and_fro_counts_on_both_sides(method):
-    """Between a lake and a tank z = z0 cos(w t), w^2 = g A_c / (L A), and each period brings 2 z0 A both ways."""
+    """A column between a lake and a tank carries 2 z0 A in each direction per period.
+
+    The level is z = z0 cos(w t) with w^2 = g A_c / (L A).
+    """
     section, bore, length, swing, periods = 0.5, 0.3, 100.0, 0.4, 3
     period = 2 * math.pi / math.sqrt(GRAVITY * scenes.area(bore) / (length * section))
     nodes = {"lake": lake(2.0, elevation=0.0), "vat": tank(section, 2.0 + swing, elevation=0.0)}
@@ -109,7 +112,10 @@ def test_a_reservoir_that_waves_reach_counts_what_its_pipe_says():
 
 @pytest.mark.parametrize("method", [*ADAPTIVE, "rk4"])
 def test_what_a_scene_without_a_state_passes_is_as_accurate_as_its_tolerance(method):
-    """From a pressure that falls through a valve to a demand that follows it: all, some, none (Wagner)."""
+    """The ledger of a case without states equals the integral of its flow.
+
+    The supply pressure falls, so that a pressure-dependent demand gets all, a part and none of its flow (Wagner).
+    """
     nodes = {
         "lake": reservoir({"time": [0.0, 100.0], "value": [AMBIENT + 6e4, AMBIENT - 1e4]}),
         "town": scenes.junction(0.02, required_pressure=AMBIENT + 4e4, minimum_pressure=AMBIENT + 2e4),
@@ -117,14 +123,17 @@ def test_what_a_scene_without_a_state_passes_is_as_accurate_as_its_tolerance(met
     case = scene(nodes, {"way": valve("lake", "town", 0.01)}, 100.0, settings(method, 0.02), ["way.flow"], 0.01)
     result = fvsolve.run(case)
     mass, flowed = result.ledger["mass"], np.trapezoid(1000.0 * result["way.flow"], result.t)
-    near = 5e-6 if method == "tr-bdf2" else 1e-6  # of second order: rtol 1e-6 bounds each of its many steps
+    near = 5e-6 if method == "tr-bdf2" else 1e-6  # order 2: many steps with an error of rtol each
     for word in ("inflow", "outflow"):
         assert mass[word] == pytest.approx(flowed, rel=near)
     assert mass["nodes"]["lake"]["outflow"] == 0.0 and mass["nodes"]["town.demand.outside"]["inflow"] == 0.0
 
 
 def swung(section: float, level: float, gap: float, times: list, gauges: list) -> dict:
-    """Truth of a tank behind a valve from a source that swings: dm/dt = q, held dry while q < 0 there [kg]."""
+    """Reference amounts [kg] of a tank behind a valve under a pressure that alternates, by SciPy.
+
+    dm/dt = q, and the tank stays at 0 while it is dry and q < 0.
+    """
     amounts, held, t = np.array([section * level * 1000.0, 0.0, 0.0]), False, times[0]
 
     def flow(t, mass):
@@ -159,7 +168,10 @@ SEESAW, GAUGES = [0.0, 100.0, 200.0, 300.0, 400.0], [3e4, -3e4, 3e4, -3e4, 1e4]
 
 @pytest.mark.parametrize("method", [*ADAPTIVE, "esdirk-3", "rk4", "trapezoid", "gauss-4"])
 def test_what_a_dry_tank_is_asked_for_is_as_accurate_as_what_it_holds(method):
-    """No state feels it, so its quadrature must; and steps are short where a flow starts from none as a root."""
+    """The made-up amount of a dry tank is accurate although no state depends on it.
+
+    Its quadrature therefore has error control, and steps are short where a flow starts as a root.
+    """
     nodes = {"lake": reservoir({"time": SEESAW, "value": [AMBIENT + p for p in GAUGES]}), "vat": tank(0.5, 1.0)}
     case = scene(nodes, {"way": valve("lake", "vat", 0.002)}, 400.0, settings(method, 0.02), ["way.flow"], 1.0)
     mass = fvsolve.run(case).ledger["mass"]
@@ -168,7 +180,7 @@ def test_what_a_dry_tank_is_asked_for_is_as_accurate_as_what_it_holds(method):
 
 
 def sucked(method: str, scheme: str = "muscl", rtol: float = 1e-6, **more):
-    """A pool over a slope that suction drains dry through all of its shallow side, and goes on to draw."""
+    """Run of a basin on a slope whose shallow side runs dry by suction at a patch that continues to draw."""
     outlet = {"outlet": {"side": "east", "span": [0.0, 4.0]}}
     nodes = {
         "pool": {"type": "basin", "size": [6.0, 4.0], "cells": [6, 4], "level": 0.2, "elevation": 0.0, "bed": "0.02*x",

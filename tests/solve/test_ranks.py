@@ -1,4 +1,4 @@
-"""Ranks of MPI share out rows of basins as threads do, to the same bits; what cannot run so is named."""
+"""MPI ranks that share the rows of basins give the bits of one process; cases that cannot be shared are reported."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def ranks(many: int, *command, timeout=300, **environment) -> subprocess.Complet
 
 
 def same(one: Path, other: Path) -> bool:
-    """Whether two runs have the same history, ledgers and frames, of which the last is their end."""
+    """True if two runs have equal histories, ledgers and frames."""
     said, again = (json.loads((run / "summary.json").read_text()) for run in (one, other))
     keys = ("ledgers", "extremes", "steps", "reason", "marks")
     frames = [[drawn(path) for _, path in read_series(run / "fields.pvd")] for run in (one, other)]
@@ -51,7 +51,7 @@ def same(one: Path, other: Path) -> bool:
 
 
 def drawn(path: Path) -> dict[str, bytes]:
-    """Corners of all cells of a frame, and what these hold, of all pieces where it has some, in their order."""
+    """Bytes of the corners and cell data of a frame, with all its pieces in order."""
     pieces = [path]
     if path.suffix == ".pvtu":
         pieces = [path.parent / one.attrib["Source"] for one in ElementTree.parse(path).getroot().iter("Piece")]
@@ -65,7 +65,7 @@ def drawn(path: Path) -> dict[str, bytes]:
 @pytest.mark.parametrize("many", [2, 3])
 def test_ranks_give_the_bits_of_one_process(tmp_path, many):
     cases = {name: SCENES[name] | {"output": SCENES[name]["output"] | {"fields": 2}} for name in NAMES}
-    alone = {name: fvsolve.run(case, out=tmp_path / "one" / name) for name, case in cases.items()}  # compiled once
+    alone = {name: fvsolve.run(case, out=tmp_path / "one" / name) for name, case in cases.items()}  # also compiles
     found = ranks(many, sys.executable, "-c", SCRIPT, json.dumps(cases), tmp_path / "ranks", "{}")
     assert found.returncode == 0, found.stderr
     for name, run in alone.items():
@@ -85,7 +85,7 @@ def test_growth_without_end_stops_all_ranks_at_the_step_of_one(tmp_path):
 
 
 def test_frames_that_ranks_write_are_those_of_one_process_to_who_reads_them(tmp_path):
-    """Each has written its rows; a reader of VTK sees one basin, units and all."""
+    """A VTK reader finds one basin in the frames of several ranks, equal to that of one process, with its unit."""
     case = {name: SCENES[name] | {"output": SCENES[name]["output"] | {"fields": 1}} for name in ("a dye",)}
     found = ranks(2, sys.executable, "-c", SCRIPT, json.dumps(case), tmp_path, "{}")
     assert found.returncode == 0, found.stderr

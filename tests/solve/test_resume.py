@@ -1,4 +1,4 @@
-"""A run killed at a random moment and resumed equals the unbroken one, bit for bit."""
+"""A run that is killed at random times and resumed equals the uninterrupted run to the bit."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ from fvsolve.solve.solve import Run
 import_module("fvsolve.solve.solve").CHECKPOINT_SECONDS = 0.02
 print(fvsolve.run(sys.argv[1], out=sys.argv[2], resume=True).reason)
 """
-WORK = ("rhs", "ended", "seconds", "seconds_setup", "seconds_total", "cost")  # what it took, not what came out
+WORK = ("rhs", "ended", "seconds", "seconds_setup", "seconds_total", "cost")  # work of the run, not its results
 
 
 def long_run(**numerics) -> dict:
-    """A case whose stepping takes about a second."""
+    """Case with about a second of steps."""
     case = branched(fields=20)
     case["nodes"]["tower"] = {"type": "tank", "area": 2.0, "level": 5.0, "height": 30.0, "elevation": 10.0}
     case["links"]["riser"] = {
@@ -60,7 +60,7 @@ def same_files(one: Path, other: Path) -> None:
         if name.name == "summary.json":
             said, again = (json.loads((run / name).read_text()) for run in (one, other))
             assert {**said, **dict.fromkeys(WORK)} == {**again, **dict.fromkeys(WORK)}
-        elif name.name != "restart.npz":  # checkpoints are made by the clock
+        elif name.name != "restart.npz":  # times of checkpoints differ
             assert (one / name).read_bytes() == (other / name).read_bytes(), name
 
 
@@ -86,14 +86,14 @@ def test_killed_at_random_moments_and_resumed_is_the_unbroken_run(tmp_path, nume
         running.kill()
         running.communicate()
         before, reached = reached, checkpoint(broken)
-        assert running.returncode != 0 and before <= wanted < reached < whole.t[-1]  # in the midst of the run
+        assert running.returncode != 0 and before <= wanted < reached < whole.t[-1]  # within the run
     said = started(script, file, broken).communicate()
     assert said == ("finished\n", "")
     same_files(tmp_path / "whole", broken)
 
 
 def checkpoint(folder: Path) -> float:
-    """Time up to which a run could be resumed [s], 0 before the first checkpoint."""
+    """Time of the last checkpoint [s], 0 without a checkpoint."""
     if not (folder / "restart.npz").exists():
         return 0.0
     with np.load(folder / "restart.npz") as kept:
@@ -182,14 +182,14 @@ def test_a_history_that_lost_rows_is_refused_with_a_remedy(tmp_path):
 
 
 def test_what_was_seen_of_a_basin_before_is_known_after(tmp_path):
-    """The quickest pace and the shortest waves so far: what warns of them is made at the end."""
+    """A resumed run keeps the greatest rates and the shortest waves so far, from which notices are made at its end."""
     case = alone(basin((40.0, 20.0), (16, 8), 0.2, start={"level": "where(x < 20, 0.2, 0.1)"}), 6.0, step=0.05)
     case["numerics"].pop("courant", None)
     case["output"] |= {"fields": 12}
     model = fvsolve.build(fvsolve.load(case))
 
     def late(t, seconds, steps):
-        run.budget = 5.0  # steps until it is called again
+        run.budget = 5.0  # steps until the next call
         if t > 3.0:
             raise KeyboardInterrupt
 
@@ -202,7 +202,7 @@ def test_what_was_seen_of_a_basin_before_is_known_after(tmp_path):
 
 
 class Keeping(MemorySink):
-    """A sink of rows in memory that keeps checkpoints too."""
+    """Sink in memory that also keeps all checkpoints."""
 
     def __init__(self, model) -> None:
         super().__init__(model)

@@ -1,4 +1,4 @@
-"""Rows between steps change no step, and none lies beyond the printed extremes."""
+"""Rows between steps do not change the steps, and are inside the printed extremes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from reference.scenes import AMBIENT, SHARP, junction, lake, pipe, ramp, reservo
 import fvsolve
 
 EVERY = [10e-3, 3e-3, 1e-3, 0.7e-3]
-NO_ROWS = 50.0  # beyond the end of every scene here
+NO_ROWS = 50.0  # later than the end of every case [s]
 FRICTION = {"model": "quasi-steady", "factor": 0.02}
 FIXED = {
     "courant": {"courant": 0.9},
@@ -29,7 +29,7 @@ SETTINGS["given"] = {"method": "radau-iia-5", "courant": 20.0}
 
 
 def slam(numerics: dict) -> dict:
-    """A check valve slams in a main whose source fails; beside it a tank swings through a rigid column."""
+    """Case of a main with a check valve that slams after a pressure drop, and of a tank on a rigid column."""
     nodes = {
         "source": reservoir(step(0.2, 8e5, 3e5)), "in": junction(), "out": junction(), "gate": junction(),
         "lake": lake(45.0), "shaft": tank(0.02, 44.0),
@@ -48,7 +48,7 @@ def slam(numerics: dict) -> dict:
 
 
 def surging(numerics: dict) -> dict:
-    """Two pipes alone, which the leap takes; a valve shuts."""
+    """Case of two pipes and a closing valve, suitable for fused steps."""
     nodes = {"lake": lake(60.0), "fork": junction(ramp(0.3, 0.1, 0.0, 0.02)), "gate": junction(),
              "out": reservoir(AMBIENT)}  # fmt: skip
     links = {
@@ -67,7 +67,7 @@ def with_rows(case: dict, every: float):
 
 
 def excess(result) -> float:
-    """By how much the worst row leaves the printed extremes."""
+    """Greatest distance of a row outside the printed extremes."""
     found = [(result[p].max() - e.maximum, e.minimum - result[p].min()) for p, e in result.extremes.items()]
     return float(np.max(found))
 
@@ -77,8 +77,8 @@ def excess(result) -> float:
 def test_steps_do_not_hang_on_rows_and_no_row_lies_beyond_the_extremes(how, scene_name):
     case = SCENES[scene_name](SETTINGS[how])
     alone = with_rows(case, NO_ROWS)
-    assert alone.reason == "finished" and len(alone.t) <= 12  # start, jumps and the end alone
-    for every in EVERY[:2] if how == "given" else EVERY:  # each row within a step taken in parts costs many solutions
+    assert alone.reason == "finished" and len(alone.t) <= 12  # only start, jumps and end
+    for every in EVERY[:2] if how == "given" else EVERY:  # rows within divided steps are costly
         result = with_rows(case, every)
         for probe, extremes in result.extremes.items():
             assert result[probe][-1] == alone[probe][-1], (probe, every)
@@ -90,7 +90,10 @@ def test_steps_do_not_hang_on_rows_and_no_row_lies_beyond_the_extremes(how, scen
 
 
 def test_rows_between_steps_keep_their_order_at_peaks():
-    """A mass on a spring with a damper, x = e^(-z w t) (cos w' t + z w / w' sin w' t), by rk4 at a fixed step."""
+    """Rows of a damped oscillator by rk4 converge with order 4 to its closed form.
+
+    x = e^(-z w t) (cos w' t + z w / w' sin w' t)
+    """
     nodes = {"wall": {"type": "frame"}, "body": {"type": "mass", "mass": 4.0, "initial_position": 1.0}}
     links = {
         "spring": {"type": "spring", "from": "wall", "to": "body", "stiffness": 400.0, "free_length": 0.0},

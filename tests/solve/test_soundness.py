@@ -1,4 +1,4 @@
-"""A run that is wrong says so by itself: steps beyond limits, growth, ledgers; sound ones are left in peace."""
+"""Invalid runs report themselves: steps beyond limits, growth and ledgers; valid runs give no such notices."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def main_case(**numerics):
 
 
 def closing(cells: int = 40, beta: float = 2.2e9, **numerics) -> dict:
-    """A frictionless main whose valve shuts at once after a while."""
+    """Case of a frictionless main whose outflow stops at once at 0.5 s."""
     fluid = {"name": "user", "density": 1000.0, "bulk_modulus": beta, "viscosity": 1e-3, "vapor_pressure": 0.0}
     speed = math.sqrt(beta / 1000.0)
     nodes = {
@@ -99,7 +99,7 @@ def test_implicit_methods_and_error_control_have_no_limit():
 
 
 def test_slow_growth_that_no_run_of_this_length_shows_is_left_in_peace():
-    """upwind5 with ssp-rk2 grows at every step, by a few 1e-5 of the worst wave at Courant 0.3."""
+    """Slow growth within the length of a run gives no notice; upwind5 with ssp-rk2 grows by few 1e-5 per step."""
     assert advection_limit("upwind5", "ssp-rk2").limit == 0.0
     assert not step_limits(model_of(closing(scheme="upwind5", method="ssp-rk2", courant=0.1)))
     (one,) = step_limits(model_of(closing(scheme="upwind5", method="euler", courant=0.5)))
@@ -124,7 +124,7 @@ def test_water_at_a_step_beyond_its_limit_is_said_by_check_and_run(fvs):
 
 
 def test_water_that_gets_deeper_in_a_run_is_watched_at_fixed_steps():
-    """A step that holds for the start's depth is beyond the limit of the wave that comes in."""
+    """A step within the limit of the initial depth gives a notice when an incoming wave is deeper."""
     pool = {"type": "basin", "size": [10.0, 1.0], "cells": [40, 4], "level": 0.1, "patches": {"in": {"side": "west"}}}
     flow = {"time": [0.0, 1.0], "value": [0.0, 2.0], "kind": "linear"}
     nodes = {"pool": pool, "feed": {"type": "inflow", "flow": flow}}
@@ -140,7 +140,7 @@ def test_water_that_gets_deeper_in_a_run_is_watched_at_fixed_steps():
 
 @pytest.mark.parametrize("scheme, method", [("upwind", "euler"), ("upwind5", "rk4"), ("fromm", "ssp-rk3")])
 def test_limits_in_the_plane_are_those_along_a_line_where_all_goes_along_it(scheme, method):
-    """Phases are tried at 33 points, so that the limit of one between them is met to a few parts in 1e3."""
+    """Limits in the plane for waves along an axis equal those on a line, to a few 1e-3 for 33 sampled phases."""
     line = advection_limit(scheme, method).limit
     assert plane_limit(scheme, method, 1.0) == pytest.approx(line, rel=2e-3)
     assert plane_limit(scheme, method, 1.0, waves=False) == pytest.approx(line, rel=2e-3)
@@ -175,7 +175,7 @@ def test_a_liquid_in_the_plane_holds_below_its_predicted_limit_and_grows_beyond_
 
 
 def stepped(model, y, h, stages):
-    """One step of Euler or of the classical method, in numpy."""
+    """State after one step of Euler's method or of rk4, in NumPy."""
     k1 = model.rhs(0.0, y)
     if stages == 1:
         return y + h * k1
@@ -213,14 +213,14 @@ def test_rows_of_a_sweep_hold_the_warnings(tmp_path):
 
 
 def test_what_must_not_be_exceeded_follows_the_start_and_what_is_given():
-    """1 l/s of 1000 kg/m3: no wave below a million times 1 kg/s is growth, and none beyond it is anything else."""
+    """The growth check stops a run above its threshold, which is at least 1e6 kg/s for an initial flow of 1 kg/s."""
     watch = RunChecks(RunData(model_of(closing(scheme="upwind", method="euler", courant=1.0))))
     assert watch.largest == pytest.approx(np.full(watch.largest.size, watch.largest[0])) and watch.largest[0] >= 1e6
     assert not watch.check(0.0, 0.99 * watch.largest) and watch.check(0.0, 1.01 * watch.largest).startswith("stopped: ")
 
 
 def test_what_grows_without_pipes_is_stopped_too():
-    """Explicit steps beyond what a mass on a spring and a vessel before a rigid column hold."""
+    """Steps beyond the limit of a mass on a spring, or of a chamber at a rigid column, stop the run."""
     fixed = {"method": "rk4", "step": 0.03}
     body = {"type": "mass", "mass": 10.0, "initial_position": 0.01}
     spring = {"type": "spring", "from": "wall", "to": "load", "stiffness": 1e5}
@@ -237,7 +237,7 @@ def test_what_grows_without_pipes_is_stopped_too():
 
 
 def chattering(step: float) -> dict:
-    """A check valve before a wide tank, that 1500 swings a second of the pressure before it open and shut."""
+    """Case of a check valve before a wide tank, which 1500 pressure cycles per second open and shut."""
     swings = 1500
     pressure = {"time": [i / (2 * swings) for i in range(2 * swings + 1)], "value": [1.2e5, 3e5] * swings + [1.2e5]}
     nodes = {
@@ -249,7 +249,7 @@ def chattering(step: float) -> dict:
 
 
 def test_events_that_crowd_within_one_step_are_bounded_where_nothing_grows():
-    """A step of 1 s would be cut 3000 times: the run ends at the 2000th or so, by name; of 0.1 s it goes on."""
+    """A run with 3000 events in a step of 1 s stops with the name of the valve; steps of 0.1 s finish."""
     result = fvsolve.run(chattering(1.0))
     model = model_of(chattering(1.0))
     assert "check opens and shuts without end" in result.reason and not result.ok and not said(result, "growth")
@@ -275,7 +275,7 @@ def test_events_that_crowd_within_a_millionth_of_a_run_are_bounded_under_error_c
 @pytest.mark.parametrize("opens", [0.0, 2.0])
 @pytest.mark.parametrize("step", [0.05, 1.0])
 def test_a_store_that_fills_within_a_linearised_step_is_reported(step, opens):
-    """It creeps to where it would be at once: the first step after each kink is looked at."""
+    """A Rosenbrock step much longer than the filling time of a chamber gives a notice, also after an opening."""
     nodes = {"pump": reservoir(8e6), "pot": chamber(1e-4, 1e6)}
     opening = {"time": [0.0, opens], "value": [0.0, 1.0], "kind": "step"} if opens else 1.0
     case = scene(nodes, {"in": valve("pump", "pot", 1e-5, opening)}, opens + 200 * step,
@@ -288,7 +288,7 @@ def test_a_store_that_fills_within_a_linearised_step_is_reported(step, opens):
 
 @pytest.mark.parametrize("level, area", [(2.0, 1e-4), (11.0, 3e-4), (11.9, 1e-3), (12.08, 2e-4), (60.0, 3e-5)])
 def test_a_tank_that_fills_within_a_few_linearised_steps_is_reported(level, area):
-    """It stays up to 1.1 m beside the level of the lake, 12 m: wherever that is over 0.5 % of its range."""
+    """A tank whose level stays wrong by more than 0.5 % of its range, up to 1.1 m, gives a notice."""
     case = scene({"lake": lake(12.0), "pot": tank(area, level)}, {"in": valve("lake", "pot", 1e-3)}, 10.0,
                  {"method": "rodas-5p", "step": 0.05}, ["pot.level"])  # fmt: skip
     found = fvsolve.run(case)

@@ -1,4 +1,4 @@
-"""Threads that share out rows of basins give the bits of one: of states, ledgers, rows and frames, resumed too."""
+"""Threads that share the rows of basins give the bits of one thread: states, ledgers, rows, frames and resumed runs."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def carried(scheme="muscl", diffusivity=0.0):
 
 
 def lined(**numerics):
-    """Delay lines between a pool, a chamber and a demand that stops: jumps reach all of them within steps."""
+    """Case of delay lines between a basin, a chamber and a demand that stops, with jumps within steps."""
     case = water(
         PIPE | {"pipe_model": "delay-line", "to": "air"}, end=0.6, probes=["pool.near.head", "air.pressure"], **numerics
     )
@@ -84,14 +84,14 @@ def lined(**numerics):
 
 
 class Kept(MemorySink):
-    """What a run tells, and its state at the end."""
+    """Sink in memory that also keeps field frames."""
 
     def field(self, t, values):
         self.frames = [*getattr(self, "frames", []), values]
 
 
 def told(case, threads: int, state=None):
-    """(bits of state and memory, rows, summary) of a run."""
+    """Bytes of all results of a run, and its summary."""
     case = case | {"output": case["output"] | {"fields": 3}}
     model = fvsolve.build(fvsolve.load(case))
     sink, state = Kept(model), state or initial_state(model)
@@ -152,7 +152,7 @@ FORMED = ("muscl, ssp-rk2", "muscl, a limiter of its own, rk4", "upwind5, ssp-rk
 @pytest.mark.parametrize("name", FORMED)
 @pytest.mark.parametrize("cells", [1, 20, 10**6])
 def test_stages_formed_beside_rates_have_the_bits_of_those_formed_after_all(name, cells, monkeypatch):
-    """In blocks of a row, of two, and of all; by one thread and by three."""
+    """Blocked stages have the bits of whole stages, for several block sizes and numbers of threads."""
     bits, _ = told(SCENES[name], 1)
     here = importlib.import_module("fvsolve.solve.blocked_stages")
     monkeypatch.setattr(here, "LEAST_STATES", 0)
@@ -168,7 +168,7 @@ def test_as_many_threads_as_rows():
 
 
 def test_two_basins_and_one_that_each_steps_whole():
-    """Of meshes that are no rectangle all threads step all cells."""
+    """Several basins give equal bits, although each thread computes all cells of a mesh that is not a rectangle."""
     case = water()
     case["nodes"]["round"] = {"type": "basin", "size": [2.0, 2.0], "cells": [6, 6], "holes": [[0.0, 0.0, 1.0, 1.0]],
                               "level": 0.4, "patches": {"near": {"side": "east"}}}  # fmt: skip
@@ -180,11 +180,11 @@ def test_two_basins_and_one_that_each_steps_whole():
     found, summary = told(case, 3)
     assert found == bits
     (notice,) = [one for one in summary.warnings if one.kind == "threads"]
-    assert notice.text == "each thread computes the whole of round: its mesh is not a full rectangle"
+    assert notice.text == "each thread computes all rows of these basins: round: its mesh is not a full rectangle"
 
 
 def stepped(case, threads: int, spoil=lambda team: None) -> bytes:
-    """The state at the end, where something may have been spoilt."""
+    """Bytes of the final state; `spoil` may change the team of threads before the run."""
     model = fvsolve.build(fvsolve.load(case))
     loop = RunLoop(model, threads=threads)
     loop.now[:] = model.start
@@ -200,7 +200,7 @@ def stepped(case, threads: int, spoil=lambda team: None) -> bytes:
 
 @pytest.mark.parametrize("threads", [2, 3])
 def test_a_row_that_is_not_taken_from_a_neighbour_is_seen(threads):
-    """So that equal bits say something: every row that is taken matters."""
+    """A missing exchange of a row changes the state, so equal bits prove that all rows are exchanged."""
 
     def forget(team):
         team.members[1].written.joint[band_exchange.STATES] -= 1
@@ -212,7 +212,7 @@ def test_a_row_that_is_not_taken_from_a_neighbour_is_seen(threads):
 
 
 def test_bands_that_do_not_wait_for_each_other_are_seen():
-    """A race, planted: all wait for the first band alone, which so never waits."""
+    """A planted race, in which threads do not wait for each other, changes the state."""
 
     def race(team):
         for member in team.members:
@@ -251,9 +251,9 @@ def test_a_run_is_resumed_by_another_number_of_threads_to_the_same_bits(tmp_path
 
 
 def test_ctrl_c_while_threads_march_ends_a_run_cleanly(tmp_path):
-    """The signal comes while all are in compiled code, and is put off until they are back."""
+    """An interrupt signal during compiled code ends a run of two threads after their return."""
     case = water(basin={"cells": [80, 80]}, end=50.0)
-    fvsolve.run(water(basin={"cells": [80, 80]}, end=1e-3), threads=2)  # so that nothing has to be compiled
+    fvsolve.run(water(basin={"cells": [80, 80]}, end=1e-3), threads=2)  # compiles all functions
     timer = threading.Timer(1.5, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
     found = fvsolve.run(case, out=tmp_path / "run", threads=2)
@@ -292,7 +292,7 @@ def test_a_number_of_threads_that_is_none_is_named(threads):
 
 def test_more_threads_than_rows_are_named():
     with pytest.raises(
-        FvsolveError, match="pool has 12 rows, and each thread needs a row of cells. Expected 12 at most"
+        FvsolveError, match="pool has 12 rows, and each thread needs a row of cells. Expected at most 12"
     ):
         fvsolve.run(water(), threads=13)
 

@@ -1,4 +1,4 @@
-"""What the ends of a short pipe cost: a known factor on the step, with which no pipe and no network grows."""
+"""Factor on the step for ends of short pipes, with which no pipe and no network grows."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def amplification(method: str, z: np.ndarray) -> np.ndarray:
 
 
 def spectrum(scheme: str, cells: int, end: dict) -> np.ndarray:
-    """Eigenvalues of a pipe from a lake to an end, in travel times of a cell."""
+    """Eigenvalues of a pipe between a lake and an end, times the travel time of a cell [-]."""
     nodes, links = {"lake": lake(50.0), "end": end}, {}
     links["main"] = pipe("lake", "end", LENGTH, 0.3, SPEED, cells, friction=NO_FRICTION)
     numerics = {"scheme": scheme, "method": "rk4", "courant": 0.5}
@@ -34,7 +34,7 @@ def spectrum(scheme: str, cells: int, end: dict) -> np.ndarray:
 
 
 def stepping(scheme: str, cells: int, end: dict, courant: float):
-    """(h J of a pipe at a Courant number, its model)."""
+    """h J of a pipe at a Courant number, and its model."""
     nodes, links = {"lake": lake(50.0), "end": end}, {"main": pipe("lake", "end", LENGTH, 0.3, SPEED, cells)}
     numerics = {"scheme": scheme, "method": "ssp-rk3", "step": courant * LENGTH / cells / SPEED}
     model = fvsolve.build(fvsolve.load(scene(nodes, links, 10.0, numerics, ["lake.pressure"], 0.1)))
@@ -42,13 +42,13 @@ def stepping(scheme: str, cells: int, end: dict, courant: float):
 
 
 def powered(z: np.ndarray) -> float:
-    """The norm of a thousand steps of ssp-rk3."""
+    """Norm of the matrix of a thousand steps of ssp-rk3."""
     one = np.eye(len(z))
     return np.linalg.norm(np.linalg.matrix_power(one + z @ (one + z / 2.0 @ (one + z / 3.0)), 1000), 2)
 
 
 def courant_limit(scheme: str, cells: int, method: str) -> float:
-    """Least Courant number at which some mode of an open or shut pipe grows."""
+    """Greatest Courant number below that at which a mode of an open or closed pipe grows, in steps of 0.01."""
     found = np.concatenate([spectrum(scheme, cells, end) for end in (lake(50.0), junction())])
     tried = np.arange(0.01, 2.0, 0.01)
     grows = [c for c in tried if np.max(amplification(method, c * found)) > 1 + 1e-9]
@@ -66,7 +66,10 @@ def test_the_factor_is_what_the_ends_ask_for_and_no_more(scheme):
 
 @pytest.mark.parametrize("scheme", WEIGHTS)
 def test_a_short_pipe_decays_below_its_limit_and_grows_beyond_it_and_is_told_so(scheme):
-    """By powers of the step as the compiled rates have it, between a lake and what reflects: a lake, an inflow."""
+    """The limit of a short pipe between reflecting ends separates decay and growth of the powers of its step.
+
+    The ends are two lakes, or a lake and an inflow.
+    """
     for cells in range(1, 9):
         for end, returned in ((lake(50.0), 1.0), ({"type": "inflow", "flow": 0.0}, -1.0)):
             limit = pipe_limit(scheme, "ssp-rk3", cells, (returned,))
@@ -78,7 +81,7 @@ def test_a_short_pipe_decays_below_its_limit_and_grows_beyond_it_and_is_told_so(
 
 @pytest.mark.parametrize("limiter", ["minmod", "van-leer", "monotonized-central"])
 def test_a_limiter_bears_a_little_more_than_what_it_is_where_all_is_smooth(limiter):
-    """What `limits.step.LIMITED` says: below the estimate nothing grows, half as much again beyond it noise does."""
+    """With a limiter noise does not grow below the limit of `fromm`, and grows at 1.5 times this limit."""
     rng = np.random.default_rng(5)
     for cells in (2, 3, 4, 5, 8):
         limit = pipe_limit("fromm", "ssp-rk3", cells)
@@ -98,7 +101,7 @@ def test_a_limiter_bears_a_little_more_than_what_it_is_where_all_is_smooth(limit
 
 
 def test_a_short_pipe_whose_waves_do_not_come_back_is_but_doubtful():
-    """Four cells between two long pipes of its own kind, at Courant 0.55, which grows between two lakes."""
+    """Four cells at Courant number 0.55 grow between two lakes; between long pipes the notice does not fail the run."""
     found = []
     for far in (False, True):
         nodes = {"a": lake(50.0), "b": junction() if far else lake(50.0)}
@@ -117,7 +120,10 @@ def test_a_short_pipe_whose_waves_do_not_come_back_is_but_doubtful():
 @pytest.mark.parametrize("cells", [5, 12, 30, 39])
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_proved_limit_is_one_of_few_cells_too_grown_or_not(cells, turned):
-    """Twenty steps of upwind by euler at Courant 1.05, whose shortest wave is seven times what it was."""
+    """The proved limit 1 of upwind with Euler also holds for few cells, before growth is visible.
+
+    Twenty steps at Courant number 1.05 multiply the shortest wave by seven.
+    """
     found = []
     for courant in (1.0, 1.05):
         h = courant * LENGTH / cells / SPEED

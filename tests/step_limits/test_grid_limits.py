@@ -31,7 +31,7 @@ KNOWN = [
     ("upwind", "ssp-rk2", 1.0),
     ("upwind", "heun", RK3_REAL / 2),
     ("upwind", "rk4", 2.785293563405282 / 2),
-    ("upwind", "ssp-rk10-4", 6.0),  # its SSP radius: and no more
+    ("upwind", "ssp-rk10-4", 6.0),  # equals its SSP radius
     ("linear-upwind", "ssp-rk2", 0.5),
     ("linear-upwind", "rk4", 2.785293563405282 / 4),
     ("fromm", "ssp-rk2", 1.0),
@@ -49,13 +49,13 @@ def test_limits_that_are_known_in_closed_form(scheme, method, limit):
 
 @pytest.mark.parametrize("scheme, limit", [("upwind3", 1.626), ("upwind5", 1.435)])
 def test_limits_of_the_third_order_method_are_those_of_the_literature(scheme, limit):
-    """Wang and Spiteri 2007, Motamed, Macdonald and Ruuth 2011: 1.43 for WENO5's linear scheme with SSP-RK3."""
+    """Wang and Spiteri 2007; Motamed, Macdonald and Ruuth 2011: 1.43 for the linear scheme of WENO5 with SSP-RK3."""
     assert advection_limit(scheme, "ssp-rk3").limit == pytest.approx(limit, abs=1e-3)
 
 
 @pytest.mark.parametrize("method", EXPLICIT)
 def test_central_differences_are_limited_by_the_imaginary_interval(method):
-    """z = -i sin(theta): the limit is the interval, which another algorithm decides."""
+    """With z = -i sin(theta) the limit is the imaginary stability interval, computed by another algorithm."""
     found = advection_limit("central", method)
     assert found.limit == pytest.approx(analyse(method).imaginary_interval, rel=1e-11)
     if found.limit > 0:
@@ -87,7 +87,7 @@ def test_some_limits_are_set_by_the_longest_waves_and_no_short_run_shows_them():
     found = {(one.scheme, one.method): one for one in advection_limits(None, DISTINCT)}
     longest = {pair for pair, one in found.items() if one.wave == "longest"}
     assert longest == {("fromm", "ssp-rk2"), ("upwind3", "ssp-rk2")}
-    slow = found["upwind3", "ssp-rk2"]  # a percent beyond the limit
+    slow = found["upwind3", "ssp-rk2"]  # at 1 % above the limit
     assert slow.theta == 0.0 and 0 < slow.growth < 1e-5 and slow.steps > 1e6
     hidden = found["central", "verner-7"]  # at Courant number 1/2
     assert hidden.limit == 0.0 and 0 < hidden.growth < 1e-8 and hidden.steps > 1e9
@@ -95,7 +95,7 @@ def test_some_limits_are_set_by_the_longest_waves_and_no_short_run_shows_them():
 
 
 def phase(u: Fraction) -> tuple[Fraction, Fraction]:
-    """(cos, sin) of 2 arctan u."""
+    """Cosine and sine of 2 arctan(u), as fractions."""
     return (1 - u * u) / (1 + u * u), 2 * u / (1 + u * u)
 
 
@@ -104,7 +104,7 @@ def times(a, b):
 
 
 def stepped(weights, method, courant: Fraction, u: Fraction) -> Fraction:
-    """|y1|^2 after one explicit step of y' = nu z(theta) y from y = 1 by the tableau itself, all in fractions."""
+    """|y1|^2 after one step of y' = nu z(theta) y from y = 1 by the tableau of an explicit method, in fractions."""
     c, s = phase(u)
     power, terms = (Fraction(1), Fraction(0)), []
     for _ in range(2):
@@ -129,7 +129,7 @@ def stepped(weights, method, courant: Fraction, u: Fraction) -> Fraction:
 @pytest.mark.parametrize("scheme", WEIGHTS)
 def test_exact_steps_of_exact_waves_do_not_grow_below_the_limit_and_one_does_above(scheme, method):
     found, weights = advection_limit(scheme, method), weights_of(scheme)
-    slack = Fraction(1, 10**35) if found.digits else 0  # of published digits
+    slack = Fraction(1, 10**35) if found.digits else 0  # for rounded published digits
     near = Fraction(math.tan(min(found.theta, 3.1) / 2)).limit_denominator(4096)
     waves = {Fraction(k, 16) for k in range(1, 33)} | {Fraction(1, 2**k) for k in range(5, 22)}
     waves |= {near * Fraction(100 + k, 100) for k in range(-10, 11)} | {Fraction(k) for k in (3, 5, 10, 100, 10**4)}
@@ -154,11 +154,11 @@ def test_the_symbol_is_that_of_the_compiled_weights(scheme):
     assert symbol(weights_of(scheme), 1e-4) == pytest.approx(-1e-4j, abs=1e-8)  # consistent
 
 
-# ---- stability that comes back
+# ---- stability above a Courant number
 
 
 def test_downwind_differences_with_implicit_euler_are_stable_from_one_on():
-    """|1 - nu z|^2 - 1 = 2 nu (nu - 1)(1 - cos theta)."""
+    """|1 - nu z|^2 - 1 = 2 nu (nu - 1)(1 - cos theta), so implicit Euler is stable from nu = 1 on."""
     found = limit_of(down, "downwind", "implicit-euler")
     assert found.limit == 0.0 and found.stable == ((pytest.approx(1.0, rel=1e-11), math.inf),) and found.proved
 
@@ -170,12 +170,12 @@ def test_downwind_differences_grow_at_every_step_with_all_others(method):
 
 @pytest.fixture
 def less_implicit():
-    """The theta method with theta = 2/5: A-stable from 1/2 on."""
+    """Name of the theta method with theta = 2/5, which is not A-stable."""
     return tableau("theta-2-5", "0 | 0 0\n 1 | 3/5 2/5\n ---\n | 3/5 2/5").name
 
 
 def test_an_implicit_method_that_is_not_a_stable_has_a_limit(less_implicit):
-    """With upwind 1 / (1 - 2 theta); with central differences none, |R(iy)| > 1 for all y."""
+    """The limit with upwind is 1 / (1 - 2 theta); with central differences |R(iy)| > 1 for all y."""
     found = advection_limit("upwind", less_implicit)
     assert found.limit == pytest.approx(5.0, rel=1e-11) and found.proved
     assert advection_limit("central", less_implicit).stable == ()
@@ -209,7 +209,7 @@ def test_ranges_of_any_weights_are_those_that_sampling_shows(four, method):
     weights = (*four[:2], 1 - sum(four), *four[2:])
     found = limit_of(weights, "any", method)
     if not found.proved:
-        return  # and it says so
+        return  # the result states this
     edges = [x for pair in found.stable for x in pair]
     for low, high in found.stable:
         top = high if math.isfinite(high) else 10 * low + 10
@@ -221,7 +221,7 @@ def test_ranges_of_any_weights_are_those_that_sampling_shows(four, method):
             assert brute(weights, method, courant) > 0
 
 
-# ---- boxes
+# ---- signs of polynomials
 
 
 def test_a_square_that_touches_zero_at_a_corner_is_not_negative():
@@ -242,12 +242,12 @@ def test_a_point_that_is_found_is_negative_and_where_none_is_there_is_none(g, li
         assert np.polynomial.polynomial.polyval2d(x, y, np.array(g, float)).min() > -1e-9
 
 
-# ---- what is said
+# ---- output and pages
 
 
 @pytest.fixture
 def said(monkeypatch, capsys, tmp_path):
-    """Runs a command in an empty directory; gives exit code, standard output, standard error."""
+    """Function that runs a command in an empty directory and returns exit code, standard output and standard error."""
     monkeypatch.chdir(tmp_path)
 
     def run(*words: str) -> tuple[int, str, str]:
@@ -313,7 +313,7 @@ def test_a_scheme_without_fixed_weights_has_no_exact_limit():
 
 @pytest.mark.parametrize("courant", [0.1, 0.3, 1.7])
 def test_growth_is_quoted_where_it_is_asked_for(courant, said):
-    """|R(iy)|^2 of Euler's method with central differences is 1 + nu^2."""
+    """The growth at a given Courant number is stated; Euler with central differences has |R(iy)|^2 = 1 + nu^2."""
     one = advection_limit("central", "euler", courant)
     assert one.courant == courant and one.growth == pytest.approx(math.hypot(1, courant) - 1, rel=1e-12)
     assert one.steps == pytest.approx(math.log(1e3) / math.log(math.hypot(1, courant)), rel=1e-9)
@@ -321,12 +321,15 @@ def test_growth_is_quoted_where_it_is_asked_for(courant, said):
         still = advection_limit(scheme, method, courant)
         assert still.growth == 0.0 and still.steps is None
     _, out, _ = said("stability", "--scheme", "upwind5", "--method", "gauss-4", "--courant", str(courant))
-    assert f"at {courant:g} no wave grows" in out
+    assert f"at Courant number {courant:g} no wave grows" in out
 
 
 @pytest.mark.parametrize("courant", [0.5, 0.1, 0.01])
 def test_growth_below_rounding_is_seen(courant):
-    """SSP-RK2 with central differences: |R(iy)|^2 = 1 + y^4 / 4; Verner's method: + C y^8 + ..., y = nu sin(theta)."""
+    """Growth below the rounding error is computed, with y = nu sin(theta) for central differences.
+
+    SSP-RK2 has |R(iy)|^2 = 1 + y^4 / 4; verner-7 has 1 + C y^8 + ...
+    """
     growth, theta = growth_of(weights_of("central"), "ssp-rk2", courant)
     assert growth == pytest.approx(math.expm1(0.5 * math.log1p(courant**4 / 4)), rel=1e-7)
     assert theta == pytest.approx(math.pi / 2, abs=1e-3)
@@ -341,7 +344,7 @@ def test_growth_a_step_is_the_greatest_amplification():
 
 
 def test_the_page_shows_what_is_computed():
-    """Every row of the first table of docs/stability-grid.md, to the digits shown, and who sets it."""
+    """The first table of docs/stability-grid.md contains the computed limits, and the letters of their waves."""
     page = folders.page("stability-grid")
     rows = [
         line.strip("| ").split(" | ") for line in page.split("## Runs on")[0].splitlines() if line.startswith("| `")

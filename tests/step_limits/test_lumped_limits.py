@@ -1,6 +1,7 @@
-"""Fixed steps too long for what is no wave, implicit ones for all: foretold, seen in the run; right runs left alone.
+"""Notices of steps that are too long for parts other than waves, and of implicit steps that are too long for any part.
 
-Truth is the closed form of a swing, the exact end of a method's stability interval, or the scene under error control.
+Notices come before the run and after it, and valid runs have none. The references are the closed form of an oscillator,
+the exact end of a stability interval, or a run under error control.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ def said(notices, kind: str) -> list:
 
 
 def swinging(mass: float, stiffness: float, damping: float, end: float, **numerics) -> dict:
-    """A mass that is let go on a spring with a damper."""
+    """Case of a displaced mass on a spring with a damper."""
     nodes = {"wall": {"type": "frame"}, "load": {"type": "mass", "mass": mass, "initial_position": 0.01}}
     links = {
         "spring": {"type": "spring", "from": "wall", "to": "load", "stiffness": stiffness},
@@ -43,7 +44,10 @@ def swinging(mass: float, stiffness: float, damping: float, end: float, **numeri
 
 @pytest.mark.parametrize("method", ["euler", "ssp-rk3", "rk4", "dormand-prince"])
 def test_the_limit_of_a_damped_swing_is_that_of_its_eigenvalues(method):
-    """s = -60 +- 308.2i 1/s: |R(h s)| = 1 at the limit; 2 % below it swings decay, 6 % above they grow and are told."""
+    """The limit of a damped oscillator with s = -60 +- 308.2i 1/s is the step with |R(h s)| = 1.
+
+    At 2 % below the limit oscillations decay; at 6 % above they grow and give a notice.
+    """
     s, r = complex(-60.0, math.sqrt(1e5 - 60.0**2)), stability_function(method_named(method))
     tried = np.linspace(1e-6, 0.03, 3000)
     first = int(np.argmax(np.abs(r(tried * s)) > 1.0))
@@ -56,7 +60,7 @@ def test_the_limit_of_a_damped_swing_is_that_of_its_eigenvalues(method):
         t, w = result.t, s.imag
         right = 0.01 * np.exp(-60.0 * t) * (np.cos(w * t) + 60.0 / w * np.sin(w * t))
         wrong = np.mean(np.abs(result["load.position"] - right)) / 0.01
-        assert result.ok is bool(wrong < 0.05 and not grows)  # euler is wrong: at its limit hardly anything decays
+        assert result.ok is bool(wrong < 0.05 and not grows)  # Euler is wrong: nearly no decay at its limit
         assert grows or np.abs(result["load.position"]).max() == 0.01 and not said(result.warnings, "step-limit")
         if grows and result.reason == "finished":
             assert np.abs(result["load.position"]).max() > 100.0
@@ -66,7 +70,10 @@ def test_the_limit_of_a_damped_swing_is_that_of_its_eigenvalues(method):
 
 @pytest.mark.parametrize("given, rate", [({"decay": 400.0}, 400.0), ({"diffusivity": 1e4}, 4e4 / 100.0)])
 def test_what_a_pipe_carries_has_the_limit_of_the_real_axis(given, rate):
-    """rk4 holds to h s = -2.7853: 6.963 ms, where decay takes 400 1/s, and the shortest wave of 1e4 m2/s too."""
+    """The limit of rk4 for decay at 400 1/s is 2.7853 / 400 s = 6.963 ms.
+
+    The rate of the shortest wave under a diffusivity of 1e4 m2/s is equal.
+    """
     nodes = {"lake": lake(50.0, scalars={"dye": 1.0}), "gate": junction(0.01)}
     links, limit = {"main": pipe("lake", "gate", 100.0, 0.1, 1000.0, 10)}, 2.785293563 / rate
     for factor, grows in ((0.99, False), (1.06, True)):
@@ -81,7 +88,10 @@ def test_what_a_pipe_carries_has_the_limit_of_the_real_axis(given, rate):
 
 
 def capillary(courant: float, scheme: str) -> dict:
-    """Ten metres of 1 mm bore with an oil of 300 cSt: laminar friction brakes by 32 nu / D^2 = 9600 1/s."""
+    """Case of 10 m of pipe with 1 mm bore and viscous oil.
+
+    Its laminar friction has the rate 32 nu / D^2 = 9600 1/s.
+    """
     nodes = {"a": reservoir(step(0.01, 1e6, 2e6)), "b": reservoir(5e5)}
     rough = {"model": "quasi-steady", "roughness": 0.0}
     links = {"line": pipe("a", "b", 10.0, 1e-3, 1000.0, 10, friction=rough)}
@@ -93,7 +103,7 @@ def capillary(courant: float, scheme: str) -> dict:
 
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5"])
 def test_friction_that_brakes_quicker_than_waves_cross_a_cell_is_foretold(scheme):
-    """With waves of 1000 1/s at their limit of 1.39 rk4 bore Courant 0.9 without a word, and grew."""
+    """Friction with a rate above that of waves gives a notice with its own limit, within 10 % of growth in the run."""
     (one,) = step_limits(model_of(capillary(0.9, scheme)))
     assert not one.ok and one.key == "courant" and one.place == "line" and one.limit < 2.785293563 / 9600.0
     bears = 0.9 * one.limit / one.value
@@ -105,7 +115,7 @@ def test_friction_that_brakes_quicker_than_waves_cross_a_cell_is_foretold(scheme
 
 
 def test_friction_that_remembers_has_a_limit_of_its_own():
-    """Zielke's terms by a step of their own: met to 3 %."""
+    """Relaxation terms of unsteady friction have a limit of their own, between 3.9 and 4.1 ms."""
     nodes, links = {"a": reservoir(step(0.01, 1e6, 2e6)), "b": reservoir(5e5)}, {}
     links["line"] = pipe("a", "b", 100.0, 0.01, 1000.0, 10, friction={"model": "unsteady", "roughness": 0.0})
     fluid = {**WATER, "viscosity": 0.03, "vapor_pressure": 0.0}
@@ -121,7 +131,7 @@ def test_friction_that_remembers_has_a_limit_of_its_own():
 
 
 def test_what_spreads_in_a_basin_has_the_limit_of_its_shortest_wave():
-    """8 x 8 cells of 1/8 m between walls: 4 D cos^2(pi / 16) (64 + 64) 1/s under rk4."""
+    """Diffusion in 8 x 8 cells of 1/8 m between walls has the greatest rate 4 D cos^2(pi / 16) (64 + 64) 1/s."""
     spreads, limit = 0.01, 2.785293563 / (4 * 0.01 * 128 * math.cos(math.pi / 16) ** 2)
     dye = "exp(-100*((x-0.3)^2+(y-0.5)^2))"
     pool = {"type": "basin", "physics": "transport", "size": [1.0, 1.0], "cells": [8, 8], "scalars": {"dye": dye}}
@@ -139,14 +149,14 @@ def test_what_spreads_in_a_basin_has_the_limit_of_its_shortest_wave():
 
 
 def vessel(end: float, first=1.0, second=1.0, pressure=None, volume=0.01, **numerics) -> dict:
-    """A chamber between two orifices of 20 mm."""
+    """Case of a chamber between two orifices of 20 mm."""
     nodes = {"high": reservoir(5e5), "c": chamber(volume, pressure), "low": reservoir(2e5)}
     links = {"in": hole("high", "c", 0.02, first), "out": hole("c", "low", 0.02, second)}
     return scene(nodes, links, end, numerics, ["c.pressure"], end / 100)
 
 
 def beside_a_pipe(end: float, **numerics) -> dict:
-    """A litre behind an orifice at the end of a main."""
+    """Case of a chamber of 1 l behind an orifice at the end of a main."""
     nodes = {"lake": lake(50.0), "t": junction(), "c": chamber(0.001), "low": reservoir(2e5)}
     links = {
         "main": pipe("lake", "t", 300.0, 0.1, 1000.0, 20),
@@ -167,7 +177,10 @@ SWINGS = {
 @pytest.mark.parametrize("how", SWINGS)
 @pytest.mark.parametrize("method", ["euler", "rk4"])
 def test_a_vessel_that_swings_between_wrong_pressures_is_not_ok(how, method):
-    """Orifices bend what swings, so that it is as large as the step is long, and never grows: 3.5e8 Pa was ok."""
+    """A chamber that oscillates by more than 100 bar at a long step fails the run.
+
+    The square-root law of orifices bounds the amplitude, so the growth check does not stop the run.
+    """
     result = fvsolve.run(SWINGS[how](method=method, step=7.5e-3))
     assert result.reason == "finished" and np.ptp(result["c.pressure"]) > 1e7 and not result.ok
     assert [one.ok for one in said(result.warnings, "step-error")] == [False]
@@ -185,7 +198,7 @@ def test_at_a_step_that_holds_the_same_vessel_is_right_and_nothing_is_said(how):
 
 
 def draining(method: str, parts: float) -> tuple:
-    """(result of a tank that drains to its last drop, its mean error over its range): 3 (1 - t / end)^2 m are in it."""
+    """Result of a tank that drains along 3 (1 - t / end)^2 m, and its mean error over its range."""
     end = math.sqrt(3.0) * 2.0 / (0.61 * math.pi / 4 * 0.05**2 * math.sqrt(9.80665 / 2.0))
     nodes = {"tank": tank(2.0, 3.0), "below": reservoir(AMBIENT)}
     numerics = {"method": method, "step": end / parts}
@@ -195,7 +208,7 @@ def draining(method: str, parts: float) -> tuple:
 
 @pytest.mark.parametrize("parts, verdict", [(0.5, [False]), (2, [False]), (8, [True]), (60, [])])
 def test_implicit_steps_that_are_too_long_are_told_though_nothing_grows(parts, verdict):
-    """Steps of implicit-euler, twice as long as the run too: a quarter of the range was wrong, and ok."""
+    """Steps of implicit Euler that are too long for a draining tank give a notice and fail the run."""
     result, wrong = draining("implicit-euler", parts)
     assert result.reason == "finished" and [one.ok for one in said(result.warnings, "step-error")] == verdict
     assert result.ok is (False not in verdict) and (wrong > 0.1 or result.ok) and (wrong < 0.05 or not result.ok)
@@ -217,7 +230,7 @@ WASHED = [
 
 @pytest.mark.parametrize("method, courant, verdict", WASHED)
 def test_waves_that_implicit_steps_wash_out_are_told(method, courant, verdict):
-    """What a demand drew comes to rest at once: pressures there go to and fro by rho a u for ever, every 2 s."""
+    """A frictionless wave of amplitude rho a u that long implicit steps damp gives a notice."""
     nodes = {"lake": lake(100.0), "end": junction(step(0.1, 0.05, 0.0))}
     links = {"main": pipe("lake", "end", 1000.0, 0.3, 1000.0, 50)}
     numerics = {"scheme": "muscl", "method": method, "courant": courant}
@@ -232,7 +245,10 @@ def test_waves_that_implicit_steps_wash_out_are_told(method, courant, verdict):
 
 
 def test_waves_of_a_hundred_times_joukowskys_pressure_that_do_not_reach_what_counts_as_growth_are_told():
-    """Linearised, weno5 grows under rodas-4 until its weights bend it: 120 MPa for 0.7 were the end of it, and ok."""
+    """Spurious waves of 120 MPa by weno5 with rodas-4 give a notice, although they stay below the growth check.
+
+    The linearised scheme grows until its weights change.
+    """
     nodes = {"lake": lake(100.0), "end": junction(step(0.1, 0.05, 0.0))}
     links = {"main": pipe("lake", "end", 1000.0, 0.3, 1000.0, 50, friction={"model": "quasi-steady", "factor": 0.02})}
     numerics = {"scheme": "weno5", "method": "rodas-4", "step": 0.6}
@@ -248,7 +264,7 @@ def test_what_never_moves_is_ok_and_told_of_the_limit_all_the_same():
 
 
 def test_chatter_about_a_drop_of_zero_that_is_too_small_to_matter_is_left_in_peace():
-    """Two tanks come to a level in finite time: then steps of euler go to and fro by some 1e-7 m, without end."""
+    """Two levels that become equal in finite time and then alternate by 1e-7 m under Euler steps give no notice."""
     nodes = {"one": tank(1.0, 3.0), "two": tank(1.0, 2.0)}
     result = fvsolve.run(
         scene(nodes, {"way": hole("one", "two", 0.03)}, 4000.0, {"method": "euler", "step": 1.0}, ["one.level"], 40.0)
@@ -270,7 +286,7 @@ def test_two_bladders_and_a_column_are_told_by_check_that_euler_never_holds():
 
 
 def test_growth_that_a_run_is_too_short_to_show_is_no_growth():
-    """Euler steps multiply an undamped swing by 1 + (h w)^2 / 2 each, h w = 0.01: by 1.005 in a hundred of them."""
+    """An undamped oscillator grows by 1 + (h w)^2 / 2 per Euler step: a hundred steps at h w = 0.01 give no notice."""
     case = swinging(10.0, 1e5, 1e-9, 100 * 1e-4, method="euler", step=1e-4)
     assert not lumped_modes(model_of(case), "euler", 1e-4) and fvsolve.run(case).ok
     case["numerics"]["end"] = 1e6 * 1e-4
@@ -281,7 +297,7 @@ def test_growth_that_a_run_is_too_short_to_show_is_no_growth():
 @pytest.mark.parametrize("implicit", [False, True])
 @pytest.mark.parametrize("seeds", [range(0, 12), range(12, 24), range(24, 36)])
 def test_the_verdict_is_that_of_the_truth_in_scenes_at_random(seeds, implicit):
-    """Chains of chambers, and tanks: what errs by a hundredth of its range is ok, what errs by a tenth of it is not."""
+    """Random cases of chambers and tanks are ok if their error is below 0.01 of the range, and not ok above 0.1."""
     for seed in seeds:
         rng = np.random.default_rng(seed)
         case, spread = drawn(rng)
@@ -298,7 +314,7 @@ def test_the_verdict_is_that_of_the_truth_in_scenes_at_random(seeds, implicit):
 
 
 def drawn(rng) -> tuple[dict, dict[str, float]]:
-    """(a case at a step of about what it bears, the range of pressures or levels that drives each of its probes)."""
+    """Random case with a step near its limit, and the driving range of each probe [Pa] or [m]."""
     h, steps = float(np.exp(rng.uniform(np.log(1e-6), np.log(3e-3)))), 300
     late = {"start": 50 * h, "duration": 100 * h, "value": [1.0, 0.3]}
     numerics = {"method": str(rng.choice(["euler", "improved-euler", "ssp-rk3", "rk4"]))}

@@ -1,4 +1,4 @@
-"""Swings without damping under a Courant number: what is said of them, against what they do and its closed form."""
+"""Notices of undamped oscillations under a Courant number, against runs and closed forms."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from reference.scenes import scene
 
 import fvsolve
 
-MASS, STIFF, END = 2.0, 32.0, 200.0  # of a swing at 4 rad/s
+MASS, STIFF, END = 2.0, 32.0, 200.0  # mass [kg] and stiffness [N/m] of an oscillator with 4 rad/s; end [s]
 
 
 def beside_a_pond(nodes, links, probes, method="ssp-rk2", **numerics):
-    """What swings, and a basin at rest whose waves set the steps."""
+    """Case of oscillating parts and a basin at rest, whose waves determine the step."""
     pond = {"type": "basin", "size": [4.0, 1.0], "cells": [16, 1], "level": 1.0}
     more = numerics or {"courant": 0.8}
     return scene({**nodes, "pond": pond}, links, END, {"scheme": "muscl", "method": method, **more}, probes, 0.1)
@@ -30,18 +30,18 @@ def sprung(damping=0.0, **more):
 
 
 def grown(result) -> float:
-    """Amplitude at the end over that of the start."""
+    """Amplitude at the end over that at the start."""
     return math.hypot(result["m.velocity"][-1], math.sqrt(STIFF / MASS) * result["m.position"][-1]) / 0.1
 
 
 def told(case):
-    """(notices of swings, result)"""
+    """Notices of oscillations, and result of the run."""
     result = fvsolve.run(case)
     return [one for one in result.warnings if one.kind == "swing"], result
 
 
 def test_a_swing_that_ssp_rk2_feeds_is_told_with_by_how_much_it_grows():
-    """sqrt(1 + (w h)^4 / 4) a step."""
+    """A notice states the growth of an oscillator under ssp-rk2, sqrt(1 + (w h)^4 / 4) per step."""
     (one,), result = told(sprung())
     h = END / result.summary["steps"]
     wanted = (1.0 + (math.sqrt(STIFF / MASS) * h) ** 4 / 4.0) ** (0.5 * END / h)

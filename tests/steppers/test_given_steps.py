@@ -1,4 +1,4 @@
-"""A step whose length is given is solved at that length: no rounding cuts it, nor does the order of the parts."""
+"""Implicit given steps are solved at their full length, independent of rounding and of the order of the parts."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ STEADY, ROUGH = {"model": "steady", "factor": 0.02}, {"model": "quasi-steady", "
 
 
 def closing(**numerics) -> dict:
-    """Two cells before a valve that closes to a third: Newton's increments end where rounding does, near 2e-13."""
+    """Case of two cells before a closing valve, where Newton increments end at the rounding error, about 2e-13."""
     main = pipe("high", "n0", 50.0, 0.2638, 800.0, 2, friction=STEADY, minor_loss=1.5)
     out = valve("n0", "low", 0.00446885, ramp(0.5245, 0.09345, 0.352, 0.2))
     nodes = {
@@ -30,9 +30,9 @@ def closing(**numerics) -> dict:
 
 
 def fork(**numerics) -> dict:
-    """A valve beside a rigid column, a leak, a tank by two ways: a wave of one cell turns the Jacobian nearly singular.
+    """Case of a valve, a rigid column, a leak and a tank with two pipes, with a nearly singular Jacobian.
 
-    From the last step's end the increments of Newton run into that; along a growing step the stage is plain.
+    Newton iterations from the end of the last step fail; along a growing step the stage is found.
     """
     nodes = {
         "high": lake(34.6, elevation=0.0), "low": reservoir(262.4e3, elevation=0.0), "n0": junction(elevation=3.888),
@@ -53,7 +53,7 @@ def fork(**numerics) -> dict:
 
 
 def to_and_fro(**numerics) -> dict:
-    """A main before two valves and beside a relief valve: solved in turn, its stages swing for ever under weno5."""
+    """Case of a main before two valves and a relief valve, where stages solved in turn oscillate under weno5."""
     nodes = {"high": lake(53.26, elevation=0.0), "low": reservoir(215.7e3, elevation=0.0),
              "n0": junction(elevation=0.05578)}  # fmt: skip
     relief = {"type": "relief-valve", "from": "high", "to": "n0", "area": 0.0005761, "set_pressure": 392.6e3,
@@ -68,7 +68,7 @@ def to_and_fro(**numerics) -> dict:
 
 
 def slowly(**numerics) -> dict:
-    """Three pipes under a step of four cells: solved in turn, the stages gain no more than a fifth by each turn."""
+    """Case of three pipes under long steps, where stages that are solved in turn gain at most a fifth per turn."""
     nodes = {
         "high": lake(48.17, elevation=0.0), "low": reservoir(150e3, elevation=0.0), "n0": junction(elevation=4.0),
         "n1": junction(0.002195, elevation=-0.4073),
@@ -125,12 +125,16 @@ def test_parts_listed_the_other_way_round_take_the_same_steps(at):
 
 @njit
 def flares(t, y):
-    """Grows as its square for 0.3 s, then fades."""
+    """Rates y' = y^2 until 0.31 s, then y' = -y."""
     return y * y if t < 0.31 else -y
 
 
 def test_a_step_without_a_solution_is_taken_in_parts_that_end_on_its_grid():
-    """z = y + h z^2 has none for 4 h y > 1: 0.3 s from 1 have none, 0.075 s and 0.225 s behind them have."""
+    """A step without a solution is divided into parts that end at the end of the step.
+
+    z = y + h z^2 has no real solution for 4 h y > 1. From y = 1 a step of 0.3 s has none, and steps of 0.075 s and
+    0.225 s have solutions.
+    """
     counts: dict = {}
     found = integrate(flares, [1.0], [0.0, 0.3, 0.6, 1.2], "implicit-euler", step=0.3, counts=counts)
 

@@ -1,4 +1,4 @@
-"""Factors, solutions and differences are those of the matrix they come from, whatever the kind of structure."""
+"""Factors, solutions and difference quotients of Jacobians for every kind of linear algebra."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ KINDS = ("dense", "banded", "sparse")
 
 
 def pattern_of(n: int, m: int = 0, density: float = 0.2, seed: int = 0) -> np.ndarray:
-    """A random pattern with a diagonal."""
+    """Random pattern with a full diagonal."""
     found = np.random.default_rng(seed).random((n + m, n)) < density
     found[np.arange(n), np.arange(n)] = True
     return found
 
 
 def values_on(structure: Structure, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """(values by columns, the same as a dense matrix of n + m rows)."""
+    """Random values by columns, and the dense matrix of n + m rows with these values."""
     values = np.random.default_rng(seed).normal(size=structure.nnz)
     pattern = structure.pattern
     return values, csc_array((values, pattern.indices, pattern.indptr), shape=pattern.shape).toarray()
 
 
 def solved(structure: Structure, values: np.ndarray, shift, b: np.ndarray) -> np.ndarray:
-    """(shift I - J)^-1 b by the compiled functions."""
+    """Solution (shift I - J)^-1 b by the compiled functions."""
     number = complex if isinstance(shift, complex) else float
     factor, solve = structure.functions(number is complex)
     store, x = np.full(structure.store_size, np.nan, dtype=number), b.astype(number)
@@ -51,7 +51,7 @@ def test_what_is_solved_is_the_shifted_matrix(kind, n, m, shift):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_two_by_two_is_solved_by_the_inverse_of_the_course(kind):
-    """(a b; c d)^-1 = (d -b; -c a) / (a d - b c), of section 2."""
+    """(a b; c d)^-1 = (d -b; -c a) / (a d - b c), section 2 of the course."""
     structure = Structure(np.ones((2, 2), dtype=bool), kind)
     j, right = np.array([[1.0, 2.0], [-3.0, 4.0]]), np.array([1.0, -2.0])
     (a, b), (c, d) = 7.0 * np.eye(2) - j
@@ -70,7 +70,7 @@ def test_rows_are_exchanged_where_a_pivot_is_zero(kind):
 
 @pytest.mark.parametrize("width", [1, 2, 5])
 def test_rows_are_exchanged_all_along_a_band(width):
-    """Random entries with nothing on the diagonal: without pivoting there is no factor."""
+    """A band with a zero diagonal is solved, which needs exchanges of rows."""
     n, rng = 60, np.random.default_rng(width)
     distance = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
     shuffled = rng.permutation(n)
@@ -89,17 +89,17 @@ def test_sparse_refuses_what_needs_an_exchange_of_rows():
     assert factor(structure.shape, np.array([1.0, 0, 0, 0, 1, 0, 0, 0, 1]), 1.0, np.zeros(structure.store_size)) > 0
 
 
-# a pipe of two waves: each cell on its neighbours and, by friction, on its other wave
+# pattern of the two waves of a pipe: each cell depends on its neighbours and, by friction, on its opposite wave
 
 
 def pipe_pattern(cells: int, reach: int) -> np.ndarray:
-    """Of both waves of a pipe, forward ones first, both closed by the other at the ends."""
+    """Pattern of a pipe, forward waves first; each wave depends on `reach` neighbours of both waves."""
     distance = np.abs(np.subtract.outer(np.arange(cells), np.arange(cells)))
     return np.kron(np.ones((2, 2), dtype=bool), distance <= reach)
 
 
 def pipe_values(structure: Structure, seed: int = 0) -> np.ndarray:
-    """Slopes that damp: random ones, and on the diagonal less than minus the sum of the others of a row."""
+    """Random slopes with a diagonal equal to minus the sum of the absolute values of its row."""
     pattern, rng = structure.pattern, np.random.default_rng(seed)
     values = rng.normal(size=structure.nnz)
     columns = np.repeat(np.arange(structure.n), np.diff(pattern.indptr))
@@ -134,10 +134,10 @@ def test_sparse_pairs_every_state_once():
 
 
 def test_sparse_factors_of_a_line_stay_inside_its_band():
-    """Two waves, one neighbour each side: by blocks of two a tridiagonal matrix, whose factors have no fill."""
+    """The sparse factors of two waves with one neighbour per side, a block tridiagonal matrix, have no fill-in."""
     cells = 200
     structure = Structure(pipe_pattern(cells, 1), "sparse")
-    assert structure.store_size == 4 * (2 * (cells - 1) + 2 * cells)  # L and U, inverses and the working row
+    assert structure.store_size == 4 * (2 * (cells - 1) + 2 * cells)  # L and U, inverses, work row
 
 
 def test_the_kind_is_chosen_by_size_and_crowding():
@@ -172,7 +172,7 @@ def test_a_singular_matrix_is_reported(kind):
     assert factor(structure.shape, np.array([1.0, 2.0, 4.0, 3.0]), 5.0, store) == 0
     whole = Structure.full(3)
     rank_one = np.ones(9)
-    assert whole.functions()[0](whole.shape, rank_one, 3.0, np.zeros(whole.store_size)) > 0  # shift is its eigenvalue
+    assert whole.functions()[0](whole.shape, rank_one, 3.0, np.zeros(whole.store_size)) > 0  # shift is an eigenvalue
 
 
 def test_a_kind_that_does_not_exist_is_refused():
@@ -202,7 +202,7 @@ def test_a_band_needs_no_more_colors_than_its_width():
 
 @pytest.mark.parametrize("n, m, density", [(1, 0, 1.0), (7, 2, 0.3), (40, 4, 0.1)])
 def test_differences_meet_the_slopes(n, m, density):
-    """f = sin of a linear map, and the ledger likewise: the slope is known."""
+    """Difference quotients of the sine of a linear map, and of its ledger, equal the exact slopes."""
     structure = Structure(pattern_of(n, m, density))
     _, a = values_on(structure)
     where = 2

@@ -1,4 +1,4 @@
-"""`integrate`: what it accepts, and what it refuses. What its steps do is in steppers/test_stepped_methods.py."""
+"""Arguments that `integrate` accepts and refuses; the steps are tested in steppers/test_stepped_methods.py."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ def test_a_function_that_numba_refuses_gives_the_same_steps():
 
 @pytest.mark.parametrize("python", [False, True])
 def test_a_constant_with_a_default_is_no_row_to_fill(python):
-    """f(t, y, rate=2): two arguments and a constant, not f(t, y, dydt)."""
+    """f(t, y, rate=2) has two arguments and a constant, unlike f(t, y, dydt)."""
 
     def decay(t, y, rate=2.0):
-        return np.array([-rate * one for one in (y.tolist() if python else y)])  # `tolist` numba refuses
+        return np.array([-rate * one for one in (y.tolist() if python else y)])  # numba has no `tolist`
 
     end = integrate(decay, [1.0], [0.0, 1.0], "rk4", step=0.01)[-1, 0]
     assert end == pytest.approx(math.exp(-2.0), abs=1e-8)

@@ -1,4 +1,4 @@
-"""What Newton does is counted, solves the stages it is asked to, and says where and in what it fails."""
+"""Newton's method: counts of its work, solved stages, and errors with time and state of a failure."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ TIMES = [0.0, 0.25, 1.0, 1.7]
 
 
 class Counted:
-    """A function that is called as Python, and counts."""
+    """Function that numba cannot compile and that counts its calls."""
 
     def __init__(self, f) -> None:
         self.f, self.calls = f, 0
@@ -44,7 +44,7 @@ COUNTED = Counted(lambda t, y: SLOPES @ y)
 def test_the_count_of_rates_is_the_number_of_calls(name, settings):
     before, counts = COUNTED.calls, {}
     integrate(COUNTED, [1.0, 1.0, 1.0], TIMES, name, counts=counts, **settings)
-    tried_out = 1  # before the first step, uncounted
+    tried_out = 1  # call before the first step, not counted
     assert counts["rhs"] == COUNTED.calls - before - tried_out > counts["steps"] > 0
 
 
@@ -55,7 +55,10 @@ def linear(t, y):
 
 @pytest.mark.parametrize("name", IMPLICIT)
 def test_a_linear_problem_needs_one_jacobian_for_all_fixed_steps(name):
-    """And factors for two lengths, the last step's being rounded apart; Rosenbrock methods renew both every step."""
+    """Fixed steps of a linear problem need one Jacobian, and factors for two lengths, because the last step is rounded.
+
+    Rosenbrock methods need a Jacobian and factors in every step.
+    """
     counts: dict = {}
     integrate(linear, [1.0, 1.0, 1.0], [0.0, 2.05], name, step=0.1, counts=counts)
     iterated = METHODS[name].kind != "linear"
@@ -79,13 +82,13 @@ def test_an_explicit_method_does_none_of_it(name):
 
 @njit
 def lands(t, y):
-    """The second falls freely, then is caught: what Newton learned of the one stretch is nothing in the other."""
+    """Rates of a state that falls freely and is then caught, so that the Jacobian changes."""
     return np.array([-y[0], -1.0 + 1e3 * max(0.5 - y[1], 0.0) ** 2])
 
 
 @pytest.mark.parametrize("h", [0.1, 0.03, 0.01])
 def test_no_step_is_taken_on_what_newton_did_in_the_last_one(h):
-    """Where each output is one step, implicit Euler's own equation y+ = y + h f(y+) holds to its accuracy."""
+    """Each step solves y+ = y + h f(y+) of implicit Euler, if each output is one step."""
     t, counts = h * np.arange(int(1.2 / h) + 1), {}
     y = integrate(lands, [1.0, 1.0], t, "implicit-euler", step=h, counts=counts)
     assert y[-1, 1] == pytest.approx(0.5 - math.sqrt(1e-3), abs=1e-5)
@@ -96,7 +99,7 @@ def test_no_step_is_taken_on_what_newton_did_in_the_last_one(h):
 
 @njit
 def jumps(t, y):
-    """The second falls slowly, below a half a hundred times as quickly."""
+    """Rates of a state that falls a hundred times faster below 0.5."""
     return np.array([-y[0], -1.0 if y[1] > 0.5 else -100.0])
 
 
@@ -119,7 +122,7 @@ def test_a_fixed_step_passes_it_within_one_step(name):
 
 @njit
 def ends(t, y):
-    """No rates at all where the second is below a half, which it is at 0.5 s."""
+    """Rates that are NaN if the second state is below 0.5, from t = 0.5 on."""
     return np.array([-y[0], -1.0 if y[1] > 0.5 else math.nan, 1.0])
 
 
@@ -150,7 +153,7 @@ def test_what_f_raises_reaches_the_caller_from_within_newton_too():
 
 
 def sucked_dry(**numerics) -> dict:
-    """A closed litre of water out of which ten litres a second are drawn: under `log` nothing is left at 0.1 s."""
+    """Case of 1 l of water under the law `log` with an outflow of 10 l/s, which is empty at 0.1 s."""
     nodes = {"pot": chamber(1e-3, 5e6), "drain": {"type": "inflow", "flow": -0.01}}
     fluid = {**WATER, "law": "log"}
     return scene(nodes, {"neck": valve("pot", "drain", 1e-3)}, 0.2, numerics, ["pot.pressure"], 0.005, fluid=fluid)
@@ -178,7 +181,7 @@ def test_a_summary_counts_what_newton_did():
     said = fvsolve.run(case).summary
     assert said["methods"] == [{"time": 0.0, "method": "radau-iia-5", "why": "given by numerics.method"}]
     assert said["steps"] > 0 and said["jacobians"] > 0 and said["newton"] >= said["steps"]
-    assert said["factorisations"] >= 2 * said["jacobians"]  # a real and a complex one
+    assert said["factorisations"] >= 2 * said["jacobians"]  # real and complex factors
     assert said["rhs"] >= said["steps"] + 3 * said["newton"] + said["jacobians"]
     explicit = fvsolve.run({**case, "numerics": {"end": 0.05, "method": "dormand-prince"}}).summary
     assert [explicit[what] for what in ("jacobians", "factorisations", "newton", "newton_failures")] == [0, 0, 0, 0]
@@ -186,19 +189,19 @@ def test_a_summary_counts_what_newton_did():
 
 @pytest.mark.parametrize("name", ["radau-iia-5", "esdirk-4"])
 def test_what_is_remembered_twice_has_no_factors_either(name):
-    """A resumed run may be stored again before it has taken a step."""
+    """A resumed state that is stored again before a step gives the same steps as the original state."""
     model = fvsolve.build(fvsolve.load(CASES / "cylinder-servo.toml", set={"numerics.method": name}))
     loop = RunLoop(model)
     loop.begin(0.01, 1e308)
     assert loop.run(30) == loop_indices.BUDGET_SPENT
     memory, states = flat(loop), []
-    for _ in range(2):  # stored and taken back
+    for _ in range(2):  # stored and restored
         again = RunLoop(model)
         again.stepper.restore(memory)
         memory = flat(again)
     assert (
         again.stepper.work[loop_indices.SHIFT] == -loop.stepper.work[loop_indices.SHIFT] < 0.0
-    )  # the sign of factors to be made
+    )  # negative shift: factors are missing
     again.now[:], again.armed[:] = loop.now, loop.armed
     for one in (loop, again):
         one.resume(0.01, 1e308)

@@ -1,4 +1,4 @@
-"""One step is what (14), (23) and (8) say: against formulas written out, SciPy's Newton and exact Taylor series."""
+"""One step against equations (14), (23) and (8) of the course, by formulas, SciPy's solver and exact Taylor series."""
 
 from __future__ import annotations
 
@@ -42,12 +42,15 @@ def test_an_implicit_step_is_23(name):
 
     k = root(remainder, np.tile(f(0.5, START), m.stages), tol=1e-14).x.reshape(m.stages, 2)
     found = integrate(f, START, [0.5, 0.5 + H], name, step=H)[-1]
-    assert found == pytest.approx(START + H * (m.b @ k), abs=1e-9)  # as near as its Newton goes
+    assert found == pytest.approx(START + H * (m.b @ k), abs=1e-9)  # tolerance of Newton's method
 
 
 @pytest.mark.parametrize("name", [name for name in EXPLICIT if not METHODS[name].digits and METHODS[name].order < 5])
 def test_a_step_has_the_terms_of_8_up_to_its_order_and_not_the_next(name):
-    """Of y' = y^2 + t y + 1, whose derivatives along the solution are polynomials: exact in powers of h."""
+    """A step has the Taylor terms (8) of y' = y^2 + t y + 1 up to its order, and a different next term.
+
+    The derivatives are polynomials, so powers of h are exact.
+    """
     m = method_named(name)
     p, y0, t0 = m.order, Fraction(2, 3), Fraction(1, 2)
     k = []
@@ -61,7 +64,7 @@ def test_a_step_has_the_terms_of_8_up_to_its_order_and_not_the_next(name):
 
 
 def exact(y0: Fraction, t0: Fraction, terms: int) -> list:
-    """The Taylor series of the solution in h: (n + 1) y_n+1 = the n-th power of y^2 + t y + 1."""
+    """Coefficients of the Taylor series of the solution in h, by (n + 1) y_n+1 = coefficient n of y^2 + t y + 1."""
     y = [y0]
     for n in range(terms):
         right = padded(plus(times(y, y), times([t0, 1], y), [1]), n + 1)
@@ -95,7 +98,7 @@ def weighed(weights, k: list) -> list:
 
 
 def test_a_modulus_of_one_is_enough_for_13_only_where_eigenvectors_are_whole():
-    """|R| = 1 at both eigenvalues -2 of J; of the second one there is no eigenvector, and steps of 1 grow by 1 each."""
+    """With |R| = 1 steps of a defective Jacobian grow linearly, and those of a diagonal Jacobian do not."""
 
     def apart(t, y):
         return np.array([-2.0 * y[0], -2.0 * y[1]])
@@ -109,7 +112,7 @@ def test_a_modulus_of_one_is_enough_for_13_only_where_eigenvectors_are_whole():
 
 
 def test_implicit_euler_is_stable_outside_the_circle_about_one_27():
-    """Of h lambda: so of lambda the circle has radius 1 / h about 1 / h."""
+    """Implicit Euler is stable outside the circle |h lambda - 1| = 1 and unstable inside."""
     r = analyse("implicit-euler").stability_function
     s = np.add.outer(np.linspace(-4, 4, 81), 1j * np.linspace(-4, 4, 81))
     off = np.abs(s - 1.0)

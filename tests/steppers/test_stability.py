@@ -1,4 +1,4 @@
-"""A-, L- and I-stability, stability intervals and SSP radii: decided, and as known in closed form."""
+"""A-, L- and I-stability, stability intervals and SSP radii against closed forms and published values."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ SSP = {  # Kraaijevanger 1991, Ketcheson 2008, Ferracina and Spijker 2008
 
 
 def user(text: str, **more) -> Method:
-    """A tableau that nobody else gets to know."""
+    """Method that is not registered, with a tableau given as text."""
     return Method("user", "test", text, **more)
 
 
@@ -91,7 +91,7 @@ def test_imaginary_intervals_in_closed_form(name):
 
 @pytest.mark.parametrize("name", [name for name in NAMES if METHODS[name].explicit])
 def test_intervals_end_where_the_modulus_crosses_one(name):
-    """Roots of |R|^2 - 1 by numpy, which knows nothing of Sturm."""
+    """Stability intervals end at a root of |R|^2 - 1, found by NumPy instead of Sturm sequences."""
     found = analyse(name)
     up = np.array([float(x) for x in found.stability_function.numerator.coefficients])[::-1]
     for direction, end in ((-1.0, found.real_interval), (1j, found.imaginary_interval)):
@@ -154,13 +154,13 @@ def test_the_sdirk_of_order_three_is_a_stable_for_one_sign_of_the_root_alone():
 
 
 def test_common_factors_do_not_count():
-    """A stage that nothing uses leaves R of the implicit midpoint, though it is solved with the wrong sign."""
+    """An unused stage with a pole on the left does not change the stability of the implicit midpoint method."""
     found = analyse(user("1/2 | 1/2 0\n-1 | 0 -1\n-\n| 1 0"))
     assert found.pade == (1, 1) and found.a_stable and found.ssp_radius == 2.0
 
 
 def test_a_pole_on_the_left_is_no_a_stability_even_where_the_imaginary_axis_is_stable():
-    """R(s) = (1 + s) (1 - s/2) / ((1 - s) (1 + s/2)) has modulus 1 on the imaginary axis, and a pole at -2."""
+    """R(s) = (1 + s) (1 - s/2) / ((1 - s) (1 + s/2)) has modulus 1 on the imaginary axis and a pole at -2."""
     found = analyse(user("1 | 1 0\n-1/2 | 0 -1/2\n-\n| 2/3 1/3"))
     assert found.i_stable and math.isinf(found.imaginary_interval)
     assert not found.a_stable and found.real_interval < 2.0
@@ -175,7 +175,7 @@ def test_a_rounded_tableau_is_decided_as_its_source_means_it():
 
 
 def in_decimals(name: str, digits: int) -> Method:
-    """The method as a user types it who has it in decimals."""
+    """Method with a tableau in decimals of `digits` digits."""
     m = METHODS[name]
     rows = [(c, *row) for c, row in zip(m.exact.c, m.exact.a, strict=True)]
     said = [[f"{float(x):.{digits}g}" for x in row] for row in (*rows, m.exact.b)]
@@ -215,8 +215,8 @@ def test_decisions_agree_with_samples_for_any_two_stage_method(a, b):
         above = float(np.nanmax(np.abs(r(1j * y)))) - 1.0
     if above > 1e-9:
         assert not found.i_stable and not found.a_stable
-    elif above < -1e-9 or found.i_stable:
-        assert above <= 1e-9
+    elif above < -1e-9:
+        assert found.i_stable
     poles = np.roots([float(x) for x in r.denominator.coefficients][::-1])
     if np.any(poles.real < -1e-9):
         assert not found.a_stable

@@ -1,4 +1,4 @@
-"""R(s) of every method: all forms of it agree, it is the Pade entry of the books, and errors follow from it."""
+"""Stability functions R(s) of all methods: agreement of all forms, Pade entries of the books, and errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is known of a method is what its compiled steps do: R(h lambda), orders, aliasing; for every method there is."""
+"""Compiled steps of every method against its stability function, its order and the predicted aliasing."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ ADAPTIVE = [name for name in NAMES if METHODS[name].adaptive]
 
 RANDOM = np.random.default_rng(59)
 RADIUS, TURN = 2.5 * np.sqrt(RANDOM.random(200)), 2.0 * np.pi * RANDOM.random(200)
-# In the left half plane, where no R has a pole; on a grid, so that differences of f along y have no rounding.
+# Left half plane, without poles of R; on a grid, so that difference quotients of f are exact.
 LAMBDA = -np.ceil(np.abs(64 * RADIUS * np.cos(TURN))) / 64 + 1j * np.round(64 * RADIUS * np.sin(TURN)) / 64
 GROWTH, TURNING = LAMBDA.real.copy(), LAMBDA.imag.copy()
 
 
 @njit
 def test_system(t, y):
-    """y' = lambda y for 200 lambda at once, real parts first."""
+    """Rates of y' = lambda y for 200 values of lambda, real parts first."""
     x, z = y[:200], y[200:]
     return np.concatenate((GROWTH * x - TURNING * z, TURNING * x + GROWTH * z))
 
@@ -32,7 +32,7 @@ test_system.__test__ = False
 
 @njit
 def pendulum(t, y):
-    """A nonlinear, non-autonomous system whose trees all count."""
+    """Rates of a driven pendulum: nonlinear and non-autonomous, so that all order conditions contribute."""
     return np.array([y[1], -np.sin(y[0]) + 0.3 * np.cos(t)])
 
 
@@ -49,7 +49,7 @@ def test_one_step_of_the_test_system_is_the_stability_function(name):
     assert end[:200] + 1j * end[200:] == pytest.approx(wanted, rel=1e-13, abs=1e-13)
 
 
-# Steps over four seconds, small enough for the leading term to rule and large enough for round-off not to.
+# Numbers of steps over four seconds, for which the leading error term dominates higher terms and rounding.
 STEPS = {1: (160, 320), 2: (40, 80), 3: (40, 80), 4: (40, 80), 5: (48, 96), 6: (16, 32), 7: (24, 40), 9: (8, 12)}
 
 
@@ -63,7 +63,7 @@ def test_fixed_steps_show_the_order(name, truth):
 
 @pytest.mark.parametrize("name", ADAPTIVE)
 def test_error_control_keeps_near_its_tolerance(name, truth):
-    """The error of a step is rtol, which h^(q+1) goes with; that of all steps goes with h^q."""
+    """The error of a step, of order h^(q+1), is rtol, so the total error is of order rtol^(q / (q + 1))."""
     q = METHODS[name].control_order - 1
     for rtol in (1e-4, 1e-8):
         error = np.linalg.norm(integrate(pendulum, [1.0, 0.2], [0.0, 4.0], name, rtol=rtol)[-1] - truth)
@@ -73,7 +73,7 @@ def test_error_control_keeps_near_its_tolerance(name, truth):
 @pytest.mark.parametrize("name", ["rk4", "ssp-rk3", "implicit-midpoint", "trapezoid", "gauss-4", "lobatto-iiia-6"])
 @pytest.mark.parametrize("fast", [1.5, 40.0, 1000.0])
 def test_a_fast_oscillation_is_seen_at_the_predicted_frequency(name, fast):
-    """omega h from a rate that is resolved to one far beyond the Nyquist frequency pi / h."""
+    """A numerical oscillation has the predicted frequency for all omega h, also beyond the Nyquist frequency pi / h."""
     h, n = 0.1, 60
     omega = min(fast, 0.9 * analyse(name).imaginary_interval) / h
 

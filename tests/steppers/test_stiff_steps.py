@@ -1,4 +1,4 @@
-"""What theory says of stiff problems is what the compiled steps do: damping, ringing, order reduction, dense output."""
+"""Compiled steps of stiff problems against theory: damping, ringing, order reduction and dense output."""
 
 from __future__ import annotations
 
@@ -22,47 +22,47 @@ RINGING = [name for name in IMPLICIT if not analyse(name).l_stable]
 ADAPTIVE = [name for name in IMPLICIT if METHODS[name].adaptive]
 
 FAST = 1e6  # [1/s]
-STEPS = 0.1 * np.arange(6)  # a hundred thousand times as long as the transient lasts
+STEPS = 0.1 * np.arange(6)  # times of steps, each 1e5 times longer than the transient [s]
 
 
 @njit
 def relaxes(t, y):
-    """y' = lambda (y - cos t) - sin t, lambda = -1e6: whatever it starts from, it soon is cos t."""
+    """Rates y' = lambda (y - cos t) - sin t with lambda = -1e6, whose solutions tend to cos t."""
     return np.array([-1e6 * (y[0] - math.cos(t)) - math.sin(t)])
 
 
 @njit
 def prothero_robinson(t, y):
-    """y' = lambda (y - sin t) + cos t, lambda = -1e6, on its slow solution sin t."""
+    """Rates y' = lambda (y - sin t) + cos t with lambda = -1e6 and the slow solution sin t."""
     return np.array([-1e6 * (y[0] - math.sin(t)) + math.cos(t)])
 
 
 @njit
 def mild(t, y):
-    """The same with lambda = -1."""
+    """Rates y' = lambda (y - sin t) + cos t with lambda = -1."""
     return np.array([-1.0 * (y[0] - math.sin(t)) + math.cos(t)])
 
 
 @njit
 def pendulum(t, y):
-    """A nonlinear, non-autonomous system whose trees all count."""
+    """Rates of a driven pendulum: nonlinear and non-autonomous, so that all order conditions contribute."""
     return np.array([y[1], -np.sin(y[0]) + 0.3 * np.cos(t)])
 
 
 def departures(name: str) -> np.ndarray:
-    """y - cos t after each of five long steps that begin 1 away."""
+    """Deviation y - cos t at the start, where it is 1, and after each of five long steps."""
     return integrate(relaxes, [2.0], STEPS, name, step=0.1)[:, 0] - np.cos(STEPS)
 
 
 @pytest.mark.parametrize("name", L_STABLE)
 def test_an_l_stable_method_kills_a_fast_transient_in_one_long_step(name):
-    """What is left is the error of following cos t: up to h^2 / 6 where stages of order 1 are no end of the step."""
+    """After one long step of an L-stable method only the error of the slow solution remains, at most about h^2 / 6."""
     assert np.max(np.abs(departures(name)[1:])) < (2e-4 if METHODS[name].stiffly_accurate else 2e-3)
 
 
 @pytest.mark.parametrize("name", RINGING)
 def test_an_a_stable_method_that_is_not_l_stable_rings_on(name):
-    """It neither grows nor dies as the truth does: R(-1e5)^n, of modulus near 1 for all but Crouzeix's methods."""
+    """The transient of a method that is not L-stable is R(-1e5)^n, of modulus near 1 except for Crouzeix's methods."""
     r = analyse(name).stability_function(-FAST * 0.1).real
     found = departures(name)
     assert abs(r) > (0.6 if name.startswith("crouzeix") else 0.999)
@@ -81,14 +81,15 @@ def test_an_explicit_method_blows_up(name):
         assert np.all(np.abs(found[1:]) > 1e4 * np.abs(found[:-1]))
 
 
-# Orders that Rosenbrock methods keep: Rodas meets no condition of Scholz, Rodas5P all of them (Steinebach 2023).
+# Orders of Rosenbrock methods: Rodas satisfies no condition of Scholz, Rodas5P all conditions (Steinebach 2023).
 ROSENBROCK = {"rodas-4": 1, "rodas-5p": 3}
 
 
 def stiff_order(name: str) -> int:
-    """Order in h at fixed, infinite lambda h, of stage order q (Prothero and Robinson 1974; H. and W. 1996, IV.15).
+    """Order in h in the limit of infinite lambda h (Prothero and Robinson 1974; Hairer and Wanner 1996, IV.15).
 
-    A step errs by h^(q+1), by h^q / lambda where the last stage is its end; where R is 1 at infinity, errors add up.
+    With stage order q the error of a step is of order h^(q+1), or h^q / lambda for stiffly accurate methods. If R is 1
+    at infinity, the errors of all steps add up.
     """
     method, far = METHODS[name], analyse(name).stability_function(-1e12).real
     if name in ROSENBROCK:
@@ -97,7 +98,7 @@ def stiff_order(name: str) -> int:
 
 
 def errors(name: str, f, counts: tuple[int, int]) -> list[float]:
-    """Greatest error at times of six seconds that steps of both numbers meet, the first few left out."""
+    """Greatest errors for both numbers of steps at common times within six seconds, without the first three times."""
     t = np.linspace(0.0, 6.0, min(counts[0], 12) + 1)
     return [np.max(np.abs(integrate(f, [0.0], t, name, step=6.0 / n)[3:, 0] - np.sin(t[3:]))) for n in counts]
 
@@ -125,7 +126,7 @@ def test_the_page_says_what_its_example_prints(capsys):
 
 
 def test_the_last_stage_as_the_end_of_the_step_is_worth_a_factor_of_lambda():
-    """Radau IA and Radau IIA have the same R; at one step length their errors are apart by lambda and more."""
+    """Radau IIA is stiffly accurate, and its error is smaller by lambda or more than that of Radau IA with equal R."""
     assert analyse("radau-ia-5").stability_function == analyse("radau-iia-5").stability_function
     first, second = (errors(name, prothero_robinson, (48, 96))[0] for name in ("radau-ia-5", "radau-iia-5"))
     assert first > FAST * second
@@ -140,14 +141,14 @@ def truth() -> np.ndarray:
 
 
 def order_between(name) -> int:
-    """Power of the step in the error of rows between steps: of a cubic, of a polynomial, of one bent at its start."""
+    """Power of the step in the error of rows between steps, from the degree of the dense output."""
     dense = coefficients(METHODS[name])[1]
     return (dense.shape[1] if dense.size else 3) + (start_slope_correction(METHODS[name]).size > 0) + 1
 
 
 @pytest.mark.parametrize("name", IMPLICIT)
 def test_between_given_steps_the_error_has_the_order_of_the_method(name, truth):
-    """By its polynomial, else by steps of their own."""
+    """Output between given steps has the order of the method, by dense output or by separate steps."""
     coarse, fine = (
         np.max(np.abs(integrate(pendulum, [1.0, 0.2], BETWEEN, name, step=4.0 / n) - truth)) for n in (40, 80)
     )
@@ -158,7 +159,7 @@ def test_between_given_steps_the_error_has_the_order_of_the_method(name, truth):
     "name, settings", [*((name, {"step": 0.1}) for name in IMPLICIT), *((name, {"rtol": 1e-6}) for name in ADAPTIVE)]
 )
 def test_asking_for_more_times_does_not_move_the_end(name, settings):
-    """To the bit; to the tolerance where steps by error control are shortened onto the times."""
+    """More output times change the end by no bit, or within the tolerance if error control shortens steps to them."""
     many, one = (integrate(pendulum, [1.0, 0.2], t, name, **settings)[-1] for t in (BETWEEN, [0.0, 4.0]))
     if "rtol" in settings and METHODS[name].order > order_between(name):
         assert many == pytest.approx(one, abs=1e-5)

@@ -1,4 +1,4 @@
-"""Every bound of every place of a limit has its own error: one that is sure says nothing of another."""
+"""Each bound and each place of a limit has its own error: a certain bound does not hide an uncertain bound."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from fvsolve.studies import scenarios
 from fvsolve.studies.peak_error import peak_errors
 from fvsolve.studies.sizing import size
 
-SURE = 49.5  # m, below the head that the whole scene starts from: its margin is the least, and does not depend on cells
-NEAR = 166.3  # m, above what the cells of the short pipe show of a peak, by less than they err
+SURE = 49.5  # [m], below the head at the start everywhere: its margin is the least, and does not depend on cells
+NEAR = 166.3  # [m], above the peak that the cells of the short pipe show, by less than its error
 
 
 def short_pipe(on: object = "gate", **bounds: float) -> dict:
-    """A quick closure behind a short pipe: its cells miss most of the peak."""
+    """Case of a quick closure behind a short pipe, whose cells miss most of the peak."""
     nodes = {"lake": lake(50.0), "j": junction(elevation=0.0), "gate": junction(elevation=0.0),
              "out": reservoir(101325.0, elevation=0.0)}  # fmt: skip
     links = {"main": pipe("lake", "j", 1000.0, 0.3, 1000.0, 100), "short": pipe("j", "gate", 25.0, 0.15, 1000.0, 2),
@@ -30,7 +30,7 @@ def short_pipe(on: object = "gate", **bounds: float) -> dict:
 
 
 def judged(case: dict) -> dict:
-    """The verdict with errors."""
+    """First verdict of a run with estimated errors."""
     return peak_errors(fvsolve.run(case), fvsolve.load(case))["verdicts"][0]
 
 
@@ -46,7 +46,7 @@ def test_a_sure_bound_that_is_nearer_hides_none_that_is_open() -> None:
 
 
 def with_still_water(case: dict, many: int = 1) -> dict:
-    """The case with dead ends at the lake, so deep that their pressure head is nearer to the limit than the peak."""
+    """Case with dead ends at the lake, so deep that their pressure head is nearer to the limit than the peak."""
     for k in range(many):
         case["nodes"][f"deep{k}"] = junction(elevation=-115.9)
         case["links"][f"still{k}"] = pipe("lake", f"deep{k}", 200.0, 0.3, 1000.0, 20)
@@ -68,7 +68,7 @@ def test_a_limit_passed_fails_whatever_another_place_may_do() -> None:
 
 
 def test_a_run_read_back_is_judged_as_one_in_memory(tmp_path) -> None:
-    """Its directory keeps ten places of a limit; the eleventh may be the one in doubt."""
+    """The run directory keeps ten places of a limit; here only an eleventh place is open."""
     case = with_still_water(short_pipe(), 12)
     fvsolve.run(case, out=tmp_path / "run", pictures=False)
     back = fvsolve.open_run(tmp_path / "run")
@@ -110,7 +110,7 @@ def test_a_study_says_why_errors_are_not_known_and_what_helps(fvs, tmp_path, mon
 
 
 def test_a_size_holds_its_limits_by_more_than_their_errors() -> None:
-    """A slow closure: the greatest head is that of the steady start, and a quick one is in doubt before it fails."""
+    """With errors, the least closing time is longer: quick closures are open before they fail."""
     case = short_pipe(maximum=NEAR, minimum=SURE)
     case["nodes"]["lake"]["head"] = 50.0
     span = "links.tap.opening.duration", "0.02 s", "0.3 s"
@@ -124,7 +124,7 @@ def test_a_size_holds_its_limits_by_more_than_their_errors() -> None:
 
 
 def test_a_place_without_a_known_error_is_open(monkeypatch) -> None:
-    """The run of twice the resolution stops early: nothing bounds the error."""
+    """The run at twice the resolution stops early, so the error is unknown."""
     from fvsolve.studies import peak_error
 
     case, real = short_pipe(minimum=SURE), peak_error.run
@@ -142,7 +142,7 @@ def test_a_place_without_a_known_error_is_open(monkeypatch) -> None:
 
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 def test_a_band_of_each_part_is_that_of_its_own_cells(factor: float) -> None:
-    """Of two like pipes the bands go by their own peaks, in the order of the limit."""
+    """The error of each gate is about the error of its own peak, for valves of different area."""
     nodes = {"lake": lake(100.0), "air": reservoir(101325.0), "gate1": junction(), "gate2": junction()}
     links = {}
     for k, share in ((1, 1.0), (2, factor)):

@@ -1,4 +1,4 @@
-"""What was planted in noisy data made by another method is found again, and what data cannot tell is said by name."""
+"""Calibration finds known values from noisy data of another method, and names keys that the data do not determine."""
 
 import json
 
@@ -17,7 +17,7 @@ FRICTION = {"model": "steady", "factor": 0.02}
 
 
 def line(leak: float, speed: float, cells: int, numerics: dict) -> dict:
-    """A main with a leak on its way, whose valve shuts quickly: the leak answers after twice the way to it."""
+    """Case of a main with a leak and a valve that shuts quickly; the leak reflects the wave."""
     nodes = {"lake": reservoir(4e6), "hole": junction(), "gate": junction(), "out": reservoir(101325.0)}
     first = max(1, round(cells * leak / LENGTH))
     links = {
@@ -34,7 +34,7 @@ MODEL = {"scheme": "upwind5", "method": "rk4", "courant": 0.9}
 
 @pytest.fixture
 def measured(tmp_path, monkeypatch):
-    """Where series lie that were measured: by another scheme on four times the cells, with noise of two thousandths."""
+    """Folder with a measured series: another scheme on four times the cells, with noise of 0.002 of the range."""
     monkeypatch.chdir(tmp_path)
     fine = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5}
     result = fvsolve.run(line(LEAK, SPEED, 4 * CELLS, fine))
@@ -56,11 +56,11 @@ def test_a_wave_speed_is_found_within_a_thousandth_from_noisy_data(measured):
     assert found.doubts == []
     off = [abs(value - own) for value, own in zip(found.values.values(), true, strict=True)]
     assert all(one < 4.0 * sigma for one, sigma in zip(off, found.sigma.values(), strict=True))
-    assert 0.0018 * 3e6 < found.rms["gate.pressure"] < 0.01 * 3e6  # the noise, and fronts on few cells
+    assert 0.0018 * 3e6 < found.rms["gate.pressure"] < 0.01 * 3e6  # noise, and error of fronts on few cells
 
 
 def test_a_planted_leak_is_found_within_a_cell_from_noisy_data(measured):
-    """Both lengths beside it are free, and its size."""
+    """Free keys are the size of the leak and the lengths of the pipes beside it."""
     case = compared(line(300.0, SPEED, 40, MODEL))
     free = {
         "links.up.length": [100.0, 500.0],
@@ -76,7 +76,7 @@ def test_a_planted_leak_is_found_within_a_cell_from_noisy_data(measured):
 
 
 def test_what_cannot_be_told_apart_and_what_changes_nothing_is_named(measured):
-    """Area and coefficient of a valve are but a product; the end of the run has no say in what was before."""
+    """Only the product of area and coefficient of a valve matters; the end of the run changes no earlier value."""
     case = compared(line(LEAK, SPEED, CELLS, MODEL))
     free = {"links.valve.area": [0.0006, 0.001], "links.valve.discharge_coefficient": [0.5, 0.8],
             "numerics.end": [4.0, 4.1]}  # fmt: skip
@@ -112,5 +112,5 @@ def test_what_cannot_be_fitted_is_named(measured):
         calibrate(compared(case), {})
     with pytest.raises(FvsolveError, match="LOW below HIGH"):
         calibrate(compared(case), {"links.valve.area": [0.001, 0.0006]})
-    with pytest.raises(FvsolveError, match="no run of the sample finished: .*halve it"):
+    with pytest.raises(FvsolveError, match="no run of the sample finished: .*halve the step"):
         calibrate(compared(case), {"links.valve.area": [0.0006, 0.001]}, {"numerics.courant": 5.0})

@@ -1,4 +1,4 @@
-"""Series of different noise are weighed each by its own scatter, so that sigma is that of the noise."""
+"""Each series is weighted by its own scatter, so that sigma of a key follows from the noise of its series."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from reference.scenes import GRAVITY, lake, scene, tank, valve
 from fvsolve.studies import calibrate
 
 FLOW_AREA, HEAD, LEVEL = {"a": 0.010, "b": 0.007}, 10.0, 1.0  # [m2], [m]
-TIMES = np.arange(1.0, 61.0)  # of rows, between which a run is taken for linear
+TIMES = np.arange(1.0, 61.0)  # [s], times of rows, between which a run is taken as linear
 DRAWS = 2
 
 
@@ -19,7 +19,7 @@ def level(flow_area: float, t: np.ndarray) -> np.ndarray:
 
 
 def filling(names: str) -> dict:
-    """Two tanks beside a lake, each by an orifice of its own, the series in the order of `names`."""
+    """Case of a lake and two tanks, each behind its own orifice, with series in the order of `names`."""
     nodes = {"lake": lake(HEAD, elevation=0.0)} | {name: tank(1.0, LEVEL, elevation=0.0) for name in FLOW_AREA}
     links = {f"to-{name}": valve("lake", name, 0.61) for name in FLOW_AREA}
     compare = {f"{name}.level": {"file": f"{name}.csv"} for name in names}
@@ -27,7 +27,7 @@ def filling(names: str) -> dict:
 
 
 def sigma_of(name: str, noise: float) -> float:
-    """Standard deviation of one key from independent noise: noise / |dh / dkey|."""
+    """Standard deviation of a key from independent noise: noise / |dh / dkey|."""
     slope = (level(FLOW_AREA[name] * 1.0001, TIMES) - level(FLOW_AREA[name], TIMES)) / (1e-4 * FLOW_AREA[name])
     return noise / float(np.linalg.norm(slope))
 
@@ -49,13 +49,13 @@ def test_sigma_of_each_key_is_that_of_its_own_series(noise, names, tmp_path, mon
         sigma = np.array([one.sigma[key] for one in found])
         assert np.mean(sigma) == pytest.approx(sigma_of(name, own), rel=0.15), (
             name
-        )  # 60 points, 4 draws: 5 % of scatter
+        )  # 60 points and 2 draws: about 6 % of scatter
         z = [(one.values[key] - true) / one.sigma[key] for one in found]
         assert np.all(np.abs(z) < 3.5), name
 
 
 def test_a_series_that_fits_to_its_digits_leaves_the_other_its_say(tmp_path, monkeypatch) -> None:
-    """No noise in one: its scatter is no more than its digits, and the other key keeps a sigma of its own."""
+    """A series without noise has only the scatter of its digits, and the key of the noisy series keeps its sigma."""
     monkeypatch.chdir(tmp_path)
     rng, case = np.random.default_rng(6), filling("ab")
     for link in case["links"].values():

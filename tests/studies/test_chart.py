@@ -1,4 +1,4 @@
-"""Charts of accuracy against speed: their errors against closed forms, their floor, what fails, what is pasted."""
+"""Charts of accuracy against speed: errors against closed forms, floors, failed runs, and lines for the case file."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ START, DURATION, END = 0.05, 0.4, 1.3
 
 
 def pot(end=30.0, **numerics) -> dict:
-    """A chamber that fills through an orifice; its drop is a parabola in time."""
+    """Case of a chamber that fills through an orifice; its drop is a parabola in time."""
     nodes = {"pump": reservoir(SUPPLY), "pot": chamber(VOLUME, P0)}
     return scene(nodes, {"hole": valve("pump", "pot", HOLE)}, end, numerics, ["pot.pressure", "hole.flow"], end / 200)
 
@@ -56,7 +56,7 @@ def pot_pressure(t):
 
 
 def line(opening=None, cells=40, end=END, **numerics) -> dict:
-    """Reservoir, pipe without friction, closing valve; the opening is a smooth polynomial unless given."""
+    """Case of a reservoir, a frictionless pipe and a closing valve, whose opening is a smooth polynomial by default."""
     nodes = {"lake": reservoir(PRESSURE), "gate": junction(), "out": reservoir(AMBIENT)}
     opening = smooth_ramp(START, DURATION, 1.0, 0.0) if opening is None else opening
     links = {"main": pipe("lake", "gate", LENGTH, DIAMETER, SPEED, cells), "tap": valve("gate", "out", OPEN, opening)}
@@ -71,7 +71,7 @@ def line_rays(opening=lambda t: 1.0 - smooth_step(t, START, DURATION)) -> rays.R
 
 
 def exact_rows(t) -> np.ndarray:
-    """Pressure at the gate, flow through the valve, pressure half way, at times t."""
+    """Exact pressure at the gate, flow through the valve and pressure half way at times t."""
     truth = line_rays()
     gate = np.array([truth.pressure("gate", x) for x in t])
     opening = np.array([1.0 - smooth_step(x, START, DURATION) for x in t])
@@ -80,7 +80,7 @@ def exact_rows(t) -> np.ndarray:
 
 
 def mean_error(values, exact, t) -> float:
-    """The worst column's mean over time of |difference|, over its range."""
+    """Greatest mean over time of |difference| of a column, relative to its range."""
     off = np.abs(values - exact) / np.ptp(exact, axis=0)
     return float(np.trapezoid(off, t, axis=0).max() / (t[-1] - t[0]))
 
@@ -97,7 +97,7 @@ def test_errors_of_a_filling_chamber_are_those_against_its_parabola():
         flow = HOLE * np.sqrt(2 * np.maximum(SUPPLY - p, 0) / RHO)
         values = np.column_stack([run["pot.pressure"], run["hole.flow"]])
         own = mean_error(values, np.column_stack([p, flow]), run.t)
-        laminar = 1e-5  # what rounds off the root near no drop, which the closed form has not
+        laminar = 1e-5  # effect of the laminar law near zero drop, which the closed form lacks
         assert point.trajectory == pytest.approx(own, abs=laminar + 2 * found.floor["trajectory"])
         last = max(
             abs(run["pot.pressure"][-1] - p[-1]) / np.ptp(p), abs(run["hole.flow"][-1] - flow[-1]) / np.ptp(flow)
@@ -109,7 +109,7 @@ def test_errors_of_a_filling_chamber_are_those_against_its_parabola():
 
 @pytest.fixture(scope="module")
 def closing():
-    """The chart of a smooth closure, which later tests read."""
+    """Chart of a smooth closure for several tests."""
     return chart(line(), schemes=["upwind", "upwind5"], methods=["rk4"], cells=[10, 20, 40])
 
 
@@ -125,7 +125,7 @@ def test_errors_of_a_closing_valve_are_those_against_exact_rays(closing):
 
 
 def test_the_error_at_the_end_is_that_of_the_fields_too(closing):
-    """Gauss points of the exact field in every cell; pressures over the range that the pipe's pressure has had."""
+    """Exact cell averages by Gauss points; pressure errors relative to the range of pressure in the pipe over time."""
     point = next(p for p in closing.points if p.setting.name == "upwind rk4" and p.setting.cells == 20)
     ended = outcome(line(), point.setting.keys)
     frame = ended.model.fields(ended.y, ended.model.evaluate(END, ended.y)[1])["main"]
@@ -152,7 +152,7 @@ def test_the_error_at_the_end_is_that_of_the_fields_too(closing):
 
 
 def told(rows, *probes) -> Outcome:
-    """A run that ended with these rows."""
+    """Outcome of a finished run with these rows."""
     return Outcome("finished", ok=True, rows=rows, probes=probes, model=study_model(pot()))
 
 
@@ -186,7 +186,7 @@ def test_a_run_that_stopped_early_has_no_error():
 
 @pytest.mark.parametrize("fine, coarse", [(40, 10), (47, 10), (64, 48)])
 def test_averages_over_fewer_cells_are_those_of_the_field(fine, coarse):
-    """Cell averages of cos, exact on both grids; between edges a spline reads their sums."""
+    """Cell averages of a cosine, exact on both grids; a spline interpolates their sums between edges."""
 
     def cells(n):
         edges = np.linspace(0.0, 1.0, n + 1)
@@ -221,11 +221,11 @@ def test_halvings_tell_the_error_of_a_reference(order):
     runs = [told(np.column_stack([t, t * (1 + 0.1 * 2.0 ** (-order * k))]), "a") for k in range(3)]
     exact = reference_of_run(told(np.column_stack([t, t]), "a"))
     own = reference_of_refinements("", runs).uncertainty.trajectory
-    assert own == pytest.approx(1.5 * distance(runs[2], exact).trajectory, rel=0.05)  # half as much again, to be sure
+    assert own == pytest.approx(1.5 * distance(runs[2], exact).trajectory, rel=0.05)  # safety factor 1.5
 
 
 def test_the_floor_of_a_sudden_closure_covers_the_true_error_of_its_reference():
-    """Where fields jump, fifth-order references converge slowly and alike: rays know by how much they are off."""
+    """At jumps, fifth-order references converge slowly and agree; rays give their true error."""
     jump = 0.0837
     case = line(step(jump, 1.0, 0.0))
     found = chart(case, schemes=["muscl"], methods=["ssp-rk3"], cells=[20, 40])
@@ -242,7 +242,7 @@ def test_the_floor_of_a_sudden_closure_covers_the_true_error_of_its_reference():
 
 @pytest.mark.parametrize("shape", ["smooth", "kinked"])
 def test_an_exact_solution_judges_where_the_case_names_one(shape):
-    """The same errors come out against finer runs, as far as the floor of those allows."""
+    """Errors against rays and against finer runs agree within the floor of the finer runs."""
     opening = {"smooth": None, "kinked": {"time": [0.1, 0.3], "value": [1.0, 0.0]}}[shape]
     given = {"schemes": ["upwind5"], "methods": ["rk4"], "cells": [10, 20]}
     runs = chart(line(opening), **given)
@@ -261,8 +261,7 @@ def test_a_chart_whose_references_are_no_better_than_its_runs_is_refused():
 
 
 def test_no_overshoot_is_claimed_that_the_references_cannot_tell(tmp_path):
-    """Upwind at Courant 1 carries a slow closure exactly through equal cells: it leaves the range of the blurred
-    reference, not that of the rays."""
+    """Upwind at Courant 1 is exact in equal cells: it leaves the range of the smeared reference, not that of rays."""
     nodes = {"lake": reservoir(AMBIENT + 1e6), "gate": junction(), "out": reservoir(AMBIENT)}
     links = {
         "main": pipe("lake", "gate", 600.0, 0.3, 1200.0, 25),
@@ -273,7 +272,7 @@ def test_no_overshoot_is_claimed_that_the_references_cannot_tell(tmp_path):
     found = chart(case, **given, out=tmp_path)
     points = [json.loads(text) for text in (tmp_path / "points.jsonl").read_text().splitlines()]
     raw = [one["found"]["overshoot"] for one in points if "overshoot" in one["found"]]
-    floor, *blur = raw[:3]  # of upwind euler
+    floor, *blur = raw[:3]  # upwind with euler
     assert "exact" not in found.reference and min(blur) > 1e-3 and found.floor["overshoot"] == floor > max(blur)
     assert [one.overshoot for one in found.curves()["upwind euler"]] == [0.0, 0.0]
     exact = chart(case | {"exact": {"name": "rays"}}, **given, out=tmp_path / "exact")
@@ -288,11 +287,11 @@ def test_nothing_is_claimed_below_the_floor(closing):
         chart(line(), schemes=["upwind5"], methods=["rk4"], cells=[10, 20], target=1e-9)
 
 
-# what fails -------------------------------------------------------------------------------------------------------
+# failed runs ------------------------------------------------------------------------------------------------------
 
 
 def stiff() -> dict:
-    """A thimble between two orifices: its rate is far above 1 / step."""
+    """Case of a chamber of 1 ml between two orifices; its rate is far above 1 / step."""
     nodes = {"pump": reservoir(SUPPLY), "pot": chamber(1e-6, P0), "sump": reservoir(AMBIENT)}
     links = {"in": valve("pump", "pot", HOLE), "out": valve("pot", "sump", HOLE)}
     return scene(nodes, links, 1e-2, {}, ["pot.pressure"], 1e-4)
@@ -310,12 +309,12 @@ def test_failed_runs_are_in_list_table_and_picture(tmp_path):
     assert len(lines) == len(found.points)
     assert [line["reason"].split(":")[0] for line in lines if line["ok"] == "0"][1:] == ["refused"]
     drawn = [one for one in chart_picture(found).axes[0].lines if one.get_markerfacecolor() == "none"]
-    assert sum(len(one.get_xdata()) for one in drawn) == 1  # the refused one spent nothing
+    assert sum(len(one.get_xdata()) for one in drawn) == 1  # the refused run has no cost
     assert not any(row.name == "rk4" and row.target < 1e-2 for row in found.front if row.by_updates is None)
 
 
 def test_a_run_that_costs_too_much_is_given_up_and_so_are_the_finer_ones_of_its_curve(monkeypatch, capsys):
-    """A thimble of a microlitre for ten seconds: millions of explicit steps, whatever the tolerance."""
+    """A chamber of 1 microlitre needs millions of explicit steps in 10 s, at any tolerance."""
     monkeypatch.setattr(timing, "CPU_LIMIT", 0.3)
     case = stiff()
     case["nodes"]["pot"] = chamber(1e-9, P0)
@@ -334,7 +333,7 @@ def test_a_failed_point_is_no_proof_for_finer_targets():
     assert found.front and "rk4" not in {row.name for row in found.front}
 
 
-# the front --------------------------------------------------------------------------------------------------------
+# Pareto front -----------------------------------------------------------------------------------------------------
 
 
 def test_the_front_names_the_cheapest_curve_by_updates_and_the_default_beside_it(closing):
@@ -360,7 +359,7 @@ def test_work_and_errors_of_a_chart_are_the_same_every_time(closing):
 
 
 def test_pasted_lines_reach_the_target(tmp_path):
-    """The lines as text into the file, run, and measured against exact rays."""
+    """Lines are pasted as text into the file, run, and compared with exact rays."""
     target = 3e-3
     case = line(cells=37)
     found = chart(case, schemes=["upwind", "upwind5"], methods=["rk4"], cells=[10, 20, 40], target=target)
@@ -375,7 +374,7 @@ def test_pasted_lines_reach_the_target(tmp_path):
     own = mean_error(values, exact_rows(run.t), run.t)
     assert own <= target
     assert own == pytest.approx(found.aim.point.trajectory, abs=2 * found.floor["trajectory"] + 1e-7)
-    assert own > target / 30  # and not by waste
+    assert own > target / 30  # not far more accurate than needed
 
 
 def test_pipes_that_state_no_cells_are_given_a_cell_time(tmp_path):
@@ -389,7 +388,7 @@ def test_pipes_that_state_no_cells_are_given_a_cell_time(tmp_path):
     assert mean_error(values, exact_rows(run.t), run.t) <= 1e-2
 
 
-# going on, and bad input ------------------------------------------------------------------------------------------
+# continued charts, and invalid input ------------------------------------------------------------------------------
 
 
 def test_a_chart_that_was_broken_off_goes_on_from_its_points(tmp_path):
@@ -401,10 +400,10 @@ def test_a_chart_that_was_broken_off_goes_on_from_its_points(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         chart(pot(), progress=stop, **given)
     found = chart(pot(), **given)
-    assert found.reused == 5  # the floor and four points
+    assert found.reused == 5  # floor and four points
     again = chart(pot(), **given)
     assert again.reused == 7 and again.compile_seconds == 0.0
-    assert again.points == found.points  # their times are stored with them
+    assert again.points == found.points  # with their stored times
 
 
 def test_a_case_in_which_nothing_moves_has_no_chart():
@@ -413,7 +412,7 @@ def test_a_case_in_which_nothing_moves_has_no_chart():
 
 
 def test_where_a_chamber_holds_explicit_steps_back_references_are_implicit():
-    """Errors against them are those against an explicit run as fine."""
+    """Errors against implicit references equal errors against an explicit run of similar accuracy."""
     case = line(smooth_ramp(0.02, 0.2, 1.0, 0.5, 101), end=0.4)
     case["nodes"]["gate"] = chamber(1e-2)
     found = chart(case, schemes=["upwind5"], methods=["rodas-5p"], cells=[10, 20])

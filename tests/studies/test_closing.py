@@ -1,4 +1,4 @@
-"""A law that makes a peak least comes near what no law can pass: the mean force that stops a column."""
+"""The least peak by optimisation is near the lower bound, given by the mean pressure that stops a column."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LENGTH, DIAMETER, TIME, SUPPLY = 100.0, 0.3, 4.0, 1.2e5
 
 
 def column() -> dict:
-    """A frictionless rigid column that a valve stops within TIME."""
+    """Case of a frictionless rigid column that a valve stops within TIME."""
     nodes = {"lake": reservoir(SUPPLY), "gate": junction(), "air": reservoir(AMBIENT)}
     links = {"main": {"type": "rigid-column", "from": "lake", "to": "gate", "length": LENGTH, "diameter": DIAMETER},
              "tap": valve("gate", "air", 0.5 * area(DIAMETER), ramp(0.5, TIME, 1.0, 0.0))}  # fmt: skip
@@ -26,7 +26,7 @@ def column() -> dict:
 def test_it_comes_near_the_least_that_can_be() -> None:
     first = fvsolve.run(column())
     speed = first["main.flow"][0] / area(DIAMETER)
-    least = RHO * LENGTH * speed / TIME  # the mean of what stops it
+    least = RHO * LENGTH * speed / TIME  # mean pressure that stops the column
     found = optimise(column(), "links.tap.opening", "max(gate.pressure)", knots=4, runs=120)
     rise, linear = found.best.peak - SUPPLY, found.linear.peak - SUPPLY
     assert linear == pytest.approx(first.extremes["gate.pressure"].maximum - SUPPLY, rel=1e-9)

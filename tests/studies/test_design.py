@@ -1,4 +1,4 @@
-"""A study is the runs that its events and protections make, and a size is where a limit is met exactly."""
+"""A study runs each event with each protection, and a size search finds the value at which a limit is reached."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from fvsolve.studies.sizing import parse_range, parse_ties, size
 
 
 def throttled() -> dict:
-    """A lake, a main and a tap; shut by `closure`, kept by an accumulator of `vessel`."""
+    """Case of a lake, a main and an open tap, with limits on the pressure in the main."""
     nodes = {"lake": lake(50.0, elevation=0.0), "gate": junction(elevation=10.0), "air": reservoir(1e5, elevation=10.0)}
     rough = {"model": "quasi-steady", "roughness": 1e-4}
     links = {"main": pipe("lake", "gate", 500.0, 0.2, 1000.0, 10, friction=rough),
@@ -77,7 +77,7 @@ def test_every_event_meets_every_protection_as_runs_of_their_own_do(study, tmp_p
     assert again.rows == found.rows
     assert {path: path.stat().st_mtime_ns for path in stamps} == stamps  # nothing was run again
     assert scenarios.open_study(tmp_path / "out")["title"] == "Two taps"
-    (tmp_path / "out" / "report.html").touch()  # of the runs before
+    (tmp_path / "out" / "report.html").touch()  # report of the runs before
     scenarios.study(study, tmp_path / "out")
     assert not (tmp_path / "out" / "report.html").exists()
 
@@ -88,9 +88,9 @@ def test_processes_and_errors_change_no_verdict(study, tmp_path) -> None:
     banded = scenarios.study(study, tmp_path / "two", jobs=2)
     for row, beside in zip(one.rows, banded.rows, strict=True):
         assert row["extremes"] == beside["extremes"]
-        for verdict, other in zip(row["verdicts"], beside["verdicts"], strict=True):  # an open place stands first
+        for verdict, other in zip(row["verdicts"], beside["verdicts"], strict=True):  # open places come first
             assert other["value"] == verdict["value"] or (other["error"] is None and other["state"] == "open")
-        errors = [verdict["error"] for verdict in beside["verdicts"]]  # not known beside a piece of one cell
+        errors = [verdict["error"] for verdict in beside["verdicts"]]  # unknown beside a piece of one cell
         assert all(error is None or error > 0.0 for error in errors)
         assert any(errors) or row["protection"] == "vessel"
 
@@ -100,7 +100,7 @@ def test_the_command_prints_a_table_and_leaves_with_1_where_no_protection_holds(
     assert status == 0 and "all limits hold in all events with: vessel" in text and "fast with none" in text
     study.write_text(STUDY[: STUDY.index("[protections.vessel")])
     status, text, _ = fvs("study", str(study), "--out", str(tmp_path / "other"))
-    assert status == 1 and "no protection holds all limits in all events" in text
+    assert status == 1 and "no protection satisfies all limits in all events" in text
 
 
 @pytest.mark.parametrize(
@@ -155,7 +155,7 @@ def test_a_study_without_limits_holds_none(fvs, study, tmp_path, monkeypatch) ->
 
 
 def test_a_protection_holds_by_limits_alone(tmp_path) -> None:
-    """Limits that one event brings along; a protection whose runs have none holds nothing."""
+    """Limits may come from one event only; a protection whose runs have no limits does not hold."""
     rows = [{"event": event, "protection": protection, "ok": True,
              "verdicts": [{"ok": True}] if protection == "vessel" and event == "fast" else []}
             for event in ("fast", "slow") for protection in ("none", "vessel")]  # fmt: skip
@@ -164,7 +164,7 @@ def test_a_protection_holds_by_limits_alone(tmp_path) -> None:
 
 
 def test_the_commands_of_the_page_say_what_it_says(fvs, tmp_path, monkeypatch) -> None:
-    """Each command of docs/designs.md, and of what it prints the words that the page has."""
+    """Each command of docs/designs.md prints the results on the page."""
     text = (DOCS / "designs.md").read_text(encoding="utf-8")
     lines = [line for block in re.findall(r"```sh\n(.*?)```", text, re.S) for line in block.splitlines()]
     assert [line.split()[1] for line in lines] == ["study", "size", "optimise"]
@@ -173,7 +173,7 @@ def test_the_commands_of_the_page_say_what_it_says(fvs, tmp_path, monkeypatch) -
     said = [fvs(*shlex.split(line.replace("--jobs 2", "--jobs 1"))[1:]) for line in lines]
     assert [status for status, _, _ in said] == [0, 0, 0]
     assert "all limits hold in all events with: vessel" in said[0][1]
-    assert "minimum value that holds all limits: 25.1" in said[1][1]
+    assert "minimum value that satisfies all limits: 25.1" in said[1][1]
     assert re.search(r"^opening = { time.*$", text, re.M)[0] in said[2][1]
 
 
@@ -181,7 +181,7 @@ def test_the_commands_of_the_page_say_what_it_says(fvs, tmp_path, monkeypatch) -
 
 
 def still(minimum: float | None = None, maximum: float | None = None) -> dict:
-    """A lake above a shut main: the gauge pressure at the gate is rho g (head - 10 m)."""
+    """Case of a lake above a shut main: the gauge pressure at the gate is rho g (head - 10 m)."""
     case = throttled()
     case["links"]["tap"]["opening"] = 0.0
     bounds = {key: one for key, one in (("minimum", minimum), ("maximum", maximum)) if one is not None}
@@ -227,7 +227,7 @@ def test_ties_follow_in_si() -> None:
 def test_the_command_shows_its_runs(fvs, tmp_path) -> None:
     (tmp_path / "still.toml").write_text(write(still(minimum=3e5)))
     status, text, _ = fvs("size", str(tmp_path / "still.toml"), "--vary", "nodes.lake.head=20 m,80 m")
-    assert status == 0 and "minimum value that holds all limits" in text and text.count("holds") > 2
+    assert status == 0 and "minimum value that satisfies all limits" in text and text.count("holds") > 1
     status, text, _ = fvs("size", str(tmp_path / "still.toml"), "--vary", "nodes.lake.head=20,30", "--json")
     said = json.loads(text)
     assert status == 1 and said["value"] is None and said["nearest"]["value"] == 30.0

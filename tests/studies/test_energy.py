@@ -1,4 +1,4 @@
-"""The ledger of energy against closed forms: what came in, what is stored, what was lost, and what the numbers took."""
+"""Energy balance against closed forms: supplied, stored and dissipated energy, and numerical loss."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_half_of_what_fills_a_chamber_is_lost_in_its_orifice():
 
 
 def slope_scene(numerics: dict, lift: float = 0.0, **more) -> dict:
-    """A sloping main with friction between a lake and a valve, all of it `lift` higher."""
+    """Case of a sloping main with friction between a lake and a valve, `lift` metres higher."""
     nodes = {"lake": reservoir(AMBIENT + 5e5, elevation=30.0 + lift), "gate": junction(elevation=lift)}
     nodes["out"] = reservoir(AMBIENT, elevation=lift)
     links = {"main": pipe("lake", "gate", 1000.0, 0.3, 1000.0, 40, friction=FRICTION, **more)}
@@ -61,7 +61,7 @@ def slope_scene(numerics: dict, lift: float = 0.0, **more) -> dict:
 
 @pytest.mark.parametrize("law", ["linear", "log", "table"])
 def test_with_no_event_only_the_steady_throughput_is_booked(law):
-    """What the lake gives is dissipated, the friction's part is its head, and no part stores a joule."""
+    """All supplied energy is dissipated, the friction loss follows from the head, and no part stores energy."""
     case = slope_scene({"scheme": "upwind5", "method": "rk4", "courant": 0.8})
     case["fluid"] = {**WATER, "law": law} if law != "table" else {"name": "Water", "temperature": 293.15, "law": law}
     found = energy(case)
@@ -95,7 +95,7 @@ def test_heights_count_from_the_lowest_node_and_lifting_a_scene_changes_nothing(
 
 
 def closing(courant: float, cells: int, end: float) -> dict:
-    """A lossless main whose valve shuts at once at 0.1 s."""
+    """Case of a lossless main whose valve shuts at once at 0.1 s."""
     nodes = {"lake": lake(50.0), "gate": junction(), "out": reservoir(AMBIENT)}
     links = {"main": pipe("lake", "gate", 1000.0, 0.3, 1000.0, cells)}
     links["tap"] = valve("gate", "out", 0.002, step(0.1, 1.0, 0.0))
@@ -105,12 +105,12 @@ def closing(courant: float, cells: int, end: float) -> dict:
 def test_a_sudden_closure_at_courant_one_loses_nothing():
     found = energy(closing(1.0, 20, 4.0))
     assert np.abs(found.remainder).max() < 1e-12 * found.throughput
-    assert found.scheme["main"][-1] > 0.01 * found.throughput  # what cells dissipate, the steps create
+    assert found.scheme["main"][-1] > 0.01 * found.throughput  # steps create what cells dissipate
     assert found.verdict == "rounding"
 
 
 def test_the_dissipation_of_upwind_at_a_front_is_the_binomial_one():
-    """Each step loses C (1 - C) sum of (u_i - u_i-1)^2 dx / (rho A); behind a jump the differences are binomial."""
+    """Each step dissipates C (1 - C) sum of (u_i - u_i-1)^2 dx / (rho A); behind a jump, differences are binomial."""
     courant, cells, steps = 0.5, 100, 100
     h = courant * 10.0 / 1000.0
     found = energy(closing(courant, cells, 0.1 + steps * h))
@@ -121,7 +121,7 @@ def test_the_dissipation_of_upwind_at_a_front_is_the_binomial_one():
 
 
 def swing(numerics: dict, friction: dict, end: float) -> dict:
-    """Two tanks joined by a rigid column, 2 m out of level."""
+    """Case of two tanks joined by a rigid column, with levels 2 m apart."""
     nodes = {"a": tank(2.0, 5.0), "b": tank(3.0, 3.0)}
     links = {"way": {"type": "rigid-column", "from": "a", "to": "b", "length": 50.0, "diameter": 0.5,
                      "friction": friction}}  # fmt: skip
@@ -146,7 +146,7 @@ def test_gauss_methods_leave_no_remainder(method, friction):
 
 
 def test_euler_creates_half_the_square_of_what_a_step_moves():
-    """A tank of area A that gains M h a step: the level used is that before, so rho g (M h / rho)^2 / (2 A) is made."""
+    """Euler uses the level before a step: a tank of area A with inflow M gains rho g (M h / rho)^2 / (2 A) per step."""
     flow, section, h, steps = 0.02, 1.5, 0.5, 40
     nodes = {"spring": {"type": "inflow", "flow": flow}, "pond": tank(section, 1.0)}
     case = scene(nodes, {"sluice": valve("spring", "pond", 0.05)}, h * steps, {"method": "euler", "step": h})
@@ -158,7 +158,7 @@ def test_euler_creates_half_the_square_of_what_a_step_moves():
 
 
 def pushed(numerics: dict, end: float, more: dict, **mass) -> dict:
-    """A mass of 2 kg above the ground."""
+    """Case of a mass of 2 kg and a frame, with given links."""
     nodes = {"ground": {"type": "frame"}, "load": {"type": "mass", "mass": 2.0, **mass}}
     return scene(nodes, more, end, numerics)
 
@@ -199,7 +199,7 @@ def test_what_runs_over_the_rim_carries_its_height_away():
 
 
 def test_a_shaped_tank_stores_the_moment_of_its_areas():
-    """A cone of areas 1 to 3 m2 over 2 m: integral of z A dz from 0.5 to the end's level."""
+    """Cone with areas from 1 to 3 m2 over 2 m: integral of z A dz from 0.5 m to the final level."""
     shape = {"level": [0.0, 2.0], "area": [1.0, 3.0]}
     nodes = {"spring": {"type": "inflow", "flow": 0.05}, "pond": tank(shape, 0.5)}
     found = energy(scene(nodes, {"sluice": valve("spring", "pond", 0.05)}, 40.0, TIGHT))
@@ -210,7 +210,7 @@ def test_a_shaped_tank_stores_the_moment_of_its_areas():
 
 
 def test_a_leak_planted_in_the_ledger_is_found(monkeypatch):
-    """A valve that the ledger forgets is what remains."""
+    """The energy of a valve that is missing in the accounts is the remainder."""
     from fvsolve.model import energy_accounts
 
     case = slope_scene({"scheme": "upwind5", "method": "rk4", "courant": 0.8})
@@ -233,7 +233,7 @@ def test_a_leak_planted_in_the_ledger_is_found(monkeypatch):
      ("cylinder-servo", 1e-7), ("valve-closure", 6e-3), ("gradual-closure", 6e-3)],
 )  # fmt: skip
 def test_the_ledgers_of_shipped_cases_close(name, near):
-    """With error control to what the tolerance allows; where fronts are smeared, half a percent is numerical."""
+    """Remainders are within the tolerance of error control, or below 0.6 % where fronts are smeared."""
     from fvsolve.case import shipped
 
     found = energy(shipped.find(name))
@@ -258,7 +258,7 @@ def test_a_column_that_stops_dead_loses_its_kinetic_energy():
     "rim, held", [({}, 0.5 * 3.0**2), ({"height": 4.0}, 0.5 * (3.0**2 - 1.0))], ids=["open", "with a rim"]
 )
 def test_what_a_tank_below_the_port_could_give_is_what_filling_it_to_the_port_sets_free(rim, held):
-    """Bottom at -5 m, level 2 m: the integral of the 5 m - z that water falls on its way to the surface."""
+    """Bottom at -5 m, level 2 m: integral of the fall 5 m - z of the water that fills the tank to the port or rim."""
     nodes = {"sea": reservoir(AMBIENT, elevation=0.0), "pit": tank(1.5, 2.0, elevation=-5.0, **rim)}
     case = scene(nodes, {"gap": valve("sea", "pit", 0.05)}, 10.0, TIGHT)
     found = energy(case, port="sea")
@@ -272,7 +272,7 @@ def test_what_a_tank_below_the_port_could_give_is_what_filling_it_to_the_port_se
                   ("rigid-column", "log"), ("cylinder-servo", "log"), ("two-tanks", "linear")],
 )  # fmt: skip
 def test_no_part_ever_holds_less_than_nothing(name, law):
-    """What could be had at the start and the change since then are one energy, that is not negative."""
+    """For each part, available energy at the start plus stored energy since then is not negative."""
     from fvsolve.case import shipped
 
     found = energy(shipped.find(name), {"fluid.law": law})

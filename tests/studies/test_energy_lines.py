@@ -1,4 +1,4 @@
-"""Energy of delay lines: what is stored by quadrature along them, beside closed forms, cells, and all powers."""
+"""Energy of delay lines: stored energy by quadrature, against closed forms, fine cells and the sum of all powers."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ STEADY = {"model": "steady", "factor": 0.02}
 
 
 def main(law, gate: dict, method: str, h: float, end: float) -> dict:
-    """A lake, a main, and what happens at its end."""
+    """Case of a lake, a main as delay line, and a given node at its end."""
     nodes = {"lake": lake(HEAD), "gate": gate}
     links = {"main": pipe("lake", "gate", LENGTH, DIAMETER, SPEED, 20, friction=law)}
     return scene(nodes, links, end, {"pipe_model": "delay-line", "method": method, "step": h})
 
 
 def chain(h: float, method: str = "rk4", law=STEADY) -> dict:
-    """Two lines, and one between them that is shorter than a step; the last shuts in a second."""
+    """Case of two delay lines with a third between them, shorter than a step; the demand falls to 40 % in 1 s."""
     nodes = {"lake": lake(50.0), "a": junction(), "b": junction()}
     nodes["gate"] = junction({"time": [0.5, 1.5], "value": [FLOW, 0.4 * FLOW], "kind": "smooth"})
     links = {
@@ -36,9 +36,9 @@ def chain(h: float, method: str = "rk4", law=STEADY) -> dict:
 @pytest.mark.parametrize("method", ["euler", "rk4", "trapezoid", "rodas-4"])
 @pytest.mark.parametrize("share", [0.5, 1.5, 2.5, 4.0])
 def test_the_ledger_of_an_instant_closure_is_exact(method, share):
-    """Lossless: Joukowsky's wave fills the main, leaves it and comes back; after four travel times nothing has changed.
+    """Lossless: Joukowsky's wave fills the main and returns; after four travel times the stored energy is as before.
 
-    Steps of 13 ms divide nothing: jumps reach the lake and the gate within them.
+    Steps of 13 ms do not divide the travel time, so jumps reach the lake and the gate within steps.
     """
     found = energy(main(LOSSLESS, junction(step(0.1, FLOW, 0.0)), method, 0.013, 0.1 + share * TAU))
     filled, still = {0.5: (0.5, 0.5), 1.5: (0.5, 0.5), 2.5: (-0.5, 0.5), 4.0: (0.0, 0.0)}[share]
@@ -51,7 +51,7 @@ def test_the_ledger_of_an_instant_closure_is_exact(method, share):
 
 @pytest.mark.parametrize("h", [0.01, 0.013])
 def test_stages_outside_a_step_see_jumps_of_its_neighbours(h):
-    """crouzeix-4 looks ahead and back: once the gate is shut nothing is made, also where jumps arrive as steps end."""
+    """crouzeix-4 has stages outside its steps; after the closure no energy is created, even by jumps at step ends."""
     found = energy(main(LOSSLESS, junction(step(0.1, FLOW, 0.0)), "crouzeix-4", h, 2.0))
     shut = found.numerical_remainder[found.t > 0.12]
     assert np.max(np.abs(shut - shut[0])) < 1e-12 * found.throughput
@@ -73,13 +73,13 @@ def test_what_is_stored_and_taken_as_by_fine_cells():
 
 @pytest.mark.parametrize("method", ["rk4", "trapezoid"])
 def test_what_the_steps_take_falls_with_their_square(method):
-    """What is stored by quadrature is the sum of all powers but for what is read between steps."""
+    """Stored energy by quadrature and the sum of all powers differ only by interpolation between steps."""
     sizes = [abs(float(energy(chain(h, method)).step[-1])) for h in (0.02, 0.01, 0.005)]
     assert sizes[0] > 3.0 * sizes[1] > 9.0 * sizes[2]
 
 
 def test_a_short_line_takes_and_never_gives():
-    """It smooths what passes: what it takes at every moment is a square."""
+    """A short line smooths waves: the energy that it removes is a square at each time."""
     found = energy(chain(0.02, law=LOSSLESS))
     taken = found.scheme["short"]
     assert set(found.scheme) == {"short"}
@@ -99,7 +99,7 @@ def test_from_the_other_end(method):
 
 
 def test_a_jump_into_a_store_is_booked_as_the_store_has_it():
-    """A chamber between two lossless lines, which a jump reaches within a step: what is left is of second order."""
+    """A jump reaches a chamber between two lossless lines within a step: the remainder is of second order."""
     nodes = {"lake": lake(HEAD), "air": chamber(20.0), "gate": junction(step(0.1, FLOW, 0.0))}
     links = {
         "one": pipe("lake", "air", LENGTH, DIAMETER, SPEED, 20, friction=LOSSLESS),

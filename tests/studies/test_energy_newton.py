@@ -1,4 +1,4 @@
-"""What Newton leaves of its equations is booked as such: neither as supplied nor as made by schemes and steps."""
+"""The residual of Newton's method has its own account: it is no supplied energy and no loss of schemes or steps."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import fvsolve
 from fvsolve.studies.energy.energy_balance import energy
 from fvsolve.studies.energy.energy_of_pairs import measure_pairs
 
-VOLUME, P0, P1 = 0.02, 5e5, 50e5  # over ambient
+VOLUME, P0, P1 = 0.02, 5e5, 50e5  # pressures above ambient
 PER = VOLUME / WATER["bulk_modulus"]
 
 
 def filled(method: str, **numerics) -> dict:
-    """A chamber that has filled through an orifice after 2 s, and then rests where the orifice has no slope."""
+    """Case of a chamber that an orifice fills within 2 s and that then stays at zero drop."""
     nodes = {"src": reservoir(AMBIENT + P1), "pot": chamber(VOLUME, AMBIENT + P0)}
     return scene(nodes, {"hole": valve("src", "pot", 6e-7)}, 20.0, {"method": method, **numerics})
 
@@ -28,7 +28,7 @@ def test_a_chamber_that_has_filled_is_supplied_what_it_took_and_creates_nothing(
     assert found.dissipated["hole"][-1] == pytest.approx(0.5 * PER * (P1 - P0) ** 2, rel=3e-5)
     assert found.remainder == pytest.approx(found.step + found.newton, abs=1e-12 * found.throughput)
     assert np.abs(found.newton).max() < 1e-12 * found.throughput
-    if method.startswith("gauss"):  # they conserve squares: steps leave rounding, and the verdict says so
+    if method.startswith("gauss"):  # Gauss methods conserve squares, so the step loss is rounding
         assert np.abs(found.step).max() < 1e-12 * found.throughput
         assert found.verdict == "rounding"
     elif method == "radau-iia-5":
@@ -36,7 +36,7 @@ def test_a_chamber_that_has_filled_is_supplied_what_it_took_and_creates_nothing(
 
 
 def test_what_newton_leaves_is_a_part_of_its_own_and_condemns_no_method():
-    """Under a tolerance it stops there."""
+    """With rtol, Newton's method stops at a tolerance."""
     case = fvsolve.load(filled("radau-iia-5", rtol=1e-3))
     found = energy(case)
     assert found.newton_counts
@@ -55,7 +55,7 @@ def test_beside_newton_gauss_leaves_rounding_in_a_network_of_pipes():
 
 
 def test_steps_of_second_order_book_the_orifice_to_one_per_cent_where_the_state_is_exact():
-    """The mass of the chamber is a parabola in time: no error to control but that of its powers."""
+    """The mass of the chamber is a parabola in time, so error control sees only the error of the powers."""
     found = energy(filled("tr-bdf2", rtol=1e-6))
     lost = 0.5 * PER * (P1 - P0) ** 2
     assert found.supplied["src"][-1] == pytest.approx(PER * P1 * (P1 - P0), rel=1e-6)

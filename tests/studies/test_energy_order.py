@@ -1,4 +1,4 @@
-"""The remainder of the energy ledger falls at the order of scheme and method, under every law and kind of method."""
+"""The energy remainder falls at the order of scheme and method, for each density law and kind of method."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ FRICTION = {"model": "steady", "factor": 0.02}
 
 
 def throttled(scheme: str, method: str, cells: int, law: str) -> dict:
-    """A main with friction whose valve closes smoothly to a third in 3 s."""
+    """Case of a main with friction whose valve closes smoothly to 30 % in 3 s."""
     nodes = {"lake": lake(50.0), "gate": junction(), "out": reservoir(AMBIENT)}
     links = {"main": pipe("lake", "gate", 1000.0, 0.3, 1000.0, cells, friction=FRICTION)}
     links["tap"] = valve("gate", "out", 0.002, smooth_ramp(0.0, 3.0, 1.0, 0.3))
@@ -51,9 +51,9 @@ def orders(remainders: list[float]) -> np.ndarray:
 )  # fmt: skip
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_with_cells_and_steps_the_remainder_falls_at_the_order_of_the_scheme(scheme, method, order, law):
-    """fromm and muscl gain one: their error of second order moves waves and takes no energy from them.
+    """fromm and muscl gain an order: their second-order error moves waves but removes no energy.
 
-    Under log energies are differences of m h, known to 1e-8 J here, which the fifth order reaches at 160 cells.
+    Under the law log, energies are differences of m h, known to 1e-8 J here, which fifth order reaches at 160 cells.
     """
     counts = (40, 80) if law == "log" and order == 5 else (80, 160)
     found = [energy(throttled(scheme, method, cells, law)) for cells in counts]
@@ -63,7 +63,7 @@ def test_with_cells_and_steps_the_remainder_falls_at_the_order_of_the_scheme(sch
 
 
 def swinging(method: str, h: float) -> dict:
-    """Two tanks and a rigid column with friction, while it flows one way: a system without cells."""
+    """Case of two tanks and a rigid column with friction, without cells and without reversal of the flow."""
     swell = {"time": [0.0, 20.0, 40.0], "value": [0.0, 0.05, 0.02], "kind": "smooth"}
     nodes = {"a": tank(2.0, 5.0), "b": tank(3.0, 3.0), "spring": {"type": "inflow", "flow": swell}}
     links = {"way": {"type": "rigid-column", "from": "a", "to": "b", "length": 50.0, "diameter": 0.5,
@@ -89,7 +89,7 @@ def test_without_cells_the_remainder_falls_at_least_at_the_order_of_the_method(m
 
 @pytest.mark.parametrize("law", ["log", "table"])
 def test_a_chamber_under_a_curved_law_stores_what_its_law_says(law):
-    """log: V (beta (exp(p / beta) - 1) - p), with beta (exp(p / beta) - 1) q at the port; table: integral of h dm."""
+    """Energy of the chamber: V (beta (exp(p / beta) - 1) - p) stored under log; integral of h dm under table."""
     fluid = {**WATER, "law": "log"} if law == "log" else {"name": "Water", "temperature": 293.15, "law": "table"}
     volume, p0, p1 = 0.5, AMBIENT, AMBIENT + 4e7
     nodes = {"pump": reservoir(p1), "pot": chamber(volume, p0)}
@@ -117,7 +117,7 @@ def test_a_chamber_under_a_curved_law_stores_what_its_law_says(law):
 
 
 def test_the_linear_law_makes_energy_where_a_piston_moves_and_the_ledger_says_so():
-    """A volume that moves under p and not under p q: of order p / beta of the work; under log there is none."""
+    """A piston under the linear law creates energy of order p / beta of the work; under log it creates none."""
     nodes = {"ground": {"type": "frame"}, "load": {"type": "mass", "mass": 50.0, "initial_position": 0.1},
              "pump": reservoir(AMBIENT + 2e7), "sump": reservoir(AMBIENT)}  # fmt: skip
     links = {
@@ -155,10 +155,10 @@ def test_at_a_head_of_water_power_is_rho_g_h_q():
     + [(name, 400.0) for name in ("dormand-prince", "rodas-4", "tr-bdf2", "auto")],
 )
 def test_what_a_draining_tank_loses_is_what_it_had(method, end):
-    """Its level is a parabola in time, which a method of order two steps exactly; the power in the drain is none."""
+    """The level is a parabola in time, which methods of order two integrate exactly; the power in the drain is not."""
     nodes, links = {"up": tank(2.0, 10.0), "out": reservoir(AMBIENT)}, {"drain": valve("up", "out", 0.01)}
     found = energy(scene(nodes, links, end, {"method": method, "rtol": 1e-6}, ["up.level"]))
-    speed = 0.01 / 2.0 * math.sqrt(2.0 * GRAVITY)  # of its surface over the root of its level
+    speed = 0.01 / 2.0 * math.sqrt(2.0 * GRAVITY)  # speed of the surface over the root of the level [m^0.5/s]
     left = max(0.0, math.sqrt(10.0) - 0.5 * speed * end) ** 2
     lost = RHO * GRAVITY * 2.0 * (10.0**2 - left**2) / 2.0
     assert found.dissipated["drain"][-1] == pytest.approx(lost, rel=1e-2)

@@ -1,4 +1,4 @@
-"""The verdicts of a failure map, on synthetic runs of each kind and on real runs whose kind is known."""
+"""Verdicts of a failure map, on synthetic runs of each kind and on real runs of known kind."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_a_small_error_and_no_swing_is_stable():
 def test_an_error_that_a_shorter_step_reduces_is_coarse_and_one_that_stays_is_wrong():
     assert verdict(found(0.1), shorter(0.05), TOLERANCE) == "coarse"
     assert verdict(found(0.1), shorter(0.09, 0.03), TOLERANCE) == "coarse"
-    assert verdict(found(0.021), shorter(0.0199), TOLERANCE) == "coarse"  # within the tolerance is enough
+    assert verdict(found(0.021), shorter(0.0199), TOLERANCE) == "coarse"  # an error within the tolerance suffices
     assert verdict(found(0.1), shorter(0.099, 0.099), TOLERANCE) == "wrong"
     assert verdict(found(0.1), shorter(math.nan, math.nan), TOLERANCE) == "wrong"
 
@@ -112,10 +112,10 @@ def test_excess_counts_what_swings_beyond_the_reference_and_nothing_else():
     t = np.linspace(0, 1, 101)[:, None]
     square = np.floor(4 * t) % 2
     assert excess_variation(square, square, np.ones(1)) == 0.0
-    assert excess_variation(0.5 * square, square, np.ones(1)) == 0.0  # less is no swing
+    assert excess_variation(0.5 * square, square, np.ones(1)) == 0.0  # smaller variation is no ringing
     assert (
         excess_variation(square + 5.0 * (np.arange(101) == 40)[:, None], square, np.ones(1)) == 0.0
-    )  # nor is a single row
+    )  # a single row is no ringing
     assert excess_variation(square + 0.1 * (-1.0) ** np.arange(101)[:, None], square, np.ones(1)) > 4.0
 
 
@@ -128,7 +128,7 @@ def test_a_probe_that_stands_still_is_not_judged():
 
 
 def closing(**numerics) -> dict:
-    """A frictionless pipe whose valve shuts in a tenth of the wave's way there and back."""
+    """Case of a frictionless pipe whose valve shuts within a tenth of 2 L / a."""
     nodes = {"lake": lake(60.0), "gate": junction(), "out": reservoir(AMBIENT)}
     links = {
         "main": pipe("lake", "gate", 600.0, 0.3, 1200.0, 60),
@@ -151,7 +151,7 @@ def test_a_map_of_upwind_shows_the_exact_square_the_smeared_ones_and_the_limit()
 
 def test_a_map_goes_by_the_exact_solution_of_a_case_and_without_it_knows_how_far_off_it_may_be():
     case = closing()
-    case["links"]["valve"]["opening"] = step(0.1, 1.0, 0.0)  # whose front all finer runs blur alike
+    case["links"]["valve"]["opening"] = step(0.1, 1.0, 0.0)  # all finer runs smear this front alike
     asked = {"schemes": ["upwind5"], "methods": ["rk4"], "courants": [0.5], "tolerance": 0.1}
     found, exact = (failure_map(load(case | more), **asked) for more in ({}, {"exact": {"name": "rays"}}))
     assert exact.reference.startswith('exact solution "rays", checked by ') and "exact" not in found.reference
@@ -175,7 +175,7 @@ def test_central_differences_swing_behind_a_front():
 
 
 def stiff() -> dict:
-    """Oil pressed into a small chamber through a pipe: the chamber answers in microseconds."""
+    """Case of oil pressed into a small chamber through a pipe; the chamber responds within microseconds."""
     nodes = {"pump": reservoir(2.0e6), "body": chamber(1e-6), "sump": reservoir(AMBIENT)}
     opening = step(0.01, 1.0, 0.3)
     links = {
@@ -220,8 +220,8 @@ def test_finished_squares_are_kept_and_reused(tmp_path):
 
 
 def test_points_of_other_sources_are_not_taken_up(tmp_path, monkeypatch):
-    """Of studies too, which compile nothing."""
-    jit.source_hash()  # of what is tested
+    """Sources of studies count too, although they compile nothing."""
+    jit.source_hash()  # hash of the tested sources
     made, package = [], shutil.copytree(jit.PACKAGE, tmp_path / "fvsolve", ignore=shutil.ignore_patterns("*.pyc"))
     study = package / "studies" / "stability" / "stability.py"
     for words in ("", "", "# another"):
@@ -292,7 +292,7 @@ def test_the_command_writes_table_and_pictures_and_speaks_json(tmp_path, monkeyp
 
 
 def test_no_old_picture_stands_beside_a_new_table(tmp_path, fvs, monkeypatch):
-    """Also where the new one cannot be drawn."""
+    """Pictures of an earlier map are deleted, even if the new picture cannot be drawn."""
     from fvsolve.case import text
 
     path, out = tmp_path / "scene.toml", tmp_path / "out"
@@ -305,12 +305,12 @@ def test_no_old_picture_stands_beside_a_new_table(tmp_path, fvs, monkeypatch):
 
 
 def test_a_swing_of_the_scene_that_euler_amplifies_is_no_ringing():
-    """A column between two tanks swings at omega; Euler makes each step sqrt(1 + (omega h)^2) times larger."""
+    """A column between two tanks oscillates at omega; Euler multiplies it by sqrt(1 + (omega h)^2) in each step."""
     omega = math.sqrt(2 * 9.80665 * area(0.5) / (50.0 * 1.0))
     nodes = {"a": tank(1.0, 5.0), "b": tank(1.0, 4.0)}
     column = {"type": "rigid-column", "from": "a", "to": "b", "length": 50.0, "diameter": 0.5}
     end = 6 * 2 * math.pi / omega
-    grown = 2.0  # over the run: end omega^2 h / 2 = log 2
+    grown = 2.0  # growth over the run: end omega^2 h / 2 = log 2
     long = 2 * math.log(grown) / (omega**2 * end)
     case = scene(nodes, {"c": column}, end, {"method": "rk4", "step": long}, ["a.level"], end / 200)
     (euler,) = failure_map(case, methods=["euler"], steps=[long]).squares

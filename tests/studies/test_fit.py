@@ -1,4 +1,4 @@
-"""The order fitter on errors whose order is known: it finds it, says how sure it is, or says why there is none."""
+"""Fit of the order on errors of known order: it gives order and spread, or the reason why there is no order."""
 
 from __future__ import annotations
 
@@ -160,7 +160,7 @@ def test_what_are_no_errors_are_refused(h, e, words):
 @pytest.mark.parametrize("c", [4.0, 8.0, 16.0])
 @pytest.mark.parametrize("first", [0, 1, 2])
 def test_orders_that_climb_slowly_leave_the_limit_within_the_spread(c, first):
-    """Errors that saturate, as of waves blurred away: orders climb to 1, at first by more from row to row, not less."""
+    """Errors saturate like those of smeared waves: orders climb to 1, at first by growing increments."""
     h = 0.5 / 2.0 ** np.arange(7)
     found = fit(h[first : first + 4], 1.0 - np.exp(-c * h[first : first + 4]))
     assert found.reason or abs(found.order - 1.0) <= found.spread + 0.05, found

@@ -1,4 +1,4 @@
-"""Studies whose runs are made by other processes find what they find alone, but for what a clock says."""
+"""Studies with several processes give the results of one process, except measured times."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ CLOCKS = ("seconds", "processor", "compile_seconds", "front", "default_seconds",
 
 @pytest.fixture
 def line() -> dict:
-    """A pipe whose valve shuts."""
+    """Case of a pipe with a closing valve."""
     nodes = {"lake": reservoir(1e6), "gate": junction(), "out": reservoir(101325.0)}
     links = {
         "main": pipe("lake", "gate", 100.0, 0.3, 1000.0, 10, friction=NO_FRICTION, initial_flow=0.05),
@@ -29,7 +29,7 @@ def line() -> dict:
 
 
 def timeless(found):
-    """The same without what a clock says; numbers that are not finite as None."""
+    """Results without the keys of CLOCKS."""
     if isinstance(found, dict):
         return {key: timeless(one) for key, one in found.items() if key not in CLOCKS}
     return [timeless(one) for one in found] if isinstance(found, list) else found
@@ -47,8 +47,8 @@ def test_a_map_is_the_same_by_a_method_that_only_this_process_knows(line, tmp_pa
     alone = failure_map(line, tolerance=0.05, **asked)
     together = failure_map(line, tolerance=0.05, jobs=2, out=tmp_path, **asked)
     assert timeless(plain(together.plain())) == timeless(plain(alone.plain()))
-    assert len({one.verdict for one in alone.squares}) > 1  # some of them judged by shorter steps too
-    again = failure_map(line, tolerance=0.05, jobs=2, out=tmp_path, **asked)  # all of whose runs are known
+    assert len({one.verdict for one in alone.squares}) > 1  # with verdicts that need shorter steps
+    again = failure_map(line, tolerance=0.05, jobs=2, out=tmp_path, **asked)  # all runs are in the cache
     assert again.squares == together.squares
 
 

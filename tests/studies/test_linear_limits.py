@@ -1,4 +1,4 @@
-"""What linearise, stability and response answer for large models, and what they refuse, by name."""
+"""Linearisation, stability and response of large models, and named refusals."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from fvsolve.studies.stability.stability import stability
 
 
 def line(cells, probes=()):
-    """A lossless pipe of 600 m between a lake and a dead end, 1200 m/s."""
+    """Case of a lossless pipe of 600 m and 1200 m/s between a lake and a dead end."""
     numerics = {"scheme": "upwind5", "method": "rk4", "courant": 0.5}
     nodes = {"top": lake(50.0), "end": junction()}
     return scene(nodes, {"main": pipe("top", "end", 600.0, 0.5, 1200.0, cells)}, 1.0, numerics, probes)
 
 
 def masses():
-    """Two masses on a spring, no fluid around."""
+    """Case of two masses on a spring, without fluid."""
     nodes = {name: {"type": "mass", "mass": 10.0} for name in "ab"}
     spring = {"type": "spring", "from": "a", "to": "b", "stiffness": 1e6}
     return scene(nodes, {"s": spring}, 1.0, {"method": "rk4", "step": 1e-3})
 
 
 def ran(monkeypatch, capsys, tmp_path, *arguments):
-    """What a command leaves on standard error."""
+    """Standard error of a command that exits with status 2."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", ["fvsolve", *arguments])
     with pytest.raises(SystemExit) as left:

@@ -1,4 +1,4 @@
-"""A case as A, B, C, D: closed forms of small scenes, eigenfrequencies of pipes, runs with inputs a little off."""
+"""Matrices A, B, C, D of cases: closed forms, eigenfrequencies of pipes, and runs with slightly changed inputs."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ LINES = {"scheme": "upwind5", "method": "rk4", "courant": 0.5}
 
 
 def filling(opening=0.5, **more):
-    """A reservoir at 3 MPa fills a chamber of 2 l at 1 MPa through a valve of 10 mm2."""
+    """Case of a chamber of 2 l at 1 MPa that a reservoir at 3 MPa fills through a valve of 10 mm2."""
     nodes = {"pump": reservoir(3e6), "bottle": chamber(2e-3, 1e6)}
     return scene(
         nodes, {"v": valve("pump", "bottle", 1e-5, opening)}, 1.0, TIGHT, ["bottle.pressure", "v.flow"], **more
@@ -65,7 +65,7 @@ def test_a_chamber_behind_an_orifice_is_as_by_hand():
 
 @pytest.mark.parametrize("case", ["two-tanks", "surge-tank", "closed-cylinder"])
 def test_poles_are_eigenvalues_of_a_with_their_vectors(case):
-    """det(lambda I - A) = 0 and (A - lambda I) v = 0, by singular values of A in units that balance it."""
+    """det(lambda I - A) = 0 and (A - lambda I) v = 0, by singular values of the balanced A."""
     a = matrix_balance(linearise(case).a)[0]
     values = find_eigenvalues(a).values
     assert len(values) == len(a)
@@ -137,7 +137,7 @@ HOSE = 9e-3  # diameter of its orifice [m]
 
 
 def behind_hoses(**spool):
-    """A spool whose chambers stand behind hoses at a drop of zero: their laminar slope is 1e6 times that of the oil."""
+    """Case of a spool valve with hoses at zero drop behind its chambers; their laminar slope is 1e6 that of the oil."""
     nodes = {
         "P": reservoir(2e7), "T": reservoir(3e5), "A": chamber(4e-4, 5e6), "B": chamber(4e-4, 4e6),
         "a": chamber(2e-4, 5e6), "b": chamber(2e-4, 4e6),
@@ -151,13 +151,13 @@ def behind_hoses(**spool):
 
 
 def gain(drop):
-    """Mass flow of a spool of 20 mm2 at a drop, over its position."""
+    """Mass flow over position of a spool of 20 mm2 at a pressure drop [kg/s]."""
     return 0.61 * 2e-5 * math.sqrt(2 * OIL["density"] * drop)
 
 
 @pytest.mark.parametrize("outputs", [[], ["spool.flow_P"]])
 def test_a_shut_spool_is_refused_whatever_stands_behind_its_chambers(outputs):
-    """One way P fills A and B drains, the other way P fills B and A drains: slopes of B are gain(37) and gain(160)."""
+    """Chamber B drains with slope gain(37 bar) in one direction and fills with slope gain(160 bar) in the opposite."""
     with pytest.raises(FvsolveError, match="spool.position = 0 cannot be linearised.*from side to side"):
         linearise(behind_hoses(), ["spool.position"], outputs)
 
@@ -171,7 +171,7 @@ def test_a_spool_beside_its_middle_has_the_slope_of_that_side(position, flows):
 
 
 def test_a_shut_valve_has_the_slope_of_its_opening_whatever_stands_behind_it():
-    """Its law is laminar at the first thousandth of the opening: not there, where a hose wants steps of 1e-11."""
+    """The law is laminar below 0.001 of the opening; the slope is that above, although hoses need steps of 1e-11."""
     nodes = {"P": reservoir(2e7), "A": chamber(4e-4, 5e6), "a": chamber(2e-4, 5e6)}
     links = {"v": valve("P", "A", 2e-5, 0.0), "hose": valve("A", "a", area(HOSE))}
     found = linearise(scene(nodes, links, 1.0, TIGHT, fluid=OIL), ["v.opening"], ["v.flow"])
@@ -181,7 +181,7 @@ def test_a_shut_valve_has_the_slope_of_its_opening_whatever_stands_behind_it():
 
 @pytest.mark.parametrize("hose", [False, True])
 def test_a_relief_valve_at_its_set_pressure_is_refused_whatever_stands_beside_it(hose):
-    """It opens one way alone; a hose's laminar slope in the same row hid that, and half the slope was said."""
+    """The valve opens in one direction only; the laminar slope of a hose in its row once hid this."""
     nodes = {"T": reservoir(3e5), "A": chamber(4e-4, 5e6)} | ({"a": chamber(4e-4, 5e6)} if hose else {})
     links = {"relief": {"type": "relief-valve", "from": "A", "to": "T", "diameter": 8e-3,
                         "set_pressure": 5e6, "overpressure": 1.5e6}}  # fmt: skip
@@ -191,7 +191,7 @@ def test_a_relief_valve_at_its_set_pressure_is_refused_whatever_stands_beside_it
 
 
 def test_an_output_that_opens_one_way_is_refused_by_its_name():
-    """The loop of a closed linkage has no gap: its probe is the length of a vector, which has no slope at zero."""
+    """The gap of a closed linkage is zero, and its probe is the length of a vector, which has no slope at zero."""
     with pytest.raises(FvsolveError, match="loop.gap cannot be linearised.*--outputs"):
         linearise("four-bar", outputs=["two.angle", "loop.gap"])
     assert linearise("four-bar", outputs=["two.angle"]).c.shape[0] == 1
@@ -308,7 +308,7 @@ def test_a_valve_at_a_drop_of_zero_has_its_laminar_slope_and_none_where_it_is_ba
     model = found.at.model
     bare, row = model.tables.valves.copy(), model.tables.valves[0]
     assert row["transition"] > 0.0
-    laminar = 45 / 32 * row["conductance"] / row["transition"]  # slope of the law at a drop of zero
+    laminar = 45 / 32 * row["conductance"] / row["transition"]  # slope of the law at zero drop
     assert found.a[0, 0] == pytest.approx(-laminar * K / (RHO * 1e-3), rel=1e-4)
     bare["transition"] = 0.0
     with pytest.raises(FvsolveError, match="b.mass: its slope does not converge.*drop of zero"):
@@ -349,7 +349,7 @@ def test_the_command_writes_matrices_with_names_and_one_json_object(tmp_path, mo
 
 
 def test_a_folder_that_is_written_again_is_named(tmp_path, fvs):
-    """What was there goes, with a word: another size leaves no matrix of the first beside its own."""
+    """A second command in a folder reports this and deletes matrices of an earlier case."""
     first = fvs("linearise", "two-tanks", "--out", tmp_path)[2]
     (tmp_path / "A-sparse.csv").write_text("of a larger case")
     again = fvs("linearise", "two-tanks", "--out", tmp_path)[2]

@@ -1,4 +1,4 @@
-"""Tasks done in chunks by other processes, or by Dask's workers, give what they give here, whoever is killed."""
+"""Tasks in other processes or Dask workers give the results of local tasks, even if processes are killed."""
 
 import os
 import signal
@@ -17,7 +17,7 @@ from fvsolve.studies.parallel import next_chunk_size, run_tasks
 
 
 class Work:
-    """The square of a number; some end the process that is to do them, always or until a file is there."""
+    """Task that squares a number; numbers in `deadly` kill another process, always or until the file `once` exists."""
 
     def __init__(self, deadly=(), once=None) -> None:
         self.deadly, self.once, self.home = deadly, once, os.getpid()
@@ -61,7 +61,7 @@ def test_what_kills_every_process_is_lost_and_nothing_else():
 
 
 def test_processes_end_with_the_one_that_started_them(tmp_path):
-    """Killed, it can tell nobody; what they do would go on for hours."""
+    """Processes end with a killed parent; otherwise their tasks would continue for hours."""
     script = """if True:
         import os, signal, sys, time
         from fvsolve.studies.parallel import run_tasks
@@ -86,7 +86,7 @@ def until(holds) -> None:
 
 
 def test_what_a_task_raises_is_raised_here_and_no_process_stays():
-    before = {*active_children()}  # of Dask's
+    before = {*active_children()}  # processes of Dask
     with pytest.raises(ValueError, match="what a task raises"):
         dict(run_tasks(Work(), [1, 2, "fault", 4], jobs=2))
     assert not {*active_children()} - before
@@ -149,7 +149,7 @@ def test_another_version_is_named_with_both_numbers(cluster, monkeypatch):
 
     def versions(said, own=room.version_numbers):
         asked.append(said)
-        return own(said) | ({} if len(asked) == 1 else {"distributed": "2019.1"})  # the first is that of here
+        return own(said) | ({} if len(asked) == 1 else {"distributed": "2019.1"})  # the first call is local
 
     monkeypatch.setattr(room, "version_numbers", versions)
     said = (

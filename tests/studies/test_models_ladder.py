@@ -1,4 +1,4 @@
-"""The ladder of models says each scene with less, measures what that errs, and chooses the cheapest that will do."""
+"""Hierarchy of models: simpler forms of a case, their errors, and the cheapest form within a target."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FRICTION = {"model": "steady", "factor": FACTOR}
 
 
 def shutting(duration: float, cells: int = 40, end: float = 6.0, **more) -> dict:
-    """A valve at the end of a main of 0.3 s travel time shuts to a half in `duration`."""
+    """Case of a main with 0.3 s travel time whose valve closes to a half within `duration` [s]."""
     nodes = {"lake": reservoir(5e5), "gate": junction(), "out": reservoir(AMBIENT)}
     opening = step(0.5, 1.0, 0.5) if duration == 0.0 else ramp(0.5, duration, 1.0, 0.5)
     links = {
@@ -42,15 +42,15 @@ def named(found, name: str, law: str = "linear"):
 def test_slow_changes_need_a_column_alone_and_quick_ones_the_line():
     slow, quick = ladder(shutting(20.0, end=25.0), target=0.01), ladder(shutting(0.0, cells=80), target=0.01)
     assert named(slow, "rigid column").states == 1 and named(slow, "rigid column").error < 0.01
-    assert slow.cheapest.states < named(slow, "full line").states / 2  # which small one is a matter of milliseconds
+    assert slow.cheapest.states < named(slow, "full line").states / 2  # the fastest small model depends on milliseconds
     assert quick.cheapest.name in ("full line", "delay lines") and named(quick, "rigid column").error > 0.1
     assert slow.change_time == pytest.approx(20.0) and quick.change_time == 0.0
     assert slow.travel_time == pytest.approx(LENGTH / SPEED)
     assert "waves hardly matter" in slow.rules[1] and "waves matter" in quick.rules[1]
-    coarse = ladder(shutting(0.0, every=0.0437), target=0.01)  # 40 cells err by more behind a jump, lines at no time
-    # but its own: no row is there
+    coarse = ladder(shutting(0.0, every=0.0437), target=0.01)  # no row at the time of the jump
+    # 40 cells smear the jump, and delay lines err only at its time
     assert named(coarse, "full line").error > 0.01 > named(coarse, "delay lines").error  # exact at any step
-    assert coarse.cheapest.name in ("delay lines", "2 times the cells")  # by their time, which is about the same
+    assert coarse.cheapest.name in ("delay lines", "2 times the cells")  # their times are about equal
 
 
 def test_the_cheapest_is_within_the_target_and_nothing_quicker_is():
@@ -76,7 +76,7 @@ def test_errors_are_differences_of_runs_over_the_range_of_the_richest():
 def test_a_lumped_volume_has_half_the_line_and_its_friction():
     said = level_keys(fvsolve.load(shutting(2.0)), "lumped volume")
     assert said["nodes.gate"]["type"] == "chamber" and said["links.main"]["type"] == "orifice"
-    held = 0.5 * AREA * LENGTH * WATER["bulk_modulus"] / (RHO * SPEED**2)  # its compressibility is the line's
+    held = 0.5 * AREA * LENGTH * WATER["bulk_modulus"] / (RHO * SPEED**2)  # half the compressibility of the line
     assert said["nodes.gate"]["volume"] == pytest.approx(held)
     assert said["links.main"]["loss_coefficient"] == pytest.approx(FACTOR * LENGTH / DIAMETER)
 
@@ -130,11 +130,11 @@ def test_a_scene_without_pipes_has_the_laws_for_its_rungs():
     found = ladder(case, target=0.01)
     assert [(one.name, one.law) for one in found.rungs] == [("as it is", "linear"), ("as it is", "log")]
     assert found.strain == pytest.approx(9.89e6 / 2.2e9, rel=0.02)
-    assert named(found, "as it is").error == pytest.approx(found.strain, rel=1.0)  # of that size
+    assert named(found, "as it is").error == pytest.approx(found.strain, rel=1.0)  # of the size of the strain
 
 
 def test_laws_that_differ_beyond_what_changes_are_said_to():
-    """At 100 bar the laws differ by p/K = 0.8 % of a head; where the supply rises by 1 %, that is most of its range."""
+    """At 100 bar the laws differ by p / K = 0.8 % of a head, most of the range where the supply rises by 1 %."""
     fluid = WATER | {"density": 850.0, "bulk_modulus": 1.2e9}
     nodes = {"pump": reservoir(step(0.01, 1e7, 1.01e7)), "c": chamber(2e-6), "sump": reservoir(2e5)}
     links = {"in": valve("pump", "c", 5e-7), "out": valve("c", "sump", 5e-7)}
@@ -142,7 +142,7 @@ def test_laws_that_differ_beyond_what_changes_are_said_to():
     assert found.strain == pytest.approx(1e5 / 1.2e9, rel=0.01) and found.cheapest.law == "log"
     head = {
         "linear": np.array([1e7, 1.01e7]) / 850.0,
-        "log": 1.2e9 / 850.0 * -np.expm1(-(np.array([1e7, 1.01e7]) - AMBIENT) / 1.2e9),  # int dp / rho
+        "log": 1.2e9 / 850.0 * -np.expm1(-(np.array([1e7, 1.01e7]) - AMBIENT) / 1.2e9),  # integral of dp / rho
     }
     shift = head["linear"][0] - AMBIENT / 850.0 - head["log"][0]
     assert found.law_difference.probe == "pump.head" and found.law_difference.start == pytest.approx(
@@ -201,14 +201,14 @@ def test_the_command_names_the_cheapest(fvs, tmp_path):
     assert code == 0 and said["cheapest"] == min(within, key=lambda rung: rung["seconds"]) and said["target"] == 0.05
     code, out, _ = fvs("chart", "gradual-closure", "--models", "--target", "0.05")
     (named,) = [line for line in out.splitlines() if line.startswith("cheapest within 0.05: ")]
-    assert code == 0  # which of them was quickest is a matter of the clock
+    assert code == 0  # the fastest depends on measured times
     assert ", ".join(named.removeprefix("cheapest within 0.05: ").split(", ")[:2]) in {
         f"{rung['name']}, {rung['law']}" for rung in within
     }
 
 
 def coarse(cells=(3, 2), **numerics) -> dict:
-    """Two pipes of few cells by first order, behind a gate that shuts to a half."""
+    """Case of two pipes with few cells and first order, behind a valve that closes to a half."""
     nodes = {"lake": reservoir(5e5), "mid": junction(), "gate": junction(), "out": reservoir(AMBIENT)}
     links = {
         "a": pipe("lake", "mid", 180.0, DIAMETER, SPEED, cells[0], friction=FRICTION),
@@ -227,7 +227,7 @@ def test_a_rung_is_within_the_target_of_what_many_cells_say_and_not_of_the_case(
     fine = fvsolve.run(coarse((180, 120), scheme="upwind5", method="rk4"), {"fluid.law": "log"})
 
     def off(keys):
-        """What a run errs against many cells of fifth order: an independent reference."""
+        """Error of a run against many cells of fifth order, an independent reference."""
         gap = fvsolve.run(case, keys).si("gate.pressure") - fine.si("gate.pressure")
         return math.sqrt(np.mean(gap**2)) / np.ptp(fine.si("gate.pressure"))
 

@@ -1,4 +1,4 @@
-"""Water in tanks that ride, as ice, as modes and as cells: which rung a scene needs, and that the ladder says so."""
+"""Water in moving tanks as frozen mass, modes or cells: the hierarchy of models states which form a case needs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fvsolve.studies import ladder
 
 
 def rolling(rate: float, level: float = 0.2, **basin):
-    """A hull that swings by little or much, with water across it."""
+    """Case of a rolling hull with an initial rate, and a basin across it."""
     nodes = {
         "hull": {"type": "body", "mass": 3000.0, "inertia": [2e4] * 3,
                  "joint": {"kind": "revolute", "axis": [1, 0, 0], "rate": rate, "stiffness": 8e4}},
@@ -38,8 +38,8 @@ def test_it_says_how_far_from_shallow_a_tank_is():
     found = ladder(rolling(1e-4, level=1.0), target=0.05)
     (said,) = found.shallow_water
     assert (
-        said == "tank: its slowest wave, with k h = 1, is 16 % too fast in shallow water, more than the target: modes "
-        "are more accurate for small waves"
+        said == "tank: its slowest wave, with k h = 1, is 16 % too fast in shallow-water theory, more than the target: "
+        "modes are more accurate for small waves"
     )
 
 
@@ -65,7 +65,7 @@ def test_basins_that_do_not_ride_are_refused_by_name():
 
 
 def test_a_liquid_that_rides_is_no_tank_that_sloshes():
-    """It has no level: a rung of it is refused by name, never said with one."""
+    """A liquid has no level, so a basin of it is refused by name."""
     liquid = {"physics": "liquid", "cells": [4, 4], "pressure": 5e5, "thickness": 0.1}
     case = rolling(1e-4, **liquid)
     case["output"]["probes"] = ["hull.angle"]

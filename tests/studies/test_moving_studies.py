@@ -1,4 +1,4 @@
-"""Studies asked of scenes that move: poles, impedances and ledgers against closed forms, and what they say."""
+"""Studies of moving cases: poles, impedances and energy balances against closed forms, and messages."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ def poles(case) -> np.ndarray:
 
 
 def test_a_free_body_about_its_middle_axis_has_the_poles_of_eulers_equations():
-    """w sqrt((I2 - I1) (I3 - I2) / (I1 I3)), one of them growing; rows of A that are rounding alone are no fault."""
+    """Poles +-w sqrt((I2 - I1) (I3 - I2) / (I1 I3)), one of them unstable; rows of A may be rounding alone."""
     stone = body(5.0, [0.3, 0.5, 0.7], {"kind": "free", "rate": [0.0, 2.0, 0.0]})
     found = poles(bodies({"stone": stone}, 1.0, ["stone.wy"], method="gauss-4", step=0.01) | {"gravity": 0.0})
     wanted = 2.0 * math.sqrt(0.2 * 0.2 / (0.3 * 0.7))
     assert max(found.real) == pytest.approx(wanted, rel=1e-9) and min(found.real) == pytest.approx(-wanted, rel=1e-9)
-    stone["joint"]["rate"] = [0.01, 2.0, 0.02]  # nearly: it turns on, and still it can be linearised
+    stone["joint"]["rate"] = [0.01, 2.0, 0.02]  # near the equilibrium; it can still be linearised
     found = poles(bodies({"stone": stone}, 1.0, ["stone.wy"], method="gauss-4", step=0.01) | {"gravity": 0.0})
     assert max(found.real) == pytest.approx(wanted, rel=1e-3)
 
@@ -61,7 +61,7 @@ def test_a_tank_on_a_spring_has_the_pole_of_the_tangent_law():
 
 
 def test_the_impedance_of_a_u_tube_on_its_hull_is_that_of_two_tanks_and_what_lies_between():
-    """rho g / (A s) (s^2 + w^2) / (s^2 + 2 w^2), w^2 = g a / (A L)."""
+    """Impedance rho g / (A s) (s^2 + w^2) / (s^2 + 2 w^2), w^2 = g a / (A L)."""
     case = u_tube("dormand-prince", free=False)
     case["nodes"]["hull"]["joint"]["angle"] = {"mean": 0.0, "amplitude": 0.0, "period": 5.0}
     case["links"]["duct"]["minor_loss"] = 0.0
@@ -73,7 +73,7 @@ def test_the_impedance_of_a_u_tube_on_its_hull_is_that_of_two_tanks_and_what_lie
 
 
 def test_the_ledger_of_energy_of_a_basin_with_a_wall_and_of_a_device_beside_it_closes():
-    """Rows of devices come behind those of basins; a valve passes energy between a basin that moves and a tank."""
+    """Rows of devices come after those of basins; a valve joins a basin with a moving wall to a tank."""
     parts = []
     for step in (8e-3, 4e-3):
         found = energy(flume("ssp-rk3"), {"numerics.step": step})

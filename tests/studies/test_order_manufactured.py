@@ -1,4 +1,4 @@
-"""Manufactured solutions: start, source and exact solution as functions of x and t, and reading inside pipes."""
+"""Manufactured solutions: start, source and exact solution as functions of x and t, and values inside pipes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ AREA, K, W = scenes.area(DIAMETER), 1.5 * np.pi / LENGTH, 300.0
 
 
 def case(cells: int = 20, friction=scenes.NO_FRICTION, **numerics) -> dict:
-    """A reservoir at one end, a blind end at the other."""
+    """Case of a pipe between a reservoir and a dead end."""
     nodes = {"lake": scenes.reservoir(3e5), "end": scenes.junction()}
     links = {"main": scenes.pipe("lake", "end", LENGTH, DIAMETER, SPEED, cells, friction=friction)}
     given = {"scheme": "upwind5", "method": "verner-7", "courant": 0.5, **numerics}
@@ -24,18 +24,18 @@ def case(cells: int = 20, friction=scenes.NO_FRICTION, **numerics) -> dict:
 
 
 def free(pipe, x, t):
-    """A standing wave that needs no source."""
+    """Pressure and flow of a standing wave without source."""
     swing = 1e5 * AREA / (scenes.RHO * SPEED)
     return 3e5 + 1e5 * np.sin(K * x) * np.cos(K * SPEED * t), -swing * np.cos(K * x) * np.sin(K * SPEED * t)
 
 
 def driven(pipe, x, t):
-    """Waves that no pipe would show by itself."""
+    """Pressure and flow of waves that need a source."""
     return 3e5 + 1e5 * np.sin(K * x) * np.cos(W * t), 0.3 * np.cos(K * x) * np.sin(2 * W * t)
 
 
 def drive(pipe, x, t):
-    """What must be fed in for `driven`: p_t A / a^2 + rho q_x, and rho q_t + A p_x."""
+    """Source of `driven`: p_t A / a^2 + rho q_x, and rho q_t + A p_x."""
     p_t, p_x = -W * 1e5 * np.sin(K * x) * np.sin(W * t), K * 1e5 * np.cos(K * x) * np.cos(W * t)
     q_t, q_x = 0.6 * W * np.cos(K * x) * np.cos(2 * W * t), -0.3 * K * np.sin(K * x) * np.sin(2 * W * t)
     return AREA / SPEED**2 * p_t + scenes.RHO * q_x, scenes.RHO * q_t + AREA * p_x
@@ -53,7 +53,7 @@ def test_a_standing_wave_shows_the_order_of_the_scheme(scheme, p):
 @pytest.mark.parametrize(("scheme", "p"), [("upwind3", 3), ("upwind5", 5)])
 @pytest.mark.parametrize("probe", ["main.pressure@0.37", "main.flow@0.61", "end.pressure", "main.flow@0"])
 def test_reading_at_a_point_does_not_cap_the_order(scheme, p, probe):
-    """0.37 falls on another part of its cell at every level."""
+    """0.37 is at another place of its cell at each level."""
     found = order(case(20), schemes=scheme, exact=free, levels=4)
     fit = found.fits[probe]["L2"]
     assert fit.order > p - 0.2, fit
@@ -63,7 +63,7 @@ def test_reading_at_a_point_does_not_cap_the_order(scheme, p, probe):
 
 @pytest.mark.parametrize(("scheme", "p"), [("upwind3", 3), ("upwind5", 5)])
 def test_a_source_is_fed_in_at_the_order_of_the_scheme(scheme, p):
-    """In max: the error is largest at the ends; inside it falls by one order more for a while."""
+    """Maximum norm: the error is largest at the ends, and inside it falls by one order more at first."""
     found = order(case(30), schemes=scheme, exact=driven, source=drive, levels=4)
     assert found.fits["pressure"]["max"].order == approx(p, abs=0.25)
     slow = [row.errors["flow"]["max"] for row in found.rows]
@@ -71,7 +71,7 @@ def test_a_source_is_fed_in_at_the_order_of_the_scheme(scheme, p):
 
 
 def test_friction_is_averaged_to_fourth_order_where_the_flow_keeps_its_direction():
-    """Between two reservoirs; where a flow turns, |q| q has a kink in its slope and the order is three."""
+    """The flow between two reservoirs does not reverse; where it does, |q| q has a kink and the order is three."""
     factor, loss, k = 0.5, 0.5 * scenes.RHO / (2 * DIAMETER * AREA), 2 * np.pi / LENGTH
 
     def exact(pipe, x, t):

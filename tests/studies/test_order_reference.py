@@ -1,4 +1,4 @@
-"""What errors are measured against: it is right, it knows how far off it is, and it says where it is no judge."""
+"""References of errors: their accuracy, the estimate of it, and cases in which a reference is not accurate enough."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_the_error_that_a_reference_states_of_itself_is_about_its_true_one(case,
 
 
 def test_rows_that_the_reference_cannot_judge_are_marked_and_said():
-    """Both have a front, which a finer grid hardly sharpens: the reference is no better than the last rows."""
+    """Rows and reference have a front, which finer grids hardly sharpen: the last rows are as good as the reference."""
     found = order(pulses.front(), schemes="fromm", against="finer", levels=4)
     assert found.kind == "finer" and "reference" in found.fits["pressure"]["L1"].marks
     assert any("they are not reliable" in note and "[exact]" in note for note in found.notes)
@@ -64,7 +64,7 @@ def test_rows_that_the_reference_cannot_judge_are_marked_and_said():
 
 
 def test_a_reference_that_is_no_better_than_the_runs_is_refused_with_a_way_out():
-    """Upwind and Euler at Courant number 1 are the exact solution, fronts and all; no finer run can judge them."""
+    """Upwind with Euler at Courant number 1 is exact, fronts included, so finer runs cannot judge it."""
     case = pulses.front(50, method="euler", courant=1.0)
     with pytest.raises(FvsolveError, match=r"not more accurate than the rows.*\[exact\].*richardson"):
         order(case, against="finer", levels=3)
@@ -155,7 +155,7 @@ def test_a_reference_that_fails_says_so():
     case["nodes"]["gate"] = scenes.junction(scenes.step(0.01, 0.0, 5.0))
     with pytest.raises(FvsolveError, match="reference run failed.*vapour"):
         order(case, levels=2, cells=4, against="finer")
-    with pytest.raises(FvsolveError, match="no row could be run.*vapour"):  # nor by each other
+    with pytest.raises(FvsolveError, match="no row could be run.*vapour"):  # nor with the next row as reference
         order(case, levels=2, cells=4)
 
 
@@ -164,7 +164,7 @@ LAWS = ("log", "table")
 
 @pytest.mark.parametrize("law", LAWS)
 def test_other_density_laws_are_compared_by_cell_averages_as_well(law):
-    """A smooth pulse under a law that has no exact solution here: the order shows against a finer run."""
+    """A smooth pulse under a law without exact solution: a finer run shows the order."""
     case = pulses.case(20, exact=False, points=pulses.FEW)
     case["fluid"] = {"name": "Water", "law": law}
     found = order(case, schemes="upwind3", levels=3, cells=40)
@@ -173,7 +173,7 @@ def test_other_density_laws_are_compared_by_cell_averages_as_well(law):
 
 @pytest.mark.parametrize(("cells", "levels"), [(24, 4), (28, 4), (20, 5)])
 def test_richardson_gives_no_number_that_its_differences_cannot_show(cells, levels):
-    """Upwind blurs the pulse away: orders of differences stay near 0.42 between the coarse rows and climb to 1 late."""
+    """Upwind smears the pulse: orders of differences stay near 0.42 between coarse rows and approach 1 late."""
     exact, found = (order(pulses.case(cells, points=pulses.FEW), schemes="upwind", levels=levels, against=way)
                     for way in ("exact", "richardson"))  # fmt: skip
     for norm, fit in found.fits["pressure"].items():
@@ -196,7 +196,7 @@ def test_errors_by_richardson_are_the_true_ones_where_the_order_is_sure():
 
 @pytest.mark.parametrize(("scheme", "method", "p"), [("upwind5", "rk4", 5), ("upwind3", "ssp-rk3", 3)])
 def test_refining_space_alone_shows_the_order_of_the_scheme_by_default(scheme, method, p):
-    """At the case's Courant number, 0.9, the error of the step would hide it."""
+    """At the Courant number 0.9 of the case, the error of the step would hide the order."""
     found = order(pulses.case(20, courant=0.9), schemes=scheme, methods=method, refine="space", levels=4, cells=30)
     assert len({row.level.step for row in found.rows}) == 1
     assert f"Courant number {0.19 if p == 5 else 0.22}" in found.plan.words

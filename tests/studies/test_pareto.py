@@ -1,4 +1,4 @@
-"""Fronts, crossings and targets of synthetic sets, where the answer is known."""
+"""Pareto fronts, crossings and targets of synthetic sets with known answers."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_a_failed_point_is_on_no_front():
 
 @given(st.floats(0.3, 6.0), st.floats(1.001, 900.0))
 def test_a_crossing_on_a_power_law_is_exact(order, ratio):
-    """Error 8 h^p at cost h^-2, h = 1, 1/2, 1/4, 1/8: the target met in between has cost (8 / target)^(2 / p)."""
+    """Error 8 h^p at cost h^-2, h = 1, 1/2, 1/4, 1/8: a target between has the cost (8 / target)^(2 / p)."""
     errors = [8.0 * 2.0 ** (-order * k) for k in range(4)]
     target = 8.0 / min(ratio, 2.0 ** (3.0 * order) * 0.999)
     where = find_crossing(errors, COSTS, target)
@@ -41,7 +41,7 @@ def test_a_crossing_on_a_power_law_is_exact(order, ratio):
 
 
 def test_a_crossing_counts_only_from_where_all_finer_points_hold():
-    """One lucky coarse point below the target promises nothing."""
+    """A single coarse point below the target does not count."""
     where = find_crossing([1e-3, 1e-1, 1e-2, 1e-4], COSTS, 1e-3)
     assert (where.coarser, where.finer) == (2, 3)
     assert where.cost == pytest.approx(32.0)

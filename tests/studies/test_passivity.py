@@ -1,4 +1,4 @@
-"""Who keeps a passive network passive: claims from coefficients, and that real runs do as they say."""
+"""Passivity of methods and schemes: claims from coefficients, and real runs that agree with them."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ NEVER = ["euler", "improved-euler", "rk4", "ssp-rk3", "dormand-prince", "trapezo
 
 
 def pumped(method: str, h: float, half: int) -> dict:
-    """A chamber at ambient pressure that is filled for `half` steps and emptied for as many."""
+    """Case of a chamber at ambient pressure that is filled for `half` steps and emptied for as many."""
     nodes = {"pump": {"type": "inflow", "flow": stepped(half * h, FLOW, -FLOW)}, "pot": chamber(VOLUME, AMBIENT)}
     return scene(nodes, {"way": valve("pump", "pot", 10.0)}, 2 * half * h, {"method": method, "step": h})
 
@@ -54,7 +54,7 @@ def test_algebraically_stable_methods_are_passive_in_any_network(name):
 
 @pytest.mark.parametrize("name", NEVER)
 def test_other_methods_create_energy_in_a_chamber_by_some_flow(name):
-    """The flow of the worst eigenvector, at the times of the stages, through y' = q(t), by the method's own steps."""
+    """The worst eigenvector is the flow q at the stage times, and the method integrates y' = q(t)."""
     from fvsolve.steppers import method_named
 
     claim, method = method_claim(name), method_named(name)
@@ -71,7 +71,7 @@ def test_other_methods_create_energy_in_a_chamber_by_some_flow(name):
 
 
 def test_forward_euler_breaks_condition_2_on_a_single_chamber():
-    """Filled by h q a step and emptied again, it gives h^2 q^2 beta / V more than it got, every two steps."""
+    """Filled and emptied by h q per step, the chamber creates h^2 q^2 beta / V every two steps."""
     h, half = 0.01, 30
     found = energy(pumped("euler", h, half), port="pump")
     made = half * (h * FLOW) ** 2 * BETA / VOLUME
@@ -84,7 +84,7 @@ def test_forward_euler_breaks_condition_2_on_a_single_chamber():
 
 @pytest.mark.parametrize("method", [*ALWAYS, "improved-euler", "rk4", "trapezoid"])
 def test_others_keep_condition_2_on_it(method):
-    """Methods of order two and more see a flow that does not change within a step, and make nothing of it."""
+    """For methods of order two and more, the flow is constant within a step, and they create no energy."""
     found = energy(pumped(method, 0.01, 30), port="pump")
     assert found.port.passive
     assert found.port.margin >= -1e-12 * found.throughput
@@ -109,7 +109,7 @@ def test_a_resonator_gains_energy_just_beyond_the_limit_and_not_below(name):
     limit = method_claim(name).resonator
 
     def swing(h_omega: float) -> np.ndarray:
-        """Energy about the level of the sea over its start."""
+        """Energy relative to the level of the sea, over its value at the start."""
         found = energy(swinging(name, h_omega))
         held = found.stored["way"] + found.stored["pond"] - found.supplied["sea"]
         return 1.0 + held / (0.5 * RHO * GRAVITY * 2.0 * 2.0**2)
@@ -123,7 +123,7 @@ def test_a_resonator_gains_energy_just_beyond_the_limit_and_not_below(name):
 
 
 def pipe_model(scheme: str, method: str, courant: float, steps: int = 1):
-    """The closed pipe of the study, to be run for some steps of a Courant number."""
+    """Model of the closed pipe of the study, for some steps at a Courant number."""
     h = courant * 50.0 / 1000.0
     nodes = {"a": junction(), "b": junction(), "tap": reservoir(1e6)}
     links = {"pipe": pipe("a", "b", 1000.0, 0.3, 1000.0, study.CELLS), "shut": valve("b", "tap", 1e-4, 0.0)}
@@ -133,7 +133,7 @@ def pipe_model(scheme: str, method: str, courant: float, steps: int = 1):
 
 
 def worst_state(scheme: str, method: str, courant: float) -> np.ndarray:
-    """The state whose energy a step stretches most."""
+    """State whose energy a step increases most."""
     from fvsolve.steppers import stability_function
 
     a, s = closed_pipe(scheme)
@@ -145,7 +145,7 @@ def worst_state(scheme: str, method: str, courant: float) -> np.ndarray:
 
 
 def gain(scheme: str, method: str, courant: float) -> float:
-    """Energy after one real step over that before, from the worst state."""
+    """Energy after a real step over that before, from the worst state."""
     start, s = worst_state(scheme, method, courant), closed_pipe(scheme)[1]
     run = outcome(pipe_model(scheme, method, courant), y=start)
     assert run.ok
@@ -176,7 +176,7 @@ def test_a_stable_methods_with_a_passive_scheme_never_gain_energy(scheme, method
 
 @pytest.mark.parametrize("scheme", ["central", "linear-upwind", "upwind3", "upwind5"])
 def test_other_schemes_create_energy_at_pipe_ends_and_no_more_than_they_say(scheme):
-    """Whatever the method: here by gauss-4, which creates none of its own."""
+    """The method does not matter: gauss-4 itself creates no energy."""
     claim = scheme_claim(scheme)
     assert not claim.passive
     assert gain(scheme, "gauss-4", 0.1) > 1.0 + 0.02 * claim.rate

@@ -1,4 +1,4 @@
-"""The error of a peak is a band: it holds what is known to be the error, and says where no order is seen."""
+"""Error bands of peaks contain the known error, and state no order where none is observed."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_bands_of_shipped_cases_hold_what_four_times_the_resolution_gives(name: 
 
 
 def test_where_liquid_parts_no_order_is_believed() -> None:
-    """A pumping main after a trip: three grids show order two, and four times the resolution is beyond its band."""
+    """Pumping main after a trip: three grids show order two, but four times the resolution is outside its band."""
     trip = {"links.pump.trip": 1.0, "links.main.cells": 60, "numerics.end": 14.0, "expect": {}}
     way = {"fluid.law": "mixture", "fluid.cavitation": True, "numerics.scheme": "muscl", "numerics.courant": 0.9}
     case = fvsolve.load("pumping-main", set=trip | way)
@@ -58,13 +58,13 @@ def test_the_command_says_how_far_peaks_and_verdicts_are_off(fvs, tmp_path, monk
     said = json.loads((tmp_path / "runs" / "scene" / "summary.json").read_text())
     peak, verdict = said["peaks"]["gate.pressure"]["maximum"], said["verdicts"][0]
     assert peak["value"] == said["extremes"]["gate.pressure"]["maximum"]
-    assert peak["error"] <= verdict["error"] <= 0.01 * verdict["value"]  # of the whole pipe, whose places differ more
+    assert peak["error"] <= verdict["error"] <= 0.01 * verdict["value"]  # of the whole pipe, which errs more
     fine = fvsolve.run(case, set=refined_keys(fvsolve.load(case), 8.0))
     assert abs(fine.extremes["gate.pressure"].maximum - peak["value"]) <= peak["error"]
     assert abs(fine.verdicts[0].value - verdict["value"]) <= verdict["error"]
     assert fvsolve.open_run(tmp_path / "runs" / "scene").verdicts[0].error == verdict["error"]
     assert "+-" not in fvs("run", "scene.toml", "--out", "plain", "--no-pictures")[1]
-    for share, state, wanted in ((0.5, "open", 1), (2.0, "holds", 0), (-0.5, "fails", 1)):  # of the band, as a margin
+    for share, state, wanted in ((0.5, "open", 1), (2.0, "holds", 0), (-0.5, "fails", 1)):  # margin over error
         limit = f"limits.top.maximum={verdict['value'] + share * verdict['error']!r} Pag"
         status, text, _ = fvs("run", "scene.toml", "--estimate-error", "--no-pictures", "--set", limit, "--out", state)
         (one,) = fvsolve.open_run(tmp_path / state).verdicts
@@ -82,11 +82,11 @@ def test_a_finer_case_is_finer_in_all_that_has_a_resolution() -> None:
     assert refined_keys(line, 2.0) == {
         "numerics.courant": 0.45,
         "numerics.delay_tolerance": 0.005,
-    }  # by which its steps go
+    }  # its steps follow courant
 
 
 def two_pipes(limits: dict) -> dict:
-    """A line closes by 70 % behind an air vessel: its trough comes late, and sharper on finer cells."""
+    """Case of a line that closes by 70 % behind an air vessel; its late trough is deeper on finer cells."""
     nodes = {"lake": lake(87.473, elevation=0.0), "end": junction(elevation=0.0),
              "j": {"type": "accumulator", "volume": 0.116436, "gas_volume": 0.0103807, "elevation": 0.0,
                    "connection": {"diameter": 0.1, "loss_in": 2.0, "loss_out": 2.0}},
@@ -99,7 +99,7 @@ def two_pipes(limits: dict) -> dict:
 
 
 def test_a_trough_that_finer_cells_deepen_leaves_a_limit_open() -> None:
-    """On all three resolutions the start is the least; on eight times the cells a later trough is lower by 31 kPa."""
+    """On three resolutions the start is the minimum; on eight times the cells a later trough is 31 kPa lower."""
     case = two_pipes({"low": {"on": "end", "quantity": "pressure", "minimum": "6.3 bar"}})
     said = peak_errors(fvsolve.run(case), fvsolve.load(case))
     peak, (verdict,) = said["peaks"]["end.pressure"]["minimum"], said["verdicts"]
@@ -109,7 +109,7 @@ def test_a_trough_that_finer_cells_deepen_leaves_a_limit_open() -> None:
 
 
 def stub(cells: int, opening: dict, beside: int = 100, **more) -> dict:
-    """A valve behind a short pipe of few cells at the end of a long one."""
+    """Case of a valve behind a short pipe of few cells at the end of a long pipe."""
     nodes = {"lake": lake(50.0), "j": junction(), "gate": junction(), "out": reservoir(101325.0)}
     links = {"main": pipe("lake", "j", 1000.0, 0.3, 1000.0, beside),
              "short": pipe("j", "gate", 8.0, 0.15, 1000.0, cells),
@@ -126,7 +126,7 @@ def test_one_cell_cannot_be_halved() -> None:
 
 
 def test_a_pipe_shorter_than_a_cell_beside_it_is_not_known() -> None:
-    """The wave from the lake is smeared over more than the short pipe, whatever its own cells: 22.3 m for -63.54."""
+    """The long pipe smears the wave over more than the short pipe, for any cells of it: 22.3 m instead of -63.54 m."""
     case = stub(8, ramp(0.5, 0.0, 1.0, 0.0))
     said = peak_errors(fvsolve.run(case), fvsolve.load(case))
     assert said["peaks"]["gate.head"]["minimum"]["error"] is None
@@ -139,7 +139,7 @@ def test_a_pipe_shorter_than_a_cell_beside_it_is_not_known() -> None:
 
 
 def slamming(at: float) -> dict:
-    """A pump trips; a check valve slams before a vessel that stands so far along the main."""
+    """Case of a pump trip with a check valve that slams before a vessel at chainage `at` [m] of the main."""
     case = station(at)
     case["nodes"]["header"] = junction(elevation=0.0)
     del case["links"]["flap"]["area"]
@@ -190,7 +190,7 @@ def test_events_that_differ_between_resolutions_are_named() -> None:
 
 
 class Finished:
-    """A run with events."""
+    """Result of a finished run with events."""
 
     reason = "finished"
 

@@ -1,4 +1,4 @@
-"""A periodic pipe fails where its waves say, and what limited schemes do there: real runs of the package's stepper."""
+"""Periodic pipe: real runs fail at the limits of linear schemes, and limits of limited schemes are measured."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ EXPLICIT = [name for name, one in METHODS.items() if name == one.name and one.ex
 
 @pytest.mark.parametrize("scheme", [*WEIGHTS, "weno5"])
 def test_a_run_is_what_numpy_makes_of_the_same_steps(scheme):
-    """SSP-RK3 of Shu and Osher, faces by rolling; WENO5 of a smooth field by its formula."""
+    """SSP-RK3 of Shu and Osher with shifted arrays in NumPy; weno5 by its formula."""
     cells, courant, steps = 24, 0.3, 7
     u = np.sin(2 * np.pi * np.arange(cells) / cells) + np.random.default_rng(3).random(cells)
 
@@ -50,14 +50,14 @@ def test_a_run_is_what_numpy_makes_of_the_same_steps(scheme):
 
 @pytest.mark.parametrize("scheme", WEIGHTS)
 def test_runs_fail_where_the_waves_say(scheme):
-    """The goal is one percent, of every linear scheme with every explicit method; the matrix is normal: it is exact."""
+    """Measured and predicted limits of linear schemes with explicit methods are equal, because matrices are normal."""
     found = measured_limits([scheme])
     assert [one.method for one in found] == EXPLICIT
     assert all(one.ratio == pytest.approx(1.0, abs=1e-6) for one in found)
 
 
 def test_a_run_fails_where_the_matrix_of_a_step_says():
-    """The norm of the n-th power of the step's matrix, by NumPy, passes the threshold at the measured limit."""
+    """At the measured limit, the greatest norm of the powers of the step matrix (NumPy) passes the threshold."""
     cells, steps = 16, 200
     one = measured_limit("upwind3", "rk4", cells, steps)
     face = np.zeros((cells, cells))
@@ -88,7 +88,7 @@ def test_a_short_run_looks_stable_far_beyond_the_exact_limit(scheme, method, lea
 
 
 def test_frozen_slopes_are_the_tangents_of_the_limiters():
-    """Their slopes at a = 0, at a = b and at b = 0, by differences: what their entries say, and no more."""
+    """Slopes of the limiters at a = 0, a = b and b = 0 by differences are those of their entries."""
     tiny = 1e-7
     for name, one in LIMITERS.items():
         found = set()
@@ -122,7 +122,7 @@ def test_total_variation_does_not_grow_up_to_the_bound(limiter, bound, method):
 
 
 def test_van_leers_limiter_with_euler_has_no_sharp_limit():
-    """0.67, 0.56, 0.52 of the issue: 50 cells, one wave, 500, 5 000 and 50 000 steps; above the bound 1/2."""
+    """Measured limits of one wave on 50 cells fall with 500, 5 000 and 50 000 steps, and stay above the bound 1/2."""
     u = start_fields(50)["wave"]
     found = [measured_courant("muscl", "van-leer", "euler", u, n) for n in (500, 5000, 50000)]
     assert found == pytest.approx([0.67, 0.57, 0.52], abs=0.01) and found[-1] > 0.5

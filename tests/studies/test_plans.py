@@ -1,4 +1,4 @@
-"""Samples fill their ranges and are the same for the same seed; a file of points says all that is wrong of it."""
+"""Samples fill their ranges and depend only on the seed; a file of points reports all its faults."""
 
 import codecs
 
@@ -124,8 +124,8 @@ def test_all_that_is_wrong_of_a_file_is_said_at_once(case, tmp_path):
 @pytest.mark.parametrize(
     "text, said",
     [
-        ("", "is empty; expected a header"),
-        ("links.valve.area\n", "is empty; expected a header"),
+        ("", "has no rows; expected a header"),
+        ("links.valve.area\n", "has no rows; expected a header"),
         ("1,2\n3,4\n", "has no header"),
         ("links.valve.area,nodes.lake.head\n1,2\n1\n", "line 3: 1 cell under 2 headers"),
         ("links.valve.area,nodes.lake.head\n0,5,3\n", "line 2: 3 cells under 2 headers; with decimal commas"),

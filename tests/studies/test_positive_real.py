@@ -1,4 +1,4 @@
-"""`positive_real` decides: textbook functions, boundary cases, narrow bands, hidden modes, random passive networks."""
+"""`positive_real` on textbook functions, boundary cases, narrow bands, hidden modes and random passive networks."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from fvsolve.steppers.numbers.polynomial import Polynomial
 from fvsolve.studies import positive_real
 from fvsolve.studies.ports.rational import locate_roots
 
-S = [1, 0]  # s itself
+S = [1, 0]  # the polynomial s
 
 
 def times(*factors):
-    """The product of polynomials, highest power first, exact."""
+    """Exact product of polynomials, highest power first."""
     found = Polynomial([1])
     for factor in factors:
         found = found * Polynomial([F(x) for x in factor][::-1])
@@ -95,7 +95,7 @@ def test_connected_passive_systems_parallel_yes_series_product_no():
 
 
 def closed(h, g):
-    """h / (1 + h g), h with g fed back, highest power first."""
+    """Feedback h / (1 + h g), highest power first."""
     (n, d), (m, e) = h, g
     return times(n, e) or [0], total(times(d, e), times(n, m))
 
@@ -112,14 +112,14 @@ def test_passive_systems_in_feedback_are_passive(name, back):
 
 
 def test_stable_systems_in_feedback_need_not_be_stable():
-    three = ([1], [1, 3, 3, 1])  # 1 / (s + 1)^3, which is not passive, under a gain of 9: its limit is 8
+    three = ([1], [1, 3, 3, 1])  # 1 / (s + 1)^3 is not passive, and its feedback is unstable above a gain of 8
     assert not positive_real(*three)
     assert max(np.roots([float(x) for x in closed(three, ([9], [1]))[1]]).real) > 0.0
     assert max(np.roots([float(x) for x in closed(three, ([7], [1]))[1]]).real) < 0.0
 
 
 def in_the_right_half_plane(n, d):
-    """Least Re H / |H| about poles and zeros and far around, right of the axis; greatest |Im H| on the real axis."""
+    """Least Re H / |H| right of the axis, near poles and zeros and far from them; greatest |Im H| on the real axis."""
     poles, zeros = (np.roots([float(x) for x in p]) for p in (d, n))
     about = np.concatenate([poles, zeros, [0.0]])
     rings = about[:, None, None] + np.geomspace(1e-4, 1e4, 65)[:, None] * np.exp(1j * np.linspace(-np.pi, np.pi, 181))
@@ -135,7 +135,7 @@ def in_the_right_half_plane(n, d):
 
 @pytest.mark.parametrize("name", YES)
 def test_the_theorem_finds_what_the_definition_says(name):
-    """H is real for positive s, and Re H >= 0 right of the axis: the definition in 4.1, sampled."""
+    """Definition of section 4.1, sampled: H is real for positive s, and Re H >= 0 right of the axis."""
     least, imaginary = in_the_right_half_plane(*YES[name])
     assert least > -1e-9 and imaginary == 0.0
 
@@ -179,7 +179,7 @@ def test_lossless_functions_are_told():
 
 
 def biquad(b0):
-    """(s^2 + s + b0) / (s^2 + s + 4): Re H touches zero at b0 = 1, w = sqrt 2."""
+    """Function (s^2 + s + b0) / (s^2 + s + 4): Re H touches zero at b0 = 1, w = sqrt 2."""
     return [1, 1, b0], [1, 1, 4]
 
 
@@ -221,7 +221,7 @@ def test_two_bands_beside_each_other():
 
 
 def with_real_part(roots, d):
-    """N, D with E(x) = prod (x - root): linear equations in the coefficients of N, solved exactly."""
+    """N and D with E(x) = prod (x - root), from exact linear equations for the coefficients of N."""
     degree = len(d) - 1
     e = times(*([1, -root] for root in roots))
     down = [F(x) for x in d][::-1]
@@ -269,7 +269,7 @@ def test_a_pole_that_misses_the_axis_by_1e_30_is_told_from_one_on_it():
     assert [mode.side for mode in positive_real(n, [1, -2 * tiny, 1]).poles] == ["right", "right"]
 
 
-ROUTH = {  # rows of Routh's array that begin with, or hold nothing but, zeros
+ROUTH = {  # rows of Routh's array begin with zero or are zero
     "s^4+s^3+2s^2+2s+3": ([1, 1, 2, 2, 3], (2, 0, 2)),
     "s^5+2s^4+3s^3+6s^2+5s+3": ([1, 2, 3, 6, 5, 3], (2, 0, 3)),
     "s^6+s^5-6s^4-s^2-s+6": ([1, 1, -6, 0, -1, -1, 6], (2, 2, 2)),
@@ -318,7 +318,7 @@ def added(one, two):
 
 
 def network(steps):
-    """An impedance built element by element, in series and in parallel by turns (a ladder: a continued fraction)."""
+    """Impedance of elements in series and in parallel by turns (a ladder: a continued fraction)."""
     found = element(*steps[0])
     for k, step in enumerate(steps[1:]):
         one = element(*step)
@@ -377,11 +377,11 @@ def test_bands_agree_with_dense_sampling_of_stable_functions(n, pairs):
     assert np.array_equal(re[sure] < 0, inside[sure]) and found.positive_real == (not found.bands)
 
 
-# what goes in ---------------------------------------------------------------------------------------------------
+# input ----------------------------------------------------------------------------------------------------------
 
 
 def test_floats_are_the_binary_fractions_they_are_and_text_is_decimal():
-    # 0.1 + 0.2 differs from 0.3 in floats: the factor is not shared, in text it is
+    # 0.1 + 0.2 is not 0.3 in floats, so the factor is not shared; as text it is shared
     assert positive_real(["0.3"], ["0.3"]).hidden == ()
     assert positive_real([1, "-0.3"], [1, "-0.3"]).hidden and not positive_real([1, -0.1 - 0.2], [1, -0.3])
     found = positive_real([1, 0.1], [1, Decimal("0.1")])

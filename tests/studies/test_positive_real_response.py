@@ -1,4 +1,4 @@
-"""`fvsolve response`: ports of cases against closed forms; the verdict follows the scheme."""
+"""`fvsolve response`: ports of cases against closed forms, and verdicts that depend on the scheme."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ OIL = {"name": "user", "density": 870.0, "bulk_modulus": BETA, "viscosity": 0.03
 
 
 def bottle():
-    """A chamber filled through an orifice, 100 bar apart."""
+    """Case of a chamber filled through an orifice at a drop of 100 bar."""
     nodes = {
         "pump": reservoir(101e5),
         "bottle": {"type": "chamber", "volume": VOLUME, "initial_pressure": 1e5},
@@ -48,7 +48,7 @@ WAVE, LENGTH, DIAMETER, CELLS = 1000.0, 1000.0, 0.5, 30
 
 
 def line(scheme, port="gate", cells=CELLS, reverse=False, instead=None):
-    """A lossless pipe between a reservoir and a dead end."""
+    """Response of a lossless pipe between a reservoir and a dead end."""
     ends = ("gate", "lake") if reverse else ("lake", "gate")
     pipe = {"type": "pipe", "from": ends[0], "to": ends[1], "length": LENGTH, "diameter": DIAMETER,
             "wave_speed": WAVE, "cells": cells, "friction": NO_FRICTION}  # fmt: skip

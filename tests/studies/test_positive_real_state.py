@@ -1,4 +1,4 @@
-"""State spaces in floats agree with the exact verdict where they decide; lines are swept with a bound that holds."""
+"""State spaces in floats agree with the exact verdict where they decide, and sweeps of lines have a valid bound."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from fvsolve.studies import (
 
 
 def companion(n, d):
-    """A, b, c, d of a proper rational function, highest power first, without SciPy's scaling."""
+    """State space A, b, c, d of a proper rational function, highest power first, without SciPy's scaling."""
     n, d = np.trim_zeros(np.asarray(n, float), "f"), np.asarray(d, float)
     order = len(d) - 1
     n = np.concatenate([np.zeros(order + 1 - len(n)), n]) / d[0]
@@ -96,7 +96,7 @@ def test_a_narrow_band_is_found_without_a_grid():
 
 
 def test_a_narrow_band_of_a_stiff_system_with_a_quick_pole_beside_it():
-    # plus a lag of 1e7 1/s whose real part, 1e-9, does not fill the dip of 5e-7
+    # plus a lag of 1e7 1/s with real part 1e-9, which is less than the dip of 5e-7
     n = np.polyadd(np.polymul([1, 1, 1 - 1e-6], [1e-7, 1]), np.polymul([1e-9], [1, 1, 4]))
     found = verdict(n, np.polymul([1, 1, 4], [1e-7, 1]))
     assert found.positive_real is False and found.dips[0].low < math.sqrt(2) < found.dips[0].high
@@ -154,7 +154,7 @@ def test_a_line_that_ends_in_a_negative_resistance_is_not_positive_real():
 
 def test_a_line_on_its_lossless_axis_wants_to_be_taken_right_of_its_poles():
     for reflection in (-1.0, 1.0):
-        with pytest.raises(FvsolveError, match="greater shift"):
+        with pytest.raises(FvsolveError, match="right"):
             line_positive_real(LineImpedance(Z0, T, reflection), shift=0.0)
 
 

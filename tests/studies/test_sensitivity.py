@@ -1,4 +1,4 @@
-"""Indices of a function that are known in closed form are found; those of runs are those of their own outcomes."""
+"""Sensitivity indices: closed forms of functions, and indices of runs from their outcomes."""
 
 import json
 import math
@@ -23,20 +23,20 @@ def ishigami(x: dict) -> float:
 
 
 def test_the_ishigami_function_has_its_known_indices():
-    """Ishigami and Homma 1990: variances of its terms in closed form."""
+    """Closed forms of the variances of all terms (Ishigami and Homma 1990)."""
     first = [0.5 * (1 + B * math.pi**4 / 5) ** 2, A**2 / 8, 0.0]
-    both = 8 * B**2 * math.pi**8 / 225  # of x1 and x3 together
+    both = 8 * B**2 * math.pi**8 / 225  # term of x1 and x3
     whole = sum(first) + both
     found = sensitivity(ishigami, CIRCLE, samples=4096)
     assert found.S1 == approx([one / whole for one in first], abs=0.02)
     assert found.ST == approx([(first[0] + both) / whole, first[1] / whole, both / whole], abs=0.02)
     assert np.all(np.abs(np.array(found.S1) - [one / whole for one in first]) < 2.0 * np.array(found.S1_conf))
     assert found.runs == 4096 * 5 + 1024 * 4 and found.outcome == "the function"
-    assert found.mu_star[1] > 0.0 and found.mu[1] == approx(0.0, abs=0.5)  # up and down alike
+    assert found.mu_star[1] > 0.0 and found.mu[1] == approx(0.0, abs=0.5)  # effects of both signs cancel
 
 
 def test_a_line_has_its_slopes_whatever_its_units():
-    """Of a sum S1 = ST, in the ratio of squares of slope times range; every effect is the same: no spread."""
+    """For a sum S1 = ST, in the ratio of squares of slope times range; all effects are equal, so sigma is zero."""
     found = sensitivity(lambda x: 1e9 + 3e-4 * x["a"] + 4e2 * x["b"], {"a": (0.0, 1e6), "b": (-0.5, 0.5)}, samples=256)
     assert found.S1 == approx([0.36, 0.64], abs=0.02) and found.ST == approx([0.36, 0.64], abs=0.02)
     assert found.mu_star == approx([300.0, 400.0], rel=1e-6) and found.sigma == approx([0.0, 0.0], abs=1e-3)
@@ -49,7 +49,7 @@ def test_the_same_seed_gives_the_same_indices():
 
 @pytest.fixture
 def line() -> dict:
-    """A frictionless pipe shut at once: the first rise is rho a v."""
+    """Case of a frictionless pipe shut at once: the first rise is rho a v."""
     nodes = {"lake": reservoir(3e6), "gate": junction(), "out": reservoir(101325.0)}
     main = pipe("lake", "gate", 100.0, 0.3, 1000.0, 5, friction=NO_FRICTION)
     links = {"main": main, "valve": valve("gate", "out", 0.001, {"start": 0.05, "duration": 0.0, "value": [1.0, 0.0]})}
@@ -58,7 +58,7 @@ def line() -> dict:
 
 
 def test_of_joukowskys_rise_speed_and_opening_have_the_shares_that_a_product_has(line):
-    """p = p0 + rho a v, v by the valve's area: V = V_a + V_v + V_av, each by means and variances of the two."""
+    """p = p0 + rho a v, v proportional to the valve area: V = V_a + V_v + V_av, from means and variances of both."""
     bounds = {"links.main.wave_speed": [900.0, 1300.0], "links.valve.area": [0.001, 0.002]}
     a, s = ((sum(one) / 2, (one[1] - one[0]) ** 2 / 12) for one in bounds.values())
     terms = a[1] * s[0] ** 2, s[1] * a[0] ** 2, a[1] * s[1]
@@ -66,12 +66,12 @@ def test_of_joukowskys_rise_speed_and_opening_have_the_shares_that_a_product_has
     assert found.outcome == "max(gate.pressure) [Pa]"
     assert found.S1 == approx([one / sum(terms) for one in terms[:2]], abs=0.03)
     assert found.ST == approx([(one + terms[2]) / sum(terms) for one in terms[:2]], abs=0.03)
-    rise = 0.61 * math.sqrt(2 * (3e6 - 101325.0) * 1000.0) / (math.pi / 4 * 0.3**2)  # of speed times area
+    rise = 0.61 * math.sqrt(2 * (3e6 - 101325.0) * 1000.0) / (math.pi / 4 * 0.3**2)  # rise per speed and area
     assert found.mu_star == approx([rise * 0.0015 * 400.0, rise * 1100.0 * 0.001], rel=0.1)
 
 
 def test_no_label_of_its_picture_covers_another_or_leaves_it():
-    """Of long keys that end alike, with numbers of six digits."""
+    """Long keys with equal ends, and numbers of six digits."""
     from fvsolve.draw.sweep_picture import sensitivity_figure
 
     keys = tuple(f"links.a-rather-long-name-{k}.opening.duration" for k in range(4))

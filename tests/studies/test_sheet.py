@@ -1,4 +1,4 @@
-"""A sheet says the same rows in a file, on a terminal, as JSON and in a frame; what is not known is empty in each."""
+"""A sheet has equal rows in a file, on a terminal, as JSON and in a frame; unknown values are empty."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a case fails: prediction against exact growth, against real runs, and where bounds mislead."""
+"""Stability of cases: prediction against exact growth and real runs, and bounds that mislead."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ IMPLICIT = ["implicit-euler", "trapezoid", "gauss-4", "radau-iia-5", "lobatto-ii
 
 
 def shut(cells, scheme):
-    """A pipe between a shut valve and a blind end."""
+    """Case of a pipe between a shut valve and a dead end."""
     nodes = {"A": reservoir(1e6), "a": junction(), "b": junction()}
     links = {"v": valve("A", "a", 1e-3, 0.0), "p": pipe("a", "b", 100.0, 0.3, 1000.0, cells)}
     return scene(nodes, links, 1.0, {**NUMERICS, "scheme": scheme})
 
 
 def through(cells, scheme):
-    """A pipe whose ends send nothing back: valves whose slope is that of the pipe, dM/dp = A / a."""
+    """Case of a pipe without reflection: its valves have the slope of the pipe, dM/dp = A / a."""
     flow, admittance = 10.0, area(0.3) / 1000.0
     conductance = 2 * flow * admittance  # M |M| = G dp
     opened, drop = math.sqrt(conductance / (2 * RHO)), flow**2 / conductance
@@ -47,7 +47,7 @@ def through(cells, scheme):
 
 
 def branches(cells, scheme):
-    """Three pipes meet; a reservoir, a flowing valve and a blind end."""
+    """Case of three pipes that join, with a reservoir, a flowing valve and a dead end."""
     nodes = {"A": reservoir(1.2e6), "t": junction(), "g": junction(), "B": reservoir(1e6), "d": junction()}
     links = {"p": pipe("A", "t", 100.0, 0.3, 1000.0, cells), "q": pipe("t", "g", 60.0, 0.2, 1100.0, 5),
              "r": pipe("t", "d", 80.0, 0.25, 900.0, 7), "v": valve("g", "B", 2e-3)}  # fmt: skip
@@ -55,7 +55,7 @@ def branches(cells, scheme):
 
 
 def chambers(count, scheme="upwind"):
-    """A chain of chambers and flowing valves between two pressures."""
+    """Case of a chain of chambers and flowing valves between two pressures."""
     nodes = {
         "in": reservoir(2e6),
         **{f"c{k}": chamber(1e-3 * (1 + k % 3)) for k in range(count)},
@@ -67,7 +67,7 @@ def chambers(count, scheme="upwind"):
 
 
 def matrix(case):
-    """J of a case in its energy norm."""
+    """Jacobian J of a case in its energy norm."""
     at = operating_point(case)
     return energy_form(at.model).seen(linearise_at(at).a)
 
@@ -94,7 +94,7 @@ def test_a_step_matrix_is_the_stability_function_of_its_eigenvalues(name):
 @pytest.mark.parametrize("name", [name for name, m in METHODS.items() if name == m.name and m.explicit])
 def test_one_step_of_the_program_is_the_step_matrix_to_round_off(name):
     case = branches(5, "upwind5")
-    del case["nodes"]["B"], case["links"]["v"]  # linear to the last bit without its valve
+    del case["nodes"]["B"], case["links"]["v"]  # exactly linear without its valve
     assert one_step_error(case, name, 0.01) < 1e-10
 
 
@@ -104,7 +104,7 @@ def test_one_implicit_step_of_the_program_is_the_step_matrix(name):
 
 
 def one_step_error(case, name, h):
-    """The program's step of unit vectors against R(h J), relative, in the energy norm."""
+    """Greatest difference between steps of unit vectors in the program and R(h J), relative to R(h J)."""
     at = operating_point(case)
     a = linearise_at(at).a
     runs = RealRuns(at, name, energy_form(at.model), a=a)
@@ -154,7 +154,7 @@ def test_an_inflow_pipe_grows_at_courant_numbers_far_below_what_its_eigenvalues_
 
 
 def by_hand(cells, steps):
-    """Least Courant number at which some power of (1 - C) I + C S grows a thousandfold, S the shift; all powers."""
+    """Least Courant number at which a power of (1 - C) I + C S exceeds norm 1000, S the shift; all powers by NumPy."""
     low, high = 1.0, 1.3
     while high - low > 2e-4:
         middle, power, fails = (low + high) / 2, np.eye(cells), False
@@ -273,7 +273,7 @@ def test_without_a_case_the_command_answers_for_a_periodic_grid(monkeypatch, cap
 
 
 def carried(method="rk4", ends=("lake", "end"), **scalar):
-    """Ten cells of 10 m with a dye; `vessel`, a tank that starts with none of it, stands at either end."""
+    """Case of a pipe with ten cells of 10 m and a dye; `vessel`, a tank without dye, may be at either end."""
     nodes = {
         "lake": reservoir(3e5, scalars={"dye": 1.0}),
         "end": reservoir(2.99e5),
@@ -287,7 +287,7 @@ def carried(method="rk4", ends=("lake", "end"), **scalar):
 
 
 def spread(model, diffusivity):
-    """Eigenvalues of a pipe's diffusion, ends at given values: D (u'' by three cells, half a cell at the ends)."""
+    """Eigenvalues of diffusion in a pipe with given end values: D u'' by three cells, half a cell at the ends."""
     n, dx = model.pipes[0].cells, model.pipes[0].length / model.pipes[0].cells
     a = np.diag(np.full(n, -2.0)) + np.diag(np.ones(n - 1), 1) + np.diag(np.ones(n - 1), -1)
     a[0, 0] = a[-1, -1] = -3.0
@@ -295,7 +295,7 @@ def spread(model, diffusivity):
 
 
 def real_end(method, low, high):
-    """Where |R| comes to 1 on the negative real axis, R by its own series."""
+    """Real x with |R(-x)| = 1, with R as its series."""
     r = {"euler": lambda z: 1 + z, "rk4": lambda z: 1 + z + z**2 / 2 + z**3 / 6 + z**4 / 24}[method]
     return brentq(lambda x: abs(r(-x)) - 1.0, low, high)
 
@@ -307,8 +307,8 @@ def test_scalars_of_pipes_bound_the_step_in_powers_eigenvalues_and_real_runs(met
     fastest = quick.get("decay") or -spread(build(load(case)), quick["diffusivity"]).min()
     row = stability(case).rows[0]
     truth = real_end(method, low, high) / fastest
-    assert row.eigenvalues == pytest.approx(truth, rel=1e-3)  # what flows besides
-    assert row.predicted == pytest.approx(truth, rel=6e-3)  # 1000 steps grow by 1000 only a little beyond
+    assert row.eigenvalues == pytest.approx(truth, rel=1e-3)  # the flow adds little
+    assert row.predicted == pytest.approx(truth, rel=6e-3)  # growth by 1000 in 1000 steps needs a longer step
     assert row.measured == pytest.approx(row.predicted, rel=2e-3)
 
 
@@ -320,6 +320,6 @@ def test_a_vessel_that_starts_without_a_scalar_is_no_kink(scheme, ends):
     case["numerics"]["scheme"] = scheme
     found = linearise(case)
     i = found.states.index("vessel.dye")
-    drop = AMBIENT + 20.0 * RHO * GRAVITY - 2.0e5  # of pressure from the vessel to the end
+    drop = AMBIENT + 20.0 * RHO * GRAVITY - 2.0e5  # pressure drop from the vessel to the end
     leaves = area(0.1) * math.sqrt(2 * RHO * drop * 0.1 / (0.02 * 100.0)) if "end" in ends else 0.0
     assert found.a[i, i] == pytest.approx(-0.25 - leaves / (20.0 * RHO), rel=1e-3)

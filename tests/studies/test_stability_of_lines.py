@@ -1,4 +1,4 @@
-"""Stability with delay lines: the linear system of steps is what the program does, and limits are where runs fail."""
+"""Stability with delay lines: the linear system equals the steps of the program, and runs fail at its limits."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from fvsolve.studies.stability.delay_line_system import DelayLineSystem
 
 
 def system(case: dict, method: str, h: float) -> DelayLineSystem:
-    """Steps of h [s] of a case as a linear system."""
+    """Linear system of the steps of a case, with step h [s]."""
     case["numerics"] |= {"method": method, "step": h}
     model = fvsolve.build(fvsolve.load(case))
     return DelayLineSystem(with_held_schedules(model, 0.0), method_named(method), h)
@@ -27,11 +27,11 @@ def system(case: dict, method: str, h: float) -> DelayLineSystem:
 @pytest.mark.parametrize("method", ["euler", "rk4", "ssp-rk3", "trapezoid", "gauss-4"])
 @pytest.mark.parametrize("scene", ["vessel", "short", "rough"])
 def test_a_step_of_the_linear_system_is_one_of_the_program(method, scene):
-    """With a chamber, with lines shorter than steps and a valve, with friction: 40 steps from what is on its way."""
+    """40 steps from given waves: with a chamber, with lines shorter than steps and a valve, and with friction."""
     rough = main(friction={"model": "steady", "factor": 0.1}, numerics={"delay_tolerance": 0.02})
     case = {"vessel": vessel(method, 0.01, volume=0.15), "short": short("delay-line"), "rough": rough}[scene]
     one = system(case, method, 0.01)
-    x, before = (part[..., :1] * 1e-6 for part in one.starts())  # of which all moves
+    x, before = (part[..., :1] * 1e-6 for part in one.starts())  # a start that moves all states
     runs = DelayLineRuns.__new__(DelayLineRuns)
     runs.steps = 40
     moved, still = (runs.start_run(one, width * x[:, 0], width * before[..., 0]) for width in (1.0, 0.0))
@@ -47,7 +47,7 @@ def test_a_step_of_the_linear_system_is_one_of_the_program(method, scene):
 
 @pytest.mark.parametrize("method", ["euler", "implicit-midpoint"])
 def test_runs_fail_at_the_step_that_is_predicted(method):
-    """A chamber of 0.15 m3 that a wave fills within 10 ms; the other way round the same."""
+    """A wave fills the chamber of 0.15 m3 within 10 ms; the reversed pipe has an equal limit."""
     row = studies.stability(vessel("rk4", 0.01, volume=0.15), methods=[method], steps=200).rows[0]
     assert row.lines and row.rate == 0.0 and row.where == "neck" and abs(row.difference) < 0.01
     other = studies.stability(turned(vessel("rk4", 0.01, volume=0.15)), methods=[method], steps=200).rows[0]
@@ -55,7 +55,7 @@ def test_runs_fail_at_the_step_that_is_predicted(method):
 
 
 def test_what_check_tells_to_grow_has_a_limit_below_the_step():
-    """Of the runs that tests/step_limits/test_lines.py holds to what `check` tells, with steps of 10 ms for 30 s."""
+    """Runs that tests/step_limits/test_lines.py compares with `check`, with steps of 10 ms for 30 s."""
     for method, volume, grows in (("euler", 0.6, True), ("ssp-rk3", 0.15, True), ("rk4", 0.15, False)):
         made = DelayLineLimits(
             fvsolve.load(vessel(method, 0.01, 30.0, volume)), "upwind", method_named(method), 3000, 30.0

@@ -1,4 +1,4 @@
-"""Real runs of servo axes in `stability`: what rounding leaves, and where a scene ends, is no step that fails."""
+"""Real runs of servo axes in `stability`: rounding and the end of a case are not taken as failed steps."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from fvsolve.studies.stability.stability import LinearSystem, stability
 ARM = Path(__file__).parents[1] / "reference" / "servo-arm.toml"
 IMPLICIT = {"numerics.method": "radau-iia-5"}
 OIL = {"name": "user", "density": 870.0, "bulk_modulus": 1.4e9, "viscosity": 46e-6, "law": "linear"}
-THETA = "0 | 0 0\n 1 | 3/5 2/5\n ---\n | 3/5 2/5"  # |R| = 1.5 at infinity: fails from |h lambda| = 10 on
+THETA = "0 | 0 0\n 1 | 3/5 2/5\n ---\n | 3/5 2/5"  # |R| = 1.5 at infinity, |R| > 1 beyond |h lambda| = 10
 
 
 @pytest.fixture(scope="module")
 def arm():
-    """The arm in motion: hoses at hardly any drop, whose laws stay linear for 1e-11 of what pressures are."""
+    """Linear system of the moving arm; hoses near zero drop have laws that are linear over 1e-11 of the pressures."""
     return LinearSystem(operating_point(ARM, IMPLICIT, 0.7))
 
 
 def runs(side, method):
-    """Runs of a method, without an end in time."""
+    """Real runs of a method without an end in time."""
     found = RealRuns(side.at, method, side.form, a=side.linear.a)
     found.latest = np.inf
     return found
@@ -34,7 +34,7 @@ def runs(side, method):
 
 @pytest.mark.parametrize("method", ["rodas-5p", "radau-iia-5", "tr-bdf2"])
 def test_what_newton_and_rounding_leave_is_no_growth(arm, method):
-    """Starts are as small as 1e-14 here; runs at 0.2 ms are right to five digits, as the next test says."""
+    """Deviations start at 1e-14 here; runs at 0.2 ms are right to five digits, as the next test shows."""
     assert not any(runs(arm, method).fails(h) for h in (4e-5, 2e-4))
 
 
@@ -44,7 +44,7 @@ def truth():
 
 
 def swing(method, step=None):
-    """(angle [deg], pressure [bar]) of the arm every 2 ms until 1.9 s : float64[2, n]; on its way until 1.2 s."""
+    """Angle [deg] and pressure [bar] of the arm every 2 ms until 1.9 s, in motion until 1.2 s : float64[2, n]."""
     steps = {} if step is None else {"numerics.step": step}
     case = fvsolve.load(ARM)
     raw = {**case.raw, "numerics": {"end": "1.9 s"} | ({"rtol": 1e-8} if step is None else {})}
@@ -59,14 +59,14 @@ def test_steps_that_are_said_to_be_safe_are_right(truth):
 
 @pytest.mark.parametrize("method, step", [("rk4", 2e-4), ("rodas-5p", 4e-2)])
 def test_steps_that_fail_are_found(arm, truth, method, step):
-    """Explicit ones on the way; linearly implicit ones where the arm stops, and pressures are 18 bar off."""
+    """Explicit steps fail in motion; linearly implicit steps fail where the arm stops, with pressures 18 bar off."""
     assert runs(arm, method).fails(step)
     if method == "rodas-5p":
         assert np.abs(swing(method, step) - truth)[1].max() > 10.0
 
 
 def test_an_implicit_method_that_fails_is_found_where_it_is_predicted_to():
-    """Chambers and flowing valves: of this method |R| exceeds 1 beyond h = 10 / |lambda|."""
+    """Chambers and flowing valves: |R| of this method exceeds 1 beyond h = 10 / |lambda|."""
     fvsolve.tableau("theta-4-10", THETA)
     nodes = {"in": reservoir(2e6), "a": chamber(1e-3), "b": chamber(2e-3), "out": reservoir(1e6)}
     links = {f"v{k}": valve(*pair, 1e-5) for k, pair in enumerate((("in", "a"), ("a", "b"), ("b", "out")))}
@@ -76,7 +76,7 @@ def test_an_implicit_method_that_fails_is_found_where_it_is_predicted_to():
 
 
 def pushed():
-    """A cylinder that a spool drives to its end in 1.5 s, where its model ends."""
+    """Case of a cylinder that a spool valve moves to its end in 1.5 s, where its model ends."""
     nodes = {"P": reservoir(2e7), "T": reservoir(3e5), "A": chamber(4e-4), "B": chamber(4e-4),
              "post": {"type": "frame"}, "load": {"type": "mass", "mass": 350.0, "initial_position": 1.0}}  # fmt: skip
     links = {
@@ -90,7 +90,7 @@ def pushed():
 
 
 def test_a_scene_that_ends_is_no_step_that_fails():
-    """1000 steps from 1.4 ms on reach the end of the cylinder, with any method."""
+    """1000 steps of 1.4 ms or more reach the end of the cylinder with any method."""
     (row,) = stability(pushed(), methods=["radau-iia-5"], at=0.1).rows
     assert row.measured == np.inf and row.steps * row.measured_up_to > 2.0
     (quick,) = stability(pushed(), methods=["rk4"], at=0.1).rows

@@ -1,4 +1,4 @@
-"""Studies of scenes with delay lines: orders, against cells and rays; what is exact is said to be."""
+"""Studies of cases with delay lines: orders, against cells and rays, and exact results."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fvsolve.errors import FvsolveError
 
 
 def rough(**numerics) -> dict:
-    """A pulse of demand in a pipe with much friction, as one delay line."""
+    """Case of a pulse of demand in one delay line with large friction."""
     case = pulses.case(exact=False, points=pulses.FEW)
     case["links"]["main"]["friction"] = {"model": "steady", "factor": 0.5}
     demand = case["nodes"]["gate"]["demand"]
@@ -43,7 +43,7 @@ def test_drawn_the_other_way_or_by_two_the_study_is_the_same():
 
 
 def test_smooth_waves_between_steps_are_of_sixth_order():
-    """Against rays, in the middle of a pipe; at the gate each wave is back after whole steps, and exact."""
+    """Against rays in the middle of a pipe; at the gate, waves return after whole steps and are exact."""
     case = pulses.case(pipe_model="delay-line", method="euler", courant=0.9)
     found = studies.order(case, levels=3)
     errors = [row.errors["main.pressure@0.37"]["L1"] for row in found.rows]
@@ -75,7 +75,7 @@ def test_lines_beside_cells_are_refined_with_them():
 
 
 def test_a_chart_of_lines_is_judged_by_cells():
-    """Shorter steps help until friction is left, whose places stay: a fourteenth of it in four times the stretches."""
+    """Shorter steps help until the error of friction remains; four times the stretches divide it by fourteen."""
     steps, methods = [0.013, 0.0031, 0.00078], ["euler"]
     found = studies.chart(rough(delay_tolerance=0.005), methods=methods, step=steps)
     assert found.reference.startswith("upwind5 on") and found.floor["trajectory"] < 1e-6 and found.default == "rk4"
@@ -108,7 +108,7 @@ def test_a_chart_of_lines_beside_cells_refines_the_cells():
 
 
 def test_a_map_of_lines_says_at_which_step_a_store_makes_waves_grow():
-    """A chamber that fills within 10 ms, behind 0.1 s of a line: the limit, and runs beside it."""
+    """A chamber that fills within 10 ms at a line of 0.1 s: the limit, and runs on both sides of it."""
     case = vessel("rk4", 0.01, 6.0, 0.15, 60)
     found = studies.failure_map(case, methods=["rk4", "implicit-midpoint", "rodas-5p"], steps=[0.0034, 0.0207, 0.068])
     assert found.wave_rate is None and found.reference.startswith("upwind5")

@@ -1,4 +1,4 @@
-"""Studies asked of scenes with devices, vessels and cavities: what cases of parts brought to light."""
+"""Studies of cases with devices, vessels and cavities."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from fvsolve.studies.stability.vector_growth import TooLarge
 
 
 def case(name, **numerics):
-    """A shipped case with keys changed: double underscores are dots."""
+    """Shipped case with changed keys, in which double underscores are dots."""
     return fvsolve.load(CASES / f"{name}.toml", {key.replace("__", "."): value for key, value in numerics.items()})
 
 
@@ -99,7 +99,7 @@ def test_every_state_has_its_unit(name, states):
     assert states.items() <= units.items()
 
 
-# what is expected before a run ----------------------------------------------------------------------------------
+# checks before a run --------------------------------------------------------------------------------------------
 
 
 def test_check_names_the_pipe_that_sets_the_step_and_knows_what_cavities_cost():
@@ -121,7 +121,7 @@ def test_an_order_that_would_take_long_begins_on_fewer_cells_and_says_so(monkeyp
     assert [level.cells for level in made.levels] == [8, 16, 32] and "starts with 8 of 64 cells" in made.words
     assert affordable_plan(few, None, None, 3, 50, "auto", None).levels[0].cells == 50
     monkeypatch.undo()
-    assert affordable_plan(few, None, None, 3, None, "auto", ResultCache(tmp_path)) == made  # a study that goes on
+    assert affordable_plan(few, None, None, 3, None, "auto", ResultCache(tmp_path)) == made  # continued study
 
 
 def test_errors_that_fall_quicker_than_scheme_and_method_can_make_them_are_said_to_show_no_order():
@@ -186,9 +186,6 @@ def test_a_law_that_takes_long_is_not_tried_on_more_cells(monkeypatch):
         FvsolveError, match="the case itself does not run: not run: the run with 1 cell was already given up"
     ):
         model_hierarchy.ladder(case("relief-on-closed-main", links__main__cells=4, numerics__courant=0.001))
-
-
-# pictures -------------------------------------------------------------------------------------------------------
 
 
 # map ------------------------------------------------------------------------------------------------------------

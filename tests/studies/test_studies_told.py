@@ -1,4 +1,4 @@
-"""What studies share: they take a path, say where they are without a terminal, read `--set` with `--method`."""
+"""Common features of studies: a path as case, progress without a terminal, and `--set` with `--method`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A sweep has a row for every combination, of a run's own numbers; finished rows are reused, failed ones explained."""
+"""Sweep: a row for each combination with the numbers of its run; finished rows are reused, failed rows explained."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from fvsolve.studies.sweep import Sweep, as_option_text
 
 @pytest.fixture
 def line(tmp_path) -> dict:
-    """A pipe whose valve shuts."""
+    """Case of a pipe with a closing valve."""
     nodes = {"lake": reservoir(1e6), "gate": junction(), "out": reservoir(101325.0)}
     links = {
         "main": pipe("lake", "gate", 100.0, 0.3, 1000.0, 20, friction=NO_FRICTION, initial_flow=0.05),
@@ -56,9 +56,9 @@ def test_rows_are_the_numbers_of_the_runs_in_the_order_of_the_values(line):
 def test_a_run_that_stops_or_is_refused_is_a_row_with_its_reason(line):
     made = sweep(line, {"numerics.courant": [4.0, 0.5, -1.0]}, {"numerics.end": 5.0})
     stopped, fine, refused = made.rows
-    assert stopped["max(gate.pressure) [Pa]"] is stopped["final(gate.pressure) [Pa]"] is None  # it blew up
+    assert stopped["max(gate.pressure) [Pa]"] is stopped["final(gate.pressure) [Pa]"] is None  # the run blew up
     assert fine["ok"]
-    assert not stopped["ok"] and "halve it" in stopped["reason"] and 0.1 < stopped["t [s]"] < 5.0
+    assert not stopped["ok"] and "halve the step" in stopped["reason"] and 0.1 < stopped["t [s]"] < 5.0
     assert not refused["ok"] and refused["reason"].startswith("refused: numerics.courant: -1.0")
 
 
@@ -116,9 +116,9 @@ def test_ctrl_c_breaks_off_the_runs_of_other_processes_and_keeps_what_is_finishe
         while not kept.exists() or len(kept.read_text().splitlines()) < 2:
             assert running.poll() is None, running.communicate()
             time.sleep(0.01)
-        time.sleep(0.3)  # it counts a row after it has kept it
+        time.sleep(0.3)  # a row is stored before it is counted
         send(running.pid, signal.SIGINT)
-        err = running.communicate(timeout=30)[1]  # ends where no process holds the pipe any more
+        err = running.communicate(timeout=30)[1]  # ends when no process has the pipe open
     finally:
         if running.poll() is None:
             os.killpg(running.pid, signal.SIGKILL)
@@ -127,7 +127,7 @@ def test_ctrl_c_breaks_off_the_runs_of_other_processes_and_keeps_what_is_finishe
 
 
 def test_a_row_shows_what_the_model_could_not_follow(line, fvs, tmp_path):
-    shut = {"start": 0.1, "duration": 0.05, "value": [1.0, 0.0]}  # dp = rho a v is more than the lake holds
+    shut = {"start": 0.1, "duration": 0.05, "value": [1.0, 0.0]}  # rho a v exceeds the pressure of the lake
     quiet, marked = sweep(line, {"links.valve.opening": [1.0, shut]}).rows
     assert quiet["marks"] == "" and marked["ok"] and "below vapour pressure" in marked["marks"]
     (tmp_path / "line.toml").write_text(write(line))
@@ -211,7 +211,7 @@ def test_the_command_prints_the_rows_and_fails_where_one_does(fvs, tmp_path):
 
 
 def bare(rows) -> list[dict]:
-    """Rows without what a clock says."""
+    """Rows without measured time."""
     return [{key: one for key, one in row.items() if key != "seconds"} for row in rows]
 
 
@@ -258,17 +258,17 @@ def test_a_sweep_that_is_killed_goes_on_where_it_was_a_torn_line_or_not(line, tm
         running.wait()
     with open(kept, "a") as file:
         file.write('{"key": "half of a li')
-    for reused in (3, 4):  # the line that is whole after the torn one is found, too
+    for reused in (3, 4):  # the whole line after the torn line is found too
         made = sweep(tmp_path / "line.toml", {"numerics.end": [0.5, 0.4, 0.3, 0.2]}, out=tmp_path / "o")
         assert made.reused == reused and [row["t [s]"] for row in made.rows] == [0.5, 0.4, 0.3, 0.2]
     assert all(json.loads(text)["key"] for text in kept.read_text().splitlines())
 
 
 def test_a_disk_that_is_full_in_the_middle_is_named_and_what_was_kept_is_found_again(line, tmp_path):
-    """Files may hold no more than 3000 bytes, which takes two rows and a part of the third."""
+    """Files may have 3000 bytes, enough for two rows and a part of the third."""
     resource = pytest.importorskip("resource", reason="a limit of Unix")
     vary, limits = {"numerics.courant": [0.5, 0.6, 0.7, 0.8]}, resource.getrlimit(resource.RLIMIT_FSIZE)
-    sweep(line, {"numerics.courant": [0.5, 0.9]})  # what is compiled is written too
+    sweep(line, {"numerics.courant": [0.5, 0.9]})  # compiled code is written too
     try:
         resource.setrlimit(resource.RLIMIT_FSIZE, (3000, limits[1]))
         with pytest.raises(RunError, match="points.jsonl: cannot be written: .*. Finished results are kept"):
@@ -311,7 +311,7 @@ def test_a_file_that_a_value_names_is_part_of_what_is_reused(line, tmp_path, mon
 
 
 def mapped(rows: list[dict]):
-    """The picture of a sweep over two keys, and its axes."""
+    """Axes of the picture of a sweep over two keys."""
     made = Sweep(("a.b", "c.d"), [{"ok": True, "reason": "finished"} | row for row in rows], 0)
     figure = outcome_figure(made, "max(x) [m]", {"a.b": "a.b [s]", "c.d": "c.d"})
     figure.canvas.draw()
@@ -319,14 +319,14 @@ def mapped(rows: list[dict]):
 
 
 def test_a_sweep_over_two_keys_is_a_map():
-    """A grid is squares with their values, the first key across and the second up; what failed is crossed and empty."""
+    """A grid has squares with their values, first key across and second key up; failed runs are crossed and empty."""
     rows = [{"a.b": a, "c.d": c, "max(x) [m]": 10.0 * k + j}
             for k, a in enumerate((0.1, 0.5, 3.0)) for j, c in enumerate(("low", "high"))]  # fmt: skip
     rows[-1] |= {"ok": False, "max(x) [m]": None}
     axes, bar = mapped(rows[::-1])
     table = axes.collections[0].get_array().reshape(2, 3)
     assert [one.get_text() for one in axes.get_xticklabels()] == ["0.1", "0.5", "3"]
-    assert [one.get_text() for one in axes.get_yticklabels()] == ["high", "low"]  # as they first come
+    assert [one.get_text() for one in axes.get_yticklabels()] == ["high", "low"]  # in order of occurrence
     assert table[0].tolist() == [1.0, 11.0, None] and table[1].tolist() == [0.0, 10.0, 20.0]
     assert {one.get_text() for one in axes.texts} == {"0", "1", "10", "11", "20"}
     assert axes.lines[0].get_xydata().tolist() == [[2.5, 0.5]] and bar.get_ylabel().startswith("max(x) [m], crossed")

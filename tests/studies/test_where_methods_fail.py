@@ -1,6 +1,6 @@
-"""Where methods fail in time: each failure happens where it is predicted, and its remedy removes it.
+"""Failures of methods in time: each failure occurs where it is predicted, and its remedy removes it.
 
-The sections of docs/where-methods-fail.md name these tests. Pipes have theirs in
+The sections of docs/where-methods-fail.md name these tests. Tests of pipes are in
 studies/test_where_methods_fail_in_pipes.py.
 """
 
@@ -26,7 +26,7 @@ def r_of(method: str, z: complex) -> complex:
 
 
 def observed_order(errors: list[float]) -> float:
-    """From the last two of errors at halved steps."""
+    """Order from the last two errors at halved steps."""
     return math.log2(errors[-2] / errors[-1])
 
 
@@ -39,9 +39,9 @@ def tiny(method: str, h: float, end: float, **more) -> dict:
 
 
 def chamber_eigenvalue() -> float:
-    """-(beta / V) (A / (rho a) + q / (2 dp)) of pipe-tiny-chamber before its valve moves [1/s]: by hand."""
+    """Eigenvalue -(beta / V) (A / (rho a) + q / (2 dp)) of pipe-tiny-chamber before its valve moves [1/s]."""
     beta, volume, density, speed = 1.5e9, 1e-6, 870.0, 1250.0
-    section, drop = math.pi / 4 * 0.032**2, 20e5  # no friction: all of the pump's pressure falls at the valve
+    section, drop = math.pi / 4 * 0.032**2, 20e5  # no friction: the valve has the whole drop
     flow = 0.6 * 20e-6 * math.sqrt(2 * drop / density)
     return -beta / volume * (section / (density * speed) + flow / (2 * drop))
 
@@ -79,14 +79,14 @@ def test_an_implicit_method_takes_the_chamber_at_a_step_hundreds_of_times_longer
 
 
 def bottle(volume: float = 1e-5) -> dict:
-    """A bottle of water between two valves, the second of which closes by a ten-thousandth, at once."""
+    """Case of a bottle of water between two valves; the second valve closes by 1e-4 at once."""
     nodes = {"pump": reservoir(1e6), "body": chamber(volume), "sump": reservoir(AMBIENT)}
     links = {"way-in": valve("pump", "body", 1e-5), "way-out": valve("body", "sump", 1e-5, step(0.5, 1.0, 0.9999))}
     return scene(nodes, links, 1.0, {"method": "radau-iia-5", "step": 0.01}, ["body.pressure"], 0.1)
 
 
 def swings(method: str, h: float) -> tuple[np.ndarray, float]:
-    """(distances of the bottle's pressure from where it comes to rest, after each step from the jump on, h lambda)."""
+    """Deviations of the pressure from its final value after each step from the jump on, and h lambda."""
     case = bottle()
     rest = outcome(case, {"numerics.end": 20.0}).rows[-1, 1]
     settings = {"numerics.method": method, "numerics.step": h, "numerics.end": 0.5 + 12 * h, "output.every": h}
@@ -151,7 +151,7 @@ def test_a_stiffly_accurate_method_of_higher_stage_order_is_a_million_times_clos
 
 
 def surge(method: str, h: float, steps: int) -> dict:
-    """A lake, a rigid column and a bottle: an undamped oscillator of two states, struck at once."""
+    """Case of a lake, a rigid column and a bottle: an undamped oscillator of two states after a jump of pressure."""
     nodes = {"lake": reservoir(step(0.0, 1e6, 1.01e6)), "body": chamber(1e-3)}
     column = {"type": "rigid-column", "from": "lake", "to": "body", "length": 10.0, "diameter": 0.05,
               "friction": {"model": "none"}}  # fmt: skip
@@ -160,12 +160,12 @@ def surge(method: str, h: float, steps: int) -> dict:
 
 
 def column_frequency() -> float:
-    """omega = sqrt(beta A / (V rho L)) [rad/s]."""
+    """Natural frequency omega = sqrt(beta A / (V rho L)) [rad/s]."""
     return math.sqrt(WATER["bulk_modulus"] * math.pi / 4 * 0.05**2 / (1e-3 * RHO * 10.0))
 
 
 def shown_frequency(method: str, h: float) -> float:
-    """The frequency of what the steps show, from the recurrence p[n+1] + p[n-1] = 2 cos(omega h) p[n]."""
+    """Frequency that the steps show, from the recurrence p[n+1] + p[n-1] = 2 cos(omega h) p[n]."""
     rows = outcome(surge(method, h, 200)).rows
     p = rows[1:, 1] - 1.01e6
     cosine = np.sum((p[2:] + p[:-2]) * p[1:-1]) / (2 * np.sum(p[1:-1] ** 2))
@@ -190,14 +190,14 @@ LEVEL = 2.0  # difference of the levels at the start [m]
 
 
 def levelling(method: str, h: float, end: float, **more) -> dict:
-    """Two equal tanks joined by an orifice."""
+    """Case of two equal tanks joined by an orifice."""
     nodes = {"high": tank(1.0, 3.0 + LEVEL / 2), "low": tank(1.0, 3.0 - LEVEL / 2)}
     links = {"hole": valve("high", "low", 0.01, **more)}
     return scene(nodes, links, end, {"method": method, "step": h}, ["high.level", "low.level"], h)
 
 
 def root_rate() -> float:
-    """k of d(dz)/dt = -k sqrt(dz), dz the difference of the levels [m^0.5/s]."""
+    """Coefficient k of d(dz)/dt = -k sqrt(dz), dz the difference of the levels [m^0.5/s]."""
     return 2.0 * 0.01 * math.sqrt(2 * 9.80665)
 
 
@@ -218,16 +218,16 @@ def test_a_bare_square_root_chatters_about_zero_drop_by_the_amplitude_that_its_s
 
 
 def slope_at_rest(h: float, reynolds: float) -> float:
-    """|lambda| of the softened law at equal levels [1/s]."""
+    """Eigenvalue |lambda| of the softened law at equal levels [1/s]."""
     model = study_model(levelling("euler", h, 1.0, laminar_reynolds=reynolds))
-    equal = np.array([-1.0, 1.0]) * LEVEL / 2 * RHO  # of masses, from the start
+    equal = np.array([-1.0, 1.0]) * LEVEL / 2 * RHO  # change of masses since the start
     return float(np.abs(np.linalg.eigvals(model.jacobian(0.0, equal))).max())
 
 
 @pytest.mark.parametrize("times", [20.0, 4.0, 2.1, 1.9, 0.5])
 def test_the_softened_law_comes_to_rest_once_the_step_is_below_two_over_its_slope(times):
     h, level = 1.0, 2 * math.sqrt(LEVEL) / root_rate()
-    reynolds = 1e4 * h * slope_at_rest(h, 1e4) / times  # the slope goes with 1 / Reynolds number
+    reynolds = 1e4 * h * slope_at_rest(h, 1e4) / times  # the slope is proportional to 1 / Reynolds number
     assert h * slope_at_rest(h, reynolds) == pytest.approx(times, rel=2e-3)
     rows = outcome(levelling("euler", h, round(level) + 600.0, laminar_reynolds=reynolds)).rows
     gap = (rows[:, 1] - rows[:, 2])[-50:]
@@ -236,7 +236,7 @@ def test_the_softened_law_comes_to_rest_once_the_step_is_below_two_over_its_slop
 
 
 def test_error_control_shrinks_its_steps_at_a_bare_root_as_the_tolerance_predicts_and_not_at_a_softened_one():
-    k, soft, after = root_rate(), 1e-4, 20.0  # below `soft` [m] an odd polynomial in dz
+    k, soft, after = root_rate(), 1e-4, 20.0  # odd polynomial in dz below `soft` [m]
     level = 2 * math.sqrt(LEVEL) / k
 
     @njit
@@ -259,7 +259,7 @@ def test_error_control_shrinks_its_steps_at_a_bare_root_as_the_tolerance_predict
         return counted[1] - counted[0]
 
     chatter = {tol: steps_at_rest(bare, tol) for tol in (1e-6, 1e-8, 1e-10)}
-    for tol, count in chatter.items():  # (k h / 2)^2 is of the size of the tolerance
+    for tol, count in chatter.items():  # (k h / 2)^2 is about the tolerance
         assert 0.2 < count / (after * k / (2 * math.sqrt(tol))) < 2.0
     slope = k * 45 / (32 * math.sqrt(soft))
     for tol in (1e-6, 1e-8):
@@ -284,7 +284,7 @@ def test_a_step_across_a_kink_costs_the_order_and_segments_restore_it(kind, orde
         return np.array([(1.0 if t >= BEND else 0.2) - RATE * y[0]])
 
     pieces, y = [0.0, BEND, SHUT, 1.5], np.array([1.0])
-    for a, b in zip(pieces[:-1], pieces[1:], strict=True):  # exact: a pair of tight steps, piece by piece
+    for a, b in zip(pieces[:-1], pieces[1:], strict=True):  # exact: tight tolerance, piece by piece
         y = fvsolve.integrate(f, y, [a, np.nextafter(b, 0.0)], "verner-7", rtol=1e-13)[-1]
     exact = y[0]
     straddling, landing = [], []
@@ -309,7 +309,7 @@ def test_the_program_ends_its_steps_at_kinks_and_jumps_and_keeps_the_order_that_
     gain = WATER["bulk_modulus"] / volume * flow_area * math.sqrt(2.0 / RHO)
 
     @njit
-    def law(t, p):  # (79) and (80), with no notion of a segment
+    def law(t, p):  # equations (79) and (80), without segments
         s = min(max((t - BEND) / (SHUT - BEND), 0.0), 1.0) if bends else (1.0 if t >= BEND else 0.0)
         opening = 0.2 + 0.8 * s
         return np.array([gain * (math.sqrt(pump - p[0]) - opening * math.sqrt(p[0] - AMBIENT))])
@@ -323,7 +323,7 @@ def test_the_program_ends_its_steps_at_kinks_and_jumps_and_keeps_the_order_that_
     errors = [abs(last("rk4", step=1.5 / n)[1] - exact) for n in (9, 17, 33)]
     assert observed_order(errors) == pytest.approx(4.0, abs=0.5)
 
-    def worst(least: int) -> float:  # over where in a step the kink falls
+    def worst(least: int) -> float:  # for any place of the kink in a step
         counts = range(least, 2 * least, max(1, least // 12))
         ends = [fvsolve.integrate(law, [start], [0.0, 1.5], "rk4", step=1.5 / n)[-1, 0] for n in counts]
         return max(abs(p - exact) for p in ends)

@@ -1,6 +1,6 @@
-"""Where schemes and methods fail in pipes: each failure happens where it is predicted, and its remedy removes it.
+"""Failures of schemes and methods in pipes: each failure occurs where it is predicted, and its remedy removes it.
 
-The sections of docs/where-methods-fail.md name these tests. Real runs of the compiled program all of them.
+The sections of docs/where-methods-fail.md name these tests. All of them run the compiled program.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ EXPLICIT = ("euler", "improved-euler", "heun", "rk4", "ssp-rk3", "bogacki-shampi
 
 
 def lossless(cells: int, scheme: str, method: str, h: float, steps: int = 1):
-    """The model of a frictionless pipe from a lake to a dead end, for so many steps of h."""
+    """Model of a frictionless pipe from a lake to a dead end, for some steps of h [s]."""
     nodes = {"lake": lake(50.0), "end": junction()}
     links = {"main": pipe("lake", "end", LENGTH, DIAMETER, SPEED, cells)}
     numerics = {"scheme": scheme, "method": method, "step": h}
@@ -57,7 +57,7 @@ def one_step(method: str, matrix: np.ndarray) -> np.ndarray:
 
 
 def scaled(model, jacobian: np.ndarray) -> np.ndarray:
-    """The rates in the variables whose Euclidean norm is the energy norm."""
+    """Jacobian in variables whose Euclidean norm is the energy norm."""
     root = np.sqrt(energy_weights(model))
     return root[:, None] * jacobian / root[None, :]
 
@@ -67,14 +67,14 @@ def energy_norm(model, y: np.ndarray) -> float:
 
 
 def growth(method: str, matrix: np.ndarray, steps: int) -> float:
-    """||R(h J)^n|| after n steps."""
+    """Norm ||R(h J)^n|| after n steps."""
     with np.errstate(all="ignore"):
         power = np.linalg.matrix_power(one_step(method, matrix), steps)
     return float(np.linalg.norm(power, 2)) if np.all(np.isfinite(power)) else math.inf
 
 
 def worst_start(model, method: str, matrix: np.ndarray, steps: int) -> np.ndarray:
-    """The state that grows most in n steps, of energy norm one thousandth."""
+    """State of energy norm 0.001 that grows most in n steps."""
     power = np.linalg.matrix_power(one_step(method, matrix), steps)
     vector = np.linalg.svd(power)[2][0]
     return 1e-3 * vector / np.sqrt(energy_weights(model))
@@ -109,7 +109,7 @@ def test_central_differences_with_euler_grow_at_any_step_and_rk4_does_not(couran
 
 
 def courant_limit(method: str, unit: np.ndarray, steps: int) -> float:
-    """The greatest C with ||R(C J)^n|| <= 1e3, J in travel times of a cell."""
+    """Greatest Courant number C with ||R(C J)^n|| <= 1e3, J in travel times of a cell."""
     low, high = 0.0, 8.0
     for _ in range(40):
         middle = 0.5 * (low + high)
@@ -151,7 +151,7 @@ def test_euler_takes_upwind_to_courant_one_and_nothing_above_first_order_to_any_
 
 
 def matched(cells: int, scheme: str, method: str, h: float, steps: int):
-    """A pipe whose valve, at its steady flow, takes waves without reflection: d(drop)/d(flow) = rho a / A."""
+    """Model of a pipe whose valve, at its steady flow, does not reflect waves: d(drop)/d(flow) = rho a / A."""
     velocity = 1.0
     drop = 0.5 * RHO * SPEED * velocity
     flow_area = area(DIAMETER) * velocity / math.sqrt(2 * drop / RHO)
@@ -167,8 +167,8 @@ def test_below_the_limit_of_the_eigenvalues_an_inflow_pipe_grows_by_orders_befor
     h = courant * LENGTH / cells / SPEED
     model = matched(cells, "upwind", "euler", h, 1)
     matrix = h * scaled(model, model.jacobian(0.0, np.zeros(model.y_size)))
-    assert np.max(np.abs(np.tril(matrix[:cells, :cells], -2))) < 1e-9  # a wave looks at its own cell and the last one
-    spectrum = 1.0 + np.diag(matrix)  # so these are the eigenvalues: all equal, and below one up to Courant 2
+    assert np.max(np.abs(np.tril(matrix[:cells, :cells], -2))) < 1e-9  # a cell depends on itself and the last cell
+    spectrum = 1.0 + np.diag(matrix)  # equal eigenvalues, below one up to Courant 2
     assert spectrum == pytest.approx(1.0 - courant) and abs(1.0 - courant) < 1.0
     norms = {n: growth("euler", matrix, n) for n in (5, 10, 15, 20, 30, 40, 60, 400)}
     peak = max(norms, key=norms.get)
@@ -190,22 +190,22 @@ def averages(cell: int, degree: int = 4) -> list[float]:
 
 
 def by_hand(cells: int, left: float, right: float, datum: bool) -> np.ndarray:
-    """Rates, per travel time of a cell, of upwind5 between ends that reflect so much of what comes; waves r, then l.
+    """Rates of upwind5 per travel time of a cell, for waves r and then l, between ends with reflection factors.
 
-    Cells imagined beyond an end continue a polynomial of degree 4: where a wave leaves, through the nearest five
-    cells; where one enters, through the node's value and four cells (`datum`) or through five cells again.
+    Ghost cells beyond an end continue a polynomial of degree 4. Where a wave leaves, it fits the nearest five cells.
+    Where a wave enters, it fits the value of the node and four cells (`datum`), or five cells.
     """
     weights, value = np.array([2, -13, 47, 27, -3]) / 60, [1.0, 0.0, 0.0, 0.0, 0.0]
     alone = np.linalg.inv(np.array([averages(c) for c in range(5)]))
     through = np.linalg.inv(np.array([value, *(averages(c) for c in range(4))]))
     beyond = np.array([averages(c) for c in (-1, -2, -3)])
     leaving, at_end = beyond @ alone, value @ alone
-    goes = np.zeros((2, 2 * cells))  # what leaves: r at the right end, l at the left
+    goes = np.zeros((2, 2 * cells))  # leaving waves: r at the right end, l at the left end
     goes[0, cells - 5 : cells], goes[1, cells : cells + 5] = at_end[::-1], at_end
     comes = (left * goes[1], right * goes[0])
     rates = []
     for wave, node in enumerate(comes):
-        own = np.eye(2 * cells)[wave * cells : (wave + 1) * cells][:: -1 if wave else 1]  # from where it enters
+        own = np.eye(2 * cells)[wave * cells : (wave + 1) * cells][:: -1 if wave else 1]  # in the direction of the wave
         enters = (beyond @ through) @ np.vstack([node, own[:4]]) if datum else leaving @ own[:5]
         wide = np.vstack([enters[::-1], own, leaving @ own[::-1][:5]])
         faces = np.array([node, *(weights @ wide[j : j + 5] for j in range(1, cells)), goes[wave]])
@@ -244,13 +244,13 @@ def test_the_one_sided_closure_grows_in_every_short_pipe_and_ours_in_none():
 
 
 def tvd_courant(limiter: str) -> float:
-    """2 / (2 + phi), phi the steepest slope over the smaller difference: where Euler keeps the variation (Harten)."""
+    """Courant number 2 / (2 + phi) up to which Euler keeps the variation (Harten), phi the greatest slope ratio."""
     steepest = max(limited(CODES[limiter], 1.0, r) for r in np.geomspace(1.0, 1e9, 91))
     return 2.0 / (2.0 + steepest)
 
 
 def crossed(heights, steps: int, method: str, courant: float, scheme: str, limiter: str) -> float:
-    """What a profile of the wave that goes right gains in total variation while it crosses part of a pipe."""
+    """Relative increase of total variation of a forward wave that crosses part of a pipe."""
     cells = 60
     h = courant * LENGTH / cells / SPEED
     nodes = {"one": lake(50.0), "two": lake(50.0)}
@@ -264,7 +264,7 @@ def crossed(heights, steps: int, method: str, courant: float, scheme: str, limit
 
 
 def more_variation(method: str, courant: float, scheme: str = "muscl", limiter: str = "minmod") -> float:
-    """The most that fronts of all heights gain."""
+    """Greatest increase of total variation of fronts of several heights."""
     draws = [np.random.default_rng(seed).choice([0.0, 0.25, 0.5, 1.0, 2.0], 16) for seed in range(1, 6)]
     fronts = zip([np.ones(16), *draws], (12, 1, 1, 5, 5, 12), strict=True)
     return max(crossed(heights, steps, method, courant, scheme, limiter) for heights, steps in fronts)
@@ -285,7 +285,7 @@ def test_unlimited_slopes_overshoot_at_any_step_and_limited_ones_below_their_cou
 
 
 def rate_by_hand(u: np.ndarray) -> np.ndarray:
-    """h du/dt at Courant 1 of a wave that goes right, minmod slopes."""
+    """h du/dt of a forward wave at Courant 1 with minmod slopes."""
     d = np.diff(u, prepend=u[0], append=u[-1])
     a, b = d[:-1], d[1:]
     slope = np.where(a * b > 0, np.where(np.abs(a) < np.abs(b), a, b), 0.0)
@@ -319,7 +319,7 @@ def test_no_ssp_radius_is_no_sentence():
 
 
 def struck(velocity: float = 1.0, every: float = 0.01, shut: float = 0.0411, **changed) -> dict:
-    """A frictionless pipe whose flow is stopped at once; upwind and Euler at Courant 1."""
+    """Case of a frictionless pipe whose flow stops at once; upwind and Euler at Courant 1."""
     supply = 2 * AMBIENT + 2 * RHO * SPEED * velocity
     nodes = {"lake": reservoir(supply), "gate": junction(step(shut, velocity * area(DIAMETER), 0.0))}
     links = {"main": pipe("lake", "gate", 400.0, DIAMETER, SPEED, 40)}
@@ -327,19 +327,19 @@ def struck(velocity: float = 1.0, every: float = 0.01, shut: float = 0.0411, **c
 
 
 def square_wave(t: np.ndarray, shut: float) -> np.ndarray:
-    """Pressure at the gate over rho a v, from the lake's."""
+    """Pressure at the gate relative to the lake, over rho a v."""
     return np.where(t < shut, 0.0, 1.0 - 2.0 * (np.floor((t - shut) / 0.8) % 2))
 
 
 def clear(t: np.ndarray, shut: float) -> np.ndarray:
-    """Three steps away from every front."""
+    """True for times at least three steps away from each front."""
     return np.abs((t - shut + 0.4) % 0.8 - 0.4) > 0.03
 
 
 def upwind_by_hand(steps: np.ndarray, cells: int = 40) -> np.ndarray:
-    """Gate pressure over rho a v after each step of a Courant number, from the closed pipe with all its flow.
+    """Gate pressure over rho a v after steps of given Courant numbers, in the closed pipe with its whole flow.
 
-    r enters with -l at the lake, l with r at the gate; in units where rho a v is one, r - l = 1 at the start.
+    r enters with -l at the lake, l with r at the gate; in units where rho a v is 1, r - l = 1 at the start.
     """
     r, l, found = np.full(cells, 0.5), np.full(cells, -0.5), []  # noqa: E741
     for c in steps:
@@ -353,7 +353,7 @@ def test_landing_on_output_times_spoils_the_exact_wave_as_predicted_and_dense_ou
     model = fvsolve.build(load(struck(shut=0.0)))
     state, landed = fvsolve.initial_state(model), []
     times = np.arange(1, 200) * every
-    for t in times:  # advance lands on the time it is asked for: so does a program that shortens steps for its rows
+    for t in times:  # advance ends at t, like a program that shortens steps for its rows
         state = fvsolve.advance(model, state, t)
         landed.append(model.observe(t, state.y)[0])
     supply = 2 * AMBIENT + 2 * jump
@@ -374,7 +374,7 @@ def test_landing_on_output_times_spoils_the_exact_wave_as_predicted_and_dense_ou
 
 
 def falling(velocity: float, closure: float = 0.0, **numerics) -> dict:
-    """Water stopped in a pipe under 3 bar; the wave comes back to the gate as rho a v below them."""
+    """Case of water stopped in a pipe at 3 bar; the wave returns to the gate with rho a v below this pressure."""
     flow, shut = velocity * area(DIAMETER), 0.1
     demand = step(shut, flow, 0.0) if closure == 0.0 else ramp(shut, closure, flow, 0.0)
     nodes = {"lake": reservoir(3e5), "gate": junction(demand)}
@@ -382,7 +382,7 @@ def falling(velocity: float, closure: float = 0.0, **numerics) -> dict:
     return scene(nodes, links, 2.0, {**SHARP, **numerics}, ["gate.pressure"], 0.01)
 
 
-VAPOUR, LIMIT = 2300.0, (3e5 - 2300.0) / (RHO * SPEED)  # [Pa], and the velocity whose rho a v reaches it [m/s]
+VAPOUR, LIMIT = 2300.0, (3e5 - 2300.0) / (RHO * SPEED)  # [Pa], and velocity whose rho a v reaches it [m/s]
 
 
 def test_pressure_below_vapour_pressure_is_marked_at_the_gate_when_the_wave_is_back():
@@ -403,7 +403,7 @@ def test_below_vapour_the_run_can_be_told_to_stop_and_a_slow_closure_needs_no_ma
 
 
 def test_upwind_with_euler_at_courant_one_grows_wherever_there_is_friction_and_shorter_steps_do_not():
-    """Waves of nearly two cells: |R|^2 = 1 - 4 C (1 - C) + h g, so the limit is about 1 - g / 4 q, q = c / dx."""
+    """Waves of nearly two cells: |R|^2 = 1 - 4 C (1 - C) + h g, so the limit is about 1 - g / (4 q), q = c / dx."""
     q, g = 1000.0 / 15.0, 0.05 * (0.2 / (math.pi / 4 * 0.3**2)) / 0.3
     limit = 1.0 - g / (4.0 * q)
     for courant, grows in ((1.0, True), (limit - 1e-3, False)):

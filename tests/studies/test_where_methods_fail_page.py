@@ -1,4 +1,4 @@
-"""docs/where-methods-fail.md: its tests exist, its commands say what the page says, its table is what is computed."""
+"""docs/where-methods-fail.md: its tests exist, its commands run as described, and its table is the computed one."""
 
 from __future__ import annotations
 

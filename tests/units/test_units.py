@@ -1,4 +1,4 @@
-"""Units: every spelling of the table says what pint says, and near misses are refused."""
+"""Units: every spelling of the table agrees with pint, and near misses are refused."""
 
 import subprocess
 import sys
@@ -10,7 +10,7 @@ from pytest import approx
 from fvsolve import units
 from fvsolve.units import DIMENSIONS, UNITS, Kinematic, convert, parse
 
-# Spelling -> what it is in pint's words. A row for each spelling of the table; a test sees that none lacks.
+# Spelling -> unit in pint's words. A test checks that each spelling of the table has a row.
 ROWS = """
 m: meter | mm: millimeter | cm: centimeter | dm: decimeter | km: kilometer | um: micrometer | in: inch
 inch: inch | ft: foot | yd: yard | mi: mile | m2: meter**2 | cm2: centimeter**2 | mm2: millimeter**2

@@ -70,7 +70,8 @@ def fast_film_notice(basin, error: tuple[float, float, float], when: str = "") -
     deep, method = basin.case.amount(error[1], "length", 3), basin.case.numerics.method
     text = (
         f"{basin.name}: water runs {100.0 * error[0]:.2g} % too fast{when}: with {method} the rate of friction, "
-        f"{error[2]:.2g} 1/s in {deep} of water, is capped below {RATE_CAP:g} 1/s; use {remedy}, without a cap"
+        f"{error[2]:.2g} 1/s in {deep} of water, is capped below {RATE_CAP:g} 1/s; "
+        f"use {remedy}, where the rate has no cap"
     )
     return Notice("friction", f"nodes.{basin.name}", text, "method", error[0], NOTICE_ERROR)
 

@@ -58,7 +58,9 @@ class TransportRows(BasinRows):
             speed = np.abs(flows[own]) / mesh.length[own]
             around = is_outer_loop(mesh)[own - mesh.inner]  # report the outer outline, before the outlines of holes
             at = mesh.middle[own[np.argmax(np.where(around, speed, 0.0) if speed[around].any() else speed)]]
-            text = f"it crosses the outline at x = {at[0]:.6g} m, y = {at[1]:.6g} m, where there is no named patch"
+            text = (
+                f"the flow crosses the outline at x = {at[0]:.6g} m, y = {at[1]:.6g} m, where there is no named patch"
+            )
             draft.fault(f"nodes.{self.name}.velocity", f"{text}. Expected a patch with a name there")
             draft.check()
         row["unsplit"] = self.unsplit(row, passing)

@@ -121,7 +121,9 @@ def _by_corners(mesh: Mesh, stream: np.ndarray) -> np.ndarray:
     """
     stream = np.asarray(stream, float)
     if stream.shape != (len(mesh.points),):
-        raise ValueError(f"stream has shape {stream.shape}; expected a value for each of {len(mesh.points)} corners")
+        raise ValueError(
+            f"stream has shape {stream.shape}; expected a value for each of {len(mesh.points)} corners of cells"
+        )
     if not np.isfinite(stream).all():
         x, y = mesh.points[np.flatnonzero(~np.isfinite(stream))[0]]
         raise ValueError(f"the stream function is not finite at ({x:.6g}, {y:.6g}) m")
@@ -187,7 +189,7 @@ def _columns(path: Path) -> dict[str, np.ndarray]:
     except ValueError as error:
         raise MeshError([Fault("", str(error))], str(path)) from None
     if len(rows.lines) < 3:
-        text = f"it has {len(rows.lines)} points; expected at least three, around the mesh"
+        text = f"too few points ({len(rows.lines)}); expected at least three, around the mesh"
         raise MeshError([Fault("", text)], str(path))
     return columns
 
@@ -200,12 +202,14 @@ def _interpolated(file: str | Path, places: np.ndarray, values: np.ndarray, posi
         result = LinearNDInterpolator(places, values)(positions)
     except QhullError as error:
         raise MeshError(
-            [Fault("", "its points lie on one line; expected points around the mesh")], str(file)
+            [Fault("", "the points lie on one line; expected points around the mesh")], str(file)
         ) from error
     outside = np.isnan(result).reshape(len(positions), -1).any(axis=1)
     if outside.any():
         (x, y), (low, high) = positions[outside][0], (places.min(axis=0), places.max(axis=0))
-        text = f"its points do not enclose {outside.sum()} of {len(positions)} positions of the mesh, the first "
-        text += f"({x:.6g}, {y:.6g}) m; they span ({low[0]:.6g}, {low[1]:.6g}) to ({high[0]:.6g}, {high[1]:.6g}) m"
+        text = f"the points do not enclose {outside.sum()} of {len(positions)} positions of the mesh, the first "
+        text += (
+            f"({x:.6g}, {y:.6g}) m; the points span ({low[0]:.6g}, {low[1]:.6g}) to ({high[0]:.6g}, {high[1]:.6g}) m"
+        )
         raise MeshError([Fault("", text)], str(file))
     return result

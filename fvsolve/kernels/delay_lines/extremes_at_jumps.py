@@ -31,10 +31,12 @@ from fvsolve.kernels.table_handle import open_tables
 
 @njit(forceinline=True)
 def spare_offsets(tables):
-    """Offsets in the array `spare` of five arrays, in this order.
+    """Offsets of five arrays in the array `spare`, in this order.
 
-    - probe values and node pressures of the last record
-    - probe values and node pressures at the end of the step without the jumps that arrive in it
+    - probe values of the last record
+    - node pressures of the last record
+    - probe values at the end of the step, without the jumps that arrive in the step
+    - node pressures at the end of the step, without these jumps
     - work array
     """
     at, probes, nodes = 2 * tables.layout[0]["size"], tables.probes.size, tables.nodes.size
@@ -68,7 +70,7 @@ def store_smooth_values(t, y, state, handle):
 
 @njit
 def extremes_at_jump(t, time, y, state, handle):
-    """Update the extremes of probes and the first times below vapour pressure by the values on a side of a jump.
+    """Update the extremes of probes and the first times below vapour pressure by the values on one side of a jump.
 
     Probes within pipes are left out, see `update_probe_extremes`.
     time : arrival time of the jump [s]; t : end of the step [s]
@@ -103,7 +105,8 @@ def line_extremes_at_jumps(past, places, clock, line, q, x, sign, before, t):
 
     Returns (least, time of the least, greatest, time of the greatest) [kg/s, s]; without a jump, least is INFINITE.
     r, l : forward and backward wave; sign : 1 for pressure, -1 for flow; x : position as fraction of stretch q
-    before, t : begin and end of the step [s]; places : result of `offsets_of`; clock : result of `reading_data`
+    before, t : begin and end of the step [s]; line : row of the delay line
+    past, places, clock : wave history, result of `offsets_of`, result of `reading_data`
     """
     least, t_least, greatest, t_greatest = INFINITE, t, -INFINITE, t
     queue, tau, s, same = int(past[JUMP_CAPACITY]), line["tau"], line["stretch"] + q, clock[4]
@@ -176,6 +179,7 @@ def update_line_extremes(past, places, tables, before, t):
     """Update envelopes and extremes within delay lines by the values beside jumps that pass between `before` and t.
 
     The first times below vapour pressure along the lines are updated too.
+    past, places : wave history, and result of `offsets_of`
     """
     clock = reading_data(past, int(past[COUNT]) - 1)
     for number in range(tables.delays.size):
@@ -217,7 +221,10 @@ def mark_vapour(tables, number, j, t, value):
 
 @njit
 def update_probe_extremes(past, places, clock, tables, before, t):
-    """Update the extremes of probes within delay lines by the values beside jumps between the times `before` and t."""
+    """Update the extremes of probes within delay lines by the values beside jumps between the times `before` and t.
+
+    past, places, clock : wave history, result of `offsets_of`, result of `reading_data`
+    """
     for k in range(tables.probes.size):
         probe = tables.probes[k]
         if (probe["kind"] != PIPE_PRESSURE and probe["kind"] != PIPE_FLOW) or probe["side"] != 0:

@@ -78,7 +78,7 @@ def record_again(past, places, tables, t, y, out):
     """Record a state at the time of the last entry again: after a kink or event, or after a correction of the state.
 
     After a correction the waves that nodes send replace those of the entry; otherwise changes are jumps
-    (`detect_jumps`). An earlier state is ignored.
+    (`detect_jumps`). An earlier state is ignored. past, places : wave history, and result of `offsets_of`
     """
     k = int(past[COUNT]) - 1
     last = time_of(past, k)
@@ -95,6 +95,7 @@ def record_step(past, places, tables, t, y, out, handle):
     """Pass on the jumps that have arrived in an accepted step; then write the waves as a new entry.
 
     Jumps at nodes correct the states y; then out[STATUS] becomes AMENDED. Extremes beside jumps are updated.
+    past, places : wave history, and result of `offsets_of`
     """
     before = time_of(past, int(past[COUNT]) - 1)
     write_joint_arrivals(past, places, tables, t)
@@ -132,6 +133,7 @@ def update_line_envelope(t, places, clock, tables, number):
     """Update the pressure envelope along a delay line at the time t of the last entry.
 
     The first time below vapour pressure is updated too. number : number of the delay line
+    places, clock : results of `offsets_of` and `reading_data`
     """
     line, envelope = tables.delays[number], tables.envelope
     n, cell = line["places"], tables.pipes[line["pipe"]]["cell"]
@@ -155,7 +157,10 @@ def update_line_envelopes(t, places, tables):
 
 @njit
 def write_ends(past, places, tables, entry, out):
-    """Write the waves that nodes send into delay lines, which are in `out`, again into entry number `entry`."""
+    """Write the waves that nodes send into delay lines, which are in `out`, again into entry number `entry`.
+
+    past, places : wave history, and result of `offsets_of`
+    """
     for i in range(tables.delays.size):
         line, at = tables.delays[i], tables.layout[0]["ends"] + 4 * tables.delays[i]["pipe"]
         write_entry(past, places, line, 0, entry, 0, out[at])

@@ -1,9 +1,9 @@
 """Correction of states for a jump that arrives within a step, applied after the step.
 
 The rates of a state change when a jump arrives. The weights of the Runge-Kutta method count the new rate for too short
-or too long a time. The missing part is added, so that a jump is correct to second order. Without a correction are the
-supply through nodes of given pressure, and the mass in delay lines except the mass that they give to nodes with
-storage.
+or too long a time. The missing part is added, so that a jump is correct to second order. The supply through
+nodes of given pressure is not corrected, nor is the mass in delay lines, except for the mass that they give to nodes
+with storage.
 """
 
 from math import exp, expm1
@@ -37,11 +37,11 @@ def change_times(past, tables, t, time, sent):
 
 @njit(forceinline=True)
 def missing_time(times, rate):
-    """Time that the weights of the step miss [s], reduced because a node with storage soon balances the inflow.
+    """Time for which a change acts but the weights of the step do not count it [s]; negative if they count it too long.
 
-    It is negative if the weights count the change for too long.
+    It is reduced, because a node with storage soon balances the inflow. Without the reduction, a jump at a node that
+    fills within a step would be corrected by more than it brings.
     times : result of `change_times`; rate : rate at which the node adopts the new pressure [1/s]
-    Without the reduction, a jump at a node that fills within a step would be corrected by more than it brings.
     """
     since, booked = times
     late = since - booked
@@ -66,10 +66,11 @@ def filling_rate(tables, out, i, j):
 
 @njit(forceinline=True)
 def correct_store(past, tables, y, out, pipe, i, flow, times):
-    """Add to node i the mass that the step missed of a flow out of a delay line; subtract it from the line.
+    """Add the uncounted mass of a flow out of a delay line to node i, and subtract it from the line.
 
-    The flow [kg/s] began within the step. Without `stores_inflow` nothing is changed. A change marks the step as
-    corrected (past[CORRECTED_TIME] = NaN). pipe : row of the line's pipe
+    The flow [kg/s] began within the step, so the weights of the step have not counted a part of it. Nothing is changed
+    if the node does not store its inflow (`stores_inflow`). A
+    change marks the step as corrected (past[CORRECTED_TIME] = NaN). pipe : row of the line's pipe
     out : values of the right-hand side after the jump; times : result of `change_times`
     """
     if flow != 0.0 and stores_inflow(tables, i):
@@ -81,9 +82,10 @@ def correct_store(past, tables, y, out, pipe, i, flow, times):
 
 @njit
 def correct_columns(past, tables, y, i, change, times):
-    """Add to the flow of each rigid column at node i what the step missed of the effect of a pressure jump there.
+    """Correct the flow of each rigid column at node i for a pressure jump there within the step.
 
-    change : jump of the pressure within the step [Pa]; times : result of `change_times`. A change marks the step as
+    The part of its effect that the weights of the step have not counted is added.
+    change : jump of the pressure [Pa]; times : result of `change_times`. A correction marks the step as
     corrected (past[CORRECTED_TIME] = NaN).
     """
     columns = tables.columns

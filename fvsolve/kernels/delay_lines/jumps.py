@@ -66,9 +66,11 @@ def least_jump(past, tables, pipe):
 
 @njit
 def store_jump(past, places, s, wave, t, size, pipe):
-    """Store a jump of a wave that enters stretch s at t; if the list is full, record the greatest size without storage.
+    """Store a jump of a wave that enters stretch s at t; if the list is full, only update the greatest unstored jump.
 
+    past[GREATEST_UNSTORED_JUMP] is the greatest pressure of the jumps that could not be stored [Pa].
     s : stretch counted over all lines; wave : 0 forward, 1 backward; size : change of the wave [kg/s]
+    pipe : row of the line's pipe; past, places : wave history, and result of `offsets_of`
     """
     if not insert_jump(past, places, jump_head(places, s, wave), t, size):
         past[GREATEST_UNSTORED_JUMP] = max(past[GREATEST_UNSTORED_JUMP], abs(size) / pipe["admittance"])
@@ -76,9 +78,9 @@ def store_jump(past, places, s, wave, t, size, pipe):
 
 @njit
 def store_large_jump(past, places, tables, s, wave, t, size, pipe):
-    """Store a jump of a wave that enters stretch s at t, unless it is small (`least_jump`): it joins the smooth part.
+    """Store a jump of a wave that enters stretch s at t, unless it is small.
 
-    Arguments as for `store_jump`.
+    A jump up to the size of `least_jump` joins the smooth part of the wave. Arguments as for `store_jump`.
     """
     if abs(size) > least_jump(past, tables, pipe):
         store_jump(past, places, s, wave, t, size, pipe)
@@ -86,7 +88,7 @@ def store_large_jump(past, places, tables, s, wave, t, size, pipe):
 
 @njit(forceinline=True)
 def first_waiting_jump(past, places, s, wave):
-    """Offset in `past` of the time of the first jump of a wave that has not left stretch s; -1 for none.
+    """Offset in `past` of the time of the oldest jump of a wave that has not left stretch s; -1 without such a jump.
 
     Its size is `past[JUMP_CAPACITY]` places further. s : stretch counted over all lines; wave : 0 forward, 1 backward
     """
@@ -101,6 +103,8 @@ def reflected_part(past, places, tables, line, pipe, q, wave, size, t):
     """Part of a jump that friction in the middle of stretch q reflects [kg/s]; the jump is not yet passed on.
 
     size : change of the wave by the jump [kg/s]; t : end of the step in which it reaches the end of the stretch [s]
+    line, pipe : rows of the delay line and of its pipe; wave : 0 forward, 1 backward
+    past, places : wave history, and result of `offsets_of`
     """
     if not has_friction(pipe):
         return 0.0
@@ -156,8 +160,8 @@ def write_joint_arrivals(past, places, tables, t):
 def complete_short_arrivals(past, places, tables, t):
     """Write the arriving waves of delay lines shorter than a step, with the part of sent waves that arrives at once.
 
-    They replace the waves by `write_arrivals`, which hold for zero pressure deviations at both ends. The part is that
-    of the waves in the last entry. t : time of that entry
+    They replace the waves by `write_arrivals`, which hold for zero pressure deviations at both ends. The part that
+    arrives at once is computed from the waves in the last entry. t : time of that entry
     """
     newest = int(past[COUNT]) - 1
     clock = reading_data(past, newest)
@@ -180,7 +184,7 @@ def complete_short_arrivals(past, places, tables, t):
 def last_sent_wave(past, places, line, q, side, k):
     """Wave sent into stretch q of a delay line at entry k: its smooth part and all jumps so far [kg/s].
 
-    side : 0 forward, 1 backward wave
+    side : 0 forward, 1 backward wave; line : row of the delay line; past, places : wave history, result of `offsets_of`
     """
     ring, mask = ring_of(places, line, q)
     jumps = jump_head(places, line["stretch"] + q, side)
@@ -191,7 +195,7 @@ def last_sent_wave(past, places, line, q, side, k):
 def waves_differ(past, places, tables, k, out):
     """True if the waves that nodes send now differ from those of entry k by more than rounding, or are NaN.
 
-    out : values of the right-hand side now
+    out : values of the right-hand side now; past, places : wave history, and result of `offsets_of`
     """
     for i in range(tables.delays.size):
         line = tables.delays[i]
@@ -210,6 +214,7 @@ def detect_jumps(past, places, tables, t, y, out, short):
     t : time of the last entry; out : values of the right-hand side now
     short : True to solve nodes again, with the waves of that entry in lines shorter than a step. A jump then sets
         out[STATUS] to AMENDED, because the state must be evaluated again.
+    past, places : wave history, and result of `offsets_of`
     """
     k, ends, state = int(past[COUNT]) - 1, tables.layout[0]["ends"], out
     if short:

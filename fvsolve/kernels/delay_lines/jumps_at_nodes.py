@@ -79,9 +79,10 @@ def end_stretch(line, side):
 def ends_step(past, tables, line, pipe, q, wave, size):
     """True if a step ends when a jump of stretch q, or the part of it that friction reflects, leaves the stretch.
 
-    It does so if it arrives at a node with an instantaneous device and is large; after a small jump the device acts at
-    the end of the step. The least size of such a jump never decreases in a run: otherwise a jump to be passed on within
-    a step would stay in the list.
+    The step ends if the jump arrives at a node with an instantaneous device and is large; after a small jump the device
+    acts at the end of the step. The least size of a large jump never decreases in a run: otherwise a jump to be passed
+    on
+    within a step would stay in the list.
     q : stretch within the line; wave : 0 forward, 1 backward; size : change of the wave [kg/s]
     """
     acts = line["acts"]
@@ -167,11 +168,12 @@ def earliest_jump(past, places, tables, t):
 
 @njit
 def pass_jumps_at_ends(past, places, own, t, y, out, handle):
-    """Pass on the jumps that leave first and last stretches of delay lines up to t, in order; return True for any jump.
+    """Pass on the jumps that leave first and last stretches of delay lines up to t, in order; return True if any do.
 
     Extremes are updated by the values beside each jump. Masses of storing nodes and lines and flows of columns in y are
     corrected (`jump_correction`). Jumps that end a step are left out.
     own : tables of the run, in which short lines couple their ends at once
+    past, places : wave history, and result of `offsets_of`
     """
     number, q, wave, place = earliest_jump(past, places, own, t)
     if number < 0:
@@ -235,7 +237,7 @@ def enter_plain_node(past, places, tables, y, state, number, side, time, size, t
 
     y : states, corrected; state : values of the right-hand side at the end of the step, updated
     number : number of the line; side : 0 end at `from`, 1 at `to`; size : change of the wave [kg/s]
-    time : arrival time [s]; times : result of `change_times`
+    time : arrival time [s]; times : result of `change_times`; past, places : wave history, result of `offsets_of`
     """
     line, pipe, layout = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]], tables.layout[0]
     i = pipe["to_node"] if side == 1 else pipe["from_node"]
@@ -264,6 +266,7 @@ def solve_nodes_again(past, places, tables, t, y, state, sharp, time, times):
 
     y : states, corrected; state : values of the right-hand side before the jump, replaced by the solution
     sharp : handle, see the module; time : arrival time of the jump [s]; times : result of `change_times`
+    past, places : wave history, and result of `offsets_of`
     """
     layout, size = tables.layout[0], state.size
     solved = tables.spare[size : 2 * size]

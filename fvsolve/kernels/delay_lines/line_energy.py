@@ -7,9 +7,9 @@ the forward wave is smaller by delta, the friction loss there, and the backward 
 In units of 1 / (rho A) per length, with density rho and area A, the stretch stores
 R^2 + L^2 + (q0 + M0) R + (q0 - M0) L above the initial steady state. M0 is its mass flow, q0 = Y P0 its potential P0 =
 p - p_ambient + rho g z times the admittance Y; q0 falls along the line by drag0 times the travel time. The power that
-enters at the ends is stored or taken. Taken are (drag(M) - drag0) M times the length of the stretch, with the flow M in
-its middle, and drag0 times the integral of M. The power taken is that of friction, drag(M) M times the length, and the
-error of the midpoint rule for falling q0.
+enters at the ends is stored or taken. The part taken is (drag(M) - drag0) M times the length of the stretch, with the
+flow M in its middle, plus drag0 times the integral of M. It is the power of friction, drag(M) M times the length, plus
+the error of the midpoint rule for falling q0.
 
 A line shorter than a step h stores the fraction 1 - beta of the waves sent in h, beta = 1 - tau / h. It takes
 beta (1 - beta) c (s - s_h)^2 of each wave s; s_h is the wave sent h before.
@@ -78,11 +78,13 @@ def kink_before(past, places, line, q, t, least):
 
 @njit
 def stretch_integrals(t, out, tables, number, q):
-    """Integrals over stretch q of delay line `number` at t: (of R - L [kg m/s], of energies of R, of L [kg2 m/s2]).
+    """(integral of R - L [kg m/s], energy of R, energy of L [kg2 m/s2]) in stretch q of delay line `number` at t.
 
-    The energies, above the initial steady state, are multiplied by rho A, see the module. In a line shorter than a step
-    h the integrals are 1 - beta times those of the waves sent in h, beta = 1 - tau / h; the first is so twice.
-    R, L : forward and backward wave [kg/s]; rho A : density times area [kg/m]; out : values of the right-hand side at t
+    R, L : forward and backward wave [kg/s]; out : values of the right-hand side at t
+    The energies are those above the initial steady state, multiplied by density times area [kg/m], see the module. A
+    line
+    with a travel time tau below the step h stores the fraction tau / h of the waves sent in h. There the integrals are
+    those of the waves sent in h; the energies are multiplied by tau / h, the first result by (tau / h)^2.
     """
     past, line, st = tables.past, tables.delays[number], tables.settings[0]
     pipe, places, hold, share = tables.pipes[line["pipe"]], offsets_of(past), line["hold"], 1.0 - line["now"]

@@ -113,8 +113,9 @@ def sent_wave_linear(past, places, clock, ring, mask, jumps, wave, t):
 def waves_at_linear(t, past, places, clock, line, share):
     """Both waves as in `waves_at` at the time t of the last entry, by linear interpolation; used for envelopes.
 
-    The friction loss is that of the waves that arrive at the ends of the stretch at t. line : row of the delay line;
-    places : result of `offsets_of`; clock : result of `reading_data`
+    The friction loss is that of the waves that arrive at the ends of the stretch at t.
+    line : row of the delay line; share : distance from `from` as a fraction of its length
+    past, places, clock : wave history, result of `offsets_of`, result of `reading_data`
     """
     stretches, tau = line["stretches"], line["tau"]
     q = min(int(share * stretches), stretches - 1)

@@ -109,7 +109,7 @@ def write_arrivals(past, places, clock, line, pipe, q, t):
 def write_all_arrivals(past, tables, t):
     """Write the waves that arrive at t in first and last stretches of delay lines into `past`, see `write_arrivals`.
 
-    Nodes are solved several times at one time; the waves are read only once.
+    If nodes are solved several times for the same t, the waves are read only once.
     """
     if past[ARRIVALS_TIME] == t and past[ARRIVALS_COUNT] == past[COUNT]:
         return
@@ -151,8 +151,8 @@ def incoming_line_waves(t, y, dydt, out, handle):
     """Write the waves that nodes send into delay lines, Y p' minus the arriving waves; write d/dt of the mass in lines.
 
     Y : admittance of the pipe [kg/s per Pa]; p' : deviation of the node pressure from the initial steady state [Pa]
-    In lines shorter than a step the arriving waves depend on p', which is added to them in out[ends] first. d/dt of the
-    mass [kg/s] is the inflow at both ends; it is not written if `dydt` is empty.
+    In lines shorter than a step the arriving waves depend on p'; this part is added to them in out[ends] first. d/dt of
+    the mass [kg/s] is the inflow at both ends; it is not written if `dydt` is empty.
     """
     tables = open_tables(handle)
     layout, lines = tables.layout[0], tables.delays

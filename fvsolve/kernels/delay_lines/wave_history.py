@@ -105,7 +105,7 @@ def jump_head(places, s, wave):
 def jump_list(places, queue, at):
     """Offset in `past` of the times of the jumps of the head at `at`; their sizes and running sums follow.
 
-    queue : capacity of the list, which each of the three parts takes up; places : result of `offsets_of`
+    queue : capacity of the list, which is the length of each of the three parts; places : result of `offsets_of`
     """
     return places[2] + 3 * queue * ((at - places[1]) // HEAD_SIZE)
 
@@ -200,10 +200,11 @@ def lagrange_unequal(past, newest, t):
 
 @njit(forceinline=True)
 def reading_data(past, newest):
-    """Data for readings: (newest entry, its time [s], 1 / step [1/s], number of equal steps, tolerance of times [s]).
+    """(newest entry, its time [s], 1 / step [1/s], number of equal steps, tolerance of times [s]) for readings.
 
     newest : number of the last or the last but one entry. Except for the tolerance, the result does not depend on
-    whether an entry after `newest` exists already. The number counts the last steps of this length up to `newest`.
+    whether an entry after `newest` exists already. The number of equal steps is that of the last steps up to `newest`
+    that have the length `step`.
     """
     step, even = past[LAST_STEP], past[EQUAL_STEPS]
     if newest != int(past[COUNT]) - 1:
@@ -285,7 +286,10 @@ def sum_of_first(past, places, at, count):
 
 @njit
 def sum_listed_jumps(past, places, at, t):
-    """Sum of the jumps of a wave sent up to t, with those removed from its list [kg/s]; the list must not be empty."""
+    """Sum of the jumps of a wave sent up to t [kg/s], including jumps already removed from its list.
+
+    The list must not be empty. at : offset of the head of the list in `past`
+    """
     count, queue, first = int(past[at + JUMP_COUNT]), int(past[JUMP_CAPACITY]), int(past[at + FIRST_JUMP])
     times = jump_list(places, queue, at)
     if past[times + wrap_index(first + count - 1, queue)] <= t:
@@ -295,7 +299,10 @@ def sum_listed_jumps(past, places, at, t):
 
 @njit(forceinline=True)
 def jumps_until(past, places, at, t):
-    """Sum of the jumps of a wave sent up to t, with those removed from its list [kg/s]; at : offset of its head."""
+    """Sum of the jumps of a wave sent up to t [kg/s], including jumps already removed from its list.
+
+    at : offset of the head of the list in `past`
+    """
     return sum_listed_jumps(past, places, at, t) if past[at + JUMP_COUNT] > 0.0 else past[at + REMOVED_SUM]
 
 
@@ -337,9 +344,10 @@ def read_waves(past, places, clock, line, q, t):
 def insert_jump(past, places, at, t, size):
     """Insert a jump of a wave into its list, sorted by time; return False if the list is full.
 
-    The size is added to a jump of equal time that is listed and has not been passed on. A jump that is not listed
-    becomes part of the smooth part, see `write_entry`.
+    If the list contains a jump of equal time that has not been passed on, the size is added to it. A jump that is not
+    listed becomes part of the smooth part, see `write_entry`.
     t : time at which the jump was sent [s]; size [kg/s]; at : offset of the head of the list
+    past, places : wave history, and result of `offsets_of`
     """
     queue, first, count = int(past[JUMP_CAPACITY]), int(past[at + FIRST_JUMP]), int(past[at + JUMP_COUNT])
     i, times = count, jump_list(places, queue, at)
@@ -417,7 +425,8 @@ def begin_entry(past, t):
 def write_entry(past, places, line, q, k, wave, value):
     """Store the smooth part of a wave of stretch q as entry k: `value` minus all its jumps so far [kg/s].
 
-    value : whole wave [kg/s]; wave : 0 forward, 1 backward; places : result of `offsets_of`
+    value : whole wave [kg/s]; wave : 0 forward, 1 backward; line : row of the delay line
+    past, places : wave history, and result of `offsets_of`
     """
     at, mask = ring_of(places, line, q)
     jumps = jumps_until(past, places, jump_head(places, line["stretch"] + q, wave), INFINITE)

@@ -123,7 +123,7 @@ def thrust(st, floats, pipe, p):
 
 @njit
 def force_of_mass(st, floats, pipe, m):
-    """Pressure force (`thrust`) in a pipe that contains the mass per length m [kg/m], in [N]; called often."""
+    """Pressure force (`thrust`) [N] in a pipe that contains the mass per length m [kg/m]."""
     functions = log_law.force_of_mass, table_law.force_of_mass, mixture_law.force_of_mass, unknown_law.not_a_number
     return dispatch_law(*functions, st, floats, pipe, m)
 

@@ -66,7 +66,7 @@ def thrust(st, floats, pipe, p):
 
 @inline
 def force_of_mass(st, floats, pipe, m):
-    """Pressure force (`thrust`) in a pipe that contains the mass per length m [kg/m], in [N]."""
+    """Pressure force (`thrust`) [N] in a pipe that contains the mass per length m [kg/m]."""
     return thrust(st, floats, pipe, pressure_of_mass(st, floats, pipe, m))
 
 

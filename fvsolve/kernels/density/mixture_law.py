@@ -40,7 +40,7 @@ def relative_volume(st, p):
 
 @law_njit
 def gas_integral(st, x):
-    """Integral of the volume of free gas by `free_gas` over the gas pressure up to x, apart from a constant [Pa]."""
+    """Integral of the volume of free gas by `free_gas` over the gas pressure up to x [Pa], except for a constant."""
     k, at, s = st["gas_power"], min(x, st["saturation"]), st["saturation"]
     if k == 1.0:
         return st["gas"] * (log(at) - at / s)
@@ -73,7 +73,9 @@ def enthalpy(st, floats, p):
 def pressure_of_enthalpy(st, floats, h):
     """Pressure p [Pa] at which the specific enthalpy is h [J/kg], by Newton.
 
-    Newton on p, or on the logarithm of the gas pressure where a step would reduce it to a fifth or less.
+    Newton's method is applied to p, or to the logarithm of the gas pressure where a step would reduce the gas pressure
+    to
+    a fifth or less.
     """
     prevent_inlining()
     floor, beta = st["floor"], st["beta"]
@@ -106,7 +108,7 @@ def gas_root(st, compliance, share, slope, rest):
 
 @law_njit
 def pressure_of_mass_ratio(st, compliance, share):
-    """Pressure [Pa] of a pipe whose mass per length is `share` [-] times rho_ref A_ref; or of a vessel.
+    """Pressure [Pa] of a pipe or a vessel, from its mass over that of liquid in the reference state, `share` [-].
 
     compliance : relative area change of the wall per pressure [1/Pa], 0 for a vessel
     If the gas is not isothermal, its tangent in 1 / x replaces it, x : gas pressure, and the root is iterated until it
@@ -177,7 +179,7 @@ def mass_of_pressure(st, floats, pipe, p):
 
 @inline
 def force_of_mass(st, floats, pipe, m):
-    """Pressure force (`thrust`) in a pipe that contains the mass per length m [kg/m], in [N]."""
+    """Pressure force (`thrust`) [N] in a pipe that contains the mass per length m [kg/m]."""
     return thrust(st, floats, pipe, pressure_of_mass(st, floats, pipe, m))
 
 

@@ -17,7 +17,7 @@ if COMPILING:
 else:
 
     def prevent_inlining():
-        """Do nothing, without numba."""
+        """Do nothing, because without numba no function is inlined."""
 
 
 def law_njit(function):

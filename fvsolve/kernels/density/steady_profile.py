@@ -55,7 +55,7 @@ def mass_of_bernoulli(st, floats, pipe, bernoulli, flow):
 def profile_along(st, floats, profile, pipe, start, z, flow, faces, centers):
     """Write the initial steady state along a pipe with friction: d(h + v^2/2 + g z)/dx = -drag m_ref / m^2.
 
-    By the classical Runge-Kutta method over half cells.
+    The equation is integrated by the classical Runge-Kutta method in steps of half a cell.
     h : specific enthalpy, v : velocity, m : mass per length, m_ref : its reference value
     drag : drag of the initial steady state in the row of the pipe, constant along it
     start : h + v^2/2 + g z at the `from` end [J/kg]; z : elevation there [m]; flow : mass flow [kg/s]

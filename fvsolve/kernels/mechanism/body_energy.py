@@ -62,7 +62,7 @@ def joint_drive_power(t, y, out, tables, i):
 
 @njit
 def joint_damping_power(body, y):
-    """Power dissipated by the damping of a joint [W], at a free body of its rotation only."""
+    """Power dissipated by the damping of a joint [W]; for a free body only its rotation is damped."""
     total, first = 0.0, 3 if body["joint"] == FREE else 0
     for k in range(first, body["freedoms"]):
         rate = body["speed"][k] + y[body["rate"] + k]

@@ -42,7 +42,10 @@ POINT_QUANTITIES = (
 
 @njit
 def angular_momentum(body, out, here):
-    """Angular momentum of a body about its centre of mass, J w (68) [kg m2/s]; J : inertia, w : angular velocity."""
+    """Angular momentum J w of a body about its centre of mass [kg m2/s], (68) of docs/course.md.
+
+    J : inertia, w : angular velocity; here : offset of the body in `out`
+    """
     r, w = here + ATTITUDE, here + SPIN
     return inertia_product(body["inertia"], out, r, out[w], out[w + 1], out[w + 2])
 
@@ -72,8 +75,9 @@ def kinetic_energy(body, out, here):
 
 @njit
 def acceleration_at(out, here, at, x, y, z):
-    """Acceleration of a point fixed in a body [m/s2], (65); (x, y, z) : its position from the origin of the body.
+    """Acceleration of a point fixed in a body [m/s2], (65) of docs/course.md.
 
+    (x, y, z) : position of the point from the origin of the body, in axes of the world
     here : offset of the body in `out`; at : index in `out` of the acceleration of its origin
     """
     a, b, c = cross(out, here + SPIN_RATE, x, y, z)
@@ -86,8 +90,9 @@ def acceleration_at(out, here, at, x, y, z):
 def joint_load(out, tables, i):
     """Force [N] and torque [N m] of the joint of body i on that body, six numbers in axes of the world.
 
-    The torque is about the origin of the body. Both follow from the equations of Newton and Euler (68) of body i and of
-    all bodies that it carries, with the loads of the water in basins on them.
+    The torque is about the origin of the body. Both follow from the equations of Newton and Euler, (68) of
+    docs/course.md,
+    of body i and of all bodies that it carries, with the loads of the water in basins on them.
     """
     bodies, first = tables.bodies, body_row(tables, i)
     fx = fy = fz = tx = ty = tz = 0.0
@@ -125,11 +130,11 @@ def joint_load(out, tables, i):
 
 @njit
 def roll_pitch_yaw(out, r):
-    """Angles (roll, pitch, yaw) [rad] of the rotation matrix R at out[r], R = R_z(yaw) R_y(pitch) R_x(roll) (40).
+    """Angles (roll, pitch, yaw) [rad] of the rotation matrix R at out[r], R = R_z(yaw) R_y(pitch) R_x(roll).
 
-    Roll is computed from R_z(-yaw) R. So the angles give R also near a pitch of 90 degrees, where the entries of R that
-    give roll and yaw vanish. There only the sum or difference of roll and yaw is defined: yaw is set to 0, as in
-    `fvsolve.attitude`.
+    This is (40) of docs/course.md. Roll is computed from R_z(-yaw) R. So the angles give R also near a pitch of 90
+    degrees, where the entries of R that give roll and yaw vanish. There only the sum or difference of roll and yaw is
+    defined: yaw is set to 0, as in `fvsolve.attitude`.
     """
     level = hypot(out[r], out[r + 3])  # cos(pitch)
     yaw = atan2(out[r + 3], out[r]) if level > LEAST_COSINE else 0.0
@@ -140,9 +145,10 @@ def roll_pitch_yaw(out, r):
 
 @njit
 def euler_parameters(body, y, out, here):
-    """Normalised Euler parameters (eta, eps_x, eps_y, eps_z) of the attitude of a body (44).
+    """Normalised Euler parameters (eta, eps_x, eps_y, eps_z) of the attitude of a body, (44) of docs/course.md.
 
     For a free body they are read from the states; for other bodies they are computed from R, with eta >= 0.
+    here : offset of the body in `out`
     """
     if body["joint"] == FREE:
         h, a, b, c = joint_parameters(body, 3, y)
@@ -206,9 +212,11 @@ def body_value(t, y, out, tables, i, number):
 def point_value(out, tables, k, number):
     """Value of a quantity of point k in SI; number : index of the quantity in `POINT_QUANTITIES`.
 
-    Accelerations of a point of the world are 0. The parts of the acceleration are the terms of (65), relative to the
-    axes of the parent of the body that contains the point. With the acceleration of the origin of the parent they add
-    up to the acceleration of the point. If that body is joined to the world, its own axes replace those of a parent.
+    Accelerations of a point of the world are 0. The parts of the acceleration are the terms of (65) of docs/course.md,
+    relative to the axes of the parent of the body that contains the point. With the acceleration of the origin of the
+    parent they add up to the acceleration of the point. If that body is joined to the world, its own axes replace those
+    of
+    a parent.
     """
     moved = point_at(out, tables, k, POSITION)
     if number < 6:

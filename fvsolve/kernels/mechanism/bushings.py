@@ -77,10 +77,10 @@ def deviation(out, tables, bushing, r, c):
 
 @njit
 def rotation_deviation(out, tables, bushing):
-    """Rotation of the body of `to` relative to that of `from`, from R_d of `deviation`, as seven numbers.
+    """Deviation of the relative attitude of the bodies of a bushing from R_d (see `deviation`), as seven numbers.
 
     They are, in axes of the world, 2 eta eps (3 numbers), the relative angular velocity [rad/s] (3 numbers), and
-    eps . eps, with the Euler parameters (eta, eps) of the rotation.
+    eps . eps, with the Euler parameters (eta, eps) of the deviation.
     """
     x = 0.5 * (deviation(out, tables, bushing, 2, 1) - deviation(out, tables, bushing, 1, 2))
     y = 0.5 * (deviation(out, tables, bushing, 0, 2) - deviation(out, tables, bushing, 2, 0))

@@ -69,6 +69,7 @@ def segment_energy(tables, out, here, segment, z, rise):
     segment : (start r, direction t, mass moments m), see `fluid_loads`; with the rates of the moments in place of m,
         the result is the power that the inflow brings [W]
     z, rise : elevation of the start of the segment in the network at rest [m], and its increase per distance s
+    here : offset of the body in `out`
     """
     motion, g, (r, t, m) = tables.scratch, tables.settings[0]["gravity"], segment
     u, v, w = cross(motion, BODY_SPIN, r[0], r[1], r[2])
@@ -92,7 +93,10 @@ def load_power(motion, load):
 
 @njit
 def segment_energy_rate(tables, out, here, segment, d, z, rise):
-    """Rate of the energy of a segment that `segment_energy` gives [W]; d : rates of the mass moments of the segment."""
+    """Rate of the energy of a segment that `segment_energy` gives [W].
+
+    d : rates of the mass moments of the segment; other arguments as for `segment_energy`
+    """
     motion, (r, t, m) = tables.scratch, segment
     carried = load_power(motion, segment_load(motion, r, t, m, ZERO_VECTOR))
     return carried + segment_energy(tables, out, here, (r, t, d), z, rise)
@@ -112,6 +116,7 @@ def path_energy_rate(tables, out, here, path, change, flow, rate):
     """Rate of the energy M (v . C + W . Z) of a mass flow M along a flow path (C, Z) on a body [W].
 
     path, change : (C, Z) and its rate; flow, rate : M [kg/s] and dM/dt [kg/s2]; v, W : see `path_velocity`
+    here : offset of the body in `out`
     """
     motion, g, up = tables.scratch, tables.settings[0]["gravity"], here + ATTITUDE + 6
     x, y, z = cross(motion, BODY_SPIN, motion[BODY_VELOCITY], motion[BODY_VELOCITY + 1], motion[BODY_VELOCITY + 2])
@@ -128,6 +133,7 @@ def extra_head(y, out, tables, here, i):
     """Energy per mass that the motion of the body adds to flow from node i into a link [J/kg].
 
     For a tank, the energy at its surface, above datum, also replaces the energy at the pressure of its bottom.
+    here : offset of the body in `out`
     """
     st, node, motion = tables.settings[0], tables.nodes[i], tables.scratch
     r = as_tuple(tables.moving_segments[node["moving_segment"]]["start"])
@@ -153,7 +159,7 @@ def add_node_power(y, dydt, out, tables, i, power):
     """Add to `power` the supplied power or the rate of energy of node i that is due to the motion of its body [W].
 
     The supplied power is that of a junction or reservoir; the rate is that of a tank or chamber. For a tank the rate
-    replaces the entry, with heights from the datum.
+    replaces the entry, and heights are those above the datum.
     """
     node, st, motion = tables.nodes[i], tables.settings[0], tables.scratch
     here = body_row(tables, tables.moving_segments[node["moving_segment"]]["body"])
@@ -174,7 +180,7 @@ def add_node_power(y, dydt, out, tables, i, power):
 def add_node_stored(y, out, tables, i, stored):
     """Add to `stored` the energy of the fluid at node i that is due to the motion of its body [J].
 
-    For a tank it replaces the entry, with heights from the datum.
+    For a tank it replaces the entry, and heights are those above the datum.
     """
     node = tables.nodes[i]
     here, z = body_row(tables, tables.moving_segments[node["moving_segment"]]["body"]), node["elevation"]
@@ -196,7 +202,7 @@ def end_heights(tables, link, length):
 
 @njit
 def pipe_energy_rate(y, dydt, out, tables, k, here):
-    """Rate of the energy of pipe k that is due to the motion of its body [W]."""
+    """Rate of the energy of pipe k that is due to the motion of its body [W]; here : offset of the body in `out`."""
     r, t, length = pipe_segment(tables, k)
     z, rise = end_heights(tables, tables.pipes[k], length)
     (m, flow), (d, rate) = pipe_moments(tables, y, k, length, 1.0), pipe_moments(tables, dydt, k, length, 0.0)
@@ -214,7 +220,7 @@ def pipe_energy_rate(y, dydt, out, tables, k, here):
 
 @njit
 def pipe_extra_energy(y, out, tables, k, here):
-    """Energy of pipe k that is due to the motion of its body [J]."""
+    """Energy of pipe k that is due to the motion of its body [J]; here : offset of the body in `out`."""
     motion, (r, t, length) = tables.scratch, pipe_segment(tables, k)
     z, rise = end_heights(tables, tables.pipes[k], length)
     m, flow = pipe_moments(tables, y, k, length, 1.0)
@@ -229,7 +235,10 @@ def pipe_extra_energy(y, out, tables, k, here):
 
 @njit
 def column_energy_rate(y, dydt, out, tables, k, here):
-    """Rate of the energy of rigid column k that is due to the motion of its body [W]; heights count from the datum."""
+    """Rate of the energy of rigid column k that is due to the motion of its body [W].
+
+    Heights are those above the datum. here : offset of the body in `out`
+    """
     column, z, total = tables.columns[k], tables.settings[0]["datum"], 0.0
     for m in range(column["moving_segments"]):
         total += segment_energy_rate(tables, out, here, column_segment(tables, column, m), ZERO_VECTOR, z, 0.0)
@@ -241,7 +250,10 @@ def column_energy_rate(y, dydt, out, tables, k, here):
 
 @njit
 def column_extra_energy(y, out, tables, k, here):
-    """Energy of rigid column k that is due to the motion of its body [J]; heights count from the datum."""
+    """Energy of rigid column k that is due to the motion of its body [J].
+
+    Heights are those above the datum. here : offset of the body in `out`
+    """
     column, z, motion = tables.columns[k], tables.settings[0]["datum"], tables.scratch
     total = (column["flow"] + y[column["y"]]) * path_velocity(motion, column_path(y, tables, column))
     for m in range(column["moving_segments"]):
@@ -296,7 +308,9 @@ def add_power(t, y, dydt, out, handle, power):
 def add_stored(t, y, dydt, out, handle, stored):
     """Add the energy due to the motion of bodies to the entries of nodes, pipes and rigid columns in `stored` [J].
 
-    The energy is counted from a body at rest in its position at the start, for tanks and columns from the datum.
+    It is the difference from the energy with the body at rest in its position at the start. For tanks and columns,
+    heights
+    are those above the datum instead.
     """
     tables = open_tables(handle)
     nodes, pipes, columns, segments = tables.nodes, tables.pipes, tables.columns, tables.moving_segments

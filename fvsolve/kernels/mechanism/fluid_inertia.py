@@ -72,8 +72,9 @@ def path_component(out, work, here, s, flow_path):
 def subtract_sliding_inertia(out, tables, i, flow_path, slides):
     """Subtract the inertia of fluid that slides along a flow path on body i from the mass matrix M in `scratch`.
 
-    flow_path : integrals of dr and r x dr along the path; slides : mass of the fluid over its length squared [kg/m2],
-        for a path of unit length times the square of the distance between the ends [kg]
+    flow_path : integrals of dr and r x dr along the path
+    slides : mass of the fluid over the square of its length [kg/m2]; if the path has unit length, this value times the
+        square of the distance between the ends of the fluid [kg]
     """
     work, n, here = tables.scratch, tables.freedoms.size, body_row(tables, i)
     path, count = freedom_path(tables, nearest_free_body(tables, i))

@@ -170,7 +170,7 @@ def set_prismatic(body, t, y, tables, own):
 
 @njit
 def copy_joint_axes(tables, own):
-    """Set the attitude of a body to the axes of its joint, in scratch[9:18]; for joints that do not rotate the body."""
+    """Set the attitude of a body to the axes of its joint, which are in scratch[9:18]; for joints without rotation."""
     for k in range(9):
         own[ATTITUDE + k] = tables.scratch[9 + k]
 
@@ -194,7 +194,10 @@ def add_joint_velocity(own, wx, wy, wz, vx, vy, vz):
 
 @njit
 def set_jointed_body(body, t, y, out, tables, own):
-    """Write attitude, position, and motion at o, of a body that is not free from those of its parent to `own`."""
+    """Write attitude, position, and motion at o of a body with a joint to `own`, computed from those of its parent.
+
+    own : data of the body in `out`; o : reference point, see `body_layout`
+    """
     set_joint_frame(body, out, tables, own)
     if body["joint"] == REVOLUTE:
         set_revolute(body, t, y, tables, own)

@@ -159,8 +159,9 @@ def bias_load(own, inertia, load):
 def fill_mass_matrix(y, out, tables):
     """Write joint columns S, mass matrix M and the forces of all degrees of freedom to `scratch`, see the module.
 
-    The forces contain the loads of all bodies, bias, and springs and dampers of joints. Those that are rounding of the
-    equilibrium at the start are subtracted. M contains the fluid in basins and networks on bodies.
+    The forces contain the loads of all bodies, bias, and springs and dampers of joints. Forces at the start that are
+    only
+    rounding of its equilibrium are subtracted. M contains the fluid in basins and networks on bodies.
     """
     bodies, freedoms, work, paths = tables.bodies, tables.freedoms, tables.scratch, tables.integers
     n = freedoms.size

@@ -97,7 +97,7 @@ def set_segment_drives(t, y, dydt, out, handle):
 def bottom_pressure_per_density(tables, out, segment, level):
     """Integral of dp / density from the surface to the bottom of a tank on a body [J/kg].
 
-    At constant density it is the gauge pressure at the bottom over density. It is for zero joint accelerations.
+    At constant density it is the gauge pressure at the bottom over density. Joint accelerations are taken as zero.
     segment : row of the tank in `moving_segments`; level : depth along the z axis of the body [m]
     `scratch` is overwritten by `set_body_motion`.
     """
@@ -138,6 +138,7 @@ def mark_weightless(tables, out, i, segment, level):
     """Write the status NO_WEIGHT if the fluid at the surface of the tank at node i has no weight.
 
     out[WHERE] is set to i plus the number of basins, because lower numbers denote basins.
+    segment, level : see `bottom_pressure_per_density`
     """
     if not bottom_pressure_per_density(tables, out, segment, level + THIN_LAYER) > bottom_pressure_per_density(
         tables, out, segment, level

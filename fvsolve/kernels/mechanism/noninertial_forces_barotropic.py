@@ -32,9 +32,10 @@ def moving_tank_pressures_barotropic(t, y, dydt, out, handle):
 
 @njit
 def add_cell_drives_barotropic(t, y, dydt, out, handle):
-    """Add the drive of the cells of pipes on bodies to the rates of their waves, as `add_cell_drives`.
+    """Add the drive of the cells of pipes on bodies to the rates of their waves, under barotropic density laws.
 
-    It changes dM/dt by m / dx times the drive. M : mass flow, m : mass per length, dx : length of a cell
+    The drive is that of `add_cell_drives`. It changes dM/dt by m / dx times the drive. M : mass flow, m : mass per
+    length, dx : length of a cell
     """
     tables = open_tables(handle)
     pipes, profile, at = tables.pipes, tables.profile, tables.layout[0]["moving_segment"]

@@ -76,7 +76,7 @@ def density_law_power(st, floats, profile, pipe, z, w, y, dydt):
 def add_power_barotropic(t, y, dydt, out, handle, power):
     """Add the power of viscoelastic walls to the entries of their pipes in `power` [W].
 
-    Added are dissipation, rate of stored energy, and the residual of the density law (`density_law_power`).
+    It consists of dissipation, rate of stored energy, and the residual of the density law (`density_law_power`).
     """
     tables = open_tables(handle)
     st, pipes, nodes, at = tables.settings[0], tables.pipes, tables.nodes, NODE * tables.nodes.size

@@ -21,7 +21,7 @@ class AccumulatorRows(Device, kind="accumulator"):
     vessel = True
     quantities = ("gas_volume", "gas_pressure")
     events = ("is empty", "holds fluid again")
-    remedy = "give it a connection, whose loss damps the flow in and out"
+    remedy = "give the accumulator a connection, whose loss damps the flow in and out"
 
     def of(self, part) -> Device:
         return self if not part.has_shape else ShapedRows() if part.compressor is None else CompressorRows()

@@ -39,7 +39,8 @@ class Accumulator(Node, kind="accumulator"):
     quantities: ClassVar[dict[str, str]] = {**Node.quantities, "gas_pressure": "pressure", "gas_volume": "volume"}
     fixes_pressure: ClassVar[bool] = True
     synonyms: ClassVar[dict[str, str]] = {
-        "height": "volume, from which it follows", "length": "volume, from which it follows", "inclination": "slope",
+        "height": "volume, from which the height follows", "length": "volume, from which the length follows",
+        "inclination": "slope",
         "base": "bottom", "initial_level": "level", "liquid_level": "level", "gas_exponent": "exponent",
     }  # fmt: skip
 
@@ -48,8 +49,7 @@ class Accumulator(Node, kind="accumulator"):
         float | None,
         Quantity(
             "pressure",
-            about="gas pressure at which the bladder fills `volume` [Pa]; "
-            "`gas_volume` or `level` is needed if left out",
+            about="gas pressure at which the bladder fills `volume` [Pa]; required without `gas_volume` and `level`",
             usual=GAS_PRESSURES,
         ),
     ] = None
@@ -58,7 +58,7 @@ class Accumulator(Node, kind="accumulator"):
         Quantity(
             "volume",
             positive,
-            "gas volume of an air vessel at the start [m3]; `precharge` or `level` is needed if left out",
+            "gas volume of an air vessel at the start [m3]; required without `precharge` and `level`",
             VOLUMES,
         ),
     ] = None
@@ -67,7 +67,7 @@ class Accumulator(Node, kind="accumulator"):
         Quantity(
             "level",
             nonnegative,
-            "fluid level above the bottom at the start [m]; `precharge` or `gas_volume` is needed if left out",
+            "fluid level above the bottom at the start [m]; required without `precharge` and `gas_volume`",
             LEVELS,
         ),
     ] = None
@@ -144,9 +144,15 @@ class Accumulator(Node, kind="accumulator"):
         if self.compressor is not None:
             start, stop = self.compressor.start, self.compressor.stop
             if stop >= start:
-                yield ("compressor", "stop"), f"{stop:g} m is not below the level `start`, {start:g} m; set it lower"
+                yield (
+                    ("compressor", "stop"),
+                    f"{stop:g} m is not below the level `start`, {start:g} m; expected a lower level",
+                )
             if start >= top:
-                yield ("compressor", "start"), f"{start:g} m is never reached; the vessel is full at {top:.6g} m"
+                yield (
+                    ("compressor", "start"),
+                    f"{start:g} m is never reached; expected less than {top:.6g} m, at which the vessel is full",
+                )
 
 
 class Vessel(Accumulator):

@@ -19,7 +19,7 @@ class AirValveRows(Device, kind="air-valve"):
     states = ("air",)
     quantities = ("air_volume", "air_mass", "air_pressure")
     events = ("opens", "shuts")
-    remedy = "give it another volume"
+    remedy = "give the air valve another volume"
 
     def of(self, part) -> Device:
         return self if part.throttled_outlet is None else ThrottledAirValveRows()
@@ -63,7 +63,7 @@ class AirValveRows(Device, kind="air-valve"):
         if deficit <= law.PRESSURE_MARGIN:
             return []
         below = start.case.amount(deficit, "pressure", span=True)
-        text = f"{name}: the air valve is open at the start, {below} below ambient"
+        text = f"{name}: the air valve is open at the start, at a pressure of {below} below ambient"
         start.draft.warnings.append(Notice("start", f"nodes.{name}", text, "pressure", float(deficit), 0.0))
         return [f"air valve {name}: {below} below ambient, so it opens"]
 

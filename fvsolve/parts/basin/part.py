@@ -93,13 +93,13 @@ class Patch(Table):
 class Cells(Value):
     """Numbers of cells along x and y of a rectangle."""
 
-    about = "numbers of cells along x and y; `mesh` is needed if left out"
+    about = "numbers of cells along x and y; required without `mesh`"
     takes = "[whole number, whole number]"
 
     def read(self, given: Any, setting: ReadContext) -> tuple[int, int]:
         is_pair = isinstance(given, (list, tuple)) and len(given) == 2 and all(type(n) is int and n > 0 for n in given)
         if not is_pair:
-            raise ValueError(f"{show(given)} is not a pair of cell numbers; expected for example [64, 32]")
+            raise ValueError(f"{show(given)} is not a pair of numbers of cells; expected for example [64, 32]")
         return tuple(given)
 
 
@@ -273,9 +273,7 @@ class Basin(PlaceOnBody, kind="basin"):
     physics: Annotated[str, Choice("physics", Physics.kinds, "equations solved in the basin")] = "free-surface"
     size: Annotated[
         tuple[float, float] | None,
-        Rows(
-            "length", positive, length=2, about="lengths along x and y [m]; `mesh` is needed if left out", changes=SHAPE
-        ),
+        Rows("length", positive, length=2, about="lengths along x and y [m]; required without `mesh`", changes=SHAPE),
     ] = None
     cells: Annotated[Any, Cells()] = None
     grading: Annotated[

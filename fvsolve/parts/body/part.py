@@ -134,7 +134,7 @@ class Joint(Table):
         if "axis" in own and "axis" not in given:
             faults.append(((), f"axis is missing: a {kind} joint needs it, for example [0, 1, 0]"))
         if kind == "free" and "on" in given:
-            faults.append((("on",), "is not valid for a free joint, which has no carrier; remove it"))
+            faults.append((("on",), "is not valid for a free joint, which has no carrier; remove this key"))
         if isinstance(given.get("axis"), (list, tuple)) and len(given["axis"]) == 3:
             if all(isinstance(x, (int, float)) for x in given["axis"]) and is_zero_vector(given["axis"]):
                 faults.append((("axis",), "is all zeros; expected a direction, for example [0, 1, 0]"))

@@ -104,7 +104,7 @@ class SlamCurveRows(CheckValveRows, kind=""):
     law = law_slam
     states = ("slam_velocity", "deceleration")
     events = ("flow reverses", "shuts", "flow is forward again", "flow reverses faster than its curve covers")
-    remedy = "give its curve a greater reverse_velocity"
+    remedy = "give the curve of the check valve a greater reverse_velocity"
 
     def numbers(self, draft, name, part) -> list[float]:
         return [part.cracking_pressure, draft.fluid.density * part.bore_area, part.deceleration.rate[-1]]

@@ -114,7 +114,8 @@ class CheckValve(Disc, Sized, TwoPort, kind="check-valve"):
             faults.append((("overpressure",), "needs the key `time_constant` or `natural_frequency`"))
         if "deceleration" in given and moves:
             text = (
-                "is not valid with `time_constant` or `natural_frequency`, which also define how it shuts; remove one"
+                "is not valid with `time_constant` or `natural_frequency`, which also define how the valve shuts; "
+                "remove one"
             )
             faults.append((("deceleration",), text))
         if "deceleration" in given and not {"area", "diameter"} & set(given):

@@ -39,11 +39,11 @@ class Cylinder(Link, kind="cylinder"):
     ] = 0.0
     area_A: Annotated[
         float | None,
-        Quantity("area", positive, "area of the piston at A [m2]; `piston_diameter` is needed if left out", AREAS),
+        Quantity("area", positive, "area of the piston at A [m2]; required without `piston_diameter`", AREAS),
     ] = None
     area_B: Annotated[
         float | None,
-        Quantity("area", positive, "ring area at B, without the rod [m2]; `rod_diameter` is needed if left out", AREAS),
+        Quantity("area", positive, "ring area at B, without the rod [m2]; required without `rod_diameter`", AREAS),
     ] = None
     piston_diameter: Annotated[
         float | None, Quantity("length", positive, "diameter of the piston, instead of `area_A` [m]", SIZES)

@@ -25,7 +25,7 @@ class LiftedValve(Device, kind=""):
     law, controlling_event = law, 4
     quantities = ("opening",)
     events = STOP_EVENTS
-    remedy = "give it a greater overpressure"
+    remedy = "give the disc a greater overpressure"
 
     def numbers(self, draft, name, part) -> list[float]:
         """Parameters of the disc in the order of `law`: lift, target, lifting pressure at the start, then its keys."""

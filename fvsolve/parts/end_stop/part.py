@@ -30,4 +30,7 @@ class EndStop(Coupling, kind="end-stop"):
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         if None not in (self.minimum, self.maximum) and self.minimum >= self.maximum:
-            yield ("maximum",), f"{self.maximum:g} m is not above `minimum`, {self.minimum:g} m; set it higher"
+            yield (
+                ("maximum",),
+                f"{self.maximum:g} m is not above `minimum`, {self.minimum:g} m; expected a greater value",
+            )

@@ -26,10 +26,17 @@ class Force(Coupling, kind="force"):
     from_: Annotated[
         str | None, Text("mass or point that takes the reaction; none if left out"), Field(alias="from")
     ] = None
-    force: Annotated[Schedule, Scheduled("force", about="force on `to`, positive forward [N]")]
+    force: Annotated[
+        Schedule,
+        Scheduled("force", about="force on `to`, positive along `direction` (of masses: along their axis) [N]"),
+    ]
     direction: Annotated[
         tuple[float, ...] | None,
-        Rows("number", length=3, about="direction in world axes, on points; the line from `from` to `to` if left out"),
+        Rows(
+            "number",
+            length=3,
+            about="direction of a force on a point, in world axes; the line from `from` to `to` if left out",
+        ),
     ] = None
 
     @property

@@ -61,7 +61,7 @@ class Junction(PlaceOnBody, kind="junction"):
                 yield ("minimum_pressure",), text
             return
         if self.required_pressure <= least:
-            text = f"{self.required_pressure:g} Pa is not above the pressure of no flow, {least:g} Pa"
+            text = f"{self.required_pressure:g} Pa is not above {least:g} Pa, at which no demand is supplied"
             yield ("required_pressure",), text
         if least < around.ambient:
             yield (

@@ -114,7 +114,7 @@ class HeadCurve(Value):
         end = zero_head_flow(coefficients)
         if coefficients[0] <= 0.0 or end is None:
             raise ValueFault([(("coefficients",), "the head must start above 0 and fall to 0 at some flow; for example "
-                                              "[60.0, 0.0, -900.0], 60 m less 900 m at 1 m3/s")])  # fmt: skip
+                                              "[60.0, 0.0, -900.0], a head of 60 m - 900 Q^2, Q in m3/s")])  # fmt: skip
         slope = np.polynomial.polynomial.polyder(coefficients)
         flows = np.linspace(0.0, end, 1001)
         rises = np.flatnonzero(np.polynomial.polynomial.polyval(flows, slope) > 0.0)
@@ -123,7 +123,7 @@ class HeadCurve(Value):
                 [
                     (
                         ("coefficients",),
-                        f"the head rises at a flow of {flows[rises[0]]:.4g} m3/s; it must fall as the flow rises",
+                        f"the head rises at a flow of {flows[rises[0]]:.4g} m3/s; the head must fall as the flow rises",
                     )
                 ]
             )
@@ -153,7 +153,7 @@ class Efficiency(Value):
         if isinstance(given, dict):
             curve = points(given, "efficiency", "number", setting, between(0, 1))
             if not any(q > 0.0 and eta > 0.0 for q, eta in zip(curve.flow, curve.value, strict=True)):
-                raise ValueFault([(("efficiency",), "expected a value above 0 at a flow above 0")])
+                raise ValueFault([(("efficiency",), "no value above 0 at a flow above 0; expected at least one")])
             return curve
         return self.number.read(given, setting)
 
@@ -223,7 +223,9 @@ class Suter(Value):
         values = read_keys(given, self.keys, setting)
         table = values.pop("table")
         if table is not None and ("head" in given or "torque" in given):
-            raise ValueFault([(("table",), "gives head and torque; remove `table`, or remove `head` and `torque`")])
+            raise ValueFault(
+                [(("table",), "already gives head and torque; remove `table`, or remove `head` and `torque`")]
+            )
         if table is not None:
             values["head"], values["torque"] = SUTER_TABLES[table]
         head, torque, faults = values["head"], values["torque"], []

@@ -32,7 +32,7 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
     quantities = ("head", "speed", "torque", "power")
     events = ("check valve shuts", "check valve opens")
     small = 0.01  # relative speed
-    remedy = "replace its check_valve by a check-valve link with a time_constant"
+    remedy = "replace the check_valve of the pump by a check-valve link with a time_constant"
 
     def inputs(self, model, name, part):
         return {"speed": Input(SPEED, int(self.row_of(model, name)["schedule"]))}

@@ -47,7 +47,7 @@ class ShaftLowering:
         kinks, start = dict(draft.schedules.breaks), draft.case.numerics.start
         if part.trip < start:
             trip, begin = (draft.case.amount(moment, "time", 6) for moment in (part.trip, start))
-            draft.fault(f"links.{name}.trip", f"{trip} lies before the start at {begin}")
+            draft.fault(f"links.{name}.trip", f"{trip} lies before the start at {begin}; expected a later time")
         index = draft.schedules.add(Schedule("step", (part.trip - 1.0 - abs(part.trip), part.trip), (0.0, 1.0)))
         draft.schedules.breaks[part.trip] = kinks.get(part.trip, False)
         return index

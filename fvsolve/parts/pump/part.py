@@ -81,13 +81,16 @@ class Pump(TwoPort, kind="pump"):
         faults = super().key_faults(given)
         if "trip" in given and "inertia" not in given and "rated_speed" not in given:
             faults.append((("trip",), 'needs rated_speed, for example "1480 rpm", and the inertia of all rotating '
-                                      "masses, which is otherwise estimated; to stop it at once, set speed to 0 by a "
-                                      "schedule"))  # fmt: skip
+                                      "masses, which is otherwise estimated; to stop the pump at once, set speed to 0 "
+                                      "by a schedule"))  # fmt: skip
         if "inertia" in given and "rated_speed" not in given:
             faults.append((("inertia",), 'needs rated_speed, for example "1480 rpm"'))
         if "curve_extrapolation" in given and "curve" not in given:
             faults.append(
-                (("curve_extrapolation",), "needs the key `curve`; it defines the head outside the flows of the curve")
+                (
+                    ("curve_extrapolation",),
+                    "applies outside the flows of a curve; give the key `curve`, or remove this key",
+                )
             )
         if given.get("curve_extrapolation") == "suter" and "curve" in given and "rated_speed" not in given:
             faults.append(

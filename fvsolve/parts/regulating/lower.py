@@ -48,7 +48,7 @@ class Regulator(Device, kind=""):
     quantities = ("opening",)
     events = ("shuts against reversed flow", "opens again", "is fully open", "leaves full opening", "is shut",
               "leaves its seat", "", "")  # fmt: skip
-    remedy = "give it a longer time_constant"
+    remedy = "give the regulating valve a longer time_constant"
     key, end, verb = "set_pressure", "", ""  # key of the set value, end at which it is sensed, verb for messages
 
     def numbers(self, draft, name, part) -> list[float]:
@@ -74,7 +74,9 @@ class Regulator(Device, kind=""):
             amount = case.amount
             text = (f"{amount(least, 'pressure', 6)} at {place} is a head of {amount(head, 'head')}, above every "
                     f"source: {source} has {amount(best, 'head')}")  # fmt: skip
-            draft.fault(f"links.{name}.set_pressure", f"{text}; the valve would never {self.verb}; set it lower")
+            draft.fault(
+                f"links.{name}.set_pressure", f"{text}; the valve would never {self.verb}; expected a lower pressure"
+            )
 
     def inputs(self, model, name, part):
         schedule = int(self.row_of(model, name)["schedule"])

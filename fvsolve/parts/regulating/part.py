@@ -41,7 +41,10 @@ class PressureReducing(Regulating, kind="pressure-reducing"):
     band: Annotated[
         float,
         Quantity(
-            "pressure_drop", positive, "pressure error that moves the valve over its stroke in one time constant", BANDS
+            "pressure_drop",
+            positive,
+            "pressure error that moves the valve over its stroke in one time constant [Pa]",
+            BANDS,
         ),
     ] = 1e5
 
@@ -57,7 +60,10 @@ class PressureSustaining(Regulating, kind="pressure-sustaining"):
     band: Annotated[
         float,
         Quantity(
-            "pressure_drop", positive, "pressure error that moves the valve over its stroke in one time constant", BANDS
+            "pressure_drop",
+            positive,
+            "pressure error that moves the valve over its stroke in one time constant [Pa]",
+            BANDS,
         ),
     ] = 1e5
 

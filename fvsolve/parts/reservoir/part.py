@@ -23,7 +23,9 @@ class Reservoir(PlaceOnBody, kind="reservoir"):
     needs: ClassVar[tuple[tuple[str, ...], ...]] = (("pressure", "head"),)
     fixes_pressure: ClassVar[bool] = True
 
-    pressure: Annotated[Schedule | None, Scheduled("pressure", about="pressure at its elevation [Pa]")] = None
+    pressure: Annotated[
+        Schedule | None, Scheduled("pressure", about="pressure at the elevation of the reservoir [Pa]")
+    ] = None
     head: Annotated[Schedule | None, Scheduled("head", about="head above datum, relative to ambient pressure [m]")] = (
         None
     )

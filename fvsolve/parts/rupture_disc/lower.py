@@ -25,7 +25,7 @@ class RuptureDiscRows(RelievingRows, kind="rupture-disc"):
         drop, name = start.valve_drive(k)[0], start.draft.valve_names[k]
         if drop >= part.burst_pressure:
             across = start.case.amount(drop, "pressure", 6, span=True)
-            text = f"a drop of {across} at the start would burst the disc; raise this pressure or remove the disc"
+            text = f"a drop of {across} at the start would burst the disc; raise `burst_pressure` or remove the disc"
             start.draft.fault(f"links.{name}.burst_pressure", text)
         return []
 

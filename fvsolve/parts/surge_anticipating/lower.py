@@ -15,7 +15,7 @@ class SurgeAnticipatingRows(RelievingRows, kind="surge-anticipating"):
     law = law
     states = ("opening", "held")
     events = ("is shut", "opens", "is fully open", "begins to shut", "", "", "")
-    remedy = "give it a longer closing_time"
+    remedy = "give the surge-anticipating valve a longer closing_time"
 
     def of(self, part) -> Device:
         return AnticipatingToAmbient() if part.outward else self

@@ -23,19 +23,25 @@ class SurgeAnticipating(Relieving, kind="surge-anticipating"):
 
     low_set: Annotated[
         float | None,
-        Quantity("pressure", about="pressure at `senses` below which it opens, gauge or absolute by its unit [Pa]"),
+        Quantity(
+            "pressure", about="pressure at `senses` below which the valve opens, gauge or absolute by its unit [Pa]"
+        ),
     ] = None
     high_set: Annotated[
         float | None,
-        Quantity("pressure", about="pressure at `senses` above which it opens, gauge or absolute by its unit [Pa]"),
+        Quantity(
+            "pressure", about="pressure at `senses` above which the valve opens, gauge or absolute by its unit [Pa]"
+        ),
     ] = None
-    trip: Annotated[float | None, Quantity("time", about="time at which the valve opens regardless of pressure")] = None
+    trip: Annotated[
+        float | None, Quantity("time", about="time at which the valve opens regardless of pressure [s]")
+    ] = None
     senses: Annotated[str | None, Text("place whose pressure opens the valve; `from` if left out")] = None
-    opening_time: Annotated[float, Quantity("time", positive, "time from shut to fully open", STROKES)]
+    opening_time: Annotated[float, Quantity("time", positive, "time from shut to fully open [s]", STROKES)]
     hold: Annotated[
         float, Quantity("time", nonnegative, "time for which the valve stays fully open after `low_set` or `trip` [s]")
     ] = 0.0
-    closing_time: Annotated[float, Quantity("time", positive, "time from fully open to shut", STROKES)]
+    closing_time: Annotated[float, Quantity("time", positive, "time from fully open to shut [s]", STROKES)]
 
     @property
     def sensed(self) -> str:
@@ -52,7 +58,8 @@ class SurgeAnticipating(Relieving, kind="surge-anticipating"):
     def faults(self, name: str, around: CaseContext) -> Faults:
         yield from super().faults(name, around)
         if self.low_set is not None and self.high_set is not None and not self.low_set < self.high_set:
-            yield ("high_set",), f"{self.high_set:.6g} Pa is not above low_set, {self.low_set:.6g} Pa; set it higher"
+            text = f"{self.high_set:.6g} Pa is not above low_set, {self.low_set:.6g} Pa"
+            yield ("high_set",), f"{text}; expected a higher pressure"
         places = [place for place, node in around.nodes.items() if getattr(node, "domain", "") == "hydraulic"]
         if self.senses is not None and self.senses not in places:
             near = did_you_mean(self.senses, places)

@@ -113,4 +113,4 @@ class Tank(PlaceOnBody, kind="tank"):
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         if self.height is not None and self.level > self.height:
-            yield ("level",), f"{self.level:g} m is above its `height` of {self.height:g} m; set it lower"
+            yield ("level",), f"{self.level:g} m is above the `height` of {self.height:g} m; expected a lower level"

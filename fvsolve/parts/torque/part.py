@@ -28,7 +28,7 @@ class Torque(Link, kind="torque"):
     from_: Annotated[str | None, Text("body that takes the reaction torque; none if left out"), Field(alias="from")] = (
         None
     )
-    to: Annotated[str, Text("shaft (PUMP.shaft or TURBINE.shaft) or body")]
+    to: Annotated[str, Text("shaft (PUMP.shaft or TURBINE.shaft) or body on which the torque acts")]
     torque: Annotated[
         Schedule,
         Scheduled(
@@ -55,7 +55,7 @@ class Torque(Link, kind="torque"):
             return
         for key, given in (("from", self.from_), ("axis", self.axis)):
             if given is not None:
-                yield (key,), f"is a key for bodies, but {self.to} is a shaft; remove it"
+                yield (key,), f"is a key for bodies, but {self.to} is a shaft; remove this key"
         if turned.inertia is None:
             yield (
                 ("to",),
@@ -63,7 +63,7 @@ class Torque(Link, kind="torque"):
             )
         if turned.trip is not None:
             text = (
-                "is held by its motor until it trips; remove the key `trip`, and let the torque fall to 0 at that time"
+                "is held at its speed until the trip; remove the key `trip`, and let the torque fall to 0 at that time"
             )
             yield ("to",), f"{self.to} {text}"
 

@@ -41,10 +41,14 @@ def faults_of_curve(curve) -> list[tuple[str, str]]:
             )
         )
     if not any(q >= LEAST for _, q in points):
-        faults.append((FLOW, f"is nowhere {LEAST:g} or more; expected a positive flow, which drives the turbine"))
+        faults.append((FLOW, f"has no value of {LEAST:g} or more; expected a positive flow, which drives the turbine"))
     if (dead := next((p for p in points if p[0] == 0.0 and p[1] <= 0.0), None)) is not None:
         faults.append(
-            ("", f"{point_text(dead)} is not a valid point: no head drives reverse flow through a runner at rest")
+            (
+                "",
+                f"{point_text(dead)} is not a valid point: through a runner at rest a positive head drives a positive "
+                "flow; expected a flow above 0 at unit speed 0",
+            )
         )
     return faults or angle_faults(points)
 
@@ -75,7 +79,7 @@ def angle_faults(points: list[tuple[float, float]]) -> list[tuple[str, str]]:
                 (
                     "",
                     f"passes from {point_text((n, q))} to {point_text((m, r))} across reverse flow through a runner at "
-                    "rest; no head drives such a flow",
+                    "rest, through which a positive head drives a positive flow",
                 )
             ]
     if not (points[0] if way > 0.0 else points[-1])[0] >= LEAST:

@@ -177,7 +177,7 @@ def chart_of(curves: dict, places: dict, faults: list, source: Any, file: str = 
             faults.append(
                 (
                     (*places[k], "opening"),
-                    f"{curve.opening:g} is already the opening of curve {first}; give one for each opening",
+                    f"{curve.opening:g} is already the opening of curve {first}; give a single curve for each opening",
                 )
             )
         seen.setdefault(curve.opening, k)
@@ -186,7 +186,7 @@ def chart_of(curves: dict, places: dict, faults: list, source: Any, file: str = 
         faults += [((*keys, key) if not file and key else keys, (name if file else "") + text) for key, text in texts]
     open_curves = sorted((curve for curve in curves.values() if curve.opening > 0.0), key=lambda curve: curve.opening)
     if not open_curves and not faults:
-        faults.append(((), "has no curve of an opening above 0"))
+        faults.append(((), "has no curve of an opening above 0; expected at least one"))
     if faults:
         raise ValueFault(faults)
     shut_point = next(((curve.speed[0], curve.value[0]) for curve in curves.values() if curve.opening == 0.0), None)

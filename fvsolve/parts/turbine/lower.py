@@ -51,7 +51,7 @@ class TurbineRows(ShaftLowering, Device, kind="turbine"):
 
     def passing_notice(self, model, name, part, time) -> Notice:
         moment = model.case.amount(time, "time", 6)
-        text = (f"{name}: it leaves its hill chart at {moment}; beyond the chart its curves are straight lines to the "
+        text = (f"{name}: leaves its hill chart at {moment}; beyond the chart the curves are straight lines to the "
                 "flow at rest and to the speed without flow; give more points there")  # fmt: skip
         return Notice("range", f"links.{name}", text, "hill_chart")
 
@@ -117,7 +117,7 @@ def folded_curve_notice(start, name: str, part, valve) -> list[Notice]:
         return []
     cause = f"{part.from_} and {part.to} both set their own pressures"
     text = (f"{name}: its hill chart is folded, with several flows at one head, and {cause}: the flow may jump "
-            "between them; connect the turbine through a pipe or rigid-column")  # fmt: skip
+            "between these; connect the turbine through a pipe or rigid-column")  # fmt: skip
     return [Notice("range", f"links.{name}", text, "hill_chart")]
 
 

@@ -67,9 +67,9 @@ def _fills_in(k: list[list]) -> bool:
 
 
 def _monotone(k: list[list], r: Fraction) -> bool:
-    """True if both conditions of `ssp_radius` hold at r: no entry of (I + r K)^-1 [e, r K] is negative; exact.
+    """True if both conditions of `ssp_radius` hold at r: no entry of (I + r K)^-1 [e, r K] is negative.
 
-    False if I + r K is singular. k : matrix K
+    It is False if I + r K is singular. The computation is exact. k : matrix K
     """
     n = len(k)
     rows = [[(i == j) + r * k[i][j] for j in range(n)] + [Fraction(1)] + [r * x for x in k[i]] for i in range(n)]

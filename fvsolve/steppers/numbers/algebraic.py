@@ -61,7 +61,7 @@ class SquareRoot(Field):
 
 
 class Algebraic:
-    """Number of a `Field`, as coefficients of powers of its root theta.
+    """Element of a `Field`, given by the coefficients of powers of its root theta.
 
     Operations return a fraction if only the coefficient of theta^0 remains, and raise ValueError for different fields.
     """
@@ -211,7 +211,7 @@ class Algebraic:
 
 
 def number(field: Field, parts):
-    """Number with the coefficients `parts` of powers of theta, lowest first; a fraction if all but the first are 0."""
+    """Element of a field, sum of parts[k] theta^k; a fraction if all parts but the first are 0."""
     parts = list(parts)
     while len(parts) > 1 and not parts[-1]:
         parts.pop()

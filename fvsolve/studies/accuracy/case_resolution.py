@@ -27,7 +27,7 @@ def pipes(case) -> dict[str, Pipe]:
 
 
 def pipes_with_cells(case) -> dict[str, Pipe]:
-    """Pipes that have cells, and so are not delay lines, by name."""
+    """Pipes with cells, by name: all pipes of a case that are not delay lines."""
     delayed = delay_lines(case)
     return {name: pipe for name, pipe in pipes(case).items() if name not in delayed}
 
@@ -112,8 +112,8 @@ def is_valid(case, cells_by_key: Counts) -> bool:
 def greatest_wave_rate(case, cells_by_key: Mapping[str, tuple[int, ...]]) -> float:
     """Greatest wave rate of a case with these numbers of cells: cells that a wave crosses per second [1/s].
 
-    The wave rate of basins is that at the start, scaled by the numbers of cells. With delay lines, their rate counts
-    too: the cells of the slowest line divided by the travel time of a wave along it.
+    The wave rate of basins is that at the start, scaled by the numbers of cells. With delay lines the result is at
+    least the number of cells of the slowest line divided by the travel time of a wave along it.
     cells_by_key : as from `cell_counts`
     """
     rates = [case.wave_speed(name) * cells_by_key[f"links.{name}.cells"][0] / pipe.length
@@ -175,7 +175,7 @@ def refinable_counts(case) -> Counts:
     if not cells_by_key:
         files = basins_from_files(case)
         reason = (
-            f"the mesh of {listing(files)} is a file, which cannot be refined"
+            f"meshes from files cannot be refined ({listing(files)})"
             if files
             else "this case has no pipe or basin, and so no cells"
         )

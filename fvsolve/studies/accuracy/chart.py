@@ -185,7 +185,7 @@ def chart(
     target : mean error over time of the worst probe, relative to its range [-]; the cheapest setting with at most this
     error is found and run
     out : folder in which finished points are stored and found again; progress : progress(done, total, next)
-    jobs, dask : processes that make the runs, as in `sweep`; each takes longer if they share cache and memory
+    jobs, dask : processes that make the runs, as in `sweep`; runs take longer in processes that share cache and memory
     Raises CaseError, FvsolveError.
     """
     base_case, report = load(case, set), progress or (lambda *_: None)
@@ -247,7 +247,7 @@ class _ChartStudy:
     def reference(self) -> Reference:
         """Reference of all settings, computed at its first use, after compilation for all schemes and methods.
 
-        Raises FvsolveError if all probes are constant, and as `find_reference`.
+        Raises FvsolveError if all probes are constant, and if `find_reference` finds no reference.
         """
         for setting in {entry.curve: entry for entry in reversed(self.all)}.values():
             self.progress(self.done, self.total, f"compiling {setting.name}")

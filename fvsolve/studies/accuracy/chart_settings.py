@@ -106,8 +106,8 @@ def run_coarse(case: Case) -> CoarseRun:
 def basin_sizes(case: Case) -> list[tuple[int, float]]:
     """(greatest number of cells along a side, work) of the main basin, for all possible numbers of cells.
 
-    The numbers are that of the case, times powers of 2 from 1/32 to 16, for which patches and holes end on grid lines.
-    Work is cells times steps. The main basin is that of `main_part_name`.
+    The numbers are the number of the case times powers of 2 from 1/32 to 16. Numbers are left out if patches or holes
+    would not end on grid lines. Work is cells times steps. The main basin is that of `main_part_name`.
     """
     main_cells, sizes = basin_cells(case), []
     for n in (main_cells * 2**k // 2**LEVEL_COUNT for k in range(2 * LEVEL_COUNT)):

@@ -37,8 +37,7 @@ class Fit:
 
     pairwise : order between each row and the next, NaN if an error is zero or unknown
     order : slope of log error over log size for the fitted rows; NaN without an order
-    spread : greatest distance from `order` of the pairwise orders of the fitted rows, also after their expected further
-    drift
+    spread : greatest distance from `order` of the orders between fitted rows, and of the order to which they drift
     marks : for each row "", "pre-asymptotic", "floor", "off the line" or "failed"; rows with "" are fitted
     constant : factor C of error = C size^order; reason : "" if there is an order; note : remark on the order
     """
@@ -68,8 +67,8 @@ def fit(sizes, errors, floor: float = 0.0) -> Fit:
 
     sizes : float64[n]  decreasing sizes of cells or steps; errors : float64[n]  not negative, NaN if a run failed
     floor : error that is not reduced by refinement; errors below ten times the floor are not used
-    Raises FvsolveError for sizes that are not positive or do not decrease, for negative errors or another number of
-    errors than sizes, and for a negative floor.
+    Raises FvsolveError for sizes that are not positive or do not decrease, for negative errors, for a negative floor,
+    and if the number of errors is not that of the sizes.
     """
     h, e = np.asarray(sizes, dtype=float), np.asarray(errors, dtype=float)
     if floor < 0.0:
@@ -165,7 +164,7 @@ class FitRows:
             return NO_ERROR
         if FLOOR in self.marks or OFF_LINE in self.marks:
             return (
-                f"no order: {len(self.good)} of {len(self.h)} rows are above the floor. Expected at least {LEAST_ROWS}"
+                f"no order: rows above the floor are {len(self.good)} of {len(self.h)}. Expected at least {LEAST_ROWS}"
             )
         return f"no order: {len(self.good)} rows. Expected at least {LEAST_ROWS}"
 
@@ -266,7 +265,7 @@ def last_deviates(p: np.ndarray) -> bool:
 def may_be_floor(h, e, first: int, stop: int) -> bool:
     """True if the errors of rows first to stop - 1 may be a floor, which finer rows do not reduce.
 
-    They may be if they are few or do not lie close to a line, and the errors before them decrease much faster.
+    This is so if the errors before them decrease much faster, and if the rows are few or do not lie close to a line.
     """
     slope, _ = line_of(h[first:stop], e[first:stop])
     before = np.max(pair_orders(h[: first + 1], e[: first + 1]), initial=0.0)
@@ -306,7 +305,8 @@ def extend_window(h, e, p, first: int, stop: int) -> tuple[int, int]:
 def classify_tail(h, e, first: int, stop: int) -> str | None:
     """Kind of the rows after the rows first to stop - 1, which lie on a line.
 
-    "" if there are no such rows or they are a floor, a note if a single row leaves the line, None otherwise.
+    The result is "" if there are no such rows or they are a floor, a note if a single row leaves the line, and None
+    otherwise.
     """
     rest = e[stop:]
     if rest.size == 0:

@@ -124,7 +124,7 @@ class UserFunction:
         return first, second
 
     def fault_for(self, pipe: str, problem: str) -> FvsolveError:
-        """Return a FvsolveError on a problem of the function on a pipe.
+        """Return an FvsolveError on a problem of the function on a pipe.
 
         The error is also stored, because compiled steps that call the function cannot pass it on.
         """

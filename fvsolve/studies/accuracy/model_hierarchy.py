@@ -42,8 +42,8 @@ class ModelLevel:
     name : name of the level, such as "rigid column"; law : density law; states : number of states
     errors : probe -> root mean square over time of the difference to the level `richest`, over the range of the probe
     [-]
-    error : greatest of these errors; None if the level was skipped or failed, or has none of the probes, with the
-    `reason`
+    error : greatest of these errors; None if the level was skipped or failed, or has none of the probes
+    reason : cause if `error` is None, otherwise empty
     greatest : greatest difference of any probe at any time, over its range [-]
     seconds : wall time of the steps [s], the best of three runs, or of a single run that takes long
     rhs : number of evaluations of the rates
@@ -72,7 +72,7 @@ class LawDifference:
     probe : probe with the greatest difference; error : rms of its difference over time, over its range [-]
     start : its difference at the start, over its range [-]; moves : its range over its greatest absolute value [-]
     level : greatest pressure of a probe at the start, over the least effective bulk modulus rho a^2 of a pipe [-]
-    swift : greatest velocity head rho v^2 / 2 of a pipe at the start [Pa], which the linear law neglects
+    swift : greatest dynamic pressure rho v^2 / 2 in a pipe at the start [Pa], which the linear law neglects
     """
 
     probe: str
@@ -93,8 +93,8 @@ class Hierarchy:
     runs; its cells are refined until its own error is within `target`
     travel_time : greatest travel time of a wave along a pipe [s]
     change_time : time of the fastest change of a schedule or a tripped pump [s], as from the function `change_time`
-    strain : greatest change of pressure from the start, over the least effective bulk modulus of a pipe, or over the
-    bulk modulus of the fluid without pipes [-]
+    strain : greatest change of pressure from the start, over the least effective bulk modulus of a pipe [-]; in a case
+    without pipes, over the bulk modulus of the fluid
     law_difference : difference of the linear law from the law of `richest` for equal cells; None if `richest` has the
     linear law, or if the linear run failed or was not made
     own_error : approximate error of `richest` from its cells [-]; None without cells or without a finer run
@@ -115,7 +115,7 @@ class Hierarchy:
 
     @property
     def own_error_note(self) -> str:
-        """Note on the error of the level `richest` itself because of its cells; empty for "as it is"."""
+        """Note on the error of the level `richest` itself because of its cells; empty if this level is "as it is"."""
         if self.richest.name == "as it is":
             return ""
         if self.own_error is None:
@@ -123,7 +123,7 @@ class Hierarchy:
         text = f"{self.richest.name} itself has an error of about {self.own_error:.2g} from its cells"
         if self.own_error <= self.target:
             return text
-        return f"{text}, more than the target, so all errors of the table are uncertain by that. Try `fvsolve order`"
+        return f"{text}, more than the target, so all errors of the table are as uncertain. Try `fvsolve order`"
 
     @property
     def rules(self) -> list[str]:
@@ -160,8 +160,8 @@ class Hierarchy:
                 "the bulk modulus the laws differ by "
             )
             reason += f"this fraction, and the range of {apart.probe} is only {apart.moves:.2g} of its value"
-        head = self.case.amount(apart.swift, "pressure", 3, span=True)
-        reason += f"; linear neglects the velocity head, {head} at the start" if apart.swift > 0.0 else ""
+        dynamic = self.case.amount(apart.swift, "pressure", 3, span=True)
+        reason += f"; linear neglects the dynamic pressure, {dynamic} at the start" if apart.swift > 0.0 else ""
         return f"{text}, more than dp/K = {self.strain:.2g}: {reason}"
 
     def plain(self) -> dict[str, Any]:
@@ -255,8 +255,9 @@ def refine_richest(
 
     Returns ([(name, run) of each finer level], error of the last of these levels, or of `own_run` without them).
     The error of a level is d / (1 - r), with its difference d to the next level and the ratio r of successive
-    differences (1/2 for the first). The next level only serves to compute this error and is left out. If no finer level
-    can be run, the error is r times the error of the level before, or None if no finer level was run at all.
+    differences (1/2 for the first). The next level only serves to compute this error and is left out. If the next level
+    cannot be run, the error is r d / (1 - r), with the difference d to the level before, or None if no finer level was
+    run at all.
     """
     runs, differences, ratio = [("full line", own_run)], [], 0.5
     for name in finer_levels(case, MAX_DOUBLINGS):
@@ -332,7 +333,7 @@ def _level_of(name: str, law: str, run: Outcome, richest: Outcome) -> ModelLevel
     errors = {name: _rms_error(gap) for name, gap in gaps.items()}
     worst = max(errors.values(), default=None)
     greatest = max((gap.ranges()["max"] for gap in gaps.values()), default=None)
-    reason = "" if errors else "the level has none of the probes"
+    reason = "" if errors else "the model has none of the probes"
     return ModelLevel(name, law, reason, run.model.y_size, worst, greatest, errors, run.seconds, run.counts["rhs"])
 
 
@@ -362,16 +363,17 @@ def velocity_head(model) -> float:
 
 
 def shallow_water_notes(case, target: float) -> Iterator[str]:
-    """Notes on tanks on bodies: error of the frequency of the slowest sloshing mode in shallow-water theory.
+    """Yield a note for each tank on a body: frequency error of its slowest sloshing mode in shallow-water theory.
 
-    There is a note for each tank for which this error is known. target : acceptable error [-]
+    Tanks for which this error is not known are left out. target : acceptable error [-]
     """
     share = 100.0 * target
     for name, basin in sloshing_basins(case).items():
         mesh = {**case.meshes, **case.lumped}[name]
         if (mode := slowest(basin, mesh)) is not None:
             text = (
-                f"{name}: its slowest wave, with k h = {mode.kh:.2g}, is {mode.excess:.2g} % too fast in shallow water"
+                f"{name}: its slowest wave, with k h = {mode.kh:.2g}, is {mode.excess:.2g} % too fast in shallow-water "
+                "theory"
             )
             yield (
                 f"{text}, more than the target: modes are more accurate for small waves"

@@ -14,7 +14,7 @@ CELLS = "cell size [m]"  # measure that is printed in the units of the case; ste
 def order_picture(study):
     """matplotlib Figure of errors against cell size or step: a panel for each variable, a line for each norm.
 
-    study : an `Order`, of which at most 2 `SHOWN_VARIABLES` variables are drawn
+    study : an `Order`; at most twice `SHOWN_VARIABLES` of its variables are drawn
     """
     from fvsolve.draw.convergence_picture import order_figure
 

@@ -41,7 +41,8 @@ class Order(Displayable):
     kind : kind of the reference, "exact" | "finer" | "richardson" | "function"; words : description of the reference
     own_error : variable -> {"L1" | "L2" | "max": error of the reference itself [SI]}; notes : remarks on the numbers
     units : SI units of the variables of basins
-    shown : variable -> (factor from SI, unit) of its printed errors, and "length" for printed sizes; others are in SI
+    shown : variable -> (factor from SI, unit) of its printed errors, and "length" -> that of printed cell sizes; errors
+    of variables without an entry are printed in SI
     """
 
     case: str

@@ -130,8 +130,9 @@ class OrderStudy:
         return self.find_reference(way, self.against != "finer", queue=self.queue)
 
     def find_reference(self, way: str, exact: bool, **options) -> Reference:
-        """Find a reference for the finest row, from one kind of runs, with another scheme and method.
+        """Find a reference for the finest row by `reference.find_reference`, from one kind of reference runs.
 
+        Runs with another scheme and method than the rows are preferred.
         way : "time" for a reference with the cells and scheme of the case; exact : True to use the exact solution of
         the case if it applies; options : further arguments of `reference.find_reference`
         """
@@ -169,7 +170,7 @@ class OrderStudy:
         return row_of_run(level, run, errors)
 
     def fitted_order(self, rows, kind: str, words: str, own: dict, sizes: dict) -> Order:
-        """Fit an order for every variable and norm, and add notes. Raises FvsolveError as `refuse_reference`.
+        """Fit an order for every variable and norm, and add notes. Raises the FvsolveError of `refuse_reference`.
 
         rows : each an `OrderRow`; kind, words : kind and description of the reference
         own : variable -> norm -> error of the reference [SI]; sizes : variable -> greatest absolute value [SI]

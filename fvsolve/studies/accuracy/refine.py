@@ -98,8 +98,8 @@ def refinement_plan(
     With "both" and "space", steps follow the tolerance in all rows if the case states rtol.
 
     key : key of the only resolution that is refined, such as "links.main.cells" (default all); levels : number of rows
-    cells : cells of the coarsest row, of the part with the key `key`, else along the pipe or side with most cells, in
-    proportion to which other numbers change
+    cells : number of cells in the coarsest row, of the part whose cells `key` states. For other keys, and without a
+    key, it is the number along the pipe or side with most cells, and all other numbers change in proportion.
     Raises FvsolveError for an unknown or impossible refinement, key, or number of levels or cells.
     """
     known = resolutions(case)
@@ -156,7 +156,7 @@ def delay_line_plan(case, way: str, levels: int) -> Plan:
     if tables[0]["stretches"][line] == tables[-1]["stretches"][line]:
         raise FvsolveError("a smaller numerics.delay_tolerance divides no delay line of this case into more segments: "
                            'there is no friction, or segments are as short as a step. '
-                           'Expected "both" or "time"')  # fmt: skip
+                           'Expected refine = "both" or refine = "time"')  # fmt: skip
     refined = [Level(row, float(table["tau"][line]), count, step) for row, table in zip(rows, tables, strict=True)]
     return Plan(way, "stretch [s]", tuple(refined), f"{STRETCH_WORDS}, one step for all rows")
 
@@ -164,7 +164,7 @@ def delay_line_plan(case, way: str, levels: int) -> Plan:
 STRETCH_WORDS = "tolerance of delay lines halved, so that they have twice as many segments"
 STRETCH_AND_STEP_WORDS = {
     False: f"{STRETCH_WORDS}, and steps halved",
-    True: f"{STRETCH_WORDS}, and their longest step halved",
+    True: f"{STRETCH_WORDS}, and the longest step halved",
 }
 
 

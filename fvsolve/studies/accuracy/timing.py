@@ -12,7 +12,7 @@ from fvsolve.steppers import loop_indices
 from fvsolve.studies.outcome import Outcome, outcome, refusal_text, study_model
 
 MAX_RUNS = 5  # greatest number of runs, of which the fastest counts
-REPEAT_TIME = 0.4  # wall time of all runs together, with the first, above which no run is repeated [s]
+REPEAT_TIME = 0.4  # wall time of all runs together, including the first, above which no run is repeated [s]
 CPU_LIMIT = 30.0  # CPU time after which a run is stopped [s]
 REFERENCE_CPU_LIMIT = 120.0  # CPU time after which a reference run, or a row of an order study, is stopped [s]
 PROBE_STEPS = 20_000  # steps after which a run that only compiles is stopped
@@ -83,7 +83,7 @@ def best_run(model, most: int = MAX_RUNS, budget: float = REPEAT_TIME) -> Outcom
     """Outcome with the least CPU time among up to `most` runs of a model.
 
     A run that stops early, or exceeds its limit, is not repeated.
-    budget : wall time of all runs together, with the first, above which no further run begins [s]
+    budget : wall time of all runs together, including the first [s]; a run that would probably exceed it is not begun
     """
     began, fastest = perf_counter(), finished_run(model, capped_run)
     for _ in range(most - 1 if fastest.ok else 0):

@@ -66,7 +66,9 @@ class Energy:
     numerical method dissipates energy, negative if it creates energy
     at_start : {"PART": available energy at the start [J]}; datum : elevation of zero height [m]
     settings : scheme, method, step control and number of cells of the run; steps : number of steps
-    marks : texts on events outside the validity of the model, with their times; port : passivity at a port, if checked
+    marks : texts on conditions outside the validity of the model, with the times from which on energies are not
+    reliable
+    port : passivity at a port, if checked
     """
 
     reason: str
@@ -249,7 +251,10 @@ def port_text(port: Port, case) -> str:
         case.amount(energy_value, "energy", 6)
         for energy_value in (port.work, 0.0 - port.at_start, -(port.at_start + port.others), port.others, port.margin)
     )
-    bound = f"-(E0 + others) = {own_bound}, of which {others} from other ports" if port.others else f"-E0 = {least}"
+    if port.others:
+        bound = f"-(E0 + others) = {own_bound} (E0: energy stored at the start; others: {others} from other ports)"
+    else:
+        bound = f"-E0 = {least} (E0: energy stored at the start)"
     verdict = "passive over this run" if port.passive else "NOT passive: the network supplied more energy than it had"
     time, margin_time = (case.amount(energy_value, "time", 6) for energy_value in (port.time, port.t_margin))
     return (f"port {port.node}: integral of p q falls to {work} at {time}, its bound is {bound}; "

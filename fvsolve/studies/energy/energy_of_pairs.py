@@ -34,11 +34,11 @@ def measure_pairs(
 ) -> list[dict]:
     """Run a case with every pair of scheme and method; returns a row (dict) with the energy remainders of each pair.
 
-    Entries of a row are those of `PAIR_COLUMNS`. remainder, scheme_loss, step_loss, newton_loss : at the end [J], see
-    `Energy`; least : least value over time of the remainder without Newton residuals [J]
+    Entries of a row are those of `PAIR_COLUMNS`. remainder, scheme_loss, step_loss, newton_loss : energies at the end
+    [J], see `Energy`; least : least value over time of the remainder without Newton residuals [J]
     creates : True if `least` is below zero by more than rounding, or if the run failed; None if it was refused
     margin : least margin of the passivity at the port [J], see `Port`; None without a port
-    All entries except `reason` are None if the pair was refused.
+    If the pair was refused, all entries except scheme, method and reason are None.
 
     schemes, methods : names (default those of the case); progress : called as progress(done, total, next)
     points : `ResultCache` of earlier rows; watch : called as watch(t, seconds, steps) during every run

@@ -16,9 +16,10 @@ STEP_MARGIN = 4.0  # ratio of the limits of these steps to those of the map, up 
 
 
 class WaveGrowthLimit:
-    """Callable that returns the greatest step at which no wave grows in a case with delay lines, for a given method.
+    """Callable that returns, for a method, the greatest step at which waves in delay lines do not grow visibly.
 
-    The waves are those between a storing node and the far end of a delay line, see `wave_growth`.
+    The waves are those between a storing node and the far end of a delay line, see `wave_growth`. Growth is visible if
+    it is 1000 times or more in the run.
     case, set : the case and its changed keys; steps : steps of the failure map [s], around which limits are searched
     The model depends on the step but not on the method, so that all methods use the stored model of a step.
     """

@@ -218,9 +218,9 @@ class MapRuns:
         return self._limits[method, *at]
 
     def lines_limit(self, method: str, scheme: str, k: int) -> float | None:
-        """Predicted greatest step [s] in column k up to which waves between storing nodes and delay lines do not grow.
+        """Predicted greatest step [s] in column k at which waves between storing nodes and delay lines hardly grow.
 
-        It is inf without delay lines, or without fixed steps, and None where `WaveGrowthLimit` gives None.
+        It is the result of `WaveGrowthLimit`; inf without delay lines, or without fixed steps.
         """
         set = {**self.base, **self.columns.keys(k), "numerics.scheme": scheme}
         steps = [keys["numerics.step"] for keys in self.columns.sets if "numerics.step" in keys]

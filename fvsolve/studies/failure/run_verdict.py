@@ -107,9 +107,9 @@ def excess_variation(rows: np.ndarray, reference: np.ndarray, ranges: np.ndarray
     """Excess of the total variation TV of the worst probe over the reference, (TV - TV_ref) / max(TV_ref, range).
 
     TV is the sum of |changes| from row to row. A probe counts only if its swings follow each other in less than half
-    the time of the swings of the reference: a swing that a method amplifies or does not damp does not count as ringing.
-    Each row is first replaced by the median of itself and its neighbours, so that a single outlier after a jump does
-    not count as a swing.
+    the time of the swings of the reference. Thus a swing of the reference that the method amplifies or does not damp
+    does not count as ringing. Each row is first replaced by the median of itself and its neighbours, so that a single
+    outlier after a jump does not count as a swing.
     rows, reference : float64[k, probes]  values of the run and the reference; ranges : float64[probes]
     """
     smooth, smooth_reference = (_medians(values) / ranges for values in (rows, reference))

@@ -126,7 +126,7 @@ def state_unit(name: str, opens: bool) -> str:
 def linearise(
     case, inputs=(), outputs=None, at: float | None = None, before: bool = False, scheme: str | None = None, set=None,
 ) -> Linear:  # fmt: skip
-    """Linearise a case by central differences at its start, or at the time `at` [s], with held schedules.
+    """Linearise a case by central differences at its start, or at the time `at` [s], with schedules held constant.
 
     inputs : names such as "valve.opening", "lake.pressure"; outputs : probes; default: the probes of the case
     before : True to hold schedules at the values just before a kink or jump at this time

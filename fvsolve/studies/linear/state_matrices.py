@@ -124,7 +124,9 @@ def refuse_state(model, j: int, cause: str) -> None:
         text = (
             "fluxes of this basin have a kink near its state (equal wave speeds from both sides, or cells that run dry)"
         )
-        raise FvsolveError(f"the state cannot be linearised along {model.state_names[j]}: {text}; choose another state")
+        raise FvsolveError(
+            f"the state cannot be linearised along {model.state_names[j]}: {text}; choose another time with --at"
+        )
     reason = {
         "slope": "its slope does not converge there, like the slope of a valve at a drop of zero: give the valve the "
                  "key `laminar_reynolds`, or linearise at a time with flow (--at)",

@@ -111,7 +111,7 @@ def response(
 
 
 def _linear_system(case, port: str, at, before, scheme):
-    """State space (A, b, c, d) with the input and the output of a port, and `Linear` system from which it is made.
+    """((A, b, c, d), `Linear` system from which they are made), with the input and the output at a port.
 
     port, at, before, scheme : as in `response`
     """
@@ -180,8 +180,9 @@ def _transfer(at, a, b, c, d, error: float) -> Transfer:
 def _frequency_table(verdict: StateVerdict, h: Transfer) -> np.ndarray:
     """Frequencies of the response [rad/s] : float64[k], in increasing order.
 
-    They are a logarithmic grid, |Im s| within it of the poles s off the imaginary axis, and in each frequency band with
-    Re H < 0 the frequency of the least Re H / |H|.
+    They are a logarithmic grid, and two kinds of additional frequencies. These are |Im s| of each pole s off the
+    imaginary axis, if it is within the grid, and the frequency of the least Re H / |H| in each frequency band with Re H
+    < 0.
     """
     low, high = verdict.low, verdict.high
     grid = np.geomspace(low, high, int(POINTS_PER_DECADE * np.log10(high / low)) + 1)

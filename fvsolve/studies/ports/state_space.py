@@ -25,7 +25,8 @@ DEFECT = 1e-7  # greatest error of a pole relative to the norm of A, also for de
 class Transfer:
     """Transfer function H(s) = D + C (s - A)^-1 B with a single input and output, by a Schur form of the balanced A.
 
-    a, b, c, d : float64[n, n], float64[n], float64[n], float  matrices A, B, C, D; as attributes after balancing
+    a, b, c, d : float64[n, n], float64[n], float64[n], float  matrices A, B, C, D; the attributes of these names
+    contain the balanced matrices
     error : relative error of A
     poles : complex128[n]  poles [1/s]; residues : complex128[n]  their residues
     pole_error : float64[n]  errors of the poles due to rounding and `error` [1/s]
@@ -314,7 +315,7 @@ def _reason_texts(holds, unstable, dips, hidden, margin, worst, tolerance, shift
         texts.append("H = 0")
     elif holds:
         texts.append(f"no pole in the right half plane, Re H > 0 {where}: least {margin:.4g} |H| in the searched "
-                     f"range, at w = {worst:.6g}; Re H does not change sign outside of it")  # fmt: skip
+                     f"range, at w = {worst:.6g}; Re H does not change sign outside this range")  # fmt: skip
     elif holds is None:
         texts.append(f"on the boundary: Re H >= -{tolerance:.0e} |H| at every w {where}, and within {tolerance:.0e} "
                      f"|H| of zero at w = {worst:.6g} ({margin:.1e}), as for a lossless system")  # fmt: skip

@@ -22,7 +22,7 @@ def bound_notes(row, side, system) -> list[str]:
     if row.limited:
         return texts + limiter_notes(row, side.at.model)
     if not np.isfinite(row.predicted):
-        return [*texts, "no step up to 1e4 / ||J|| fails", *nonlinear_failure_notes(row)]
+        return [*texts, "no step up to 1e4 / ||J|| fails (J: Jacobian)", *nonlinear_failure_notes(row)]
     if "eigenvalues" not in row.left_out:
         texts += eigenvalue_notes(row, system)
     texts += field_of_values_notes(row, side)
@@ -61,7 +61,9 @@ def case_notes(row, side) -> list[str]:
     texts = []
     growing = row.greatest_real > 0.0
     if growing and row.greatest_real > GROWTH_FLOOR * max(row.rate, np.abs(side.spectrum.values).max(initial=0.0)):
-        texts.append(f"the case itself grows, at {row.greatest_real:.3g} 1/s: this is not caused by long steps")
+        texts.append(
+            f"the case itself is unstable, with a growth of {row.greatest_real:.3g} 1/s, which long steps do not cause"
+        )
     if side.full_form is not side.form:
         texts.append(f"{listing(side.idle)}: free motion stores no energy, but states with energy depend on it: it is "
                      "included, with the least weight of all states")  # fmt: skip

@@ -18,7 +18,7 @@ from fvsolve.studies.stability.stability_row import StabilityRow
 TRAVEL_PARTS, TRAVEL_FACTOR = (
     32.0,
     2.0,
-)  # first step: this part of the longest travel time at most; last step: times that time
+)  # first step: at most the longest travel time over this; last step: that time times this
 RATE_MARGIN = 0.1  # greatest product of the first step and the rates of other states
 LINE_COUNT = 4  # greatest number of lines at stores for which integer parts of the delay are checked
 RISE, FINE = 1.6, 1e-3  # ratio of consecutive steps of the search, relative width of the final bracket

@@ -13,7 +13,7 @@ class StabilityRow:
 
     when : state about which deviations grow; states : number of states; steps : number of steps over which they grow
     predicted : greatest step with which the linearised case grows by `threshold` at most
-    growth, after : greatest growth with a slightly longer step, and its number of steps
+    growth, after : greatest growth with the least step that is found to fail, and its number of steps
     where, share : part with the most energy of the grown deviation, and its share of the energy
     measured : limit of real runs, nan also if no safe step is found
     measured_up_to : a step with which real runs fail, or the longest step of real runs if none fails
