@@ -43,9 +43,13 @@ class Route(Table):
     pipes: Annotated[tuple[str, ...], PipeNames()]
     start: Annotated[
         float | None,
-        Quantity("length", about="chainage of the start of the route [m]; that of its first pipe, or 0 if left out",
-                 changes=VALUE),
-    ] = None  # fmt: skip
+        Quantity(
+            "length",
+            about="chainage of the start of the route [m]; "
+            "that of its first pipe (0 if reversed or without `profile`) if left out",
+            changes=VALUE,
+        ),
+    ] = None
 
 
 @dataclass(frozen=True)

@@ -113,7 +113,7 @@ def _root_cause(error: BaseException) -> str:
     if isinstance(chain[-1], UnicodeDecodeError):
         cause = chain[-1]
         return (
-            f"byte {cause.object[cause.start]:#x} is not UTF-8 text, in which EPANET on Windows does not save; "
+            f"byte {cause.object[cause.start]:#x} is not UTF-8 text (EPANET on Windows saves other text); "
             "save the file as UTF-8"
         )
     coded = [link for link in chain if "(Error " in str(link)]

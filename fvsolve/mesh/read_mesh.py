@@ -79,7 +79,7 @@ def _place_faults(content: Content, unit: str) -> list[Fault]:
             Fault(
                 "points",
                 f"{invalid.size} of {used.size} {'has' if invalid.size == 1 else 'have'} invalid coordinates "
-                f"(not a number, or too large), "
+                "(not a number, or too large), "
                 f"first point {invalid[0]}",
             )
         ]
