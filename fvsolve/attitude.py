@@ -44,7 +44,7 @@ def defect(matrix: Matrix) -> tuple[float, float]:
 
 
 def nearest(matrix: Matrix) -> Matrix:
-    """Rotation matrix nearest to a matrix in the Frobenius norm; its polar factor if its determinant is positive."""
+    """Rotation matrix nearest to a matrix M in the Frobenius norm; it is the polar factor of M if det M is positive."""
     u, _, v = np.linalg.svd(matrix)
     return u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
 
@@ -79,7 +79,7 @@ def roll_pitch_yaw(rotation: Matrix) -> tuple[float, float, float]:
     """Angles (roll, pitch, yaw) [rad] of a rotation matrix (docs/course.md, 40), with pitch from -pi/2 to pi/2.
 
     At a pitch of +-pi/2 roll and yaw rotate about the same axis, and only yaw -+ roll is defined: yaw is set to 0. Near
-    this pitch, roll and yaw are sensitive to small changes, but their rotation is the given rotation.
+    this pitch, roll and yaw are sensitive to small changes, but `of_roll_pitch_yaw` still gives the rotation back.
     """
     level = math.hypot(rotation[0, 0], rotation[1, 0])  # cos(pitch)
     yaw = math.atan2(rotation[1, 0], rotation[0, 0]) if level > EDGE else 0.0
@@ -236,7 +236,7 @@ def deviation_velocity(turn: Matrix, w: Vector, desired: Vector) -> np.ndarray:
     """Angular velocity w - turn w_d of the deviation `turn` (docs/course.md, 58), in axes a [rad/s].
 
     turn : deviation of an attitude from a desired attitude, see `deviation`
-    w, desired : angular velocities w of the body and w_d of its desired attitude, in axes a. Equation (57) omits the
-    factor `turn`, which is valid near the identity.
+    w, desired : angular velocities w of the body and w_d of its desired attitude, in axes a
+    Equation (57) omits the factor `turn`; this is valid only for a deviation near the identity.
     """
     return np.asarray(w, dtype=float) - turn @ np.asarray(desired, dtype=float)

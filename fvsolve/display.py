@@ -62,13 +62,13 @@ class Displayable:
 
 
 def save(figure, path) -> None:
-    """Write a figure. A .png is drawn once; `savefig` would draw a figure with a layout twice, to the same bytes."""
+    """Write a figure to a file. A .png is drawn only once; `savefig` would draw it twice, with an equal result."""
     write = figure.canvas.print_png if str(path).endswith(".png") else figure.savefig
     write(path)
 
 
 def save_if_path(figure, path):
-    """Return the figure, also written to the file `path` if given. Raises FvsolveError if it cannot be written."""
+    """Write a figure to the file `path` unless it is None; returns the figure. Raises FvsolveError if writing fails."""
     try:
         if path is not None:
             save(figure, path)

@@ -18,13 +18,13 @@ class Fault:
     """Fault of a case file.
 
     place : key path, such as "links.main.length"; message : text with the found and the expected value
-    line : line number in the file, or None
+    line : line number in the file, or None; override : True if the value came from --set, not from the file
     """
 
     place: str
     message: str
     line: int | None = None
-    override: bool = False  # the value came from --set, not from the file
+    override: bool = False
 
     def __str__(self) -> str:
         where = "--set " if self.override else f"line {self.line}: " if self.line else ""

@@ -229,7 +229,7 @@ class Function:
 
 
 def _attribute_of(module: str, name: str) -> Any:
-    """Object `name` of a module, imported by its name."""
+    """Object `name` of the module with the name `module`, which is imported."""
     return getattr(importlib.import_module(module), name)
 
 
@@ -303,7 +303,7 @@ def signature_of(argument: Any) -> str:
 
 @functools.cache
 def _dtype_text(kind: np.dtype) -> str:
-    """Short text for a dtype; for records a hash of the names and offsets of their fields."""
+    """Short text for a dtype; for records a hash of the names, types and offsets of their fields."""
     text = f"{kind.descr} {kind.itemsize} {kind.alignment}" if kind.names else ""
     return hashlib.sha256(text.encode()).hexdigest()[:12] if text else kind.str
 
@@ -515,9 +515,9 @@ def code_folder() -> Path:
 
 
 def _prune(present: Path) -> None:
-    """Delete the folders of code from other sources, except the newest; another process may do this at the same time.
+    """Delete the folders of code from other sources, except the newest `KEPT_GENERATIONS`.
 
-    present : folder of the present sources
+    present : folder of the present sources. Another process may delete these folders at the same time.
     """
     others = []
     for path in present.parent.iterdir():

@@ -17,16 +17,17 @@ Weights = tuple[Fraction, ...]
 
 
 class Reach(NamedTuple):
-    """Numbers of cells that the rate of a cell depends on, for a wave that runs forward.
+    """Numbers of cells that a scheme reads, for a wave that runs forward.
 
-    behind, ahead : cells before and after the cell
-    entering, leaving : cells under the polynomial beyond an end of a pipe, where a wave enters and where it leaves
+    behind, ahead : cells before and after a cell, for the rate of this cell
+    entering, leaving : cells at an end of a pipe that determine the polynomial which continues the wave beyond the end,
+        for an end where the wave enters and for one where it leaves
     """
 
-    behind: int  # cells before a cell, in its rate
-    ahead: int  # cells after it
-    entering: int  # cells under the polynomial beyond an end, where the wave enters
-    leaving: int  # cells under the polynomial beyond an end, where the wave leaves
+    behind: int
+    ahead: int
+    entering: int
+    leaving: int
 
 
 @dataclass(frozen=True)
@@ -34,12 +35,14 @@ class Scheme:
     """Reconstruction of the value at a face from averages of the cells around it.
 
     family : kernel that computes the scheme
-    weights : of cells u-2 .. u+2 in the value at the face after cell u; None for a limited scheme
+    weights : of cells u-2 .. u+2 in the value at the face between u and u+1, for an upstream cell u; None for a limited
+        scheme
     twin : linear scheme that a limited scheme equals in smooth solutions
     shorter : scheme for pipes of fewer than `LEAST_CELLS` cells; plane : scheme for basins on rectangles
     cavities : True if the scheme is suitable at the edge of a cavity; stencils of other schemes reach across it
     extra_cells : cells read at an end where a wave leaves, in addition to those of the polynomial there
     own_end_factors : factors, at least 1, on the rate of a pipe of 1, 2, 3, ... cells, because of its ends
+    branches : (name, weights) of each linear scheme that a limited scheme equals for fixed switches; empty for muscl
     The rate is the number of cells that a wave crosses per second. A factor is at least 0.9 min(1, C) / c: C is the
     Courant limit of ssp-rk3 on a long pipe, c the lesser of its limits on the short pipe with two open ends, and with
     an open and a shut end (tests/step_limits/test_ends.py).
@@ -90,7 +93,7 @@ class Scheme:
 
     @cached_property
     def reach(self) -> Reach:
-        """Numbers of cells that the rate of a cell depends on, see `Reach`."""
+        """Numbers of cells that the scheme reads, see `Reach`."""
         used = [k for k, w in zip(STENCIL, self.smooth.weights, strict=True) if w != 0]
         return Reach(1 - min(used), max(0, *used), self.degree, self.degree + 1 + self.extra_cells)
 

@@ -28,6 +28,11 @@ class Edge:
     row : function (flow, drop) -> (alpha, beta, gamma); None for a fixed flow
     flow : fixed mass flow, or first value of the iteration [kg/s]
     shut : True for a link without flow; potentials of nodes behind it may be estimated from its other side
+    drop : function of the flow [kg/s] that gives the potential drop [Pa] of an edge with a fixed flow; None if unknown
+    sensed_node : node with potential P on which the flow depends, or -1. With a node, `row` has the third argument P
+        and the fourth result c, and the equation has the further term -c dP on its left side.
+    held_potential : (node, potential [Pa] that the flow maintains there), whose equation replaces `row`; or None
+    drives : True if the edge drives flow between equal potentials
     """
 
     i: int
@@ -35,14 +40,10 @@ class Edge:
     row: Callable[[float, float], tuple[float, float, float]] | None
     flow: float = 0.0
     shut: bool = False
-    drop: Callable[[float], float] | None = None  # potential drop [Pa] at a fixed flow
-    sensed_node: int = (
-        -1
-    )  # node whose potential P is the third argument of `row`; its fourth result c adds -c dP to the equation
-    held_potential: tuple[int, float] | None = (
-        None  # (node, potential [Pa] that the flow maintains there), in place of `row`
-    )
-    drives: bool = False  # it drives flow between equal potentials
+    drop: Callable[[float], float] | None = None
+    sensed_node: int = -1
+    held_potential: tuple[int, float] | None = None
+    drives: bool = False
 
 
 @dataclass
@@ -50,7 +51,7 @@ class SteadyState:
     """Solution of a steady problem: potentials of nodes [Pa] and mass flows of edges [kg/s].
 
     converged : True if Newton's method converged
-    no_solution : nodes of sets without known potential whose demands do not add up to zero
+    no_solution : nodes in sets that have no known potential and whose demands do not add up to zero
     split : True if the flows of a loop are not unique; then they are those of least norm
     """
 
@@ -155,8 +156,8 @@ def _components(held, edges):
 def _references(held, demand, edges, parts, free_sets):
     """Fixed flows that give a potential to sets of nodes without one : (nodes whose balance is dropped, edge -> set).
 
-    An edge with a fixed flow joins such a set to known potentials. Its equation determines the potential of the
-    set and replaces the balance of one of its nodes.
+    An edge with a fixed flow joins such a set to known potentials. The equation of the edge determines the potential of
+    the set, and replaces the balance of one node of the set.
     held, demand, edges : as for `solve_steady`
     parts, free_sets : as from `_components`
     """
@@ -195,7 +196,9 @@ def _newton(result, edges, active, rows, nodes, balances, demand, scale, anchors
     """Solve for the flows of `active` edges and the potentials of `nodes` by Newton's method; write them to `result`.
 
     The system has a row for each edge in `rows`, for the balance of each node in `balances`, and for each node in
-    `anchors`, whose potential is kept because nothing determines it. edges, demand, scale : as for `solve_steady`
+    `anchors`, whose potential is kept because nothing determines it.
+    active, rows : lists of indices of edges; nodes, balances, anchors : lists of indices of nodes
+    result : `SteadyState`; edges, demand, scale : as for `solve_steady`
     """
     column = {("flow", e): k for k, e in enumerate(active)}
     column |= {("node", i): len(active) + k for k, i in enumerate(nodes)}
@@ -273,8 +276,9 @@ def _edge_row(values, columns, e, edge, result, scale) -> float:
 
 
 def _solve(places, values, right, size, result):
-    """Solution of the Newton system; of a singular system that of least norm, then `result.split` is set.
+    """Solution of the Newton system; if it is singular or not square, the least-squares solution of least norm.
 
+    `result.split` is set to True for a singular system, and for a large system also if it is not square.
     places : index of each of the `values` in the matrix, row * size + column; right : right-hand side
     size : number of unknowns. The solution is NaN if a number in `values` or `right` is not finite.
     """
@@ -302,7 +306,8 @@ def _solve_sparse(values, i, j, right, size):
 
     values, i, j : entries of A with their rows and columns, entries at the same place are added; right : b
     size : number of unknowns
-    If it is singular or not square: r + A x = b, A' r = DAMPING x, so that x minimises |A x - b|^2 + DAMPING |x|^2.
+    A system that is singular or not square is replaced by r + A x = b, A' r = DAMPING x. Then x minimises
+    |A x - b|^2 + DAMPING |x|^2.
     """
     from scipy.sparse import bmat, csc_matrix, identity
     from scipy.sparse.linalg import splu

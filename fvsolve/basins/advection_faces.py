@@ -112,9 +112,10 @@ def gather_flows(faces, factor, flow, out):
 
 @njit
 def put_allowed(c, least, most, allowed):
-    """Write how far values at the sides of each cell of a block may differ from its value c: up to the nearer bound.
+    """Write the greatest allowed difference between the value c of each cell of a block and the values at its sides.
 
-    The difference is 0 if c is beyond a bound. least, most : bounds of c; allowed : the differences
+    It is the distance from c to the nearer bound, or 0 if c is beyond a bound.
+    least, most : bounds of c; allowed : the differences
     """
     for i in range(BLOCK):
         allowed[i] = max(min(c[i] - least, most - c[i]), 0.0)
@@ -124,8 +125,8 @@ def put_allowed(c, least, most, allowed):
 def add_advection(count, c, d, cl, far, w):
     """Subtract the outflow by advection through one side of each cell of a block from the rates in the scratch w.
 
-    The outflow that the cell value c would have is left out: `put_rates` subtracts it. The flows, the values beyond the
-    side and sums over the sides are in w too.
+    Only the outflow of the difference between the value at the side and the cell value c is subtracted; `put_rates`
+    subtracts that of c for all sides. The flows, the values beyond the side and sums over the sides are in w too.
     c, d : values and depths of the cells; cl : values at the side inside the cells
     far : last group of measures of the side in `floats`, see `cell_sides`
     count : factor on the outflow in the rate that limits the step
@@ -173,7 +174,7 @@ def put_rates(c, w, rate):
 
 
 def work_size(integers):
-    """Length of the work array of `advection_rates`. integers : mesh, as there"""
+    """Length of the work array of `advection_rates`. integers : mesh, see `cell_sides`"""
     return 8 * integers[4] * BLOCK + 2 * integers[3] + ROWS * BLOCK
 
 

@@ -22,7 +22,7 @@ def basin_first_row(tables, power, b):
 
 @njit(forceinline=True)
 def rest_potential(st, basin):
-    """Potential p - p_ambient + rho g z of a basin in the initial steady state [Pa]; z above energy datum."""
+    """Potential p - p_ambient + rho g z of a basin in the initial steady state [Pa]; z : height above energy datum"""
     return basin["rest"] - st["rho"] * st["gravity"] * st["datum"]
 
 

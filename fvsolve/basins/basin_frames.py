@@ -67,8 +67,8 @@ def set_frame(tables, basin, out):
     """Compute the motion of the frame of a basin, and write it in axes of the basin to `tables.plane`.
 
     The entries are gravity minus acceleration of the origin [m/s2], angular velocity [rad/s], angular acceleration
-    [rad/s2], and gravity alone [m/s2]. The first of them has the opposite sign along the normal (entry GN). The
-    accelerations are those for zero accelerations of all joints.
+    [rad/s2], and gravity alone [m/s2]. The component of the first vector along the normal is written with the opposite
+    sign (entry GN). The accelerations are those for zero accelerations of all joints.
     """
     plane, at, row = tables.plane, basin["frame"], body_row(tables, basin["body"])
     rx, ry, rz = rotate(out, row + ATTITUDE, plane[at : at + 3], 0)

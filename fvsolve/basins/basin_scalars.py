@@ -71,7 +71,10 @@ def observe_values(t, y, out, handle, values):
 
 @njit
 def put_boundary_values(t, tables, patch, basin, q):
-    """Write the value of scalar q beyond the faces of a patch: that of its schedule there, else its initial value."""
+    """Write the value of scalar q beyond the faces of a patch to `tables.work`.
+
+    It is the value of the schedule of the scalar at the patch, or the initial value of the scalar without a schedule.
+    """
     schedule = tables.integers[patch["values"] + q]
     value = tables.scalars[q]["initial"]
     if schedule >= 0:

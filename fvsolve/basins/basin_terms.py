@@ -65,7 +65,7 @@ def terms_of_scalars(basins: list) -> tuple[RhsTerms, ...]:
 
 
 def scalar_terms(basin) -> Iterator[RhsTerms]:
-    """`RhsTerms` of the scalars of one basin; empty for a basin without scalars."""
+    """Yield the `RhsTerms` of the scalars of one basin; none for a basin without scalars."""
     if not basin.scalars:
         return
     yield from (PATCH_VALUES, SOURCES)

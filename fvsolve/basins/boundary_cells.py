@@ -65,7 +65,10 @@ def weighted_volume(tables, patch, leaves, y):
 
 @njit(forceinline=True)
 def has_given_flows(basin):
-    """True if flows through faces follow from a given velocity; they are in `plane`, computed flows in `work`."""
+    """True if the flows through faces follow from a given velocity.
+
+    Such flows are stored in `tables.plane`, computed flows in `tables.work`.
+    """
     return basin["given"] == 1
 
 
@@ -73,7 +76,7 @@ def has_given_flows(basin):
 def patch_inflow(tables, patch):
     """Inflow through all faces of an open patch: [m3/s] of water, [m2/s] by a given velocity, [kg/(m s)] of a liquid.
 
-    That by a given velocity is at full speed, without `flow_factor`.
+    The inflow by a given velocity is that at full speed, without `flow_factor`.
     """
     basin, total = tables.basins[patch["basin"]], 0.0
     flows = tables.plane if has_given_flows(basin) else tables.work

@@ -90,9 +90,9 @@ def limit_three_sides(p, wide, cap, beyond, geo, out):
     """Write the limited values at the three sides of each triangle of a block, from the values beyond the sides.
 
     If the neighbours differ from the cell by least <= 0 to most >= 0, the value at a side is greater than that of the
-    cell by no more than wide most, -2 wide least and `cap`. It is smaller by no more than -wide least, 2 wide most and
-    `cap`. So at an extremum all values at sides equal that of the cell. With wide = 1 they lie in the range of the
-    neighbours.
+    cell by no more than wide * most, -2 * wide * least and `cap`. It is smaller by no more than -wide * least,
+    2 * wide * most and `cap`. So at an extremum all values at sides equal that of the cell. With wide = 1 they lie in
+    the range of the neighbours.
 
     p, beyond : values of cells and of neighbours; geo : first group of measures of the sides, see `cell_sides`
     wide : factor on the range of the neighbours; cap : greatest allowed deviation from the cell

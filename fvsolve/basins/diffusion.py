@@ -57,8 +57,8 @@ def grid_diffusion(nx, ny, begin, stop, kx, ky, diffusivity, factor, flow_x, flo
     """Add the rates of diffusion to rows `begin` to `stop` - 1 of a grid; return the greatest rate of a cell [1/s].
 
     Inside a grid of equal cells of equal depth this rate is 2 D (kx^2 + ky^2). The boundary has no flux, except where
-    `factor` times a given velocity (without depths) enters: there the value on the face is `outside`. Flows of water,
-    with depths, may be almost zero at the boundary, and such a condition for one sign of them would jump.
+    `factor` times a given velocity (without depths) enters: there the value on the face is `outside`. With depths there
+    is no such exception, because the flow of water may change its sign at the boundary, and the flux would jump.
 
     diffusivity : D [m2/s]; work : float64[diffusion_work(nx, ny)]; other arguments as for `advection.grid_advection`
     """

@@ -17,7 +17,7 @@ LEAST_CELLS = 5  # with fewer cells, values beyond a side are those of its last 
 
 @njit
 def ghost_means(known, o, a, b, c, d, e):
-    """(nearest, next) mean of two ghost cells beyond a side of the grid, by a polynomial of degree 4.
+    """(mean of the nearest ghost cell, of the next ghost cell) beyond a side of the grid, by a polynomial of degree 4.
 
     a, b, c, d, e : means of the five cells inside that determine the polynomial, the nearest first
     known : True if o, the value at the side, is used in place of e
@@ -80,8 +80,9 @@ def face_excesses(scheme, factor, flow, a, b, c, d, e, g, q, excess):
 
 @njit
 def pad_sides(nx, ny, factor, flow_x, flow_y, outside, c, v):
-    """Copy the cell means c to v, with three ghost cells beyond the sides of the grid: `ghost_values`, the last twice.
+    """Copy the cell means c to v, and write three ghost cells beyond each side of the grid.
 
+    The two nearest ghost cells are those of `ghost_values`; the third is equal to the second.
     v : float64[ny + 6, nx + 6] as one array; other arguments as for `advection.grid_advection`
     """
     wide = nx + 2 * GHOSTS
@@ -104,7 +105,7 @@ def pad_sides(nx, ny, factor, flow_x, flow_y, outside, c, v):
 
 @njit
 def ghost_values(n, known, o, v, at, step):
-    """(nearest, next) mean of two ghost cells beyond a side, from the cells v[at], v[at + step], ... inward.
+    """(mean of the nearest ghost cell, of the next ghost cell) beyond a side, from the cells v[at], v[at + step], ...
 
     n : number of cells in line; with fewer than LEAST_CELLS, both means are the value o, or the nearest cell if not
     `known`; with more they are those of `ghost_means`

@@ -16,7 +16,7 @@ def accepted_fraction(available, need):
 
 @njit
 def sum_of_positive(a, b, c, d):
-    """Sum of those of four values that are positive."""
+    """Sum of the positive values among a, b, c and d."""
     a, b = a if a > 0.0 else 0.0, b if b > 0.0 else 0.0
     c, d = c if c > 0.0 else 0.0, d if d > 0.0 else 0.0
     return (a + b) + (c + d)

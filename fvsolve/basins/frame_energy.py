@@ -68,8 +68,8 @@ def origin_acceleration(tables, basin, b, out):
 def body_load(tables, basin, b, out):
     """Force [N] and torque [N m] of the water of basin b on its body, in axes of the basin: six numbers.
 
-    They are the load for zero accelerations of joints, plus the inertial load along the normal due to these
-    accelerations.
+    They are the load for zero accelerations of joints, plus the inertial load along the normal that the accelerations
+    of joints cause.
     """
     ax, ay, az, wx, wy, wz = extra_accelerations(tables, basin, out)
     tank = tables.layout[0]["tank"] + TANK_OUT * b
@@ -162,9 +162,8 @@ def energy_rate(tables, basin, b, y, dydt, out, vx, vy, vz):
 def add_stored(t, y, dydt, out, handle, stored):
     """Write the kinetic plus potential energy [J] of the water in basins on bodies to `stored`.
 
-    The potential energy is zero at elevation 0.
-
-    For a liquid it is added to the energy in its own axes there; for water with a free surface it replaces the entry.
+    The potential energy is zero at elevation 0. For a liquid the result is added to the entry of `stored`, the energy
+    of the liquid in axes of the basin. For water with a free surface it replaces the entry.
     """
     tables = open_tables(handle)
     plane = tables.plane

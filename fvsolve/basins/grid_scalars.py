@@ -119,7 +119,10 @@ def by_blocks(sums, at, scheme, limiter, begin, stop, kx, ky, factor, flow_x, fl
 
 @njit
 def add_fifth_order_on_grids(t, y, dydt, out, handle):
-    """Add the difference of upwind5 or weno5 from upwind to the rates of all scalars in grids; weno5 keeps bounds."""
+    """Add the difference of upwind5 or weno5 from upwind to the rates of all scalars in grids.
+
+    The fluxes of weno5 are limited to keep the bounds of the scalars, see `advection.add_fifth_order`.
+    """
     tables = open_tables(handle)
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]

@@ -70,7 +70,7 @@ class BasinRows:
         raise NotImplementedError
 
     def pieces(self, valves: bool) -> Iterator[RhsTerms]:
-        """`RhsTerms` of the basin for the right-hand side and probes, in order.
+        """Yield the `RhsTerms` of the basin for the right-hand side and probes, in their order within a phase.
 
         valves : True if the network contains valves
         """
@@ -203,7 +203,7 @@ class BasinRows:
 
     @property
     def forms_stages(self) -> bool:
-        """True if the kernel of the rates of cells can form sums of stages too, as nothing is added to its rates later.
+        """True if the kernel of the rates of cells can form sums of stages too: nothing is added to its rates later.
 
         Rows of cells at patches, to which many functions add, are excepted: their sums are formed elsewhere.
         """

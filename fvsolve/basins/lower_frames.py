@@ -17,7 +17,7 @@ def lower_frame(draft, basin, row) -> None:
     patch prevents the correct load at an observed joint, a fault is added to the draft.
     The axes of the kernels have their origin in the middle of the basin. Accelerations along the normal are those at
     this point, and the mirror cells at walls neglect the Euler force beyond the wall. With this origin the error is
-    least, and independent of the corner where the drawing of the basin has its origin.
+    least, and does not depend on the origin of the coordinates of the mesh.
     """
     part, grid, middle = basin.part, basin.mesh.grid, basin.mesh.centroid
     places = [*(basin.mesh.centre - middle).T]

@@ -75,9 +75,9 @@ def lower_ends(mesh: Mesh, moves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _sides(mesh: Mesh) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
-    """(slots, face, own, side): 3 or 4 sides per cell, and for each side its face, its cell and its number there.
+    """(slots, face, own, side): 3 or 4 sides per cell, then for each side its face, its cell, its number in the cell.
 
-    face is ~f where the cell is to the right of face f.
+    The entry of `face` is ~f where the cell is to the right of face f.
     """
     n, f, inner = len(mesh.area), len(mesh.left), mesh.inner
     slots = 4 if (mesh.cells[:, 3] >= 0).any() else 3

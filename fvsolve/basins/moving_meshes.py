@@ -88,7 +88,10 @@ def update_meshes(t, y, seen, out, handle):
 
 @njit
 def move_corners(tables, basin, y):
-    """Compute the positions of the corners of a mesh at the travels of its walls."""
+    """Write the coordinates of the corners of a mesh along the motion of its walls [m], at the travels in y.
+
+    They are written to the array x or y of `mesh_positions`.
+    """
     plane, walls = tables.plane, tables.walls
     x, north, drawn, _, _, _ = mesh_positions(plane, basin)
     along = north if basin["turn"] == 1 else x
@@ -263,7 +266,7 @@ def update_sides(tables, basin):
 
 @njit
 def put_lengths(face, side_lengths, lengths):
-    """Write the lengths of faces, read from the cells on their left, for one side of each cell of a block.
+    """Write the lengths of faces to `lengths`, read from the cells on their left, at one side of each cell.
 
     face : face of each side, negative for the cell on the right; side_lengths : lengths of these sides
     """
@@ -320,7 +323,11 @@ def put_speeds(tables, basin):
 
 @njit(forceinline=True)
 def mesh_motion(tables, basin):
-    """(speeds of sides [m/s], pressures and energy losses on boundary faces, present over undeformed cell areas)."""
+    """(speeds of sides, values on boundary faces, present over undeformed area of cells) of a mesh: three arrays.
+
+    The speeds are along the outward normals [m/s]. The values on boundary faces are pressures and terms of lost power,
+    see `moves` of `liquid_mesh.liquid_rates`; for water they are the thrusts of `surface_mesh.shallow_rates`.
+    """
     sides, thrust, rows = basin["sides"], basin["thrust"], basin["stretch"]
     count = 4 * BLOCK * blocks(tables.integers[basin["links"] :])
     plane, thrust_array = tables.plane, tables.work[thrust : thrust + 2 * basin["outer"]]

@@ -228,7 +228,10 @@ def set_line_speeds(t, y, dydt, out, handle):
 
 @njit
 def wall_of_row(tables, basin, i):
-    """Node of the wall whose travel changes the width of column or row (on a mesh other than a grid, cell) i most."""
+    """Node of the wall whose travel changes the width of column or row i most.
+
+    On a mesh other than a grid, i is a cell, and the area of the cell takes the place of the width.
+    """
     index, most, (_, lines) = basin["wall"], -1.0, stretching_counts(basin)
     for k in range(basin["wall"], basin["wall"] + basin["walls"]):
         per = abs(tables.plane[tables.walls[k]["weights"] + lines + i])
@@ -241,8 +244,8 @@ def wall_of_row(tables, basin, i):
 def grid_motion(tables, basin):
     """Five arrays of a grid between moving walls, in this order.
 
-    - speeds of lines along x, then along y [m/s]; the array for the axis without motion is empty
-    - pressures and energy losses on boundary faces, see `liquid_mesh.liquid_rates`; for water the thrusts of
+    - speeds of the lines x = constant, then of the lines y = constant [m/s]; empty for lines that do not move
+    - pressures and terms of lost power on boundary faces, see `liquid_mesh.liquid_rates`; for water the thrusts of
       `surface_grid.grid_rates`
     - present over undeformed area of columns or rows, then the reciprocal
     """

@@ -126,7 +126,7 @@ def second_order_work(nx, ny):
 def second_order_rates(
     scheme, limiter, nx, ny, begin, until, stop, fresh, kx, ky, factor, flow_x, flow_y, outside, c, work, rate
 ):  # fmt: skip
-    """Write the rates of rows `begin` to `until` - 1 for cell values c, by upwind or muscl, in flows times `factor`.
+    """Write the rates of rows `begin` to `until` - 1 of cell values c, by upwind or muscl, for flows times `factor`.
 
     fresh : False if the last call ended at `begin` with the same work array, whose results are then used again
     stop : first row after those of all calls; other arguments as for `advection.grid_advection`

@@ -76,7 +76,7 @@ def place_faults(name: str, node: PlaceOnBody, nodes: dict[str, Any], named: Any
 def overturned(nodes: dict[str, Any], poses: dict[str, Any]) -> Faults:
     """Faults of tanks and free-surface basins that are tilted by 90 degrees or more, so that the water runs out.
 
-    Frozen water is not checked, nor tanks and basins on bodies that can move, or whose carriers can move.
+    Frozen water is not checked. A tank or basin is checked only if all joints from its body to the world are fixed.
     poses : name of a body -> `Pose`
     """
     for name, node in nodes.items():
@@ -94,7 +94,10 @@ def overturned(nodes: dict[str, Any], poses: dict[str, Any]) -> Faults:
 
 
 def body_faults(on: str, nodes: dict[str, Any], named: Any) -> Iterator[str]:
-    """Fault text if the name `on` is not that of a body; named : tables of all nodes, also of faulty nodes."""
+    """Yield a fault text if the name `on` is not that of a body.
+
+    named : tables of all nodes, also of faulty nodes
+    """
     bodies = [body for body, node in nodes.items() if isinstance(node, Body)]
     bodies += [body for body in named if body not in nodes and getattr(named[body], "get", {}.get)("type") == "body"]
     if not isinstance(nodes.get(on), Body):
@@ -104,7 +107,7 @@ def body_faults(on: str, nodes: dict[str, Any], named: Any) -> Iterator[str]:
 
 
 def free_joints(on: str, nodes: dict[str, Any]) -> Iterator[str]:
-    """Names of the bodies, from `on` to the world, whose joints move freely (neither fixed nor driven)."""
+    """Yield the names of the bodies, from `on` to the world, whose joints move freely (neither fixed nor driven)."""
     for body in carriers(on, nodes):
         joint = nodes[body].joint
         if joint.kind != "fixed" and joint.drive_schedule is None:
@@ -112,7 +115,7 @@ def free_joints(on: str, nodes: dict[str, Any]) -> Iterator[str]:
 
 
 def carriers(on: str, nodes: dict[str, Any]) -> Iterator[str]:
-    """Names of the body `on` and of all bodies that carry it, from `on` to the world."""
+    """Yield the names of the body `on` and of all bodies that carry it, from `on` to the world."""
     seen: set[str] = set()
     while isinstance(nodes.get(on), Body) and on not in seen:
         seen.add(on)

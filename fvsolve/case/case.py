@@ -93,7 +93,7 @@ class Case(Displayable):
 
     @cached_property
     def extreme_probes(self) -> list[Probe]:
-        """Probes whose extremes alone are recorded: at points of pipe profiles, and for limits and expectations."""
+        """Probes of which only the extremes are recorded: at points of pipe profiles, for limits and expectations."""
         named = [*of_profiles(self.links)]
         extents = [claim.extent for claim in [*self.limits.values(), *self.expect.values()] if claim.extent is not None]
         for extent in extents:
@@ -144,9 +144,9 @@ class Case(Displayable):
 
     @cached_property
     def as_stated(self) -> Case:
-        """Copy of the case that starts at the positions in the file.
+        """Copy of the case that starts at the positions in the file, not at those of the equilibrium.
 
-        There bushings are not twisted, and springs have their preload.
+        At these positions bushings are not twisted, and springs have their preload.
         """
         return replace(self, equilibrium_nodes={}) if self.equilibrium_nodes else self
 
@@ -210,7 +210,7 @@ class Case(Displayable):
     def unit_of(self, dimension: str) -> str:
         """Unit of a dimension in `[output]`, such as "bar" for "pressure"; the SI unit if `[output]` states none.
 
-        A dimension that uses the units of another dimension (`base`) has the unit of that dimension if it has none.
+        A dimension with a `base`, such as "level" with "length", has the unit of its base if none is stated for itself.
         """
         known, stated = units.DIMENSIONS[dimension], self.output.units
         return stated.get(dimension) or stated.get(known.base) or known.si
@@ -218,8 +218,8 @@ class Case(Displayable):
     def amount(self, value: float, dimension: str, digits: int = 4, span: bool = False, silent: str = "") -> str:
         """Text of the value [SI] of a quantity, in its unit in `[output]`.
 
+        digits : number of significant digits; silent : unit that is used in place of the SI unit
         span : True for a difference, for which the zero of the unit has no effect
-        silent : unit to use if `[output]` states none
         """
         unit = self.unit_of(dimension)
         unit = silent if silent and unit == units.DIMENSIONS[dimension].si else unit

@@ -74,7 +74,7 @@ class CutTable:
 
     pieces : cut pipe -> names of its pieces
     origin : (group, name) of an added part -> (group, name) of the part in the file from which it comes
-    unreadable : (group, name) of parts that are not read, since the part, its pipe or another part on it is faulty
+    unreadable : (group, name) of parts that are not read, since they, their pipe or other parts on that pipe are faulty
     uncut : name -> pipe that is not cut, since a part on it is faulty
     connections_known : True if it is known which nodes each link joins
     """
@@ -156,9 +156,9 @@ def pieces_of(table: dict[str, Any]) -> dict[str, list[str]]:
 
 
 def settings(table: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Copy of overrides (dotted key -> value) with keys that exist in the file.
+    """Copy of overrides (dotted key -> value) in which keys of pipe pieces are replaced by keys of the file.
 
-    A key of a pipe piece is replaced by the key of this piece in the table `pieces` of its pipe.
+    The file states the keys of a piece in the table `pieces` of its pipe.
     table : nested dicts of a case as in the file; given : overrides
     """
     return {".".join(own) if (own := original_keys(table, keys := split_key(str(key)))) != keys else key: value
@@ -204,7 +204,7 @@ def faults(table: dict[str, Any]) -> Iterator[tuple[tuple, str]]:
 def cut(
     table: dict[str, Any], read_pipes: dict[str, Pipe], cells: dict[str, int], faulty: set, report: Report
 ) -> CutTable:
-    """Cut the pipes of a case at the parts placed on them.
+    """Cut the pipes of a case at the parts placed on them; returns the `CutTable`.
 
     table : nested dicts of the case, with junctions at bends (`add_bends`) and defaults (`fill_pipes`)
     read_pipes : pipes without faults, as read; cells : number of cells of each of these pipes
@@ -269,7 +269,7 @@ def add_unknown_pieces(result: CutTable, name: str, given: dict[str, Any], parts
 
 
 def read_distance(part: Placed, on: str | None, pipe: Pipe | None, report: Report) -> bool:
-    """Set the distance of a part along its pipe. If its chainage is faulty, report it and return False.
+    """Set the distance of a part along its pipe; return True. If its chainage is faulty, report it and return False.
 
     on, pipe : name of the pipe, and the pipe as read (None if faulty: the distance is not set); report : as for `cut`
     """
@@ -293,7 +293,10 @@ def read_distance(part: Placed, on: str | None, pipe: Pipe | None, report: Repor
 
 
 def sort_parts(parts: list[Placed], report: Report) -> bool:
-    """Sort the parts on a pipe by distance. If two have the same distance, report it (see `cut`) and return False."""
+    """Sort the parts on a pipe by distance; return True. If two have the same distance, report it and return False.
+
+    report : as for `cut`
+    """
     parts.sort(key=lambda part: part.distance)
     pairs = [(part, other) for part, other in zip(parts, parts[1:], strict=False) if part.distance == other.distance]
     for part, other in pairs:

@@ -25,7 +25,8 @@ Faults = Iterator[tuple[tuple, str]]
 def network(table: dict[str, Any]) -> Faults:
     """Faults (key path, message) of connections of a case: unknown names, unconnected nodes, wrong domains.
 
-    Separate networks are faults too, networks in which no part sets a pressure, and junctions of rigid columns alone.
+    Further faults are separate networks, networks in which no part sets a pressure, and junctions that join only rigid
+    columns.
     table : nested dicts of the case as in the file
     """
     nodes, links = ({n: p for n, p in _dict(table.get(group)).items()} for group in ("nodes", "links"))
@@ -65,7 +66,7 @@ def network(table: dict[str, Any]) -> Faults:
     touched = {place for places in [*ends.values(), *tied.values(), *hanging] for place in places}
     loose = [name for name, node in nodes.items() if name not in gone and own_places(name, node) is None
              and not touched & {name, *points_of(name, node)}]  # fmt: skip
-    if len(loose) > unjoined:  # otherwise faulty ports may be meant to join them
+    if len(loose) > unjoined:  # otherwise faulty ports may be those that join them
         yield from ((("nodes", name), "no link touches it") for name in loose)
     if unjoined or gone:
         return  # the connections are not known
@@ -100,7 +101,7 @@ def parts(
     """Faults (key path, message) of elevations, of bodies, and of each part in the context of the other parts.
 
     ambient : ambient pressure [Pa]; gravity [m/s2]; fluid : properties of the fluid, or None if it is faulty
-    raw : case before its values were read, for messages, None only without `fluid`; start : start time [s]
+    raw : case before its values were read, for messages; it may be None if `fluid` is None; start : start time [s]
     meshes, lumped : basin -> mesh, of basins with cells and of basins whose water is lumped masses
     """
     poses = bodies.poses(nodes, start)
@@ -178,7 +179,7 @@ def follows_cavities(fluid: FluidSpec | None, has_cells: bool) -> bool:
 
 
 def cavities(numerics: Numerics, has_cells: bool, fluid: FluidSpec | None) -> Faults:
-    """Fault of a scheme that cannot compute cavities, in a case with `cavitation`."""
+    """Yield a fault if a case with `cavitation` states a scheme that cannot compute cavities."""
     if follows_cavities(fluid, has_cells) and numerics.scheme not in (None, *CAVITY_SCHEMES):
         able = " or ".join(map(show, CAVITY_SCHEMES))
         yield ("numerics", "scheme"), f"{show(numerics.scheme)} cannot compute cavities in pipes; expected {able}"

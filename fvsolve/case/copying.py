@@ -15,7 +15,7 @@ def copy(name: str, to: Path) -> list[Path]:
     """Copy a shipped case to the file `to`, and its other files beside it; returns the paths of the copies.
 
     `to` may also be a folder. The schema of case files is copied too, if it is not there. Raises FvsolveError for an
-    unknown case, and if `to` exists, or another of these files with other contents.
+    unknown case, if `to` exists, and if another of these files exists with other contents.
     """
     if name not in names():
         raise FvsolveError(f"no shipped case {name}{did_you_mean(name, names())}; cases are {listing(names())}")

@@ -69,8 +69,8 @@ class On(Value):
 class DesignLimit:
     """Lower and upper bound [SI] of a quantity in some parts of a case (the extent), checked after every step.
 
-    minimum, maximum : a number, "vacuum" (ambient pressure) or "vapor" (vapour pressure)
-    class_fraction : greatest allowed gauge pressure over the allowable pressure of each pipe [-]
+    minimum, maximum : a number, "vacuum" (ambient pressure), "vapor" (vapour pressure), or None without a bound
+    class_fraction : greatest allowed gauge pressure over the allowable pressure of each pipe [-], or None
     """
 
     name: str
@@ -160,7 +160,7 @@ def limit_faults(limit: DesignLimit | None, fluid: Any, gravity: float) -> Itera
 
 
 def pipes_without_class(extent: Extent, links: Mapping[str, Any]):
-    """Fault of the key `class_fraction` if the quantity is not a pressure, or if a part has no pressure class."""
+    """Yield a fault of the key `class_fraction` if the quantity is not a pressure, or a part has no pressure class."""
     if extent.quantity not in OF_PRESSURE or extent.quantity == "head":
         yield ("class_fraction",), f"a pressure class limits the pressure, not {extent.quantity}; leave out `quantity`"
         return

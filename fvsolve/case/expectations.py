@@ -52,7 +52,7 @@ class Compare:
     """Measured series for comparison with a probe.
 
     file : name of the copy of the CSV file beside the resolved case, see `copy_name`; path : path of the CSV file
-    time, value : headers of its columns
+    time, value : headers of the columns of the CSV file
     shift : time that is added to the measured times [s]
     t, v : float64[n]  measured times without shift [s], and values [SI, pressures absolute]
     """
@@ -104,7 +104,7 @@ def read_claim(
 ) -> tuple[str, Probe | None, Extent | None, float | None]:
     """Split the text `claim` of an expectation into (function, probe, extent, time [s]). Raises ValueError.
 
-    Probe or extent is None, both if the part is faulty; time is None except for the function `at`.
+    The probe or the extent is None; both are None if the part is faulty. The time is None except for the function `at`.
     kinds : as for `read_probe`; routes : routes by name, None if faulty
     """
     match = _CLAIM.fullmatch(claim)

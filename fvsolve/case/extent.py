@@ -18,9 +18,10 @@ OF_PRESSURE = {"pressure": "pressure", "gauge_pressure": "gauge_pressure", "head
 
 @dataclass(frozen=True)
 class Extent:
-    """Quantity in all `parts`, pairs (group, name), of which a limit or expectation takes the extreme over all steps.
+    """Quantity in several parts, for a limit or an expectation on its extreme over all these parts and all steps.
 
-    In pipes it is taken in every cell and at both ends; a pressure also at the points of elevation profiles.
+    parts : pairs (group, name)
+    The extreme in a pipe is that over every cell and both ends, for a pressure also over the points of its profile.
     """
 
     on: tuple[str, ...]  # as the file names them

@@ -46,7 +46,7 @@ MARK = re.compile(r"(<!-- keys: (.+?) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 def page(text: str) -> str:
-    """Rewrite the tables of a page, each between `<!-- keys: NAME -->` and `<!-- end -->`."""
+    """Text of a page with its tables rewritten; each table is between `<!-- keys: NAME -->` and `<!-- end -->`."""
     return MARK.sub(lambda mark: mark[1] + key_table(mark[2]) + mark[3], text)
 
 

@@ -256,7 +256,9 @@ class _Reader:
         return case if named is None else self.exact(case)
 
     def sizes(self, numerics, output, links, meshes, properties) -> Iterator[tuple[tuple, str]]:
-        """Faults of cases too large for the memory, and of steps below the rounding of the time.
+        """Faults (key path, message) of cells or rows that need too much memory, and of too short steps.
+
+        Steps and output intervals must exceed the rounding of the time.
 
         numerics, output : tables as read; meshes : meshes of basins; properties : properties of the fluid
         """
@@ -277,7 +279,10 @@ class _Reader:
         return case
 
     def cut(self, properties: Any, numerics: Numerics | None) -> None:
-        """Cut pipes at the chainages of the parts placed on them; properties : properties of the fluid, or None."""
+        """Cut pipes in the table of `raw` at the parts placed on them.
+
+        properties : properties of the fluid, or None if it is faulty; numerics : table as read, or None if it is faulty
+        """
         table = chainage.add_bends(self.raw.table)
         tables = (table.get("nodes"), table.get("links"), table.get("routes", {}))
         if not all(isinstance(item, dict) for item in tables) or not chainage.placed(table):
@@ -434,7 +439,7 @@ class _Reader:
             return spec, None
 
     def in_celsius(self, stated: dict[str, Any], key: str) -> str:
-        """Hint for a message if a temperature in kelvin is out of range but would be valid in degrees Celsius; else "".
+        """Hint for a message if a temperature without unit is out of range in K but valid in degC; "" otherwise.
 
         stated : values of `[fluid]`; key : faulty key
         """

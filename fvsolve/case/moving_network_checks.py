@@ -29,7 +29,10 @@ def with_elevation(node: Node, poses: dict[str, Any]) -> Node:
 
 
 def has_elevation(node: Node, poses: dict[str, Any]) -> bool:
-    """True if a node has a single known elevation; False for a basin on a body and for a node on an unknown body."""
+    """True if a node is fixed in the world, or is on a body with a known pose and is not a basin.
+
+    poses : name of a body -> `Pose`
+    """
     on = getattr(node, "on", None)
     return on is None or (on in poses and not isinstance(node, Basin))
 
@@ -150,9 +153,9 @@ def link_faults(link: Any, ends: list[str], nodes: dict[str, Any], patches: dict
 
 
 def patch_faults(end: str, node: Any) -> Iterator[str]:
-    """Reason why a link cannot join the place `end` if that is a patch of a basin on a body; none if it can.
+    """Yield the reason, if there is one, why a link cannot join the place `end`, a patch of a basin on a body.
 
-    node : node of the place, see `node_of`
+    node : node of the place, see `node_of`; nothing is yielded for a node that is not a basin
     """
     if not isinstance(node, Basin):
         return

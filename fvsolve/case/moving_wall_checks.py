@@ -140,8 +140,9 @@ def wall_faults(
 
 
 def body_faults(name: str, nodes: dict[str, Any], axis: int) -> Iterator[str]:
-    """Fault texts if the node `name` cannot move a wall: it must be a mass, or a body that slides along the axis.
+    """Yield a fault text if the node `name` cannot move a wall.
 
+    The node must be a mass, or a body that slides along the axis of the wall.
     axis : axis of motion of the wall, 0 for x, 1 for y
     """
     known = [other for other, node in nodes.items() if getattr(node, "kind", "") in ("mass", "body")]
@@ -156,7 +157,10 @@ def body_faults(name: str, nodes: dict[str, Any], axis: int) -> Iterator[str]:
 
 
 def slider_faults(name: str, node: Any, nodes: dict[str, Any], axis: int) -> Iterator[str]:
-    """Fault texts if the body `node` does not slide on the world along the axis of a wall; axis : 0 for x, 1 for y."""
+    """Yield a fault text if a body does not slide on the world along the axis of a wall.
+
+    name, node : name of the body, and the body; axis : 0 for x, 1 for y
+    """
     up = nodes.get((node.joint.on or "").partition(".")[0])
     if node.joint.kind != "prismatic" or getattr(up, "kind", "frame") != "frame":
         remedy = "expected a prismatic joint to the world, or `travel` instead of `body`"
@@ -171,7 +175,7 @@ def slide_direction(body: Any) -> np.ndarray:
 
 
 def travel_faults(travel: Any, side: float, zone: float, times: tuple, mesh: Any, per: np.ndarray) -> Iterator[str]:
-    """Fault texts for the travel of a wall: jumps, travel beyond its zone, and inverted cells.
+    """Yield fault texts for the travel of a wall: jumps, travel beyond its zone, and inverted cells.
 
     travel : schedule [m]; side : sign of the outward normal; zone : width of the deformed zone [m]
     times : start and end of the run [s]; per : float64[n]  relative growth of cell areas per travel [1/m]
@@ -191,7 +195,7 @@ def travel_faults(travel: Any, side: float, zone: float, times: tuple, mesh: Any
 
 
 def outline_faults(basin: Any, mesh: Any, patch: str) -> Iterator[tuple[tuple, str]]:
-    """Fault of a moving wall that would deform the boundary.
+    """Yield a fault (key path within the patch, message) if a moving wall would deform the boundary.
 
     Within the zone of the wall the boundary must be parallel to the motion.
     """
@@ -207,7 +211,7 @@ def outline_faults(basin: Any, mesh: Any, patch: str) -> Iterator[tuple[tuple, s
 
 
 def bed_faults(basin: Any, mesh: Any, patch: str) -> Iterator[tuple[tuple, str]]:
-    """Fault of a bed that is not flat in the deformed zone of a wall."""
+    """Yield a fault (key path within the patch, message) if the bed is not flat in the deformed zone of a wall."""
     axis, _ = outward(mesh, patch)
     corners = np.where(mesh.cells < 0, mesh.cells[:, :1], mesh.cells)
     goes = weights(basin, mesh, patch, mesh.points[:, axis]) > 0.0
@@ -243,7 +247,7 @@ def faults_between(basin: Any, mesh: Any, walls: dict[str, Any], times: tuple) -
 
 
 def crossing_faults(basin: Any, mesh: Any, walls: dict[str, Any], times: tuple) -> Iterator[tuple[tuple, str]]:
-    """Fault of walls whose motions together invert a cell, although each motion alone does not.
+    """Yield a fault if the motions of several walls together invert a cell, although each motion alone does not.
 
     walls, times : as for `faults_between`
     """

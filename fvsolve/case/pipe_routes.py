@@ -183,10 +183,11 @@ def joined_places(links: dict[str, Any], named: dict[str, Any] = {}) -> dict[str
 
 
 def directions(route: Route, links: dict[str, Any], named: dict[str, Any] = {}) -> list[list[tuple[int, bool]]]:  # noqa: B006
-    """Possible directions of the pipes of a route : for each pipe a list with a pair for each direction.
+    """Possible directions of the pipes of a route : for each pipe a list with a pair for each possible direction.
 
-    A pair is (index of a suitable pair in the list of the previous pipe, True if the pipe is passed backwards); the
-    index for the first pipe is -1. The result ends with an empty list at the first gap. named : as for `joined_places`
+    A pair is (k, True if the pipe is passed backwards); k is the index, in the list of the previous pipe, of a
+    direction that leads to this one, -1 for the first pipe. The result ends with an empty list at the first gap.
+    named : as for `joined_places`
     """
     root = joined_places(links, named)
     ends = [[root.get(place, place) for place in (links[pipe].from_, links[pipe].to)] for pipe in route.pipes]

@@ -27,6 +27,7 @@ class Probe:
     """Recorded quantity of a part.
 
     text : text of the probe in the case, such as "main.pressure@0.5"
+    part, name : "nodes" or "links", and name of the part; quantity, dimension : such as "level" and "length"
     fraction : distance from the `from` end of a pipe over its length [-], else None
     point : x, y in a basin [m], else None
     straight : True to interpolate linearly between cells, not by the polynomial of the scheme
@@ -85,7 +86,7 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
 
 
 def may_be_piece(name: str, kinds: Kinds) -> bool:
-    """True if `name` may denote a piece, bend, point or patch of a faulty part, of which these are not known.
+    """True if `name` may be that of a piece, bend, point or patch of a faulty part for which these are unknown.
 
     kinds : as for `read_probe`
     """

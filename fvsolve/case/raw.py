@@ -132,7 +132,7 @@ def override(raw: Raw, settings: Mapping[str, Any], alternatives: list[tuple[str
 
 
 def locate_faults(error: CaseError, case: Any) -> CaseError:
-    """Copy of an error on the case `case`, with the file name and the source of each fault added.
+    """Copy of an error of the case `case`, with the file name and the source of each fault added.
 
     The source is a line number of the file, or the mark that an override set the key. The error itself is returned if
     the file cannot be read any more; for a case without a file only the name is added.
@@ -209,7 +209,10 @@ def _bare_name(line_text: str) -> str:
 
 
 def _copy(value: Any, depth: int = 0) -> Any:
-    """Copy to plain dicts, lists and scalars, from NumPy too. Raises CaseError if nested deeper than `DEEPEST`."""
+    """Copy of a value as plain dicts, lists and scalars, without types of NumPy.
+
+    Raises CaseError for more than `DEEPEST` nested levels.
+    """
     if depth > DEEPEST:
         raise CaseError([Fault("", f"tables or lists are nested too deep; expected at most {DEEPEST} levels")])
     if isinstance(value, Mapping):

@@ -57,7 +57,7 @@ def find_faults(
 
 
 def rounding_faults(numerics: Any, crossing: float) -> Iterator[tuple[tuple, str]]:
-    """Fault of a Courant number whose steps are below the rounding of the time.
+    """Yield a fault if the steps of a Courant number are below the rounding of the time.
 
     crossing : shortest travel time of a wave through a cell [s]
     """

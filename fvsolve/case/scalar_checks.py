@@ -19,7 +19,10 @@ RESERVED = {"time", "t", "mass", "energy", "nodes", "pipe", "value", "min_pressu
 
 
 def reserved_names() -> set[str]:
-    """Names that scalars cannot have: columns of output files, quantities of parts, fields of basins but velocities."""
+    """Names that scalars cannot have.
+
+    These are columns of output files, quantities of parts, and fields of basins other than velocities.
+    """
     kinds = [kind for group in KINDS.values() for kind in group.values()]
     fields = {name for physics in Physics.kinds.values() for name in physics.fields if name not in VELOCITY_FIELDS}
     return RESERVED | fields | {name for kind in kinds for name in (*kind.quantities, *getattr(kind, "along", {}))}

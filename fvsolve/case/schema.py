@@ -73,7 +73,7 @@ def full_schema() -> dict[str, Any]:
 
 
 def share_definitions(full: dict[str, Any]) -> dict[str, Any]:
-    """Move repeated parts of a schema to `$defs`; descriptions and defaults stay beside the references."""
+    """Copy of a schema with repeated parts moved to `$defs`; descriptions and defaults stay beside the references."""
     times: Counter[str] = Counter()
     names: dict[str, str] = {}
 
@@ -124,7 +124,10 @@ def _numbered(names: dict[str, str]) -> dict[str, str]:
 
 
 def _name(part: dict[str, Any]) -> str:
-    """Name for a shared schema from its dimension, that of a schedule or list, or the keys of a table; else ""."""
+    """Name for a shared schema: its dimension, that of its entries for a schedule or list, or the keys of a table.
+
+    It is "" if a schema has neither a dimension nor keys.
+    """
     first = next(iter(part.get("anyOf", [])), part)
     if (
         isinstance(first, dict)

@@ -142,7 +142,7 @@ class MethodNames(Collection):
 
 
 class MethodChoice(Choice):
-    """Value of a key that is a method: its name, or the path of a file that contains its tableau as text."""
+    """Value of a case file for a Runge-Kutta method: its name, or the path of a file with its tableau as text."""
 
     def read(self, given: Any, setting: ReadContext) -> str:
         if not isinstance(given, str) or given in BUILT_IN or given == AUTO:
@@ -264,7 +264,7 @@ class Numerics(Table):
         """Copy with the default scheme, step control and method filled in.
 
         has_cells : True if the case has pipes or basins; carries : True if basins carry scalars
-        rubs : True if beds of basins have friction; parts : True if cavities in pipes are computed
+        rubs : True if friction acts on the flow in basins; parts : True if cavities in pipes are computed
         """
         changes: dict[str, Any] = {}
         if self.scheme is None:

@@ -66,7 +66,7 @@ class Slowest(NamedTuple):
     """Slowest mode of a tank.
 
     kh : wave number times depth [-]
-    excess : relative error of its frequency in shallow-water theory, which is too high [%]
+    excess : percentage by which shallow-water theory gives too high a frequency [%]
     """
 
     kh: float
@@ -176,7 +176,7 @@ def cylinder_inertia(a: float, h: float) -> float:
     """Inertia per density [m5] of an ideal fluid in a closed cylinder about a horizontal axis through its centre.
 
     a : radius [m]; h : height [m]. The velocity potential (-r z + sum of b_j I1(c_j r) sin(c_j z)) cos(angle), with
-    c_j = (2 j - 1) pi / h and z from the centre, has the normal velocity of all walls.
+    c_j = (2 j - 1) pi / h and z from the centre, has the normal velocity of the walls at all walls.
     """
     from scipy.special import ive
 
@@ -216,7 +216,7 @@ def find_faults(nodes: dict[str, Any], lumped: dict[str, Any], poses: dict[str, 
 
 
 def weightless(nodes: dict[str, Any], gravity: float | None) -> Faults:
-    """Fault of zero gravity in a case with a free water surface. Frozen water on a body is allowed."""
+    """Yield a fault if gravity is zero in a case with a free water surface. Frozen water on a body is allowed."""
     for name, basin in nodes.items():
         if gravity == 0.0 and getattr(getattr(basin, "physics_type", None), "has_modes", False):
             if not (basin.on and basin.sloshing == "frozen"):
@@ -310,9 +310,10 @@ def modes_of(basin: Any, mesh: Any, density: float, gravity: float) -> list[Slos
 
 
 def hidden_body(mass: float, inertia: np.ndarray, joint: Joint, centre: np.ndarray) -> Body:
-    """Body that is not in the file, with its mass [kg], which may be negative.
+    """Body that is not in the file.
 
-    inertia : float64[3, 3] [kg m2], about the centre of mass; centre : centre of mass in the axes of the body [m]
+    mass : may be negative [kg]; inertia : float64[3, 3]  about the centre of mass [kg m2]
+    centre : centre of mass in the axes of the body [m]
     """
     return Body.model_construct(
         mass=mass, inertia=tuple(map(tuple, inertia.tolist())), joint=joint, points={},

@@ -18,8 +18,9 @@ PRESENCE_KEYS = ("required_pressure",)  # keys whose presence alone changes the 
 
 
 def update_values(reader: Any) -> Case | None:
-    """Copy of the case `reader.before` with new numbers of parts; None if more may change, or if there is a fault.
+    """Copy of the case `reader.before` with new numbers of parts; None if the new case must be read in full.
 
+    It must be read in full if more than numbers of parts may change, and if there is a fault.
     reader : reader of the new case; parts as read and faults are written to it, also if the result is None
     Names, types, connections, probes, expectations and all other tables are kept.
     """
@@ -72,7 +73,10 @@ def read_before(given: dict[str, Any], before: dict[str, Any], part: Any) -> dic
 
 
 def is_self_contained(case: Case) -> bool:
-    """True if a case has no files, measurements, signals, scalars, basins, placed parts or computed equilibrium."""
+    """True if a case has no files, measurements, signals, scalars, basins, placed parts or computed equilibrium.
+
+    An exact solution, if the case has one, must also be stated in its file.
+    """
     no_outer_input = not (
         placed(add_bends(case.raw))
         or case.signals

@@ -17,7 +17,8 @@ WALL_KEYS = ("diameter", "nominal", "schedule", "class", "material", "lining")  
 def wave_speed_mismatch(case: Any, name: str) -> tuple[float, float, str] | None:
     """Stated wave speed [m/s], wave speed from the wall [m/s] and message, as a tuple; None if they agree.
 
-    A ratio of up to `ALLOWED_RATIO` is allowed. name : name of a pipe
+    A ratio of up to `ALLOWED_RATIO` is allowed. The result is also None if the keys of the wall are incomplete.
+    name : name of a pipe
     """
     pipe, keys = case.links[name], defaults.raw_link(case.raw, name)
     try:

@@ -114,7 +114,8 @@ def _refuse(**options) -> None:
 def _numbers(name: str, text: str | None) -> list | None:
     """Numbers of a list such as `50,100`; None without a list.
 
-    name : name of the option that gives the list. Raises FvsolveError for a word that is not a positive number.
+    name : name of the option that gives the list
+    Raises FvsolveError for a word that is not a positive number, or for `cells` not a positive whole number.
     """
     numbers = []
     for word in comma_list(text) or ():

@@ -64,7 +64,7 @@ def run(
 
 
 def _run(model, place: Path, force: bool, resume: bool, threads: int, painter, quiet: bool, error: bool):
-    """Solve a case, print its results, then draw them.
+    """Solve a case, print its results, draw them, and return its `Result`.
 
     place : run directory; painter : `PlotProcess`, or None for no pictures; quiet : True to print no results
     error : True to estimate the errors of peaks; force, resume, threads : as for the command `run`
@@ -229,7 +229,11 @@ def view(
 
 
 def _places(cases: list[str], out: Path | None) -> dict[str, Path]:
-    """Map each case to its run directory. Raises FvsolveError if two cases would have the same directory."""
+    """Map each case to its run directory : case -> directory.
+
+    cases : case files or names of shipped cases; out : as the option --out of the command `run`
+    Raises FvsolveError if a case is named twice, or if two cases would have the same directory.
+    """
     from fvsolve.case import shipped
 
     paths, taken = {}, {}

@@ -90,9 +90,9 @@ def energy(
 
 
 def refuse_without_case(options: dict) -> None:
-    """Raise FvsolveError if options are given that need a case, for a command without a case.
+    """Raise FvsolveError if a command without a case has options that need a case.
 
-    options : name of an option -> its value
+    options : name of an option -> its value, which is empty or None if the option is not given
     """
     given = [name for name, value in options.items() if value]
     if given:
@@ -114,7 +114,7 @@ def ledger(case, port, out, as_json: bool) -> None:
     """Run a case, write its energy balance and a picture, and print the balance with the passivity verdict at a port.
 
     It ends the program, with exit code 130 if interrupted, 1 if the run is not ok, else 0.
-    port : name of the port, or None; out : folder of the files, or None
+    port : name of a node, or None for no verdict; out : folder of the files, or None for runs/NAME.energy
     """
     from fvsolve.cli.progress import run_progress
     from fvsolve.draw.energy_picture import energy_figure
@@ -184,8 +184,8 @@ def _ledger(result, case, folder) -> None:
 def compare_pairs(case, schemes, methods, port, out, as_json: bool) -> None:
     """Run a case with several schemes and methods, and print the energy that each pair of them creates.
 
-    It ends the program with exit code 2 if all pairs were refused. port : name of a port, or None
-    out : folder of the files, or None
+    It ends the program with exit code 2 if all pairs were refused.
+    port : name of a node, or None; out : folder of the files, or None for runs/NAME.energy
     """
     from fvsolve.cli.progress import interruptible
     from fvsolve.cli.terminal import console, line, print_sheet
@@ -209,7 +209,7 @@ def compare_pairs(case, schemes, methods, port, out, as_json: bool) -> None:
 
 
 def _in_unit(heading: Column, case) -> Column:
-    """Convert a column of energies from J to the unit of `[output]`; returns any other column unchanged."""
+    """Convert a column of energies from J to the unit of `[output]`, and return any other column unchanged."""
     from fvsolve.output.unit_columns import column
 
     if not heading.head.endswith(" [J]"):

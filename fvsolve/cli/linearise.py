@@ -80,7 +80,10 @@ def linearise(
 
 
 def write_matrices(folder: Path, system) -> None:
-    """Write linear.npz, and the matrices A, B, C, D as CSV tables with named rows and columns."""
+    """Write linear.npz, and the matrices A, B, C, D as CSV tables with named rows and columns.
+
+    A sparse matrix A is written to A-sparse.csv instead, with a row for each entry. system : result of `linearise`
+    """
     a, names = system.a, system.states
     arrays = {"A": a}
     if system.sparse:
@@ -110,7 +113,11 @@ def with_names(names, matrix):
 
 
 def print_system(system, values, poles: list[dict], folder: Path) -> None:
-    """Print the state, the accuracy of the difference quotients and the slowest poles."""
+    """Print the time and size of a linearised system, the accuracy of its difference quotients, and its slowest poles.
+
+    system : result of `linearise`; values : result of `poles_of`; poles : rows of the table of poles
+    folder : folder of the files, whose names are printed
+    """
     from fvsolve.cli import terminal
     from fvsolve.studies.linear.eigenvalues import POLES
 

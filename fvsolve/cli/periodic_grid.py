@@ -35,11 +35,13 @@ def without_case(
     scheme: str | None, method: str | None, cells: int | None, steps: int | None, as_json: bool, out: Path | None,
     courant: float | None = None,
 ) -> None:  # fmt: skip
-    """Print Courant limits of schemes and methods (names separated by commas; default all, without limited schemes).
+    """Print Courant limits of schemes and methods on a periodic grid, as text or as JSON.
 
-    With `cells` or `steps`, limits of explicit methods are also measured by runs on a periodic pipe. Limits of limited
-    schemes are always measured. courant : Courant number at which the growth of waves is printed
-    out : folder for CSV files, or None. Raises FvsolveError for unknown names.
+    scheme, method : names separated by commas, or None for all linear schemes and all methods
+    cells, steps : cells of the grid and steps of a run. If one of them is given, limits of explicit methods are also
+        measured by runs. Limits of limited schemes are always measured.
+    courant : Courant number at which the growth of waves is printed; out : folder for CSV files, or None
+    Raises FvsolveError for unknown names.
     """
     named, methods = comma_list(scheme, "--scheme") or None, method_names(method) or None
     linear = None if named is None else [name for name in named if name not in LIMITED]
@@ -67,10 +69,11 @@ def without_case(
 
 
 def _measure(named, linear, methods, cells: int | None, steps: int | None) -> tuple[list, list]:
-    """Limits measured by runs, as two lists: of linear schemes, and of limited schemes.
+    """Limits measured by runs : (list for linear schemes, list for limited schemes).
 
     named : names of all given schemes, or None; linear : the linear schemes among them, or None for all linear schemes
-    methods : names of methods. Linear schemes are measured only if `cells` or `steps` is given.
+    methods : names of methods, or None for all; cells, steps : as for `without_case`
+    Linear schemes are measured only if `cells` or `steps` is given.
     """
     limited = [name for name in named or () if name in LIMITED]
     given = {name: n for name, n in (("cells", cells), ("steps", steps)) if n is not None}
@@ -158,7 +161,7 @@ def _growth(growth: float) -> str:
 def _table(limits: list[AdvectionLimit]) -> None:
     """Print a table of Courant limits with a row for each method and a column for each scheme.
 
-    Methods that are stable with all schemes share one line.
+    Methods that are stable at every Courant number with all schemes share one line below the table.
     """
     console, rows, free = terminal.console(), {}, []
     for limit in limits:

@@ -53,7 +53,7 @@ def print_result(run) -> None:
     """Print the results of a run: extremes, marks, cavities, events, ledgers, verdicts, comparisons, notices and steps.
 
     Verdicts are those on expectations and limits. At most ROWS probes, EVENTS_SHOWN events and REASONS_SHOWN reasons of
-    errors are printed; of many notices only the first.
+    errors are printed. All notices of wrong results are printed, but of many other notices only the first EVENTS_SHOWN.
     """
     summary, time_text = run.summary, time_formatter(run.summary)
     console = _console()
@@ -240,7 +240,7 @@ def _print_states(console, case, word: str, parts: dict, keys: dict, every: bool
 def _notable_rows(parts: dict, keys: dict, odd: set[str]) -> list[str]:
     """Names of parts with the least or greatest value of a column, and of parts in `odd`, in the original order.
 
-    parts, keys : as for `_print_rows`
+    parts, keys : as for `_print_rows`; odd : names of parts with notices, of which at most MANY_ROWS are included
     """
     chosen = set(sorted(odd)[:MANY_ROWS])
     for key in keys:
@@ -275,7 +275,7 @@ def _in_unit(column, value):
 
 
 def _print_first(console, lines: list[str], every: bool) -> None:
-    """Print lines; every : True for all lines, False for only the first of many."""
+    """Print lines; every : True for all lines, False for only the first EVENTS_SHOWN of many lines."""
     count = len(lines) if every or len(lines) <= EVENTS_SHOWN + 2 else EVENTS_SHOWN
     for text in lines[:count]:
         _line(console, text)
@@ -286,7 +286,7 @@ def _print_first(console, lines: list[str], every: bool) -> None:
 def _print_notices(console, warnings: list[dict], every: bool = False) -> None:
     """Print all notices of wrong results in bold red, then the other notices.
 
-    every : True for all other notices, False for only the first of many
+    every : True for all other notices, False for only the first of them, as for `_print_first`
     """
     for notice in warnings:
         if not notice["ok"]:
@@ -305,7 +305,10 @@ def print_titles(cases: dict[str, str]) -> None:
 
 
 def print_differences(results: dict, summary: dict) -> None:
-    """Print differences of two runs for each common probe; times have the unit of the first run's summary."""
+    """Print the differences of two runs for each common probe, and the probes that only one of the runs has.
+
+    results : as from `differences` in `run.comparison`; summary : of the first run, whose time unit is used
+    """
     clock, rows = time_column(summary), []
     for name, probe in results["probes"].items():
         time = None if probe["t_greatest"] is None else clock.from_si(probe["t_greatest"])
@@ -370,7 +373,7 @@ def _error_text(peak: dict) -> str:
 
 
 def where_and_when(verdict: dict, summary: dict) -> str:
-    """Place, chainage and time at which a quantity is nearest to its limit, as text in the units of a run.
+    """Text of the place, chainage and time at which the margin of a limit is least, in the units of a run.
 
     verdict : verdict on the limit; summary : summary of the run
     """
@@ -411,7 +414,7 @@ def _limit_text(verdict: dict, summary: dict) -> str:
 
 
 def undecided_limit_reason(verdict, summary: dict) -> str:
-    """Reason for which a limit is undecided (state OPEN)."""
+    """Reason why a limit is undecided (state OPEN). verdict : `LimitVerdict`; summary : summary of the run"""
     if verdict.doubtful:
         return "its margin is smaller than its error"
     return undecided_reason(summary) or f"its {'value' if verdict.margin is None else 'error'} is not known"
@@ -436,7 +439,7 @@ def mark_lines(marks: list[dict], time_text) -> list[str]:
 
 
 def undecided_reason(summary: dict) -> str:
-    """Reason for which a run cannot decide a limit that it does not exceed; "" if it can."""
+    """Reason why a run cannot confirm a limit that it does not exceed; "" if it can. summary : summary of the run"""
     from fvsolve.run.result import not_valid
 
     late = [notice["text"] for notice in summary["warnings"] if notice["kind"] == "end"]

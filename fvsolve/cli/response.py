@@ -91,7 +91,10 @@ def draw(result, path: Path, size: float, unit: str) -> None:
 
 
 def print_response(result, folder: Path, name: str, unit: str) -> None:
-    """Print the transfer function's definition, the verdict with its reasons, and the files."""
+    """Print the transfer function's definition, the verdict with its reasons, and the files.
+
+    result : as from `response`; name : name of the files without their endings; unit : unit of the transfer function
+    """
     from fvsolve.cli import terminal
 
     console, verdict = terminal.console(), result.verdict

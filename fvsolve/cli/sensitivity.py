@@ -92,7 +92,10 @@ def difference_text(case, probe, value: float) -> str:
 
 
 def print_table(result, text: str, units: dict[str, str] = {}) -> None:  # noqa: B006
-    """Print a table of keys, with a line of text below it; units : key -> its heading with unit."""
+    """Print the table of keys of a sensitivity study or a calibration, and the line `text` below it.
+
+    units : key -> its heading with unit, for keys that have a unit
+    """
     from fvsolve.cli import terminal
 
     console, (heads, rows) = terminal.console(), result.sheet.words()

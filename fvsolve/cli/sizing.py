@@ -93,7 +93,7 @@ def _show(result) -> None:
 
 
 def _no_value_text(result) -> str:
-    """Text for a size search without result: the nearest value, its margin, and the direction in which to search."""
+    """Text for a size search without result: the value with the greatest margin, and a direction for further search."""
     nearest, values = result.nearest, sorted(run.value for run in result.runs)
     unit = f" {result.unit}" if result.unit else ""
     text = (f"none of the values tried between {values[0]:.6g} and {values[-1]:.6g}{unit} satisfies all limits; "

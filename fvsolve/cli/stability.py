@@ -101,9 +101,10 @@ def stability(
 
 
 def refuse_options(case: str | None, of_a_case: dict, of_a_grid: dict) -> None:
-    """Raise FvsolveError if options are given that have no effect.
+    """Raise FvsolveError if options are given that have no effect with a case, or have no effect without a case.
 
-    of_a_case, of_a_grid : name -> value, of options that apply only with a case, and only without a case
+    case : name of the case, or None
+    of_a_case : name -> value of the options that need a case; of_a_grid : name -> value of the options for no case
     """
     from fvsolve.errors import FvsolveError
 
@@ -114,9 +115,11 @@ def refuse_options(case: str | None, of_a_case: dict, of_a_grid: dict) -> None:
 
 
 def pictures(result, folder: Path) -> list[str]:
-    """Draw the spectrum over the stability region of each pair with a linear scheme; returns the file names.
+    """Draw a picture for each pair of a linear scheme and a method; returns the file names.
 
-    Pairs on a case with delay lines have no picture.
+    It shows the spectrum, multiplied by a step, over the stability region. The step is the predicted limit. If this is
+    not positive and finite, the step is 1 / (greatest magnitude of an eigenvalue). Pairs on a case with delay lines
+    have no picture. result : as from `stability`
     """
     from fvsolve.draw.spectrum_picture import spectrum_figure
     from fvsolve.steppers import analyse

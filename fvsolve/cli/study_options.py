@@ -74,7 +74,7 @@ def warn_replaced(folder: Path, name: str) -> None:
 
 
 def clear_files(folder: Path, *patterns: str) -> Path:
-    """Delete the files of an earlier command that match glob patterns from the folder, and return the folder."""
+    """Delete the files in a folder that match glob patterns, left by an earlier command; returns the folder."""
     for path in [file for pattern in patterns for file in folder.glob(pattern)]:
         path.unlink()
     return folder

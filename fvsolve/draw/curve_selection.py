@@ -72,8 +72,9 @@ def select_curves(values: np.ndarray, probes, measured=()) -> tuple[list[DrawnPa
 
 
 def _without_doubles(lines: list[DrawnLine], values: np.ndarray, probes, measured) -> list[DrawnLine]:
-    """Curves of a panel of which equal curves are drawn once, with the places of all of them as names.
+    """Curves of a panel without duplicates: coinciding curves become one curve, which has the places of all in `names`.
 
+    A curve with measurements, or with quantities in `alike`, does not become part of another curve.
     values, probes, measured : as for `select_curves`
     """
     seen = np.concatenate([values[:, line.column] for line in lines])

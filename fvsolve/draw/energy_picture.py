@@ -16,12 +16,13 @@ COLOUR_MAPS = {"stored": "Blues", "dissipated": "Oranges", "supplied": "Greens"}
 def energy_figure(t, supplied, stored, dissipated, numerical, title="", port=None, units=("s", None)):
     """Figure with three panels over time: supplied energy, stored and dissipated energy, and numerical loss.
 
-    supplied, stored, dissipated, numerical : name -> float64[k] [J], cumulative. Positive values are stacked upwards,
-    negative values downwards. Stored energy is drawn relative to its least value in the run. The gap between the areas
-    and the line above them is the remainder of the energy balance.
-    port : (name, integral of pressure times flow at the port : float64[k] [J], its lower bound : float64[k] [J]) for a
-    fourth panel
-    units : unit of t, and (size [J], name) of the unit of energies, or None to choose it by size
+    supplied, stored, dissipated, numerical : name -> float64[k] [J], cumulative
+    The first three are drawn as stacked areas, positive values upwards and negative values downwards. The last is drawn
+    as lines. A stored energy that becomes negative is drawn relative to its least value. In the second panel, the gap
+    between the areas and the line above them is the remainder of the energy balance.
+    port : None, or data of a fourth panel as (name, work, bound): the integral of pressure times flow at the port
+        float64[k] [J], and its lower bound float64[k] [J]
+    units : (unit of t, unit of energies); the second is (size [J], name), or None to choose the unit by size
     """
     figure = style.figure(8.2 if port is None else 9.8)
     heights = (2, 3, 2, 2)[: 3 if port is None else 4]
@@ -59,7 +60,7 @@ def _port_panel(axes, t, name, work, bound, given) -> None:
     """Draw the supplied energy at the port `name`, and its lower bound.
 
     work : float64[k]  integral of pressure times flow [J]
-    bound : float64[k]  its lower bound [J], only in the legend if far below
+    bound : float64[k]  its lower bound [J]; a bound that lies far below is stated only in the legend
     given : (size [J], name) of the unit of energies, or None to choose it by size
     """
     span = max(np.ptp(work), np.max(np.abs(work)))

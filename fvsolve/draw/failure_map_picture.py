@@ -17,9 +17,10 @@ DARK_VERDICTS = ("stable", "wrong", "blown up", "refused")  # verdicts with dark
 
 @style.without_markup
 def failure_map_figure(result, title: str = "", head: str = ""):
-    """Figure of a failure map with a panel for each scheme: methods down, time steps or values of a key across.
+    """Figure of a failure map with a panel for each scheme.
 
-    A bar in a row marks the predicted stability limit. head : label of the columns if they are values of a key
+    A panel has a row for each method, and a column for each time step or value of a key. A bar in a row marks the
+    predicted stability limit. head : label of the columns if they are values of a key
     """
     tall = 0.30 * len(result.methods)
     figure = style.figure(1.5 + len(result.schemes) * (tall + 0.75), width=max(7.0, 2.3 + 0.68 * len(result.values)))

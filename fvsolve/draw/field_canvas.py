@@ -30,7 +30,10 @@ BOX_MARGINS = (62.0, 44.0, 50.0, 14.0)  # margins of a box: left, low, right, hi
 
 
 class FieldCanvas:
-    """Picture of basins and bodies. All frames have the same colour range, bounding box and projection."""
+    """Picture of basins and bodies. All frames have the same colour range, bounding box and projection.
+
+    film : True for frames of an animation, which have a lower resolution
+    """
 
     def __init__(self, scene: DrawnScene, film: bool) -> None:
         import pyvista

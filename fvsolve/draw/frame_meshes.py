@@ -18,10 +18,10 @@ TUBE_RADIUS = 0.008  # radius of a pipe as a fraction of the diagonal of the sce
 
 
 def field_extent(scene: DrawnScene) -> tuple[tuple[float, float], np.ndarray, bool]:
-    """Ends of the colour range, bounding box of all frames float64[6], and True if a frame has depths of water.
+    """Extent of all frames : (colour range (low, high), bounding box float64[6], True if a frame has depths of water).
 
-    The colour range is that of the field in all frames, for basins in wet cells, see `colour_range`; (0, 1) if all are
-    dry. The bounding box is in output units: least and greatest x, then y, then z.
+    The colour range covers the values of the field in all frames, in basins only in wet cells; see `colour_range`.
+    It is (0, 1) if all cells are dry. The bounding box is in output units: least and greatest x, then y, then z.
     The process exits with a message if no frame has the field, since the function runs in a process of its own.
     """
     known, lows, highs, boxes, wet, field = {}, [], [], [], False, scene.quantity.name
@@ -83,6 +83,9 @@ def mesh_box(mesh: Any) -> list[float]:
 
 
 def tubes(mesh: Any, box) -> Any:
-    """Tubes around the lines of a mesh, with a radius in proportion to the bounding box of the scene."""
+    """Tubes around the lines of a mesh, with a radius proportional to the diagonal of `box`.
+
+    box : bounding box of the scene, as from `field_extent`
+    """
     reach = math.dist(box[::2], box[1::2])
     return mesh.extract_surface(algorithm=None).tube(radius=TUBE_RADIUS * max(reach, 1e-9))

@@ -19,7 +19,10 @@ BOX_MARGINS = (60.0, 40.0, 46.0, 16.0)  # margins of a network with a box [point
 
 
 class NetworkPicture:
-    """Picture of a network of pipes; `show` draws a frame."""
+    """Picture of a network of pipes; `show` draws a frame.
+
+    film : True for frames of an animation, which have a lower resolution
+    """
 
     def __init__(self, scene: DrawnScene, film: bool) -> None:
         self.scene, lines = scene, scene.pipes[0][1]

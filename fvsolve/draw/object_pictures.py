@@ -97,7 +97,11 @@ def state_figure(state):
 
 @style.without_markup
 def sweep_figure(sweep):
-    """Figure of extremes of the first probes of a sweep: over one key, as maps over two keys, or over the runs."""
+    """Figure of the first MAX_PANELS extremes of probes in a sweep.
+
+    For two keys the extremes are drawn as maps. For a single key with numbers they are curves over the key, otherwise
+    curves over the index of the run.
+    """
     names = [name for name in sweep.columns if name.startswith(("max(", "min("))][:MAX_PANELS]
     if len(sweep.keys) == 2 and names:
         return map_figure(sweep, names, {key: key for key in sweep.keys})

@@ -20,10 +20,10 @@ def section_figure(chainage, along, units, lines, seen, parted=(), beyond=(), po
     """Figure of heads along a route, with pipe, vapour line, pressure class and limits; shaded where cavities formed.
 
     chainage : float64[n]; along : quantity of envelope.csv -> float64[n]; lines : name of a line -> float64[n]
-    units : unit of each quantity; seen : `HeadWindow`, ends of the head axis and texts of the limits above and below it
+    units : quantity -> unit; seen : `HeadWindow`, ends of the head axis and texts of the limits above and below it
     parted : spans of chainage with cavities; beyond : (chainage, head, name) of points where a limit is violated
     posts : chainages of vertical lines
-    labels : (chainage, names of parts, True if a device and not only a junction is there)
+    labels : (chainage, names, True for a device, False for only a junction) of each label above the axes
     """
     figure = style.figure(9.2)
     axes = figure.subplots()

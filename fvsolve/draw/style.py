@@ -75,7 +75,7 @@ def label_decades(axes) -> None:
 
 
 def legend(axes) -> None:
-    """Draw the legend to the right of the axes, where it does not cover any curve; nothing without labels."""
+    """Draw the legend to the right of the axes, where it does not cover any curve. Without labels nothing is drawn."""
     if axes.get_legend_handles_labels()[0]:
         axes.legend(
             loc="upper left",

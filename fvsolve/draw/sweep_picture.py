@@ -61,7 +61,7 @@ def axis_positions(values: list) -> tuple[list[float], list[str]]:
 
 @style.without_markup
 def map_figure(sweep, names, heads: Mapping[str, str]):
-    """Figure of columns of a `Sweep` over two keys, as maps of squares or as dots; failed runs are crossed.
+    """Figure of columns of a `Sweep` over two keys, as maps of squares or as dots; failed runs are marked with a cross.
 
     Squares are drawn if there is exactly one run for each pair of values.
     names : names of the columns; heads : key -> label of its axis

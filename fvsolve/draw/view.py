@@ -22,8 +22,9 @@ def view(scene: DrawnScene, out: Path) -> None:
     """Write a single frame as a picture, several as an animation (.gif or .mp4), to the file `out`.
 
     Matplotlib draws networks in this process. PyVista draws basins and bodies in a second process, because VTK ends its
-    process without an OpenGL library. Raises FvsolveError for an unknown field, a file name without a format of
-    animations for several frames, and a picture that cannot be drawn.
+    process without an OpenGL library.
+    Raises FvsolveError for an unknown field, for an animation in a file that is not a .gif or .mp4, for an .mp4 without
+    the packages that write it, and for a picture that cannot be drawn.
     """
     animated = len(scene.frames) > 1
     if animated and out.suffix not in (".gif", ".mp4"):

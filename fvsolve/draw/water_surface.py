@@ -146,8 +146,10 @@ def _at_points(cells, chosen: np.ndarray, values: np.ndarray, n: int) -> np.ndar
 
 
 def _extended(cells, chosen: np.ndarray, at: np.ndarray, n: int) -> np.ndarray:
-    """Extrapolated values at n points: mean over the chosen cells around a point of the known values at their corners.
+    """Values extrapolated to n points : float64[n], NaN for a point without known values nearby.
 
+    The value at a point is the mean over the chosen cells around it; the value of a cell is the mean of those values at
+    its corners that are not NaN.
     cells : as from `_cells`; at : float64[n]  values at points, NaN if not known; chosen : bool[cells]
     """
     total, count = np.zeros(n), np.zeros(n)

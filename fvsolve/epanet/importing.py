@@ -57,7 +57,7 @@ def import_network(path: str | Path, hour: float = 0.0, wave_speed: float = 1200
 
 
 def cell_time(lengths: list[float], wave_speed: float) -> float:
-    """Travel time of a cell [s], rounded to two digits: 10 ms, or longer so that all cells are at most `MOST_CELLS`.
+    """Travel time of a cell [s], rounded to two digits: 10 ms, or longer for at most `MOST_CELLS` cells.
 
     lengths : lengths of all pipes [m]; wave_speed : [m/s]
     """

@@ -106,7 +106,7 @@ def state_at(network: Any, hour: float) -> HourState:
 
 
 def _root_cause(error: BaseException) -> str:
-    """Readable text of the first cause in a chain of exceptions, or of the first cause with an error code of EPANET."""
+    """Text of the innermost exception in a chain of causes, or of the innermost one with an error code of EPANET."""
     chain = [error]
     while chain[-1].__cause__ is not None:
         chain.append(chain[-1].__cause__)
@@ -133,7 +133,7 @@ def _fault_message(path: Path, faults: list[str], source: str) -> str:
 
 
 def _listed_faults(package: Any, path: Path) -> list[str]:
-    """Faults that EPANET lists for a file.
+    """Faults that EPANET lists for a file; empty if EPANET does not run.
 
     EPANET runs in a second process, because a faulty file can crash its library.
     """

@@ -108,7 +108,8 @@ def valve(ends: tuple[str, str], diameter: float, loss: float, opening: float = 
 def pump(ends: tuple[str, str], law: Part, speed: float) -> Part:
     """Table of a pump with a check valve, because EPANET's pumps have no reverse flow.
 
-    ends : names of the nodes `from` and `to`; law : key of its head law at full speed; speed : relative speed
+    ends : names of the nodes `from` and `to`; speed : relative speed
+    law : key with the head law at full speed, result of `curve` or `power`
     """
     return _link("pump", ends) | law | {"speed": rounded_number(speed), "check_valve": True}
 

@@ -68,8 +68,9 @@ class Translation:
     def elevations(self) -> dict[str, float]:
         """Elevation [m] of each junction and tank; one end of a pipe that is shorter than its rise is moved.
 
-        EPANET accepts a pipe of 6 m that rises by 200 m. Heads and flows of a network do not depend on elevations,
-        except where a demand depends on pressure: such a pipe is lengthened instead, see `length`.
+        EPANET accepts such pipes, for example 6 m long with a rise of 200 m. Heads and flows of a network do not depend
+        on elevations, except where an outflow depends on pressure. A pipe at such a node is not moved but lengthened,
+        see `length`.
         """
         result = {name: node.elevation for name, node in self.network.nodes() if node.node_type != "Reservoir"}
         pipes = [

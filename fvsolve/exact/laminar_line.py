@@ -128,7 +128,7 @@ class LineDeviation:
         return self.length - places if self.reversed else places
 
     def _demand_jumps(self):
-        """(time [s], change of the mass flow [kg/s]) of each jump of the demand from the start on."""
+        """Yield (time [s], change of the mass flow [kg/s]) for each jump of the demand from the start on."""
         times, values = self.demand.time, self.demand.value
         for k in range(1, len(times)):
             if times[k] >= self.t0:

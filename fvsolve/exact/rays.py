@@ -130,7 +130,7 @@ class RayPaths:
     # characteristics and nodes ---------------------------------------------------------------------------------------
 
     def first(self, pipe: str, end: int, age: np.ndarray) -> np.ndarray:
-        """Characteristic [Pa] from the initial state of a pipe that arrives at an end `age` seconds after the start.
+        """Characteristic [Pa] that arrives at an end of a pipe `age` seconds after the start, by the initial state.
 
         It is P + Z M at `to` (end 1) and P - Z M at `from` (end 0), with P = p + rho g z, impedance Z and mass flow M.
         """
@@ -223,7 +223,7 @@ class RayPaths:
         return p, 0.5 * (forward - backward) / (self.impedance[pipe] * self.rho)
 
     def _outgoing(self, pipe: str, end: int, when, x):
-        """Characteristic [Pa] at a distance x [m] from an end of a pipe, which left this end at the times `when` [s].
+        """Characteristic [Pa] that left an end of a pipe at the times `when` [s], at the distance x [m] from this end.
 
         If it left before the start, it follows from the initial state. For the characteristic see `first`.
         """

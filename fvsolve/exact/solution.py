@@ -97,8 +97,9 @@ class Solution:
 
 
 def averages(f: Callable, edges: np.ndarray, cuts: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
-    """Average of each value that f(x) returns over each interval of `edges`, by five Gauss points between `cuts`.
+    """Averages over each interval of `edges` of the quantities whose values f(x) returns : tuple of float64[intervals].
 
+    They are computed with five Gauss points between `cuts`.
     cuts : positions where f is not smooth, including the edges; None for the edges alone
     """
     cuts = edges if cuts is None else cuts
@@ -145,9 +146,9 @@ def type_faults(case, nodes: tuple[str, ...], links: tuple[str, ...]):
 
 
 def count_faults(case, items: list, noun: str):
-    """Yield a fault (keys, message) unless there is exactly one of `items` in a case.
+    """Yield a fault (keys, message) if `items`, parts of a case, does not have exactly one entry.
 
-    noun : name of an item in the message
+    noun : name of such a part in the message
     """
     if len(items) != 1:
         yield ("exact", "name"), f'"{case.exact.name}" needs exactly one {noun}; the case has {len(items)}'

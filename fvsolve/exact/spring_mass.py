@@ -55,7 +55,10 @@ def solution(case, start: ExactStart) -> Solution:
         place, end, force = place + end, 0.0, 0.0
 
     def parts(t):
-        """exp(-decay s) cosh(kappa s) and exp(-decay s) sinh(kappa s) / kappa, with the time s since the start."""
+        """exp(-decay s) cosh(kappa s) and exp(-decay s) sinh(kappa s) / kappa, with the time s since the start.
+
+        decay = c / (2 m), kappa^2 = decay^2 - k / m, with mass m, stiffness k and damping c
+        """
         s = np.asarray(t, dtype=float) - t0
         if abs(kappa) < 1e-12 * math.sqrt(stiffness / mass.mass):
             return np.exp(-decay * s), np.exp(-decay * s) * s

@@ -17,7 +17,7 @@ class Air:
 
     fraction : volume of free gas over volume of the mixture, at 1 atm; exponent : polytropic exponent of the gas
     saturation_pressure : pressure at which all gas is dissolved [Pa], infinite if gas does not dissolve; the amount of
-    free gas decreases linearly with the pressure until then
+    free gas decreases linearly with the pressure up to this value
     cavitation : True if vapour forms at vapour pressure, which is then the lower bound of pressure
     """
 

@@ -107,7 +107,7 @@ def _check_temperature(name: str, temperature: float, least: float, greatest: fl
 
 
 def _vapor_pressure(state: Any, temperature: float) -> float:
-    """Vapour pressure at a temperature [Pa]; 0 above the critical temperature."""
+    """Vapour pressure [Pa] at a temperature [K]; 0 at and above the critical temperature."""
     from CoolProp import CoolProp
 
     if temperature >= state.T_critical():

@@ -109,7 +109,7 @@ class Law:
 
     @property
     def cavitation_keys(self) -> str:
-        """Part of a message: the key that cavitation needs besides `cavitation = true`, and "and"; may be empty."""
+        """Words of a message before `cavitation = true`: 'law = "mixture" and '; empty for the law `mixture`."""
         return 'law = "mixture" and '
 
     @property

@@ -19,7 +19,7 @@ MAX_CELLS = 3
 
 @dataclass(frozen=True, eq=False)
 class Sketch:
-    """Mesh while it is read, with coordinates in the unit of the file; methods return texts for its places."""
+    """Mesh while it is read, with coordinates in the unit of the file; methods return texts on its places."""
 
     points: np.ndarray
     cells: np.ndarray
@@ -76,7 +76,7 @@ def shape_faults(sketch: Sketch) -> tuple[list[Fault], np.ndarray, np.ndarray]:
 
 
 def overlap_faults(sketch: Sketch, edges: Edges, number: np.ndarray) -> list[Fault]:
-    """List with the fault of faces that more than two cells share, or two cells on one side; empty without such faces.
+    """List with the fault of faces that more than two cells share, or two cells on the same side; else empty.
 
     number : int64[:]  numbers of the cells of `edges` in the file
     """

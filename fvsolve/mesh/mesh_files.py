@@ -158,14 +158,14 @@ def _groups(file_mesh: Any) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
 
 
 def _named_groups(field_data: Any) -> Iterable[tuple[str, np.ndarray]]:
-    """(name, (number, dimension)) of each group of lines that has a name in the file."""
+    """Yield (name, (number, dimension)) for each group of lines that has a name in the file."""
     for name, entry in (field_data or {}).items():
         if np.shape(entry) == (2,) and int(entry[1]) == 1:
             yield name, entry
 
 
 def _tagged_lines(cell_data: Any, k: int) -> Iterable[tuple[int, np.ndarray]]:
-    """(number of the group, indices of its lines in the block) of each group in block k of lines of the file.
+    """Yield (number of the group, indices of its lines in the block) for each group in block k, a block of lines.
 
     The number 0 stands for no group.
     """

@@ -26,7 +26,8 @@ class MeshPoints:
         self.tree = cKDTree(mesh.centre)
         order = np.argsort(mesh.cells, axis=None, kind="stable")
         first = np.searchsorted(mesh.cells.ravel()[order], np.arange(len(mesh.points) + 1))
-        self.cells_of_points, self.first = order // 4, first  # cells at a point: around[first[p] : first[p + 1]]
+        # cells at point p: cells_of_points[first[p] : first[p + 1]]
+        self.cells_of_points, self.first = order // 4, first
 
     def cell(self, x: float, y: float) -> int:
         """Number of the cell that contains the point (x, y) [m]; the lowest number on an edge, -1 outside all cells."""

@@ -23,7 +23,8 @@ def read(path: str | Path, unit: str = "m") -> Mesh:
     """Read a plane mesh from a file of any format of meshio, with coordinates in `unit`.
 
     Triangles and quadrilaterals are cells, renumbered so that neighbours are close; physical groups of lines are
-    patches. Raises MeshError with all faults that can be distinguished.
+    patches. The file, its coordinates, its cells and its boundary are checked in this order; MeshError is raised with
+    all faults of the first of these checks that fails.
     """
     path = Path(path)
     factor = _factor(unit, path)

@@ -14,7 +14,7 @@ class CaseContext:
     """Parts and properties of a case, for checks after its parts are read.
 
     nodes, links : parts by name; ambient : ambient pressure [Pa]
-    gravity : [m/s2], None if faulty; fluid : properties of the fluid, None if faulty
+    gravity : acceleration of gravity [m/s2], None if faulty; fluid : properties of the fluid, None if faulty
     boiling_faults : function of (group, name, key, pressures [Pa]) of a part, which yields a fault if the fluid boils
     at one of the pressures
     place_distance : function of two places: distance [m] from the first to the second at the start, None if unknown

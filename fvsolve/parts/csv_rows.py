@@ -148,7 +148,7 @@ def read_rows(path: Path) -> CsvRows:
 
 
 def is_uniform(rows: list[list[str]]) -> bool:
-    """True if all rows have the same number of cells, and that is more than one."""
+    """True if all rows have the same number of cells, at least two."""
     return {len(row) for row in rows} == {len(rows[0])} and len(rows[0]) > 1
 
 

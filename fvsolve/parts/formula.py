@@ -115,7 +115,7 @@ def read_points(path: Path, dimension: str) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Linear interpolation between scattered points; outside them, the value of the nearest point.
+    """Linear interpolation between scattered points; outside their convex hull, the value of the nearest point.
 
     columns : float64[n, 3]  x [m], y [m] and value of the points
     """

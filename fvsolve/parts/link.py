@@ -32,7 +32,10 @@ class Link(Table):
     owns: ClassVar[dict[str, str]] = {}  # own place, `LINK.PLACE` for other parts -> domain
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Link]]:
-        """Places and links of the solved network for this link, by name: itself, and its own places `NAME.PLACE`."""
+        """(places, links) of the solved network for this link, each by name.
+
+        They contain the link itself, and its own places `NAME.PLACE`.
+        """
         return {}, {name: self}
 
     def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:

@@ -64,7 +64,10 @@ class Node(Table):
         return ()
 
     def inner(self, name: str) -> tuple[dict[str, Node], dict[str, Any]]:
-        """Places and links of the solved network for this node, by name: itself, and its own places `NAME.PLACE`."""
+        """(places, links) of the solved network for this node, each by name.
+
+        They contain the node itself, and its own places `NAME.PLACE`.
+        """
         return {name: self}, {}
 
     def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:

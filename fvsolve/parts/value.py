@@ -28,7 +28,7 @@ SHAPE = "shape"  # a new model: cells, parts, methods
 class ValueFault(ValueError):
     """Error with the faults of a value: list of (keys below the value, message).
 
-    instead : values with which reading continues, so that it finds further faults, or None; attribute `replacement`
+    instead : values with which reading continues, so that it finds further faults, or None; stored as `replacement`
     """
 
     def __init__(self, faults: list[tuple[tuple[Any, ...], str]], instead: dict[str, Any] | None = None):

@@ -58,9 +58,9 @@ def _pipe_frames(result) -> list[tuple[float, Path]]:
 
 
 def _cells_along(result, way: SectionPath, counts: dict[str, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Chainages of cells along a section (at most `MAX_POINTS`, evenly chosen), and their indices in a frame.
+    """At most `MAX_POINTS` cells along a section, evenly chosen : (their chainages, their indices in a frame).
 
-    counts : pipe -> number of its cells, in the order of a frame
+    counts : pipe -> number of its cells, in the order of a frame. Chainages are in the unit of the envelope.
     """
     first = dict(zip(counts, np.cumsum([0, *counts.values()]).tolist(), strict=False))
     chainage, indices = [], []

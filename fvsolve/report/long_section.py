@@ -46,12 +46,13 @@ class SectionDevice(NamedTuple):
 class Section:
     """Long section: a path through the network with the results along it, in the units of `[output]`.
 
-    chainage : float64[n]; pipe : str[n]  pipe of each point
-    along : quantity -> float64[n]
+    way : the path; chainage : float64[n]; pipe : str[n]  pipe of each point
+    along : quantity -> float64[n], for the quantities `SECTION_QUANTITIES` of envelope.csv
     lines : name -> float64[n]  heads of vapour pressure, pressure class and limits; NaN where a line does not apply
     ends : chainages of both ends
     cavity_spans : (begin, end) of chainage where the least pressure is at most `cavity_pressure`
     violations : (chainage, head, name of the limit) of points where a limit is violated
+    devices : `SectionDevice` of each node of the path
     """
 
     way: SectionPath
@@ -65,7 +66,10 @@ class Section:
     devices: list[SectionDevice]
 
     def drawn_indices(self, bins: int = MAX_BINS) -> np.ndarray:
-        """Indices of the points to draw: all, or for a long section the extremes of each bin."""
+        """Indices of the points to draw: all, or for a long section the extremes of head and elevation in each bin.
+
+        bins : number of equal bins of points
+        """
         n = len(self.chainage)
         if n <= 4 * bins:
             return np.arange(n)
@@ -111,7 +115,7 @@ class HeadWindow(NamedTuple):
 
 
 def head_window(sections: Sequence[Section], unit: str) -> HeadWindow:
-    """Range of the head axis for a picture of sections: heads, pipe elevations, vapour line and limits close to them.
+    """Range of the head axis for a picture of sections, which shows heads, pipes, vapour line and limits close to them.
 
     Limits far away are only named, so that they do not compress the heads. unit : unit of heads, for their texts
     """
@@ -177,7 +181,7 @@ def cavity_pressure(result) -> float | None:
 
 
 def _cavity_spans(result, least: np.ndarray, chainage: np.ndarray, way: SectionPath) -> list[tuple[float, float]]:
-    """Spans (begin, end) of chainage [m] around points whose pressure fell to that of `cavity_pressure`.
+    """Spans (begin, end) of chainage [m] around points whose least pressure is at most `cavity_pressure`.
 
     least : float64[n]  least pressures in the unit of the envelope; chainage : float64[n] [m]
     way : path of the section
@@ -192,7 +196,7 @@ def _cavity_spans(result, least: np.ndarray, chainage: np.ndarray, way: SectionP
 
 
 def _violations(result, way: SectionPath, chainage: np.ndarray, along: dict) -> list[tuple[float, float, str]]:
-    """Points of a path where a limit on pressure or head is violated : list of (chainage [m], head, name of the limit).
+    """Worst places on a path that violate limits on pressure or head : list of (chainage [m], head, name of the limit).
 
     chainage : float64[n]  chainages of the section [m]; along : quantity -> float64[n]  results of the section
     """

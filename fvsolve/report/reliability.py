@@ -46,7 +46,10 @@ def top_sentences(result) -> list[Sentence]:
 
 
 def _mark_sentences(result) -> list[Sentence]:
-    """Sentence on the time from which results are not valid, with the first mark and the parts of later marks."""
+    """List of one sentence on the time from which results are not valid, the first mark and the places of later marks.
+
+    It is empty without marks.
+    """
     marks = sorted(result.marks, key=lambda mark: mark.time)
     if not marks:
         return []

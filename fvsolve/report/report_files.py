@@ -52,7 +52,11 @@ def write_page(path: Path, text: str) -> None:
 
 
 def _write_study(directory: Path, path: Path, xlsx: bool) -> list[Path]:
-    """Write the page of a study, the pages of its runs that it links to, and the workbook of its tables."""
+    """Write the page of a study, the pages of its runs, and with `xlsx` a workbook of the tables of the study.
+
+    Returns the paths of the page of the study and of the workbook.
+    directory : of the study; path : of its page, which links to the pages of the runs
+    """
     from fvsolve.report.page import page
     from fvsolve.report.section_pipes import section_paths
     from fvsolve.report.study_report import study_page

@@ -106,7 +106,7 @@ def _path_of_chain(chain: list[tuple[str, bool, float]], result) -> SectionPath:
 
 
 def _section_path(name: str, legs: list[Leg], links: dict) -> SectionPath:
-    """Section path with both end nodes of each pipe, so that both nodes of a device between two pipes are included."""
+    """Section path from legs. Its places are both end nodes of each pipe, so both nodes of a device are included."""
     places = []
     for leg in legs:
         ends = (links[leg.pipe].from_, leg.chainage(0.0)), (links[leg.pipe].to, leg.chainage(links[leg.pipe].length))
@@ -119,10 +119,11 @@ def _initial_head(result, pipe: str, last: bool) -> float:
 
 
 def _longest_chain(pipes: dict) -> list[tuple[str, bool, float]]:
-    """Pipes between the two nodes that are farthest apart along pipes: list of (pipe, backwards, length [m]).
+    """Pipes between the two nodes that are farthest apart along pipes : list of (pipe, backwards, length [m]).
 
-    pipes : name -> (first node, second node, length). The search finds the node farthest from an end of the longest
-    pipe, then the node farthest from this node; it is exact for networks without loops.
+    pipes : name -> (first node, second node, length); backwards : True if the pipe is passed from second to first node
+    The search finds the node farthest from an end of the longest pipe, then the node farthest from this node. It gives
+    the exact result for networks without loops.
     """
     around: dict[str, list] = {}
     for name, (a, b, length) in pipes.items():

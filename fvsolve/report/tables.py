@@ -60,7 +60,7 @@ class ReportTable:
 
     @property
     def numeric(self) -> list[bool]:
-        """For each column, True if it holds numbers and no words; it is then aligned to the right."""
+        """List with True for each column that contains numbers and no words; it is then aligned to the right."""
         columns = [[row[k] for row in self.rows] for k in range(len(self.headers))]
         return [any(is_number(value) for value in column) and not any(isinstance(value, str) for value in column)
                 for column in columns]  # fmt: skip

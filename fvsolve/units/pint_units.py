@@ -41,7 +41,7 @@ def pint_unit(spelling: str) -> Unit | None:
 
 
 def base_units(dimensionality: Mapping[str, float]) -> str:
-    """Text of the base units of a quantity, such as "kg·m²/s³", in alphabetical order above and below the bar.
+    """Text of the base units of a quantity, such as "kg·m²/s³", sorted in numerator and denominator.
 
     dimensionality : pint's dimension, such as "[length]" -> power. Pint's own order changes with its version.
     """

@@ -13,8 +13,8 @@ class Unit:
     """A unit: SI value = (number + offset) numerator / denominator.
 
     gauge : True for pressures relative to ambient pressure; absolute : True if the spelling states an absolute pressure
-    With a pressure unit that is neither, such as `bar`, the quantity decides if the value is absolute, gauge or a
-    difference.
+    In a pressure unit that is neither, such as `bar`, a value may be absolute, gauge or a difference, as the dimension
+    requires.
     """
 
     dimension: str

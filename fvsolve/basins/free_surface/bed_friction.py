@@ -20,7 +20,7 @@ TINY = 1e-300
 def cube_root(x):
     """x^(1/3) to round-off: first estimate x^(1/4) x^(1/16) x^(1/64), then Halley's iteration.
 
-    Unlike loops with a power function, loops with it vectorise.
+    Loops with this function vectorise, unlike loops with a power function.
     """
     a = sqrt(sqrt(x))
     b = sqrt(sqrt(a))
@@ -49,7 +49,8 @@ def drag_per_flow(law, g, value, depth):
 def add_friction(law, g, coefficient, depth0, dh, qx, qy, content_x, content_y, rate_x, rate_y):
     """Add the friction -r q to the rates of n cells; r is the decay rate of the flow [1/s], see `drag_per_flow`.
 
-    law, coefficient : MANNING and n [s/m^(1/3)], or DARCY and f [-]; float64[n], or float64[1] for all cells
+    law, coefficient : MANNING and n [s/m^(1/3)], or DARCY and f [-]; the coefficient is float64[n], or float64[1] for
+    all cells
     depth0, dh : depth at rest and deviation from it [m]; qx, qy : unit flows [m2/s]
     content_x, content_y : states q that have the rates rate_x, rate_y: unit flows, or, with moving walls, unit flows
     times present over undeformed area
@@ -66,7 +67,7 @@ def add_friction(law, g, coefficient, depth0, dh, qx, qy, content_x, content_y, 
 def add_capped_friction(law, g, coefficient, cap, depth0, dh, qx, qy, content_x, content_y, rate_x, rate_y):
     """Add friction with a capped decay rate of the flow, r / (1 + r / cap) [1/s]; return twice its greatest value.
 
-    An error of the flow decays at this rate, which limits explicit steps. The maximum over all cells prevents
+    An error of the flow decays at the returned rate, which limits explicit steps. The maximum over all cells prevents
     vectorisation, and then a power is faster than `cube_root`. Other arguments as for `add_friction`
     """
     most, is_uniform = 0.0, coefficient.size == 1

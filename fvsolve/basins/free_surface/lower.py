@@ -43,8 +43,9 @@ def depth_at_start(level: np.ndarray, bed: np.ndarray) -> np.ndarray:
     """Depth of the water at the start in each cell, whose bed is replaced by its mean : float64[n] [m].
 
     It is the mean of max(level - bed, 0). If a part of the cell is dry and the water in it has a uniform level, it is
-    instead the height of this level above the mean bed, at least 0, because the water then stays at rest. This
-    correction is smaller, the more the level varies with the bed. level, bed : `samples` of both in cells
+    instead the height of this level above the mean bed, at least 0, because the water then stays at rest. If the level
+    varies in the cell, this correction is reduced, to zero where the level varies as much as the bed.
+    level, bed : `samples` of both in cells
     """
     deep = level - bed
     wet = deep > ROUNDING * (np.abs(level) + np.abs(bed))

@@ -120,7 +120,7 @@ def notices(basin, y: np.ndarray) -> list[Notice]:
 
 
 def watches(basin, y: np.ndarray) -> list[ErrorWatch]:
-    """List with a check (`ErrorWatch`) of a run for waves that are too short; empty if `notices` has one at y."""
+    """List with a check (`ErrorWatch`) of a run for waves that are too short; empty if `notices` reports them at y."""
     return [] if notices(basin, y) else [ErrorWatch(basin, waves_in_run, notice, NOTICE_ERROR)]
 
 

@@ -77,7 +77,10 @@ def fast_film_notice(basin, error: tuple[float, float, float], when: str = "") -
 
 
 def watches(basin, y: np.ndarray) -> list[ErrorWatch]:
-    """Checks (`ErrorWatch`) of a run for films with errors above those at its start, where the deviations are y."""
+    """Checks (`ErrorWatch`) of a run for films with a wrong speed, one for each pair of `film_checks`.
+
+    A check reports errors above NOTICE_ERROR and above REPEAT_FACTOR times the error at the start, at deviations y.
+    """
     return [
         ErrorWatch(basin, look, notice, max(NOTICE_ERROR, REPEAT_FACTOR * look(basin, y)[0]))
         for look, notice in film_checks(basin)

@@ -83,7 +83,8 @@ def put_push(h, deep, hl, hr, el, er, ph, qh, sh, th, pe, qe, re, se, te, push):
 def put_smooth(g, scheme, p, q, r, s, t, sides, deep):
     """Replace the limited values at both faces of a row of cells by fifth-order values where the water is deep enough.
 
-    This is decided by `put_smooth_flags`. Wave speeds at the faces of all cells are written too.
+    `put_smooth_flags` determines where this is so. There the integrals of `put_push` are replaced too. Wave speeds at
+    the faces of all cells are written.
     p, q, r, s, t : blocks of the cells two and one before, of the cells, and one and two after; see `surface_rows`
     sides : values at both faces; deep : work array, 1 where the values are replaced; scheme : WENO5 or LINEAR
     """

@@ -60,7 +60,7 @@ def put_primitives(g, depth0, surface0, dh, qx, qy, h, e, u, v, c):
 def put_mirror_velocities(edges, ring, nx, ny, number, reflect, u, v, shown_u, shown_v, moves):
     """Write mirrored velocities beyond boundary sides, from which gradients in cells are computed.
 
-    At a side that moves outward at the speed w, the normal velocity u becomes 2 w - u.
+    At a wall that moves outward at the speed w, the normal velocity u becomes 2 w - u.
     edges, number : boundary sides, and numbers of their boundary faces; ring : see `cell_sides`
     nx, ny : outward normals; reflect : 1 for walls, 0 for open faces, empty for walls only
     u, v : velocities of cells; shown_u, shown_v : velocities beyond; moves : as in `shallow_rates`
@@ -152,7 +152,7 @@ def clear(w):
 
 @njit
 def put_shores(h, shore):
-    """Write how far the surface at the sides of a cell may differ from that in the cell: 0 in dry cells, else HUGE.
+    """Write the allowed difference of the surface between a cell and its sides: 0 for dry cells, else HUGE.
 
     h : depths of a block of cells; shore : the allowed differences
     """
@@ -162,9 +162,9 @@ def put_shores(h, shore):
 
 @njit
 def put_max_rate(w, top):
-    """Raise `top` to the rates of a block of cells that limit the step [1/s], for each place in a block.
+    """Raise each entry of `top`, one for each place in a block, to the rate of the cell there that limits the step.
 
-    Such a rate is half the sum of wave speeds over sides, or the outflow over the volume, see `shallow_rates`.
+    This rate [1/s] is the greatest of the two values that `shallow_rates` describes.
     """
     for i in range(BLOCK):
         top[i] = max(top[i], max(0.5 * w[_FAST + i], w[_OUTFLOW + i]))
@@ -179,10 +179,10 @@ def put_rates(w, rate_h, rate_x, rate_y):
 
 @njit
 def put_flow(where, w, length, flow):
-    """Write the flows [m3/s] through one side of each cell of a block, for faces whose normals point out of the cells.
+    """Write the flows [m3/s] through one side of each cell of a block to `flow`, by the numbers of faces.
 
-    w : scratch with the flows per length; length : lengths of faces [m]
-    where : face of each side, negative where the normal points inwards
+    Sides at which the normal of the face points into the cell are left out. where : face of each side, negative there
+    w : scratch with the flows per length; length : lengths of all faces [m]
     """
     for i in range(BLOCK):
         if where[i] >= 0:
@@ -191,7 +191,7 @@ def put_flow(where, w, length, flow):
 
 @njit
 def work_size(integers):
-    """Length of the work array of `shallow_rates`. integers : mesh, as there"""
+    """Length of the work array of `shallow_rates`. integers : mesh, see `cell_sides`"""
     return 21 * integers[4] * BLOCK + 2 * integers[3] + ROWS * BLOCK
 
 

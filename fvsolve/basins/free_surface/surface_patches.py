@@ -60,8 +60,8 @@ def bottom_pressure_at_patch(plane, basin, patch, rise, depth):
     """Deviation of the pressure at the bottom of a patch on a body from the steady start, over density [J/kg].
 
     The water is at rest in the frame of the basin, so its surface is an equipotential, and its height over any position
-    follows from the potential phi of gravity and inertial forces. A dry position has no pressure, and below the depth
-    SHALLOW the pressure is multiplied by `available_fraction`.
+    follows from the potential phi of gravity and inertial forces. At a dry position the pressure is 0.
+    Below the depth SHALLOW it is multiplied by `available_fraction`.
     rise, depth : results of `water_at_patch`
     """
     at, (fx, fy, xx, xy, yy) = patch["sizes"] + 2, potential_coefficients(plane, basin["frame"], 1.0)

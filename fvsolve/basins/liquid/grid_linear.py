@@ -116,7 +116,7 @@ def mirror(n, forward, backward):
 
 @njit
 def close_side(kind, scheme, limiter, small, reflect, n, entering, leaving, first, step, spare):
-    """Fill the three ghost cells of both waves beyond a side of a row of n cells that is not a wall.
+    """Fill the three ghost cells of both waves beyond an end of a row of n cells, where the side is not a wall.
 
     At MIRRORS they are mirror images times the reflection coefficient. At OPEN sides the outgoing wave is extrapolated
     by a polynomial; so is the incoming wave, with its value at the side as an additional datum, as at the ends of
@@ -178,16 +178,16 @@ def close_row(kind, scheme, limiter, small, reflect, n, entering, leaving, first
 
 @inline
 def reflect_waves(reflect, leaving, entering):
-    """Write the incoming waves at the faces of a side: outgoing waves times the reflection coefficients."""
+    """Write the incoming waves `entering` at faces of a side: outgoing waves `leaving` times coefficients `reflect`."""
     for i in range(entering.size):
         entering[i] = reflect[i] * leaving[i]
 
 
 @inline
 def put_inward(k, entering, leaving, inward):
-    """Write the inward mass flows per thickness through the faces of a side [kg/(m s)], from the waves at them.
+    """Write the inward mass flows per thickness through the faces of a side [kg/(m s)] to `inward`.
 
-    k : 1 / lengths of the faces [1/m]
+    k : 1 / lengths of the faces [1/m]; entering, leaving : incoming and outgoing waves at the faces
     """
     for i in range(inward.size):
         inward[i] = (entering[i] - leaving[i]) / k[i]
@@ -206,7 +206,7 @@ def put_row_rates(c, k, forward, backward, rate_r, rate_m, rate_t):
     """Write the rates of a row of cells from the waves at the faces along it; cell i is between faces i and i + 1.
 
     c : wave speed [m/s]; k : 1 / widths of the cells [1/m]
-    rate_r, rate_m, rate_t : rates of density, and of flows along and across the row
+    rate_r, rate_m, rate_t : rates of density, and of flows along and across the row; rate_t is set to 0
     """
     f, b = forward[1:], backward[1:]
     for i in range(rate_r.size):
@@ -262,7 +262,7 @@ def work_size(nx, ny):
 def put_moving_row(c, ny, j, up, down, along, moves):
     """Convert the waves `up` and `down` at the moving faces between rows j - 1 and j to mass and momentum fluxes.
 
-    At the sides of the grid the pressures and energy losses on the faces are written to `moves` too.
+    At the sides of the grid the pressures on the faces and terms of the power lost there are written to `moves` too.
     along : mass-flow densities along the faces, of all cells of the grid; moves : as in `grid_rates`
     """
     nx, count = up.size, moves[2].size // 2
@@ -296,7 +296,7 @@ def grid_rates(
     moves : None without moving walls, else a tuple of
         speeds of the grid lines x = constant [m/s], float64[nx + 1], empty if at rest
         speeds of the grid lines y = constant [m/s], float64[ny + 1], empty if at rest
-        array for pressures on boundary faces and energy losses there, as in `liquid_mesh.liquid_rates`
+        array for pressures on boundary faces and terms of the power lost there, as in `liquid_mesh.liquid_rates`
         density at rest [kg/m3]
         `wide` : area over undeformed area of columns or rows, see `basins.cell_stretching`
     """

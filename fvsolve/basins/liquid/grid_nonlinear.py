@@ -123,8 +123,9 @@ def stiffness(c0, rho, table, r):
 
 @inline
 def balance_row(c0, rho, table, k, step, r, phi, low, high, rate):
-    """Subtract from the momentum rates of a row of cells the pressures at both faces that would keep the cells at rest.
+    """Subtract from the momentum rates of a row of cells the rates that face pressures of a liquid at rest cause.
 
+    So the rates of a liquid at rest in the potential phi are zero.
     c0, rho, table : as in `grid_rates`; k : 1 / spacing of the cells [1/m], read at every `step`-th place
     r : deviations of density; phi, low, high : potential [J/kg] of the cells and of the faces before and after them
     """
@@ -204,7 +205,7 @@ def put_fluxes(c0, rho, table, forward, backward, along, speeds, step, phi):
 def relative_waves(speeds, step, forward, seen):
     """Write the forward waves minus the speeds of moving faces to `seen`.
 
-    Their difference from the backward waves is the velocity relative to the face, which defines the upwind side.
+    The result minus the backward waves is the velocity relative to the face, which defines the upwind side.
     speeds : speeds of the faces [m/s], read at every `step`-th place
     """
     for i in range(seen.size):

@@ -36,7 +36,7 @@ from fvsolve.kernels.dtypes import LAW_LOG, UPWIND
 # Rows of BLOCK in the scratch of a block: values beyond, rates, sum for the step, flow through the side.
 _U, _V, _RR, _RX, _RY, _FAST, _C, _TOP, _FREE, _MASS = (k * BLOCK for k in range(1, 11))
 _NX, _NY, _REACH = NX * BLOCK, NY * BLOCK, REACH * BLOCK
-_PUSH, _LOSS = 11 * BLOCK, 12 * BLOCK  # of moving sides: pressure at the side, energy lost there
+_PUSH, _LOSS = 11 * BLOCK, 12 * BLOCK  # of moving sides: pressure at the side, term of the power lost there
 _PER, _BULK, _PHI = (k * BLOCK for k in range(13, 16))  # with a potential: see `grid_nonlinear.stiffness`
 ROWS = 16
 
@@ -70,7 +70,7 @@ def put_primitives(law, c0, rho, table, r, mx, my, w, u, v, c):
 def put_ghosts(law, c0, rho, table, edges, ring, nx, ny, number, reflect, w, u, v, shown_w, shown_u, shown_v, moves):
     """Write the values beyond boundary sides, from which gradients in cells are computed.
 
-    They are mirror images at reflection coefficients 1 and -1, and the values of the cell at 0 (open).
+    At the reflection coefficients 1 and -1 they are mirror images; at 0 (open) they are the values of the cell.
     edges, number : boundary sides, and numbers of their boundary faces; ring : see `cell_sides`
     nx, ny : outward normals; reflect : reflection coefficients of all boundary faces; w, u, v : values of cells, see
     `put_primitives`
@@ -205,8 +205,9 @@ def put_stiffness(c0, rho, table, r, phi, w):
 
 @njit
 def balance_side(phi, geo, w):
-    """Subtract the pressures that would keep cells at rest, at one side of each cell of a block, from the rates in `w`.
+    """Subtract from the rates in `w` those that the pressure of a liquid at rest causes at one side of each cell.
 
+    After this for all sides, the rates of a liquid at rest in the potential phi are zero.
     phi : potential at the sides [J/kg]; geo : as in `add_side_linear`; w : with the values of `put_stiffness`
     """
     for i in range(BLOCK):
@@ -217,9 +218,9 @@ def balance_side(phi, geo, w):
 
 @njit
 def close_walls(edges, number, reflect, geo, w, thrust):
-    """Set the mass flow through walls to zero; write pressures on boundary sides and the energy lost there by motion.
+    """Set the mass flow through walls to zero; write pressures on boundary sides and terms of the power lost there.
 
-    thrust : pressures of all boundary faces, then losses, as in `liquid_rates`
+    thrust : pressures of all boundary faces, then terms of lost power, see `moves` of `liquid_rates`
     edges, number, reflect : as in `put_ghosts`; geo, w : as in `add_side_linear`
     """
     count = thrust.size // 2
@@ -252,7 +253,7 @@ def put_rates(w, rate_r, rate_x, rate_y):
 
 @njit
 def work_size(integers):
-    """Length of the work array of `liquid_rates`. integers : mesh, as there"""
+    """Length of the work array of `liquid_rates`. integers : mesh, see `cell_sides`"""
     return 16 * integers[4] * BLOCK + 3 * integers[3] + ROWS * BLOCK
 
 

@@ -112,10 +112,9 @@ class RiemannInvariants:
         return np.concatenate([head, of_r.ravel(), np.hstack(of_w).ravel()])
 
     def places(self, ends) -> tuple[float, int, np.ndarray]:
-        """(1 / step, number of the first multiple, multiples) of the step of a uniform grid between two ends.
+        """Uniform grid of multiples of a step between two ends: (1 / step, number of the first multiple, grid points).
 
-        The step is the distance of the ends over the number of intervals of the table; the multiples are the grid
-        points.
+        The step is the distance of the ends over the number of intervals of the table.
         """
         step = (ends[1] - ends[0]) / max(REFINEMENT * self.interval_count, 3 * LEAST_INTERVALS)
         first = math.ceil(ends[0] / step)

@@ -63,7 +63,7 @@ def reflect_at_wall(full, c, rho, speed, leaving, entering, n):
 
 @njit
 def put_wall_pressure(c, speed, forward, backward, along, n, thrust, loss):
-    """Write the pressures on n faces of a moving wall under the density law `linear`, and the energy lost there.
+    """Write the pressures on n faces of a moving wall and terms of the power lost there, density law `linear`.
 
     c : wave speed; speed : outward speed of the wall [m/s]; forward, backward : waves at the faces
     along : mass-flow densities along the wall; thrust, loss : see `moves` of `liquid_mesh.liquid_rates`

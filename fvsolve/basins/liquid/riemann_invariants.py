@@ -41,7 +41,10 @@ def invariant(table, r):
 
 @njit(forceinline=True)
 def state(table, w):
-    """(deviation of density r [kg/m3], deviation of pressure p [Pa]) from rest at the invariant w [m/s]."""
+    """(deviation of density r [kg/m3], deviation of pressure p [Pa]) from rest at the invariant w [m/s].
+
+    table : see `riemann_invariants`
+    """
     k, s = locate(table, OF_W, w, 8)
     r = table[k] + s * (table[k + 1] + s * (table[k + 2] + s * table[k + 3]))
     return r, table[k + 4] + s * (table[k + 5] + s * (table[k + 6] + s * table[k + 7]))
@@ -49,7 +52,7 @@ def state(table, w):
 
 @njit(forceinline=True)
 def speed(table, rho, w):
-    """Wave speed c [m/s] at the invariant w [m/s]. rho : density at rest [kg/m3]"""
+    """Wave speed c [m/s] at the invariant w [m/s]; table : see `riemann_invariants`; rho : density at rest [kg/m3]"""
     k, s = locate(table, OF_W, w, 8)
     b, c, d = table[k + 1], table[k + 2], table[k + 3]
     dense = rho + table[k] + s * (b + s * (c + s * d))
@@ -72,7 +75,10 @@ def invariant_at_potential(c0, rho, table, w, phi):
 
 @njit(forceinline=True)
 def pressure(table, rho, r):
-    """(deviation of pressure p [Pa], dp/dr = c^2) at a deviation r of density from rest. rho : density at rest"""
+    """(deviation of pressure p [Pa], dp/dr = c^2 [m2/s2]) at a deviation r of density from rest [kg/m3].
+
+    table : see `riemann_invariants`; rho : density at rest [kg/m3]
+    """
     w, slope = invariant(table, r)
     c = (rho + r) * slope
     return state(table, w)[1], c * c

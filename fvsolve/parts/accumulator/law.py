@@ -35,8 +35,8 @@ def gas_state(st, floats, node, at, y):
     """(ln(V / V0), pressure change [Pa], stiffness [Pa/kg]) after an inflow y since the start [kg].
 
     V : gas volume, V0 : gas volume at the start
-    pressure change : pressure of the node minus that at the start; stiffness : dp/dm, rise of pressure per mass of
-    fluid
+    pressure change : pressure of the node minus that at the start
+    stiffness : dp/dm, rise of pressure per mass of fluid
     st : settings of the model; node : row of the node; floats[at:] : parameters of the accumulator
     """
     n, neck, above_empty = floats[at + EXPONENT], floats[at + NECK_STIFFNESS], y - floats[at + EMPTY_MASS]
@@ -57,9 +57,9 @@ def gas_state(st, floats, node, at, y):
 
 @njit
 def full_bladder_gas(floats, node, at):
-    """ln(V / V0) when the gas fills the vessel with its bladder; 0 if it does so at the start.
+    """ln(V / V0) at the gas volume V at which bladder and gas fill the vessel; 0 if they fill it at the start.
 
-    V, V0, arguments : as for `gas_state`
+    V0 : gas volume at the start; arguments as for `gas_state`
     """
     if floats[at + EMPTY_MASS] > 0.0:
         return 0.0
@@ -68,7 +68,7 @@ def full_bladder_gas(floats, node, at):
 
 @njit
 def gas_state_dense(st, floats, node, at, y):
-    """Results of `gas_state` under density laws other than `linear`."""
+    """Results of `gas_state` under density laws other than `linear`, with its arguments."""
     n, gas, total, neck = (
         floats[at + EXPONENT],
         floats[at + GAS_VOLUME],

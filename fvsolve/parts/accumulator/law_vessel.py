@@ -1,6 +1,6 @@
 """Gas and fluid in a vessel with a shape, in which the fluid has a level.
 
-The numbers of the vessel are those in the module `law`, then from index `SHAPED` on those that are listed below.
+The parameters of the vessel are those in the module `law`, then from index `SHAPED` on those that are listed below.
 The gas follows p V^n = p0 V0^n (1 + a)^n, with its pressure p and volume V, their values p0 and V0 at the start, the
 exponent n, and the gas `a` that a compressor has added, relative to the gas at the start.
 Under the density law `linear` the pressure of the node is that of the gas plus rho g (bottom + level).
@@ -91,7 +91,8 @@ def vessel_state_dense(st, floats, node, at, y, a):
 def centroid_pressure_rise(st, floats, at, mass, volume):
     """(pressure at the centroid of a fluid minus that at its surface [Pa], its derivative by the volume [Pa/m3]).
 
-    The first is rho g times the depth of the centroid, with rho = mass [kg] / volume [m3] of the fluid.
+    The first is rho g times the depth of the centroid, with rho = mass [kg] / volume [m3] of the fluid. The mass is
+    constant in the derivative.
     st, floats, at : as for `vessel_state`
     """
     if volume <= 0.0 or mass <= 0.0:

@@ -91,8 +91,8 @@ class AccumulatorRows(Device, kind="accumulator"):
     def above(self, model, part, row) -> float:
         """Energy [J] that the accumulator can release from its state at the start.
 
-        It is the stored energy at the start minus the least stored energy. At the latter, the energy per mass of the
-        fluid at the node (`energy_head`) is 0, or no fluid is left.
+        It is the stored energy at the start minus the least stored energy. In the state of least energy, the energy per
+        mass of the fluid at the node (`energy_head`) is 0, or no fluid is left.
         """
         from fvsolve.kernels.barotropic_energy import energy_head
 
@@ -182,7 +182,9 @@ class CompressorRows(ShapedRows, kind=""):
         return [0.1]
 
     def energy_rows(self, model, part, row, y, out):
-        """Rows of the energy matrix L, each state index -> factor: |L dy|^2 is the energy [J] of a small deviation dy.
+        """List of rows of the energy matrix L, each as {state index: factor}.
+
+        |L dy|^2 is the energy [J] of a small deviation dy.
 
         With added gas a, inflow y, density rho, gas pressure p and volume V, exponent n and free surface S, the energy
         is n p V / 2 (da / (1 + a) + dy / (rho V))^2 of the gas and g / (2 rho S) dy^2 of the weight of the fluid.

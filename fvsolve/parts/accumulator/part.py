@@ -104,7 +104,7 @@ class Accumulator(Node, kind="accumulator"):
 
     @property
     def has_shape(self) -> bool:
-        """True if a diameter or a table of areas is given, so that the level of the fluid is known."""
+        """True if the key `diameter` or `area` is given, so that the level of the fluid is known."""
         return self.diameter is not None or self.area is not None
 
     @classmethod

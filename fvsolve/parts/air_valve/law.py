@@ -77,8 +77,9 @@ def outlet_area(tables, device):
 
 @njit
 def air_inflow(st, floats, at, gauge, outlet):
-    """(mass flow of air into the chamber [kg/s], its greatest slope over the relative pressure [kg/s]).
+    """(mass flow of air into the chamber [kg/s], estimate of its greatest slope over the pressure ratio [kg/s]).
 
+    The pressure ratio is the lower of the pressures inside and outside the chamber over the higher one.
     gauge : gauge pressure of the air in the chamber [Pa]; outlet : result of `outlet_area` [m2]
     st : settings of the model; floats[at:] : parameters of the air valve
     """
@@ -209,7 +210,7 @@ def value(t, y, out, tables, device, quantity):
 
 @njit
 def air_energy(st, floats, node, at, y_fluid, y_air):
-    """Energy of the air, and of the height of the fluid, in the chamber, minus that at the start [J].
+    """Energy of the air and potential energy of the fluid in the chamber, minus those at the start [J].
 
     The energy of the air is m R T (ln(p / p_ambient) - 1) + p_ambient V; m, p and V are its mass, pressure and volume.
     Arguments as for `air_state`.

@@ -68,7 +68,9 @@ class AirValveRows(Device, kind="air-valve"):
         return [f"air valve {name}: {below} below ambient, so it opens"]
 
     def energy_rows(self, model, part, row, y, out):
-        """Row of the energy matrix L, state index -> factor: |L dy|^2 is the energy [J] of a small deviation dy.
+        """List with the only row of the energy matrix L, as {state index: factor}.
+
+        |L dy|^2 is the energy [J] of a small deviation dy.
 
         The energy is R T / (2 m) (dm + m / (V rho) dy)^2 of air and fluid in the chamber, with air mass m, air volume
         V, fluid density rho, and deviations dm and dy of air and fluid mass.
@@ -81,9 +83,9 @@ class AirValveRows(Device, kind="air-valve"):
 
 
 class ThrottledAirValveRows(AirValveRows, kind=""):
-    """Conversion to table rows of air valves with a small bore, through which air leaves from `switch` on.
+    """Conversion to table rows of air valves with `throttled_outlet`, a smaller bore for the outflow of air.
 
-    `switch_velocity` may replace `switch`.
+    Air leaves through it above the gauge pressure `switch`, or above the fluid velocity `switch_velocity`.
     """
 
     events = (*AirValveRows.events, "throttles", "stops throttling")

@@ -239,9 +239,9 @@ class Physics(Table):
 
     @classmethod
     def formulas(cls, basin: Basin, mesh: Any) -> Iterator[tuple[tuple[str, ...], Any, np.ndarray | None]]:
-        """Yield the fields over the plane that the keys of these equations contain.
+        """Yield (key path, formula, points) for each field over the plane that the keys of these equations contain.
 
-        Each is (keys, formula, points), with the points at which it is evaluated, or None for means over the cells.
+        points : float64[n, 2]  points at which the formula is evaluated; None if its means over the cells are used
         """
         for key in cls.model_fields:
             if isinstance(shape := getattr(basin, key), SpatialField):
@@ -365,7 +365,7 @@ BASIN_DOC = Basin.__doc__  # docstring of Basin before every physics adds a line
 
 
 def optional_keys(table: type[Table]) -> dict[str, FieldInfo]:
-    """Declarations of the keys of a table, each made optional."""
+    """Declarations of the keys of a table, each made optional: key -> field of pydantic."""
     keys = {key: copy(info) for key, info in table.model_fields.items()}
     for info in keys.values():
         info.default = None if info.is_required() else info.default

@@ -7,7 +7,7 @@ from fvsolve.model.lowering import Lowering
 
 
 class BodyRows(Lowering, kind="body"):
-    """Conversion of rigid bodies in space: rows of their probes."""
+    """Conversion to table rows of the probes of rigid bodies in space."""
 
     def probe(self, draft, name, probe, row) -> None:
         from fvsolve.kernels.mechanism.body_probes import BODY_QUANTITIES  # not loaded by models without bodies

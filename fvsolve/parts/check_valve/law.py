@@ -31,8 +31,8 @@ def joins_junction(tables, device):
 def events(t, y, out, tables, device, g):
     """Write an event function and its negative to g.
 
-    It is the flow while the valve is open [kg/s], and the drop minus the opening pressure while it is shut [Pa].
-    For an open valve at a junction without flow, it is the drop plus PRESSURE_MARGIN [Pa] instead.
+    It is the flow [kg/s] while the valve is open. While it is shut, it is the drop minus the cracking pressure and
+    PRESSURE_MARGIN [Pa]. For an open valve at a junction without flow, it is the drop plus PRESSURE_MARGIN [Pa].
     """
     k, at = device["valve"], device["event"]
     margin = out[tables.layout[0]["valve"] + k]

@@ -37,7 +37,7 @@ class CheckDisc(LiftedValve, kind=""):
         return newton
 
     def add_start_notices(self, start, name, x):
-        """Add a notice if the disc and other valves join the same rigid column: it then cannot control the column."""
+        """Add a notice if the disc and other valves join the same rigid column, which the disc then cannot control."""
         valve, nodes = start.valves[start.draft.valve_names.index(name)], start.nodes
         if any(
             nodes["gates"][valve[end]] >= 0 and nodes["gate_count"][valve[end]] > 1 for end in ("from_node", "to_node")

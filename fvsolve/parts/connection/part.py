@@ -86,8 +86,8 @@ class Throat(TwoPort):
 def with_connection(name: str, vessel: Any, place: Any) -> tuple[dict[str, Any], dict[str, Throat]]:
     """(places, links) that represent a vessel, each by name.
 
-    A vessel without connection is the only place. Otherwise they are as from `behind_throat`.
-    place : node to which other links join, if there is a connection
+    A vessel without connection is the only place, and there are no links. Otherwise the result is that of
+    `behind_throat`. place : node that other links join if there is a connection
     """
     if vessel.connection is None:
         return {name: vessel}, {}

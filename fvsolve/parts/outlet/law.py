@@ -121,8 +121,8 @@ def emitter_step(floats, at, g, m, drop, rule):
     m : mass flow M before the step [kg/s]; other arguments as for `emitter_flow`
     s is the slope of the chord between the present flow and the flow at the drop; for the exponent 1/2 it is Newton's
     slope in M^2.
-    The flow rises with the drop, and the flow that the network leaves for the outlet falls, so the root lies between
-    both. Every chord lies within the previous one, so Newton cannot cycle at a kink.
+    The flow of the outlet rises with the drop, and the flow that the network supplies at this drop falls, so the root
+    lies between both. Every chord lies within the previous one, so Newton cannot cycle at a kink.
     """
     target, own_drop = emitter_flow(floats, at, g, drop, rule), emitter_drop(floats, at, g, m, rule)
     if rule == SHUT:

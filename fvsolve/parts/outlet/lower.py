@@ -62,7 +62,7 @@ class RelievingRows(Device, kind=""):
     quantities = ("opening",)
 
     def own_numbers(self, draft, name, part) -> list[float]:
-        """Parameters that the law of the valve reads (see `numbers`), without those of an outlet that precede them."""
+        """Parameters of the law of the valve; for a valve to ambient, `numbers` puts those of an outlet before them."""
         raise NotImplementedError
 
     def numbers(self, draft, name, part) -> list[float]:

@@ -28,7 +28,7 @@ class Outlet(TwoPort):
     q is the volume flow, p the pressure at the place; there is no backflow.
     flow : flow at p = upper and opening = full [m3/s]; opening : schedule
     least : pressure from which flow begins [Pa], ambient pressure if None
-    upper : pressure of the nominal flow [Pa], 1 bar above least if None; most : limit of the power of pressure [-]
+    upper : pressure of the nominal flow [Pa], 1 bar above least if None; most : greatest value of the power [-]
     """
 
     kind: ClassVar[str] = "outlet"

@@ -127,8 +127,8 @@ def restraint_factor(restraint: str | float | None, bore: float, wall: Wall) -> 
 
     restraint : the factor itself, or one of `RESTRAINTS`
     D : bore, E : Young's modulus, e : thickness, nu : Poisson's ratio of the wall
-    For a thin wall (D/e >= 25) it is 1 with expansion joints, 1 - nu/2 anchored upstream only, 1 - nu^2 anchored
-    throughout.
+    For a thin wall (D/e >= 25) it is 1 with expansion joints, 1 - nu/2 if the pipe is anchored only upstream, and
+    1 - nu^2 if it is anchored throughout.
     For a thick wall (Lame) it is the factor of the thin wall times D / (D + e), plus 2 (e/D) (1 + nu); Wylie and
     Streeter 1993.
     """

@@ -204,8 +204,8 @@ def reversal_margin(valve):
 def events(t, y, out, tables, device, g):
     """Write the event function of the check valve and its negative to g.
 
-    It is the flow plus the margin of reversal while the valve is open [kg/s], and the drop minus that at which the
-    valve opens while it is shut [Pa]. Both are 1 for a pump without check valve.
+    While the valve is open, it is the flow plus `reversal_margin` [kg/s]. While the valve is shut, it is the drop
+    minus that at which the valve opens [Pa]. Both functions are 1 for a pump without check valve.
     """
     layout, k, at = tables.layout[0], device["valve"], device["event"]
     valve, floats = tables.valves[k], tables.floats
@@ -239,7 +239,7 @@ def outside(out, tables, device):
 
     It is always 0 for a pump with only a Suter table.
     Outside the curve it is TEMPORARY instead of 1 if a Suter table is joined to the curve, or while a pump with a check
-    valve runs down. It then is slower than at the start, and its forward flow is within the curve at the initial speed.
+    valve runs down: it is slower than at the start, and its forward flow is within the curve at the initial speed.
     """
     floats, curve = tables.floats, tables.valves[device["valve"]]["data"]
     if floats[curve + LAW] == SUTER:

@@ -31,7 +31,7 @@ class ShaftLowering:
         return {law.MODE: mode, law.TRIP: self.trip(draft, name, part), law.TORQUE_COUNT: len(torques)}
 
     def torque_schedules(self, draft, name) -> list[float]:
-        """Index of the schedule and value at the start of each given torque on the shaft, in pairs.
+        """Flat list of pairs for the given torques on the shaft: index of the schedule, value at the start.
 
         The values are 0 here and are set in `set_free_shaft`.
         """
@@ -95,6 +95,7 @@ def torques_on(case, name: str) -> list:
 def numbers_of(by_index: dict[int, float], given: list[float], own: list[float]) -> list[float]:
     """Parameters of a shaft in the order of `law`, as a list of numbers.
 
-    by_index : index in `law` -> parameter of the drive; given : pairs for the given torques; own : shaft power
+    by_index : index in `law` -> parameter of the drive; given : result of `torque_schedules`
+    own : parameters of the shaft power
     """
     return [float(by_index.get(k, 0.0)) for k in range(law.OWN_NUMBERS)] + given + own

@@ -43,8 +43,8 @@ def fit_to_curve(values, shut_off: float, last: float, edge: float) -> tuple[flo
 def monotone_head(values: np.ndarray) -> np.ndarray:
     """Values of WH, raised so that the head never falls as the flow through a turning pump becomes more negative.
 
-    Otherwise two flows would have the same head. The condition on W = WH between two values is that the derivative of W
-    / cos^2(angle) by the angle is negative.
+    Otherwise two flows would have the same head. The condition on W = WH between two values is that the derivative of
+    W / cos^2(angle) by the angle atan2(v, n) is negative, with relative flow v and relative speed n.
     """
     values, at = values.copy(), np.linspace(-math.pi, math.pi, len(values))
     width = at[1] - at[0]

@@ -73,7 +73,8 @@ def events(t, y, out, tables, device, g):
 
     The function of the present stage is minus the margin left in this stage; that of a stage that may follow is the
     margin.
-    Arming : since the valve shut, the pressure has exceeded the low setting, so that a lower pressure opens it
+    Arming is the moment after the valve shut at which the pressure exceeds the low setting: from then on, a pressure
+    below this setting opens the valve.
     """
     floats, armed, o = tables.floats, tables.armed, device["y"]
     at, flags, stage = device["data"] + device["mode"], device["event"] + device["mode"], valve_stage(y, tables, device)

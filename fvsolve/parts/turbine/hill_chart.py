@@ -165,7 +165,7 @@ def columns_of(rows) -> tuple[list, str]:
 
 
 def chart_of(curves: dict, places: dict, faults: list, source: Any, file: str = "") -> HillChart:
-    """Hill chart that consists of curves. Raises ValueFault with all faults.
+    """Hill chart made of the given curves. Raises ValueFault with all faults.
 
     curves : index or opening -> curve; places : index or opening -> key path of the curve, for messages
     faults : faults found before; source : value as in the case file; file : prefix of messages about a CSV file

@@ -1,8 +1,8 @@
 """Turbine: guide vanes, speed and shaft torque.
 
 While the generator holds the speed, the speed follows a schedule. After load rejection, or with given torques from the
-start, J d(omega)/dt = torque of the water + given torques, with inertia J and angular velocity omega. The numbers of a
-turbine are those of a pump with a rated speed of 1.
+start, J d(omega)/dt = torque of the water + given torques, with inertia J and angular velocity omega. The parameters
+of a turbine are those of a pump with a rated speed of 1.
 """
 
 from math import sqrt

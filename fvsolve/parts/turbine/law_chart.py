@@ -26,7 +26,7 @@ CURVES, RAYS, SPEED, FLOW, SHUT_VANES, OWN = 0, 1, 2, 3, 4, 5
 def torque_between_rays(share_1, share_2, root_1, root_2, torque_1, torque_2):
     """Torque over head T at a point between two rays; at a head of 1 m it is linear on the line between their points.
 
-    share_1, share_2 : shares of the directions of the rays in the direction of the point
+    share_1, share_2 : weights with which the directions of both rays add up to the point (n, u)
     root_1, root_2, torque_1, torque_2 : root of head and torque over head on both rays
     """
     weight_1, weight_2 = share_1 * max(root_1, LEAST_ROOT), share_2 * max(root_2, LEAST_ROOT)
@@ -53,7 +53,7 @@ def opening_share(floats, at, opening):
 
 @njit
 def interpolate_curves(floats, first, stride, k, share):
-    """Value of curve k, floats[first + k stride], interpolated to the value of the next curve by the weight `share`."""
+    """Value between those of curve k, floats[first + k stride], and of the next curve, which has the weight `share`."""
     value = floats[first + k * stride]
     if share > 0.0:
         value += share * (floats[first + (k + 1) * stride] - value)
@@ -72,7 +72,10 @@ def capacity(floats, at, opening):
 
 @njit
 def ray_below(floats, first, count, angle):
-    """Number of the last ray whose angle is at or below `angle`; floats[first:] : `count` ascending angles [rad]"""
+    """Number of the last ray whose angle is at or below `angle`, from 0 to count - 2.
+
+    floats[first:] : `count` ascending angles [rad]
+    """
     low, high = 0, count - 1
     while high - low > 1:
         middle = (low + high) // 2
@@ -215,12 +218,12 @@ def chart_flow(floats, at, opening, omega, weight, stiff, drop, start, flow):
 def chart_step(floats, at, opening, omega, rho, weight, stiff, g, m, drop, first):
     """(a [kg/s], s [kg/s/Pa]) of the next Newton step dM = a + s d(drop) of a turbine, M the mass flow.
 
+    s is the slope of the chord between the present flow and the flow at which turbine and adjacent pipes have the same
+    drop. It is negative where the head falls with rising flow.
     m : mass flow before the step [kg/s]; drop : drop across the turbine [Pa]
     rho, weight : density [kg/m3] and rho g [N/m3] of the fluid
     stiff : decrease of the drop per mass flow, caused by the adjacent pipes [Pa s/kg]
-    g : conductance, which sets the least slope; first : start of the search for the flow of agreement [m3/s]
-    s is the slope of the chord between the present flow and the flow at which turbine and adjacent pipes agree. It is
-    negative where the head falls with rising flow.
+    g : conductance, which limits abs(s); first : start of the search for the second flow [m3/s]
     Other arguments as for `chart_at`.
     """
     q = m / rho

@@ -73,7 +73,7 @@ def nodes_of(curve, part, speed: float, flow: float, torque_scale: float, weight
 def nodes_before(first, n: float, u: float, torque: float, torque_scale: float) -> list:
     """(angle, root of head, torque over head) of each ray below the first angle of a curve, down to -pi / 2.
 
-    There the flow is reverse and the runner stands still. first : these values on the ray of the first point
+    At -pi / 2 the flow is reverse and the runner stands still. first : these values on the ray of the first point
     n, u, torque : relative speed, relative flow and torque over head of the first point
     torque_scale : as for `pump_nodes`
     """
@@ -89,7 +89,7 @@ def nodes_before(first, n: float, u: float, torque: float, torque_scale: float) 
 def nodes_behind(last, n: float, u: float, torque: float, torque_scale: float) -> list:
     """(angle, root of head, torque over head) of each ray above the last angle of a curve, up to 3 pi / 2.
 
-    There the flow is reverse and the runner stands still. last : these values on the ray of the last point
+    At 3 pi / 2 the flow is reverse and the runner stands still. last : these values on the ray of the last point
     n, u, torque : relative speed, relative flow and torque over head of the last point
     torque_scale : as for `pump_nodes`
     """
@@ -103,10 +103,10 @@ def nodes_behind(last, n: float, u: float, torque: float, torque_scale: float) -
 
 
 def pump_nodes(angle: float, root: float, torque: float, torque_scale: float, direction: float) -> list:
-    """(angle, root of head, torque over head) of each ray from a turning runner to reverse flow at standstill.
+    """(angle, root of head, torque over head) of each ray with reverse flow beyond a first ray, up to standstill.
 
-    The root is -1 at standstill.
-    The shaft power is PUMP_RATIO times the hydraulic power, plus its surplus at the first ray.
+    The root is -1 at standstill. The torque is that at which shaft power is PUMP_RATIO times hydraulic power, constant
+    beyond STEEPEST, plus the surplus of the torque on the first ray over it.
     angle, root, torque : these values on the first ray; direction : -1 for forward rotation, 1 for backward rotation
     torque_scale : torque over head [N] at which shaft power is hydraulic power, at equal relative speed and flow
     """
@@ -152,7 +152,7 @@ def curve_at_rays(
     """(roots of head, torques over head) of a curve on all rays; between its own rays the curve is a straight line.
 
     ray_directions, rays : directions (cosine, sine) and angles [rad] of all rays
-    angles, directions, roots, torques : of the own rays of the curve, as from `nodes_of`
+    angles, directions, roots, torques : values on the own rays of the curve, see `nodes_of`
     """
     i = np.clip(np.searchsorted(angles, rays) - 1, 0, len(angles) - 2)
     (a, b), (c, d), (x, y) = directions[i].T, directions[i + 1].T, ray_directions.T
