@@ -45,11 +45,6 @@ def spin(t: float) -> np.ndarray:
     return at.angular_velocity(rotation(t), along(rotation, t))
 
 
-def seen(rate):
-    """Function that converts a rate in axes b to axes i."""
-    return lambda t: rotation(t) @ rate(t)
-
-
 def shares(t: float) -> dict[str, np.ndarray]:
     """Terms of (65) after that of the origin, in axes i."""
     w, r = spin(t), rotation(t) @ within(t)

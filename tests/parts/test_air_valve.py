@@ -58,9 +58,6 @@ def test_near_ambient_pressure_alone_its_flow_is_not_the_textbooks():
         assert 0.0 <= math.sqrt(7 * x / 3.5) - orifice_flow(1.0 - x) <= math.sqrt(2.0) * 0.18 * math.sqrt(SMALL) + SMALL
 
 
-RETURN = {"time": [0.0, 2.0, 3.0], "value": [0.4e5, 0.4e5, 6e5]}
-
-
 def off_scipy(law, beta=2.2e9) -> tuple[float, int]:
     """Return (greatest relative difference from SciPy of air mass, air pressure and flow, number of steps).
 

@@ -389,7 +389,7 @@ CRANK, COUPLER = (2.0, 1.0), (3.0, 1.5)  # mass [kg] and length [m]
 
 def parallelogram(angle: float = 1.0, rate: float = 0.0, **pin) -> tuple[dict, dict]:
     """Return nodes and links of two hanging cranks with a level coupler between their ends, closed by a pin."""
-    (m, a), (n, b), (s, c) = CRANK, COUPLER, (math.sin(angle), math.cos(angle))
+    (m, a), (n, b) = CRANK, COUPLER
 
     def rod(mass, length, joint):
         inertia = mass * length**2 / 12.0
@@ -399,7 +399,6 @@ def parallelogram(angle: float = 1.0, rate: float = 0.0, **pin) -> tuple[dict, d
     nodes = {"one": rod(m, a, {"angle": angle, "rate": rate}),
              "two": rod(m, a, {"angle": angle, "at": [b, 0, 0], "rate": rate}),
              "coupler": rod(n, b, {"on": "one.end", "angle": -math.pi / 2.0 - angle, "rate": -rate})}  # fmt: skip
-    assert s * s + c * c > 0.0
     return nodes, {"loop": {"type": "pin", "from": "two.end", "to": "coupler.end", "axis": [0, 1, 0], **pin}}
 
 

@@ -103,7 +103,7 @@ def test_what_a_jump_shuts_and_opens_is_listed_once():
     assert not result["check.flow"][stands].any() and not result["lift.flow"][stands].any()
 
 
-SWING = {"time": [0.0, 0.5, 2.0, 2.5], "value": [50.0, 10.0, 10.0, 60.0]}
+FALL_AND_RISE = {"time": [0.0, 0.5, 2.0, 2.5], "value": [50.0, 10.0, 10.0, 60.0]}
 HARD = {
     "two in series": ({"a": junction(), "m": junction(), "b": junction()},
                       {"one": check("a", "m"), "two": check("m", "b")}),
@@ -118,7 +118,7 @@ WAYS = [
 ]  # fmt: skip
 
 
-def hard(name, law, numerics, head=SWING, end=3.0):
+def hard(name, law, numerics, head=FALL_AND_RISE, end=3.0):
     nodes, links = HARD[name]
     nodes = {"pump": lake(head), "town": lake(40.0), **nodes}
     if name == "on a slope":
