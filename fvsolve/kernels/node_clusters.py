@@ -61,9 +61,9 @@ def has_converged(change, last_change):
 
 @njit
 def total_inflows(cluster, tables, out, c):
-    """Write the flow into each node of a cluster from all links except its valves, at unchanged pressure, to c [kg/s].
+    """Write the inflow of each node of a cluster except through its valves, at unchanged pressure, to c [kg/s].
 
-    Returns True if these flows have not changed since the start.
+    The demand of a node is subtracted. Returns True if these inflows have not changed since the start.
     cluster : nodes that are solved together
     """
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
@@ -127,7 +127,7 @@ def assemble(cluster, tables, out, g, m, c, connected, a, s, lift, matrix, right
 
     The changes of valve flows are eliminated. Arrays with an entry for each valve or each of n nodes:
     g, m : conductance [kg2/s2/Pa] and flow [kg/s] of valves
-    c : inflow of nodes from other links [kg/s]; connected : 0 for isolated nodes
+    c : inflow of nodes except through valves, less the demand [kg/s]; connected : 0 for isolated nodes
     a, s, lift : receive the terms of each change of flow, see `add_valve`
     matrix, right : float64[n * n], float64[n]  receive the equations
     wide : see `restrictions.restriction_step`
@@ -318,7 +318,7 @@ def is_connected(cluster, tables, e, connected):
 def write_cluster(cluster, tables, out, g, m, c, connected, group, change):
     """Write the valve flows of a cluster, the pressures of its isolated nodes, and STATUS if Newton has failed.
 
-    g, m : conductances and flows [kg/s] of valves; c : inflow of nodes from other links [kg/s]
+    g, m : conductances and flows [kg/s] of valves; c : inflow of nodes except through valves, less the demand [kg/s]
     connected, group : 0 for isolated nodes; work array for their groups
     change : last relative change of Newton
     Flows that are rounding (dead ends) become zero: their sign does not depend on the pressures.

@@ -45,7 +45,7 @@ else:
         return np.empty(1, dtype=object)
 
     def open_tables(handle):
-        """Tables behind a handle, or behind a handle stored in an array."""
+        """Tables of a handle, given as `HandleTables` or as an array that contains it."""
         return handle[0] if isinstance(handle, np.ndarray) else handle
 
 

@@ -191,7 +191,10 @@ class NonlinearStart(SteadyStart):
         return self.pressure_of_mass(row, self.mass_at(k, fraction)), self.height(row, mesh, fraction)
 
     def mass_at(self, k: int, fraction: float) -> float:
-        """Mass per length of the steady state at a fraction of pipe k [kg/m], linear between faces and centres."""
+        """Mass per length of the steady state at a fraction of the length of pipe k [kg/m].
+
+        It is linear between faces and centres, and corrected for height by `mass_between` if the pipe is not straight.
+        """
         row, mesh = self.pipes[k], self.draft.meshes[k]
         profile, n = self.draft.tables.profile, mesh.cells
         masses = np.empty(2 * n + 1)

@@ -76,7 +76,7 @@ class ScalarCouplings:
         return [joined[group[i]] if inner[i] else unique_states(*self.own(i)) for i in range(len(group))]
 
     def pairs(self) -> Iterator[Pairs]:
-        """Yield all couplings of the scalar, except some of a state with itself.
+        """Yield the couplings of the scalar; some couplings of a state with itself are missing.
 
         Those within basins are yielded for all scalars together, with the first scalar.
         """

@@ -19,7 +19,7 @@ def ssp_radius(method: Method) -> float:
     of ones. It is 0 if no r > 0 is possible, inf if every r is possible.
     """
     k = _used(method)
-    if any(x < 0 for row in k for x in row) or not _fills_in(k):
+    if any(x < 0 for row in k for x in row) or not _has_no_fill_in(k):
         return 0.0
     if _monotone(k, LONGEST):
         return math.inf
@@ -58,8 +58,8 @@ def _used(method: Method) -> list[list]:
     return [[row[j] for j in stages] + [Fraction(0)] for row in (*(a[i] for i in stages), b)]
 
 
-def _fills_in(k: list[list]) -> bool:
-    """True if K^2 is zero wherever K is zero; otherwise the SSP radius is 0."""
+def _has_no_fill_in(k: list[list]) -> bool:
+    """True if K^2 has no nonzero entry where K has a zero; otherwise the SSP radius is 0. k : matrix K of `_used`"""
     n = len(k)
     return all(
         k[i][j] != 0 or not any(k[i][m] != 0 and k[m][j] != 0 for m in range(n)) for i in range(n) for j in range(n)
