@@ -435,7 +435,7 @@ class BasinRows:
                 else "with this method no Courant number keeps the bounds"
             )
             key = "courant" if radius else "method"
-            return key, f"{advice}; with ssp-rk3 those up to 1 do", numerics.courant, radius
+            return key, f"{advice}; ssp-rk3 keeps the bounds up to a Courant number of 1", numerics.courant, radius
         return None
 
     def scalar_scale(self, name: str) -> float:

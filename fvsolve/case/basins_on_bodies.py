@@ -102,7 +102,8 @@ def body_faults(on: str, nodes: dict[str, Any], named: Any) -> Iterator[str]:
     bodies += [body for body in named if body not in nodes and getattr(named[body], "get", {}.get)("type") == "body"]
     if not isinstance(nodes.get(on), Body):
         state = f"is {article(nodes[on].kind)}" if on in nodes else "is not a node"
-        yield f"{show(on)} {state}; expected a body: {listing(bodies) or 'the case has none'}{did_you_mean(on, bodies)}"
+        expected = f"expected a body: {listing(bodies)}" if bodies else "the case has no body"
+        yield f"{show(on)} {state}; {expected}{did_you_mean(on, bodies)}"
         return
 
 

@@ -246,7 +246,7 @@ class Case(Displayable):
     def _known(self, name: str, known: dict[str, Any], noun: str) -> Any:
         if not isinstance(name, str) or name not in known:
             text = f"unknown {noun} {show(name)}{did_you_mean(str(name), known)}"
-            raise FvsolveError(f"{text}; {f'expected {listing(known)}' if known else 'the case has none'}")
+            raise FvsolveError(f"{text}; {f'expected {listing(known)}' if known else f'the case has no {noun}'}")
         return known[name]
 
     def resolved(self) -> str:

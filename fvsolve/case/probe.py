@@ -197,7 +197,11 @@ def _quantity(
 ) -> tuple[float | None, str]:
     known = {**along, **own, **getattr(kind, "fields", {})}
     if quantity not in known:
-        has = f"it has {', '.join(known)}{did_you_mean(quantity, known)}" if known else "its water is part of its body"
+        has = (
+            f"it has {', '.join(known)}{did_you_mean(quantity, known)}"
+            if known
+            else 'with sloshing = "frozen" its water moves with its body; expected a probe of the body'
+        )
         raise ValueError(f"{name} is {article(kind.kind)}, which has no {show(quantity)}; {has}")
     if place is None:
         if quantity not in own:

@@ -141,7 +141,7 @@ def _show(result, paths) -> None:
     )
     print_sheet(ResultTable(FRONT, [vars(row) for row in result.front]), terminal)
     own = result.stands
-    line(terminal, f"default: {result.default}; times and updates are interpolated between the runs of a curve")
+    line(terminal, f"default: {result.default}; times and cell updates are interpolated between the runs of a curve")
     if own is not None:
         outcome = f"error {own.trajectory:.2g} in {own.seconds * 1e3:.3g} ms" if own.ok else own.reason
         line(terminal, f"default at its own resolution, {own.setting.fineness}: {outcome}")

@@ -24,6 +24,11 @@ from fvsolve.cli.study_options import (
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.result_table import Column, ResultTable, cell_text
 
+EFFECTS = {  # verdict of the JSON file -> text of the terminal
+    "rounding": "rounding only",
+    "the numbers dissipate": "the numerical method dissipates energy",
+    "the numbers create energy": "the numerical method creates energy",
+}
 OptionalCase = Annotated[
     str | None,
     typer.Argument(metavar="[CASE]", help="case to run (default none: list the passivity of schemes and methods)"),
@@ -168,7 +173,7 @@ def _ledger(result, case, folder) -> None:
     passed = case.amount(result.throughput, "energy", 6)
     line(
         terminal,
-        f"{text}{'' if left else ','} {result.relative:.3g} of the energy throughput {passed}: {result.verdict}",
+        f"{text}{'' if left else ','} {result.relative:.3g} of the energy throughput {passed}: {EFFECTS[result.verdict]}",
     )
     if result.port is not None:
         line(terminal, result.port.text, None if result.port.passive else "bold red")
@@ -283,7 +288,11 @@ def print_claims(schemes, methods, as_json: bool) -> None:
     print_sheet(ResultTable(SCHEME, [vars(entry) for entry in known]), terminal)
     for entry in result.schemes:
         if entry.passive is None:
-            line(terminal, f"{entry.scheme} is limited (nonlinear) and has no matrix. Check it with a case")
+            line(
+                terminal,
+                f"{entry.scheme} is limited (nonlinear), so no matrix describes it; check its energy in a run: "
+                f"fvsolve energy CASE --scheme {entry.scheme}",
+            )
     line(terminal, "")
     line(
         terminal,

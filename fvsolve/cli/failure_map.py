@@ -153,7 +153,8 @@ def _show(result, files: list[Path], head: str) -> None:
     if result.limited:
         terminal.line(
             console,
-            f"predicted limits of {', '.join(result.limited)}: estimates from the weights in smooth flow, not bounds",
+            f"predicted limits of {', '.join(result.limited)}: estimates with the weights of the scheme in smooth "
+            "flow, not bounds",
         )
     for reason in {square.measures.reason: None for square in result.squares if square.verdict == "refused"}:
         terminal.line(console, f"refused: {reason}")

@@ -129,7 +129,7 @@ def print_system(system, values, poles: list[dict], folder: Path) -> None:
         terminal.line(output, f"  not a steady state: {system.states[int(np.argmax(moving))]} changes fastest; "
                               "schedules are held at their values of that time")  # fmt: skip
     worst = max(system.error.values())
-    terminal.line(output, f"  derivatives by two difference steps agree to {worst:.1e}, relative to each row")
+    terminal.line(output, f"  derivatives from deviations of two sizes agree to {worst:.1e} (relative)")
     terminal.print_sheet(ResultTable([column for column in POLES if column.key != "pair"], poles[:SHOWN]), output)
     more = len(poles) - SHOWN
     terminal.line(output, f"poles: {values.description}" + (f"; faster poles in poles.csv: {more}" if more > 0 else ""))

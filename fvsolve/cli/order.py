@@ -56,7 +56,13 @@ def order(
     method: Annotated[
         str | None, typer.Option(metavar="A,B", help="methods to study (default method of the case)")
     ] = None,
-    reference: Annotated[str, typer.Option(help="reference solution: auto, exact, finer or richardson")] = "auto",
+    reference: Annotated[
+        str,
+        typer.Option(
+            help="reference solution: exact, finer, richardson, or auto (the first that is available; "
+            "with basins never finer)"
+        ),
+    ] = "auto",
     jobs: Jobs = 1,
     dask: Dask = None,
     out: Out = None,

@@ -96,9 +96,9 @@ def _show_limited(limited: LimitedLimit) -> None:
     console, name = terminal.console(), f"{limited.scheme} ({limited.limiter})" if limited.limiter else limited.scheme
     terminal.line(console, f"{name} with {limited.method}: {LIMIT_EXPLANATIONS[limited.sharp]}", "bold")
     frozen = ", ".join(f"{branch} {_limit(limit.limit)}" for branch, limit in limited.frozen.items())
-    terminal.line(console, f"  limits with frozen weights: {frozen}")
+    terminal.line(console, f"  limits if the weights of the scheme are held constant: {frozen}")
     if limited.monotone is not None:
-        terminal.line(console, f"  total variation cannot grow up to Courant number {limited.monotone:.6g}")
+        terminal.line(console, f"  up to Courant number {limited.monotone:.6g} the total variation cannot grow")
     terminal.line(
         console, f"  least Courant number that failed on {limited.cells} cells, in runs of the limited scheme:"
     )

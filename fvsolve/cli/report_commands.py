@@ -31,7 +31,7 @@ def report(
 @app.command()
 def plot(
     directory: Annotated[Path, typer.Argument(metavar="RUN", help="a run directory")],
-    probes: Annotated[str, typer.Option(metavar="A,B", help="probes whose histories are drawn")] = "",
+    probes: Annotated[str, typer.Option(metavar="A,B", help="probes whose histories are drawn (default none)")] = "",
     route: Annotated[
         str,
         typer.Option(
@@ -39,7 +39,7 @@ def plot(
             help="route whose long section is drawn (default all routes, or none with --probes or --phase)",
         ),
     ] = "",
-    phase: Annotated[list[str], typer.Option(metavar="X:Y", help="phase plane: probe Y over probe X")] = [],  # noqa: B006
+    phase: Annotated[list[str], typer.Option(metavar="X:Y", help="phase plane to draw: probe Y over probe X")] = [],  # noqa: B006
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="folder of the pictures (default RUN)")] = None,
 ) -> None:
     """Draw long sections (heads, limits, devices), histories of probes and phase planes, without a browser."""
@@ -100,5 +100,6 @@ def fatigue(
         life = "unlimited" if years == float("inf") else f"{years:.4g} years"
         terminal.line(
             console,
-            f"{entry['probe']}: a run uses {entry['share']:.3g} of the fatigue life; {per_day:g} runs a day: {life}",
+            f"{entry['probe']}: a run uses {entry['share']:.3g} of the fatigue life; with {per_day:g} runs a day the "
+            f"life is {life}",
         )

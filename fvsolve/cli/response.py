@@ -109,5 +109,6 @@ def print_response(result, folder: Path, name: str, unit: str) -> None:
     for reason in verdict.reasons:
         terminal.line(console, f"  {reason}")
     terminal.line(console, f"  searched {verdict.low:.3g} to {verdict.high:.3g} rad/s; the sign of Re H is undecided "
-                         f"below {verdict.tolerance:.0e} |H| (derivatives agree to {result.error:.0e})")  # fmt: skip
+                         f"below {verdict.tolerance:.0e} |H| "
+                         f"(error of the derivatives: {result.error:.0e})")  # fmt: skip
     terminal.line(console, f"{folder}: {name}.csv, {name}.npz, {name}.png, {name}.svg")

@@ -37,7 +37,10 @@ def find_faults(case):
         if {part.from_, part.to}.isdisjoint(node for node, item in case.nodes.items() if item.kind == "reservoir"):
             yield ("links", link), f'the exact solution "{name}" needs a reservoir at one end or both'
         if part.friction.model not in ("none", "steady", "quasi-steady") or part.friction.roughness is not None:
-            yield ("links", link, "friction"), f'the exact solution "{name}" supports only a Darcy factor'
+            yield (
+                ("links", link, "friction"),
+                f'the exact solution "{name}" supports only friction with a Darcy `factor`',
+            )
     joined = {end for _, part in columns for end in (part.from_, part.to)}
     for link, part in valves:
         if len(joined & {part.from_, part.to}) != 1:

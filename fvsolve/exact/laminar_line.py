@@ -49,7 +49,11 @@ def find_faults(case):
             yield ("links", link, "wall", "creep"), f'the exact solution "{name}" holds only for walls without creep'
         law = pipe.friction
         if law.model != "unsteady" or law.weighting == "vardy-brown" or law.roughness is None or pipe.minor_loss:
-            message = f'the exact solution "{name}" needs laminar "unsteady" friction by roughness, and no minor loss'
+            other = ' (or model = "none")' if name == "creeping-line" else ""
+            message = (
+                f'the exact solution "{name}" needs friction with model = "unsteady", `roughness` instead of `factor`, '
+                f'and `weighting` "zielke" or left out{other}, and no `minor_loss`'
+            )
             yield ("links", link, "friction"), message
         elif case.properties.viscosity is None:
             yield ("fluid",), f'viscosity is missing; the exact solution "{name}" needs it'

@@ -35,7 +35,10 @@ def _find_faults(case):
         if part.kind == "tank" and hasattr(part.area, "area"):
             yield ("nodes", node, "area"), f'the exact solution "{name}" needs a constant area'
         if getattr(part, "connection", None) is not None:
-            yield ("nodes", node, "connection"), f'the exact solution "{name}" does not support a connection'
+            yield (
+                ("nodes", node, "connection"),
+                f'the exact solution "{name}" does not support `connection`. Remove this key',
+            )
         if part.kind == "reservoir" and not constant_from(part.pressure or part.head, -math.inf):
             yield ("nodes", node), f'the exact solution "{name}" needs a constant pressure or head'
     if not any(node.kind == "tank" for node in case.nodes.values()):

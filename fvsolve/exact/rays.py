@@ -28,7 +28,7 @@ def find_faults(case):
             if link.friction.model != "none":
                 yield (
                     ("links", name, "friction"),
-                    'the exact solution "rays" holds only without friction; expected "none"',
+                    'the exact solution "rays" holds only without friction; expected model = "none"',
                 )
             if link.creep_elements:
                 yield ("links", name, "wall", "creep"), 'the exact solution "rays" holds only for walls without creep'

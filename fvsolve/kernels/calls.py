@@ -95,7 +95,7 @@ def hook_of(law, name: str):
         return function
     error = f"{law.__name__}.{name} has {function.__code__.co_argcount} arguments"
     raise FvsolveError(
-        f"{error}. Expected the {expected} listed in kernels.calls.HOOKS, or another name of the function"
+        f"{error}. Expected the {expected} arguments listed in kernels.calls.HOOKS, or another name of the function"
     )
 
 

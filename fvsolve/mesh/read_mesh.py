@@ -91,7 +91,7 @@ def _place_faults(content: Content, unit: str) -> list[Fault]:
     far = content.points[:, 2] - points[:, 2].min() > 0.5 * extent[2]
     cell = int(np.argmax(far[content.cells].any(axis=1)))
     span = f"{points[:, 2].min():.6g} to {points[:, 2].max():.6g} {unit}"
-    text = f"z runs from {span}, above the middle of this range in cell {cell}"
+    text = f"z runs from {span}; cell {cell} has a point in the upper half of this range"
     constant = "".join(
         f"; {axis} is constant: turn the mesh" for axis, e in zip("xy", extent, strict=False) if e <= near
     )

@@ -107,7 +107,7 @@ def start_pins(draft, at: StaticForces) -> np.ndarray:
             rate = draft.case.amount(slip, "velocity")
             draft.fault(
                 f"links.{name}",
-                f"velocities at the start separate its two points at {rate}. Expected velocities that keep it closed",
+                f"velocities at the start separate its two points at {rate}. Expected equal velocities of the points",
             )
     draft.check()
     forces = at.out[int(at.layout["pin"]) :][: 3 * len(draft.pin_table)].reshape(-1, 3)

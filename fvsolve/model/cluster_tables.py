@@ -75,7 +75,7 @@ def classify_nodes(draft) -> None:
     for i in np.flatnonzero(inner & (nodes["admittance"] == 0.0)):
         if nodes["solve"][i] == rec.ALONE:
             name = list(draft.case.places)[i]
-            draft.fault(f"nodes.{name}", "only rigid columns join it, so nothing sets its pressure; "
+            draft.fault(f"nodes.{name}", "only rigid columns join this node, so nothing sets its pressure; "
                        "make it a chamber, or make one of its links a pipe")  # fmt: skip
 
 
@@ -165,7 +165,7 @@ def refuse_isolated_groups(draft, members) -> None:
         reason, span = "a valve joins this air valve", " while the air valve is shut"
         if not air:
             joins = [name for name, v in zip(draft.valve_names, valves, strict=True) if int(v["from_node"]) in group]
-            reason, span = f"{listing(joins)} {'joins' if len(joins) == 1 else 'join'} it", ""
+            reason, span = f"{listing(joins)} {'joins' if len(joins) == 1 else 'join'} this node", ""
         draft.fault(f"nodes.{place}", f"{reason} to {other}, and otherwise only rigid columns join these nodes, so "
                     f"nothing sets their pressure{span}; make {other} a chamber, or make one of the columns "
                     "a pipe")  # fmt: skip

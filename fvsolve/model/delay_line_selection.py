@@ -208,7 +208,7 @@ def divide_lines(draft) -> list[str]:
             unfit.append(name)
             if (case.links[name].pipe_model or case.numerics.pipe_model) == "delay-line":
                 draft.fault(f"links.{name}.pipe_model", '"delay-line" is not possible: at the start friction does not '
-                            'balance the drop of pressure along it; expected "finite-volume"')  # fmt: skip
+                            'balance the drop of pressure along the pipe; expected "finite-volume"')  # fmt: skip
             continue
         if row["now"] > 0.0 and attenuation > MAX_ATTENUATION:
             bound = math.inf

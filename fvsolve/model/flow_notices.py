@@ -53,8 +53,8 @@ def _laminar_flow(draft: Any, names: list[str], flow: np.ndarray, area: np.ndarr
     if not NO_FLOW < reynolds[worst] < LAMINAR:
         return []
     text = (f"{names[worst]}: Reynolds number {reynolds[worst]:.4g} at the start, laminar, which is unusual for "
-            f"water in pipes this wide; check {draft.case.amount(abs(flow[worst]) / fluid.density, 'flow')} and a "
-            f"viscosity of {fluid.viscosity:.4g} Pa s")  # fmt: skip
+            f"water in pipes this wide; check the flow, {draft.case.amount(abs(flow[worst]) / fluid.density, 'flow')}, "
+            f"and the viscosity, {fluid.viscosity:.4g} Pa s")  # fmt: skip
     return [Notice("range", f"links.{names[worst]}", text, "reynolds", float(reynolds[worst]), LAMINAR)]
 
 

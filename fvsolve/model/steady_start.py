@@ -345,7 +345,7 @@ class SteadyStart:
         ]
         for name in swinging:
             text = f"{name}: without friction between unequal heads no flow is steady"
-            text += "; the flow starts from rest and oscillates"
+            text += "; the flow starts from rest, and oscillates or grows"
             self.draft.warnings.append(Notice("start", f"links.{name}", text))
         loops, before = {name: pair for name, pair in ends.items() if name not in swinging}, None
         while self.answer.split and loops != before:  # a link to a node that no other link joins is in no loop
@@ -353,7 +353,7 @@ class SteadyStart:
             loops = {name: pair for name, pair in loops.items() if min(counts[end] for end in pair) > 1}
         if self.answer.split and (loops or not swinging):
             text = f"{listing(loops) or 'paths'}: flow in loops without friction is not unique"
-            text += "; the start is the solution of least norm"
+            text += "; the start has the smallest of these flows (least norm)"
             self.draft.warnings.append(Notice("start", f"links.{next(iter(loops))}" if loops else "links", text))
 
     def freeze_factors(self) -> None:

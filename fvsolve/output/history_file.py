@@ -32,7 +32,9 @@ class HistoryFile:
         Later rows are cut off. Raises RunError if the file is missing or shorter.
         """
         if not self.path.is_file() or self.path.stat().st_size < size:
-            raise RunError(f"{self.path} is shorter than at its checkpoint; start the run again with --force")
+            raise RunError(
+                f"{self.path} is missing or shorter than at its checkpoint; start the run again with --force"
+            )
         self._file = open(self.path, "r+b")
         self._file.truncate(size)
         self._file.seek(size)
@@ -78,7 +80,7 @@ def read_table(path: Path) -> np.ndarray:
         try:
             table = np.loadtxt(file, delimiter=",", ndmin=2)
         except ValueError:
-            text = f"a row does not have {names} numbers; the file was truncated or edited, run again with --force"
+            text = f"a row does not have {names} numbers; the file was truncated or edited; run again with --force"
             raise RunError(f"{path} cannot be read: {text}") from None
     if table.size and table.shape[1] != names:
         raise RunError(

@@ -73,7 +73,7 @@ def verdict_sentence(result) -> Sentence:
         return Sentence(
             "none",
             "No limits were stated.",
-            "The case has no [limits], so this report shows what happens, but not if it is allowed.",
+            "The case has no [limits], so this report shows what happens, but not whether this is allowed.",
         )
     states = [item.state for item in verdicts]
     failed = [item.name for item, state in zip(verdicts, states, strict=True) if state == FAILS]

@@ -73,7 +73,9 @@ def study_sentences(study: dict[str, Any], runs: list) -> list[Sentence]:
     if not any(result.verdicts for _, result in runs):
         return [
             *sentences,
-            Sentence("none", "No limits were stated.", "The study shows what happens, but not if it is allowed."),
+            Sentence(
+                "none", "No limits were stated.", "The study shows what happens, but not whether this is allowed."
+            ),
         ]
     names = [visible(name) or "the unchanged case" for name in study["holds"]]
     if names:

@@ -43,7 +43,7 @@ def field_faults(summary: dict[str, Any]) -> Iterator[str]:
         if key in EXACT_ROWS and (
             unknown := list(dict.fromkeys(name for entry in rows for name in entry if name not in expected))
         ):
-            yield f"has {listing(unknown)} of {key}, which this version does not have"
+            yield f"has {listing(unknown)} of {key}, unknown to this version"
     for (key, part), expected in NESTED_ROWS.items():
         rows = [row for entry in as_rows(summary.get(key, [])) for row in as_rows(entry.get(part, []))]
         if missing := [name for name in expected if any(name not in entry for entry in rows)]:

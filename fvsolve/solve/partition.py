@@ -158,7 +158,12 @@ def make_partition(model: Model, count: int) -> Partition:
 def single_thread_reason(model: Model) -> str:
     """Reason why a model is stepped by a single thread; "" if several threads are possible."""
     method = model.case.numerics.method
-    if method == automatic.AUTO or not method_named(automatic.first_method(method)).explicit:
+    if method == automatic.AUTO:
+        return (
+            f"{method} may change to a method that solves for all states at once; "
+            "only explicit methods can be distributed over threads"
+        )
+    if not method_named(method).explicit:
         return f"{method} solves for all states at once; only explicit methods can be distributed over threads"
     if not model.basins:
         return "there is no basin; only rows of basins are distributed over threads"

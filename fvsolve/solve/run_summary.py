@@ -173,7 +173,7 @@ def drift_notices(model: Model, y: np.ndarray) -> list[Notice]:
         length = float(np.linalg.norm(row["start"][first : first + 4] + y[at : at + 4]))
         if abs(length - 1.0) > DRIFT:
             text = (f"{name}: its Euler parameters have drifted from length 1 to {length:.9g} and are divided by this "
-                    "length; the error of its attitude is about as large; "
+                    "length; the error of its attitude is about as large as this drift; "
                     'method = "gauss-4" conserves the length')  # fmt: skip
             notices.append(Notice("drift", f"nodes.{name}", text, None, length - 1.0, DRIFT))
     return notices
@@ -188,8 +188,8 @@ def find_cavities(run_data: RunData) -> list[Cavity]:
             time, distance = float(marks[k]), share * pipe.length
             amount = model.case.amount
             text = (f"{pipe.name}: a cavity opened {amount(distance, 'length')} from {pipe.from_} at "
-                    f"{amount(time, 'time', 6)}; at most {amount(volume, 'volume', silent='l')} at "
-                    f"{amount(t_volume, 'time', 6)}")  # fmt: skip
+                    f"{amount(time, 'time', 6)}; its greatest volume is {amount(volume, 'volume', silent='l')}, "
+                    f"at {amount(t_volume, 'time', 6)}")  # fmt: skip
             cavities.append(Cavity(f"links.{pipe.name}", time, distance, volume, t_volume, text))
     return cavities
 

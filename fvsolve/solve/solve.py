@@ -411,7 +411,7 @@ class Run:
             return f"stopped: {parts_text} {verbs} without end at {when}; {remedy}"
         if code == loop_indices.STOPPED:
             event = "a cavity opened" if model.cavitates else "pressure below vapour pressure"
-            return f"stopped: {event} at {when}, where the key `below_vapor` stops the run"
+            return f'stopped: {event} at {when}, and below_vapor = "stop" ends the run there'
         if code in (loop_indices.BAD_VALUE, loop_indices.BAD_STATUS):
             loop.step_back()
         if code == loop_indices.NEWTON_STUCK:

@@ -137,7 +137,7 @@ def mode_notice(case, h: float, mode: Mode, method: str, step_error: float | Non
     ends = "the numbers are not to be trusted" if wrong else doubt
     key, unit = ("step", " s") if numerics.step is not None else ("courant", "")
     size = rounded_down(getattr(numerics, key) * mode.limit / h)
-    text = (f"{mode.place}: deviations grow {mode.growth:.3g} times in the run with {method} and steps of "
+    text = (f"{mode.place}: deviations grow by a factor of {mode.growth:.3g} in the run with {method} and steps of "
             f"{case.step_amount(h)}; the limit is {case.step_amount(mode.limit)} (estimated at the start); "
             f"{ends}; give numerics.{key} = {size:.4g}{unit} or less")  # fmt: skip
     return Notice("step-limit", mode.place, text, key, h, mode.limit, not wrong)
@@ -304,7 +304,7 @@ def courant_notice(model, check: CourantCheck, method: str) -> Notice:
         limit = f"waves grow at every Courant number {check.location} ({known})"
         remedy = f"{check.scheme} needs another method, for example ssp-rk3"
     text = (
-        f"{check.place}: Courant number {check.courant:.6g}: with {scheme}{about} and {method} {limit}; "
+        f"{check.place}: Courant number {check.courant:.6g}, but with {scheme}{about} and {method} {limit}; "
         f"{'the results may be wrong' if only_doubtful(check) else 'the numbers are not to be trusted'}; {remedy}"
     )
     return Notice("step-limit", check.place, text, key, check.courant, check.limit, only_doubtful(check))

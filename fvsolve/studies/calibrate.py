@@ -285,6 +285,7 @@ def identifiability(slopes: np.ndarray, keys: list[str]) -> tuple[np.ndarray, li
             correlation = float(inverse[j, k] / (root[j] * root[k]))
             if abs(correlation) > CORRELATED and last not in without_effect and other_key not in without_effect:
                 doubts.append(
-                    f"{other_key} and {last} cannot be distinguished: the correlation of errors is {correlation:.5f}"
+                    f"{other_key} and {last} cannot be distinguished: "
+                    f"the correlation of their errors is {correlation:.5f}"
                 )
     return inverse, doubts

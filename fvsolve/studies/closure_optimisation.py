@@ -183,10 +183,9 @@ def span_of(case: Case, key: str) -> tuple[float, float, float, float]:
     schedule = laws.get(key)
     if schedule is None:
         suggestion = did_you_mean(key, laws)
-        moving = [name for name, law in laws.items() if not law.constant] or ["none"]
-        raise FvsolveError(
-            f"is not a schedule of this case{suggestion or f'. Schedules that change are {listing(moving)}'}"
-        )
+        moving = [name for name, law in laws.items() if not law.constant]
+        known = f"Schedules that change are {listing(moving)}" if moving else "No schedule of this case changes"
+        raise FvsolveError(f"is not a schedule of this case{suggestion or f'. {known}'}")
     if schedule.constant or schedule.kind not in ("linear", "smooth", "ramp") or len(schedule.time) < 2:
         example = '{ start = "1 s", duration = "10 s", value = [1, 0] }'
         raise FvsolveError(f"does not change from one value to another. Expected a ramp or a table, such as {example}")

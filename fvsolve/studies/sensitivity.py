@@ -125,7 +125,8 @@ def values_of(result, outcome: str) -> np.ndarray:
     missing = [row for row in result.rows if row.get(name) is None]
     if missing:
         values = ", ".join(f"{key} = {missing[0][key]:.6g}" for key in result.keys)
-        raise FvsolveError(f"{len(missing)} of {len(result.rows)} runs have no {name}, the first at {values}: "
+        verb = "has" if len(missing) == 1 else "have"
+        raise FvsolveError(f"{len(missing)} of {len(result.rows)} runs {verb} no {name}, the first at {values}: "
                            f"{missing[0]['reason']}. Expected ranges in which all runs have {name}")  # fmt: skip
     return np.array([float(row[name]) for row in result.rows])
 

@@ -90,7 +90,7 @@ class Unresolved:
 
     def reason(self, part: tuple[str, str], triple: Sequence[float | None], error: float | None, span: float,
                unit: str) -> str | None:  # fmt: skip
-        """Reason for which the error of a peak is unknown, or wide (above `WIDE_ERROR` times `span`); otherwise None.
+        """Reason why the error of a peak is unknown, or wide (above `WIDE_ERROR` times `span`); otherwise None.
 
         part : (group, name) of the part; triple : peak at half, one and twice the resolution; span : range of the
         signal; unit : unit of all values
@@ -128,7 +128,7 @@ def unknown_parts(case: Any) -> dict[Part, str]:
 
 
 def stopped_runs_text(case: Any, runs: dict[float, Any]) -> str:
-    """Reason for which runs at other resolutions give no value of a peak; runs : factor of resolution -> result."""
+    """Reason why runs at other resolutions give no value of a peak; runs : factor of resolution -> result."""
     ended = [f"{times:g} times the resolution: {run.reason}" for times, run in runs.items() if run.reason != "finished"]
     if len(runs) == 1:
         ended = [

@@ -199,7 +199,7 @@ def test_a_slosh_blows_up_at_the_predicted_step():
 def test_a_limited_basin_is_measured_with_upwind_beside_it():
     row = stability(alone(pool((16, 4), size=(10.0, 4.0)), 1.0), ["muscl"], ["ssp-rk2"]).rows[0]
     assert row.measured == approx(row.frozen["upwind"], rel=0.01)
-    assert any("in basins they are only those of upwind" in note for note in row.notes)
+    assert any("in basins only the weights of upwind are used" in note for note in row.notes)
 
 
 def test_a_linearised_basin_sloshes_at_its_natural_frequencies():

@@ -292,5 +292,5 @@ def test_without_gravity_no_water_stands():
 
 
 def test_nothing_is_read_of_frozen_water():
-    with pytest.raises(CaseError, match='b is a basin, which has no "depth"; its water is part of its body'):
+    with pytest.raises(CaseError, match='b is a basin, which has no "depth"; with sloshing = "frozen" its water'):
         load(case_of(hull({"kind": "fixed"}), tank(sloshing="frozen"), probes=["b.depth@1,0.5"]))

@@ -237,7 +237,7 @@ def test_a_column_without_friction_between_two_vessels_is_no_loop(other, equal):
     said = [one for one in result.warnings if one.kind == "start"]
     assert result.ok and [one.place for one in said] == ([] if equal else ["links.way"])
     for one in said:
-        assert "starts from rest and oscillates" in one.text and "loop" not in one.text
+        assert "starts from rest, and oscillates or grows" in one.text and "loop" not in one.text
     assert result["way.flow"][0] == 0.0
     if other == "tank":
         omega = math.sqrt(9.80665 * math.pi / 4 * 0.09 / (50.0 * 0.2))

@@ -80,7 +80,7 @@ def test_the_ledger_is_printed_and_written_row_by_row(told, case, tmp_path):
     code, out, _ = told(case, "--port", "lake")
     assert code == 0
     assert "passive over this run" in out
-    assert "the numbers dissipate" in out
+    assert "the numerical method dissipates energy" in out
     folder = tmp_path / "runs" / "hammer.energy"
     with open(folder / "energy.csv", newline="") as file:
         header, *rows = csv.reader(file)

@@ -99,7 +99,7 @@ BAD_FILES = {
     'groups.out: faces shared with "in": 1, the face from (0, 1) m to (0, 0) m': dict(
         **GRID, groups={"in": [0, 3], "out": [[3, 0], [0, 1]]}
     ),
-    "points: z runs from 0 to 0.2 m, above the middle of this range in cell 1; expected a mesh in one plane": dict(
+    "points: z runs from 0 to 0.2 m; cell 1 has a point in the upper half of this range; expected a mesh": dict(
         points=[(x, y, 0.2 * (x > 1)) for x, y in SQUARE], cells=TWO
     ),
     "z = constant; y is constant: turn the mesh": dict(points=[(x, 0, y) for x, y in SQUARE], cells=TWO),

@@ -422,5 +422,5 @@ def test_a_valve_or_pump_between_columns_that_nothing_holds_is_refused_by_name()
     for part in (gate("v", "j", 0.05), lifts):
         links = {"one": column("high", "v"), "k": part, "two": column("j", "low")}
         nodes = {name: junction(elevation=HEIGHT) for name in ("v", "j")}
-        with pytest.raises(fvsolve.CaseError, match="nodes.[vj]: k joins it to [jv], and otherwise only rigid columns"):
+        with pytest.raises(fvsolve.CaseError, match="nodes.[vj]: k joins this node to [jv], and otherwise only rigid"):
             fvsolve.build(fvsolve.load(summit(probes=(), nodes=nodes, links=links)))

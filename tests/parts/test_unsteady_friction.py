@@ -333,7 +333,7 @@ def test_it_needs_a_viscosity():
 @pytest.mark.parametrize(
     ("change", "words"),
     [(lambda case: case["nodes"]["gate"].update(demand=1e-3), "is laminar"),
-     (lambda case: case["links"]["main"].update(friction={"model": "none"}), 'needs laminar "unsteady" friction'),
+     (lambda case: case["links"]["main"].update(friction={"model": "none"}), 'needs friction with model = "unsteady"'),
      (lambda case: case["nodes"]["lake"].update(pressure={"time": [0, 1], "value": [1e6, 2e6]}), "constant pressure")],
 )  # fmt: skip
 def test_the_exact_line_refuses_what_it_is_not(change, words):

@@ -176,7 +176,7 @@ def test_what_acts_on_a_pump_that_trips_is_its_run_down():
 def test_a_vessel_is_not_said_by_a_volume():
     with pytest.raises(NotApplicable, match="a volume at top would replace the air-valve"):
         level_keys(case("air-valve"), "lumped volume")
-    with pytest.raises(NotApplicable, match="all ends have a given pressure"):
+    with pytest.raises(NotApplicable, match="all ends of the pipes are reservoirs"):
         level_keys(case("pump-trip-air-vessel"), "column and volume")
 
 

@@ -57,9 +57,9 @@ def slow_film_notice(basin, error: tuple[float, float, float], when: str = "") -
     """Notice that films are too slow. error : result of `slow_film_error`; when : text of the time"""
     deep, fall = (basin.case.amount(value, "length", 3) for value in error[1:])
     text = (
-        f"{basin.name}: films down a slope{when}: with upwind, {deep} of water flows {100.0 * error[0]:.2g} % too "
-        f'slowly where the bed falls by {fall} from cell to cell; use scheme = "muscl", or cells so small that '
-        "the bed falls by less than the depth"
+        f"{basin.name}: with upwind, a film {deep} deep flows {100.0 * error[0]:.2g} % too slowly{when} down a slope "
+        f'where the bed falls by {fall} from cell to cell; use scheme = "muscl", or cells so small that the bed '
+        "falls by less than the depth"
     )
     return Notice("film", f"nodes.{basin.name}", text, "scheme", error[0], NOTICE_ERROR)
 

@@ -65,7 +65,7 @@ class AirValveRows(Device, kind="air-valve"):
         below = start.case.amount(deficit, "pressure", span=True)
         text = f"{name}: the air valve is open at the start, at a pressure of {below} below ambient"
         start.draft.warnings.append(Notice("start", f"nodes.{name}", text, "pressure", float(deficit), 0.0))
-        return [f"air valve {name}: {below} below ambient, so it opens"]
+        return [f"air valve {name} opens, at a pressure of {below} below ambient"]
 
     def energy_rows(self, model, part, row, y, out):
         """List with the only row of the energy matrix L, as {state index: factor}.

@@ -72,7 +72,7 @@ class ProfileValue(Value):
     They are lists, or columns of a CSV file.
     """
 
-    about = "elevation along the axis, linear between points; straight between its ends if left out"
+    about = "elevation along the axis, linear between points; a straight line between the end nodes if left out"
     takes = "`{ chainage, elevation }` or `{ x, y, z }`, lists in m, or `{ file }` with these columns"
 
     def read(self, given: Any, setting: ReadContext) -> Profile:
@@ -141,7 +141,7 @@ def from_file(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, np
 
     setting : context for reading. Raises ValueFault with the fault.
     """
-    unknown = [((key,), "unknown key; expected only file") for key in given if key != "file"]
+    unknown = [((key,), "unknown key; expected only `file`") for key in given if key != "file"]
     if unknown:
         raise ValueFault(unknown)
     if not isinstance(given["file"], str):

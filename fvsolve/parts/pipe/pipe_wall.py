@@ -186,4 +186,4 @@ def wall_faults(pipe: Any) -> Iterator[tuple[tuple[Any, ...], str]]:
         text = f"{show(pipe.restraint)} needs Poisson's ratio of the wall, and {reason}; give wall.poisson_ratio"
         yield ("restraint",), text
     if wall.creep is not None and pipe.lining is not None:
-        yield ("wall", "creep"), "is not available for a lined wall; keep the key `creep` or `lining`"
+        yield ("wall", "creep"), "is not available for a lined wall; keep only one of the keys `creep` and `lining`"

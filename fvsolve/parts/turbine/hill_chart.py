@@ -87,7 +87,9 @@ class HillChartValue(Value):
         if isinstance(given, dict) and "file" in given:
             return from_file(given, setting)
         if not isinstance(given, (list, tuple)) or not given:
-            raise ValueError(f"{show(given)} is not a list of curves; expected [{EXAMPLE}, ...] or {{ file }}")
+            raise ValueError(
+                f'{show(given)} is not a list of curves; expected [{EXAMPLE}, ...] or {{ file = "chart.csv" }}'
+            )
         curves, faults = {}, []
         for k, entry in enumerate(given):
             try:
@@ -120,7 +122,7 @@ def from_file(given: dict[str, Any], setting: ReadContext) -> HillChart:
     The points of each opening are in order along its curve. given : table { file } of the case file
     Raises ValueFault with all faults.
     """
-    unknown = [((key,), "unknown key; expected only file") for key in given if key != "file"]
+    unknown = [((key,), "unknown key; expected only `file`") for key in given if key != "file"]
     if unknown or not isinstance(given["file"], str):
         raise ValueFault(unknown or [(("file",), f"{show(given['file'])} is not a file name in quotes")])
     try:

@@ -390,7 +390,8 @@ class _ChartStudy:
         if best is None:
             finer = "more cells" if self.finest else "shorter steps" if self.coarse else "a smaller rtol"
             raise FvsolveError(
-                f"no setting reaches an error of {target:g}, the least is {min(good_errors(points)):.2g}. Try {finer}"
+                f"no setting reaches an error of {target:g}; the least error is {min(good_errors(points)):.2g}. "
+                f"Try {finer}"
             )
         name, crossing = best
         curve = curves_by_name(points)[name]

@@ -16,7 +16,7 @@ CHART_COLUMNS = columns(
     seconds="cpu [s]", rhs="rhs", updates="cell updates", steps="steps", below="below floor",
     by_seconds="front by cpu", by_updates="front by updates", reason="reason",
 )  # fmt: skip
-ERROR_LABELS = ("mean error over the run [range]", "error at the end [range]")
+ERROR_LABELS = ("mean error over the run [fraction of the range]", "error at the end [fraction of the range]")
 
 
 def write_chart(chart: Chart, folder: Path, title: str = "", dpi: float | None = None) -> list[Path]:

@@ -163,8 +163,10 @@ class FitRows:
         if not np.any(self.e > 0.0):
             return NO_ERROR
         if FLOOR in self.marks or OFF_LINE in self.marks:
+            verb = "is" if len(self.good) == 1 else "are"
             return (
-                f"no order: rows above the floor are {len(self.good)} of {len(self.h)}. Expected at least {LEAST_ROWS}"
+                f"no order: only {len(self.good)} of {len(self.h)} rows {verb} above the floor and on the line of the "
+                f"fit. Expected at least {LEAST_ROWS} such rows"
             )
         return f"no order: {len(self.good)} rows. Expected at least {LEAST_ROWS}"
 
@@ -327,5 +329,5 @@ def classify_tail(h, e, first: int, stop: int) -> str | None:
     if rest.size == 1 and stop - first > LEAST_ROWS:
         if 0.0 < excess[0] and rest[0] < ALLOWED_RISE * last and abs(rest[0] / last - 1.0) < 0.1 * slope:
             return ""  # the error no longer falls
-        return "the last row leaves the line: a floor or another order begins there"
+        return "the error of the last row leaves the line of the other rows: a floor or another order begins there"
     return None

@@ -119,11 +119,14 @@ class Hierarchy:
         if self.richest.name == "as it is":
             return ""
         if self.own_error is None:
-            return f"the error of {self.richest.name} itself is not known: twice its cells could not be run"
+            return f"the error of {self.richest.name} itself is not known: the run with twice the cells failed"
         text = f"{self.richest.name} itself has an error of about {self.own_error:.2g} from its cells"
         if self.own_error <= self.target:
             return text
-        return f"{text}, more than the target, so all errors of the table are as uncertain. Try `fvsolve order`"
+        return (
+            f"{text}, more than the target, so all errors of the table have at least this uncertainty. "
+            "Try `fvsolve order`"
+        )
 
     @property
     def rules(self) -> list[str]:
@@ -144,9 +147,10 @@ class Hierarchy:
         return [*rules, self.own_error_note] if self.own_error_note else rules
 
     def _law_rule(self, apart: LawDifference) -> str:
-        """Rule of thumb for the density law, in which its difference is compared with dp/K.
+        """Rule of thumb on the density law: compares the effect of the law with dp/K.
 
-        apart : difference of the linear law. dp is the greatest change of pressure, K the least effective bulk modulus.
+        apart : difference between the law `linear` and the most complete law; dp : greatest change of pressure;
+        K : least effective bulk modulus
         """
         side = "within" if apart.error <= self.target else "above"
         text = f"linear differs from {self.richest.law} by {apart.error:.3g} of the range of {apart.probe}"
@@ -156,8 +160,8 @@ class Hierarchy:
         reason = f"the difference is {apart.start:.3g} at the start and grows"
         if apart.start >= 0.5 * apart.error:
             reason = (
-                f"the difference is already {apart.start:.3g} at the start: at pressures of {apart.level:.2g} times "
-                "the bulk modulus the laws differ by "
+                f"the difference is already {apart.start:.3g} at the start, because at pressures of "
+                f"{apart.level:.2g} times the bulk modulus the laws differ by "
             )
             reason += f"this fraction, and the range of {apart.probe} is only {apart.moves:.2g} of its value"
         dynamic = self.case.amount(apart.swift, "pressure", 3, span=True)

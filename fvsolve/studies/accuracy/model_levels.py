@@ -186,5 +186,7 @@ def junction_chambers(case, pipes: dict) -> dict[str, Any]:
         own_volume = node.volume if node.kind == "chamber" else 0.0
         chambers[f"nodes.{name}"] = {"type": "chamber", "volume": own_volume + volume, **start_keys}
     if not chambers:
-        raise NotApplicable("all ends have a given pressure, so there is no volume between them")
+        raise NotApplicable(
+            "all ends of the pipes are reservoirs, tanks or accumulators, so no node can take the pipes' volumes"
+        )
     return chambers

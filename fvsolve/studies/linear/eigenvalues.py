@@ -69,7 +69,7 @@ def poles_of(a: Any, form: EnergyForm) -> Spectrum:
     text = (
         f"all {values.size}"
         if moving.complete
-        else f"{moving.description}, and {idle.size} of motions that store no energy"
+        else f"{moving.description}; and {idle.size} of motions that store no energy"
     )
     return Spectrum(values, moving.complete, text)
 

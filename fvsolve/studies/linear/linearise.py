@@ -176,7 +176,7 @@ def refuse_limiter(model) -> None:
         if model.basins and all(basin.is_grid for basin in model.basins):
             linear = "upwind or upwind5"
         elif "upwind5" in schemes and not model.basins:
-            linear = f"{SCHEMES[scheme].twin} ({scheme} in smooth solutions), upwind or upwind5"
+            linear = f"{SCHEMES[scheme].twin} (equals {scheme} in smooth solutions), upwind or upwind5"
         raise FvsolveError(
             f"numerics.scheme = {scheme} is limited: it has no derivative where the state is constant, however small "
             f"the deviation; linearise with a linear scheme, --scheme {linear}"
@@ -230,7 +230,7 @@ def input_column(at, name, input_, value, size, outputs, steps) -> tuple[np.ndar
     sides = differences(at_input, x, width, at_input(x), steps)
     slope, error, kink = longest_step_slopes(*sides, np.concatenate([size, np.zeros(outputs)]), steps)
     if max(np.max(error), np.max(kink)) > SLOPE_TOLERANCE:
-        reason = "from side to side" if np.max(kink) > SLOPE_TOLERANCE else "with the step of the differences"
-        raise FvsolveError(f"{name} = {value:g} cannot be linearised: its effect differs {reason} there; give it "
-                           "another value with --set, or choose another time with --at")  # fmt: skip
+        reason = "differ" if np.max(kink) > SLOPE_TOLERANCE else "depend on the size of the small deviation"
+        raise FvsolveError(f"{name} = {value:g} cannot be linearised: the slopes for a rise and a fall of this input "
+                           f"{reason}; set another value with --set, or choose another time with --at")  # fmt: skip
     return slope / width[0], float(np.max(error))

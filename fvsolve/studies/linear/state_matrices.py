@@ -130,8 +130,8 @@ def refuse_state(model, j: int, cause: str) -> None:
     reason = {
         "slope": "its slope does not converge there, like the slope of a valve at a drop of zero: give the valve the "
                  "key `laminar_reynolds`, or linearise at a time with flow (--at)",
-        "kink": "its slope differs from side to side there (a tank dry or full, an end stop or seat just touched): "
-                "choose another time with --at",
+        "kink": "its slopes for a rise and a fall of this state differ (a tank dry or full, an end stop or seat just "
+                "touched); choose another time with --at",
     }[cause]  # fmt: skip
     raise FvsolveError(f"the state cannot be linearised along {model.state_names[j]}: {reason}")
 
@@ -185,8 +185,9 @@ def output_matrix(at: OperatingPoint, outputs: int, steps: np.ndarray) -> tuple[
     if np.max(kink) > SLOPE_TOLERANCE:
         j, k = divmod(int(np.argmax(kink)), outputs)
         raise FvsolveError(f"{at.model.case.probes[k].text} cannot be linearised along {at.model.state_names[j]}: its "
-                           "slope differs there from side to side, or with the step; leave it out of --outputs, or "
-                           "choose another time with --at")  # fmt: skip
+                           "slopes for a rise and a fall of this state differ, or depend on the size of the small "
+                           "deviation; leave this probe out of --outputs, or choose another time with "
+                           "--at")  # fmt: skip
     return values.reshape(n, outputs).T / width, float(np.max(errors))
 
 

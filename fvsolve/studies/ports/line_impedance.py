@@ -118,8 +118,8 @@ def sweep_positive_real(
     not finite on the line.
     """
     if rightmost > shift:
-        return SweepVerdict(False, f"a pole with Re s = {rightmost:.6g} 1/s, right of the line", math.nan, math.nan,
-                            -math.inf, shift, high, 0)  # fmt: skip
+        text = f"a pole with Re s = {rightmost:.6g} 1/s lies right of the line Re s = {shift:g} 1/s"
+        return SweepVerdict(False, text, math.nan, math.nan, -math.inf, shift, high, 0)
     w = np.linspace(0.0, high, 257)
     value = _sampled(h, shift, w)
     while True:
@@ -156,7 +156,8 @@ def _slopes(slope, w: np.ndarray, shift: float) -> np.ndarray:
     bounds = _value_per_point("the slope", values, (len(w) - 1,), float)
     if not np.all(np.isfinite(bounds) & (bounds >= 0.0)):
         raise FvsolveError(
-            f"the slope is not bounded on the line Re s = {shift:g} 1/s. If poles lie on this line, use a greater shift"
+            f"the bound of the slope of H is negative or not finite on the line Re s = {shift:g} 1/s. "
+            "If poles lie on this line, use a greater shift"
         )
     return bounds
 

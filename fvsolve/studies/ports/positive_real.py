@@ -313,7 +313,7 @@ def _proof_text(axis: list[AxisPole], zeros: list[float], lossless: bool, n: Pol
         return ["H = 0: positive real, neither supplies nor absorbs energy"]
     texts = ["no pole in the right half plane"]
     if lossless:
-        texts.append("Re H(jw) = 0 at every w: lossless, on the boundary")
+        texts.append("Re H(jw) = 0 at every w: lossless, at the limit of positive realness")
     else:
         zeros_text = f", zero at w = {', '.join(f'{w:.12g}' for w in zeros)} rad/s" if zeros else ""
         texts.append(f"Re H(jw) >= 0 at every w{zeros_text}")

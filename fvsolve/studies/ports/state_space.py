@@ -310,15 +310,16 @@ def _reason_texts(holds, unstable, dips, hidden, margin, worst, tolerance, shift
                     f"at w = {dip.worst:.9g} rad/s")  # fmt: skip
     if len(dips) > 8:
         texts.append(f"and in {len(dips) - 8} more bands")
-    where = f"from Re s = {shift:.3g} 1/s on (poles on the axis)" if shift else "on the axis"
+    where = f"for Re s >= {shift:.3g} 1/s (H has poles on the axis)" if shift else "on the axis"
     if holds and worst == 0.0:
         texts.append("H = 0")
     elif holds:
         texts.append(f"no pole in the right half plane, Re H > 0 {where}: least {margin:.4g} |H| in the searched "
                      f"range, at w = {worst:.6g}; Re H does not change sign outside this range")  # fmt: skip
     elif holds is None:
-        texts.append(f"on the boundary: Re H >= -{tolerance:.0e} |H| at every w {where}, and within {tolerance:.0e} "
-                     f"|H| of zero at w = {worst:.6g} ({margin:.1e}), as for a lossless system")  # fmt: skip
+        texts.append(f"at the limit of positive realness: Re H >= -{tolerance:.0e} |H| at every w {where}, "
+                     f"and within {tolerance:.0e} |H| of zero at w = {worst:.6g} ({margin:.1e}), "
+                     "as for a lossless system")  # fmt: skip
     if len(hidden):
         texts.append(f"hidden: {_poles(hidden)} in the right half plane that H does not show, "
                     f"s = {_listed(hidden)[0]:.6g} 1/s")  # fmt: skip

@@ -52,8 +52,8 @@ def nonlinear_failure_notes(row) -> list[str]:
     """
     if not np.isfinite(row.measured):
         return []
-    return [f"this holds for the linear system; real runs fail from h = {row.measured:.5g} s on: in so long a "
-            "time they leave the linearised state, and nonlinear laws decide about the growth"]  # fmt: skip
+    return [f"only the linear system never fails; real runs fail from h = {row.measured:.5g} s on: in so long a time "
+            "the state leaves the linearised state, and nonlinear laws decide about the growth"]  # fmt: skip
 
 
 def case_notes(row, side) -> list[str]:
@@ -62,11 +62,11 @@ def case_notes(row, side) -> list[str]:
     growing = row.greatest_real > 0.0
     if growing and row.greatest_real > GROWTH_FLOOR * max(row.rate, np.abs(side.spectrum.values).max(initial=0.0)):
         texts.append(
-            f"the case itself is unstable, with a growth of {row.greatest_real:.3g} 1/s, which long steps do not cause"
+            f"the case itself is unstable, with a growth rate of {row.greatest_real:.3g} 1/s, not because of long steps"
         )
     if side.full_form is not side.form:
-        texts.append(f"{listing(side.idle)}: free motion stores no energy, but states with energy depend on it: it is "
-                     "included, with the least weight of all states")  # fmt: skip
+        texts.append(f"{listing(side.idle)}: free motion stores no energy, but states with energy depend on it; "
+                     "the norm includes this motion, with the least weight of all states")  # fmt: skip
     elif side.idle:
         texts.append(f"{listing(side.idle)}: free motion stores no energy and is left out")
     model = side.at.model
@@ -97,8 +97,8 @@ def eigenvalue_notes(row, system) -> list[str]:
                     f"{row.threshold:g} after {after} steps"]  # fmt: skip
         return ["eigenvalues allow longer steps than the growth of deviations does: the Jacobian J is not normal"]
     if row.eigenvalues < (1.0 - AGREEMENT) * row.predicted:
-        return [f"above the limit of the eigenvalues a mode grows, but not {row.threshold:g} times in {row.steps} "
-                "steps: longer runs fail at smaller steps"]  # fmt: skip
+        return [f"above the limit of the eigenvalues a mode grows, but by less than a factor of {row.threshold:g} in "
+                f"{row.steps} steps: longer runs fail at smaller steps"]  # fmt: skip
     return []
 
 
@@ -115,7 +115,9 @@ def field_of_values_notes(row, side) -> list[str]:
             return [f"the field of values allows no step: it reaches {reach:.3g} 1/s into the right half plane; energy "
                     "can grow at first (ends of a scheme above first order, a gain in the case). This is not a failure"
                     ]  # fmt: skip
-        return ["the field of values allows no step: it touches the imaginary axis, outside the stability region"]
+        return [
+            "the field of values allows no step: it touches the imaginary axis at points outside the stability region"
+        ]
     return ["the bound by the field of values is on the safe side here"]
 
 
@@ -133,11 +135,11 @@ def von_neumann_notes(row) -> list[str]:
 
 def limiter_notes(row, model) -> list[str]:
     """Notes on a limited scheme, whose weights are held constant in predictions."""
-    frozen = "they give the limits in this row"
+    frozen = "these weights give the limits in this row"
     if model.cavitates:
-        frozen = "in pipes with cavities they are only those of upwind"
+        frozen = "in pipes with cavities only the weights of upwind are used"
     elif model.basins:
-        frozen = "in basins they are only those of upwind"
+        frozen = "in basins only the weights of upwind are used"
     texts = [f"{row.scheme} has no derivative at a constant state, so its limit is measured; in predictions its "
              f"weights are held constant: {frozen}"]  # fmt: skip
     if np.isfinite(row.longer):

@@ -128,7 +128,7 @@ def delayed_row(case, scheme: str, method, steps: int, threshold: float) -> Stab
     predicted, model = limits.predicted(), limits.base_model
     rate = float(max(model.wave_rates[model.tables.pipes["delay"] < 0], default=0.0))
     row = {
-        "scheme": scheme, "method": method.name, "when": "the start, delay lines not replaced by cells",
+        "scheme": scheme, "method": method.name, "when": "the start, with delay lines instead of cells",
         "states": model.y_size, "steps": steps, "threshold": threshold, "rate": rate, "predicted": predicted.step,
         "lines": True,
     }  # fmt: skip
@@ -143,7 +143,7 @@ def delayed_row(case, scheme: str, method, steps: int, threshold: float) -> Stab
         row |= {"growth": growth.size, "after": growth.steps, "where": where, "share": share}
     if limits.refused:
         h = min(limits.refused)
-        notes.append(f"steps from {h:.4g} s on are refused: {limits.refused[h]}")
+        notes.append(f"steps of {h:.4g} s or more are refused: {limits.refused[h]}")
     if not limits.refused or predicted.fails not in limits.refused:
         row |= measured_entries(DelayLineRuns(limits, steps, threshold, predicted.fails), predicted.step, left_out)
     return StabilityRow(**row, left_out=left_out, notes=tuple(notes))

@@ -195,8 +195,8 @@ class RowTask:
 
     def lost_result(self, pair: tuple[str, str]) -> dict:
         """Raise RunError for a row whose process has ended."""
-        raise RunError(f"the process for the row of {' with '.join(pair)} has ended repeatedly; was memory "
-                       "too small?")  # fmt: skip
+        raise RunError(f"the process for the row of {' with '.join(pair)} was killed repeatedly. Is there enough "
+                       "memory?")  # fmt: skip
 
     def __getstate__(self) -> dict:
         return {"pickled_case": self.pickled_case, "options": self.options, "makers": {}}
@@ -261,7 +261,11 @@ class SchemeRows:
             row |= {"growth": greatest.size, "after": greatest.steps, "where": where, "share": share}
         row |= measure_limit(runs, limit.step, growth.size, row["left_out"])
         result = StabilityRow(**row)
-        return StabilityRow(**row | {"notes": tuple(bound_notes(result, side, growth))})
+        notes = bound_notes(result, side, growth)
+        if result.states > DENSE:
+            notes.append(f"{result.states} states are more than {DENSE}, so the limit is predicted from powers of the "
+                         f"step matrix applied to {VECTORS} start vectors")  # fmt: skip
+        return StabilityRow(**row | {"notes": tuple(notes)})
 
     def bound_columns(self, side: LinearSystem, method) -> dict:
         """Columns of a row that do not need powers of the step matrix: names, sizes, bounds of the step.
@@ -281,11 +285,9 @@ class SchemeRows:
         if model.y_size <= MAX_STATES:
             row["field_of_values"] = region_limit(method, side.field)
         else:
-            left_out["field_of_values"] = f"{model.y_size} states; it is computed up to {MAX_STATES}"
+            left_out["field_of_values"] = f"not computed, because {model.y_size} states are more than {MAX_STATES}"
         if model.cells:
             row["von_neumann"] = von_neumann_limit(self.scheme, method) / float(model.wave_rates.max())
-        if model.y_size > DENSE:
-            left_out["squaring"] = f"{model.y_size} states: predicted by powers applied to {VECTORS} vectors"
         return row | {"left_out": left_out}
 
     def limited_row(self, method) -> StabilityRow:
