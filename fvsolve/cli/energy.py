@@ -170,10 +170,10 @@ def _ledger(result, case, folder) -> None:
     text, left = f"remainder {case.amount(result.remainder[-1], 'energy')}", result.newton_counts
     if left:
         text += f", of which Newton residuals cause {case.amount(result.newton[-1], 'energy')}; the rest is"
-    passed = case.amount(result.throughput, "energy", 6)
+    passed, effect = case.amount(result.throughput, "energy", 6), EFFECTS[result.verdict]
     line(
         terminal,
-        f"{text}{'' if left else ','} {result.relative:.3g} of the energy throughput {passed}: {EFFECTS[result.verdict]}",
+        f"{text}{'' if left else ','} {result.relative:.3g} of the energy throughput {passed}: {effect}",
     )
     if result.port is not None:
         line(terminal, result.port.text, None if result.port.passive else "bold red")
