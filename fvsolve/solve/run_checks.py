@@ -61,7 +61,7 @@ class RunChecks:
         name, times = self.model.state_names[worst], GROWTH_LIMIT * float(ratio[worst])
         text = (f"{name} has grown to {times:.3g} times the range of its forcing at t = "
                 f"{self.model.case.amount(t, 'time', 6)}; the step is beyond the limit of the method: "
-                "halve it")  # fmt: skip
+                "halve the step")  # fmt: skip
         self.grown = Notice(
             "growth", name.partition("[")[0], text, None, float(abs(y[worst])), float(self.largest[worst]), False
         )

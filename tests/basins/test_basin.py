@@ -230,7 +230,7 @@ FAULTS = {
     "needs": ({"physics": "liquid"}, "thickness is missing"),
     "start": ({"start": {"pressure": "1 bar"}}, 'start.pressure: does not apply to physics "free-surface"'),
     "formula": ({"bed": "0.1*z"}, "z is unknown"),
-    "number": ({"bed": "sqrt(x - 1)"}, "is not finite at x = 0.25 m"),
+    "number": ({"bed": "sqrt(x - 1)"}, "is not a number at x = 0.25 m"),
     "holes": ({"holes": [[0.1, 0.0, 1.0, 1.0]]}, "holes.0.: x0 = 0.1 m is on no grid line"),
 }
 

@@ -425,5 +425,5 @@ def test_a_chart_of_a_slosh_lays_error_against_cost():
 
 
 def test_a_chart_says_that_cells_of_a_file_are_not_refined():
-    with pytest.raises(FvsolveError, match=r"meshes from files cannot be refined \(plain\)"):
+    with pytest.raises(FvsolveError, match=r"the mesh of plain is a file"):
         chart(CASES / "flooding.toml")

@@ -496,6 +496,6 @@ def test_reading_a_case_is_light():
 
 
 def test_load_takes_a_case_path_or_dict_alone():
-    with pytest.raises(CaseError, match="a int is not a case"):
+    with pytest.raises(CaseError, match="an int is not a case"):
         load(3)
     assert isinstance(load(two_tanks()), Case)

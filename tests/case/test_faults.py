@@ -775,7 +775,7 @@ CANNOT_START = {
     "unequal heads and no friction": (
         SCENE.replace('"steady", roughness = "0.26 mm"', '"none"').replace('"junction"', '"reservoir"\nhead = 3'),
         {},
-        "line 23: links.main: no steady state: it has no friction",
+        "line 23: links.main: no steady state: this pipe has no friction",
     ),
     "what moves": (
         SCENE.replace("courant = 0.9", 'initial = "equilibrium"').replace('"junction"', '"tank"\nlevel = 1\narea = 1'),

@@ -221,7 +221,7 @@ def test_loops_without_friction_are_named_once(law):
     case["links"] |= {name: scenes.pipe("a", "b", 100.0, 0.3, 1200.0, 5) for name in ("left", "right")}
     case["links"]["stub"] = scenes.pipe("b", "out", 100.0, 0.3, 1200.0, 5)
     (note,) = [one for one in model_of(load(case)).warnings if "loops" in one.text]
-    assert note.place == "links.left" and note.text.startswith("left, right: loops without friction")
+    assert note.place == "links.left" and note.text.startswith("left, right: flow in loops without friction")
 
 
 @pytest.mark.parametrize("other, equal", [("tank", False), ("chamber", False), ("lake", False), ("tank", True)])

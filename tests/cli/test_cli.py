@@ -134,7 +134,7 @@ def test_a_case_that_cannot_start_says_where(case, fvs):
     for command in ("run", "check"):
         code, out, err = fvs(command, case, "--set", "nodes.gate.type=reservoir", "--set", "nodes.gate.head=1 m")
         assert code == 2 and out == ""
-        assert f"shut.toml: 1 fault\n  line {line}: links.main: no steady state: it has no friction" in err
+        assert f"shut.toml: 1 fault\n  line {line}: links.main: no steady state: this pipe has no friction" in err
     assert not Path("runs").exists()
 
 

@@ -108,9 +108,9 @@ NOWHERE = {
     "min(1/x, 5)": ": 1/x divides by zero at x = 0 m",
     "0/x": "divides by zero",
     "log(x)": "is the logarithm of zero at x = 0 m",
-    "1 + sqrt(y)": r": sqrt\(y\) is not finite at x = 3.5 m",
-    "y^0.5": "is not finite at x = 3.5 m, y = -0.5 m",
-    "where(x < 2, 1/y, log(y))": r": log\(y\) is not finite at x = 3.5 m",
+    "1 + sqrt(y)": r": sqrt\(y\) is not a number at x = 3.5 m",
+    "y^0.5": "is not a number at x = 3.5 m, y = -0.5 m",
+    "where(x < 2, 1/y, log(y))": r": log\(y\) is not a number at x = 3.5 m",
 }
 
 
