@@ -59,7 +59,8 @@ def fatigue(
         float | None, typer.Option(metavar="R", help="pressure range of the fatigue strength, in the unit of the probe")
     ] = None,
     allowable_range: Annotated[
-        float | None, typer.Option(metavar="N", help="number of cycles until failure at the range --range")
+        float | None,
+        typer.Option(metavar="N", help="number of cycles (not a range) until failure at the range --range"),
     ] = None,
     slope: Annotated[
         float | None,

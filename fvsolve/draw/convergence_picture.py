@@ -70,7 +70,8 @@ def panel(axes, sizes, norms: Mapping, name: str) -> None:
 def dress_panel(axes, name: str, marks: list[str]) -> None:
     """Style the axes of a panel, and draw its title and its legend.
 
-    name : variable of the panel; marks : marks of sizes that are not fitted, which the legend explains by open markers
+    name : variable of the panel; marks : reasons why points are left out of the fit, such as "pre-asymptotic"; the
+    legend shows an open marker for each
     """
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)

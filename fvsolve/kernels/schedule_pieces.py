@@ -65,7 +65,8 @@ def piece_slopes(pieces, row, t):
 def schedule_slopes(tables, index, t):
     """(first, second) derivative of schedule number `index` at time t [per s, per s2].
 
-    From the end of the integration segment on, they are the derivatives from the left at this end.
+    From the end of the schedule segment on, a schedule of several pieces keeps its derivatives from the left at this
+    end; a single piece continues.
     """
     record, limit = tables.schedules[index], tables.clock[0]["limit"]
     if record["pieces"] == 1:
@@ -76,7 +77,10 @@ def schedule_slopes(tables, index, t):
 
 @njit(forceinline=True)
 def schedule_value(tables, index, t):
-    """Value of schedule `index` at time t [s]; from the end of the integration segment on, its left limit there."""
+    """Value of schedule `index` at time t [s].
+
+    From the end of the schedule segment on, a schedule of several pieces keeps its left limit at this end.
+    """
     return value_with_limit(tables.schedules, tables.pieces, index, t, tables.clock[0]["limit"])
 
 

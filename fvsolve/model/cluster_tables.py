@@ -80,9 +80,10 @@ def classify_nodes(draft) -> None:
 
 
 def mark_event_ends(draft, group) -> None:
-    """Mark ends of delay lines at junctions whose group of connected nodes contains a device with events.
+    """Mark in column `acts` the ends of delay lines at junctions that respond instantly: 1 `from`, 2 `to`, 3 both.
 
-    group : label of the group of each node
+    Their group contains a device with events, or an end of a restriction with a flow law of its own.
+    group : label of the group of each node; valves or short delay lines join the junctions of a group
     """
     inner, valves, acting = draft.node_table["kind"] == rec.JUNCTION, draft.valve_table, set()
     for v in valves:

@@ -139,7 +139,8 @@ def total_amount(model, q: int, y: np.ndarray) -> float:
 def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[str, Any]]:
     """Balance of each scalar in a run : name -> initial, final, inflow, outflow, decayed, remainder [kg x its unit].
 
-    Further entries list the inflow and outflow of each node; `relative` is the remainder over the greatest term.
+    Further entries: net inflow (`by_node`), and inflow and outflow (`nodes`), of each node through which it flows.
+    relative : |remainder| over the greatest of |initial|, |final| and the sum inflow + outflow + |decayed|
     ledger : float64[2, m]  integrals of positive rates, and of negative rates, of each row of the stepper's ledger
     """
     ledgers, n = {}, len(model.node_names)

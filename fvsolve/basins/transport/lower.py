@@ -69,7 +69,7 @@ class TransportRows(BasinRows):
             row["through"] = draft.to_plane(inward[self.ring()] if self.is_grid else inward)
 
     def unsplit(self, row, passing: list[str]) -> float:
-        """Factor on column `fastest`, the greatest rate of flow through a cell [1/s], in the rate that limits the step.
+        """Factor by which `fastest`, the greatest rate of flow through a cell [1/s], is multiplied to limit the step.
 
         Without divergence and diffusion, Euler steps of Courant number 1 by this rate keep scalars within their bounds,
         except with upwind5, which has no bounds.

@@ -81,8 +81,7 @@ def ends_step(past, tables, line, pipe, q, wave, size):
 
     The step ends if the jump arrives at a node with an instantaneous device and is large; after a small jump the device
     acts at the end of the step. The least size of a large jump never decreases in a run: otherwise a jump to be passed
-    on
-    within a step would stay in the list.
+    on within a step would stay in the list.
     q : stretch within the line; wave : 0 forward, 1 backward; size : change of the wave [kg/s]
     """
     acts = line["acts"]

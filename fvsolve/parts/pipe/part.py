@@ -52,7 +52,7 @@ WAVES = UsualRange(
 )  # most are between 50 and 1500 m/s, Wylie and Streeter 1993
 SOFT_WALLS = (  # (modulus [Pa], least wall over bore of such a pipe, text); the thinnest plastics are SDR 26
     (2e8, 0.1, "softer than any plastic, as rubber is"),
-    (4e8, 0.04, "soft as low-density polyethylene"),
+    (4e8, 0.04, "as soft as low-density polyethylene"),
 )
 
 

@@ -112,8 +112,9 @@ def is_valid(case, cells_by_key: Counts) -> bool:
 def greatest_wave_rate(case, cells_by_key: Mapping[str, tuple[int, ...]]) -> float:
     """Greatest wave rate of a case with these numbers of cells: cells that a wave crosses per second [1/s].
 
-    The wave rate of basins is that at the start, scaled by the numbers of cells. With delay lines the result is at
-    least the number of cells of the slowest line divided by the travel time of a wave along it.
+    With basins the result is at least the step-limiting rate of all parts at the start (`Model.wave_rate`), times the
+    greatest factor by which a basin is refined. With delay lines it is at least the number of cells of the slowest
+    line divided by the travel time of a wave along it.
     cells_by_key : as from `cell_counts`
     """
     rates = [case.wave_speed(name) * cells_by_key[f"links.{name}.cells"][0] / pipe.length

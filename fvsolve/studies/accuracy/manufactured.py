@@ -97,8 +97,9 @@ class ManufacturedStudy(OrderStudy):
 
 
 class UserFunction:
-    """Function of the user along pipes, called as function(pipe, x, t) or function(pipe, x); returns two arrays.
+    """Function of the user along pipes, called as function(pipe, x, t), or as function(pipe, x) for the initial state.
 
+    Returns two arrays: pressure [Pa] and flow [m3/s], or the mass [kg/s/m] and momentum [kg/s2] of a source.
     Raises FvsolveError if the function fails or returns unusable values.
     """
 

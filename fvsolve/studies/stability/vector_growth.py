@@ -113,8 +113,8 @@ def too_large(states: int, steps: int) -> str:
     """Text of the error `TooLarge`: number of states and steps, and remedies."""
     return (
         f"{states} states and {steps} steps take longer than {TIME_LIMIT:g} s to predict: give pipes or basins fewer "
-        "cells, --set links.NAME.cells=100 or nodes.NAME.cells=[20,20] (or a greater numerics.cell_time for pipes "
-        "without cells; the limit as a Courant number changes little), or use fewer --steps"
+        "cells, --set links.NAME.cells=100 or nodes.NAME.cells=[20,20] (or, for pipes that state no cells, a "
+        "greater numerics.cell_time; the limit as a Courant number changes little), or use fewer --steps"
     )
 
 
