@@ -35,10 +35,7 @@ def rotation(x, y, centre, angular_velocity):
 
 
 def swirl(x, y, speed=1.0, origin=(0.0, 0.0), size=1.0):
-    """Stream function [m2/s] of LeVeque's swirl (1996), speed size / pi sin^2(pi x / size) sin^2(pi y / size).
-
-    In this formula x and y are relative to `origin` [m]; speed : [m/s]; size : [m]
-    """
+    """LeVeque's swirl (1996): speed size / pi sin^2(pi x / size) sin^2(pi y / size) [m2/s]; x, y from `origin`."""
     x, y = np.pi * (x - origin[0]) / size, np.pi * (y - origin[1]) / size
     return speed * size / np.pi * np.sin(x) ** 2 * np.sin(y) ** 2
 
@@ -55,10 +52,7 @@ def parabolic(x, y, speed, south, north):
 
 
 def cellular(x, y, speed, width, height, origin=(0.0, 0.0)):
-    """Stream function [m2/s] of vortices of `width` by `height` [m] with alternate senses of rotation.
-
-    speed : greatest u [m/s]; origin : corner of a vortex [m]
-    """
+    """Stream function [m2/s] of vortices of `width` by `height` [m] with alternate rotation; speed : greatest u."""
     s = np.sin(np.pi * (x - origin[0]) / width) * np.sin(np.pi * (y - origin[1]) / height)
     return speed * height / np.pi * s
 
