@@ -35,7 +35,7 @@ def rotation(x, y, centre, angular_velocity):
 
 
 def swirl(x, y, speed=1.0, origin=(0.0, 0.0), size=1.0):
-    """LeVeque's swirl (1996): speed size / pi sin^2(pi x / size) sin^2(pi y / size) [m2/s]; x, y from `origin`."""
+    """LeVeque's swirl (1996): speed size / pi sin^2(pi x / size) sin^2(pi y / size) [m2/s], from `origin`."""
     x, y = np.pi * (x - origin[0]) / size, np.pi * (y - origin[1]) / size
     return speed * size / np.pi * np.sin(x) ** 2 * np.sin(y) ** 2
 
