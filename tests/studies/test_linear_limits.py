@@ -82,7 +82,7 @@ def test_runs_that_leave_the_state_where_no_linear_step_fails_are_explained():
     case = scene(nodes, {"hole": valve("high", "low", 1e-5)}, 1.0, {"method": "rodas-4", "step": 1.0})
     (row,) = stability(case, steps=100).rows
     assert np.isinf(row.predicted) and 0.0 < row.measured < np.inf
-    assert any("leave the linearised state" in note for note in row.notes)
+    assert any("leaves the linearised state" in note for note in row.notes)
 
 
 def test_auto_is_the_method_it_begins_with_once_and_says_so():

@@ -53,7 +53,7 @@ def nonlinear_failure_notes(row) -> list[str]:
     if not np.isfinite(row.measured):
         return []
     return [f"only the linear system never fails; real runs fail from h = {row.measured:.5g} s on: in so long a time "
-            "the state leaves the linearised state, and nonlinear laws decide about the growth"]  # fmt: skip
+            "the solution leaves the linearised state, and nonlinear laws decide about the growth"]  # fmt: skip
 
 
 def case_notes(row, side) -> list[str]:
