@@ -47,7 +47,7 @@ STEPS, PEER = (0.0025, 0.01, 0.0165, 0.02, 0.025, 0.05), (0.0025, 0.01)  # steps
 ACCURACY = 5e-3  # `delay_tolerance`: half the default, at little cost
 ERROR, THIRTIETH, HUNDREDTH, QUARTER = 1.5e-2, 30.0, 100.0, 4.0
 REPEATS = 5
-SIDE, LINES = 32, ("cells", "delay")  # grid: junctions along a side, pipe models
+SIDE, LINES = 32, ("finite-volume", "delay-line")  # grid: junctions along a side, pipe models
 
 
 @dataclass
@@ -276,7 +276,9 @@ def grid():
                 begun = process_time()
                 fvsolve.run(model)
                 runs.append(process_time() - begun)
-            print(f"  {line:6} check {min(spent):6.2f} s of CPU (goal 2), run {min(runs):7.3f} s (goal 10)", flush=True)
+            print(
+                f"  {line:13} check {min(spent):6.2f} s of CPU (goal 2), run {min(runs):7.3f} s (goal 10)", flush=True
+            )
 
 
 def children():
