@@ -70,7 +70,8 @@ def place_faults(name: str, node: PlaceOnBody, nodes: dict[str, Any], named: Any
     if node.on in nodes or node.on not in named:  # otherwise the body itself is faulty
         yield from (((*key, "on"), text) for text in body_faults(node.on, nodes, named))
     if node.elevation is not None:
-        yield (*key, "elevation"), f"the node is on {node.on}; give its position as `at`, in the axes of that body"
+        text = f"has no effect on a body; give the position in the axes of {node.on} as `at`, and remove this key"
+        yield (*key, "elevation"), text
 
 
 def overturned(nodes: dict[str, Any], poses: dict[str, Any]) -> Faults:

@@ -21,7 +21,10 @@ def import_(
     source: Annotated[Path, typer.Argument(metavar="FILE", help="EPANET network to import, for example town.inp")],
     case: Annotated[
         Path | None,
-        typer.Argument(metavar="CASE", help="case file to write, or its folder (default FILE with the ending .toml)"),
+        typer.Argument(
+            metavar="CASE",
+            help="case file to write, or its folder (default the name of FILE with .toml, in the current folder)",
+        ),
     ] = None,
     hour: Annotated[float, typer.Option(metavar="H", help="hour of the EPANET run that gives the initial state")] = 0.0,
     wave_speed: Annotated[str, typer.Option(metavar="A", help="wave speed of all pipes")] = "1200 m/s",

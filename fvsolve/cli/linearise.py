@@ -18,7 +18,8 @@ AtTime = Annotated[
     str | None, typer.Option(metavar="T", help="time of the state: seconds, or `20 ms` (default start of the run)")
 ]
 BeforeJump = Annotated[
-    bool, typer.Option("--left-limit", help="use the state just before a kink or jump of a schedule")
+    bool,
+    typer.Option("--left-limit", help="if a schedule has a kink or jump at the time --at, use its values just before"),
 ]
 
 

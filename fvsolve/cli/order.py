@@ -48,7 +48,9 @@ def order(
     ] = None,
     cells: Annotated[
         int | None,
-        typer.Option(help="number of cells of the longest pipe or side at the coarsest level (default from the case)"),
+        typer.Option(
+            help="number of cells of the longest pipe or basin side at the coarsest level (default from the case)"
+        ),
     ] = None,
     scheme: Annotated[
         str | None, typer.Option(metavar="A,B", help="schemes to study (default scheme of the case)")

@@ -239,7 +239,7 @@ def vessel_energy(st, floats, node, mass, volume, p):
 
 @njit
 def stored_barotropic(t, y, dydt, out, handle, stored):
-    """Fill `stored` with the energy changes of every part since the start [J], in the order of `linear_energy.py`."""
+    """Fill `stored` with the energy changes since the start [J] of the parts of `stored_linear`, in its order."""
     tables = open_tables(handle)
     st, layout, nodes, pipes = tables.settings[0], tables.layout[0], tables.nodes, tables.pipes
     columns, pistons, floats = tables.columns, tables.pistons, tables.floats

@@ -1,4 +1,4 @@
-"""Power and stored energy of every part under the density law `linear`.
+"""Power and stored energy of nodes, links and masses under the density law `linear`.
 
 P = p - p_ambient + rho g z is the potential [Pa], z the elevation above datum. A mass flow M at a port carries the
 power P M / rho. A pipe of area A and wave speed c stores A P^2 / (2 rho c^2) + M^2 / (2 rho A) per length. A chamber of
@@ -267,7 +267,10 @@ def power_pistons(y, dydt, out, tables, power, at):
 
 @njit
 def stored_linear(t, y, dydt, out, handle, stored):
-    """Fill `stored` with the energy changes of every part since the start [J] under the density law `linear`."""
+    """Fill `stored` with the energy changes since the start [J] of nodes, pipes, columns, masses, braces and stops.
+
+    Density law `linear`; devices, basins, bodies and bushings have functions of their own.
+    """
     tables = open_tables(handle)
     st, layout, nodes, pipes = tables.settings[0], tables.layout[0], tables.nodes, tables.pipes
     columns, pistons, per = tables.columns, tables.pistons, 1.0 / tables.settings[0]["rho"]

@@ -116,7 +116,10 @@ class Table(BaseModel):
         yield from ()
 
     def table(self) -> dict[str, Any]:
-        """Table of a case file that reads back as this object: SI numbers, with defaults, without missing keys."""
+        """Table of a case file that reads back as this object: SI numbers, with defaults.
+
+        Keys without a value are left out.
+        """
         result = {}
         for name, info in type(self).model_fields.items():
             value = plain_value(getattr(self, name))

@@ -239,7 +239,7 @@ def _limit_arrow(limits: list[str], edge: int) -> list[dict[str, Any]]:
 
 
 def _place_names(section: Section) -> list[dict[str, Any]]:
-    """Names of devices and nodes above the chainages of a section."""
+    """Plotly annotations with the names of devices and nodes, above a section at their chainages."""
     late = section.ends[0] + 0.9 * (section.ends[1] - section.ends[0])
     return [{"x": x, "y": 1.02, "xref": "x", "yref": "paper", "showarrow": False, "textangle": -45,
              "xanchor": "right" if x > late else "left", "yanchor": "bottom",

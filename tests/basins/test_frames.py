@@ -173,7 +173,7 @@ def test_a_tank_that_falls_freely_ends_the_run_by_name():
 # faults ----------
 
 FAULTS = {
-    "the node is on body; give its position as `at`": ({}, {"elevation": 1.0}),
+    "has no effect on a body; give the position in the axes of body as `at`": ({}, {"elevation": 1.0}),
     "expected a body: body; did you mean": ({}, {"on": "bdy"}),
     "give the body as `on = BODY`": ({}, {"on": None, "at": [0, 0, 1]}),
     "and the reaction to outflow is not modelled": (

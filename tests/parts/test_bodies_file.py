@@ -260,7 +260,7 @@ TOLD = """all.toml: 11 faults
   line 23: nodes.a.joint.on: is carried by itself: a on b on a; remove `on` from one of these bodies and close the loop by a pin
   line 33: nodes.c.joint.attitude.matrix: is not a rotation: R'R differs from the identity by 3; expected orthogonal columns of length 1
   line 39: nodes.pool.on: "boon" is not a node; expected a body: a, arm, b, boom, c; did you mean "boom"?
-  line 40: nodes.pool.elevation: the node is on boon; give its position as `at`, in the axes of that body
+  line 40: nodes.pool.elevation: has no effect on a body; give the position in the axes of boon as `at`, and remove this key
   line 46: nodes.flume.patches.lid.travel: moves the wall 1.5 m inward in a zone 1 m wide; expected less travel, or a wider zone
   line 50: links.lift.stroke: the piston starts at 3 m (ground.far minus ground.lug); expected 0 to 1 m
   line 58: links.s.to: no place named "boom.eye"; places are a, arm, b, boom, c, flume.lid, ground, ground.far, ground.lug, lift.A, lift.B; did you mean "boom"?"""  # noqa: E501

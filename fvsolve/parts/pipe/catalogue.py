@@ -84,7 +84,10 @@ def _add_class(table: dict[str, Any], sources: list[str], material: str | None) 
 
 
 def _add_schedule(table: dict[str, Any], material: Material | None) -> None:
-    """Add bore and wall thickness of a steel pipe from its nominal size."""
+    """Replace nominal size and pipe schedule (default 40) of a steel pipe in its table by bore and wall thickness.
+
+    Raises ValueFault if a material is given and is not a steel. Nothing is done for an unknown size.
+    """
     if material is not None and material.name not in STEELS:
         raise ValueFault(
             [(("nominal",), f"is a steel size without the key `class`; expected a class for {material.name}")]

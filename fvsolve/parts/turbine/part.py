@@ -14,7 +14,7 @@ from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.turbine.hill_chart import HillChart, HillChartValue, OpeningCurve
 from fvsolve.parts.value import VALUE, Quantity, UsualRange, anything, between, positive
 
-RUNNER_DIAMETERS = UsualRange(0.05, 12.0, "pico turbines to great Kaplan runners")
+RUNNER_DIAMETERS = UsualRange(0.05, 12.0, "pico turbines to large Kaplan runners")
 ROUNDING = 1e-9  # tolerance, over the power of the water
 
 

@@ -329,5 +329,7 @@ def classify_tail(h, e, first: int, stop: int) -> str | None:
     if rest.size == 1 and stop - first > LEAST_ROWS:
         if 0.0 < excess[0] and rest[0] < ALLOWED_RISE * last and abs(rest[0] / last - 1.0) < 0.1 * slope:
             return ""  # the error no longer falls
-        return "the error of the last row leaves the line of the other rows: a floor or another order begins there"
+        return (
+            "the error of the last row leaves the line of the other rows: an error floor or another order begins there"
+        )
     return None
