@@ -377,7 +377,7 @@ FAULTS = {
         {"joint": {"kind": "prismatic", "axis": [1, 0, 0]}},
         {"patches": {"gap": {"side": "east", "impedance": 0.0}}},
     ),
-    "give its position as `at`": ({}, {"elevation": 1.0}),
+    "give the position in the axes of body as `at`": ({}, {"elevation": 1.0}),
 }
 
 

@@ -303,7 +303,7 @@ def test_what_does_not_ride_together_is_told_all_at_once():
     case["links"]["bridge"] = {**PIPE, "from": "port", "to": "shore", "length": 3.0}
     case["links"]["long"] = {**PIPE, "from": "port", "to": "head", "length": 3.0}
     found = said(case)
-    assert "give its position as `at`" in found["nodes.port.elevation"]
+    assert "has no effect on a body" in found["nodes.port.elevation"]
     assert 'did you mean "hull"' in found["nodes.starboard.on"]
     assert "give the body as `on = BODY`" in found["nodes.shore.at"]
     assert "counts from the ground" in found["nodes.head.head"]
