@@ -21,7 +21,10 @@ from pathlib import Path
 
 TOP = Path(__file__).parents[1]
 QUICK_NEEDED, ALL_NEEDED = 36, 40
-OWN = ("--deselect", "tests/repository/test_planted_faults.py")  # fails on every planted fault, so it finds none
+WITHOUT_OWN_TEST = (
+    "--deselect",
+    "tests/repository/test_planted_faults.py",
+)  # fails on every planted fault, so it finds none
 
 
 @dataclass(frozen=True)
@@ -162,7 +165,19 @@ def copied(folder: Path) -> Path:
 def tests_fail(folder: Path, jobs: int, *options: str) -> str:
     """Name of the first test that fails, empty if all pass."""
     environment = os.environ | {"PYTHONPATH": str(folder), "MPLBACKEND": "Agg", "PYVISTA_OFF_SCREEN": "true"}
-    command = [sys.executable, "-m", "pytest", "-q", "-x", "-n", str(jobs), "--dist", "worksteal", *OWN, *options]
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-x",
+        "-n",
+        str(jobs),
+        "--dist",
+        "worksteal",
+        *WITHOUT_OWN_TEST,
+        *options,
+    ]
     found = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
     lines = [line for line in found.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
     if found.returncode in (0, 5):
