@@ -104,8 +104,8 @@ FAULTS = [
     Fault("studies/stability/vector_growth.py", "scaled @ result + x * v", "scaled @ result - x * v"),
     Fault(
         "studies/linear/linearise.py",
-        "(value - input_.offset) / input_.scale",
-        "(value + input_.offset) / input_.scale",
+        "float(value / input_.scale)",
+        "float(value * input_.scale)",
     ),
     Fault("studies/ports/positive_real.py", "order = n.degree - d.degree", "order = d.degree - n.degree"),
     Fault(

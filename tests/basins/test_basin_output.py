@@ -246,9 +246,12 @@ def test_lines_hold_what_the_frames_hold_at_their_points(tmp_path):
     frame = meshio.read(tmp_path / "run" / "fields" / "pool-000003.vtu").cell_data_dict
     nx, ny = CELLS
     axes = [(np.arange(n) + 0.5) * size / n for n, size in ((ny, SIZE[1]), (nx, SIZE[0]))]
-    for column, values, unit in ((3, frame["depth"]["quad"], 1.0), (6, frame["velocity"]["quad"][:, 0], 1e-3)):
+    u, v = frame["velocity"]["quad"][:, :2].T
+    assert np.abs(v).max() > 0.0
+    for column, values, unit in ((3, frame["depth"]["quad"], 1.0), (6, u, 1e-3), (7, v, 1e-3)):
         want = RegularGridInterpolator(axes, values.reshape(ny, nx))(found[:, [2, 1]])
         assert unit * found[:, column] == approx(want, rel=1e-12)
+    assert found[:, 8] == approx(np.hypot(found[:, 6], found[:, 7]), rel=1e-12)
 
 
 def test_lines_of_a_resumed_run_are_those_of_the_unbroken_one(tmp_path):

@@ -392,3 +392,20 @@ def beside(name: str) -> dict:
 def test_a_part_of_a_known_kind_in_the_wrong_place_is_refused(name):
     with pytest.raises(CaseError, match="links.stray"):
         load(beside(name))
+
+
+# laminar line -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ends, distance", [(("tank", "gate"), [64.0, 64.0]), (("gate", "tank"), [36.0, 36.0])])
+def test_the_wave_front_in_a_laminar_line_moves_from_the_demand_at_the_wave_speed(ends, distance):
+    """The demand jumps at 10 ms; the front is 36 m from it 30 ms later, and on its way back 137 ms later."""
+    nodes = {"tank": scenes.reservoir(6e5), "gate": scenes.junction(scenes.step(0.01, 0.0, 1e-4))}
+    links = {"line": scenes.pipe(*ends, 100.0, 0.05, 1200.0, 10, friction={"model": "unsteady", "roughness": 0.0})}
+    case = scenes.scene(nodes, links, 0.2, {"method": "rk4", "courant": 0.9}, ["gate.pressure"],
+                        exact={"name": "laminar-line"})  # fmt: skip
+    case["fluid"]["viscosity"] = 0.05
+    _, truth = solved(case)
+    assert truth.kinks("line", 0.009) == approx([])
+    found = [truth.kinks("line", 0.01 + travelled / 1200.0) for travelled in (36.0, 164.0)]
+    assert np.concatenate(found) == approx(distance, rel=1e-12)

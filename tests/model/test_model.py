@@ -166,3 +166,14 @@ def test_compiled_and_plain_python_agree(law, scheme):
     for name, values in plain["values"].items():
         here = compiled[name]
         assert np.asarray(values) == pytest.approx(here, rel=1e-9, abs=1e-9 * np.max(np.abs(here))), name
+
+
+def test_a_restriction_is_laminar_below_the_mass_flow_of_its_reynolds_number():
+    """Re = 4 M / (pi d mu), with the stated diameter, or that of the flow area Cd A."""
+    case = scene()
+    case["links"]["v1"] |= {"laminar_reynolds": 40.0, "discharge_coefficient": 0.6}
+    case["links"]["v2"] = {"type": "valve", "from": "pot", "to": "mid", "diameter": 0.05, "laminar_reynolds": 30.0}
+    model = fvsolve.build(fvsolve.load(case))
+    flows = dict(zip(model.valve_names, model.tables.valves["transition"], strict=True))
+    for name, reynolds, diameter in (("v1", 40.0, np.sqrt(4 * 2e-3 / np.pi)), ("v2", 30.0, 0.05)):
+        assert 4.0 * flows[name] / (np.pi * diameter * 1e-3) == pytest.approx(reynolds, rel=1e-12)

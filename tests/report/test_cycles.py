@@ -67,3 +67,8 @@ def test_the_command_says_how_long_it_lasts(fvs, tmp_path, monkeypatch) -> None:
 def test_what_has_no_cycles_is_named() -> None:
     with pytest.raises(FvsolveError, match='did you mean "swung.pressure"'):
         cycles(fvsolve.run(swung()), ["swung.presure"])
+
+
+def test_endured_cycles_are_those_of_basquins_law() -> None:
+    assert FatigueStrength(4e5, 1e6, 3.0).allowed(4e5) == 1e6
+    assert FatigueStrength(4e5, 1e6, 3.0).allowed(2e5) == 8e6

@@ -243,6 +243,18 @@ def test_routh_decides_on_which_side_roots_lie():
     assert not roots_right(Polynomial([-2, 1, 1])) and not roots_right(Polynomial([1, 0, 1]))
 
 
+def test_routh_agrees_with_roots_of_numpy():
+    """Products of random factors with roots a + b i, a - b i and c; coefficients alone do not decide all of them."""
+    random, found = np.random.default_rng(11), []
+    for _ in range(60):
+        p = Polynomial([1])
+        for a, b, c in random.choice([-1, 1, 2, 3, 5, 8, 9], (3, 3), p=[0.1] + [0.15] * 6).tolist():
+            p = p * Polynomial([a * a + b * b, -2 * a, 1]) * Polynomial([-abs(c), 1])
+        found.append(roots_right(p))
+        assert found[-1] == bool(np.all(np.roots([float(x) for x in p.coefficients][::-1]).real > 0.0))
+    assert 10 < sum(found) < 50
+
+
 @pytest.mark.parametrize("root", [1, 2, 3, Fraction(1, 2), Fraction(5, 7), 1024])
 def test_a_change_of_sign_is_found_where_bisection_meets_it_exactly(root):
     for sign in (1, -1):

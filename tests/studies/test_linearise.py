@@ -221,6 +221,11 @@ def test_steady_friction_damps_waves_at_half_its_rate():
     assert slowest["real"] == pytest.approx(-factor * velocity / (2 * 0.5), rel=1e-4)
 
 
+def test_inputs_have_the_values_of_the_case():
+    found = linearise(line(4, demand=0.2), ["end.demand", "top.head"])
+    assert found.input_units == ("m3/s", "m") and found.input_values == pytest.approx((0.2, 50.0), rel=1e-12)
+
+
 def network():
     nodes = {"pump": reservoir(3e6), "gate": junction(), "bottle": chamber(0.05), "air": reservoir(AMBIENT)}
     links = {

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 from model.test_resolution import station
 from reference.scenes import area, junction, lake, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
-from fvsolve.studies.peak_error import peak_errors
+from fvsolve.studies.peak_error import between_rows, peak_errors
 from fvsolve.studies.refinement import refined_keys
 from fvsolve.studies.unresolved import differing_events
 
@@ -196,3 +197,20 @@ class Finished:
 
     def __init__(self, events: list) -> None:
         self.summary = {"events": events}
+
+
+class Rows(dict):
+    """Rows of probes at the times t, like those of a Result."""
+
+    t = np.arange(8.0)
+
+
+@pytest.mark.parametrize("side, sign", [("minimum", 1.0), ("maximum", -1.0)])
+def test_a_parabola_passes_its_rows_by_at_most_an_eighth_of_the_second_difference(side, sign):
+    """Its vertex is 0; halfway between two rows it is farthest from them, by the whole bound."""
+    for vertex in (3.5, 3.2, 4.0):
+        rows = Rows(p=sign * (Rows.t - vertex) ** 2)
+        bound = between_rows(rows, "p", side)
+        assert bound == pytest.approx(0.25)
+        assert np.abs(rows["p"]).min() <= bound * (1.0 + 1e-12)
+    assert between_rows(Rows(p=sign * Rows.t), "p", side) == 0.0  # the first or last row

@@ -194,7 +194,7 @@ def input_value(at: OperatingPoint, name: str, input_: Input) -> float:
     value = value_with_limit(model.tables.schedules, model.tables.pieces, input_.schedule, at.t, np.inf)
     if input_.other >= 0:
         value -= value_with_limit(model.tables.schedules, model.tables.pieces, input_.other, at.t, np.inf)
-    return float((value - input_.offset) / input_.scale)
+    return float(value / input_.scale)
 
 
 def input_width(at: OperatingPoint, input_: Input, value: float) -> float:
