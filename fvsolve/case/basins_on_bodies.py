@@ -20,7 +20,7 @@ Faults = Iterator[tuple[tuple, str]]
 
 
 def find_faults(name: str, basin: Any, nodes: dict[str, Any], named: Any) -> Faults:
-    """Faults (key path, message) of the keys of a basin that apply to the body that carries it.
+    """Faults (key path, message) of the keys of a basin that place it on a body, or apply only on a body.
 
     named : tables of all nodes, also of faulty nodes
     """

@@ -300,11 +300,19 @@ def sort_parts(parts: list[Placed], report: Report) -> bool:
     parts.sort(key=lambda part: part.distance)
     pairs = [(part, other) for part, other in zip(parts, parts[1:], strict=False) if part.distance == other.distance]
     for part, other in pairs:
-        report(
-            (other.group, other.name, "at"),
-            f"{part.name} has the same place; join {other.name} to {part.name}, or change `at`",
-        )
+        text = f"{part.name} has the same place; {remedy_at_equal_chainage(part, other)}, or change `at`"
+        report((other.group, other.name, "at"), text)
     return not pairs
+
+
+def remedy_at_equal_chainage(part: Placed, other: Placed) -> str:
+    """Text on how to place two parts at the same chainage."""
+    if part.group == other.group == "links":
+        return f"place a junction there and join {part.name} and {other.name} to it"
+    if part.group == other.group:
+        return f"leave out {part.name} or {other.name}"
+    link, node = (part, other) if part.group == "links" else (other, part)
+    return f"join {link.name} to {node.name}"
 
 
 def cut_pipe(

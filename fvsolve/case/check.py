@@ -324,7 +324,8 @@ def _unknown_place(place: str, places: dict[str, Any], nodes: dict[str, Any], li
         own = [other for other in places if other not in nodes and other.startswith(f"{place}.")]
         if own:
             return f"{show(place)} is {article(_dict(links[place])['type'])}; its places are {listing(own)}"
-        return f"{show(place)} is a link, and a link joins places: put a junction between; places are {listing(places)}"
+        text = f"{show(place)} is a link, and links join places, not links; put a junction between the two links"
+        return f"{text}; places are {listing(places)}"
     return f"no place named {show(place)}; places are {listing(places)}{did_you_mean(place, places)}"
 
 

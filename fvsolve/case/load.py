@@ -279,8 +279,9 @@ class _Reader:
         return case
 
     def cut(self, properties: Any, numerics: Numerics | None) -> None:
-        """Cut pipes in the table of `raw` at the parts placed on them.
+        """Replace the table of the case by one with its pipes cut at their bends and at the parts placed on them.
 
+        Faults of these parts are added to the list of faults.
         properties : properties of the fluid, or None if it is faulty; numerics : table as read, or None if it is faulty
         """
         table = chainage.add_bends(self.raw.table)

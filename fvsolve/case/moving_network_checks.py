@@ -74,10 +74,10 @@ def missing_reactions(nodes: dict[str, Any], links: dict[str, Any], free: bool =
             if getattr(nodes[name], key) is not None:
                 yield (
                     ("nodes", name, key),
-                    "the reaction of this flow on the body is not modelled yet; leave this key out",
+                    "the reaction of this flow on the body is not modelled yet; expected a tank without this key",
                 )
         if hasattr(nodes[name].area, "area"):
-            yield ("nodes", name, "area"), "a tank on a body supports only a constant area yet; expected a number"
+            yield ("nodes", name, "area"), "a tank on a body supports only a constant area; expected a number"
     for name, link in links.items():
         ends = [place for port, place in link.ports.items() if link.joins.get(port) == "hydraulic"]
         if not any(map(on_body, ends)):
@@ -163,7 +163,7 @@ def patch_faults(end: str, node: Any) -> Iterator[str]:
         place = f"of a basin on a body, which physics {show(node.physics)} does not support yet"
         yield f"joins {end} {place}; expected a free surface, or a tank"
     elif node.lumped:
-        yield f'joins {end}, a patch without cells; expected sloshing = "cells"'
+        yield f'joins {end}, a patch of a basin without cells; expected sloshing = "cells" in this basin'
 
 
 def position_text(ends: list[str], patches: dict[str, Any]) -> str:

@@ -21,7 +21,8 @@ def notices(case: Any) -> list[Notice]:
             for key, time in starts_after_end(part, end):
                 place = f"{group}.{name}"
                 late, last = (case.amount(t, "time", 6) for t in (time, end))
-                text = f"{place}.{key}: continues to {late}, after the end of the run at {last}"
+                verb = "occurs at" if key == "trip" else "continues to"
+                text = f"{place}.{key}: {verb} {late}, after the end of the run at {last}"
                 result.append(Notice("end", place, text, key, time, end))
     return result
 

@@ -23,7 +23,7 @@ SHARED_LENGTH = 60  # letters of JSON; shorter schemas are repeated, not shared
 
 
 def schema() -> dict[str, Any]:
-    """JSON schema (draft 2020-12) of a case file, with repeated parts under `$defs`."""
+    """JSON schema (draft 2020-12) of a case file, with repeated subschemas under `$defs`."""
     return share_definitions(full_schema())
 
 
@@ -34,7 +34,7 @@ def schema_text(content: dict[str, Any]) -> str:
 
 
 def full_schema() -> dict[str, Any]:
-    """Schema of a case file in which repeated parts are written out."""
+    """JSON schema of a case file before `share_definitions`: a subschema is repeated at each place that uses it."""
     definitions: dict[str, Any] = {}
     properties: dict[str, Any] = dict.fromkeys(KEYS, {})
     properties |= keys_json(TOP)["properties"]
@@ -73,7 +73,7 @@ def full_schema() -> dict[str, Any]:
 
 
 def share_definitions(full: dict[str, Any]) -> dict[str, Any]:
-    """Copy of a schema with repeated parts moved to `$defs`; descriptions and defaults stay beside the references."""
+    """Copy of a schema with repeated subschemas moved to `$defs`; descriptions and defaults stay by the references."""
     times: Counter[str] = Counter()
     names: dict[str, str] = {}
 

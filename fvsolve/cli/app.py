@@ -40,7 +40,12 @@ def all_commands(
 Cases = Annotated[list[str], typer.Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
 SingleCase = Annotated[str, typer.Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
 Set = Annotated[
-    list[str], typer.Option("--set", metavar="KEY=VALUE", help="new value of a key of the case: links.main.cells=400")
+    list[str],
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="new value of a key of the case, for example links.main.cells=400; repeat the option for more keys",
+    ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="print one JSON object on standard output instead of text")]
 

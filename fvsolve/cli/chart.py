@@ -26,7 +26,8 @@ def chart(
         str | None,
         typer.Option(
             metavar="LIST",
-            help="numbers of cells of the longest pipe or basin side: 50,100,200 (default five numbers up to 400)",
+            help="numbers of cells along the basin side with most cells, or without basins of the pipe with the "
+            "longest travel time: 50,100,200 (default up to five numbers)",
         ),
     ] = None,
     rtol: Annotated[
@@ -40,15 +41,16 @@ def chart(
         str | None,
         typer.Option(
             metavar="LIST",
-            help="time steps [s], for methods without an error estimate: 1e-3,1e-4 (default seven steps)",
+            help="time steps [s], for a case without cells: 1e-3,1e-4; used by methods without an error estimate, with "
+            "delay lines by all methods (default seven or eight steps)",
         ),
     ] = None,
     target: Annotated[
         float | None,
         typer.Option(
             metavar="ERROR",
-            help="greatest accepted error, as a fraction of a probe's range; prints the cheapest [numerics] for it "
-            "(default none, or 0.01 with --models)",
+            help="greatest accepted error, as a fraction of the range of a probe; the cheapest settings that satisfy "
+            "it are printed, or with --models the cheapest model (default none, or 0.01 with --models)",
         ),
     ] = None,
     models: Annotated[
@@ -107,7 +109,8 @@ def _refuse(**options) -> None:
     if names:
         raise FvsolveError(
             f"{', '.join(names)}: not valid with --models, which compares models of the case with the settings of "
-            "[numerics] and writes no files. Remove the option, or set the key with --set"
+            f"[numerics] and writes no files. Remove {'these options' if len(names) > 1 else 'this option'}; "
+            "keys of [numerics] can be changed with --set"
         )
 
 

@@ -19,7 +19,10 @@ def run(
     cases: Cases,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="run directory, or for several cases its parent (default runs/NAME)"),
+        typer.Option(
+            metavar="DIR",
+            help="run directory, or for several cases the folder of their run directories DIR/NAME (default runs/NAME)",
+        ),
     ] = None,
     set: Set = [],  # noqa: B006
     resume: Annotated[
@@ -30,7 +33,10 @@ def run(
     no_pictures: Annotated[bool, typer.Option("--no-pictures", help="write no pictures")] = False,
     estimate_error: Annotated[
         bool,
-        typer.Option("--estimate-error", help="estimate the errors of peaks, by runs at half and twice the resolution"),
+        typer.Option(
+            "--estimate-error",
+            help="estimate the errors of peaks, from further runs at half, one and twice the resolution",
+        ),
     ] = False,
     as_json: Json = False,
 ) -> None:
@@ -159,9 +165,16 @@ def schema() -> None:
 
 @app.command()
 def methods(
-    name: Annotated[str | None, typer.Argument(metavar="NAME", help="name of a method (default all methods)")] = None,
+    name: Annotated[
+        str | None,
+        typer.Argument(metavar="NAME", help="name of a method, or file of its tableau (default all methods)"),
+    ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="picture of the stability region (default NAME.png)")
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="picture file of the stability region of NAME: .png, .svg or .pdf (default NAME.png)",
+        ),
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -179,8 +192,8 @@ def methods(
 
 @app.command()
 def compare(
-    run_a: Annotated[Path, typer.Argument(metavar="RUN_A")],
-    run_b: Annotated[Path, typer.Argument(metavar="RUN_B")],
+    run_a: Annotated[Path, typer.Argument(metavar="RUN_A", help="run directory, as written by fvsolve run --out")],
+    run_b: Annotated[Path, typer.Argument(metavar="RUN_B", help="run directory that is compared with RUN_A")],
     as_json: Json = False,
 ) -> None:
     """Compare two runs: greatest and rms difference (RUN_B minus RUN_A) of each common probe."""
@@ -200,15 +213,21 @@ def compare(
 def view(
     directory: Annotated[Path, typer.Argument(metavar="RUN", help="a run directory")],
     time: Annotated[
-        str | None, typer.Option(metavar="T", help='time of the frame: "1.2 s" (default the last frame)')
+        str | None,
+        typer.Option(
+            metavar="T", help='time whose nearest frame is drawn: seconds, or "20 ms" (default the last frame)'
+        ),
     ] = None,
     field: Annotated[
         str | None,
         typer.Option(
-            help="quantity to draw: pressure, head, flow, ... (default pressure, or another field without pipes)"
+            help="quantity to draw: pressure, head, flow, depth, ... (default pressure, or for a case without pipes a "
+            "quantity of its basins or bodies)"
         ),
     ] = None,
-    contours: Annotated[int, typer.Option(metavar="N", min=0, max=100, help="number of contour lines")] = 0,
+    contours: Annotated[
+        int, typer.Option(metavar="N", min=0, max=100, help="number of contour lines on the surfaces of basins")
+    ] = 0,
     animate: Annotated[
         Path | None, typer.Option(metavar="FILE", help="animation of all frames, a .gif or .mp4 file")
     ] = None,

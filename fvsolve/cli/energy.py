@@ -31,11 +31,17 @@ EFFECTS = {  # verdict of the JSON file -> text of the terminal
 }
 OptionalCase = Annotated[
     str | None,
-    typer.Argument(metavar="[CASE]", help="case to run (default none: list the passivity of schemes and methods)"),
+    typer.Argument(
+        metavar="CASE",
+        help="case file or shipped case to run (default none: list the passivity of schemes and methods)",
+    ),
 ]
 Port = Annotated[
     str | None,
-    typer.Option(metavar="NODE", help="node from which the passivity of the network is checked (default none)"),
+    typer.Option(
+        metavar="NODE",
+        help="node at which the passivity of the network is checked: a reservoir, inflow or junction (default none)",
+    ),
 ]
 Schemes = Annotated[
     str | None,

@@ -13,7 +13,10 @@ from fvsolve.case import shipped
 from fvsolve.cli.app import app, value_of
 from fvsolve.errors import FvsolveError, listing
 
-SHORT = 'shorter than a cell: with pipe_model = "finite-volume" use --min-pipe-length'
+SHORT = (
+    'pipes shorter than a cell, which make steps small with pipe_model = "finite-volume" '
+    "(--min-pipe-length lengthens them)"
+)
 
 
 @app.command("import")
@@ -26,11 +29,17 @@ def import_(
             help="case file to write, or its folder (default the name of FILE with .toml, in the current folder)",
         ),
     ] = None,
-    hour: Annotated[float, typer.Option(metavar="H", help="hour of the EPANET run that gives the initial state")] = 0.0,
+    hour: Annotated[
+        float, typer.Option(metavar="H", help="hours from the start of the EPANET run to the initial state of the case")
+    ] = 0.0,
     wave_speed: Annotated[str, typer.Option(metavar="A", help="wave speed of all pipes")] = "1200 m/s",
     min_pipe_length: Annotated[
         str | None,
-        typer.Option(metavar="L", help="minimum pipe length, to which shorter pipes are lengthened (default 0)"),
+        typer.Option(
+            metavar="L",
+            help='length to which shorter pipes are lengthened, for example "10 m" (default none: pipes keep their '
+            "lengths)",
+        ),
     ] = None,
 ) -> None:
     """Import an EPANET network: write its case file and print all differences from EPANET."""

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from fvsolve.cli.app import Json, Set, SingleCase, app, load_case, print_json, value_of
-from fvsolve.cli.study_options import Dask, Jobs, Out, clear_files, comma_list, folder_of, method_names, progress_line
+from fvsolve.cli.study_options import Dask, Jobs, clear_files, comma_list, folder_of, method_names, progress_line
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.result_table import Column, ResultTable
 from fvsolve.units import parse
@@ -19,7 +19,11 @@ def failure_map(
     case: SingleCase,
     scheme: Annotated[
         str | None,
-        typer.Option(metavar="A,B", help="schemes, one panel for each (default upwind and the scheme of the case)"),
+        typer.Option(
+            metavar="A,B",
+            help="schemes, one panel for each (default upwind and the scheme of the case, or the latter alone for a "
+            "stiff case or a case without cells)",
+        ),
     ] = None,
     method: Annotated[
         str | None,
@@ -28,13 +32,26 @@ def failure_map(
         ),
     ] = None,
     courant: Annotated[
-        str | None, typer.Option(metavar="A,B", help="Courant numbers, one column for each (default 0.25 to 3)")
+        str | None,
+        typer.Option(
+            metavar="A,B",
+            help="Courant numbers, one column for each, or a single one with --key (default 0.25 to 3, or ten time "
+            "steps for a stiff case or a case without cells)",
+        ),
     ] = None,
     step: Annotated[
-        str | None, typer.Option(metavar="A,B", help='time steps, one column for each: "1 ms,2 ms"')
+        str | None,
+        typer.Option(
+            metavar="A,B",
+            help='time steps in place of Courant numbers, one column for each, or a single one with --key: "1 ms,2 ms"',
+        ),
     ] = None,
     key: Annotated[
-        str | None, typer.Option(metavar="KEY=A,B", help="values of a key of the case, one column for each")
+        str | None,
+        typer.Option(
+            metavar="KEY=A,B",
+            help="values of a key of the case, one column for each, in place of several time steps or Courant numbers",
+        ),
     ] = None,
     tolerance: Annotated[
         float,
@@ -45,7 +62,9 @@ def failure_map(
     ] = 0.02,
     jobs: Jobs = 1,
     dask: Dask = None,
-    out: Out = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="folder of the table and pictures (default runs/NAME.map)")
+    ] = None,
     set: Set = [],  # noqa: B006
     as_json: Json = False,
 ) -> None:

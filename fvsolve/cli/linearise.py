@@ -15,7 +15,11 @@ from fvsolve.studies.result_table import ResultTable, write_csv
 SHOWN = 24  # greatest number of poles on the terminal; poles.csv has all
 
 AtTime = Annotated[
-    str | None, typer.Option(metavar="T", help="time of the state: seconds, or `20 ms` (default start of the run)")
+    str | None,
+    typer.Option(
+        metavar="T",
+        help='time of the state about which the case is linearised: seconds, or "20 ms" (default start of the run)',
+    ),
 ]
 BeforeJump = Annotated[
     bool,
@@ -39,7 +43,10 @@ def time_of(text: str | None) -> float | None:
 def linearise(
     case: SingleCase,
     inputs: Annotated[
-        str | None, typer.Option(metavar="A,B", help="inputs, such as valve.opening,lake.pressure (default none)")
+        str | None,
+        typer.Option(
+            metavar="A,B", help="inputs of the linear system, such as valve.opening,lake.pressure (default none)"
+        ),
     ] = None,
     outputs: Annotated[
         str | None, typer.Option(metavar="A,B", help="probes used as outputs (default probes of the case)")
@@ -47,7 +54,10 @@ def linearise(
     at: AtTime = None,
     before: BeforeJump = False,
     scheme: Annotated[
-        str | None, typer.Option(metavar="NAME", help="linear scheme (default scheme of the case)")
+        str | None,
+        typer.Option(
+            metavar="NAME", help="linear scheme, for example upwind5 (default scheme of the case, if it is linear)"
+        ),
     ] = None,
     out: Out = None,
     set: Set = [],  # noqa: B006

@@ -14,11 +14,19 @@ from fvsolve.errors import CaseError, collect_faults
 @app.command()
 def optimise(
     case: SingleCase,
-    schedule: Annotated[str, typer.Option(metavar="KEY", help="key of the schedule that is optimised")],
-    minimise: Annotated[
-        str, typer.Option(metavar="CLAIM", help='peak that is minimised: "max(gate.pressure)", "max(main.head)"')
+    schedule: Annotated[
+        str,
+        typer.Option(
+            metavar="KEY", help="key of the schedule to optimise, from one value to another: links.valve.opening"
+        ),
     ],
-    knots: Annotated[int, typer.Option(metavar="N", help="number of inner knots of the schedule")] = 3,
+    minimise: Annotated[
+        str,
+        typer.Option(metavar="CLAIM", help='peak to minimise, for example "max(gate.pressure)" or "max(main.head)"'),
+    ],
+    knots: Annotated[
+        int, typer.Option(metavar="N", help="number of knots between the ends of the schedule, 1 to 12")
+    ] = 3,
     runs: Annotated[int, typer.Option(metavar="N", help="greatest number of runs")] = 60,
     set: Set = [],  # noqa: B006
     as_json: Json = False,

@@ -36,20 +36,26 @@ def order(
         str | None,
         typer.Option(
             help="resolution to refine: both (cells and time steps), space or time "
-            "(default both, or time without cells)"
+            "(default both, or time for a case without pipes and basins)"
         ),
     ] = None,
     key: Annotated[
         str | None,
-        typer.Option(metavar="KEY", help="single key to refine, instead of --refine, for example links.main.cells"),
+        typer.Option(
+            metavar="KEY",
+            help="single key to refine, for example links.main.cells or numerics.step (default all cells and steps, as "
+            "--refine states)",
+        ),
     ] = None,
     levels: Annotated[
-        int | None, typer.Option(help="number of refinement levels (default 4, or 6 with --refine time)")
+        int | None,
+        typer.Option(help="number of refinement levels, 2 or more (default 4, or 6 if only time is refined)"),
     ] = None,
     cells: Annotated[
         int | None,
         typer.Option(
-            help="number of cells of the longest pipe or basin side at the coarsest level (default from the case)"
+            help="number of cells at the coarsest level, of the part of --key or else of the pipe or basin side with "
+            "most cells (default number of the case, or less to shorten the study)"
         ),
     ] = None,
     scheme: Annotated[
@@ -61,8 +67,8 @@ def order(
     reference: Annotated[
         str,
         typer.Option(
-            help="reference solution: exact, finer, richardson, or auto (the first that is available; "
-            "with basins never finer)"
+            help="reference solution: exact (solution named in the case), finer (a run at a finer level), richardson "
+            "(the next level), or auto (the first of these that is available; with basins never finer)"
         ),
     ] = "auto",
     jobs: Jobs = 1,

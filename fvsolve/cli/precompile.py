@@ -13,7 +13,12 @@ from fvsolve.cli.app import Json, app, print_json
 @app.command()
 def precompile(
     cases: Annotated[
-        list[str], typer.Option("--for", metavar="CASE", help="case to compile for (default all shipped cases)")
+        list[str],
+        typer.Option(
+            "--for",
+            metavar="CASE",
+            help="case file or shipped case to compile for; repeat the option for more (default all shipped cases)",
+        ),
     ] = [],  # noqa: B006
     jobs: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="number of processes (default number of processors)")

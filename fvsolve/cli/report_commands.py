@@ -39,7 +39,12 @@ def plot(
             help="route whose long section is drawn (default all routes, or none with --probes or --phase)",
         ),
     ] = "",
-    phase: Annotated[list[str], typer.Option(metavar="X:Y", help="phase plane to draw: probe Y over probe X")] = [],  # noqa: B006
+    phase: Annotated[
+        list[str],
+        typer.Option(
+            metavar="X:Y", help="phase plane to draw, probe Y over probe X; repeat the option for more (default none)"
+        ),
+    ] = [],  # noqa: B006
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="folder of the pictures (default RUN)")] = None,
 ) -> None:
     """Draw long sections (heads, limits, devices), histories of probes and phase planes, without a browser."""
@@ -53,10 +58,19 @@ def plot(
 def fatigue(
     directory: Annotated[Path, typer.Argument(metavar="RUN", help="a run directory")],
     probes: Annotated[
-        str, typer.Option(metavar="A,B", help="probes of pressure or head (default all probes of pressure or head)")
+        str,
+        typer.Option(
+            metavar="A,B",
+            help="probes of pressure or head whose cycles are counted (default all such probes)",
+        ),
     ] = "",
     range: Annotated[
-        float | None, typer.Option(metavar="R", help="pressure range of the fatigue strength, in the unit of the probe")
+        float | None,
+        typer.Option(
+            metavar="R",
+            help="range of pressure or head that defines the fatigue strength, in the unit of the probe; with "
+            "--allowable-range and --slope (default none: cycles are only counted)",
+        ),
     ] = None,
     allowable_range: Annotated[
         float | None,
@@ -65,7 +79,7 @@ def fatigue(
     slope: Annotated[
         float | None,
         typer.Option(
-            metavar="M", help="exponent of the fatigue strength: N (R / r)^M cycles of another range r until failure"
+            metavar="M", help="exponent of the fatigue strength: failure after N (R / r)^M cycles of another range r"
         ),
     ] = None,
     per_day: Annotated[

@@ -30,7 +30,10 @@ def response(
     at: AtTime = None,
     before: BeforeJump = False,
     scheme: Annotated[
-        str | None, typer.Option(metavar="NAME", help="linear scheme (default scheme of the case)")
+        str | None,
+        typer.Option(
+            metavar="NAME", help="linear scheme, for example upwind5 (default scheme of the case, if it is linear)"
+        ),
     ] = None,
     out: Out = None,
     set: Set = [],  # noqa: B006

@@ -9,13 +9,19 @@ from typing import Annotated
 import typer
 
 from fvsolve.cli.app import Json, app, print_json
-from fvsolve.cli.study_options import Dask, Jobs, Out, progress_line
+from fvsolve.cli.study_options import Dask, Jobs, progress_line
 
 
 @app.command()
 def study(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="a study file: case, events, protections")],
-    out: Out = None,
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="TOML file of a study: case, events, protections")],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="folder of the run directories and tables (default runs/NAME, the name of FILE without .toml)",
+        ),
+    ] = None,
     jobs: Jobs = 1,
     dask: Dask = None,
     force: Annotated[bool, typer.Option("--force", help="replace earlier runs of this study")] = False,

@@ -14,7 +14,14 @@ from fvsolve.cli.sweep import ranges
 @app.command()
 def sensitivity(
     case: SingleCase,
-    vary: Annotated[list[str], typer.Option("--vary", metavar="KEY=LOW,HIGH", help="range of a key to vary")],
+    vary: Annotated[
+        list[str],
+        typer.Option(
+            "--vary",
+            metavar="KEY=LOW,HIGH",
+            help="key to vary and its range, in SI or with units; repeat the option for more keys",
+        ),
+    ],
     outcome: Annotated[
         str, typer.Option(metavar="max(PROBE)", help="outcome to analyse: min, max or final of a probe")
     ],
@@ -22,7 +29,7 @@ def sensitivity(
         int,
         typer.Option(
             metavar="N",
-            help="base sample size, a power of two; the number of runs is about N times (number of keys + 2)",
+            help="base sample size, a power of two; the number of runs is about 1.25 N (number of keys + 2)",
         ),
     ] = 64,
     seed: Seed = 0,
@@ -55,7 +62,13 @@ def sensitivity(
 @app.command()
 def calibrate(
     case: SingleCase,
-    parameter: Annotated[list[str], typer.Option(metavar="KEY=LOW,HIGH", help="key to calibrate and its range")],
+    parameter: Annotated[
+        list[str],
+        typer.Option(
+            metavar="KEY=LOW,HIGH",
+            help="key to calibrate and its range, in SI or with units; repeat the option for more keys",
+        ),
+    ],
     seed: Seed = 0,
     jobs: Jobs = 1,
     dask: Dask = None,

@@ -16,7 +16,10 @@ from fvsolve.errors import CaseError, FvsolveError, collect_faults
 @app.command()
 def size(
     case: SingleCase,
-    vary: Annotated[str, typer.Option("--vary", metavar="KEY=LOW,HIGH", help="key to size and its range")],
+    vary: Annotated[
+        str,
+        typer.Option("--vary", metavar="KEY=LOW,HIGH", help="key to size and its range, in SI or with units"),
+    ],
     goal: Annotated[
         str,
         typer.Option(
@@ -26,7 +29,8 @@ def size(
     dependent: Annotated[
         list[str],
         typer.Option(
-            metavar='"KEY = formula"', help="key that changes too, as a formula of x, the value of the sized key in SI"
+            metavar='"KEY = formula"',
+            help="dependent key, as a formula of x, the value of the sized key in SI; repeat the option for more keys",
         ),
     ] = [],  # noqa: B006
     rtol: Annotated[

@@ -10,7 +10,7 @@ import typer
 
 from fvsolve.cli.app import Json, Set, app, load_case, print_json
 from fvsolve.cli.linearise import AtTime, BeforeJump, time_of
-from fvsolve.cli.study_options import Dask, Jobs, Out, clear_files, comma_list, folder_of, method_names, progress_line
+from fvsolve.cli.study_options import Dask, Jobs, clear_files, comma_list, folder_of, method_names, progress_line
 from fvsolve.studies.result_table import Column, ResultTable, columns
 
 PICTURES = 12  # greatest number of pairs of scheme and method for which pictures are drawn
@@ -27,7 +27,7 @@ FILE = columns(
 def stability(
     case: Annotated[
         str | None,
-        typer.Argument(metavar="[CASE]", help="case file or shipped case (default none: advection on a periodic grid)"),
+        typer.Argument(metavar="CASE", help="case file or shipped case (default none: advection on a periodic grid)"),
     ] = None,
     scheme: Annotated[
         str | None,
@@ -42,19 +42,36 @@ def stability(
         ),
     ] = None,
     steps: Annotated[
-        int | None, typer.Option(help="number of steps in which growth is measured (default 1000)")
+        int | None,
+        typer.Option(
+            help="number of steps in which growth is measured (default 1000; without a case, linear schemes are "
+            "measured only with --steps or --cells)"
+        ),
     ] = None,
     cells: Annotated[
-        int | None, typer.Option(help="number of cells of the periodic grid to measure on (only without a case)")
+        int | None,
+        typer.Option(
+            help="number of cells of the periodic grid on which growth is measured, only without a case (default 100)"
+        ),
     ] = None,
     courant: Annotated[
-        float | None, typer.Option(help="Courant number at which growth is computed (only without a case)")
+        float | None,
+        typer.Option(
+            help="Courant number at which growth is computed, only without a case (default 1 % above the limit, or 0.5 "
+            "for a limit of 0)"
+        ),
     ] = None,
     at: AtTime = None,
     before: BeforeJump = False,
     jobs: Jobs = 1,
     dask: Dask = None,
-    out: Out = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="folder of tables and pictures (default runs/NAME.stability, or no files without a case)",
+        ),
+    ] = None,
     set: Set = [],  # noqa: B006
     as_json: Json = False,
 ) -> None:

@@ -19,7 +19,7 @@ PROGRESS_INTERVAL = 10.0  # interval between lines of progress if the output is 
 Out = Annotated[
     Path | None,
     typer.Option(
-        metavar="DIR", help="folder of tables and pictures (default runs/NAME.STUDY, such as runs/main.sweep)"
+        metavar="DIR", help="folder of tables and pictures (default runs/NAME.COMMAND, such as runs/main.sweep)"
     ),
 ]
 Jobs = Annotated[int, typer.Option(metavar="N", help="number of runs at a time, each in its own process")]

@@ -16,13 +16,27 @@ from fvsolve.errors import FvsolveError
 Values = Annotated[
     list[str],
     typer.Option(
-        "--set", metavar="KEY=a,b,c", help="values of a key, one run for each; a single value holds for all runs"
+        "--set",
+        metavar="KEY=a,b,c",
+        help="values of a key, one run for each, or a single value for all runs; repeat the option for more keys",
     ),
 ]
-Ranges = Annotated[list[str], typer.Option("--vary", metavar="KEY=LOW,HIGH", help="range of a key, for --sample")]
+Ranges = Annotated[
+    list[str],
+    typer.Option(
+        "--vary",
+        metavar="KEY=LOW,HIGH",
+        help="key to vary with --sample and its range, in SI or with units; repeat the option for more keys",
+    ),
+]
 Outcomes = Annotated[
     list[str],
-    typer.Option("--quantity", metavar="max(PROBE)", help="quantity to chart over the keys (default all extremes)"),
+    typer.Option(
+        "--quantity",
+        metavar="max(PROBE)",
+        help="quantity to chart over the keys: max, min or final of a probe; repeat the option for more quantities "
+        "(default max and min of all probes)",
+    ),
 ]
 VALUES_FORMAT = "KEY=a,b,c, for example links.main.cells=100,200,400"
 RANGE_FORMAT = "KEY=LOW,HIGH, for example links.main.length=900,1000"
@@ -37,7 +51,8 @@ def sweep(
     points: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE.csv", help="CSV file from which the runs are read: a row for each run, a column for each key"
+            metavar="FILE.csv",
+            help="CSV file of the values of keys in all runs: a row for each run, a column for each key",
         ),
     ] = None,
     sample: Annotated[

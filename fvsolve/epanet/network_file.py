@@ -96,7 +96,7 @@ def state_at(network: Any, hour: float) -> HourState:
             messages = _report_errors(report) or [_root_cause(error)]
             raise FvsolveError(_fault_message(Path(network.name), messages, "EPANET")) from None
     if seconds not in results.node["head"].index:
-        raise FvsolveError(f"{network.name}: EPANET's run has no results at hour {hour:g}")
+        raise FvsolveError(f"{network.name}: EPANET's run has no results at hour {hour:g}; try an earlier hour")
     rows = [
         results.node["head"],
         results.node["demand"],

@@ -166,7 +166,7 @@ class Translation:
         length = self.lengths[name] = self.length(link)
         if length > link.length:
             law = self.spread(name, link, length)
-            self.note(f"lengthened to {length:.4g} m, with the loss of the original length", name)
+            self.note(f"lengthened to {length:.4g} m; the friction loss is that of the original length", name)
         return part_tables.pipe((start, end), length, link.diameter, law, link.minor_loss, self.speed)
 
     def length(self, link: Any) -> float:

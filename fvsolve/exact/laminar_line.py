@@ -58,7 +58,8 @@ def find_faults(case):
         elif case.properties.viscosity is None:
             yield ("fluid",), f'viscosity is missing; the exact solution "{name}" needs it'
         elif reynolds(case, pipe) >= LAMINAR:
-            message = f'the exact solution "{name}" is laminar; the demand reaches Reynolds {reynolds(case, pipe):.0f}'
+            message = f'the exact solution "{name}" is laminar, but the demand reaches the Reynolds number '
+            message += f"{reynolds(case, pipe):.0f}; expected below {LAMINAR:g}"
             yield ("links", link, "friction"), message
 
 

@@ -166,4 +166,5 @@ def level_faults(exact: Solution):
         rim = exact.case.nodes[name].height
         if low < -1e-9 or (rim is not None and high > rim + 1e-9):
             event = "runs dry" if low < -1e-9 else "overflows"
-            yield ("nodes", name), f'the exact solution "{exact.case.exact.name}" is not valid after the tank {event}'
+            text = f'the exact solution "{exact.case.exact.name}" is not valid after the tank {event}'
+            yield ("nodes", name), f"{text}; expected an earlier end of the run"

@@ -24,7 +24,7 @@ def find_faults(case):
         yield ("links",), f'the exact solution "{case.exact.name}" needs a spring'
     for name, link in case.links.items():
         if not any(end is not None and case.nodes[end].kind == "mass" for end in (link.from_, link.to)):
-            yield ("links", name), f'the exact solution "{case.exact.name}" needs every link at the mass'
+            yield ("links", name), f'the exact solution "{case.exact.name}" supports only links that join the mass'
         if link.kind == "force" and not constant_from(link.force, -math.inf):
             yield ("links", name, "force"), f'the exact solution "{case.exact.name}" needs a constant force'
 

@@ -64,7 +64,7 @@ def oil_properties(name: str, temperature: float, pressure: float) -> dict[str, 
         text = f"{temperature - ZERO:.6g} degC"
         raise FluidError("temperature", f"{text} is outside the range of {name}, 0 degC to 100 degC")
     if pressure > MAX_PRESSURE:
-        raise FluidError("pressure", f"{pressure:g} Pa is above the range of {name}, {MAX_PRESSURE:g} Pa")
+        raise FluidError("pressure", f"{pressure:g} Pa is above the range of {name}, up to {MAX_PRESSURE:g} Pa")
     oil, p = OILS[name], pressure / 1e5
     expansion, rho = density_1atm(oil, temperature)
     c, b = TAIT_COEFFICIENTS[0], TAIT_COEFFICIENTS[1] + TAIT_COEFFICIENTS[2] * temperature

@@ -40,7 +40,7 @@ def rectangle(
     lines = [_graded(*axis) for axis in zip(origin, size, cells, grading, strict=True)]
     if any(np.diff(axis).min() <= 0.0 for axis in lines):
         raise MeshError(
-            [Fault("grading", f"{_list_text(grading)}: the smallest cells vanish; expected weaker grading")],
+            [Fault("grading", f"{_list_text(grading)}: the smallest cells vanish; expected ratios nearer to 1")],
             "rectangle",
         )
     solid = np.ones((cells[1], cells[0]), bool)

@@ -17,7 +17,7 @@ def coarse_for_cavities(draft) -> list[Notice]:
     pipes = draft.meshes
     if not draft.case.law.cavitates or not pipes:
         return []
-    longest = max(pipes, key=lambda pipe: pipe.length / pipe.wave_speed)
+    longest = max(pipes, key=lambda pipe: (pipe.length / pipe.wave_speed, -pipe.cells))
     if longest.cells >= ENOUGH:
         return []
     error = DURATION * longest.cells**-RATE

@@ -65,7 +65,7 @@ def line_methods(case, unfit: Collection[str] = ()) -> dict[str, LineMethod]:
     if not lines:
         return {name: methods[name] for name in pipes}
     travel = {name: link.length / case.wave_speed(name) for name, link in pipes.items()}
-    slowest = max(lines, key=travel.get)
+    slowest = slowest_pipe(case, lines)
     rate = pipes[slowest].cells / travel[slowest]
     cells = max((pipes[name].cells / travel[name] for name in methods), default=0.0)
     numerics = case.numerics
@@ -81,6 +81,13 @@ def line_methods(case, unfit: Collection[str] = ()) -> dict[str, LineMethod]:
             reason += f", and in less than a step of {case.step_amount(longest, 4)}"
         methods[name] = LineMethod("delay-line", reason, rate, longest)
     return {name: methods[name] for name in pipes}
+
+
+def slowest_pipe(case, names: Collection[str]) -> str:
+    """Name of the pipe with the longest travel time of a wave; with most cells if several have the longest."""
+    travel = {name: case.links[name].length / case.wave_speed(name) for name in names}
+    longest = max(travel.values())
+    return max((name for name in names if travel[name] > longest * (1.0 - 1e-9)), key=lambda n: case.links[n].cells)
 
 
 def reason_for_cells(case, name: str, link) -> str:

@@ -137,7 +137,7 @@ def form_of(rows: Any, parts: tuple[str, ...], scale: np.ndarray) -> EnergyForm:
         if at.size > MAX_GROUP:
             raise FvsolveError(
                 f"{at.size} positions are joined by springs; the energy norm is computed for at most {MAX_GROUP}. "
-                "Expected fewer bodies or masses in a group"
+                "Expected fewer bodies or masses that springs join to each other"
             )
         part = rows[:, at].toarray() * scale[at]
         part = np.vstack([part[np.any(part, axis=1)], np.zeros((1, at.size))])

@@ -131,5 +131,5 @@ def refuse_overturned(at: Configuration, y: np.ndarray) -> None:
         return
     where = int(at.out[rec.WHERE]) - len(at.draft.basins)
     name = list(at.draft.case.places)[where] if where >= 0 else at.draft.basins[where].name
-    text = f"in the equilibrium found {name} is turned over, and the contents would run out"
+    text = f"{name} is turned over in the equilibrium found, and its contents would run out"
     at.draft.fault(f"nodes.{name}", f'{text}; hold the body upright, state another position, or use initial = "steady"')

@@ -133,7 +133,7 @@ class Restriction(Lowering):
     def edge(self, start, k: int) -> Edge | None:
         """Edge of VALVE row k in the steady flow problem; None for the square-root law, which the caller treats.
 
-        Also sets `open` of the row to the conductance at the start.
+        Otherwise it sets `open` of the row to the conductance at the start.
         """
         if not self.steps:
             return None

@@ -206,8 +206,9 @@ class NonlinearStart(SteadyStart):
         return m if row["rise"] < 0 else self.mass_between(row, mesh, fraction, m)
 
     def mass_between(self, row, mesh, fraction: float, m: float) -> float:
-        """Mass per length [kg/m] between a face and a centre, where the pipe is not straight.
+        """Mass per length [kg/m] at a place between a face and a centre, where the pipe is not straight.
 
+        fraction : distance of the place from the `from` end over the length of the pipe
         m : mass per length by linear interpolation, to be corrected for the height of the pipe above the straight line
         """
         rises = self.draft.tables.profile[row["rise"] : row["rise"] + 2 * mesh.cells + 1]

@@ -122,6 +122,6 @@ def _check_identity(path: Path, stored: dict[str, str], expected: dict[str, str]
     if other:
         listed = ", ".join(f"{name} {stored.get(name)} (now {expected[name]})" for name in other)
         raise RunError(
-            f"{path} was written by other versions, so the run would not continue to the bit: {listed}; "
-            "start again with --force, or continue with the earlier versions"
+            f"{path} was written by other versions, so the continued run could differ from an uninterrupted run: "
+            f"{listed}; start again with --force, or continue with the earlier versions"
         )

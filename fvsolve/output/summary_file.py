@@ -85,9 +85,10 @@ def read_summary(path: Path) -> dict:
     """Read summary.json; raises RunError if it is missing, damaged or lacks a required key."""
     try:
         summary = json.loads(path.read_text(encoding="utf-8"))
-        missing = [key for key in REQUIRED_KEYS if key not in summary] if isinstance(summary, dict) else ["a table"]
+        is_object = isinstance(summary, dict)
+        missing = [key for key in REQUIRED_KEYS if key not in summary] if is_object else ["a JSON object"]
         if missing:
-            raise ValueError(f"this is not the summary of a run, {listing(missing)} missing; run again with --force")
+            raise ValueError(f"this is not the summary of a run (missing: {listing(missing)}); run again with --force")
         return summary
     except FileNotFoundError:
         raise RunError(f"{path.parent} does not hold a finished run (no {path.name})") from None

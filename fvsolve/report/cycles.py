@@ -65,8 +65,8 @@ def cycles(result, probes: list[str] | None = None, strength: FatigueStrength | 
     known = [name for name in result.probes if result.column(name).dimension in PRESSURE_QUANTITIES]
     unknown = [name for name in probes or () if name not in known]
     if unknown:
-        raise FvsolveError(f"{listing(unknown)}: unknown probe of pressure or head{did_you_mean(unknown[0], known)}. "
-                           f"The run has {listing(known) or 'none'}")  # fmt: skip
+        hint = did_you_mean(unknown[0], known) or f". The run has {listing(known) or 'none'}"
+        raise FvsolveError(f"no probe of pressure or head named {listing(unknown)}{hint}")
     rows = []
     for name in probes or known:
         if not np.isfinite(result[name]).all():

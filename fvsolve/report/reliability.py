@@ -101,7 +101,7 @@ def open_reason(result) -> str:
     if result.marks:
         return "from some time on the results are not to be trusted"
     if any(notice.kind == "end" for notice in result.warnings):
-        return "a schedule continues after the end of the run"
+        return "a schedule continues, or a trip occurs, after the end of the run"
     return "margins are smaller than the numerical errors"
 
 

@@ -80,15 +80,15 @@ def open_checked_run(directory: Path):
     if not (directory / "summary.json").is_file() and (directory / "restart.npz").is_file():
         resume = f"fvsolve run CASE --out {directory} --resume"
         raise RunError(f"{directory} holds an unfinished run: continue it with {resume}, then report it")
-    result = open_run(directory)
+    result, again = open_run(directory), f"run the case again with fvsolve run CASE --out {directory} --force"
     if gaps := [key for key in REQUIRED_KEYS if key not in result.summary]:
-        raise RunError(f"{directory / 'summary.json'} lacks {listing(gaps)}; run again with --force")
+        raise RunError(f"{directory / 'summary.json'} lacks {listing(gaps)}; {again}")
     pipes = {name: link.length for name, link in result.case.links.items() if link.kind == "pipe"}
     for pipe, length in pipes.items():
         arrays = result.envelope.get(pipe, {})
         if gaps := [name for name in ENVELOPE_QUANTITIES if name not in arrays]:
-            raise RunError(f"{directory / 'envelope.csv'}: {listing(gaps)} of {pipe} missing. Run again with --force")
+            raise RunError(f"{directory / 'envelope.csv'} lacks {listing(gaps)} of {pipe}; {again}")
         x = envelope_column(result, "distance").to_si(arrays["distance"])
         if length - x[-1] > max([2.0 * x[0], *np.diff(x)]):  # the last cell is missing
-            raise RunError(f"{directory / 'envelope.csv'} ends within {pipe}; run again with --force")
+            raise RunError(f"{directory / 'envelope.csv'} lacks the last rows of {pipe}; {again}")
     return result

@@ -406,7 +406,7 @@ class Run:
                 device.remedy: None for name, _, device in model.devices if name.removesuffix(".inside") in names
             }
             parts_text = listing(names) if names else "a leak, or a demand that follows the pressure,"
-            verbs = "open and shut" if len(names) > 1 else "opens and shuts"
+            verbs = "change their states" if len(names) > 1 else "changes its state"
             remedy = ", or ".join(remedies) or "put a chamber at the node of this part"
             return f"stopped: {parts_text} {verbs} without end at {when}; {remedy}"
         if code == loop_indices.STOPPED:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from fvsolve.model.delay_line_selection import line_methods
+from fvsolve.model.delay_line_selection import line_methods, slowest_pipe
 
 POINTS = 5  # points of a cell of a line at which waves are evaluated
 WEIGHTS = np.array([275.0, 100.0, 402.0, 100.0, 275.0]) / 1152.0  # at the middles of fifths; exact to degree 5
@@ -31,7 +31,7 @@ def delay_lines(case) -> list[str]:
 
 def slowest_line(case) -> str:
     """Name of the delay line with the longest travel time; its key `cells` limits the step if the case states none."""
-    return max(delay_lines(case), key=lambda name: case.links[name].length / case.wave_speed(name))
+    return slowest_pipe(case, delay_lines(case))
 
 
 def fixed_choices(case) -> dict[str, str]:

@@ -280,8 +280,8 @@ def find_faults(
     """
     faults: list[Fault] = []
     if goal not in GOALS:
-        suggestion = did_you_mean(str(goal), GOALS)
-        faults.append(Fault("goal", f"{show(goal)} is unknown{suggestion}. Expected {' or '.join(GOALS)}"))
+        hint = did_you_mean(str(goal), GOALS) or f". Expected {' or '.join(GOALS)}"
+        faults.append(Fault("goal", f"{show(goal)} is unknown{hint}"))
     if not 0.0 < rtol < 1.0:
         faults.append(Fault("rtol", f"{rtol} is out of range. Expected a number between 0 and 1"))
     count = len(faults)

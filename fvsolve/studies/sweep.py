@@ -79,7 +79,7 @@ class Sweep(Displayable):
         """
         by_name = {column.partition(" [")[0]: column for column in self.outcomes}
         if name not in by_name and name not in by_name.values():
-            hint = f"{did_you_mean(name, by_name)}. Outcomes are {listing(by_name) or 'none'}"
+            hint = did_you_mean(name, by_name) or f". Outcomes are {listing(by_name) or 'none'}"
             raise FvsolveError(f"no outcome {show(name)}{hint}")
         return by_name.get(name, name)
 

@@ -14,7 +14,7 @@ from fvsolve.studies.case_pickle import PickledCase
 from fvsolve.studies.outcome import has_diverged, refusal_text
 
 REFUSED = "refused: "
-LOST_REASON = "lost: the process that ran it was killed repeatedly. Is there enough memory?"
+LOST_REASON = "lost: the process of this run was killed repeatedly. Is there enough memory?"
 NO_FIELDS = {"output.fields": 0, "output.lines": {}}  # output that no row needs
 
 

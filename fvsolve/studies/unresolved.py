@@ -179,4 +179,4 @@ def differing_events(runs: dict[float, Any]) -> list[str]:
     names = sorted(set().union(*counts)) if len(finished) > 1 else []
     by_device = {name: [event[name] for event in counts] for name in names}
     texts = [f"{name} ({', '.join(map(str, values))})" for name, values in by_device.items() if len(set(values)) > 1]
-    return [f"events differ between resolutions: {listing(texts, MAX_NAMES)}"] if texts else []
+    return [f"numbers of events differ between resolutions: {listing(texts, MAX_NAMES)}"] if texts else []

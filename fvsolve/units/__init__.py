@@ -39,7 +39,8 @@ def parse(given: Any, dimension: str) -> Any:
         raise ValueError(f"{show(given)} is not finite; {expected(dimension)}")
     if abs(value) > MAX_NUMBER:
         raise ValueError(
-            f"{show(given)} is greater than {MAX_NUMBER:g} SI, where products overflow; {expected(dimension)}"
+            f"{show(given)} has a magnitude above {MAX_NUMBER:g} in SI units, where products overflow; "
+            f"{expected(dimension)}"
         )
     if (DIMENSIONS[dimension].base or dimension) == "pressure" and DIMENSIONS[dimension].gauge:
         return value, unit is not None and unit.gauge

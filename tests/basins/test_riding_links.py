@@ -250,7 +250,8 @@ FAULTS = {  # text: (keys of nodes, of the link)
         {}, {"length": 0.9}),
     "its ends lie 1 m apart (a.gap at [2, 0.5, 0] and b.gap at [3, 0.5, 0]), and a valve has no length": (
         {}, {"type": "valve", "area": 0.1, "length": None, "diameter": None}),
-    'joins a.gap, a patch without cells; expected sloshing = "cells"': ({"a": {"sloshing": "frozen"}}, {}),
+    'joins a.gap, a patch of a basin without cells; expected sloshing = "cells" in this basin': (
+        {"a": {"sloshing": "frozen"}}, {}),
     'joins a.gap of a basin on a body, which physics "liquid" does not support yet': (
         {"a": {"physics": "liquid", "pressure": 2e5, "thickness": 0.1, "level": None}}, {}),
     "the reaction of the flow through a.gap is not modelled yet; "

@@ -199,7 +199,11 @@ def test_probes_count_along_the_whole_pipe() -> None:
         (("half", "on", None), "links.half: `at` is 1500.0, but `on` is missing"),
         (("half", "at", None), "links.half: `at` is missing; expected the chainage along main"),
         (("half", "from", "lake"), "links.half.from: `on` and `at` place this link on a pipe, where it starts"),
-        (("hole", "at", 1500.0), "links.half.at: hole has the same place; join half to hole, or change `at`"),
+        (
+            ("hole", "at", 1500.0),
+            "links.half.at: hole has the same place; place a junction there and join hole and half to it, or change",
+        ),
+        (("hole", "at", 2200.0), "hole.at: top has the same place; join hole to top, or change `at`"),
         (("main", "diameter", -1.0), "links.main.diameter: -1.0 is out of range"),
         (("main", "friction", {"model": "steady"}), "links.main.friction"),
     ],

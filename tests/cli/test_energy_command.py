@@ -139,7 +139,7 @@ def test_without_a_case_it_says_what_schemes_and_methods_claim(told):
     "arguments, fault",
     [
         (["--port", "gat"], 'no port named "gat"'), (["--scheme", "upwnd"], 'did you mean "upwind"'),
-        (["--method", "rk5"], "Expected euler, improved-euler"), (["--scheme", "quik"], "Expected upwind, muscl"),
+        (["--method", "xyz"], "Expected euler, improved-euler"), (["--scheme", "quik"], "Expected upwind, muscl"),
         (["--method", "rk5"], 'no method named "rk5"'), (["--set", "nodes.lake.hed=3"], "unknown key"),
     ],
 )  # fmt: skip

@@ -467,7 +467,7 @@ def test_what_nothing_holds_finds_no_balance_and_is_named():
 def test_a_hull_that_would_turn_over_with_its_water_is_a_fault():
     nodes = hull("cells", 0.1, 0.2, 10)
     nodes["hull"]["centre_of_mass"] = [0, 0, 0.8]
-    with pytest.raises(CaseError, match="nodes.pool: in the equilibrium found pool is turned over"):
+    with pytest.raises(CaseError, match="nodes.pool: pool is turned over in the equilibrium found"):
         built(balanced(nodes))
 
 

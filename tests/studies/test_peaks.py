@@ -187,7 +187,7 @@ def test_a_pulse_that_no_cell_shows_is_not_known() -> None:
 def test_events_that_differ_between_resolutions_are_named() -> None:
     runs = {times: Finished([{"name": "nrv"}] * many + [{"name": "pump"}])
             for times, many in ((0.5, 2), (1.0, 2), (2.0, 150))}  # fmt: skip
-    assert differing_events(runs) == ["events differ between resolutions: nrv (2, 2, 150)"]
+    assert differing_events(runs) == ["numbers of events differ between resolutions: nrv (2, 2, 150)"]
 
 
 class Finished:

@@ -69,7 +69,7 @@ def fast_film_notice(basin, error: tuple[float, float, float], when: str = "") -
     remedy = 'method = "rodas-5p"' if basin.part.on is not None else 'method = "ssp-rk3" or "ssp-rk2"'
     deep, method = basin.case.amount(error[1], "length", 3), basin.case.numerics.method
     text = (
-        f"{basin.name}: water runs {100.0 * error[0]:.2g} % too fast{when}: with {method} the rate of friction, "
+        f"{basin.name}: water runs {100.0 * error[0]:.2g} % too fast{when}: with {method} the decay rate by friction, "
         f"{error[2]:.2g} 1/s in {deep} of water, is capped below {RATE_CAP:g} 1/s; "
         f"use {remedy}, where the rate has no cap"
     )

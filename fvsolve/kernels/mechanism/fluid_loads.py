@@ -255,6 +255,7 @@ def pipe_end(y, tables, k, right, share):
 def pipe_load(y, dydt, tables, k):
     """Force and torque of the fluid in pipe k, and of the flow between its ends and the surfaces of tanks, on its body.
 
+    Axes and origin are those of the body.
     `set_body_motion` must have written the motion of the body to `scratch`.
     """
     motion, (r, t, length) = tables.scratch, pipe_segment(tables, k)

@@ -244,7 +244,9 @@ def origin_acceleration(out, here, wide, spin):
 
 @njit
 def centre_of(body, out, here):
-    """Position of the centre of mass of a body from its origin, and its velocity, in axes of the world: 6 numbers.
+    """Position of the centre of mass from the origin of its body, and its velocity in the world: 6 numbers.
+
+    Both are in axes of the world.
 
     here : offset of the body in `out`
     """

@@ -74,9 +74,9 @@ def bore_growth(st, floats, pipe, i, g, y):
 
 @njit
 def work_against_profile(st, floats, pipe, node, y):
-    """Energy stored in wall elements as work against initial steady potential P [J], or its rate [W] if y are rates.
+    """Energy [J] stored in wall elements as work against the initial steady potential P; its rate [W] if y are rates.
 
-    P = p - p_ambient + rho g z; node : node at the `from` end of the pipe
+    P = p - p_ambient + rho g z [Pa]; node : node at the `from` end of the pipe
     """
     start, fall = (node["pressure"] - st["ambient"]) + height_pressure(st, node), pipe["drag"] / pipe["area"]
     sum_ = 0.0

@@ -22,8 +22,9 @@ from fvsolve.parts.accumulator.law import NUMBER_COUNT as SHAPED
 from fvsolve.parts.accumulator.law_shape import FULL_LEVEL, level_at, moment_below, surface_at
 
 GAS_PRESSURE, LEVEL, BOTTOM, COMPRESSOR_RATE, START_LEVEL, STOP_LEVEL, SHAPE = range(SHAPED, SHAPED + 7)
-"""Gas pressure [Pa] and level [m] at the start; height of the bottom above the node [m]; of the compressor, da/dt
-[1/s] and the levels at which it starts and stops [m]; the first number of the shape."""
+"""Indices into the numbers of a vessel: gas pressure [Pa] and level [m] at the start; height of the bottom above the
+node [m]; gas that the compressor adds per second, relative to the gas at the start [1/s]; levels at which it starts and
+stops [m]; the first number of the shape."""
 LEAST_SURFACE = 1e-3  # of the mean surface: lower bound in the stiffness, for a little fluid in a corner
 
 

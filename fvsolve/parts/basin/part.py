@@ -116,7 +116,7 @@ class Holes(Value):
 
 
 class File(Value):
-    """Key that names a file; its value is the name of the copy of the file in the run directory."""
+    """Key that gives the path of a file; its value as read is the name of the copy in the run directory."""
 
     def __init__(self, about: str) -> None:
         self.about = about

@@ -106,7 +106,7 @@ def check_slope(profile: Profile) -> None:
         text = (
             f"{lengths[k]:g} m from chainage {profile.chainage[k]:g} m is too short to rise or fall by {rises[k]:g} m"
         )
-        raise ValueError(f"{text}; chainage counts along the axis")
+        raise ValueError(f"{text}; chainage is the length along the axis, not in plan")
 
 
 def from_lists(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, np.ndarray], dict[str, Any]]:

@@ -137,7 +137,7 @@ def _plastic(series: str, number: float, name: str, size: float, material: str |
     strength = MRS.get(material or "")
     if series == "PN" and strength is None:
         raise ValueError(f"the wall of {name} is known only for {listing(list(MRS))}. Expected one of these "
-                         "materials, or the SDR and allowable_pressure")  # fmt: skip
+                         'materials, or a class such as "SDR11" and the key `allowable_pressure`')  # fmt: skip
     ratio = number if series == "SDR" else 1.0 + 20.0 * strength / (DESIGN_COEFFICIENT * number)
     if not SDR_RANGE[0] <= ratio <= SDR_RANGE[1]:
         raise ValueError(

@@ -133,7 +133,9 @@ def lifting_step(tables, out, k, full, g, m, wide):
 def lifting_slope(tables, out, k, full, wide):
     """Derivative [kg/s/Pa] of the flow of a partly open valve k by the upstream pressure, through the lift.
 
-    It is negative for reverse flow. full : flow at full opening [kg/s]; wide : True if the valve counts as fully open
+    It is negative for reverse flow; it is 0 for reverse flow if the valve counts as fully open, or if the lift that its
+    pressure sets is not between 0 and 1.
+    full : flow at full opening [kg/s]; wide : True if the valve counts as fully open
     """
     if full < 0.0 and (wide or not 0.0 < pressure_lift(tables, out, k) < 1.0):
         return 0.0

@@ -116,8 +116,8 @@ def folded_curve_notice(start, name: str, part, valve) -> list[Notice]:
     if rec.JUNCTION in ends or not any(map(has_fold, part.hill_chart.curves)):
         return []
     cause = f"{part.from_} and {part.to} both set their own pressures"
-    text = (f"{name}: its hill chart is folded, with several flows at one head, and {cause}: the flow may jump "
-            "between these; connect the turbine through a pipe or rigid-column")  # fmt: skip
+    text = (f"{name}: its hill chart is folded, with several flows at one head, and {cause}: the turbine may jump "
+            "between these flows; connect the turbine through a pipe or rigid-column")  # fmt: skip
     return [Notice("range", f"links.{name}", text, "hill_chart")]
 
 

@@ -305,10 +305,10 @@ def extend_window(h, e, p, first: int, stop: int) -> tuple[int, int]:
 
 
 def classify_tail(h, e, first: int, stop: int) -> str | None:
-    """Kind of the rows after the rows first to stop - 1, which lie on a line.
+    """Judge the rows of a convergence table after the rows first to stop - 1, whose errors lie on a line.
 
-    The result is "" if there are no such rows or they are a floor, a note if a single row leaves the line, and None
-    otherwise.
+    The result is "" if there are no rows after them or their errors are a floor, a note if a single row leaves the
+    line, and None if the rows first to stop - 1 cannot be taken. h, e : steps or cell sizes, and errors, of all rows
     """
     rest = e[stop:]
     if rest.size == 0:

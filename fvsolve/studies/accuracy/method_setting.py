@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from fvsolve.case.case import Case
 from fvsolve.case.defaults import raw_link
 from fvsolve.case.sections import DEFAULT_COURANT, uses_error_control
+from fvsolve.model.delay_line_selection import slowest_pipe
 from fvsolve.steppers.built_in_methods import AUTO, METHODS
 from fvsolve.studies.accuracy.case_resolution import basins, cell_counts, cell_keys_of, pipes_with_cells, scaled
 
@@ -54,8 +55,8 @@ def main_part_name(case: Case) -> str | None:
     sizes = {name: max(basin.cells) for name, basin in basins(case).items() if basin.cells}
     if sizes:
         return max(sizes, key=sizes.get)
-    sizes = {name: pipe.length / case.wave_speed(name) for name, pipe in pipes_with_cells(case).items()}
-    return max(sizes, key=sizes.get, default=None)
+    pipes = pipes_with_cells(case)
+    return slowest_pipe(case, pipes) if pipes else None
 
 
 def basin_cells(case: Case) -> int | None:

@@ -58,10 +58,8 @@ def order(
     Raises CaseError, FvsolveError.
     """
     if against not in REFERENCE_KINDS:
-        raise FvsolveError(
-            f'against = "{against}" is unknown{did_you_mean(against, REFERENCE_KINDS)}. '
-            f"Expected {', '.join(REFERENCE_KINDS)}"
-        )
+        hint = did_you_mean(against, REFERENCE_KINDS) or f". Expected {', '.join(REFERENCE_KINDS)}"
+        raise FvsolveError(f'against = "{against}" is unknown{hint}')
     given = initial, source, exact
     if any(given) and (jobs != 1 or dask is not None):
         raise FvsolveError("initial, source and exact are functions of this process. Expected jobs = 1 and no dask")

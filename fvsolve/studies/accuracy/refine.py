@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.case.defaults import raw_link
-from fvsolve.errors import FvsolveError, did_you_mean
+from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.steppers.built_in_methods import AUTO, METHODS
 from fvsolve.studies.accuracy.case_resolution import (
     Counts,
@@ -104,11 +104,12 @@ def refinement_plan(
     """
     known = resolutions(case)
     if key is not None and key not in known:
-        nearest = did_you_mean(key, known)
-        raise FvsolveError(f"{key} is not a resolution of this case{nearest}. Expected one of {', '.join(known)}")
+        hint = did_you_mean(key, known)
+        raise FvsolveError(f"{key} is not a resolution of this case; expected one of {listing(known)}{hint}")
     refine = refine or (known[key] if key else "both" if cell_counts(case) or delay_lines(case) else "time")
     if refine not in WAYS:
-        raise FvsolveError(f'refine = "{refine}" is unknown{did_you_mean(refine, WAYS)}. Expected {", ".join(WAYS)}')
+        hint = did_you_mean(refine, WAYS) or f". Expected {', '.join(WAYS)}"
+        raise FvsolveError(f'refine = "{refine}" is unknown{hint}')
     if refine != "time" and not delay_lines(case):
         refinable_counts(case)
     if key is not None and (known[key] == "time") != (refine == "time"):

@@ -61,7 +61,7 @@ def long_capped_run(model, state, sink, progress) -> Run:
 
 
 def probe_run(model, state, sink, progress) -> Run:
-    """Run of a model that is stopped after about PROBE_STEPS steps; arguments as for `solve.Run`."""
+    """New `Run` of a model, not yet started, that stops after about PROBE_STEPS steps; arguments as for `solve.Run`."""
     run = CappedRun(model, state, sink, progress)
     run.max_steps = PROBE_STEPS
     return run

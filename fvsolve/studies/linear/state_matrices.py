@@ -128,9 +128,9 @@ def refuse_state(model, j: int, cause: str) -> None:
             f"the state cannot be linearised along {model.state_names[j]}: {text}; choose another time with --at"
         )
     reason = {
-        "slope": "its slope does not converge there, like the slope of a valve at a drop of zero: give the valve the "
+        "slope": "the slopes there do not converge, as for a valve with a pressure drop of zero: give the valve the "
                  "key `laminar_reynolds`, or linearise at a time with flow (--at)",
-        "kink": "its slopes for a rise and a fall of this state differ (a tank dry or full, an end stop or seat just "
+        "kink": "the slopes for a rise and a fall of this state differ (a tank dry or full, an end stop or seat just "
                 "touched); choose another time with --at",
     }[cause]  # fmt: skip
     raise FvsolveError(f"the state cannot be linearised along {model.state_names[j]}: {reason}")

@@ -157,7 +157,7 @@ def _slopes(slope, w: np.ndarray, shift: float) -> np.ndarray:
     if not np.all(np.isfinite(bounds) & (bounds >= 0.0)):
         raise FvsolveError(
             f"the bound of the slope of H is negative or not finite on the line Re s = {shift:g} 1/s. "
-            "If poles lie on this line, use a greater shift"
+            "Expected finite numbers of at least 0. If poles lie on this line, use a greater shift"
         )
     return bounds
 

@@ -93,7 +93,8 @@ def response(
         raise FvsolveError(f"{case.name} has no port, because no node has a pressure. Expected a reservoir, junction, "
                            "inflow, chamber or tank")  # fmt: skip
     if port not in case.places:
-        raise FvsolveError(f'no port named "{port}"{did_you_mean(port, case.places)}. Ports are {listing(case.places)}')
+        hint = did_you_mean(port, case.places) or f". Ports are {listing(case.places)}"
+        raise FvsolveError(f'no port named "{port}"{hint}')
     system, flows = _linear_system(case, port, at, before, scheme)
     a, b, c, d = system
     model = flows.at.model

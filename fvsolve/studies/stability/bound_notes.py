@@ -22,7 +22,11 @@ def bound_notes(row, side, system) -> list[str]:
     if row.limited:
         return texts + limiter_notes(row, side.at.model)
     if not np.isfinite(row.predicted):
-        return [*texts, "no step up to 1e4 / ||J|| fails (J: Jacobian)", *nonlinear_failure_notes(row)]
+        return [
+            *texts,
+            "in linearised form no step up to 1e4 / ||J|| fails (J: Jacobian)",
+            *nonlinear_failure_notes(row),
+        ]
     if "eigenvalues" not in row.left_out:
         texts += eigenvalue_notes(row, system)
     texts += field_of_values_notes(row, side)
@@ -41,8 +45,8 @@ def difference_reason(row, side) -> str:
     """Reason why the limits of real runs and of the linear system differ; row, side : as in `bound_notes`."""
     if not state_moves(side):
         return "the deviation does not stay linear"
-    return (f"{row.steps} such steps take {row.steps * row.predicted:.3g} s, and meanwhile the state leaves the "
-            "linearised state; the prediction is for that state only")  # fmt: skip
+    return (f"{row.steps} steps of the predicted limit take {row.steps * row.predicted:.3g} s, and meanwhile the state "
+            "leaves the linearised state; the prediction is for that state only")  # fmt: skip
 
 
 def nonlinear_failure_notes(row) -> list[str]:
@@ -52,8 +56,8 @@ def nonlinear_failure_notes(row) -> list[str]:
     """
     if not np.isfinite(row.measured):
         return []
-    return [f"only the linear system never fails; real runs fail from h = {row.measured:.5g} s on: in so long a time "
-            "the solution leaves the linearised state, and nonlinear laws decide about the growth"]  # fmt: skip
+    return [f"only the linear system never fails; real runs fail from h = {row.measured:.5g} s on: in {row.steps} such "
+            "steps the solution leaves the linearised state, and nonlinear laws determine the growth"]  # fmt: skip
 
 
 def case_notes(row, side) -> list[str]:
@@ -113,8 +117,8 @@ def field_of_values_notes(row, side) -> list[str]:
         reach = float(side.field.real.max())
         if reach > GROWTH_FLOOR * np.abs(side.field).max():
             return [f"the field of values allows no step: it reaches {reach:.3g} 1/s into the right half plane; energy "
-                    "can grow at first (ends of a scheme above first order, a gain in the case). This is not a failure"
-                    ]  # fmt: skip
+                    "can grow at first (pipe ends with a scheme above first order, or a gain in the case). This is not "
+                    "a failure"]  # fmt: skip
         return [
             "the field of values allows no step: it touches the imaginary axis at points outside the stability region"
         ]
