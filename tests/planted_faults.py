@@ -3,8 +3,8 @@
     python tests/planted_faults.py [--full] [--only TEXT] [--jobs 2]
 
 A fault is a sign, an index or a factor of 1.01. Each is planted alone in a copy of the repository. The quick tests of
-the corresponding folder run first, then all quick tests; with --full all tests run on a fault that these miss. A fault
-that stops the import of fvsolve would be found by any test, and is an error of this list.
+its module run first, then all quick tests; with --full all tests run on a fault that these miss. A fault that stops the
+import of fvsolve would be found by any test, and is an error of this list.
 """
 
 from __future__ import annotations
@@ -187,10 +187,17 @@ def tests_fail(folder: Path, jobs: int, *options: str) -> str:
     return lines[0].split(" - ")[0]
 
 
-def near(fault: Fault) -> str:
-    """Folder of tests that corresponds to the folder of a fault, tests/schemes if there is none."""
-    folder = TOP / "tests" / fault.path.split("/")[0]
-    return f"tests/{folder.name}" if folder.is_dir() else "tests/schemes"
+def near(fault: Fault) -> list[str]:
+    """Files of tests that import the module of a fault or have its name, or that of its folder, in their own name."""
+    folder, name = ("", *fault.path.removesuffix(".py").split("/"))[-2:]
+    return [
+        str(path.relative_to(TOP))
+        for path in sorted((TOP / "tests").glob("*/test_*.py"))
+        if f"{folder}.{name} " in (text := path.read_text(encoding="utf-8"))
+        or f"from fvsolve.{folder} import {name}" in text
+        or name in path.stem
+        or (folder and folder in path.stem)
+    ]
 
 
 def main() -> None:
@@ -208,10 +215,11 @@ def main() -> None:
             path, start = folder / "fvsolve" / fault.path, time.perf_counter()
             text = path.read_text(encoding="utf-8")
             path.write_text(fault.planted(text), encoding="utf-8")
-            first = tests_fail(folder, options.jobs, "--quick", near(fault)) or tests_fail(folder, options.jobs)
+            files = near(fault)
+            first = files and tests_fail(folder, options.jobs, "--quick", *files) or tests_fail(folder, options.jobs)
             by = "quick" if first else ""
             if not first and options.full:
-                first = tests_fail(folder, options.jobs, near(fault)) or tests_fail(folder, options.jobs, "--full")
+                first = tests_fail(folder, options.jobs, "--full")
                 by = "full" if first else ""
             path.write_text(text, encoding="utf-8")
             count, quick, every = count + 1, quick + (by == "quick"), every + bool(by)
