@@ -368,8 +368,8 @@ def other_caches() -> str:
         return f"{own.parent} contains code compiled for {', '.join(machines)}; this machine is {own.name}"
     if others:
         return (
-            f"{own.parent.parent} contains code compiled from other sources ({', '.join(others)}); "
-            f"the present sources are {own.parent.name}"
+            f"{own.parent.parent} contains code compiled from other versions of the sources ({', '.join(others)}), "
+            f"which cannot be used with the present version, {own.parent.name}"
         )
     return ""
 

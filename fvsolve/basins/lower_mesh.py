@@ -91,7 +91,10 @@ def _sides(mesh: Mesh) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _by_block(table: np.ndarray) -> np.ndarray:
-    """Flatten a table float64[rows, sides] to the order in memory: by block, side number in the cell, row, cell."""
+    """Flatten a table to the order in memory of `cell_sides`: by block, side number, row of the table, cell.
+
+    table : [rows, sides], its sides ordered by block, side number and cell, with BLOCK cells in every block
+    """
     return table.reshape(len(table), -1, cell_sides.BLOCK).swapaxes(0, 1).ravel()
 
 

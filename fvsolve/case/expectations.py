@@ -161,7 +161,7 @@ COMPARE_KEYS = {
 
 
 def read_compare(probe: Probe | None, given: Any, setting: ReadContext) -> Compare | None:
-    """Read one entry of `[compare]`; None if its probe is faulty. Raises ValueError."""
+    """Read one entry of `[compare]`; None if its probe is faulty. Raises ValueError if entry or file are invalid."""
     if not isinstance(given, dict):
         raise ValueError(f'{show(given)} is not a table; expected for example {{ file = "rig.csv" }}')
     values = read_keys(given, COMPARE_KEYS, setting)

@@ -41,8 +41,8 @@ def chart(
         str | None,
         typer.Option(
             metavar="LIST",
-            help="time steps [s], for a case without cells: 1e-3,1e-4; used by methods without an error estimate, with "
-            "delay lines by all methods (default seven or eight steps)",
+            help="time steps [s] of methods without an error estimate (with delay lines of all methods), for a case "
+            "without cells: 1e-3,1e-4 (default seven or eight steps)",
         ),
     ] = None,
     target: Annotated[

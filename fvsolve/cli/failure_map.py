@@ -167,7 +167,8 @@ def _show(result, files: list[Path], head: str) -> None:
     if result.lines:
         terminal.line(
             console,
-            "or a wave between a storage element and a delay line; growth caused by jumps is not predicted",
+            "or by which a wave between a delay line and a node that stores liquid grows so; growth caused by jumps is "
+            "not predicted",
         )
     if result.limited:
         terminal.line(

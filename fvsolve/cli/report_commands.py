@@ -68,8 +68,8 @@ def fatigue(
         float | None,
         typer.Option(
             metavar="R",
-            help="range of pressure or head that defines the fatigue strength, in the unit of the probe; with "
-            "--allowable-range and --slope (default none: cycles are only counted)",
+            help="range of pressure or head at which the part fails after N cycles, in the unit of the probe; N is the "
+            "value of --allowable-range, and --slope is needed too (default none: cycles are only counted)",
         ),
     ] = None,
     allowable_range: Annotated[

@@ -128,7 +128,7 @@ else:
         return array.ctypes.data
 
     def store_release(address, value):
-        """Store an integer at an address, on which other bands wait."""
+        """Store an integer at an address that other bands read while they wait."""
         ctypes.c_int64.from_address(int(address)).value = int(value)
 
     def load_acquire(address):

@@ -52,7 +52,7 @@ def supporting_pressures(draft, start) -> dict[int, float]:
 
 
 class UnbalancedForces:
-    """Unbalanced forces on joint freedoms and on free masses, for given pushes of springs, stops and pistons."""
+    """Computes unbalanced forces on joint freedoms and free masses, for given forces of springs, stops and pistons."""
 
     def __init__(self, draft, t: float) -> None:
         self.draft, self.free = draft, np.flatnonzero(draft.mass_table["y"] >= 0)

@@ -35,8 +35,8 @@ MAX_ATTENUATION = 0.5  # greatest attenuation of a wave by friction in a line sh
 class LineMethod:
     """Method for a pipe ("finite-volume" or "delay-line"), the reason for it, and the steps that it implies.
 
-    rate : cells that a wave crosses per second in the delay line with the longest travel time [1/s]
-    longest : longest step, for which delay lines are divided into stretches [s]
+    rate : wave rate of all delay lines: key `cells` of the line with the longest travel time, over this time [1/s]
+    longest : longest step [s]; stretches have at least this travel time, or the line is shorter than a step
     For "finite-volume" they are 0 and infinite.
     """
 

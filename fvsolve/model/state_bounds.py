@@ -43,9 +43,9 @@ def depths(model):
 
 
 def in_pipes(model, q: int):
-    """Yield `bound_rows` of the amounts per length of scalar q in each pipe.
+    """Yield `bound_rows` of the amounts per length of scalar q in the cells of each pipe.
 
-    They are its least and greatest value times the mass per length that follows from both waves.
+    The bounds are the least and the greatest value of the scalar, times the mass per length from both waves.
     """
     row, profile = model.tables.scalars[q], model.tables.profile
     for pipe in model.tables.pipes:

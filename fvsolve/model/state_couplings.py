@@ -219,7 +219,10 @@ class Couplings:
         return [joined[group[i]] if self.inner[i] else self.pressure_states(i) for i in range(len(group))]
 
     def stored(self) -> Iterator[Pairs]:
-        """Yield couplings of the masses in tanks, chambers and patches, and of the ledger, with the flows into them."""
+        """Yield pairs (rates, states) of the masses in tanks, chambers and patches, and of the mass ledger.
+
+        The states are those that determine the flows into them.
+        """
         into = [[self.pressure_states(i)] for i in range(len(self.nodes))]
         for pipe in self.pipes:
             for right, i in enumerate(ends_of(pipe)):
@@ -338,7 +341,9 @@ class Couplings:
                     yield pipe["y"] + wave * cells.size + here, first + here + offset
 
     def friction_memory_pairs(self, pipe) -> Iterator[Pairs]:
-        """Yield couplings of waves with memory states of unsteady friction, and of these with the waves in their cell.
+        """Yield pairs (rates, states) of unsteady friction: waves with memory states, and memory states with waves.
+
+        Both are those of the same cell.
 
         Under density laws other than `linear` the memory is that of the velocity, which depends on neighbouring cells
         too.

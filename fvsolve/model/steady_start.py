@@ -185,7 +185,10 @@ class SteadyStart:
         return held, np.zeros_like(demand) if self.rest else demand
 
     def set_supporting_pressures(self, pressures: dict[int, float]) -> bool:
-        """Set the pressures of closed chambers that support loads : node -> pressure [Pa]; True if there are any."""
+        """Hold closed chambers that support loads at given pressures in the next `solve`; True if there are any.
+
+        pressures : node -> pressure [Pa]
+        """
         self.loads = pressures
         return bool(pressures)
 

@@ -216,7 +216,7 @@ def _violations(result, way: SectionPath, chainage: np.ndarray, along: dict) -> 
 
 
 def _devices(result, way: SectionPath) -> list[SectionDevice]:
-    """Nodes of the path `way` with their devices; here the chainages of `SectionDevice` are in m."""
+    """A `SectionDevice` for each place of the path `way`, its chainage in m, not in the unit of the output."""
     case, devices = result.case, []
     for place, chainage in way.places:
         owner = place.partition(".")[0]

@@ -21,10 +21,10 @@ EXTREMES = (  # quantity, its text, function of the index of the extreme, quanti
 
 
 def extremes_of_pipes(result, ways: list[SectionPath]) -> ReportTable | None:
-    """Table of the extremes over all pipes: value, pipe, distance, elevation, time; None without pipes or if diverged.
+    """Table of the extremes of each quantity over all pipes: value, pipe, distance, elevation, time.
 
-    The chainage is added if the run has a single section, and if the chainage differs from the
-    distance along the pipe.
+    It is None without pipes, or if the run diverged. The chainage is added if the run has a single section, and if the
+    chainage differs from the distance along the pipe. ways : paths of the long sections
     """
     envelope = result.envelope
     if not envelope or not_valid(result.summary):

@@ -94,7 +94,11 @@ def model_of(case, set: Mapping | None = None, like=None):
 
 
 def sink_of(model, out: str | Path | None, force: bool, resume: bool, threads: int = 1):
-    """Object that stores the output of a run: in memory, or in a run directory, which is locked until it is closed."""
+    """Object that stores the output of a run: in memory, or in a run directory, which is locked until it is closed.
+
+    out : run directory, None for memory; force, resume : as for `RunDirectory`. Raises RunError for `threads` above 1
+    under MPI, and for `resume` without `out`.
+    """
     with mpi_run.rank_zero_first(comm := mpi_run.world()):
         if comm is not None and threads > 1:
             raise RunError(

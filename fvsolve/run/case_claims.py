@@ -46,8 +46,9 @@ def expectations(model, summary, result) -> list[dict]:
 def expectation(text: str, expect, column: UnitColumn, value: float, complete: bool) -> dict:
     """Entry of the summary for one claim: claimed and found value and tolerance in the unit of `column`, and state.
 
-    value : value in the run [SI], not finite if unknown; complete : True if the run is ok and valid at the time of the
-    value, without which a claim that is met is open. `error` is None until an error estimate sets it.
+    text, expect : name and data of the claim; value : value in the run [SI], not finite if unknown
+    complete : True if the run is ok and valid at the time of the value; if False, a claim that is met is open
+    `error` of the entry is None until an error estimate sets it.
     """
     tolerance = expect.atol + expect.rtol * abs(expect.value)
     known = math.isfinite(value)

@@ -54,7 +54,8 @@ class Partition:
     def row_blocks(self, k: int) -> np.ndarray:
         """Blocks of states that band k steps : int64[q, 4]; blocks that every band steps come first.
 
-        Each row: first state, last state + 1, number of the first partial sum, number of partial sums.
+        Each row: first state, last state + 1, index of its first partial sum of the error norm (see `sum_count`), count
+        of its partial sums.
         """
         alike = self.common_states()
         blocks, first = [(*run, m, 1) for m, run in enumerate(alike)], len(alike)

@@ -132,7 +132,8 @@ def stopped_runs_text(case: Any, runs: dict[float, Any]) -> str:
     ended = [f"{times:g} times the resolution: {run.reason}" for times, run in runs.items() if run.reason != "finished"]
     if len(runs) == 1:
         ended = [
-            f"cells of {listing(basins_from_files(case), MAX_NAMES)} come from a file; use a file with finer cells"
+            f"the cells of {listing(basins_from_files(case), MAX_NAMES)} come from a file, so there is no run at "
+            "another resolution; run the case with a file of finer cells, and compare both runs with fvsolve compare"
         ]
     return "; ".join(ended) or "at another resolution the peak is not a number; use more cells or shorter steps"
 

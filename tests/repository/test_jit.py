@@ -130,7 +130,7 @@ def test_code_of_other_sources_is_named(package):
     old = python(package, "from fvsolve import jit; print(jit.source_hash())")[0]
     (package / "units.py").write_text("NEW = 1\n")
     told = " ".join(python(package, "from fvsolve import jit; print(jit.other_caches())"))
-    assert f"contains code compiled from other sources ({old}); the present sources are " in told
+    assert f"contains code compiled from other versions of the sources ({old}), which cannot be used" in told
 
 
 @pytest.mark.parametrize(

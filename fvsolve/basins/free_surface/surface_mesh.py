@@ -145,7 +145,7 @@ def close_walls(g, edges, number, reflect, rest, h0, geo, w, thrust):
 
 @njit
 def clear(w):
-    """Set the rates of a block of cells, and their sums for the limit of the time step, to zero."""
+    """Set the rates of a block of cells in its scratch w, and their sums for the limit of the time step, to zero."""
     for i in range(BLOCK):
         w[_RH + i], w[_RX + i], w[_RY + i], w[_FAST + i], w[_OUTFLOW + i] = 0.0, 0.0, 0.0, 0.0, 0.0
 

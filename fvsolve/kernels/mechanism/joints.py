@@ -170,7 +170,10 @@ def set_prismatic(body, t, y, tables, own):
 
 @njit
 def copy_joint_axes(tables, own):
-    """Set the attitude of a body to the axes of its joint, which are in scratch[9:18]; for joints without rotation."""
+    """Set the attitude of a body to the axes of its joint, for joints without rotation.
+
+    scratch[9:18] : axes of the joint, see `set_joint_frame`; own : data of the body in `out`
+    """
     for k in range(9):
         own[ATTITUDE + k] = tables.scratch[9 + k]
 

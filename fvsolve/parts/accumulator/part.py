@@ -34,7 +34,7 @@ class Accumulator(Node, kind="accumulator"):
     compressed. An air vessel that runs empty lets its air into the node.
     """
 
-    no_scalars: ClassVar[str] = "its contents carry no scalars yet"
+    no_scalars: ClassVar[str] = "its contents carry no scalars yet; leave out this part, or `[scalars]`"
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (GAS_KEYS, SHAPE_KEYS)
     quantities: ClassVar[dict[str, str]] = {**Node.quantities, "gas_pressure": "pressure", "gas_volume": "volume"}
     fixes_pressure: ClassVar[bool] = True

@@ -30,7 +30,7 @@ class AirValve(Node, kind="air-valve"):
     With `switch` or `switch_velocity` it throttles the outflow until the air inside is at ambient pressure again.
     """
 
-    no_scalars: ClassVar[str] = "its contents carry no scalars yet"
+    no_scalars: ClassVar[str] = "its contents carry no scalars yet; leave out this part, or `[scalars]`"
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (SWITCH_KEYS,)
     quantities: ClassVar[dict[str, str]] = {
         **Node.quantities, "air_volume": "volume", "air_mass": "mass", "air_pressure": "pressure",

@@ -146,7 +146,10 @@ class Joint(Table):
 
     @classmethod
     def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
-        """Table with the keys `rate`, `damping` and `stiffness` read in the units of the kind of joint."""
+        """Copy of a table in which the keys `rate`, `damping` and `stiffness` are read in units of the kind of joint.
+
+        Raises ValueFault for an invalid value.
+        """
         kind, result, faults = given.get("kind", "free"), dict(given), []
         rate, damping, stiffness = LINEAR_DIMENSIONS if kind == "prismatic" else ANGULAR_DIMENSIONS
         triple = kind in ("ball", "free")

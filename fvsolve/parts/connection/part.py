@@ -84,10 +84,10 @@ class Throat(TwoPort):
 
 
 def with_connection(name: str, vessel: Any, place: Any) -> tuple[dict[str, Any], dict[str, Throat]]:
-    """(places, links) that represent a vessel, each by name.
+    """(places, links) that represent a vessel: two dicts by name.
 
     A vessel without connection is the only place, and there are no links. Otherwise the result is that of
-    `behind_throat`. place : node that other links join if there is a connection
+    `behind_throat`. place : node that other links join if there is a connection; it gets the name of the vessel
     """
     if vessel.connection is None:
         return {name: vessel}, {}

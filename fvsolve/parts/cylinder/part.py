@@ -24,7 +24,7 @@ class Cylinder(Link, kind="cylinder"):
     energy: that of its chambers. Dissipated power: leakage (p_A - p_B)^2 + viscous_friction (v_rod - v_case)^2 [W].
     """
 
-    no_scalars: ClassVar[str] = "its chambers carry no scalars yet"
+    no_scalars: ClassVar[str] = "its chambers carry no scalars yet; leave out this part, or `[scalars]`"
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("area_A", "piston_diameter"), ("area_B", "rod_diameter"))
     joins: ClassVar[dict[str, str]] = {"rod": "translational or spatial", "case": "translational or spatial"}
     owns: ClassVar[dict[str, str]] = {"A": "hydraulic", "B": "hydraulic"}

@@ -34,7 +34,7 @@ class PositiveList(Value):
 
     def read(self, given: Any, setting: ReadContext) -> tuple[float, ...]:
         if not isinstance(given, (list, tuple)) or not given:
-            raise ValueError(f"{show(given)} is not a list of numbers; expected one number for each element")
+            raise ValueError(f"{show(given)} is not a list of numbers; expected one number for each creep element")
         values = tuple(float(parse(raw, self.dimension)) for raw in given)
         for raw, value in zip(given, values, strict=True):
             positive.check(value, raw)

@@ -137,7 +137,7 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
                 valve["drop"] = drop
         if valve["open"] == 0.0 and k not in start.shut:
             moving.append(
-                f"pump {name}: runs at {valve['drive']:.4g} of its rated speed, with a flow that is not on its curve"
+                f"pump {name}: runs at {valve['drive']:.4g} of its rated speed; its initial flow is not on its curve"
             )
         draft.warnings += [
             *reversed_pump(start, name, part, valve),

@@ -71,7 +71,10 @@ def angle_faults(points: list[tuple[float, float]]) -> list[tuple[str, str]]:
                 )
             ]
         if across * way < 0.0:
-            rule = f"its angle, atan2({FLOW}, {SPEED}), must rise or fall throughout: give the points in their order"
+            rule = (
+                f"its angle, atan2({FLOW}, {SPEED}), must rise or fall throughout: list the points in their order "
+                "along the curve"
+            )
             return [("", f"turns back at point {k + 1}, {point_text((n, q))}; a curve may fold in {SPEED}, but {rule}")]
         way = across
         if (n > 0.0) != (m > 0.0) and (q * abs(m) + r * abs(n)) <= 0.0:
