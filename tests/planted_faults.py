@@ -188,9 +188,12 @@ def tests_fail(folder: Path, jobs: int, *options: str) -> str:
 
 
 def near(fault: Fault) -> list[str]:
-    """Files of tests that import the module of a fault or have its name, or that of its folder, in their own name."""
+    """Files of tests that import the module of a fault or have its name, or that of its folder, in their own name.
+
+    Without such files it is the folder of tests of this part of the package, if there is one.
+    """
     folder, name = ("", *fault.path.removesuffix(".py").split("/"))[-2:]
-    return [
+    files = [
         str(path.relative_to(TOP))
         for path in sorted((TOP / "tests").glob("*/test_*.py"))
         if f"{folder}.{name} " in (text := path.read_text(encoding="utf-8"))
@@ -198,6 +201,8 @@ def near(fault: Fault) -> list[str]:
         or name in path.stem
         or (folder and folder in path.stem)
     ]
+    part = fault.path.split("/")[0]
+    return files or ([f"tests/{part}"] if (TOP / "tests" / part).is_dir() else [])
 
 
 def main() -> None:
