@@ -219,13 +219,13 @@ def stencil(past, clock, t):
     clock : result of `reading_data`. After that entry its value is kept.
     """
     newest, latest, per_step, even = clock[0], clock[1], clock[2], clock[3]
+    if t >= latest:
+        return newest, (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
     place = (t - latest) * per_step
     if place <= -even:
         return lagrange_unequal(past, newest, t)
     steps = int(place) - 1 if place < int(place) else int(place)
     k, x = newest + steps, place - steps
-    if k >= newest:
-        return newest, (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
     if k + 3 <= newest and steps - 2 >= -even:
         return k, lagrange_six(x)
     if k + 2 <= newest and steps - 1 >= -even:
