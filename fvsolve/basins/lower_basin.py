@@ -418,8 +418,8 @@ class BasinRows:
         if diffusing and not self.is_grid:
             return (
                 None,
-                f"{listing(diffusing)} {'diffuse' if len(diffusing) > 1 else 'diffuses'} on a mesh with oblique faces; "
-                "a rectangle keeps the bounds",
+                f"{listing(diffusing)} {'diffuse' if len(diffusing) > 1 else 'diffuses'} on a mesh that is "
+                "not a full rectangle; a full rectangle keeps the bounds",
                 None,
                 None,
             )

@@ -195,7 +195,10 @@ def _patch_hint(basin: Basin, known: tuple[str, ...], name: str) -> str:
     if known or basin.mesh is None:
         return f"patches are {listing(known) or 'none'}"
     file = Path(basin.mesh.file).name
-    return f"{file} has no named groups of lines; in Gmsh name them by Physical Curve({show(name)}) = {{1, 2}};"
+    return (
+        f"{file} has no named groups of lines; in Gmsh name the lines of this patch, such as 1 and 2, by "
+        f"Physical Curve({show(name)}) = {{1, 2}};"
+    )
 
 
 def find_faults(

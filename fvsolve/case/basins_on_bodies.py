@@ -28,7 +28,8 @@ def find_faults(name: str, basin: Any, nodes: dict[str, Any], named: Any) -> Fau
     yield from place_faults(name, basin, nodes, named)
     if basin.on is None:
         if basin.sloshing != "cells":
-            yield (*key, "sloshing"), "applies only to water on a body; give the body as `on = BODY`"
+            text = "applies only to water on a body; give the body as `on = BODY`, or remove this key"
+            yield (*key, "sloshing"), text
         return
     if not basin.physics_type.on_bodies:
         kinds = " or ".join(show(name) for name, patch_options in Physics.kinds.items() if patch_options.on_bodies)

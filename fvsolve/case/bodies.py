@@ -246,7 +246,8 @@ def find_faults(nodes: dict[str, Any], named: Any) -> Faults:
             has = f"its points are {listing(own[on].points)}" if own[on].points else "it has no points"
             yield keys, f"{on} has no point {show(point)}; {has}{did_you_mean(point, own[on].points)}"
         elif not point and on not in bodies:
-            yield keys, f"{show(on)} is a frame; expected a point of it, FRAME.POINT, or leave out `on`"
+            text = f"{show(on)} is a frame; expected a point of this frame (FRAME.POINT)"
+            yield keys, f"{text}; for a joint to the world leave out `on`"
     loop = set(bodies) - set(bodies_of(nodes)) - {name for name in bodies if not ends_in_loop(nodes, bodies, name)}
     while loop:
         name = min(loop, key=list(bodies).index)

@@ -344,11 +344,11 @@ def name_faults(
     for item in names:
         if item in result.named:
             result.connections_known = False
-            report(
-                ("links", item), f"{name} is cut, and {show(item)} is the name of one of its pieces; rename this link"
-            )
+            text = f"pipe {name} is cut at the parts and bends on it, and {show(item)} is the name of a piece"
+            report(("links", item), f"{text}; rename this link")
     if name in result.table["routes"]:
-        report(("routes", name), f"{name} is cut, and its pieces form a route of that name; rename this route")
+        text = f"pipe {name} is cut at the parts and bends on it, and the pieces form a route of that name"
+        report(("routes", name), f"{text}; rename this route")
     for item in parts:
         for place in dict.fromkeys(item.joins) if item.group == "links" else ():
             if place in result.table["nodes"]:

@@ -152,15 +152,15 @@ def numerics(numerics: Numerics, has_cells: bool) -> Faults:
     method = METHODS.get(numerics.method)
     if numerics.courant is not None and not has_cells:
         or_rtol = " or `rtol`" if method is None or method.adaptive else ""
-        yield ("numerics", "courant"), f"needs cells, and the case has no pipe or basin; give `step`{or_rtol}"
+        yield ("numerics", "courant"), f"needs cells, and the case has no pipe or basin; give `step`{or_rtol} instead"
     least = LEAST_STEP * max(abs(numerics.start), abs(numerics.end))
     if numerics.step is not None and not numerics.step > least:
         yield (
             ("numerics", "step"),
-            f"{numerics.step:g} s is below the rounding of the time; expected more than {least:.2g} s",
+            f"{numerics.step:g} s is below the rounding error of the time; expected more than {least:.2g} s",
         )
     if numerics.rtol is not None and numerics.rtol < LEAST_TOLERANCE:
-        yield ("numerics", "rtol"), f"{numerics.rtol:g} is below rounding; expected {LEAST_TOLERANCE:g} or more"
+        yield ("numerics", "rtol"), f"{numerics.rtol:g} is below rounding errors; expected {LEAST_TOLERANCE:g} or more"
     if numerics.method == AUTO and not numerics.courant is numerics.step is None:
         yield (
             ("numerics", "method"),
@@ -371,8 +371,8 @@ def _rigid_junctions(nodes: dict[str, Any], links: dict[str, Any], ends: dict[st
     for name, node in nodes.items():
         if _dict(node).get("type") in ("junction", "inflow") and touching.get(name) == {"rigid-column"}:
             fixed = ", since its demand is constant above its required_pressure" if "required_pressure" in node else ""
-            message = f"only rigid columns join here, so nothing sets its pressure{fixed}; use a chamber with a volume"
-            yield ("nodes", name), message
+            message = f"only rigid columns join this node, so nothing sets its pressure{fixed}"
+            yield ("nodes", name), f"{message}; use a chamber with a volume"
 
 
 def _elevations(nodes: dict[str, Any], links: dict[str, Any], lends: bool) -> Faults:
@@ -394,7 +394,7 @@ def _elevations(nodes: dict[str, Any], links: dict[str, Any], lends: bool) -> Fa
             climb = abs(heights[1] - heights[0])
             yield (
                 ("links", name, "length"),
-                f"{length:g} m is too short: its ends differ by {climb:g} m in elevation",
+                f"{length:g} m is too short: the ends differ by {climb:g} m in elevation; expected a greater length",
             )
 
 

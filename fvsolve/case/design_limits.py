@@ -170,5 +170,5 @@ def pipes_without_class(extent: Extent, links: Mapping[str, Any]):
         more = f" and {len(parts) - 1} more" if len(parts) > 1 else ""
         yield (
             ("class_fraction",),
-            f"no pressure class is given for {parts[0]}{more}; expected the key `class` or `allowable_pressure` there",
+            f"no pressure class is given for {parts[0]}{more}; expected pipes with `class` or `allowable_pressure`",
         )

@@ -409,7 +409,7 @@ class _Reader:
             if gauge:
                 raise ValueError(f'{show(given)} is a gauge pressure; expected an absolute pressure, such as "1 atm"')
             if ambient <= 0:
-                raise ValueError(f'{show(given)} is absolute and not above 0; expected for example "1 atm"')
+                raise ValueError(f'{show(given)} is not an absolute pressure above 0; expected for example "1 atm"')
             self.setting.ambient = ambient
         except ValueError as error:
             self.fault(("ambient_pressure",), str(error))

@@ -72,10 +72,9 @@ def missing_reactions(nodes: dict[str, Any], links: dict[str, Any], free: bool =
     for name in tanks:
         for key in ("connection", "height"):
             if getattr(nodes[name], key) is not None:
-                yield (
-                    ("nodes", name, key),
-                    "the reaction of this flow on the body is not modelled yet; expected a tank without this key",
-                )
+                flow = "flow through the connection" if key == "connection" else "spilled water"
+                text = f"the reaction of the {flow} on the body is not modelled yet; expected a tank without this key"
+                yield ("nodes", name, key), text
         if hasattr(nodes[name].area, "area"):
             yield ("nodes", name, "area"), "a tank on a body supports only a constant area; expected a number"
     for name, link in links.items():
@@ -132,7 +131,8 @@ def link_faults(link: Any, ends: list[str], nodes: dict[str, Any], patches: dict
     if len(set(on)) > 1:
         each = zip(ends, on, strict=True)
         words = " and ".join(f"{end}, on {body}" if body else f"{end}, which is fixed" for end, body in each)
-        yield (), f"joins {words}: this would be a flexible hose, which is not supported yet"
+        text = f"joins {words}: this would be a flexible hose, which is not supported yet"
+        yield (), f"{text}; expected both ends on one body, or both fixed"
         return
     unable = [*dict.fromkeys(words for end, node in zip(ends, stand, strict=True) for words in patch_faults(end, node))]
     yield from (((), text) for text in unable)
@@ -143,12 +143,12 @@ def link_faults(link: Any, ends: list[str], nodes: dict[str, Any], patches: dict
     points = np.array([where[0].place, *getattr(link, "route", []), where[-1].place])
     way = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
     if length is None and way > LENGTH_TOLERANCE:
-        text = f"its ends lie {way:g} m apart{position_text(ends, patches)}, and {article(link.kind)} has no length"
+        text = f"the ends lie {way:g} m apart{position_text(ends, patches)}, and {article(link.kind)} has no length"
         yield (), f"{text}; expected both ends at one place, and a pipe or rigid-column to the other place"
     elif length is not None and way > length * (1.0 + LENGTH_TOLERANCE):
         yield (
             ("length",),
-            f"{length:g} m is too short: its route on {on[0]} is {way:g} m long{position_text(ends, patches)}",
+            f"{length:g} m is too short: the route on {on[0]} is {way:g} m long{position_text(ends, patches)}",
         )
 
 

@@ -102,7 +102,7 @@ def wall_faults(
     patch, options : name and keys of the patch; other arguments as for `find_faults`
     """
     if not basin.physics_type.moves:
-        yield (), f"physics {show(basin.physics)} does not support moving walls"
+        yield (), f"physics {show(basin.physics)} does not support moving walls; leave out `body` or `travel`"
     for other in ("boundary", "impedance", "scalars"):
         if getattr(options, other):
             yield (other,), "applies only to an open boundary, and this is a moving wall; leave this key out"
@@ -129,7 +129,7 @@ def wall_faults(
     if zone > size * (1.0 + 1e-9):
         yield (
             ("zone",),
-            f"{zone:g} m is more than the length of the basin along {'xy'[axis]}, {size:g} m; expected less",
+            f"{zone:g} m is more than the length of the basin along {'xy'[axis]}, {size:g} m; expected a narrower zone",
         )
     if options.travel is not None:
         per = area_growth(mesh, axis, weights(basin, mesh, patch, at))
@@ -166,7 +166,8 @@ def slider_faults(name: str, node: Any, nodes: dict[str, Any], axis: int) -> Ite
         remedy = "expected a prismatic joint to the world, or `travel` instead of `body`"
         yield f"{name} does not slide on the world; {remedy}"
     elif abs(slide_direction(node)[axis]) < 1.0 - 1e-9:
-        yield f"{name} does not slide along {'xy'[axis]}, the axis of the wall; change the axis of its joint"
+        text = f"{name} does not slide along {'xy'[axis]}, the direction in which the wall moves"
+        yield f"{text}; change the axis of the joint of {name}"
 
 
 def slide_direction(body: Any) -> np.ndarray:
@@ -243,7 +244,7 @@ def faults_between(basin: Any, mesh: Any, walls: dict[str, Any], times: tuple) -
             end = mesh.points[:, axis].max() if side > 0.0 else mesh.points[:, axis].min()
             lies = np.abs(mesh.middle[mesh.patch(patch), axis] - end) < 1e-9 * np.ptp(mesh.points[:, axis])
             if lies.any():
-                yield (patch,), f"lies on the side of the moving wall {wall}; expected on a fixed side"
+                yield (patch,), f"lies on the side of the moving wall {wall}; expected a patch on a fixed side"
 
 
 def crossing_faults(basin: Any, mesh: Any, walls: dict[str, Any], times: tuple) -> Iterator[tuple[tuple, str]]:

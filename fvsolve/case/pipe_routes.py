@@ -145,7 +145,8 @@ def find_faults(
         if k is not None:
             pairs = [(pipe, links[pipe]) for pipe in route.pipes[k - 1 : k + 1]]
             ends = " and ".join(f"{pipe} joins {item.from_} and {item.to}" for pipe, item in pairs)
-            text = f"{route.pipes[k]} does not join the previous pipe: {ends}, and no links other than pipes join them"
+            text = f"{route.pipes[k]} does not join the previous pipe: {ends}"
+            text += ", and no links of other types join these two pipes"
             yield ("routes", name, "pipes", index_in_file(route, pieces, k)), text
 
 

@@ -112,7 +112,8 @@ def route_probe(text: str, name: str, quantity: str, place: str | None, kinds: K
     at = begin + fraction_of(place or "0", end - begin, begin) * (end - begin)
     leg = next((item for item in legs if at <= item.end), legs[-1])
     if leg.backwards and quantity in ("flow", "velocity"):
-        raise ValueError(f"{name} and {leg.pipe} have opposite directions there; expected {leg.pipe}.{quantity}@x")
+        text = f"{name} runs against the direction of {leg.pipe} at this place"
+        raise ValueError(f"{text}; expected a probe of the pipe, for example {leg.pipe}.{quantity}@0.5")
     share = min(max((at - leg.begin) / (leg.end - leg.begin), 0.0), 1.0)
     share = 1.0 - share if leg.backwards else share
     scalar = kinds["scalars"].get(quantity)

@@ -79,7 +79,9 @@ def read_raw(source: Any) -> Raw:
     try:
         table = tomllib.loads(text)
     except RecursionError:
-        raise CaseError([Fault("", "tables or lists are nested too deep")], path.name) from None
+        raise CaseError(
+            [Fault("", f"tables or lists are nested too deep; expected at most {DEEPEST} levels")], path.name
+        ) from None
     except ValueError as error:
         if re.search(r"^\s*\[(JUNCTIONS|RESERVOIRS|PIPES)\]", text, re.MULTILINE | re.IGNORECASE):
             message = f"is an EPANET network, not a case; fvsolve import {path} translates it"

@@ -45,7 +45,7 @@ def find_faults(
     if output.every is not None and not output.every > least:
         yield (
             ("output", "every"),
-            f"{output.every:g} s is below the rounding of the time; expected more than {least:.2g} s",
+            f"{output.every:g} s is below the rounding error of the time; expected more than {least:.2g} s",
         )
     elif output.every is not None and output.probes is not None and span > 0.0:
         rows, columns = span / output.every, 1 + len(output.probes)
@@ -63,9 +63,8 @@ def rounding_faults(numerics: Any, crossing: float) -> Iterator[tuple[tuple, str
     """
     least = LEAST_STEP * max(abs(numerics.start), abs(numerics.end))
     if numerics.courant is not None and not numerics.courant * crossing > least:
-        text = (
-            f"{numerics.courant:g} gives steps of {numerics.courant * crossing:.2g} s, below the rounding of the time"
-        )
+        text = f"{numerics.courant:g} gives steps of {numerics.courant * crossing:.2g} s"
+        text += ", below the rounding error of the time"
         yield ("numerics", "courant"), f"{text}; expected more than {least / crossing:.2g}"
 
 

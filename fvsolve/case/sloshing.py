@@ -230,13 +230,14 @@ def weightless(nodes: dict[str, Any], gravity: float | None) -> Faults:
 def unsupported_keys(key: tuple, basin: Any) -> Faults:
     """Faults of keys of a basin that are not valid with sloshing modes; key : key path of the basin."""
     for key_name in sorted(basin.start.model_fields_set) if basin.start is not None else ():
-        yield (*key, "start", key_name), "modes start from level water at rest; leave this key out"
+        yield (*key, "start", key_name), "sloshing modes start from level water at rest; leave this key out"
     for patch, patch_options in basin.patches.items():
         if patch_options.boundary == "open":
-            yield (*key, "patches", patch, "boundary"), "modes are valid only with walls on all sides; expected a wall"
+            text = "sloshing modes are valid only with walls on all sides; expected a wall"
+            yield (*key, "patches", patch, "boundary"), text
     for key_name in ("manning", "factor"):
         if getattr(basin, key_name) is not None:
-            yield (*key, key_name), "modes have no friction; leave this key out"
+            yield (*key, key_name), "sloshing modes have no friction; leave this key out"
 
 
 def held_water(basin: Any, mesh: Any, density: float) -> tuple[float, np.ndarray, np.ndarray]:

@@ -26,31 +26,32 @@ def chart(
         str | None,
         typer.Option(
             metavar="LIST",
-            help="numbers of cells along the basin side with most cells, or without basins of the pipe with the "
-            "longest travel time: 50,100,200 (default up to five numbers)",
+            help="numbers of cells to compare, for example 50,100,200, of the pipe with the longest travel time or of "
+            "the basin side with most cells (default up to five numbers that suit the case)",
         ),
     ] = None,
     rtol: Annotated[
         str | None,
         typer.Option(
             metavar="LIST",
-            help="relative tolerances, for a case without pipes and basins: 1e-3,1e-6 (default 1e-2 to 1e-10)",
+            help="relative tolerances to compare, for example 1e-3,1e-6, for a case without pipes and basins "
+            "(default 1e-2 to 1e-10)",
         ),
     ] = None,
     step: Annotated[
         str | None,
         typer.Option(
             metavar="LIST",
-            help="time steps [s] of methods without an error estimate (with delay lines of all methods), for a case "
-            "without cells: 1e-3,1e-4 (default seven or eight steps)",
+            help="fixed time steps [s] to compare, for example 1e-3,1e-4, for a case without cells "
+            "(default seven or eight steps)",
         ),
     ] = None,
     target: Annotated[
         float | None,
         typer.Option(
             metavar="ERROR",
-            help="greatest accepted error, as a fraction of the range of a probe; the cheapest settings that satisfy "
-            "it are printed, or with --models the cheapest model (default none, or 0.01 with --models)",
+            help="greatest accepted error of a probe, as a fraction of its range, for which the cheapest settings or "
+            "model are printed (default none, or 0.01 with --models)",
         ),
     ] = None,
     models: Annotated[
@@ -144,7 +145,11 @@ def _show(result, paths) -> None:
     )
     print_sheet(ResultTable(FRONT, [vars(row) for row in result.front]), terminal)
     own = result.stands
-    line(terminal, f"default: {result.default}; times and cell updates are interpolated between the runs of a curve")
+    line(
+        terminal,
+        f"default: {result.default}; times and cell updates are interpolated between the runs of each pair of scheme "
+        "and method",
+    )
     if own is not None:
         outcome = f"error {own.trajectory:.2g} in {own.seconds * 1e3:.3g} ms" if own.ok else own.reason
         line(terminal, f"default at its own resolution, {own.setting.fineness}: {outcome}")

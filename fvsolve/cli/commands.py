@@ -221,8 +221,8 @@ def view(
     field: Annotated[
         str | None,
         typer.Option(
-            help="quantity to draw: pressure, head, flow, depth, ... (default pressure, or for a case without pipes a "
-            "quantity of its basins or bodies)"
+            help="quantity to draw, such as pressure, head, flow, velocity or depth (default pressure, or for a case "
+            "without pipes the first field of its basins or the speed of its bodies)"
         ),
     ] = None,
     contours: Annotated[

@@ -47,14 +47,14 @@ Schemes = Annotated[
     str | None,
     typer.Option(
         metavar="S,S,...",
-        help="schemes to run with a case (default the scheme of the case), or to list without a case (default all)",
+        help="schemes to study (default scheme of the case, or without a case all schemes)",
     ),
 ]
 Methods = Annotated[
     str | None,
     typer.Option(
         metavar="M,M,...",
-        help="methods to run with a case (default the method of the case), or to list without a case (default all)",
+        help="methods to study (default method of the case, or without a case all methods)",
     ),
 ]
 LINES = 12  # greatest number of lines of a kind on the terminal; energy.csv has all

@@ -32,7 +32,9 @@ def import_(
     hour: Annotated[
         float, typer.Option(metavar="H", help="hours from the start of the EPANET run to the initial state of the case")
     ] = 0.0,
-    wave_speed: Annotated[str, typer.Option(metavar="A", help="wave speed of all pipes")] = "1200 m/s",
+    wave_speed: Annotated[
+        str, typer.Option(metavar="A", help="wave speed of all pipes, in m/s or with a unit")
+    ] = "1200 m/s",
     min_pipe_length: Annotated[
         str | None,
         typer.Option(

@@ -43,14 +43,16 @@ def failure_map(
         str | None,
         typer.Option(
             metavar="A,B",
-            help='time steps in place of Courant numbers, one column for each, or a single one with --key: "1 ms,2 ms"',
+            help='time steps instead of Courant numbers, for example "1 ms,2 ms", one column for each, or a single '
+            "step with --key",
         ),
     ] = None,
     key: Annotated[
         str | None,
         typer.Option(
             metavar="KEY=A,B",
-            help="values of a key of the case, one column for each, in place of several time steps or Courant numbers",
+            help="key of the case and its values, one column for each, instead of columns of time steps or Courant "
+            "numbers",
         ),
     ] = None,
     tolerance: Annotated[
@@ -167,8 +169,8 @@ def _show(result, files: list[Path], head: str) -> None:
     if result.lines:
         terminal.line(
             console,
-            "or by which a wave between a delay line and a node that stores liquid grows so; growth caused by jumps is "
-            "not predicted",
+            "or at which a wave between a delay line and a node that stores liquid grows 1000 times; growth caused by "
+            "jumps is not predicted",
         )
     if result.limited:
         terminal.line(

@@ -17,12 +17,16 @@ def optimise(
     schedule: Annotated[
         str,
         typer.Option(
-            metavar="KEY", help="key of the schedule to optimise, from one value to another: links.valve.opening"
+            metavar="KEY",
+            help="key of the schedule to optimise, for example links.valve.opening; its ends keep their times "
+            "and values",
         ),
     ],
     minimise: Annotated[
         str,
-        typer.Option(metavar="CLAIM", help='peak to minimise, for example "max(gate.pressure)" or "max(main.head)"'),
+        typer.Option(
+            metavar="max(PROBE)", help='peak to minimise, for example "max(gate.pressure)" or "max(main.head)"'
+        ),
     ],
     knots: Annotated[
         int, typer.Option(metavar="N", help="number of knots between the ends of the schedule, 1 to 12")

@@ -43,8 +43,8 @@ def order(
         str | None,
         typer.Option(
             metavar="KEY",
-            help="single key to refine, for example links.main.cells or numerics.step (default all cells and steps, as "
-            "--refine states)",
+            help="single key to refine, for example links.main.cells or numerics.step (default all keys that --refine "
+            "selects)",
         ),
     ] = None,
     levels: Annotated[
@@ -54,8 +54,8 @@ def order(
     cells: Annotated[
         int | None,
         typer.Option(
-            help="number of cells at the coarsest level, of the part of --key or else of the pipe or basin side with "
-            "most cells (default number of the case, or less to shorten the study)"
+            help="number of cells, at the coarsest level, of the pipe or basin side with most cells, or of the part of "
+            "--key (default as in the case, or fewer to shorten the study)"
         ),
     ] = None,
     scheme: Annotated[
@@ -67,8 +67,8 @@ def order(
     reference: Annotated[
         str,
         typer.Option(
-            help="reference solution: exact (solution named in the case), finer (a run at a finer level), richardson "
-            "(the next level), or auto (the first of these that is available; with basins never finer)"
+            help="reference solution: exact (named in the case), finer (a run at a finer level), richardson (the next "
+            "level) or auto (the first of these that suits the case)"
         ),
     ] = "auto",
     jobs: Jobs = 1,

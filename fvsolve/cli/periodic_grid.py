@@ -139,7 +139,8 @@ def _sentences(limit: AdvectionLimit) -> list[str]:
     if limit.steps is not None:
         steps = f"a thousandfold in {limit.steps:.4g} steps"
         sentences.append(
-            f"at Courant number {limit.courant:.6g} the worst wave grows by {_growth(limit.growth)} a step, {steps}"
+            f"at Courant number {limit.courant:.6g} the worst wave grows by a factor of "
+            f"{_growth(limit.growth)} a step, {steps}"
         )
     elif limit.growth is not None:
         sentences.append(f"at Courant number {limit.courant:.6g} no wave grows")

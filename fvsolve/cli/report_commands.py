@@ -18,7 +18,7 @@ def report(
         Path | None, typer.Option(metavar="FILE", help="file of the report (default RUN_OR_STUDY/report.html)")
     ] = None,
     xlsx: Annotated[
-        bool, typer.Option("--xlsx", help="also write a workbook with the tables, in the folder of the report")
+        bool, typer.Option("--xlsx", help="also write the tables as an Excel workbook in the folder of the report")
     ] = False,
 ) -> None:
     """Write an offline HTML page of a run or a study: verdicts, long sections, histories, model, numerics."""
@@ -68,24 +68,25 @@ def fatigue(
         float | None,
         typer.Option(
             metavar="R",
-            help="range of pressure or head at which the part fails after N cycles, in the unit of the probe; N is the "
-            "value of --allowable-range, and --slope is needed too (default none: cycles are only counted)",
+            help="range of pressure or head that causes failure after --allowable-range cycles, in the unit of the "
+            "probe (default none: cycles are only counted)",
         ),
     ] = None,
     allowable_range: Annotated[
         float | None,
-        typer.Option(metavar="N", help="number of cycles (not a range) until failure at the range --range"),
+        typer.Option(metavar="N", help="number of cycles of the range --range until failure, required with --range"),
     ] = None,
     slope: Annotated[
         float | None,
         typer.Option(
-            metavar="M", help="exponent of the fatigue strength: failure after N (R / r)^M cycles of another range r"
+            metavar="M",
+            help="exponent of the fatigue strength, required with --range: N (R/r)^M cycles of a range r cause failure",
         ),
     ] = None,
     per_day: Annotated[
         float,
         typer.Option(
-            metavar="N", help="number of times per day that the events of this run occur, for the service life"
+            metavar="N", help="number of occurrences of the run per day, from which its fatigue life in years follows"
         ),
     ] = 1.0,
     as_json: Json = False,

@@ -29,7 +29,7 @@ def sensitivity(
         int,
         typer.Option(
             metavar="N",
-            help="base sample size, a power of two; the number of runs is about 1.25 N (number of keys + 2)",
+            help="base sample size, a power of two; for k keys the study makes about 1.25 N (k + 2) runs",
         ),
     ] = 64,
     seed: Seed = 0,

@@ -30,17 +30,16 @@ def size(
         list[str],
         typer.Option(
             metavar='"KEY = formula"',
-            help="dependent key, as a formula of x, the value of the sized key in SI; repeat the option for more keys",
+            help="other key to set by a formula of x, the value of the sized key in SI, for example "
+            '"nodes.vessel.gas_volume = 0.4 * x"; repeat the option for more keys',
         ),
     ] = [],  # noqa: B006
     rtol: Annotated[
-        float, typer.Option(help="greatest relative distance between the value found and a value that fails")
+        float, typer.Option(help="relative tolerance: greatest distance of the value found from a value that fails")
     ] = 0.01,
     error: Annotated[
         bool,
-        typer.Option(
-            "--error", help="require margins above their numerical errors, estimated by further runs for each value"
-        ),
+        typer.Option("--error", help="require that margins exceed their numerical errors, estimated from further runs"),
     ] = False,
     set: Set = [],  # noqa: B006
     as_json: Json = False,
@@ -101,7 +100,7 @@ def _no_value_text(result) -> str:
     nearest, values = result.nearest, sorted(run.value for run in result.runs)
     unit = f" {result.unit}" if result.unit else ""
     text = (f"none of the values tried between {values[0]:.6g} and {values[-1]:.6g}{unit} satisfies all limits; "
-            f"the nearest is {nearest.value:.6g}{unit}")  # fmt: skip
+            f"the nearest to the limits is {nearest.value:.6g}{unit}")  # fmt: skip
     if nearest.margin is None:
         return f"{text}; no margin is known"
     text += f", with a margin of {nearest.margin:.3g} of the limit {nearest.limit}"

@@ -44,8 +44,8 @@ def stability(
     steps: Annotated[
         int | None,
         typer.Option(
-            help="number of steps in which growth is measured (default 1000; without a case, linear schemes are "
-            "measured only with --steps or --cells)"
+            help="number of steps over which growth is measured; without a case it adds measured limits of linear "
+            "schemes (default 1000)"
         ),
     ] = None,
     cells: Annotated[
@@ -57,8 +57,8 @@ def stability(
     courant: Annotated[
         float | None,
         typer.Option(
-            help="Courant number at which growth is computed, only without a case (default 1 % above the limit, or 0.5 "
-            "for a limit of 0)"
+            help="Courant number at which growth is computed, only without a case (default 1 % above the stability "
+            "limit, or 0.5 if the limit is 0)"
         ),
     ] = None,
     at: AtTime = None,

@@ -26,7 +26,8 @@ Jobs = Annotated[int, typer.Option(metavar="N", help="number of runs at a time, 
 Dask = Annotated[
     str | None,
     typer.Option(
-        metavar="ADDRESS", help="address of a Dask scheduler whose workers make the runs: tcp://10.0.0.1:8786"
+        metavar="ADDRESS",
+        help="address of a Dask scheduler whose workers make the runs, for example tcp://10.0.0.1:8786",
     ),
 ]
 Seed = Annotated[int, typer.Option(metavar="N", help="seed of the random samples")]

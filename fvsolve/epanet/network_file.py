@@ -113,8 +113,8 @@ def _root_cause(error: BaseException) -> str:
     if isinstance(chain[-1], UnicodeDecodeError):
         cause = chain[-1]
         return (
-            f"byte {cause.object[cause.start]:#x} is not UTF-8 text (EPANET on Windows saves other text); "
-            "save the file as UTF-8"
+            f"byte {cause.object[cause.start]:#x} is not UTF-8 text (EPANET on Windows uses another encoding); "
+            "convert the file to UTF-8"
         )
     coded = [link for link in chain if "(Error " in str(link)]
     text = str(coded[-1] if coded else chain[-1]).replace("%s", "").replace(" ()", "")

@@ -281,7 +281,7 @@ class Translation:
 
     def options(self, hydraulic: Any) -> None:
         if self.formula == "D-W":
-            self.note("Darcy factor by Colebrook, in EPANET by Swamee and Jain: they differ by less than 3 %", "D-W")
+            self.note("Darcy factor by Colebrook, in EPANET by Swamee and Jain: both factors agree within 3 %", "D-W")
 
 
 def curve_slope(points: list[tuple[float, float]], at: float) -> float:

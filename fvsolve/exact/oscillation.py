@@ -45,7 +45,8 @@ def _find_faults(case):
         yield ("nodes",), f'the exact solution "{name}" needs a tank'
     for link, part in case.links.items():
         if part.friction.model != "none" or part.minor_loss != 0.0:
-            yield ("links", link, "friction"), f'the exact solution "{name}" holds only without friction and losses'
+            text = f'the exact solution "{name}" holds only without friction and losses'
+            yield ("links", link, "friction"), f'{text}; expected model = "none", and no `minor_loss` of the column'
 
 
 def solution(case, start: ExactStart) -> Solution:

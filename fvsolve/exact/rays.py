@@ -51,7 +51,7 @@ def find_faults(case):
         if case.nodes[node].kind != "reservoir" and len(names) > 1:
             yield (
                 ("links", names[1]),
-                f'the exact solution "rays" supports a single valve at {node}; the case has {len(names)}',
+                f'the exact solution "rays" supports a single valve at {node}; the case has {len(names)} there',
             )
     piped = {end for link in case.links.values() if link.kind == "pipe" for end in (link.from_, link.to)}
     for node in valves:

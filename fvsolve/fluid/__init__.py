@@ -127,5 +127,5 @@ def _missing(name: str, key: str) -> str:
 def _not_liquid(name: str, boiling: float, temperature: float, pressure: float) -> str:
     return (
         f"{pressure:.6g} Pa is not above the vapour pressure of {name} at {celsius(temperature)}, "
-        f"{boiling:.6g} Pa; expected a liquid (pressures are absolute)"
+        f"{boiling:.6g} Pa; expected a liquid, at a higher pressure (absolute) or a lower temperature"
     )

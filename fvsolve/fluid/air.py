@@ -56,7 +56,9 @@ def air_of(given: dict[str, float]) -> Air:
         raise FluidError("gas_exponent", f"{exponent:g} is not 1; with cavitation the gas is isothermal, expected 1")
     if saturation <= ATMOSPHERE:
         raise FluidError(
-            "saturation_pressure", f"{saturation:g} Pa is not above 1 atm, the pressure to which `air_fraction` refers"
+            "saturation_pressure",
+            f"{saturation:g} Pa is not above 1 atm, the pressure to which `air_fraction` refers; "
+            f"expected more than {ATMOSPHERE:g} Pa",
         )
     return Air(fraction, exponent, saturation, cavitation)
 

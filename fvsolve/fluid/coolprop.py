@@ -44,7 +44,8 @@ def _pure_properties(name: str, temperature: float, pressure: float, law: str) -
     except ValueError as error:
         raise FluidError(
             "pressure",
-            f"{name} is two-phase at this temperature and pressure, or has no data there (CoolProp: {error})",
+            f"{name} is two-phase at {celsius(temperature)} and {pressure:g} Pa, or CoolProp has no data ({error}); "
+            "try another temperature or pressure",
         ) from None
     values |= dict(density=state.rhomass(), bulk_modulus=state.rhomass() * state.speed_sound() ** 2)
     values["viscosity"] = value_or_none(state.viscosity)

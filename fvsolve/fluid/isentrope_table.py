@@ -104,10 +104,10 @@ def isentrope(state: Any, name: str, vapor_pressure: float) -> FluidTable:
             table = _tabulate(state, span, intervals, temperature, entropy)
     except ValueError as error:
         raise FluidError(
-            "law", f'"table" of {name} cannot be computed from this state (CoolProp: {error}); use "log"'
+            "law", f'"table" cannot be computed for {name} at these `temperature` and `pressure` ({error}); use "log"'
         ) from None
     if table.error > MAX_ERROR or not _monotone(table):
-        text = f'"table" of {name} has an error of {table.error:.1g}, too near the critical point; use "log"'
+        text = f'"table" of {name} has a relative error of {table.error:.1g}, near its critical point; use "log"'
         raise FluidError("law", text)
     return table
 

@@ -87,11 +87,11 @@ def overlap_faults(sketch: Sketch, edges: Edges, number: np.ndarray) -> list[Fau
     at = crowded[edges.key[crowded] == faces[0]]
     cells = np.sort(number[edges.cell[at]])
     cell_texts = " and ".join(sketch.show(c) for c in cells[:MAX_CELLS])
-    reason = "more than two cells share it" if cells.size > 2 else "both lie on one side of it"
+    reason = "more than two cells share the face" if cells.size > 2 else "both lie on one side of the face"
     more = f" ({faces.size} such faces)" if faces.size > 1 else ""
     where = sketch.face((edges.start[at[0]], edges.stop[at[0]]))
     remedy = "expected one cell on each side; is a surface meshed twice, or in two physical groups?"
-    return [Fault("cells", f"they overlap at {where}{more}: {cell_texts}, {reason}; {remedy}")]
+    return [Fault("cells", f"some cells overlap at {where}{more}: {cell_texts}, {reason}; {remedy}")]
 
 
 def contact_faults(sketch: Sketch, edges: Edges, named: np.ndarray) -> list[Fault]:
@@ -104,7 +104,7 @@ def contact_faults(sketch: Sketch, edges: Edges, named: np.ndarray) -> list[Faul
     contact_pairs, complete = contacts(sketch.points[start], sketch.points[stop], named)
     texts = {
         "same": "coincide but are not connected: {cell} and {neighbour} at {face}; expected one set of points "
-        "there (Gmsh: Coherence), or a group that marks it as a thin wall",
+        "there (Gmsh: Coherence), or a group of lines that marks the face as a thin wall",
         "middle": "have the corner of another cell between their ends: {cell} and {neighbour} at {face}; "
         "expected faces that touch at their ends only",
         "cross": "cross each other: {cell} and {neighbour} at {face}; expected a boundary that does not cross itself",
@@ -128,13 +128,15 @@ def piece_faults(sketch: Sketch, edges: Edges) -> list[Fault]:
     size, first = np.bincount(piece), np.unique(piece, return_index=True)[1]
     if size.size == 1:
         return []
-    listed = [f"{size[k]} with {sketch.show(first[k])}" for k in np.argsort(-size, kind="stable")[:MAX_CELLS]]
+    listed = [
+        f"{size[k]} in the piece of {sketch.show(first[k])}" for k in np.argsort(-size, kind="stable")[:MAX_CELLS]
+    ]
     more = ", ..." if size.size > MAX_CELLS else ""
     return [
         Fault(
             "cells",
-            f"they are in {size.size} pieces that share no face: {', '.join(listed)}{more}; "
-            "expected one piece: write each to its own file",
+            f"the cells are in {size.size} pieces that share no face: {', '.join(listed)}{more}; "
+            "expected one piece: write each piece to its own file",
         )
     ]
 
@@ -154,7 +156,7 @@ def assign_patches(
     for name, members in groups.items():
         place = f"groups.{name}"
         if not members.size:
-            remedy = "expected lines of the boundary (with Mesh.SaveAll = 1 Gmsh writes no lines of groups)"
+            remedy = "expected lines of the boundary (Gmsh: try Mesh.SaveAll = 0; 1 leaves out the groups of lines)"
             faults.append(Fault(place, f"the group contains no line of the file; {remedy}"))
             continue
         member_keys = key_of(lines[members], len(sketch.points))
@@ -171,7 +173,9 @@ def assign_patches(
             first = edges.outer[taken[0]]
             where = sketch.face((edges.start[first], edges.stop[first]))
             faults.append(
-                Fault(place, f"faces shared with {others}: {taken.size}, {where}; expected each in one group")
+                Fault(
+                    place, f"faces shared with {others}: {taken.size}, first {where}; expected each face in one group"
+                )
             )
         patch[spot] = names.index(name)
     return faults, names, patch

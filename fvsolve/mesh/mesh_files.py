@@ -100,7 +100,7 @@ def _read_by_meshio(path: Path) -> tuple[Any, tuple[str, ...]]:
     known = sorted(meshio.extension_to_filetypes)
     if path.suffix.lower() not in known:
         remedy = f"expected a name that ends in {listing(known, 40)}"
-    raise MeshError([Fault("", "; ".join(filter(None, [f"meshio cannot read it ({text})", remedy])))], path.name)
+    raise MeshError([Fault("", "; ".join(filter(None, [f"meshio cannot read the file ({text})", remedy])))], path.name)
 
 
 def _single_line(text: str) -> str:
@@ -117,7 +117,8 @@ def _bad_kinds(kinds: dict[str, int]) -> list[Fault]:
     other = [kind for kind in kinds if kind not in IGNORED and kind not in solid]
     expected = "expected triangle and quad"
     if solid:
-        return [Fault("cells", f"they are three-dimensional ({counts}); {expected}: a mesh of one plane surface")]
+        text = f"the file has three-dimensional cells ({counts})"
+        return [Fault("cells", f"{text}; {expected}: a mesh of one plane surface")]
     if other:
         remedy = "Gmsh: Mesh.ElementOrder = 1" if re.search(r"\d", "".join(other)) else "split them"
         return [Fault("cells", f"{', '.join(other)} cannot be used ({counts}); {expected}; {remedy}")]
@@ -151,7 +152,8 @@ def _groups(file_mesh: Any) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
             unnamed |= {tag} - set(name_of)
             members.setdefault(name_of.get(tag, str(tag)), []).append(first + lines)
         first += len(block.data)
-    text = f"groups of lines without a name in the file: their patches are {', '.join(map(str, sorted(unnamed)))}"
+    numbers = ", ".join(map(str, sorted(unnamed)))
+    text = f"groups of lines with a number instead of a name in the file: their patches are named {numbers}"
     notes = (text,) if unnamed else ()
     empty = [np.empty(0, np.int64)]
     return {name: np.unique(np.concatenate(lines or empty)) for name, lines in members.items()}, notes

@@ -127,5 +127,7 @@ def _notes(sketch: Sketch, factor: float, patch: np.ndarray, grouped: bool) -> l
     extent = factor * np.ptp(sketch.points, axis=0).max()
     if sketch.unit == "m" and not SMALL <= extent <= LARGE:
         guess = 'unit = "mm"' if extent > LARGE else 'unit = "km"'
-        notes.append(f"the mesh is {extent:.6g} m across: is the file in another unit? Then state it, perhaps {guess}")
+        notes.append(
+            f"the mesh is {extent:.6g} m across: is the file in another unit? Then state the unit, perhaps {guess}"
+        )
     return notes

@@ -47,13 +47,13 @@ def rectangle(
     for k, hole in enumerate(holes):
         faults += _cut(solid, lines, f"holes[{k}]", hole)
     if faults or not solid.any():
-        raise MeshError(faults or [Fault("holes", "they leave no cell")], "rectangle")
+        raise MeshError(faults or [Fault("holes", "the holes leave no cell; expected smaller holes")], "rectangle")
     index = np.where(solid, np.cumsum(solid).reshape(solid.shape) - 1, -1)
     points, corners = _corners(lines, solid)
     edges = edges_of(corners, len(points))
     pieces = np.bincount(edges.pieces(len(corners)))
     if pieces.size > 1:
-        faults.append(Fault("holes", f"they leave {pieces.size} pieces that share no face; expected one piece"))
+        faults.append(Fault("holes", f"the holes leave {pieces.size} pieces that share no face; expected one piece"))
     names, patch = _patches(patches or {}, lines, solid, points, edges, faults)
     if faults:
         raise MeshError(faults, "rectangle")

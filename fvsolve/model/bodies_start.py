@@ -97,7 +97,7 @@ def start_pins(draft, at: StaticForces) -> np.ndarray:
     rows = pin_rows(draft, at)
     names = [name for name, row in zip(draft.pin_names, draft.pin_table, strict=True) for _ in range(row["rows"])]
     for name in dict.fromkeys(redundant_pins(rows, names)):
-        text = "this pin is redundant: in some direction joints or other pins already prevent its opening"
+        text = "this pin is redundant: in some direction joints or other pins already hold its two points together"
         draft.fault(f"links.{name}", f"{text}. Give the key `axis` for a loop in a plane, else remove one pin")
     slips: dict[str, float] = {}
     for name, slip in zip(names, rows @ at.rates(), strict=True):
@@ -107,7 +107,7 @@ def start_pins(draft, at: StaticForces) -> np.ndarray:
             rate = draft.case.amount(slip, "velocity")
             draft.fault(
                 f"links.{name}",
-                f"velocities at the start separate its two points at {rate}. Expected equal velocities of the points",
+                f"velocities at the start separate the two points of this pin at {rate}. Expected equal velocities",
             )
     draft.check()
     forces = at.out[int(at.layout["pin"]) :][: 3 * len(draft.pin_table)].reshape(-1, 3)

@@ -23,6 +23,6 @@ def coarse_for_cavities(draft) -> list[Notice]:
     error = DURATION * longest.cells**-RATE
     better = DURATION * ENOUGH**-RATE
     text = (f"{longest.name}: with {longest.cells} cell{'s' if longest.cells > 1 else ''} the duration of a first "
-            f"cavity is about {100.0 * error:.2g} % too short with little damping; "
-            f"with {ENOUGH} cells it is {100.0 * better:.2g} %")  # fmt: skip
+            f"cavity is about {100.0 * error:.2g} % too short if damping is low; "
+            f"{ENOUGH} cells reduce this error to {100.0 * better:.2g} %")  # fmt: skip
     return [Notice("cells", f"links.{longest.name}", text, "cells", float(longest.cells), float(ENOUGH))]

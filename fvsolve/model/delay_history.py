@@ -76,7 +76,9 @@ def split_memory(memory: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """
     size = int(memory[-1]) if memory.size and np.isfinite(memory[-1]) else -1
     if not 0 <= size < memory.size:
-        raise ValueError("the memory holds no history of delay lines")
+        raise ValueError(
+            "the memory of the state contains no history of delay lines; expected a State that a run returned"
+        )
     return memory[: memory.size - 1 - size], memory[memory.size - 1 - size : -1]
 
 
@@ -141,6 +143,6 @@ def jump_overflow_notices(past: np.ndarray) -> list[Notice]:
     text = (
         f"more than {int(past[at.JUMP_CAPACITY])} jumps were travelling in one pipe: some of them, of up to "
         f"{share:.3g} times the greatest jump, were smoothed over a step; raise `numerics.delay_tolerance`, so that "
-        'fewer are stored, or set pipe_model = "finite-volume"'
+        'fewer jumps are stored, or set pipe_model = "finite-volume"'
     )
     return [Notice("jumps", "numerics", text, "delay_tolerance", float(share), None)]

@@ -228,8 +228,8 @@ def divide_lines(draft) -> list[str]:
         elif bound == math.inf:
             longest = draft.case.step_amount(chosen.longest, 4)
             draft.fault(f"links.{name}.pipe_model", '"delay-line" is not possible: friction attenuates a wave by a '
-                        f"fraction of {attenuation:.3g} in a line shorter than a step of {longest}; expected shorter "
-                        'steps, or "finite-volume"')  # fmt: skip
+                        f"fraction of {attenuation:.3g} in this pipe, whose travel time is less than a step of "
+                        f'{longest}; expected shorter steps, or "finite-volume"')  # fmt: skip
     shape_history(draft)
     return unfit
 

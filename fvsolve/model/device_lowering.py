@@ -29,7 +29,7 @@ class Device(Restriction):
     controlling_event: ClassVar[int] = -1
     states: ClassVar[tuple[str, ...]] = ()
     quantities: ClassVar[tuple[str, ...]] = ()
-    remedy: ClassVar[str] = "give it a time_constant"
+    remedy: ClassVar[str] = "give the part a time_constant"
     vessel: ClassVar[bool] = False  # True for a node whose pressure it computes
 
     def place(self, draft, name: str, node: Any, row) -> None:

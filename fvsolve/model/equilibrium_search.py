@@ -185,5 +185,5 @@ def instability_notices(at: Configuration, result: StaticState) -> list[Notice]:
     name, rate = owner_name(at, int(np.argmax(np.abs(free @ modes[:, 0])))), float(np.sqrt(-values[0]))
     duration = at.draft.case.amount(1.0 / rate, "time", 3)
     text = (f"{name}: its forces balance, but the equilibrium is unstable: a small displacement grows by a factor e in "
-            f"{duration}; state another position, or support it")  # fmt: skip
+            f"{duration}; state another position, or add a support such as a spring")  # fmt: skip
     return [Notice("start", f"nodes.{name}", text, "stability", rate, 0.0)]

@@ -81,7 +81,7 @@ class Hydraulics:
                 self.case.amount(speed_value, "velocity", 6) for speed_value in (speed, self.fluid.sound_speed)
             )
             fault(f"links.{name}.wave_speed", f"{given} is faster than sound in the fluid, {sound}; expected at most "
-                  'this speed, or law = "linear"')  # fmt: skip
+                  'the speed of sound, or law = "linear"')  # fmt: skip
         return growth if growth > 1e-9 / self.fluid.bulk_modulus else 0.0
 
     def transition_flow(self, name: str, link, reynolds: float, fault) -> float:

@@ -324,8 +324,9 @@ class Model(Displayable):
     def refuse_delay_lines(self, function: str) -> None:
         """Raise FvsolveError if the model has delay lines: their history is not part of y."""
         if len(self.tables.delays):
-            raise FvsolveError(f"{function}(t, y) is not defined for a model with delay lines: waves sent into them "
-                               'are needed too. Expected rhs(State), or pipe_model = "finite-volume"')  # fmt: skip
+            raise FvsolveError(f"{function}(t, y) is not defined for a model with delay lines: y does not contain "
+                               "their waves. Expected "
+                               'pipe_model = "finite-volume" (or rhs(State) instead of rhs(t, y))')  # fmt: skip
 
     def evaluate(self, t: float, y: np.ndarray, limit: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
         """Right-hand side and further values at (t, y), see `rhs` : (dydt, out).

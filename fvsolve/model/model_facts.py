@@ -131,7 +131,7 @@ def cost_notices(model, steps: int | None, set_by: str) -> list[Notice]:
     reason = set_by if numerics.rtol is None else "a part that is faster than waves"
     text = (
         f"{numerics.method}: about {count} steps, {ratio:.3g} times as many as waves need ({reason}); "
-        'method = "auto" or "rodas-5p" with rtol = 1e-6 avoids this limit'
+        'method = "auto" or "rodas-5p" with rtol = 1e-6 needs fewer steps'
     )
     return [Notice("cost", "numerics", text, "method", float(count), float(count / ratio))]
 

@@ -163,7 +163,10 @@ def _costly_piece(draft: Any, cells: np.ndarray) -> list[Notice]:
     ratio = rate[worst] / min(rate[draft.pipe_names.index(piece)] or math.inf for piece in case.routes[pipe].pipes)
     if ratio <= COSTLY_RATIO:
         return []
-    text = f"{_location(case, name)}: steps are {ratio:.3g} times shorter than other pieces of {pipe} need"
+    text = (
+        f"{_location(case, name)}: because of this short piece, steps are {ratio:.3g} times shorter than other "
+        f"pieces of {pipe} need; a longer piece allows longer steps"
+    )
     return [Notice("cost", f"links.{name}", text, "length", float(ratio), COSTLY_RATIO)]
 
 

@@ -149,8 +149,9 @@ class RunDirectory:
             yield
         except OSError as error:
             path = error.filename or self.folder
-            raise RunError(f"{path}: cannot be written: {error.strerror or error}. Free disk space and continue with "
-                           "--resume, or choose another directory with --out DIR") from None  # fmt: skip
+            raise RunError(f"{path}: cannot be written: {error.strerror or error}. Free disk space, or "
+                           "correct the access rights, and continue with --resume, or choose another directory "
+                           "with --out DIR") from None  # fmt: skip
 
     def table(self):
         """Contents of history.csv : float64[rows, 1 + probes], time and probes in the units of the file."""
@@ -228,7 +229,9 @@ def clear_reports(folder: Path) -> None:
 def _refuse_reserved_names(case) -> None:
     for name, path in case.copies.items():
         if name in (SUMMARY_FILE, *RUN_FILES, *PICTURE_FILES, *REPORT_FILES):
-            raise RunError(f"{path} has the name of a file of the run directory ({name}); rename it")
+            raise RunError(
+                f"{path} has the name of a file that a run writes ({name}); rename your file, and correct the case"
+            )
 
 
 def _refuse_full_disk(folder: Path, case) -> None:
@@ -236,7 +239,7 @@ def _refuse_full_disk(folder: Path, case) -> None:
     if least > free:
         raise RunError(
             f"{folder}: history.csv needs at least {byte_text(least)}, but {byte_text(free)} are free. Expected a "
-            "longer [output] every, or another directory with --out DIR"
+            "longer interval `output.every`, or another directory with --out DIR"
         )
 
 

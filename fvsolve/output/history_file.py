@@ -69,7 +69,7 @@ def read_headers(path: Path) -> list[tuple[str, str]]:
         with open(path, encoding="utf-8", newline="") as file:
             return [split_header(header) for header in next(csv.reader(file), [])]
     except OSError as error:
-        raise RunError(f"{path}: {error.strerror}; is this a run directory?") from None
+        raise RunError(f"{path}: {error.strerror}; expected a run directory with this file") from None
 
 
 def read_table(path: Path) -> np.ndarray:

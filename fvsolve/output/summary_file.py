@@ -91,7 +91,9 @@ def read_summary(path: Path) -> dict:
             raise ValueError(f"this is not the summary of a run (missing: {listing(missing)}); run again with --force")
         return summary
     except FileNotFoundError:
-        raise RunError(f"{path.parent} does not hold a finished run (no {path.name})") from None
+        raise RunError(
+            f"{path.parent} does not hold a finished run (no {path.name}); check the path, or finish the run"
+        ) from None
     except (OSError, ValueError) as error:
         raise RunError(f"{path} cannot be read: {error}") from None
 

@@ -173,7 +173,12 @@ def length_notices(key: str, given: tuple[float, ...] | None) -> Iterator[tuple[
     """
     length = math.hypot(*given) if given else 1.0
     if abs(length - 1.0) > ROUNDING:
-        yield (key,), length, 1.0, f"its length is {length:.6g}, not 1; it is divided by its length"
+        yield (
+            (key,),
+            length,
+            1.0,
+            f"the vector has length {length:.6g}, not 1, and is divided by this length",
+        )
 
 
 def is_zero_vector(given: tuple[float, ...] | None) -> bool:

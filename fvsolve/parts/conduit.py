@@ -92,13 +92,15 @@ class Conduit(TwoPort):
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         if self.diameter > self.length:
             text = (
-                f"{self.diameter:g} m is more than the length of {self.length:g} m, so the flow is not one-dimensional"
+                f"{self.diameter:g} m is more than the length of {self.length:g} m, so the flow is not "
+                "one-dimensional; check the units of `diameter` and `length`"
             )
             yield ("diameter",), self.diameter, self.length, text
         rough, most = self.friction.roughness or 0.0, MAX_ROUGHNESS * self.diameter
         if rough > most:
             text = (
-                f"{rough:g} m in a bore of {self.diameter:g} m; Moody's chart is valid to {MAX_ROUGHNESS:g} of the bore"
+                f"{rough:g} m is {rough / self.diameter:.3g} of the bore of {self.diameter:g} m; Moody's chart is "
+                f"valid up to {MAX_ROUGHNESS:g} of the bore"
             )
             likely = units.likely(rough, "length", 0.0, most) if rough <= 1e3 * most else ""
             yield ("friction", "roughness"), rough, most, text + likely

@@ -101,7 +101,8 @@ class CsvRows:
                 raise CsvError(self.file, message, line)
             points = points or "." in text
             if points and "," in text:
-                raise CsvError(self.file, f"{show(text)} has a decimal comma, but numbers above have points", line)
+                message = f"{show(text)} has a decimal comma, but numbers above have decimal points"
+                raise CsvError(self.file, f"{message}; expected one decimal sign in the column", line)
             values.append(value)
         return values
 

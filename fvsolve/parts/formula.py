@@ -35,7 +35,8 @@ class SpatialField:
             values[part] = self.rule(x[part], y[part])
         if not np.isfinite(values).all():
             k = int(np.argmax(~np.isfinite(values)))
-            raise ValueError(f"{show(self.given)} is not finite at x = {x[k]:.6g} m, y = {y[k]:.6g} m")
+            place = f"x = {x[k]:.6g} m, y = {y[k]:.6g} m"
+            raise ValueError(f"{show(self.given)} is not finite at {place}; expected finite values in the whole basin")
         return values
 
     def table(self) -> Any:

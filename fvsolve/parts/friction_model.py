@@ -85,7 +85,7 @@ class Friction(Table):
         if allowed is None:
             return faults
         stray = [key for key in given if key in cls.model_fields and key not in ("model", *allowed)]
-        faults += [((key,), f'friction model "{model}" has no key {key}') for key in stray]
+        faults += [((key,), f'friction model "{model}" has no key {key}; remove this key') for key in stray]
         return faults + (missing_key_faults(given, allowed[:2]) if allowed else [])
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:

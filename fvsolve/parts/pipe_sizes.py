@@ -79,7 +79,7 @@ def pipe_bore(nominal: str, schedule: str) -> tuple[float, float]:
     sizes = schedule_lookup[schedule][0]
     if number not in sizes:
         near = ", ".join(f"NPS {size:g}" for size in sorted(sizes, key=lambda size: abs(size - number))[:3])
-        raise ValueError(f"{nominal} is not made in schedule {schedule}; the nearest are {near}")
+        raise ValueError(f"{nominal} is not made in schedule {schedule}; the nearest sizes are {near}")
     _, inner, _, wall = nearest_pipe(NPS=number, schedule=schedule)
     return inner, wall
 

@@ -152,7 +152,9 @@ class Scheduled(Value):
         values = read_keys(given, self.forms["table"], setting)
         t, v, kind = values["time"], values["value"], values["kind"]
         if len(t) != len(v):
-            raise ValueFault([(("value",), f"{len(v)} values for {len(t)} times; expected the same number")])
+            raise ValueFault(
+                [(("value",), f"has length {len(v)}, but `time` has length {len(t)}; expected equal lengths")]
+            )
         try:
             check_increasing(t, given["time"], "times")
         except ValueError as error:
@@ -199,10 +201,12 @@ class Scheduled(Value):
         name = read_keys(given, self.forms["signal"], setting)["signal"]
         if name not in setting.signals:
             near, names = did_you_mean(name, setting.signals), listing(setting.signals) or "none"
-            raise ValueFault([(("signal",), f"no signal named {show(name)}{near}; signals are {names}")])
+            raise ValueFault([(("signal",), f"no signal named {show(name)}{near}; [signals] has {names}")])
         shared = setting.signals[name]
         if isinstance(shared, dict) and "signal" in shared:
-            raise ValueFault([(("signal",), f"signal {show(name)} refers to another signal; expected values")])
+            raise ValueFault(
+                [(("signal",), f"signal {show(name)} refers to another signal; expected a signal with values")]
+            )
         try:
             schedule = self.read(shared, setting)
         except ValueFault as error:

@@ -24,8 +24,8 @@ def find_file(name: str, setting: ReadContext) -> Path:
     try:
         if not path.is_file():
             near = did_you_mean(path.name, _neighbours(path))
-            state = "is a directory" if path.is_dir() else "there is no such file"
-            raise ValueError(f"{show(name)}: {state}{near}; a path is relative to the case file")
+            state = "is a directory, not a file" if path.is_dir() else "there is no such file"
+            raise ValueError(f"{show(name)}: {state}{near}; a relative path starts at the folder of the case file")
     except OSError as error:
         raise ValueError(f"{show(name)}: {error.strerror}") from None
     setting.files.setdefault(copy_name(path, setting), path)

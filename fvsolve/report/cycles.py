@@ -70,7 +70,7 @@ def cycles(result, probes: list[str] | None = None, strength: FatigueStrength | 
     rows = []
     for name in probes or known:
         if not np.isfinite(result[name]).all():
-            raise FvsolveError(f"{name} is not finite at all times, so its cycles cannot be counted")
+            raise FvsolveError(f"{name} has values that are not finite, so its cycles cannot be counted")
         counts = count_cycles(np.asarray(result[name]))
         row: dict[str, Any] = {"probe": name, "unit": span(result.units[name]), "cycles": counts}
         if strength is not None:

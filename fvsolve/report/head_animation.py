@@ -78,5 +78,6 @@ def _read_heads(path: Path, cells: int) -> np.ndarray:
     """Heads of all pipe cells in a frame [m]; raises RunError if their number differs from that of the case."""
     heads = read_pipes(path, "head")
     if len(heads) != cells:
-        raise RunError(f"{path} has {len(heads)} pipe cells, but the case has {cells}; run again with --force")
+        counts = f"number of pipe cells {len(heads)}, but {cells} in the case"
+        raise RunError(f"{path}: {counts}; run the case again with --force")
     return heads

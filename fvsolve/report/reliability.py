@@ -31,7 +31,7 @@ def top_sentences(result) -> list[Sentence]:
     rows = []
     if result.reason != "finished":
         reached, end = (result.case.amount(item, "time", 6) for item in (summary["t"], result.case.numerics.end))
-        reached = f"It reached t = {reached} of {end}"
+        reached = f"The run reached t = {reached} of {end}"
         rows.append(
             Sentence("bad", "This run stopped early.", f"{result.reason}. {reached}; later values are unknown.")
         )

@@ -228,7 +228,8 @@ class Result(Displayable):
     def _table(self) -> np.ndarray:
         table = self._read_table()
         if table.shape[1] != 1 + len(self.units):
-            raise RunError(f"history.csv has {table.shape[1]} columns; expected the time and {len(self.units)} probes")
+            counts = f"number of columns {table.shape[1]}; expected {1 + len(self.units)}, the time and each probe"
+            raise RunError(f"history.csv: {counts}; run the case again with --force")
         table.flags.writeable = False
         return table
 
@@ -339,7 +340,7 @@ class Result(Displayable):
         if not {part.kind for part in (*self.case.nodes.values(), *self.case.links.values())} & KINDS_WITH_FIELDS:
             return "the case has no basin, body or pipe"
         if self.case.output.fields == 0:
-            return "[output] fields is 0; run again with --set output.fields=20"
+            return "[output] fields is 0; run again with --set output.fields=20 --force"
         return f"{self.directory / 'fields.pvd'} is missing; run again with --force"
 
     def _draw(self, times: list[float], field: str | None, path, suffix: str, contours: int) -> Path:

@@ -18,11 +18,13 @@ from fvsolve.steppers import automatic, loop_indices
 from fvsolve.units import show
 
 STOP_REASONS = {
-    loop_indices.BAD_VALUE: "a value is not finite; try a smaller numerics.step",
-    loop_indices.TINY_STEP: "the step became too small; try a larger numerics.rtol",
+    loop_indices.BAD_VALUE: "a value is not finite; try shorter steps, by numerics.step, courant or rtol",
+    loop_indices.TINY_STEP: "the step became too small; try a larger numerics.rtol, or numerics.courant instead",
     loop_indices.NEWTON_STUCK: "Newton's method did not converge; try an explicit method",
-    loop_indices.CHATTERING: "a part changes its state without end; put a chamber at the node of this part",
-    loop_indices.STOPPED: 'the pressure fell below the vapour pressure, and below_vapor = "stop" ends the run there',
+    loop_indices.CHATTERING: "a part changes its state without end; a run of the case names the part and a remedy",
+    loop_indices.STOPPED: (
+        'the pressure fell below the vapour pressure, and numerics.below_vapor = "stop" ends the run there'
+    ),
 }  # code of the loop -> text
 
 
@@ -42,7 +44,9 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
     if not math.isfinite(until):
         raise FvsolveError(f"until = {until} is not a time. Expected a finite number of seconds")
     if not until >= state.t:
-        raise FvsolveError(f"until = {until:g} s is before the time of the state, {state.t:g} s")
+        raise FvsolveError(
+            f"until = {until:g} s is before the time of the state, {state.t:g} s. Expected at least {state.t:g} s"
+        )
     model.checked(state.t, state.y)
     held = hold(model, inputs or {})
     loop = RunLoop(held, lambda: model.structure)  # the structure does not depend on the held inputs

@@ -161,13 +161,13 @@ def single_thread_reason(model: Model) -> str:
     method = model.case.numerics.method
     if method == automatic.AUTO:
         return (
-            f"{method} may change to a method that solves for all states at once; "
+            f"method {method} may change to a method that solves for all states at once; "
             "only explicit methods can be distributed over threads"
         )
     if not method_named(method).explicit:
-        return f"{method} solves for all states at once; only explicit methods can be distributed over threads"
+        return f"method {method} solves for all states at once; only explicit methods can be distributed over threads"
     if not model.basins:
-        return "there is no basin; only rows of basins are distributed over threads"
+        return "the case has no basin; only rows of basins are distributed over threads"
     return "" if not all(basin.undivided_reason for basin in model.basins) else undivided_basins(model)
 
 

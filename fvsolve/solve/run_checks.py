@@ -101,7 +101,7 @@ def ledger_notices(name: str, ledger: dict) -> list[Notice]:
     if relative <= LEDGER_TOLERANCE:  # False for NaN: such a ledger does not close
         return []
     text = (
-        f"{name} ledger: the remainder is {ledger['remainder']:.6g}, {relative:.3g} of its largest term; expected "
-        f"{LEDGER_TOLERANCE:g} at most"
+        f"{name} ledger: the remainder, 0 in an exact balance, is {ledger['remainder']:.6g}, {relative:.3g} of the "
+        f"largest term; expected at most {LEDGER_TOLERANCE:g} of the largest term"
     )
     return [Notice("ledger", name, text, "remainder", float(relative), LEDGER_TOLERANCE, False)]

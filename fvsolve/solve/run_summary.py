@@ -121,7 +121,8 @@ def find_marks(run_data: RunData) -> list[Mark]:
         ),
         "outside its curve": (
             "the pump works in reverse or beyond the last flow of its curve; give the key `rated_speed` to extend the "
-            "curve by the Suter table of its specific speed, or `suter = { rated_flow, rated_head, table }` instead"
+            "curve by the Suter table for the specific speed of the pump, or give "
+            "`suter = { rated_flow, rated_head, table }` instead of the curve"
         ),
         "beyond its stroke": "the piston is beyond an end of its stroke; add an end-stop",
         "below vapor pressure": (

@@ -65,7 +65,8 @@ def solve(model: Model, state: State, sink, progress=None, threads: int = 1, com
     MemoryMismatch for restart data of another run.
     """
     if not isinstance(model, Model) or not isinstance(state, State):
-        raise FvsolveError(f"solve takes a Model and a State, not {type(model).__name__} and {type(state).__name__}")
+        raise FvsolveError(f"solve takes a Model and a State, not {type(model).__name__} and {type(state).__name__}. "
+                           "Expected the results of build() and initial_state()")  # fmt: skip
     if progress is not None and not callable(progress):
         raise FvsolveError(f"progress = {progress!r} cannot be called. Expected progress(t, seconds, steps)")
     if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
@@ -410,8 +411,8 @@ class Run:
             remedy = ", or ".join(remedies) or "put a chamber at the node of this part"
             return f"stopped: {parts_text} {verbs} without end at {when}; {remedy}"
         if code == loop_indices.STOPPED:
-            event = "a cavity opened" if model.cavitates else "pressure below vapour pressure"
-            return f'stopped: {event} at {when}, and below_vapor = "stop" ends the run there'
+            event = "a cavity opened" if model.cavitates else "pressure fell below vapour pressure"
+            return f'stopped: {event} at {when}, and numerics.below_vapor = "stop" ends the run there'
         if code in (loop_indices.BAD_VALUE, loop_indices.BAD_STATUS):
             loop.step_back()
         if code == loop_indices.NEWTON_STUCK:
@@ -421,7 +422,7 @@ class Run:
         if code == loop_indices.TINY_STEP:
             return f"stopped: the step became too small at {when}; try a larger rtol, or numerics.courant instead"
         if code == loop_indices.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_SOLUTION:
-            return f"stopped: the demand{place} cannot be supplied at {when}; all connections to it are shut"
+            return f"stopped: the demand{place} cannot be supplied at {when}; all connections to its node are shut"
         if code == loop_indices.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_VOLUME:
             return f"stopped: the chamber volume{place} is zero at {when}; give the piston an end-stop"
         if code == loop_indices.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_WIDTH:

@@ -61,7 +61,8 @@ def line_growth_notices(model, method: Method, h: float, span: float) -> list[No
         return []
     wrong, other = grows >= LEAST_GROWTH**2, '"rk4" or "trapezoid"' if a < RK4_BOUND else '"trapezoid"'
     text = (f"{name}: waves between this part and the delay lines grow by a factor of {grows:.3g} in the run (an "
-            f"estimate), with {method.name} and steps of {model.case.step_amount(h)}, {a:.3g} times its filling time; "
+            f"estimate), with {method.name} and steps of {model.case.step_amount(h)}, {a:.3g} times "
+            "the time constant with which the lines fill the part; "
             f"{'the numbers are not to be trusted' if wrong else 'the results may be wrong'}; "
             f"give method = {other}, or shorter steps")  # fmt: skip
     return [Notice("step-limit", name, text, "method", a, None, not wrong)]

@@ -212,7 +212,7 @@ def short_pipe(model, method: str, k: int, courant: float) -> CourantCheck | Non
         return None
     if not limited:
         grows = growth_factor(pipe_growth(scheme, method, cells, courant, reflection_products(model, k)), steps)
-    where = f"between the ends of {cells} cell{'s' if cells > 1 else ''}"
+    where = f"with reflections at the ends of this pipe of {cells} cell{'s' if cells > 1 else ''}"
     limit, share = pipe_limit(scheme, method, cells), LIMITED_EXCESS if limited else 0.0
     return CourantCheck(f"links.{model.pipes[k].name}", courant, limit, scheme, False, where, share, grows)
 
@@ -293,7 +293,7 @@ def courant_notice(model, check: CourantCheck, method: str) -> Notice:
     """
     numerics = model.case.numerics
     scheme = model.case.numerics.scheme
-    about = f", which there equals {check.scheme}," if check.scheme != scheme else ""
+    about = f", which equals {check.scheme} here," if check.scheme != scheme else ""
     known = "proved" if check.proved else "an estimate"
     size = numerics.step if numerics.step is not None else numerics.courant
     key, unit = ("step", " s") if numerics.step is not None else ("courant", "")

@@ -125,7 +125,8 @@ def _failure(method, code, loop_state) -> str:
     if code == loop_indices.NEWTON_STUCK:
         return (
             when
-            + f"Newton did not converge, worst in y[{int(loop_state[loop_indices.WORST])}]; try another rtol or method"
+            + f"Newton did not converge, worst in y[{int(loop_state[loop_indices.WORST])}]; try another rtol, step or "
+            "method"
         )
     return when + "the solution is not finite or the step became too small; try a smaller step or a larger rtol"
 
@@ -136,7 +137,7 @@ def _numbers(name, given) -> np.ndarray:
             raise TypeError
         return np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError):
-        raise FvsolveError(f"{name} = {given!r} is not made of numbers") from None
+        raise FvsolveError(f"{name} = {given!r} is not valid. Expected real numbers") from None
 
 
 def _scale(atol, rtol: float, n: int) -> np.ndarray:
@@ -147,7 +148,8 @@ def _scale(atol, rtol: float, n: int) -> np.ndarray:
     """
     atol = _numbers("atol", atol)
     if atol.shape not in ((), (n,)) or not np.all(np.isfinite(atol) & (atol > 0)):
-        raise FvsolveError(f"atol is not valid. Expected a positive number, or {n} of them, one for each state")
+        raise FvsolveError(f"atol = {atol.tolist()} is not valid. Expected a positive number, or a row of positive "
+                           f"numbers with the length of y0, {n}")  # fmt: skip
     return np.broadcast_to(atol / rtol, n).copy()
 
 
@@ -168,7 +170,7 @@ def _check(method, t, rtol, step) -> None:
         raise FvsolveError("rtol and step both set the step; give only one of them")
     if step is None and not method.adaptive:
         adaptive = ", ".join(dict.fromkeys(other.name for other in METHODS.values() if other.adaptive))
-        raise FvsolveError(f"{method.name} has no error estimate; give step, or one of {adaptive}")
+        raise FvsolveError(f"{method.name} has no error estimate; give step, or one of the methods {adaptive}")
     if t.ndim != 1 or t.size < 2 or not np.all(np.diff(t) > 0):
         raise FvsolveError("t is not valid. Expected at least two times in rising order")
     for name, value in (("rtol", rtol), ("step", step)):

@@ -231,8 +231,8 @@ def printed(a: Sequence, b: Sequence, c: Sequence | None = None) -> str:
     a, b = np.atleast_2d(np.asarray(a, dtype=object)), np.atleast_2d(np.asarray(b, dtype=object))
     s = a.shape[0]
     if a.shape != (s, s) or b.ndim != 2 or b.shape[0] > 2 or b.shape[1] != s:
-        raise FvsolveError(f"A has shape {a.shape}, b {b.shape}. Expected s x s and s, or two rows of s for an "
-                           "embedded solution")  # fmt: skip
+        raise FvsolveError(f"A has shape {a.shape}, b {b.shape}. Expected s x s numbers in A and s in b, or two rows "
+                           "of s in b for an embedded solution (s: number of stages)")  # fmt: skip
     if c is None:
         c = [sum(map(_number, row), Fraction(0)) for row in a]
     c = np.atleast_1d(np.asarray(c, dtype=object))
@@ -333,7 +333,7 @@ def _rows(text: str, numbers: Mapping, faults: list[str]) -> tuple[list, list]:
                 faults.append(f'row "{line}": {error}')
         (weights if below else head).append(row)
     if not head or not below:
-        faults.append("incomplete tableau. Expected rows, a ruled line and weights")
+        faults.append("incomplete tableau. Expected rows, a line of dashes and weights")
     return head, weights
 
 

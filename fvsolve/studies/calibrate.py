@@ -258,8 +258,8 @@ class LeastSquaresFit:
         root = np.sqrt(np.diag(covariance))
         correlation = covariance / np.outer(root, root)
         np.fill_diagonal(correlation, 1.0)
-        doubts += [f"{key} lies at an end of its range" for key, x in zip(keys, answer.x, strict=True)
-                   if min(x, 1.0 - x) <= AT_BOUND]  # fmt: skip
+        doubts += [f"{key} lies at an end of its range; try a wider range"
+                   for key, x in zip(keys, answer.x, strict=True) if min(x, 1.0 - x) <= AT_BOUND]  # fmt: skip
         series = self.case.compare.values()
         rms = {entry.probe.text: series_range(entry.v) * float(np.sqrt(np.mean(series_difference**2)))
                for entry, series_difference in zip(series, differences, strict=True)}  # fmt: skip

@@ -184,7 +184,7 @@ def span_of(case: Case, key: str) -> tuple[float, float, float, float]:
     if schedule is None:
         suggestion = did_you_mean(key, laws)
         moving = [name for name, law in laws.items() if not law.constant]
-        known = f"Schedules that change are {listing(moving)}" if moving else "No schedule of this case changes"
+        known = f"Schedules that change: {listing(moving)}" if moving else "No schedule of this case changes"
         raise FvsolveError(f"is not a schedule of this case{suggestion or f'. {known}'}")
     if schedule.constant or schedule.kind not in ("linear", "smooth", "ramp") or len(schedule.time) < 2:
         example = '{ start = "1 s", duration = "10 s", value = [1, 0] }'

@@ -275,7 +275,9 @@ def description(runs: dict[float, Result], case: Any) -> str:
     """Sentence that describes how the errors of peaks were found, and the restrictions for this case."""
     others = " and ".join(f"{factor:g}" for factor in sorted(runs) if factor != 1.0)
     if not others:
-        return f"errors are unknown: cells of {listing(fixed_basins(case))} come from files, and no others can change"
+        return (
+            f"errors are unknown: cells of {listing(fixed_basins(case))} come from files, and there are no other cells"
+        )
     text = f"peaks compared with those at {others} times the resolution"
     if fixed_basins(case):
         text += f"; cells of {', '.join(fixed_basins(case))} come from files and did not change"

@@ -94,7 +94,7 @@ class RequestRunner:
 
     def lost_result(self, request: RunRequest) -> Any:
         """Raise RunError, because a study cannot continue without the run of a request that crashed its process."""
-        keys = ", ".join(f"{key} = {value}" for key, value in request.keys.items())
+        keys = ", ".join(f"{key} = {value}" for key, value in request.keys.items()) or "the keys of the case"
         raise RunError(f"the process that made the run with {keys} was killed repeatedly. Is there enough memory?")
 
     def __getstate__(self) -> dict[str, Any]:

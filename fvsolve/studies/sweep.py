@@ -55,7 +55,7 @@ class Sweep(Displayable):
 
     def summary_line(self) -> str:
         failed = sum(not row["ok"] for row in self.rows)
-        return f"over {', '.join(self.keys)}: {len(self.rows)} runs, {failed} of them not ok"
+        return f"over {', '.join(self.keys)}: {len(self.rows)} run{'s' * (len(self.rows) != 1)}, {failed} not ok"
 
     def table_columns(self) -> dict[str, list]:
         return ResultTable([Column(name) for name in self.columns], self.rows).table_columns()

@@ -115,7 +115,7 @@ def unknown_parts(case: Any) -> dict[Part, str]:
             "travel time of a cell; use more cells"
         )
         reasons = {(group, name): text for group in ("nodes", "links") for name in getattr(case, group)}
-    texts = {name: f"{name} is shorter than a cell of {neighbour}; set links.{neighbour}.cells = {cells}"
+    texts = {name: f"a wave crosses {name} faster than a cell of {neighbour}; set links.{neighbour}.cells = {cells}"
              for name, (neighbour, cells) in short_pipes(case).items()}  # fmt: skip
     texts |= {
         name: f"{name} has a single cell; set links.{name}.cells = {MIN_CELLS}" for name in single_cell_pipes(case)

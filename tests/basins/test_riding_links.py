@@ -246,9 +246,9 @@ FAULTS = {  # text: (keys of nodes, of the link)
     "joins a.gap, on hull and b.gap, which is fixed: this would be a flexible hose": ({"b": STANDS}, {}),
     "joins a.gap, on hull and b.gap, on deck: this would be a flexible hose": (
         {"deck": hull(kind="fixed", on="hull"), "b": basin((0, 0, 0), "west") | {"on": "deck"}}, {}),
-    "0.9 m is too short: its route on hull is 1 m long (a.gap at [2, 0.5, 0] and b.gap at [3, 0.5, 0])": (
+    "0.9 m is too short: the route on hull is 1 m long (a.gap at [2, 0.5, 0] and b.gap at [3, 0.5, 0])": (
         {}, {"length": 0.9}),
-    "its ends lie 1 m apart (a.gap at [2, 0.5, 0] and b.gap at [3, 0.5, 0]), and a valve has no length": (
+    "the ends lie 1 m apart (a.gap at [2, 0.5, 0] and b.gap at [3, 0.5, 0]), and a valve has no length": (
         {}, {"type": "valve", "area": 0.1, "length": None, "diameter": None}),
     'joins a.gap, a patch of a basin without cells; expected sloshing = "cells" in this basin': (
         {"a": {"sloshing": "frozen"}}, {}),

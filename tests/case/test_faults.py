@@ -209,7 +209,7 @@ BAD = {
     ),
     "only rigid columns": (
         SCENE + RIGID,
-        "nodes.c: only rigid columns join here, so nothing sets its pressure",
+        "nodes.c: only rigid columns join this node, so nothing sets its pressure",
     ),
     "a demand above its pressure between rigid columns": (
         SCENE + RIGID.replace('type = "junction"', 'type = "junction"\ndemand = 0.1\nrequired_pressure = 3e5'),
@@ -345,7 +345,10 @@ BAD = {
         'ambient_pressure = "1 barg"\n' + SCENE,
         'line 1: ambient_pressure: "1 barg" is a gauge pressure',
     ),
-    "no ambient": ('ambient_pressure = "0 bar"\n' + SCENE, 'ambient_pressure: "0 bar" is absolute and not above 0'),
+    "no ambient": (
+        'ambient_pressure = "0 bar"\n' + SCENE,
+        'ambient_pressure: "0 bar" is not an absolute pressure above 0',
+    ),
     "vacuum of the fluid": (
         add("fluid", 'pressure = "0 bar"'),
         'fluid.pressure: "0 bar" is absolute, a vacuum',
@@ -364,7 +367,7 @@ BAD = {
         add("nodes.gate", "elevation = 1000")
         .replace('"0 barg"', '"0 barg"\nelevation = 0')
         .replace('head = "45.72 m"', 'head = "1100 m"\nelevation = 0'),
-        "links.main.length: 914.4 m is too short: its ends differ by 1000 m in elevation",
+        "links.main.length: 914.4 m is too short: the ends differ by 1000 m in elevation",
     ),
     # tanks
     "tank without level": (tank("level = 1\n", ""), "nodes.t: level is missing"),
@@ -403,7 +406,7 @@ BAD = {
     ),
     "unlike lengths": (
         opening("{ time = [0, 1], value = [1] }"),
-        "opening.value: 1 values for 2 times; expected the same number",
+        "opening.value: has length 1, but `time` has length 2; expected equal lengths",
     ),
     "opening above 1": (
         opening("{ time = [0, 1], value = [1, 2] }"),
@@ -438,7 +441,7 @@ BAD = {
         opening("{ start = 0, duration = 1, value = [1, 0], exponent = 0 }"),
         "opening.exponent: 0 is out",
     ),
-    "unknown signal": (opening('{ signal = "x" }'), 'opening.signal: no signal named "x"; signals are none'),
+    "unknown signal": (opening('{ signal = "x" }'), 'opening.signal: no signal named "x"; [signals] has none'),
     "signal with more keys": (opening('{ signal = "x", time = [1] }'), "opening.time: unknown key"),
     "a signal at fault": (
         opening('{ signal = "x" }') + "[signals.x]\ntime = [0, 1]\nvalue = [2, 3]\n",

@@ -243,7 +243,7 @@ def test_what_lies_in_the_middle_of_a_cell_goes_to_the_same_face_from_either_end
         (lambda case: case["nodes"].update({"hole-at": junction(elevation=20.0)}), "hole joins main at a new node"),
         (
             lambda case: case.update(routes={"main": {"pipes": ["main"]}}),
-            "main is cut, and its pieces form a route of that name",
+            "main is cut at the parts and bends on it, and the pieces form a route of that name",
         ),
         (lambda case: case["links"]["main"].update(pieces={"main-9": {"cells": 3}}), "main has no piece of that name"),
         (lambda case: case["links"]["main"].update(pieces=3), "3 is not a table; expected a table"),

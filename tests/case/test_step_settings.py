@@ -37,12 +37,12 @@ FAULTS = {
     "no estimate by default": (cellless(method="gauss-4"), 'numerics.method: method "gauss-4" estimates no error; use'),
     "rtol below rounding": (
         piped(method="radau-iia-5", rtol=1e-14),
-        "numerics.rtol: 1e-14 is below rounding; expected",
+        "numerics.rtol: 1e-14 is below rounding errors; expected",
     ),
     "rtol of no kind": (piped(method="radau-iia-5", rtol="small"), "numerics.rtol"),
     "step that moves nothing": (
         piped(method="gauss-4", step=1e-17),
-        "numerics.step: 1e-17 s is below the rounding of the time",
+        "numerics.step: 1e-17 s is below the rounding error of the time",
     ),
     "step of no time": (piped(method="gauss-4", step="1 m"), "numerics.step"),
     "step of zero": (piped(method="gauss-4", step=0.0), "numerics.step"),
@@ -95,8 +95,8 @@ INTEGRATE = {
     "infinite": (dict(method="radau-iia-5", step=float("inf")), "step = inf is not a positive number"),
     "text": (dict(rtol="1e-6"), "rtol = '1e-6' is not a positive number"),
     "auto by steps": (dict(method="auto", step=0.1), 'method "auto" uses error control; give rtol'),
-    "negative atol": (dict(atol=-1.0), "atol is not valid. Expected a positive number, or 1 of them"),
-    "atol of another length": (dict(atol=[1e-6, 1e-6]), "atol is not valid. Expected a positive number, or 1 of them"),
+    "negative atol": (dict(atol=-1.0), "atol = -1.0 is not valid. Expected a positive number, or a row"),
+    "atol of another length": (dict(atol=[1e-6, 1e-6]), "positive numbers with the length of y0, 1"),
 }
 
 
@@ -112,7 +112,7 @@ WRONG = {
     "too many": (lambda t, y: np.array([y[1], y[0], 0.0]), [1.0, 0.0], "f(t, y) gives 3 rates for 2 states"),
     "nothing": (lambda t, y: None, [1.0], "f(t, y) gives 0 rates for 1 states"),
     "no function": (5, [1.0], "f = 5 cannot be called"),
-    "no numbers": (lambda t, y: -y, ["a"], "y0 = ['a'] is not made of numbers"),
+    "no numbers": (lambda t, y: -y, ["a"], "y0 = ['a'] is not valid. Expected real numbers"),
 }
 
 

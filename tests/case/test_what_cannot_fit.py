@@ -17,10 +17,10 @@ POOL = {"type": "basin", "physics": "transport", "size": [1.0, 1.0], "cells": [4
 
 
 @pytest.mark.parametrize("settings, words", [
-    ({"numerics.courant": 1e-300}, "numerics.courant: 1e-300 gives steps of .* s, below the rounding of the time"),
-    ({"numerics.courant": 1e-14, "numerics.end": 1e4}, "below the rounding of the time; expected more than"),
+    ({"numerics.courant": 1e-300}, "numerics.courant: 1e-300 gives steps of .* s, below the rounding error of the"),
+    ({"numerics.courant": 1e-14, "numerics.end": 1e4}, "below the rounding error of the time; expected more than"),
     ({"output.every": 1e-9, "numerics.end": 1e4}, r"output.every: 1e-09 s gives 1e\+13 rows of 5 numbers, about .* TB"),
-    ({"output.every": 1e-300}, "output.every: 1e-300 s is below the rounding of the time"),
+    ({"output.every": 1e-300}, "output.every: 1e-300 s is below the rounding error of the time"),
     ({"links.main.cells": 10**8}, r"links.main.cells: 1e\+08 cells take about 50 GB of memory, and .* are free"),
     ({"links.main.cells": 2 * 10**7, "numerics.method": "radau-iia-5"}, "cells take about 60 GB of memory"),
 ])  # fmt: skip

@@ -213,4 +213,4 @@ def test_numbered_groups_are_patches_by_number(tmp_path):
     lines.write(tmp_path / "ref.mesh")
     mesh = read(tmp_path / "ref.mesh")
     assert mesh.patches == ("4", "wall") and mesh.middle[mesh.patch("4")].tolist() == [[0.0, 0.5]]
-    assert "groups of lines without a name in the file: their patches are 4" in mesh.notes
+    assert "groups of lines with a number instead of a name in the file: their patches are named 4" in mesh.notes

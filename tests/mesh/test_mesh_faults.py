@@ -22,8 +22,8 @@ BAD_RECTANGLES = {
     "holes[0]: [0, 0, 0, 1]; expected [x0, y0, x1, y1]": dict(holes=[(0, 0, 0, 1)]),
     "holes[0]: x1 = 0.3 m is on no grid line; nearest x: 0.25 and 0.5 m": dict(holes=[(0, 0, 0.3, 1)]),
     "holes[0]: y1 = 2 m is on no grid line; nearest y: 1 m": dict(holes=[(0, 0, 0.5, 2)]),
-    "holes: they leave 2 pieces that share no face": dict(holes=[(0.25, 0, 0.5, 1)]),
-    "holes: they leave no cell": dict(holes=[(0, 0, 1, 1)]),
+    "holes: the holes leave 2 pieces that share no face": dict(holes=[(0.25, 0, 0.5, 1)]),
+    "holes: the holes leave no cell": dict(holes=[(0, 0, 1, 1)]),
     'patches.a: unknown side "wets"; expected west, east, south, north; did you mean "west"?': dict(
         patches={"a": "wets"}
     ),
@@ -75,10 +75,10 @@ BAD_FILES = {
         points=[*SQUARE[:5], (1.2, 0.5)], cells=[TWO[0], [1, 2, 5, 4]]
     ),
     "cells: 1 of 3 cells: cell 0 at (1, 0) m have no area": dict(points=SQUARE, cells=[[0, 1, 2], *TWO]),
-    "cells: they overlap at the face from (1, 1) m to (1, 0) m: cell 0 at (1.16667, 0.5) m and cell 1": dict(
+    "cells: some cells overlap at the face from (1, 1) m to (1, 0) m: cell 0 at (1.16667, 0.5) m and cell 1": dict(
         points=[*SQUARE, (1.5, 0.5)], cells=[[1, 6, 4], *TWO]
     ),
-    "both lie on one side of it": dict(points=[*SQUARE[:5], (0.5, 0.5)], cells=[[0, 1, 4, 3], [0, 1, 5]]),
+    "both lie on one side of the face": dict(points=[*SQUARE[:5], (0.5, 0.5)], cells=[[0, 1, 4, 3], [0, 1, 5]]),
     "(4 such faces): cell 0 at (0.5, 0.5) m and cell 1 at (0.5, 0.5) m and cell 2 at": dict(
         points=SQUARE, cells=[TWO[0]] * 3
     ),
@@ -86,7 +86,7 @@ BAD_FILES = {
     "boundary: at 1 place faces coincide but are not connected: cell 0 at (0.5, 0.5) m and cell 1": dict(
         points=TWICE, cells=[TWO[0], [6, 2, 5, 7]]
     ),
-    "cells: they are in 2 pieces that share no face: 2 with cell 1 at (0.5, 0.5) m, 1 with cell 0 at": dict(
+    "the cells are in 2 pieces that share no face: 2 in the piece of cell 1 at (0.5, 0.5) m, 1 in the piece": dict(
         points=[*SQUARE, (5, 0), (6, 0), (6, 1)], cells=[[6, 7, 8], *TWO]
     ),
     "groups.in: lines that are not boundary faces: 1 of 1; the line from (1, 0) m to (1, 1) m lies between": dict(
@@ -96,7 +96,7 @@ BAD_FILES = {
         **GRID, groups={"in": [[0, 3], [0, 4]]}
     ),
     "a line ends at a point that belongs to no cell": dict(points=[*SQUARE, (9, 9)], cells=TWO, groups={"in": [0, 6]}),
-    'groups.out: faces shared with "in": 1, the face from (0, 1) m to (0, 0) m': dict(
+    'groups.out: faces shared with "in": 1, first the face from (0, 1) m to (0, 0) m': dict(
         **GRID, groups={"in": [0, 3], "out": [[3, 0], [0, 1]]}
     ),
     "points: z runs from 0 to 0.2 m; cell 1 has a point in the upper half of this range; expected a mesh": dict(
@@ -135,7 +135,7 @@ def test_a_thin_wall_may_be_named(tmp_path, monkeypatch):
     cells = [[0, 1, 4, 3], [9, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]]
     mesh = read(write(tmp_path / "wall.msh", points, cells, {"baffle": [1, 4]}))
     assert mesh.length[mesh.patch("baffle")].tolist() == [1.0] and mesh.inner == 3
-    with pytest.raises(MeshError, match="at 1 place faces coincide .* a group that marks it as a thin wall"):
+    with pytest.raises(MeshError, match="at 1 place faces coincide .* a group of lines that marks the face as a thin"):
         read(write(tmp_path / "none.msh", points, cells))
     monkeypatch.setattr(contact, "BLOCK", 1)  # as for a long boundary
     assert read(tmp_path / "wall.msh").inner == 3
@@ -159,15 +159,15 @@ def test_files_that_hold_no_plane_mesh(tmp_path, capsys):
         return str(caught.value)
 
     (tmp_path / "pool.msh").write_text(MSH4[: len(MSH4) // 2])
-    assert "pool.msh: 1 fault\n  meshio cannot read it (" in fault("pool.msh")
+    assert "pool.msh: 1 fault\n  meshio cannot read the file (" in fault("pool.msh")
     assert 'there is no such file; did you mean "pool.msh"?' in fault("pol.msh")
     (tmp_path / "pool.dxf").write_text("0\n")
     assert "expected a name that ends in " in fault("pool.dxf") and ".msh" in fault("pool.dxf")
     (tmp_path / "empty.vtk").write_text("")
-    assert "empty.vtk: 1 fault\n  meshio cannot read it (" in fault("empty.vtk")
+    assert "empty.vtk: 1 fault\n  meshio cannot read the file (" in fault("empty.vtk")
     cube = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
     meshio.Mesh(cube, [("tetra", [[0, 1, 2, 3]]), ("triangle", [[0, 1, 2]])]).write(tmp_path / "solid.vtk")
-    assert "cells: they are three-dimensional (1 tetra, 1 triangle)" in fault("solid.vtk")
+    assert "cells: the file has three-dimensional cells (1 tetra, 1 triangle)" in fault("solid.vtk")
     six = np.array([(0, 0, 0), (2, 0, 0), (0, 2, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], float)
     meshio.Mesh(six, [("triangle6", [[0, 1, 2, 3, 4, 5]])]).write(tmp_path / "six.vtk")
     assert "cells: triangle6 cannot be used (1 triangle6)" in fault("six.vtk")

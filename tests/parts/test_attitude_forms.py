@@ -87,7 +87,7 @@ def test_forms_that_disagree_are_named_with_the_angle_between_them():
 
 def test_a_length_that_is_not_one_is_divided_by_and_said():
     one = read(axis=[1, 1, 0], angle="90 deg")
-    assert notes(one) == [("axis", "its length is 1.41421, not 1; it is divided by its length")]
+    assert notes(one) == [("axis", "the vector has length 1.41421, not 1, and is divided by this length")]
     wanted = Rotation.from_rotvec(np.pi / 2**1.5 * np.array([1, 1, 0]))
     assert_allclose(one.rotation, wanted.as_matrix(), rtol=0, atol=1e-15)
     assert notes(read(euler_parameters=[0, 0, 0, -3]))[0][0] == "euler_parameters"
@@ -173,7 +173,7 @@ def test_a_case_has_its_notes_and_faults_with_their_places():
             30.0,
             '30 rad is outside -6.3 to 6.3 rad, one turn in either direction; did you mean "30 deg"?',
         ),
-        ("joint.attitude.axis", 2.0, "its length is 2, not 1; it is divided by its length"),
+        ("joint.attitude.axis", 2.0, "the vector has length 2, not 1, and is divided by this length"),
     ]
 
 

@@ -825,6 +825,6 @@ def test_bennetts_linkage_moves_as_its_half_angles_have_it_and_a_ball_there_is_r
     gap = np.array([result["three.end.x"] + 1.5, result["three.end.y"], result["three.end.z"]])
     assert np.abs(gap).max() < 1e-8  # also along the axis of the pin, without a constraint
     with pytest.raises(
-        fvsolve.errors.CaseError, match="in some direction joints or other pins already prevent its opening"
+        fvsolve.errors.CaseError, match="in some direction joints or other pins already hold its two points together"
     ):
         fvsolve.build(fvsolve.load(bennett(axis=False)))

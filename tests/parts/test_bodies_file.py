@@ -126,16 +126,16 @@ def test_a_loop_that_is_not_closed_is_told_by_how_much_and_one_held_twice_by_whi
     )
     nodes, links = parallelogram()
     del links["loop"]["axis"]
-    text = "links.loop: this pin is redundant: in some direction joints or other pins already prevent its opening"
+    text = "links.loop: this pin is redundant: in some direction joints or other pins already hold its two points"
     assert text in told(nodes, links)
     nodes, links = parallelogram()
     nodes["two"]["joint"]["rate"] = 0.5
-    assert "links.loop: velocities at the start separate its two points at" in told(nodes, links)
+    assert "links.loop: velocities at the start separate the two points of this pin at" in told(nodes, links)
 
 
 def test_a_pin_that_opens_across_its_axis_in_one_direction_alone_is_refused():
     straight = {f"nodes.{name}.joint.angle": 0.0 for name in ("one", "two", "coupler")}
-    with pytest.raises(CaseError, match="links.loop: velocities at the start separate its two points at 1.5 m/s"):
+    with pytest.raises(CaseError, match="loop: velocities at the start separate the two points of this pin at 1.5 m/s"):
         fvsolve.build(fvsolve.load("four-bar", straight | {"nodes.coupler.joint.rate": 1.0}))
 
 
@@ -264,7 +264,7 @@ TOLD = """all.toml: 11 faults
   line 39: nodes.pool.on: "boon" is not a node; expected a body: a, arm, b, boom, c; did you mean "boom"?
   line 40: nodes.pool.elevation: has no effect on a body; give the position in the axes of boon as `at`, and remove this key
   line 46: nodes.flume.patches.lid.travel: moves the wall 1.5 m inward in a zone 1 m wide; expected less travel, or a wider zone
-  line 50: links.lift.stroke: the piston starts at 3 m (ground.far minus ground.lug); expected 0 to 1 m
+  line 50: links.lift.stroke: the piston starts at 3 m (distance from ground.lug to ground.far); expected 0 to 1 m
   line 58: links.s.to: no place named "boom.eye"; places are a, arm, b, boom, c, flume.lid, ground, ground.far, ground.lug, lift.A, lift.B; did you mean "boom"?"""  # noqa: E501
 
 

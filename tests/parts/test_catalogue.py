@@ -131,13 +131,13 @@ def test_what_the_file_says_itself_stands():
 def test_what_was_not_read_is_refused_and_asked_for():
     for more, said in [
         ({"material": "stel", "diameter": 0.3}, 'unknown material "stel"; did you mean "steel"'),
-        ({"material": "PEX", "diameter": 0.3}, "the catalogue has no data of PEX; give wall"),
+        ({"material": "PEX", "diameter": 0.3}, "the catalogue has no data of PEX; leave `material` out"),
         ({"material": "steel", "diameter": 0.3}, "wall thickness of steel is missing"),
         ({"material": "PE100", "nominal": "DN110"}, "expected a class for PE100"),
         ({"class": "K9", "nominal": "DN300"}, 'expected material = "ductile-iron"'),
         ({"class": "K9", "diameter": 0.3}, "diameter and class are given; keep one"),
         ({"class": "K9", "nominal": "DN310", "material": "ductile-iron"}, "the nearest sizes are DN250, DN300, DN350"),
-        ({"class": "C20", "nominal": "DN300", "material": "ductile-iron"}, "available are C100, C40, C50, C64"),
+        ({"class": "C20", "nominal": "DN300", "material": "ductile-iron"}, "expected one of C100, C40, C50, C64"),
         ({"class": "X9", "nominal": "DN300"}, 'unknown class "X9"'),
         ({"class": "PN16", "nominal": "DN110", "material": "PVC-U"}, "Expected one of these materials, or a class"),
         ({"class": "SDR11", "nominal": "DN110", "material": "PE80", "restraint": "joints"}, "needs Poisson's ratio"),

@@ -425,7 +425,7 @@ def test_a_duct_most_of_which_is_a_pipe_is_the_rigid_column_that_it_was(truth):
 
 
 @pytest.mark.parametrize(("change", "place", "text"), [
-    ({"nodes": {"port": {"height": 2.0}}}, "nodes.port.height", "the reaction of this flow"),
+    ({"nodes": {"port": {"height": 2.0}}}, "nodes.port.height", "the reaction of the spilled water"),
     ({"nodes": {"port": {"area": {"level": [0, 1], "area": [1, 2]}}}}, "nodes.port.area", "a constant area"),
 ])  # fmt: skip
 def test_what_a_free_body_does_not_feel_is_refused_by_name(change, place, text):

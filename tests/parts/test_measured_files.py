@@ -71,7 +71,7 @@ def test_other_encodings_of_spreadsheets_are_read(encoding, tmp_path):
     ),
     "both commas and points": (
         "t;H\n0;1.234\n1;1,2\n",
-        'line 3: "1,2" has a decimal comma, but numbers above have points',
+        'line 3: "1,2" has a decimal comma, but numbers above have decimal points',
     ),
     "thousands": ("t;H\n0;1.234,5\n", '"1.234,5" is not a number'),
     "many thousands": ("t;H\n0;1,234,500\n", '"1,234,500" is not a number'),

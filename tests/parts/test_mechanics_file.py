@@ -151,7 +151,7 @@ BAD = {
     "a volume for a mass": (swap('"50 kg"', '"50 l"'), 'nodes.load.mass: "50 l" is a volume; expected a mass'),
     "a piston outside": (
         swap('"100 mm"', '"300 mm"'),
-        "links.cyl.stroke: the piston starts at 0.3 m (load minus ground); expected 0 to 0.2 m",
+        "links.cyl.stroke: the piston starts at 0.3 m (distance from ground to load); expected 0 to 0.2 m",
     ),
     "no area": (swap('piston_diameter = "40 mm"', ""), "links.cyl: area_A or piston_diameter is missing"),
     "no area at B": (swap('rod_diameter = "25 mm"', ""), "links.cyl: area_B or rod_diameter is missing"),

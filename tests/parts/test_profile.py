@@ -176,8 +176,8 @@ def test_x_y_and_z_give_the_way_and_files_read_as_lists(tmp_path) -> None:
     ("change", "told"),
     [
         ({"chainage": [0, 900, 800, 3000], "elevation": [30, 40, 50, 20]}, "800 comes after 900"),
-        ({"chainage": [0, 3000], "elevation": [30, 19]}, "gate is at 20 m, and the profile ends at 19 m"),
-        ({"chainage": [0, 2900], "elevation": [30, 20]}, "chainage spans 2900 m, and `length` is 3000 m; they must"),
+        ({"chainage": [0, 3000], "elevation": [30, 19]}, "the elevation of gate is 20 m, and the profile ends at 19 m"),
+        ({"chainage": [0, 2900], "elevation": [30, 20]}, "the axis is 2900 m long, and `length` is 3000 m; expected"),
         ({"chainage": [0, 10, 3000], "elevation": [30, 60, 20]}, "10 m from chainage 0 m is too short to rise"),
         ({"chainage": [0, 3000], "elevation": [30, 25, 20]}, "2 of chainage, 3 of elevation"),
         ({"chainage": [0], "elevation": [30]}, "has one point"),

@@ -308,18 +308,18 @@ def test_what_does_not_ride_together_is_told_all_at_once():
     assert "give the body as `on = BODY`" in found["nodes.shore.at"]
     assert "counts from the ground" in found["nodes.head.head"]
     assert "port, on hull and shore, which is fixed: this would be a flexible hose" in found["links.bridge"]
-    assert "too short: its route on hull is" in found["links.long.length"]
+    assert "too short: the route on hull is" in found["links.long.length"]
 
 
 def test_what_has_no_way_between_its_ends_joins_one_place():
     case = cut("linear")
     case["nodes"]["beside"]["at"] = [0, -HALF, 0.0]
-    assert "its ends lie 1.5 m apart" in said(case)["links.gate"]
+    assert "the ends lie 1.5 m apart" in said(case)["links.gate"]
 
 
 def test_a_way_round_that_is_longer_than_its_column_is_told():
     case = u_tube(route=[[3.0, 0.0, -DEPTH]])
-    assert said(case)["links.duct.length"].startswith("8 m is too short: its route on hull is 10 m")
+    assert said(case)["links.duct.length"].startswith("8 m is too short: the route on hull is 10 m")
 
 
 def test_a_route_of_a_column_that_stands_still_is_told():

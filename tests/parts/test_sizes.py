@@ -93,7 +93,7 @@ def test_the_wall_of_a_nominal_size_makes_its_wave_speed():
 
 
 BAD = {
-    "a size that is not made": ({"nominal": "DN110"}, "nominal", "the nearest are NPS 4"),
+    "a size that is not made": ({"nominal": "DN110"}, "nominal", "the nearest sizes are NPS 4"),
     "no size": ({"nominal": "100 mm"}, "nominal", '"DN100", "NPS 4" or "NPS 1-1/2"'),
     "a schedule": ({"nominal": "DN100", "schedule": "45"}, "schedule", "did you mean"),
     "a schedule alone": ({"diameter": 0.1, "schedule": "40"}, "schedule", "keep one"),

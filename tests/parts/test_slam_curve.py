@@ -94,11 +94,11 @@ def test_resumed_it_is_the_unbroken_run_to_the_bit(tmp_path, end):
 @pytest.mark.parametrize(
     "wrong, said",
     [({"time_constant": 0.1, "overpressure": 1e3}, "define how the valve shuts"),
-     ({"deceleration": {"rate": [1.0, 2.0], "reverse_velocity": [0.1]}}, "1 values for 2 rates"),
+     ({"deceleration": {"rate": [1.0, 2.0], "reverse_velocity": [0.1]}}, "has length 1, but `rate` has length 2"),
      ({"deceleration": {"rate": [2.0, 1.0], "reverse_velocity": [0.1, 0.2]}}, "rates"),
      ({"deceleration": {"rate": [1.0]}}, "reverse_velocity is missing"),
      ({"deceleration": 3.0}, "is not a table"),
-     ({"diameter": None, "loss_coefficient": None, "Kv": 100.0}, "its velocities refer to a bore")],
+     ({"diameter": None, "loss_coefficient": None, "Kv": 100.0}, "the velocities of this curve refer to a bore")],
 )  # fmt: skip
 def test_what_is_wrong_with_its_curve_is_said(wrong, said):
     case = column(3.0, TIGHT)

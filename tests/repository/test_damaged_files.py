@@ -87,7 +87,7 @@ def test_a_disk_that_fills_up_is_named_with_the_place_and_the_run_goes_on_later(
     case.write_text(fvsolve.load(branched(fields=0), {"output.every": "1 ms"}).resolved())
     done = subprocess.run([sys.executable, "-c", FULL, str(case), str(out)], capture_output=True, text=True)
     assert done.returncode == 2 and f"\n{out}" in f"\n{done.stderr}"
-    assert "cannot be written: File too large. Free disk space and continue with --resume" in done.stderr
+    assert "cannot be written: File too large. Free disk space, or correct the access rights" in done.stderr
     assert fvsolve.run(case, out=out, resume=True).ok
     whole = fvsolve.run(case, out=tmp_path / "whole")
     assert whole.ok and (out / "history.csv").read_bytes() == (tmp_path / "whole" / "history.csv").read_bytes()

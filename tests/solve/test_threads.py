@@ -268,7 +268,7 @@ NETWORK = scene({"a": reservoir(AMBIENT), "b": reservoir(2 * AMBIENT)},
                 {"method": "rk4", "step": 0.01})  # fmt: skip
 ALONE = {
     "an implicit method": (water(method="tr-bdf2"), "tr-bdf2 solves for all states at once"),
-    "no basin": (NETWORK, "there is no basin"),
+    "no basin": (NETWORK, "the case has no basin"),
     "fifth order of a dye": (carried("weno5"), "sheet: its scalars use the scheme weno5"),
     "a dye that decays": (dyed(decay=0.1), "pool: dye decays"),
 }  # fmt: skip

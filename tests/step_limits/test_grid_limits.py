@@ -368,7 +368,7 @@ def test_all_keys_of_a_limit_are_on_the_page():
         (("scheme=upwind5", "method=rk4", "courant=1.7"), None),
         (("scheme=upwind5", "method=rk4", "courant=1.8"), "the limit is 1.73197"),
         (("scheme=central", "method=euler", "courant=0.1"), "waves grow at every Courant number"),
-        (("scheme=weno5", "method=ssp-rk3", "step=20 ms"), "which there equals upwind5"),
+        (("scheme=weno5", "method=ssp-rk3", "step=20 ms"), "which equals upwind5 here"),
         (("scheme=upwind", "method=implicit-euler", "courant=20"), None),
     ],
 )

@@ -154,8 +154,8 @@ def test_every_decimal_of_a_published_array_counts():
         ("0 |\n1 | sqrt(1/2)\n--+--\n | 1/2 1/2", "expected sqrt(n) of an integer"),
         ("0 |\n1 | sqrt(123456789012)\n--+--\n | 1/2 1/2", "expected sqrt(n) of an integer"),
         ("0 |\n1e99 | 1e99\n--+--\n | 1/2 1/2", '"1e99" is beyond 1e+30'),
-        ("0 |", "Expected rows, a ruled line and weights"),
-        ("", "Expected rows, a ruled line and weights"),
+        ("0 |", "Expected rows, a line of dashes and weights"),
+        ("", "Expected rows, a line of dashes and weights"),
         ("0\n--+--\n | 1", 'has no "|"'),
         ("0 |\n--+----\n | 1/2 1/2", "one or two rows of 1"),
         (

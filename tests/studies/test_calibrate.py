@@ -99,7 +99,7 @@ def test_the_command_prints_values_with_their_sigma(measured, fvs):
 
 def test_a_value_at_an_end_of_its_range_is_named(measured):
     found = calibrate(compared(line(LEAK, SPEED, 20, MODEL)), {"links.valve.area": [0.0009, 0.0012]})
-    assert found.doubts == ["links.valve.area lies at an end of its range"]
+    assert found.doubts == ["links.valve.area lies at an end of its range; try a wider range"]
 
 
 def test_what_cannot_be_fitted_is_named(measured):

@@ -106,7 +106,7 @@ def test_rungs_that_would_be_ill_posed_are_skipped_by_name():
     assert "flow enters or leaves at gate" in named(found, "column and volume").reason
     case["nodes"]["out"] = junction(ramp(1.0, 0.5, 0.0, 0.01))
     case["links"]["valve"] = pipe("gate", "out", 50.0, 0.2, SPEED, 4)
-    assert "only rigid columns join here" in named(ladder(case), "rigid column").reason
+    assert "only rigid columns join this node" in named(ladder(case), "rigid column").reason
 
 
 def test_a_scene_in_which_nothing_moves_is_refused():

@@ -38,8 +38,8 @@ def test_it_says_how_far_from_shallow_a_tank_is():
     found = ladder(rolling(1e-4, level=1.0), target=0.05)
     (said,) = found.shallow_water
     assert (
-        said == "tank: its slowest wave, with k h = 1, is 16 % too fast in shallow-water theory, more than the target: "
-        "modes are more accurate for small waves"
+        said == "tank: its slowest wave, with k h = 1 (wave number times depth), is 16 % too fast in shallow-water "
+        "theory, more than the target: modes are more accurate for small waves"
     )
 
 

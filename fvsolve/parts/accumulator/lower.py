@@ -68,7 +68,7 @@ class AccumulatorRows(Device, kind="accumulator"):
         if neck and excess >= 0.0:
             name = list(draft.case.places)[row["node"]].removesuffix(".inside")
             charge, pressure = (draft.case.amount(value, "pressure", 6) for value in (charge_pressure, p))
-            text = f"{name}: empty at the start: its precharge, {charge}, is not below the pressure, {pressure}"
+            text = f"{name}: empty at the start: precharge {charge} is not below the pressure at the node, {pressure}"
             draft.warnings.append(Notice("start", f"nodes.{name}", text, "precharge", float(charge_pressure), float(p)))
         return []
 
@@ -147,7 +147,8 @@ class ShapedRows(AccumulatorRows, kind=""):
                 draft.case.amount(height, "head", span=True),
             )
             text = (f"no steady state: the pressure at the node, {pressure}, is below that of the fluid column, {head} "
-                    "high, so the gas would have no pressure; set the key `bottom` or `level` lower")  # fmt: skip
+                    "high, so the gas would have no pressure; set the key `bottom` or `level` "
+                    "lower, or `gas_volume` greater")  # fmt: skip
             draft.fault(f"nodes.{name}.{'level' if part.gas_volume is None else 'gas_volume'}", text)
             return []
         floats = draft.tables.floats

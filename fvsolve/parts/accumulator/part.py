@@ -116,7 +116,8 @@ class Accumulator(Node, kind="accumulator"):
             text = "has no effect on a vessel without a shape; give the key `diameter` or `area`, or remove this key"
             faults += [((key,), text) for key in KEYS_WITH_SHAPE if key in given]
         elif "precharge" in given:
-            text = "is not valid with `precharge` (a bladder); give `gas_volume` or `level` instead, or remove this key"
+            text = "is not valid with `precharge` (a bladder); remove this key, or replace `precharge` by "
+            text += "`gas_volume` or `level`"
             faults += [((key,), text) for key in shapes]
         if "slope" in given and shapes == ["area"]:
             faults.append(
@@ -129,7 +130,8 @@ class Accumulator(Node, kind="accumulator"):
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         if (self.gas_volume or 0.0) > self.volume:
-            yield ("gas_volume",), f"{self.gas_volume:g} m3 is greater than `volume`, {self.volume:g} m3; expected less"
+            text = f"{self.gas_volume:g} m3 is greater than `volume`, {self.volume:g} m3"
+            yield ("gas_volume",), f"{text}; expected at most `volume`"
         if self.initial_pressure is not None:
             yield from around.boiling_faults("nodes", name, "initial_pressure", [self.initial_pressure])
         if not self.has_shape:

@@ -19,7 +19,7 @@ class AirValveRows(Device, kind="air-valve"):
     states = ("air",)
     quantities = ("air_volume", "air_mass", "air_pressure")
     events = ("opens", "shuts")
-    remedy = "give the air valve another volume"
+    remedy = "try a greater or smaller `volume` of the air valve"
 
     def of(self, part) -> Device:
         return self if part.throttled_outlet is None else ThrottledAirValveRows()

@@ -110,7 +110,7 @@ class AirValve(Node, kind="air-valve"):
         if self.switch_velocity is not None and not lines:
             yield (
                 ("switch_velocity",),
-                "no pipe or rigid column joins this node, so it has no velocity; give the key `switch` instead",
+                "no pipe or rigid column joins this node to give a fluid velocity; give the key `switch` instead",
             )
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:

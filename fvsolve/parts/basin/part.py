@@ -321,7 +321,7 @@ class Basin(PlaceOnBody, kind="basin"):
         faults = Physics.kinds[physics].own_faults(given) if known else []
         if "mesh" in given:
             faults += [
-                ((key,), "is a key of rectangles, but this basin has a `mesh`; remove one")
+                ((key,), "is a key of rectangles, but this basin has a `mesh`; remove this key or `mesh`")
                 for key in RECTANGLE_KEYS
                 if key in given
             ]

@@ -140,7 +140,10 @@ class Joint(Table):
                 faults.append((("axis",), "is all zeros; expected a direction, for example [0, 1, 0]"))
         if "at" in given and isinstance(given.get("on"), str) and "." in given["on"]:
             faults.append(
-                (("at",), f"{given['on']} gives the position already; remove `at`, or name only the body in `on`")
+                (
+                    ("at",),
+                    f"{given['on']} gives the position already; remove `at`, or give a body without point in `on`",
+                )
             )
         return faults
 

@@ -26,7 +26,8 @@ class Bushing(TwoPort, kind="bushing"):
         if not any((self.stiffness, self.damping, self.rotational_stiffness, self.rotational_damping)):
             yield (
                 ("stiffness",),
-                "is 0, like `damping`, `rotational_stiffness` and `rotational_damping`; expected at least one above 0",
+                "is 0, like `damping`, `rotational_stiffness` and `rotational_damping`; "
+                "expected at least one of these four keys above 0",
             )
 
     stiffness: Annotated[

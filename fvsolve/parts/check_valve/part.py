@@ -57,7 +57,10 @@ class SlamCurveTable(Value):
         rate, velocity = values["rate"], values["reverse_velocity"]
         if len(rate) != len(velocity):
             faults.append(
-                (("reverse_velocity",), f"{len(velocity)} values for {len(rate)} rates; expected equal numbers")
+                (
+                    ("reverse_velocity",),
+                    f"has length {len(velocity)}, but `rate` has length {len(rate)}; expected equal lengths",
+                )
             )
         try:
             check_increasing(rate, given["rate"], "rates")
@@ -115,12 +118,13 @@ class CheckValve(Disc, Sized, TwoPort, kind="check-valve"):
         if "deceleration" in given and moves:
             text = (
                 "is not valid with `time_constant` or `natural_frequency`, which also define how the valve shuts; "
-                "remove one"
+                "keep either this key or the others"
             )
             faults.append((("deceleration",), text))
         if "deceleration" in given and not {"area", "diameter"} & set(given):
             text = (
-                "its velocities refer to a bore; give `diameter` or `area`, with `loss_coefficient` instead of Kv or Cv"
+                "the velocities of this curve refer to a bore, whose size is missing; give `diameter` or `area`, and "
+                "`loss_coefficient` instead of Kv or Cv"
             )
             faults.append((("deceleration",), text))
         return faults

@@ -102,7 +102,8 @@ class Cylinder(Link, kind="cylinder"):
         x, (rod, case) = distance - self.closed_length, (self.ports["rod"], self.ports["case"])
         if not 0.0 <= x <= self.stroke:
             closed = " minus closed_length" if self.closed_length else ""
-            text = f"the piston starts at {x:g} m ({rod} minus {case}{closed}); expected 0 to {self.stroke:g} m"
+            place = f"{x:g} m (distance from {case} to {rod}{closed})"
+            text = f"the piston starts at {place}; expected 0 to {self.stroke:g} m"
             yield ("stroke",), text
         if min(self.areas()) <= 0.0:
             yield ("rod_diameter",), "leaves no area at B; expected a diameter below `piston_diameter`"

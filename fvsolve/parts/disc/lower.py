@@ -109,7 +109,7 @@ class LiftedValve(Device, kind=""):
         self.add_start_notices(start, name, x)
         target = self.lifting_pressure(start, k) / part.overpressure
         return (
-            [f"{name}: shut at the start, although its pressure would open it"]
+            [f"{name}: the valve is shut at the start, although the pressure there would open the valve"]
             if start.rest and target > SMALL_LIFT
             else []
         )

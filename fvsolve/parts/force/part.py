@@ -50,7 +50,7 @@ class Force(Coupling, kind="force"):
         if around.spatial(self.to) and self.from_ is None and self.direction is None:
             yield (
                 (),
-                "direction is missing: a force on a point without `from` needs it; [0, 0, -1] is down",
+                "direction is missing: a force on a point needs this key or `from`; for example [0, 0, -1], downward",
             )
         if not around.spatial(self.to) and self.direction is not None:
             yield (

@@ -61,7 +61,10 @@ class Junction(PlaceOnBody, kind="junction"):
                 yield ("minimum_pressure",), text
             return
         if self.required_pressure <= least:
-            text = f"{self.required_pressure:g} Pa is not above {least:g} Pa, at which no demand is supplied"
+            text = (
+                f"{self.required_pressure:g} Pa is not above {least:g} Pa, at which no demand is supplied; "
+                "expected a higher pressure"
+            )
             yield ("required_pressure",), text
         if least < around.ambient:
             yield (
@@ -72,4 +75,5 @@ class Junction(PlaceOnBody, kind="junction"):
                 ),
             )
         if not (self.demand.value.min() >= 0.0 and self.demand.value.max() > 0.0):
-            yield ("demand",), "with `required_pressure`, expected a demand that is never negative and not always 0"
+            text = "is negative at some time, or always 0; `required_pressure` needs values of at least 0, not all 0"
+            yield ("demand",), text

@@ -90,7 +90,13 @@ def _add_schedule(table: dict[str, Any], material: Material | None) -> None:
     """
     if material is not None and material.name not in STEELS:
         raise ValueFault(
-            [(("nominal",), f"is a steel size without the key `class`; expected a class for {material.name}")]
+            [
+                (
+                    ("nominal",),
+                    f"is a steel size without the key `class`; expected a class for {material.name}, or `diameter` and "
+                    "a wall thickness instead of `nominal`",
+                )
+            ]
         )
     try:
         bore, thickness = pipe_size(table["nominal"], table.get("schedule", "40"))

@@ -61,7 +61,7 @@ class Elements(Value):
             raise ValueError(f"{show(given)} is not a table; expected {{ compliance = [1e-10], time = [0.05] }}")
         creep = Creep(**read_keys(given, CREEP_KEYS, setting))
         if len(creep.compliance) != len(creep.time):
-            sizes = f"{len(creep.compliance)} values of `compliance` and {len(creep.time)} of `time`"
+            sizes = f"`compliance` has length {len(creep.compliance)}, and `time` has length {len(creep.time)}"
             raise ValueError(f"{sizes}; expected one compliance and one time for each element")
         return creep
 

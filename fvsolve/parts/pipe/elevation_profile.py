@@ -104,9 +104,10 @@ def check_slope(profile: Profile) -> None:
     if (rises > lengths * (1.0 + 1e-9)).any():
         k = int(np.argmax(rises - lengths))
         text = (
-            f"{lengths[k]:g} m from chainage {profile.chainage[k]:g} m is too short to rise or fall by {rises[k]:g} m"
+            f"a length of {lengths[k]:g} m from chainage {profile.chainage[k]:g} m is too short to rise or fall by "
+            f"{rises[k]:g} m"
         )
-        raise ValueError(f"{text}; chainage is the length along the axis, not in plan")
+        raise ValueError(f"{text}; expected chainages along the axis, not in plan")
 
 
 def from_lists(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
@@ -126,7 +127,7 @@ def from_lists(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, n
             faults.append(((key,), str(error)))
     if not faults and len({len(values) for values in columns.values()}) > 1:
         counts = ", ".join(f"{len(values)} of {key}" for key, values in columns.items())
-        faults.append(((), f"lists have different lengths: {counts}"))
+        faults.append(((), f"lists have different lengths: {counts}; expected equal lengths"))
     if not faults and len(columns[keys[0]]) < 2:
         faults.append(((), "has one point; expected at least two"))
     if faults:
@@ -145,7 +146,7 @@ def from_file(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, np
     if unknown:
         raise ValueFault(unknown)
     if not isinstance(given["file"], str):
-        raise ValueFault([(("file",), f"{show(given['file'])} is not a file name in quotes")])
+        raise ValueFault([(("file",), f"{show(given['file'])} is not text; expected a file name in quotes")])
     try:
         path = find_file(given["file"], setting)
         rows = read_rows(path)

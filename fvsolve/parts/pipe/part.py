@@ -51,7 +51,7 @@ WAVES = UsualRange(
     30.0, 2000.0, "soft hoses to stiff pipes"
 )  # most are between 50 and 1500 m/s, Wylie and Streeter 1993
 SOFT_WALLS = (  # (modulus [Pa], least wall over bore of such a pipe, text); the thinnest plastics are SDR 26
-    (2e8, 0.1, "softer than any plastic, as rubber is"),
+    (2e8, 0.1, "softer than any plastic, like rubber"),
     (4e8, 0.04, "as soft as low-density polyethylene"),
 )
 
@@ -114,7 +114,7 @@ class Pipe(Conduit, kind="pipe"):
     ] = None
     cells: Annotated[
         int | None,
-        Whole(between(1, MOST_CELLS), "number of finite volumes; travel time over `cell_time` if left out"),
+        Whole(between(1, MOST_CELLS), "number of finite volumes; travel time over numerics.cell_time if left out"),
     ] = None
     pipe_model: Annotated[
         str | None,
@@ -174,8 +174,8 @@ class Pipe(Conduit, kind="pipe"):
         if self.profile is None:
             return
         if abs(self.profile.length - self.length) > LENGTH_TOLERANCE * self.length:
-            text = f"chainage spans {self.profile.length:.10g} m, and `length` is {self.length:.10g} m; they must agree"
-            yield ("profile",), f"{text}. Leave `length` out"
+            text = f"the axis is {self.profile.length:.10g} m long, and `length` is {self.length:.10g} m"
+            yield ("profile",), f"{text}; expected equal lengths. Leave `length` out"
         for place, end, z in zip(("from", "to"), (self.from_, self.to), self.profile.elevation[[0, -1]], strict=True):
             node = around.nodes.get(end)
             if getattr(node, "on", None) is not None:
@@ -183,7 +183,8 @@ class Pipe(Conduit, kind="pipe"):
             stated = getattr(node, "elevation", None)
             if stated is not None and abs(stated - z) > ELEVATION_TOLERANCE:
                 text = (
-                    f"{end} is at {stated:.10g} m, and the profile {END_VERBS[place]} at {z:.10g} m; expected the same"
+                    f"the elevation of {end} is {stated:.10g} m, and the profile {END_VERBS[place]} at {z:.10g} m; "
+                    "expected equal elevations"
                 )
                 yield ("profile",), f"{text}, or no elevation of {end}, which then takes that of the profile"
 
@@ -194,7 +195,7 @@ class Pipe(Conduit, kind="pipe"):
             return
         for limit, thin, example in SOFT_WALLS:
             if wall.youngs_modulus < limit and wall.thickness < thin * self.diameter:
-                text = (f"{wall.youngs_modulus:g} Pa is below {limit:g} Pa, {example}, for which a wall of "
+                text = (f"{wall.youngs_modulus:g} Pa is {example} (below {limit:g} Pa); for such a material a wall of "
                         f"{wall.thickness:g} m is too thin in a bore of {self.diameter:g} m; "
                         "is the unit GPa?")  # fmt: skip
                 yield ("wall", "youngs_modulus"), wall.youngs_modulus, limit, text

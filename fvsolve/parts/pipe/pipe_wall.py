@@ -65,7 +65,7 @@ class MaterialName(Value):
             return given
         if not isinstance(given, str):
             raise ValueError(f"{show(given)} is not text; expected one of {', '.join(self.names)}")
-        wall = "give wall = { youngs_modulus, thickness }"
+        wall = "leave `material` out, and give wall = { youngs_modulus, thickness }"
         if given in WITHOUT_SOURCE:
             raise ValueError(f"the catalogue has no data of {given}; {wall}")
         raise ValueError(f"unknown material {show(given)}{did_you_mean(given, self.names)}; expected "

@@ -126,7 +126,7 @@ def _ductile(series: str, number: int, name: str, size: float) -> ClassSize:
         source = f"K{number} DN{size:g}: wall {wall:g} mm, K (0.5 + 0.001 DN), at least 6 mm; {K_SOURCES}"
     elif number not in walls:
         available = [f"C{pressure}" for pressure in walls]
-        raise ValueError(f"no class {show(name)} of DN{size:g} in the catalogue; available are {listing(available)}")
+        raise ValueError(f"no class {show(name)} of DN{size:g} in the catalogue; expected one of {listing(available)}")
     else:
         wall, allowable = walls[number] + spare, float(number)
         source = f"C{number} DN{size:g}: wall at least {walls[number]:g} mm, nominal wall {spare:g} mm more; {EN_545}"

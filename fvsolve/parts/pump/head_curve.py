@@ -62,7 +62,7 @@ def points(
     flow, value = lists["flow"], lists[word]
     faults = faults_of(given, flow, value)
     if len(flow) != len(value):
-        faults.append(((word,), f"{len(value)} values for {len(flow)} flows; expected equal numbers"))
+        faults.append(((word,), f"has length {len(value)}, but `flow` has length {len(flow)}; expected equal lengths"))
     try:
         check_increasing(flow, given["flow"], "flows")
     except ValueError as error:
@@ -101,7 +101,7 @@ class HeadCurve(Value):
         faults = []
         if len(flow) == 1 and not (flow[0] > 0 and head[0] > 0):
             faults.append(
-                ((), "a single point must have a flow and a head above 0; correct it, or give two points or more")
+                ((), "a single point must have a flow and a head above 0; correct the point, or give two or more")
             )
         for k, (before, after) in enumerate(zip(head, head[1:], strict=False)):
             if not after < before:
@@ -231,10 +231,10 @@ class Suter(Value):
         head, torque, faults = values["head"], values["torque"], []
         if len(head) != len(torque):
             faults.append(
-                (("torque",), f"{len(torque)} values for {len(head)} values of `head`; expected equal numbers")
+                (("torque",), f"has length {len(torque)}, but `head` has length {len(head)}; expected equal lengths")
             )
         if not head and not torque:
-            raise ValueFault([((), f"table, or head and torque, is missing; tables are {', '.join(SUTER_TABLES)}")])
+            raise ValueFault([((), f"expected `table`, or `head` and `torque`; tables are {', '.join(SUTER_TABLES)}")])
         for key, series in (("head", head), ("torque", torque)):
             if len(series) < 9:
                 faults.append(((key,), f"{len(series)} values; expected at least 9, from x = 0 to x = 2 pi"))

@@ -71,7 +71,8 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
         rated = rated_point(part, weight_of(model))
         if (table := joined_table(part, *rated)) is None:
             text = (f"{name}: from {moment} on its flow is beyond the last flow of its curve, where its head "
-                    "follows a parabola; give rated_speed to use a Suter table there")  # fmt: skip
+                    "follows a parabola; for a Suter table there give rated_speed, without "
+                    'curve_extrapolation = "parabola"')  # fmt: skip
             return Notice("range", f"links.{name}", text, "curve")
         speed = specific_speed(part, *rated)
         source = table.words if SMALL_SPECIFIC_SPEED <= speed <= LARGE_SPECIFIC_SPEED else f"{table.words}, the nearest"
@@ -137,7 +138,8 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
                 valve["drop"] = drop
         if valve["open"] == 0.0 and k not in start.shut:
             moving.append(
-                f"pump {name}: runs at {valve['drive']:.4g} of its rated speed; its initial flow is not on its curve"
+                f"pump {name}: its flow at the start is not on its characteristic at the relative speed "
+                f"{valve['drive']:.4g}"
             )
         draft.warnings += [
             *reversed_pump(start, name, part, valve),

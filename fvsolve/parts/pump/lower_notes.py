@@ -32,9 +32,13 @@ def reversed_pump(start, name: str, part, valve) -> list[Notice]:
     if valve["drive"] <= 0.0 or start.rest or not (heads[i] > heads[j] + SPEED_TOLERANCE or lowest):
         return []
     target = (
-        "the lowest water level" if lowest else f"{start.case.amount(heads[i] - heads[j], 'head', span=True)} lower"
+        "which has the lowest water level"
+        if lowest
+        else f"where the head is {start.case.amount(heads[i] - heads[j], 'head', span=True)} lower"
     )
-    text = f"{name}: it pumps from {part.from_} to {part.to}, {target}; check its direction, `from` is the suction side"
+    text = (
+        f"{name}: it pumps from {part.from_} to {part.to}, {target}; check its direction (`from` is the suction side)"
+    )
     return [Notice("range", f"links.{name}", text, "from", float(heads[i] - heads[j]), 0.0)]
 
 
@@ -62,7 +66,10 @@ def rated_point_notes(draft, name: str, part) -> list[Notice]:
     if part.shaft_power is not None and part.power is None and not plausible:
         stated, fluid = (draft.case.amount(value, "power") for value in (power, taken))
         likely = units.likely(power, "power", taken, taken / LEAST_SHARE)
-        text = f"{name}: shaft_power is {stated} at its rated flow, but the fluid takes up {fluid} there{likely}"
+        text = (
+            f"{name}: shaft_power is {stated} at the rated flow, but the fluid takes up {fluid} there"
+            f"{likely or '; check values and units of `shaft_power`'}"
+        )
         notices.append(Notice("range", f"links.{name}", text, "shaft_power", power, taken))
     return notices
 
@@ -74,7 +81,8 @@ def unusual_inertia(case, name: str, given: float, power: float, speed: float) -
         return []
     likely = units.likely(given, "inertia", usual / INERTIA_RATIO, usual * INERTIA_RATIO)
     rated = f"{case.amount(power, 'power')} at {speed * 30.0 / math.pi:.4g} rpm"
-    text = f"{name}: an inertia of {given:.4g} kg m2, where {usual:.3g} kg m2 is usual for {rated}{likely}"
+    hint = likely or "; check value and unit"
+    text = f"{name}: an inertia of {given:.4g} kg m2, where {usual:.3g} kg m2 is usual for {rated}{hint}"
     return [Notice("range", f"links.{name}", text, "inertia", given, usual)]
 
 

@@ -167,8 +167,9 @@ class Regulator(Device, kind=""):
     def refuse(self, start, k: int) -> None:
         """Report a fault: no opening of valve k keeps the sensed quantity at its set value."""
         name = start.draft.valve_names[k]
-        start.draft.fault(f"links.{name}.{self.key}", "no steady state: the valve alone supplies a given demand, "
-                          'so it cannot set pressure or flow; change the demand, or use initial = "rest"')  # fmt: skip
+        start.draft.fault(f"links.{name}.{self.key}", f"no steady state: no opening of the valve gives {self.key}, for "
+                          "example because a given demand alone determines the flow through the valve; change "
+                          f'{self.key} or the demand, or use initial = "rest"')  # fmt: skip
 
 
 class PressureReducingRows(Regulator, kind="pressure-reducing"):
@@ -178,7 +179,7 @@ class PressureReducingRows(Regulator, kind="pressure-reducing"):
     it higher.
     """
 
-    mode, end, verb = law.REDUCING, "to", "reduce"
+    mode, end, verb = law.REDUCING, "to", "reduce the pressure"
 
     def next_mode(self, here, now):
         low, high = here.target - SMALL_PRESSURE, here.target + SMALL_PRESSURE

@@ -53,8 +53,8 @@ class SurgeAnticipatingRows(RelievingRows, kind="surge-anticipating"):
         if not high:
             return []
         return [
-            f"{name}: opens at the start: {amount(p, 'pressure', 6)} is not below high_set, "
-            f"{amount(part.high_set, 'pressure', 6)}"
+            f"{name}: opens at the start, because the pressure at {part.sensed}, {amount(p, 'pressure', 6)}, is not "
+            f"below high_set, {amount(part.high_set, 'pressure', 6)}"
         ]
 
 

@@ -71,7 +71,9 @@ class Surface(Value):
         level, area = values["level"], values["area"]
         faults = []
         if len(level) != len(area):
-            faults.append((("area",), f"{len(area)} areas for {len(level)} levels; expected equal numbers"))
+            faults.append(
+                (("area",), f"has length {len(area)}, but `level` has length {len(level)}; expected equal lengths")
+            )
         if level[0] != 0:
             faults.append((("level",), "levels are measured from the bottom; the first must be 0"))
         try:

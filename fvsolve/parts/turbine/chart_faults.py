@@ -37,11 +37,14 @@ def faults_of_curve(curve) -> list[tuple[str, str]]:
         faults.append(
             (
                 EFFICIENCY,
-                f"gives no torque at point {k + 1}, {point_text(points[k])}; expected {TORQUE} for such points",
+                f"gives no torque at point {k + 1}, {point_text(points[k])}; expected {TORQUE} instead for the whole "
+                "curve",
             )
         )
     if not any(q >= LEAST for _, q in points):
-        faults.append((FLOW, f"has no value of {LEAST:g} or more; expected a positive flow, which drives the turbine"))
+        faults.append(
+            (FLOW, f"has no value of {LEAST:g} or more; expected at least one, a flow that drives the turbine")
+        )
     if (dead := next((p for p in points if p[0] == 0.0 and p[1] <= 0.0), None)) is not None:
         faults.append(
             (
@@ -82,7 +85,7 @@ def angle_faults(points: list[tuple[float, float]]) -> list[tuple[str, str]]:
                 (
                     "",
                     f"passes from {point_text((n, q))} to {point_text((m, r))} across reverse flow through a runner at "
-                    "rest, through which a positive head drives a positive flow",
+                    f"rest, through which a positive head drives a positive flow; expected {FLOW} above 0 at {SPEED} 0",
                 )
             ]
     if not (points[0] if way > 0.0 else points[-1])[0] >= LEAST:

@@ -124,7 +124,7 @@ def from_file(given: dict[str, Any], setting: ReadContext) -> HillChart:
     """
     unknown = [((key,), "unknown key; expected only `file`") for key in given if key != "file"]
     if unknown or not isinstance(given["file"], str):
-        raise ValueFault(unknown or [(("file",), f"{show(given['file'])} is not a file name in quotes")])
+        raise ValueFault(unknown or [(("file",), f"{show(given['file'])} is not text; expected a file name in quotes")])
     try:
         path = find_file(given["file"], setting)
         columns, word = columns_of(read_rows(path))
@@ -175,11 +175,12 @@ def chart_of(curves: dict, places: dict, faults: list, source: Any, file: str = 
     seen: dict[float, Any] = {}
     for k, curve in curves.items():
         if curve.opening in seen:
-            first = seen[curve.opening] + 1
+            first = seen[curve.opening]
             faults.append(
                 (
                     (*places[k], "opening"),
-                    f"{curve.opening:g} is already the opening of curve {first}; give a single curve for each opening",
+                    f"{curve.opening:g} is already the opening of hill_chart[{first}]; give a single curve for each "
+                    "opening",
                 )
             )
         seen.setdefault(curve.opening, k)

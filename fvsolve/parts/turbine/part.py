@@ -77,11 +77,13 @@ def excess_power_point(curve: OpeningCurve, weight: float) -> str | None:
     for n, q, t in points:
         if t * n > weight * q + ROUNDING * weight * abs(q):
             most = t * n / (weight * q) if q > 0.0 else 0.0
-            excess = f"an efficiency of {most:.4g}" if q > 0.0 else "less shaft power than the pumped water takes up"
-            return f"torque at ({n:g}, {q:g}) means {excess}; expected {'at most 1' if q > 0.0 else 'more'}"
+            excess = f"an efficiency of {most:.4g}" if q > 0.0 else "a shaft power above the power of the flow"
+            rule = "at most 1" if q > 0.0 else "at most the power of the flow (negative if the shaft drives the water)"
+            return f"torque at unit_speed {n:g}, unit_flow {q:g} means {excess}; expected {rule}"
     for (n, q, t), (m, r, s) in pairwise(points):
         # power lost on the line, fractions a + b = 1: a^2 (w q - t n) + a b (w (q + r) - t m - s n) + b^2 (w r - s m)
         ends, both = (weight * q - t * n, weight * r - s * m), weight * (q + r) - t * m - s * n
         if both < 0.0 and both * both > 4.0 * ends[0] * ends[1] * (1.0 + ROUNDING):
-            return f"between ({n:g}, {q:g}) and ({m:g}, {r:g}) the efficiency would exceed 1; give more points there"
+            ends = f"(unit_speed, unit_flow) = ({n:g}, {q:g}) and ({m:g}, {r:g})"
+            return f"between {ends} the efficiency would exceed 1; give more points there"
     return None

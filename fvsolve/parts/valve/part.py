@@ -75,7 +75,10 @@ class CharacteristicValue(Value):
         faults = []
         if len(opening) != len(flow_area):
             faults.append(
-                (("flow_area",), f"{len(flow_area)} values for {len(opening)} openings; expected equal numbers")
+                (
+                    ("flow_area",),
+                    f"has length {len(flow_area)}, but `opening` has length {len(opening)}; expected equal lengths",
+                )
             )
         if opening[0] != 0 or opening[-1] != 1:
             faults.append((("opening",), "openings must begin at 0 and end at 1"))

@@ -255,4 +255,6 @@ def _isolated(p: Polynomial, near: Fraction, name: str) -> tuple[Fraction, Fract
         if p(low) * p(high) < 0 and count_roots(p, low, high) == 1:
             return low, high
         width *= 2
-    raise ValueError(f"the polynomial of {name} has no single root near {float(near):.12g}")
+    raise ValueError(
+        f"the polynomial of {name} has no single root near {float(near):.12g}. Expected a value closer to a real root"
+    )

@@ -384,7 +384,8 @@ class _ChartStudy:
         if not target >= floor["trajectory"]:
             raise FvsolveError(
                 f"a target of {target:g} is below the floor: the two references ({floor['reference']}; "
-                f"{floor['second']}) disagree by {floor['trajectory']:.2g}. Try a larger target, or more cells"
+                f"{floor['second']}) disagree by {floor['trajectory']:.2g}. Try a larger target, or more cells "
+                "if the case has cells"
             )
         best = cheapest_curve(points, target, floor["trajectory"], "seconds")
         if best is None:

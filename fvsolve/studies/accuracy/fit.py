@@ -168,7 +168,7 @@ class FitRows:
                 f"no order: only {len(self.good)} of {len(self.h)} rows {verb} above the floor and on the line of the "
                 f"fit. Expected at least {LEAST_ROWS} such rows"
             )
-        return f"no order: {len(self.good)} rows. Expected at least {LEAST_ROWS}"
+        return f"no order: the number of rows with a known error is {len(self.good)}. Expected at least {LEAST_ROWS}"
 
     def failure_reason(self) -> str:
         """Reason why no successive rows show an order."""

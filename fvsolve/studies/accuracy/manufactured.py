@@ -41,7 +41,10 @@ class ManufacturedStudy(OrderStudy):
         if not pipes(case):
             raise FvsolveError("initial, source and exact are functions along pipes, but this case has no pipes")
         if not case.law.linear:
-            raise FvsolveError(f'initial, source and exact need the law "linear", but this case has "{case.fluid.law}"')
+            raise FvsolveError(
+                f'initial, source and exact need the law "linear", but this case has "{case.fluid.law}". '
+                'Set fluid.law = "linear", without cavitation'
+            )
         t0 = case.numerics.start
         self.source, self.exact = source and UserFunction("source", source), exact and UserFunction("exact", exact)
         self.initial = initial and UserFunction("initial", initial)

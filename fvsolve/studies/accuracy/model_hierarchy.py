@@ -125,7 +125,7 @@ class Hierarchy:
             return text
         return (
             f"{text}, more than the target, so all errors of the table have at least this uncertainty. "
-            "Try `fvsolve order`"
+            "Try `fvsolve order` to see how this error falls with more cells"
         )
 
     @property
@@ -156,7 +156,10 @@ class Hierarchy:
         text = f"linear differs from {self.richest.law} by {apart.error:.3g} of the range of {apart.probe}"
         text += f", {side} the target"
         if apart.error <= STRAIN_FACTOR * self.strain:
-            return f"dp/K = {self.strain:.2g}: the laws differ by about this fraction of a pressure change; here {text}"
+            return (
+                f"dp/K = {self.strain:.2g} (greatest pressure change / bulk modulus): the laws differ by about this "
+                f"fraction of a pressure change; here {text}"
+            )
         reason = f"the difference is {apart.start:.3g} at the start and grows"
         if apart.start >= 0.5 * apart.error:
             reason = (
@@ -166,7 +169,7 @@ class Hierarchy:
             reason += f"this fraction, and the range of {apart.probe} is only {apart.moves:.2g} of its value"
         dynamic = self.case.amount(apart.swift, "pressure", 3, span=True)
         reason += f"; linear neglects the dynamic pressure, {dynamic} at the start" if apart.swift > 0.0 else ""
-        return f"{text}, more than dp/K = {self.strain:.2g}: {reason}"
+        return f"{text}, more than dp/K = {self.strain:.2g} (greatest pressure change / bulk modulus): {reason}"
 
     def plain(self) -> dict[str, Any]:
         """Return the hierarchy as plain data, SI."""
@@ -376,8 +379,8 @@ def shallow_water_notes(case, target: float) -> Iterator[str]:
         mesh = {**case.meshes, **case.lumped}[name]
         if (mode := slowest(basin, mesh)) is not None:
             text = (
-                f"{name}: its slowest wave, with k h = {mode.kh:.2g}, is {mode.excess:.2g} % too fast in shallow-water "
-                "theory"
+                f"{name}: its slowest wave, with k h = {mode.kh:.2g} (wave number times depth), is {mode.excess:.2g} % "
+                "too fast in shallow-water theory"
             )
             yield (
                 f"{text}, more than the target: modes are more accurate for small waves"

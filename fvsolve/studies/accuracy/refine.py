@@ -114,7 +114,8 @@ def refinement_plan(
         refinable_counts(case)
     if key is not None and (known[key] == "time") != (refine == "time"):
         raise FvsolveError(
-            f'{key} refines {"time" if known[key] == "time" else "space"}, so refine = "{refine}" is impossible'
+            f'{key} refines {"time" if known[key] == "time" else "space"}, so refine = "{refine}" is impossible. '
+            "Leave `refine` out"
         )
     levels = DEFAULT_LEVELS[refine] if levels is None else levels
     if levels < 2:

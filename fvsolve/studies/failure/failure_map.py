@@ -192,8 +192,8 @@ class MapRuns:
                 raise FvsolveError(
                     "the reference is not accurate enough: its error may be "
                     f"{uncertainty:.2g} of the range of {reference.uncertainty.worst or 'a probe'}, but the tolerance "
-                    f"is {self.tolerance:g}. Try --tolerance {4 * uncertainty:.1g}, or more cells; if this probe shows "
-                    "only rounding, remove it from output.probes"
+                    f"is {self.tolerance:g}. Try --tolerance {4 * uncertainty:.1g}, or more cells if the case has "
+                    "cells; if this probe shows only rounding, remove this probe from output.probes"
                 )
             self._references[at] = reference
         return self._references[at]

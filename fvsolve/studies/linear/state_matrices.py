@@ -40,7 +40,8 @@ def responses(at: OperatingPoint, y: np.ndarray, outputs: int) -> np.ndarray:
     if out[rec.STATUS] != rec.OK or not np.all(np.isfinite(dydt)):
         place = f" at {model.node_names[int(out[rec.WHERE])]}" if out[rec.WHERE] >= 0 else ""
         raise FvsolveError(
-            f"the state cannot be linearised: no flow supplies the demand{place}; every path to it is closed"
+            f"the state cannot be linearised: its rates cannot be computed{place}, for example because every path to "
+            "a demand is closed; choose another time with --at"
         )
     return np.concatenate([dydt, values])
 

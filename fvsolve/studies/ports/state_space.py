@@ -303,7 +303,7 @@ def _listed(poles: np.ndarray) -> tuple[complex, ...]:
 def _reason_texts(holds, unstable, dips, hidden, margin, worst, tolerance, shift) -> list[str]:
     texts = []
     if len(unstable):
-        texts.append(f"{_poles(unstable)} in the right half plane, the first s = {_listed(unstable)[0]:.6g} 1/s")
+        texts.append(f"{_poles(unstable)} in the right half plane, greatest Re s at s = {_listed(unstable)[0]:.6g} 1/s")
     for dip in dips[:8]:
         high = f"< {dip.high:.9g}" if np.isfinite(dip.high) else "to infinity"
         texts.append(f"Re H < 0 for {dip.low:.9g} < w {high} rad/s, least Re H / |H| = {dip.angle:.4g} "
@@ -322,7 +322,7 @@ def _reason_texts(holds, unstable, dips, hidden, margin, worst, tolerance, shift
                      "as for a lossless system")  # fmt: skip
     if len(hidden):
         texts.append(f"hidden: {_poles(hidden)} in the right half plane that H does not show, "
-                    f"s = {_listed(hidden)[0]:.6g} 1/s")  # fmt: skip
+                    f"greatest Re s at s = {_listed(hidden)[0]:.6g} 1/s")  # fmt: skip
     return texts
 
 

@@ -132,8 +132,8 @@ def von_neumann_notes(row) -> list[str]:
     if row.von_neumann > (1.0 + AGREEMENT) * row.predicted:
         return ["von Neumann's limit is misleading: pipe ends, nodes or other parts limit the step, not the interior"]
     if row.von_neumann < (1.0 - AGREEMENT) * row.predicted:
-        return ["von Neumann's limit holds for any number of steps and any wavelength; in this pipe and number of "
-                "steps growth remains below the threshold"]  # fmt: skip
+        return ["von Neumann's limit holds for any number of steps and any wavelength; in this case growth remains "
+                f"below the threshold of {row.threshold:g} in {row.steps} steps"]  # fmt: skip
     return []
 
 

@@ -58,7 +58,7 @@ class DelayLineLimits:
         step = {} if h is None else {"numerics.step": h}
         model = study_model(self.case, self.set | step)
         if model.case.numerics.scheme in LIMITED and (model.tables.pipes["delay"] < 0).any():
-            raise FvsolveError(f"numerics.scheme: {model.case.numerics.scheme} limits slopes. Expected a linear scheme "
+            raise FvsolveError(f"numerics.scheme: {model.case.numerics.scheme} is not linear. Expected a linear scheme "
                                "for stability with delay lines, such as scheme = \"upwind5\"")  # fmt: skip
         if model.y_size > MAX_STATES:
             raise FvsolveError(

@@ -281,7 +281,9 @@ class SchemeRows:
             "greatest_real": float(values.values.real.max(initial=0.0)),
         }  # fmt: skip
         if not values.complete:
-            left_out["eigenvalues"] = f"the limit may be lower; it is computed from {values.description}"
+            left_out["eigenvalues"] = (
+                f"the limit may be lower; it is computed from some eigenvalues, {values.description}"
+            )
         if model.y_size <= MAX_STATES:
             row["field_of_values"] = region_limit(method, side.field)
         else:
