@@ -381,7 +381,7 @@ BAD = {
     ),
     "area table of unlike lengths": (
         tank("area = 1", "area = { level = [0, 1], area = [1] }"),
-        "nodes.t.area.area: 1 areas for 2 levels",
+        "nodes.t.area.area: has length 1, but `level` has length 2",
     ),
     "area table out of order": (
         tank("area = 1", "area = { level = [0, 2, 1], area = [1, 1, 1] }"),

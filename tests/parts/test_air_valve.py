@@ -223,7 +223,7 @@ def test_a_demand_follows_the_pressure_between_none_and_all():
     [
         ({"required_pressure": 1e5}, "at which no demand is supplied"),
         ({"required_pressure": 3e5, "minimum_pressure": 0.9e5}, "is below ambient"),
-        ({"required_pressure": 3e5, "demand": -1.0}, "never negative"),
+        ({"required_pressure": 3e5, "demand": -1.0}, "is negative at some time"),
         ({"minimum_pressure": 2e5}, "has no effect without `required_pressure`"),
     ],
 )

@@ -87,7 +87,7 @@ def test_the_ledger_of_energy_of_a_basin_with_a_wall_and_of_a_device_beside_it_c
 def test_a_map_names_the_probe_that_its_reference_does_not_know():
     case = SCENES["loop"]("rk4")
     case["output"]["probes"] = ["one.angle", "loop.gap"]
-    with pytest.raises(FvsolveError, match="of the range of loop.gap.*remove it from output.probes"):
+    with pytest.raises(FvsolveError, match="of the range of loop.gap.*remove this probe from output.probes"):
         failure_map(case, methods=["rk4"], steps=[4e-3])
 
 
