@@ -6,9 +6,9 @@ from fvsolve.jit import inline, njit
 
 @njit
 def accelerate_flow(plane, basin, y, rates, first, own, twice, east, north, turn):
-    """Add twice (q_y, -q_x) + depth (east + turn y, north - turn x) to the rates of the flow (q_x, q_y) of all cells.
+    """Add twice (q_y, -q_x) + depth (east + turn Y, north - turn X) to the rates of the flow (q_x, q_y) of all cells.
 
-    depth : depth of water [m], or density of a liquid [kg/m3]; x, y : position of the cell [m]
+    depth : depth of water [m], or density of a liquid [kg/m3]; (X, Y) : position of the cell [m]; y : state vector
     first : index in `rates` of the first rate of the basin
     own : 1 to include the deviation of depth from rest, 0 for the depth at rest
     twice : 2 W_z [1/s]; east, north : uniform acceleration [m/s2]; turn : Euler term [1/s2]

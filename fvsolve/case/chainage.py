@@ -91,7 +91,8 @@ class CutTable:
 def placed(table: dict[str, Any]) -> list[tuple[str, str, dict[str, Any]]]:
     """List of (group, name, keys) of the parts that are placed on a pipe.
 
-    These are parts with a chainage `at`, or with a pipe as `on`. table : nested dicts of a case as in the file
+    These are parts with a chainage `at`, or with a pipe as `on`; keys : table of the part
+    table : nested dicts of a case as in the file
     """
     links = table.get("links")
     pipes = [name for name, link in links.items() if is_pipe(link)] if isinstance(links, dict) else []

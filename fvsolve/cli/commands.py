@@ -231,7 +231,10 @@ def view(
     animate: Annotated[
         Path | None, typer.Option(metavar="FILE", help="animation of all frames, a .gif or .mp4 file")
     ] = None,
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="picture file (default RUN/view-FIELD.png)")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="picture file (default RUN/view-FIELD.png, with the name of the field)"),
+    ] = None,
 ) -> None:
     """Draw a quantity in all parts at one time, or an animation of all stored times, into a file."""
     from fvsolve.run import open_run

@@ -149,7 +149,7 @@ def _sentences(limit: AdvectionLimit) -> list[str]:
             place = f"from {low:.10g} to {high:.10g}" if math.isfinite(high) else f"above {low:.10g}"
             sentences.append(f"stable again {place}")
     if limit.digits:
-        sentences.append(f"with the coefficients as published, to {limit.digits} digits")
+        sentences.append(f"computed with the coefficients as published, which have {limit.digits} digits")
     if not limit.proved:
         sentences.append("computed for sampled waves; not proved for waves between them")
     return sentences

@@ -162,7 +162,10 @@ if COMPILING:
 
     @Intrinsic
     def call_outside(typingctx, address, out, tables, device):
-        """Call the function `outside` of a device's law at `address`: check of the range of validity; see `HOOKS`."""
+        """Call the function `outside` of a device's law at `address`, see `HOOKS`.
+
+        The result is 1 outside the range of validity, TEMPORARY if this ends by itself, otherwise 0.
+        """
         return call(*HOOKS["outside"])
 
     @Intrinsic

@@ -71,7 +71,7 @@ class Device(Restriction):
         return []
 
     def revise_state(self, start, part: Any, row) -> bool:
-        """Set the device state that the steady solution implies; True if the state changed."""
+        """Set the state of the device, such as open or shut, that the steady solution implies; True if it changed."""
         return False
 
     def begin(self, start, part: Any, row) -> list[str]:

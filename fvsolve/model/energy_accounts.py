@@ -86,7 +86,7 @@ class Accounts:
         return self.power_count - count
 
     def add(self, category: str, place: str, kind: str, row: int, sign: float = 1.0) -> None:
-        """Add an account with a single row of power."""
+        """Add an account with a single row of power; other arguments as in `Account`."""
         self.accounts.append(Account(category, place, kind, (row,), (sign,)))
 
     def hold(self, place: str, kind: str, rate: int | None, rows: int = 1) -> None:

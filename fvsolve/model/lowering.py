@@ -211,5 +211,5 @@ def links_by_table(case) -> dict[str, list[tuple[str, Any, Lowering]]]:
 
 
 def rows_in(case, table: str) -> list[tuple[str, Any, Lowering]]:
-    """Links with rows in one table, in the order of rows : list of (name, link, conversion)."""
+    """Links with rows in one table, in the order of rows : list of (name, link, its `Lowering`)."""
     return links_by_table(case).get(table, [])

@@ -138,8 +138,8 @@ class NonlinearStart(SteadyStart):
     def match(self, row, mesh, flow: float):
         """Steady state along a pipe that ends at the pressure of its `to` node : (masses at faces, at centres).
 
-        The masses are per length [kg/m]. A pressure difference that friction does not balance drives the flow and
-        enters the pipe's drag.
+        The masses are per length [kg/m]. If friction does not balance the pressures of the end nodes, the difference is
+        recorded as unbalanced, and the drag in `row` is changed so that the profile ends at the pressure of `to`.
         """
         j = int(row["to_node"])
         for sweep in range(20):

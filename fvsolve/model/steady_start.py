@@ -507,7 +507,7 @@ class SteadyStart:
             if row["drop"] != 0.0 and row["open"] == 0.0 and row["flow"] == 0.0:
                 if self.conductance(k) > 0.0:
                     moving.append(
-                        f"valve {name}: open with {amount(row['drop'], 'pressure', span=True)} across it and no flow"
+                        f"valve {name}: open with {amount(row['drop'], 'pressure', span=True)} across it; a flow starts"
                     )
         if self.case.numerics.initial == "equilibrium":
             for text in moving:

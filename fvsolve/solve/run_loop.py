@@ -264,7 +264,7 @@ class RunLoop:
         return self.stepper.rows[:count].copy()
 
     def step_back(self) -> None:
-        """Return to the state before the last step, unless the ledgers include that step already (a valid step)."""
+        """Return to the state before the last step, unless the ledgers include that step already; it is valid then."""
         if self.progress[loop_indices.HAS_LAST_STEP] == 1 and self.loop_state[loop_indices.UNBOOKED] > 0.0:
             self.before  # noqa: B018  (copies that state from the other threads or ranks)
             self.loop_state[loop_indices.T] -= self.loop_state[loop_indices.LAST]

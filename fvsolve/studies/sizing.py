@@ -14,7 +14,7 @@ from fvsolve.case import Case, load
 from fvsolve.errors import CaseError, Fault, FvsolveError, collect_faults, did_you_mean
 from fvsolve.parts.arithmetic import Arithmetic
 from fvsolve.run import run
-from fvsolve.run.result import FAILS
+from fvsolve.run.result import FAILS, OPEN
 from fvsolve.run.verdicts import SIZES
 from fvsolve.studies.peak_error import peak_errors
 from fvsolve.studies.sampling import is_known, key_quantity, si_unit_of
@@ -223,7 +223,12 @@ def size_run(value: float, result: Any) -> SizeRun:
     doubts += [
         f"{verdict.name}: its margin is smaller than its error" for verdict in result.verdicts if verdict.doubtful
     ]
-    reason = "" if ok or failed or not result.ok else next(iter(doubts), f"{name}: its margin is not known")
+    doubts += [
+        f"{verdict.name}: its {'value' if verdict.margin is None else 'error'} is not known"
+        for verdict in result.verdicts
+        if verdict.state == OPEN and not verdict.doubtful
+    ]
+    reason = "" if ok or failed or not result.ok else next(iter(doubts), "")
     is_known = result.ok and (ok or margin < 0.0) and math.isfinite(margin)
     return SizeRun(value, result.ok and ok, margin if is_known else None, name, result.reason, reason)
 

@@ -6,6 +6,7 @@ import json
 import re
 import shlex
 import shutil
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,8 +16,9 @@ from reference.scenes import AMBIENT, GRAVITY, RHO, area, junction, lake, pipe, 
 import fvsolve
 from fvsolve.case.text import write
 from fvsolve.errors import CaseError, FvsolveError
+from fvsolve.run.result import HOLDS, OPEN, LimitVerdict
 from fvsolve.studies import scenarios
-from fvsolve.studies.sizing import parse_range, parse_ties, size
+from fvsolve.studies.sizing import parse_range, parse_ties, size, size_run
 
 
 def throttled() -> dict:
@@ -269,3 +271,19 @@ def test_all_that_is_wrong_of_a_search_comes_at_once(fvs, tmp_path) -> None:
         "optimise", case, "--schedule", "links.tap.openning", "--minimise", "max(gaet.head)", "--knots", "0"
     )
     assert status == 2 and "3 faults" in told and 'did you mean "links.tap.opening"' in told
+
+
+@pytest.mark.parametrize("margin, what", [(0.2, "error"), (None, "value")])
+def test_an_open_limit_says_if_its_value_or_its_error_is_not_known(margin, what):
+    """The second limit is open, and the first has a smaller margin."""
+    row = {"margin": 0.1, "error": 0.05, "unit": "m", "limit": 10.0, "value": 9.9}
+    rows = [row, row | {"margin": margin, "error": None}]
+    blank = dict.fromkeys(LimitVerdict._fields)
+    verdicts = [
+        LimitVerdict(**blank | {"name": name, "ok": ok, "state": state, "quantity": "head", "worst": [row]} | given)
+        for name, ok, state, row, given in zip(
+            ("first", "second"), (True, False), (HOLDS, OPEN), rows, ({}, {"margin": margin}), strict=True
+        )
+    ]
+    result = SimpleNamespace(verdicts=verdicts, marks=[], warnings=[], ok=True, reason="finished")
+    assert size_run(1.0, result).open == f"second: its {what} is not known"

@@ -45,7 +45,8 @@ def nodes_of(curve, part, speed: float, flow: float, torque_scale: float, weight
     """(capacity, angles, directions, roots, torques, range) of a curve: its values on its own rays from the origin.
 
     capacity : greatest flow at 1 m over the flow scale [-]; angles : angles of the rays [rad]
-    directions : (cosine, sine) of each ray; roots : roots of head, 1 over the distance of the curve from the origin
+    directions : (cosine, sine) of each ray
+    roots : square root of the head at unit distance from the origin, 1 over the distance of the curve
     torques : torque over head [N]; range : (least, greatest) angle of the given points [rad]
     speed, flow : scales of speed [rad/s] and flow [m3/s] at 1 m; torque_scale : weight flow / speed
     weight : rho g [N/m3]

@@ -248,8 +248,8 @@ def step_keys(case, cells: Counts, step_cells: Counts, k: int, courant: float | 
     """(time step [s], overrides that set it) of row k: by the Courant number, or from the step that the case states.
 
     cells : numbers of cells of row k; step_cells : numbers of cells whose wave rate sets the step. If both are the same
-    object, the step is refined with the cells: a step that the case states is halved k times. Under error control the
-    step is NaN.
+    object, the step is refined with the cells: a step that the case states is halved k times; otherwise the step is the
+    same in all rows. Under error control it is NaN.
     """
     numerics = case.numerics
     if numerics.rtol is not None:

@@ -122,7 +122,7 @@ def field_of_values_notes(row, side) -> list[str]:
         return [
             "the field of values allows no step: it touches the imaginary axis at points outside the stability region"
         ]
-    return ["the bound by the field of values is on the safe side here"]
+    return ["the bound by the field of values is below the predicted limit here"]
 
 
 def von_neumann_notes(row) -> list[str]:
