@@ -86,8 +86,8 @@ def line_methods(case, unfit: Collection[str] = ()) -> dict[str, LineMethod]:
 def slowest_pipe(case, names: Collection[str]) -> str:
     """Name of the pipe with the longest travel time of a wave; with most cells if several have the longest."""
     travel = {name: case.links[name].length / case.wave_speed(name) for name in names}
-    longest = max(travel.values())
-    return max((name for name in names if travel[name] > longest * (1.0 - 1e-9)), key=lambda n: case.links[n].cells)
+    longest = (1.0 - 1e-9) * max(travel.values())  # travel times that differ by rounding are equal
+    return max(names, key=lambda name: (travel[name] > longest, case.links[name].cells, travel[name]))
 
 
 def reason_for_cells(case, name: str, link) -> str:

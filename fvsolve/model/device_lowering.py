@@ -41,7 +41,10 @@ class Device(Restriction):
         return node.initial_pressure
 
     def motion_text(self, name: str, node: Any, row, inflow: float, flow: float, amount: Callable[..., str]) -> str:
-        """Text of the rate of the pressure that a net inflow [kg/s] causes in a vessel at the start."""
+        """Text of the rate of change of the pressure in a vessel that a net inflow causes at the start.
+
+        Arguments as for `Lowering.motion_text`.
+        """
         return f"{node.kind} {name}: pressure changes by {amount(row['stiffness'] * inflow, 'pressure', span=True)}/s"
 
     def gate(self, name: str) -> str | None:

@@ -17,16 +17,6 @@ from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
 from fvsolve.steppers import automatic, loop_indices
 from fvsolve.units import show
 
-STOP_REASONS = {
-    loop_indices.BAD_VALUE: "a value is not finite; try shorter steps, by numerics.step, courant or rtol",
-    loop_indices.TINY_STEP: "the step became too small; try a larger numerics.rtol, or numerics.courant instead",
-    loop_indices.NEWTON_STUCK: "Newton's method did not converge; try an explicit method",
-    loop_indices.CHATTERING: "a part changes its state without end; a run of the case names the part and a remedy",
-    loop_indices.STOPPED: (
-        'the pressure fell below the vapour pressure, and numerics.below_vapor = "stop" ends the run there'
-    ),
-}  # code of the loop -> text
-
 
 def advance(model: Model, state: State, until: float, inputs: dict[str, float] | None = None) -> State:
     """Advance `state` to the time `until` [s], with named inputs held at constant values; returns the new state.
@@ -69,8 +59,7 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
             automatic.change(loop.stepper)
             code = loop.run(NO_LIMIT)
         if code != loop_indices.DONE:
-            reason = STOP_REASONS.get(code, "a node has no solution; a run of the case names the node")
-            raise FvsolveError(f"advance stopped at t = {loop.t:.6g} s: {reason}")
+            raise FvsolveError(f"advance stopped: {loop.failure_text(code)}")
     memory = np.append(loop.loop_state[[loop_indices.STEP, loop_indices.ERROR_OLD]], loop.armed)
     if len(model.tables.delays):
         memory = np.concatenate([memory, loop.run_data.past, [float(loop.run_data.past.size)]])

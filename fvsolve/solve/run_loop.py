@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from fvsolve.errors import listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import tank_limits
 from fvsolve.kernels.compiled_functions import fused_step_function
@@ -274,6 +275,56 @@ class RunLoop:
                 self.progress[loop_indices.NOW],
             )
             self.progress[loop_indices.HAS_LAST_STEP] = 0
+
+    def failure_text(self, code: int) -> str:
+        """Text with failure, place, time and remedy for a code of `steppers.loop_indices`.
+
+        For BAD_VALUE and BAD_STATUS the loop returns to the state before the last step, see `step_back`.
+        """
+        model = self.model
+        place = ""
+        if code == loop_indices.BAD_VALUE:
+            bad = np.flatnonzero(~np.isfinite(self.now))
+            place = f" at {model.state_names[bad[0]]}" if bad.size else ""
+        elif code == loop_indices.BAD_STATUS and self.out[rec.WHERE] >= 0 and self.out[rec.STATUS] != rec.NO_WEIGHT:
+            place = f" at {model.node_names[int(self.out[rec.WHERE])]}"
+        when = f"t = {model.case.amount(self.t, 'time', 6)}"
+        if code == loop_indices.CHATTERING:
+            first = self.t if self.at_once > 1 else self.recent_events[0]  # at the same time, or within a short span
+            names = sorted({model.events[k][0] for t, k in self.switched if t >= first})
+            remedies = {
+                device.remedy: None for name, _, device in model.devices if name.removesuffix(".inside") in names
+            }
+            parts_text = listing(names) if names else "a leak, or a demand that follows the pressure,"
+            verbs = "change their states" if len(names) > 1 else "changes its state"
+            remedy = ", or ".join(remedies) or "put a chamber at the node of this part"
+            return f"{parts_text} {verbs} without end at {when}; {remedy}"
+        if code == loop_indices.STOPPED:
+            event = "a cavity opened" if model.cavitates else "pressure fell below vapour pressure"
+            return f'{event} at {when}, and numerics.below_vapor = "stop" ends the run there'
+        if code in (loop_indices.BAD_VALUE, loop_indices.BAD_STATUS):
+            self.step_back()
+        if code == loop_indices.NEWTON_STUCK:
+            worst = model.state_names[int(self.loop_state[loop_indices.WORST])]
+            return (f"Newton did not converge at {when}, however short the step, worst in {worst}; check the "
+                    "parts there for jumps, or try an explicit method")  # fmt: skip
+        if code == loop_indices.TINY_STEP:
+            return f"the step became too small at {when}; try a larger rtol, or numerics.courant instead"
+        if code == loop_indices.BAD_STATUS and self.out[rec.STATUS] == rec.NO_SOLUTION:
+            return f"the demand{place} cannot be supplied at {when}; all connections to its node are shut"
+        if code == loop_indices.BAD_STATUS and self.out[rec.STATUS] == rec.NO_VOLUME:
+            return f"the chamber volume{place} is zero at {when}; give the piston an end-stop"
+        if code == loop_indices.BAD_STATUS and self.out[rec.STATUS] == rec.NO_WIDTH:
+            return f"the wall has no space left{place} at {when}; give its mass an end-stop, or a wider zone"
+        if code == loop_indices.BAD_STATUS and self.out[rec.STATUS] == rec.NO_WEIGHT:
+            index = int(self.out[rec.WHERE])
+            names = [*(basin.name for basin in model.basins), *model.node_names]
+            name = names[index].removesuffix(".inside")
+            return (f"the water in {name} has no weight left at {when}; reduce the downward acceleration of "
+                    "its body")  # fmt: skip
+        if code == loop_indices.BAD_STATUS:
+            return f"Newton did not converge{place} at {when}; try a smaller step"
+        return f"a value is not finite{place} at {when}; the step is too long for the method: halve the step"
 
 
 def longest_step(model: Model) -> float:

@@ -7,7 +7,6 @@ import time
 import numpy as np
 
 from fvsolve.errors import FvsolveError, RunError, listing
-from fvsolve.kernels import dtypes as rec
 from fvsolve.model import Model, State
 from fvsolve.model.delay_history import split_memory
 from fvsolve.model.scalar_tables import scalar_ledgers
@@ -380,62 +379,13 @@ class Run:
         """Reason why a run stopped: failure, place, time and remedy.
 
         code : code of `steppers.loop_indices` that the time loop returned
-        The advice of the density law is added for BAD_VALUE, NEWTON_STUCK and TINY_STEP.
+        The advice of the density law is added for BAD_VALUE, NEWTON_STUCK and TINY_STEP. For BAD_VALUE, `invalid_from`
+        is set.
         """
-        numbers = code in (loop_indices.BAD_VALUE, loop_indices.NEWTON_STUCK, loop_indices.TINY_STEP)
-        return self.failure_text(code) + (self.model.case.law.advice if numbers else "")
-
-    def failure_text(self, code: int) -> str:
-        """Text with failure, place, time and remedy for a code of `steppers.loop_indices`.
-
-        For BAD_VALUE and BAD_STATUS the loop returns to the state before the last step, see `RunLoop.step_back`; for
-        BAD_VALUE `invalid_from` is set.
-        """
-        model, loop = self.model, self.loop
-        place = ""
         if code == loop_indices.BAD_VALUE:
             self.invalid_from = self.checks.sound
-            bad = np.flatnonzero(~np.isfinite(loop.now))
-            place = f" at {model.state_names[bad[0]]}" if bad.size else ""
-        elif code == loop_indices.BAD_STATUS and loop.out[rec.WHERE] >= 0 and loop.out[rec.STATUS] != rec.NO_WEIGHT:
-            place = f" at {model.node_names[int(loop.out[rec.WHERE])]}"
-        when = f"t = {model.case.amount(loop.t, 'time', 6)}"
-        if code == loop_indices.CHATTERING:
-            first = loop.t if loop.at_once > 1 else loop.recent_events[0]  # at the same time, or within a short span
-            names = sorted({model.events[k][0] for t, k in loop.switched if t >= first})
-            remedies = {
-                device.remedy: None for name, _, device in model.devices if name.removesuffix(".inside") in names
-            }
-            parts_text = listing(names) if names else "a leak, or a demand that follows the pressure,"
-            verbs = "change their states" if len(names) > 1 else "changes its state"
-            remedy = ", or ".join(remedies) or "put a chamber at the node of this part"
-            return f"stopped: {parts_text} {verbs} without end at {when}; {remedy}"
-        if code == loop_indices.STOPPED:
-            event = "a cavity opened" if model.cavitates else "pressure fell below vapour pressure"
-            return f'stopped: {event} at {when}, and numerics.below_vapor = "stop" ends the run there'
-        if code in (loop_indices.BAD_VALUE, loop_indices.BAD_STATUS):
-            loop.step_back()
-        if code == loop_indices.NEWTON_STUCK:
-            worst = model.state_names[int(loop.loop_state[loop_indices.WORST])]
-            return (f"stopped: Newton did not converge at {when}, however short the step, worst in {worst}; check the "
-                    "parts there for jumps, or try an explicit method")  # fmt: skip
-        if code == loop_indices.TINY_STEP:
-            return f"stopped: the step became too small at {when}; try a larger rtol, or numerics.courant instead"
-        if code == loop_indices.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_SOLUTION:
-            return f"stopped: the demand{place} cannot be supplied at {when}; all connections to its node are shut"
-        if code == loop_indices.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_VOLUME:
-            return f"stopped: the chamber volume{place} is zero at {when}; give the piston an end-stop"
-        if code == loop_indices.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_WIDTH:
-            return f"stopped: the wall has no space left{place} at {when}; give its mass an end-stop, or a wider zone"
-        if code == loop_indices.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_WEIGHT:
-            index = int(loop.out[rec.WHERE])
-            names = [*(basin.name for basin in model.basins), *model.node_names]
-            name = names[index].removesuffix(".inside")
-            return (f"stopped: the water in {name} has no weight left at {when}; reduce the downward acceleration of "
-                    "its body")  # fmt: skip
-        if code == loop_indices.BAD_STATUS:
-            return f"stopped: Newton did not converge{place} at {when}; try a smaller step"
-        return f"stopped: a value is not finite{place} at {when}; the step is too long for the method: halve the step"
+        numbers = code in (loop_indices.BAD_VALUE, loop_indices.NEWTON_STUCK, loop_indices.TINY_STEP)
+        return "stopped: " + self.loop.failure_text(code) + (self.model.case.law.advice if numbers else "")
 
     def methods(self) -> list[dict]:
         """Time methods used in the run: dicts with start time [s], name and reason."""

@@ -14,12 +14,12 @@ WEIGHTS = np.array([275.0, 100.0, 402.0, 100.0, 275.0]) / 1152.0  # at the middl
 READING_ORDER = 6.0  # order of the interpolation in the history of a line
 EXPECTED_ORDER = (
     "delay lines carry jumps exactly, and smooth waves without friction exactly at whole steps. Expected orders: 2 in "
-    "the length of segments with friction (1 behind jumps); 2 in the step behind kinks (about 1.5 in L2, 1 in max) or "
+    "the length of stretches with friction (1 behind jumps); 2 in the step behind kinks (about 1.5 in L2, 1 in max) or "
     "in lines shorter than a step, else up to 6 in the step; the order of the method with parts that store fluid or "
     "energy"
 )
 EXACT_NOTE = (
-    "delay lines are exact here, at any step and length of segments: all errors are rounding errors, except errors of "
+    "delay lines are exact here, at any step and length of stretches: all errors are rounding errors, except errors of "
     "values along the lines"
 )
 

@@ -25,6 +25,7 @@ from fvsolve.studies.accuracy.order import order
 from fvsolve.studies.accuracy.refine import refinement_plan, resolutions
 from fvsolve.studies.energy.energy_balance import energy
 from fvsolve.studies.linear.linearise import linearise
+from fvsolve.studies.peak_error import description
 from fvsolve.studies.stability.stability import stability
 
 PLANE = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.9}
@@ -109,7 +110,8 @@ def test_a_mesh_from_a_file_has_no_finer_one(tmp_path):
     meshio.write(tmp_path / "square.vtu", meshio.Mesh(points, [("triangle", np.array([[0, 1, 2], [0, 2, 3]]))]))
     basin = {"type": "basin", "mesh": {"file": str(tmp_path / "square.vtu")}, "level": 1.0}
     case = fvsolve.load(scene({"pool": basin}, {}, 1.0, PLANE))
-    with pytest.raises(FvsolveError, match="meshes from files cannot be refined \(pool\)"):
+    assert description({1.0: None}, case).startswith("errors are unknown: cells of pool come from files")
+    with pytest.raises(FvsolveError, match=r"meshes from files cannot be refined \(pool\)"):
         refinement_plan(case, "both")
 
 

@@ -220,6 +220,12 @@ def test_what_is_wrong_is_named_once(change, told: str) -> None:
     assert len(error.value.faults) == 1
 
 
+def test_one_of_two_nodes_at_one_place_is_left_out() -> None:
+    nodes = {name: {"type": "junction", "on": "main", "at": 2500.0} for name in ("spot", "stop")}
+    with pytest.raises(fvsolve.CaseError, match="spot has the same place; leave out spot or stop, or change `at`"):
+        fvsolve.load(line(nodes, {"main": main()}))
+
+
 @pytest.mark.parametrize("cells", [7, 8])
 def test_what_lies_in_the_middle_of_a_cell_goes_to_the_same_face_from_either_end(cells: int) -> None:
     said = {key: one for key, one in main(cells=cells).items() if key != "profile"}

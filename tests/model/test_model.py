@@ -101,6 +101,17 @@ def test_advance_refuses_inputs_that_name_nothing_and_times_gone_by():
         fvsolve.advance(model, state, np.inf)
 
 
+def test_advance_stops_for_the_reason_for_which_a_run_stops():
+    case = scene("log")
+    case["nodes"]["gate"]["demand"] = {"time": [0.0, 0.1], "value": [0.002, 0.2]}
+    case["numerics"]["below_vapor"] = "stop"
+    model = fvsolve.build(fvsolve.load(case))
+    result = fvsolve.run(model)
+    assert result.reason.startswith("stopped: pressure fell below vapour pressure at t = ")
+    with pytest.raises(FvsolveError, match=re.escape(f"advance {result.reason}")):
+        fvsolve.advance(model, fvsolve.initial_state(model), 0.6)
+
+
 @pytest.mark.parametrize(
     "name, value, said",
     [

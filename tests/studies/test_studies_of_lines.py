@@ -54,7 +54,7 @@ def test_smooth_waves_between_steps_are_of_sixth_order():
 def test_what_is_exact_at_any_step_is_said_to_be():
     found = studies.order(main(4.0), levels=3)
     assert found.words.startswith("upwind on") and any("exact here, at any step" in note for note in found.notes)
-    with pytest.raises(FvsolveError, match="no delay line of this case into more segments: there is no friction"):
+    with pytest.raises(FvsolveError, match="no delay line of this case into more stretches: there is no friction"):
         studies.order(main(4.0), refine="space")
     with pytest.raises(FvsolveError, match="functions along pipes need cells, but main would be"):
         studies.order(main(4.0), source=lambda pipe, x, t: (0.0 * x, 0.0 * x))

@@ -219,7 +219,7 @@ def stencil(past, clock, t):
     clock : result of `reading_data`. After that entry its value is kept.
     """
     newest, latest, per_step, even = clock[0], clock[1], clock[2], clock[3]
-    if t >= latest:
+    if t >= latest:  # also before the first step, whose length is not known yet
         return newest, (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
     place = (t - latest) * per_step
     if place <= -even:

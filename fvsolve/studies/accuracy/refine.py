@@ -156,14 +156,14 @@ def delay_line_plan(case, way: str, levels: int) -> Plan:
     tables = [study_model(case, row).tables.delays for row in rows]
     line = int(np.argmax(tables[-1]["stretches"]))
     if tables[0]["stretches"][line] == tables[-1]["stretches"][line]:
-        raise FvsolveError("a smaller numerics.delay_tolerance divides no delay line of this case into more segments: "
-                           'there is no friction, or segments are as short as a step. '
+        raise FvsolveError("a smaller numerics.delay_tolerance divides no delay line of this case into more stretches: "
+                           'there is no friction, or stretches are as short as a step. '
                            'Expected refine = "both" or refine = "time"')  # fmt: skip
     refined = [Level(row, float(table["tau"][line]), count, step) for row, table in zip(rows, tables, strict=True)]
     return Plan(way, "stretch [s]", tuple(refined), f"{STRETCH_WORDS}, one step for all rows")
 
 
-STRETCH_WORDS = "tolerance of delay lines halved, so that they have twice as many segments"
+STRETCH_WORDS = "tolerance of delay lines halved, so that they have twice as many stretches"
 STRETCH_AND_STEP_WORDS = {
     False: f"{STRETCH_WORDS}, and steps halved",
     True: f"{STRETCH_WORDS}, and the longest step halved",
@@ -213,7 +213,7 @@ def space_plan(case, way: str, key: str | None, levels: int, cells: int | None) 
     text = (
         f"cells of all {kinds}" if len(refined) == len(first) and not basins_from_files(case) else f"cells of {names}"
     )
-    text += " and segments of delay lines" if delay_lines(case) and key is None else ""
+    text += " and stretches of delay lines" if delay_lines(case) and key is None else ""
     return Plan(way, "cell size [m]", tuple(rows), f"{text} doubled, {stepping_words(case, way, courant)}")
 
 

@@ -70,9 +70,10 @@ def curves_by_name(points: Sequence[Point]) -> dict[str, list[Point]]:
 
 
 def front_row(points: Sequence[Point], target: float, floor: float, default: str) -> FrontRow:
-    """Row of the front for a target error; default : name of the default scheme and method.
+    """Cheapest pair of scheme and method that reaches a target error, beside the default pair, as a `FrontRow`.
 
     target : trajectory error [-]; floor : smaller errors count as this error
+    default : name of the default scheme and method, such as "weno5 rk4"
     """
     by_time, by_work = (cheapest_curve(points, target, floor, cost) for cost in ("seconds", "updates"))
     name, best = by_time or (None, None)
