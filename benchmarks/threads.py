@@ -19,11 +19,11 @@ import numpy as np
 from measure import against, agree, machine, parser, peer_module
 from planes_scenes import BASINS, scene, square
 
+from fvsolve.assembly.model_draft import aligned_zeros
 from fvsolve.case import load
 from fvsolve.jit import njit
 from fvsolve.kernels import band_exchange
 from fvsolve.model import build
-from fvsolve.model.run_data import aligned_zeros
 from fvsolve.run import mpi_run
 from fvsolve.solve import initial_state
 from fvsolve.solve.run_loop import NO_LIMIT, RunLoop

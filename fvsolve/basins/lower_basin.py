@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from fvsolve.assembly.scheme_codes import CODES, family
+from fvsolve.assembly.state_names import Numbered
 from fvsolve.basins import advection_faces
 from fvsolve.basins.advection import THIN, advection_work
 from fvsolve.basins.basin_probes import SPEED, U, V
@@ -19,8 +21,6 @@ from fvsolve.case.cell_means import is_grid, means, samples
 from fvsolve.case.sections import DEFAULT_COURANT as COURANT
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.scheme_codes import CODES, family
-from fvsolve.model.state_names import Numbered
 from fvsolve.schemes import LIMITERS, SCHEMES
 from fvsolve.steppers.analysis.absolute_monotonicity import ssp_radius
 from fvsolve.steppers.built_in_methods import METHODS

@@ -132,6 +132,14 @@ class Case(Displayable):
         """Poses of bodies at the start, name -> `bodies.Pose`; each body comes after its carrier."""
         return bodies.poses(self.nodes_with_water, self.numerics.start)
 
+    def body_point(self, place: str) -> tuple[str, Any]:
+        """Name of the body ("" for the world) and position in its axes [m] of a place, see `bodies.body_point`."""
+        return bodies.body_point(self.nodes, place)
+
+    def pose_of(self, name: str) -> bodies.Pose:
+        """Pose of a body at the start; the pose at rest for the world and for other nodes."""
+        return self.poses.get(name, bodies.AT_REST)
+
     @cached_property
     def nodes_with_water(self) -> dict[str, Node]:
         """Nodes at the start, with lumped water as added mass of bodies and sloshing modes as extra bodies."""

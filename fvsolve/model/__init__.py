@@ -1,7 +1,8 @@
 """Model of a case in compiled form: names become indices, laws become codes, data become flat arrays."""
 
+from fvsolve.assembly.model_draft import PipeMesh
 from fvsolve.model.build import build
-from fvsolve.model.model import Model, PipeMesh, State
+from fvsolve.model.model import Model, State
 from fvsolve.model.run_data import RunData
 from fvsolve.model.vary import vary
 

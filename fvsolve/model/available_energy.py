@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from fvsolve.assembly.lowering import rows_in
+from fvsolve.assembly.unsteady_terms import memory_shares
+from fvsolve.assembly.wall_creep import elements
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.lowering import rows_in
 from fvsolve.model.model import Model
-from fvsolve.model.unsteady_terms import memory_shares
-from fvsolve.model.wall_creep import elements
 
 
 def datum_of(model: Model, port: str | None = None) -> float:

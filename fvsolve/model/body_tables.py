@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from fvsolve.assembly.mechanics import PLAIN_LINE, distance_and_rate
+from fvsolve.assembly.schedule_tables import break_times
 from fvsolve.case import bodies
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.schedule_tables import break_times
 from fvsolve.parts.body.part import Body
 
 SMALL_ANGLE, SMALL_TRAVEL = 1e-3, 1e-3  # [rad], [m]
 SMALL_SPIN, SMALL_SPEED = 0.1, 0.1  # [rad/s], [m/s]
-PLAIN_LINE = (-1, -1, -1, rec.ALONG, (0.0, 0.0, 0.0), 0.0)  # a line
+
+
 KINDS = {"revolute": rec.REVOLUTE, "prismatic": rec.PRISMATIC, "ball": rec.BALL, "free": rec.FREE, "fixed": rec.WELD}
 ANGLES, SPINS = ("eta", "eps_x", "eps_y", "eps_z"), ("spin_x", "spin_y", "spin_z")
 STATES = {  # for each kind: coordinates, then velocities, each with its size of a small deviation
@@ -113,31 +115,6 @@ def rate_jumps(schedule) -> list[tuple[float, bool]]:
     return [first] + ([last] if n <= 1.0 else [])  # v1 + (v0 - v1) (1 - s)^n never begins level
 
 
-def point_row(draft, place: str) -> int:
-    """Row in the table of points for the point that a link or a probe names; added on first use."""
-    if place not in draft.point_index:
-        name, position = bodies.body_point(draft.case.nodes, place)
-        draft.point_index[place] = len(draft.points)
-        draft.points.append((draft.body_names.index(name) if name != bodies.WORLD else -1, tuple(position)))
-    return draft.point_index[place]
-
-
-def pose_of(draft, place: str) -> bodies.Pose:
-    """Pose (position and attitude) stated for the body of a point; the pose at rest for a point of the world."""
-    return draft.case.as_stated.poses.get(bodies.body_point(draft.case.nodes, place)[0], bodies.AT_REST)
-
-
-def add_line(draft, places: tuple[str | None, str], acts: int = rec.ALONG, direction=(0.0, 0.0, 0.0)) -> int:
-    """Add a line of action of a force between two points; return its row in the table of lines.
-
-    acts : ALONG the line between the points, TOWARD a direction of the world, or ABOUT an axis of the second body
-    direction : vector of that direction or axis. `lower_lines` later writes the number of the force element.
-    """
-    ends = [-1 if place is None else point_row(draft, place) for place in places]
-    draft.lines.append((-1, *ends, acts, tuple(direction), 0.0))
-    return len(draft.lines) - 1
-
-
 def lower_lines(draft) -> None:
     """Fill the tables of pins and bushings; write the number of its force element to each line of action."""
     draft.pin_names, draft.pin_table = draft.fill("pin", rec.PIN)
@@ -158,28 +135,6 @@ def relative_turn(draft, places: tuple[str, str]) -> float:
     """sin(angle / 2)^2 of the rotation between the stated relative attitude of two bodies and that at the start."""
     relative = []
     for case in (draft.case, draft.case.as_stated):
-        here, there = (case.poses.get(bodies.body_point(case.nodes, place)[0], bodies.AT_REST) for place in places)
+        here, there = (case.pose_of(case.body_point(place)[0]) for place in places)
         relative.append(here.attitude.T @ there.attitude)
     return 0.25 * (3.0 - float(np.sum(relative[0] * relative[1])))
-
-
-def distance_and_rate(draft, places: tuple[str | None, str], line) -> tuple[float, float]:
-    """Distance between two points at the start [m], and its rate [m/s]; a point None is the origin of the world.
-
-    For a line that acts TOWARD a direction the result is (0, relative velocity in this direction [m/s]). For a line
-    that acts ABOUT an axis it is (0, relative angular velocity about the axis [rad/s]). line : entry of `draft.lines`
-    """
-    ends = []
-    for place in places:
-        name, position = (bodies.WORLD, np.zeros(3)) if place is None else bodies.body_point(draft.case.nodes, place)
-        pose = draft.case.poses.get(name, bodies.AT_REST)
-        ends.append((pose.at(position), pose.velocity_at(position), pose.spin))
-    (x, u, a), (z, v, b) = ends
-    _, _, _, acts, direction, _ = line
-    if acts == rec.ABOUT:
-        axis = draft.case.poses[bodies.body_point(draft.case.nodes, places[1])[0]].attitude @ direction
-        return 0.0, float(np.dot(axis, b - a))
-    if acts == rec.TOWARD:
-        return 0.0, float(np.dot(direction, v - u))
-    length = float(np.linalg.norm(z - x))
-    return length, float(np.dot(z - x, v - u)) / length if length > 0.0 else 0.0

@@ -8,6 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from fvsolve.assembly.device_lowering import lower_devices
+from fvsolve.assembly.lowering import lowering_of
+from fvsolve.assembly.model_draft import ModelDraft
+from fvsolve.assembly.scheme_codes import scheme_settings
+from fvsolve.assembly.unsteady_terms import MAX_TERMS
 from fvsolve.basins.lower import basin_start, lower_basins
 from fvsolve.case.case import Case
 from fvsolve.errors import FvsolveError
@@ -24,20 +29,15 @@ from fvsolve.model.delay_line_selection import (
     line_methods,
     lower_delays,
 )
-from fvsolve.model.device_lowering import lower_devices
 from fvsolve.model.equilibrium_search import with_equilibrium
 from fvsolve.model.flow_notices import flow_notices
-from fvsolve.model.lowering import lowering_of
 from fvsolve.model.mass_tables import lower_masses
 from fvsolve.model.model import Model
-from fvsolve.model.model_draft import ModelDraft
 from fvsolve.model.moving_networks import lower_moving_segments
 from fvsolve.model.probe_tables import lower_probes
 from fvsolve.model.resolution import too_few_cells
 from fvsolve.model.scalar_tables import lower_scalars, scale_scalars, start_amounts
-from fvsolve.model.scheme_codes import scheme_settings
 from fvsolve.model.start_tables import start_profile
-from fvsolve.model.unsteady_terms import MAX_TERMS
 from fvsolve.model.update_tables import with_new_sizes
 from fvsolve.steppers import automatic
 from fvsolve.steppers.tableau import method_named

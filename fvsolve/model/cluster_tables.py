@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from fvsolve.assembly.lowering import LAMINAR_REYNOLDS
 from fvsolve.errors import listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.steady import union
@@ -197,7 +198,7 @@ TOLERANCES = 10.0  # tolerances of a vessel: its tolerance grows with its deviat
 
 
 def regularise(draft, ks) -> None:
-    """Make valves without an adjacent pipe laminar below Reynolds number 10, to bound their slope at zero drop.
+    """Make valves without an adjacent pipe laminar below `LAMINAR_REYNOLDS`, to bound their slope at zero drop.
 
     They are also laminar below the drop of `tolerated_drop`, and at a bladder accumulator below at least 1 Pa, as its
     neck stores hardly any mass. Valves with a law of their own or a stated transition are not changed. ks : rows of the
@@ -207,15 +208,11 @@ def regularise(draft, ks) -> None:
     for k in ks:
         row = draft.valve_table[k]
         if row["transition"] == 0.0 and row["hooks"] < 0:
-            link = draft.case.conduits[draft.valve_names[k]]
+            name = draft.valve_names[k]
+            link = draft.case.conduits[name]
             neck = any(getattr(places[row[end]], "precharge", None) is not None for end in ("from_node", "to_node"))
-            set_transition(draft, draft.valve_names[k], link, row)
+            row["transition"] = draft.hydraulics.transition_flow(name, link, LAMINAR_REYNOLDS, draft.fault)
             row["rounding_drop"] = max(1.0 if neck else 0.0, unseen)
-
-
-def set_transition(draft, name: str, link, row) -> None:
-    """Set the transition flow of a restriction [kg/s], its flow at Reynolds number 10; below it the flow is laminar."""
-    row["transition"] = draft.hydraulics.transition_flow(name, link, 10.0, draft.fault)
 
 
 def tolerated_drop(draft, ks) -> float:

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.assembly.lowering import lowering_of, rows_in
 from fvsolve.case.moving_network_checks import missing_reactions
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.lowering import lowering_of, rows_in
 from fvsolve.model.run_data import RunData
 
 

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.assembly.lowering import rows_in
+from fvsolve.assembly.unsteady_terms import memory_shares
+from fvsolve.assembly.wall_creep import elements
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.lowering import rows_in
 from fvsolve.model.scalar_tables import bounds
 from fvsolve.model.static_forces import mass_factor
-from fvsolve.model.unsteady_terms import memory_shares
-from fvsolve.model.wall_creep import elements
 
 RANK_TOLERANCE = 1e-12  # singular values below this share of a group's greatest: motions that store no energy
 MAX_GROUP = 2500  # largest group of positions joined by springs whose singular values are computed, in about 7 s

@@ -6,28 +6,12 @@ import math
 
 import numpy as np
 
+from fvsolve.assembly.mechanics import are_points, push_ends
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.bodies_start import rounding
-from fvsolve.model.body_tables import add_line, distance_and_rate
-from fvsolve.model.lowering import Lowering
 
 SMALL_PRESSURE = 1e5  # a small pressure, which sets the size of a small travel
 SMALL_TRAVEL, SMALL_SPEED = 1e-3, 0.1  # of masses without chambers; of masses without stiffness
-
-
-class PushLowering(Lowering):
-    """Conversion of links between masses; their probes read the force."""
-
-    def probe(self, draft, name, probe, row) -> None:
-        row["kind"], row["index"] = rec.FORCE, draft.push_names.index(name)
-
-
-class AxisLowering(Lowering):
-    """Conversion of masses, which move along an axis, and of frames, which are fixed on it."""
-
-    def probe(self, draft, name, probe, row) -> None:
-        row["kind"] = rec.POSITION if probe.quantity == "position" else rec.VELOCITY
-        row["index"] = draft.mass_index[name]
 
 
 def lower_masses(draft) -> None:
@@ -49,38 +33,6 @@ def lower_masses(draft) -> None:
     draft.piston_names, draft.piston_table = draft.fill("piston", rec.PISTON)
     draft.push_names = [*braces, *stops, *draft.piston_names]
     add_states(draft)
-
-
-def push_ends(link) -> tuple[str | None, str]:
-    """Names of the two masses or points that a force element joins; the first may be None."""
-    return (
-        (link.ports["case"], link.ports["rod"]) if "rod" in link.ports else (link.ports.get("from"), link.ports["to"])
-    )
-
-
-def are_points(draft, *places: str | None) -> bool:
-    """True if any of the names is a point of a body or of the world."""
-    return any(place is not None and place not in draft.mass_index for place in places)
-
-
-def join_ports(
-    draft, row, ports: tuple[str, str], places: tuple[str | None, str], *line_options
-) -> tuple[float, float]:
-    """Write to the row of a force element the two masses or points that it joins.
-
-    Returns the offset of the second mass from the first at the start [m] and its relative velocity [m/s]; for points
-    the result of `body_tables.distance_and_rate`.
-    ports : names of the fields for the masses; line_options : for points, further arguments of `body_tables.add_line`
-    """
-    row["line"] = -1
-    if are_points(draft, *places):
-        row["line"] = add_line(draft, places, *line_options)
-        row[ports[0]] = row[ports[1]] = draft.mass_index[None]
-        return distance_and_rate(draft, places, draft.lines[-1])
-    for port, place in zip(ports, places, strict=True):
-        row[port] = draft.mass_index[place]
-    first, second = (draft.mass_table[int(row[port])] for port in ports)
-    return second["position"] - first["position"], second["velocity"] - first["velocity"]
 
 
 def add_states(draft) -> None:

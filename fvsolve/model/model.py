@@ -11,49 +11,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fvsolve.assembly.wall_creep import mass_in_creep
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.delay_history import split_memory
 from fvsolve.model.run_data import RunData
 from fvsolve.model.scalar_tables import node_values, pipe_values
-from fvsolve.model.wall_creep import mass_in_creep
 from fvsolve.units import show
 
 if TYPE_CHECKING:
+    from fvsolve.assembly.model_draft import PipeMesh
+    from fvsolve.assembly.state_names import StateNames
     from fvsolve.basins.lower_basin import BasinRows
     from fvsolve.case import Case
     from fvsolve.case.probe import Probe
-    from fvsolve.model.state_names import StateNames
-    from fvsolve.parts.pipe.elevation_profile import Profile
-
-
-@dataclass(frozen=True)
-class PipeMesh:
-    """Cells of a pipe, counted from its `from` end; for a delay line the places at which fields are computed.
-
-    x, edges : centres and edges of cells, as distances along the pipe [m]; elevation : elevations of the centres [m]
-    profile : elevation profile; None for a straight pipe
-    """
-
-    name: str
-    from_: str
-    to: str
-    length: float
-    diameter: float
-    cells: int
-    wave_speed: float
-    x: np.ndarray
-    edges: np.ndarray
-    elevation: np.ndarray
-    profile: Profile | None
-    ends: tuple[float, float]  # elevations of the pipe's ends [m]
-
-    def height(self, distance: Any) -> Any:
-        """Elevation of the pipe at distances from its `from` end [m]."""
-        if self.profile is None:
-            return self.ends[0] + (self.ends[1] - self.ends[0]) * (distance / self.length)
-        return self.profile.at(distance)
 
 
 @dataclass(repr=False)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from fvsolve.assembly.lowering import lowering_of
+from fvsolve.assembly.mechanics import point_row
+from fvsolve.assembly.probe_weights import lower_position
 from fvsolve.case import sloshing
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.body_tables import point_row
-from fvsolve.model.lowering import lowering_of
-from fvsolve.model.probe_weights import lower_position
 
 
 def lower_probes(draft) -> np.ndarray:

@@ -7,22 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fvsolve.assembly.model_draft import aligned_zeros
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.delay_lines.wave_history import COUNT
 from fvsolve.model.delay_history import LEAST_STEPS, reset_history, split_memory, steps_left, with_doubled_rings
 
 if TYPE_CHECKING:
     from fvsolve.model.model import Model
-
-
-CACHE_LINE = 8  # floats of a cache line
-
-
-def aligned_zeros(size: int) -> np.ndarray:
-    """Array of zeros whose first element starts a cache line."""
-    buffer = np.zeros(size + CACHE_LINE)
-    first = -(buffer.ctypes.data // 8) % CACHE_LINE
-    return buffer[first : first + size]
 
 
 def zeros_for_run(shapes: rec.RunArrays) -> rec.RunArrays:

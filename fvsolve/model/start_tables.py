@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from fvsolve.assembly.unsteady_terms import add_terms
+from fvsolve.assembly.wall_creep import limit_creep_step
 from fvsolve.model.chamber_loads import find_closed_chambers, supporting_pressures
 from fvsolve.model.probe_tables import probe_offsets
 from fvsolve.model.steady_start import SteadyStart
-from fvsolve.model.unsteady_terms import add_terms
-from fvsolve.model.wall_creep import limit_creep_step
 
 
 def start_profile(draft) -> dict[str, Any]:

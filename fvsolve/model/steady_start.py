@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.assembly.lowering import lowering_of
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.schedule_pieces import value_with_limit
@@ -17,7 +18,6 @@ from fvsolve.kernels.steady_friction import drag, drag_slope, factor_times_reyno
 from fvsolve.kernels.table_handle import make_handle
 from fvsolve.kernels.valves import conductance_of, flow_at_drop, flow_slope, transition_of
 from fvsolve.model.bodies_start import start_bodies
-from fvsolve.model.lowering import lowering_of
 from fvsolve.model.mass_tables import start_masses
 from fvsolve.model.moving_networks import driven_at_start
 from fvsolve.model.run_data import zeros_for_run

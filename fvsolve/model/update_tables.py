@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Any
 
+from fvsolve.assembly.lowering import lowering_of
+from fvsolve.assembly.model_draft import ModelDraft
 from fvsolve.case.case import Case
-from fvsolve.model.lowering import lowering_of
-from fvsolve.model.model_draft import ModelDraft
 
 CHANGING_FIELDS = ("nodes", "links", "raw", "read")  # fields of a case that differ after a change of numbers of parts
 

@@ -18,10 +18,10 @@ from queue import SimpleQueue
 
 import numpy as np
 
+from fvsolve.assembly.model_draft import aligned_zeros
 from fvsolve.kernels import band_exchange
 from fvsolve.kernels.compiled_functions import functions
 from fvsolve.model import RunData
-from fvsolve.model.run_data import aligned_zeros
 from fvsolve.solve.blocked_stages import blocked_sums
 from fvsolve.solve.partition import Partition
 from fvsolve.steppers import loop_indices

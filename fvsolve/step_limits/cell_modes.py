@@ -11,8 +11,8 @@ import functools
 
 import numpy as np
 
+from fvsolve.assembly.wall_creep import elements
 from fvsolve.kernels.steady_friction import drag_slope
-from fvsolve.model.wall_creep import elements
 from fvsolve.schemes import SCHEMES
 from fvsolve.step_limits.symbol import symbol
 

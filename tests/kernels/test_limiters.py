@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from fvsolve.assembly.scheme_codes import CODES
 from fvsolve.basins import second_order
 from fvsolve.basins.free_surface import surface_rows as shallow_rows
 from fvsolve.basins.liquid import grid_linear as liquid
@@ -15,7 +16,6 @@ from fvsolve.basins.liquid import grid_nonlinear as liquid_log
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import limiters, reconstruction, scalar_transport
 from fvsolve.kernels.limiters import by_limiter, limited
-from fvsolve.model.scheme_codes import CODES
 
 CELLS, NONE = 40, 99
 

@@ -254,7 +254,7 @@ def test_a_spool_opens_one_pair_of_edges_on_each_side_of_zero(kind):
     for key in ("ports", "position"):
         del plain[key]
     schedule = model.case.links["spool"].position
-    from fvsolve.model.schedule_tables import piece_value, schedule_pieces
+    from fvsolve.assembly.schedule_tables import piece_value, schedule_pieces
 
     pieces = schedule_pieces(schedule)
     jumps = [t for t, jump in model.breaks if jump]

@@ -15,8 +15,8 @@ from reference.scenes import WATER, area, junction, reservoir, scene
 
 import fvsolve
 from fvsolve import exact
+from fvsolve.assembly import unsteady_terms
 from fvsolve.errors import CaseError
-from fvsolve.model import unsteady_terms
 from fvsolve.studies.accuracy.model_levels import rigid_column
 from fvsolve.studies.energy.energy_balance import energy
 from fvsolve.studies.ports.response import response

@@ -9,11 +9,11 @@ import pytest
 from reference.scenes import AMBIENT, WATER, reservoir, scene
 
 from fvsolve import run
+from fvsolve.assembly.schedule_tables import Schedules
 from fvsolve.case.load import load
 from fvsolve.errors import CaseError
 from fvsolve.exact.schedule_values import value
 from fvsolve.kernels.schedule_pieces import piece_slopes, piece_value
-from fvsolve.model.schedule_tables import Schedules
 from fvsolve.parts.schedule import Schedule
 
 WAVE = {"mean": 0.01, "amplitude": "5 l/s", "period": "0.4 s", "phase": "30 deg"}

@@ -16,12 +16,12 @@ FLOORS = {  # folder -> role -> folders that a file of this role may import besi
     "parts": {
         "part": {"parts", "units", "errors", "names", "steppers", "attitude"},
         "law": {"kernels", "jit"},
-        "lower": {"parts", "model", "steady", "kernels", "errors", "units", "fluid", "schemes", "attitude"},
+        "lower": {"parts", "assembly", "steady", "kernels", "errors", "units", "fluid", "schemes", "attitude"},
     },
     "basins": {
         "part": {"parts", "units", "errors"},
         "law": {"kernels", "jit"},
-        "lower": {"basins", "parts", "case", "model", "kernels", "errors", "fluid", "mesh", "schemes", "steppers"},
+        "lower": {"basins", "parts", "case", "assembly", "kernels", "errors", "fluid", "mesh", "schemes", "steppers"},
     },
 }
 

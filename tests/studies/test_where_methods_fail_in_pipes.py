@@ -25,10 +25,10 @@ from reference.scenes import (
 )  # fmt: skip
 
 import fvsolve
+from fvsolve.assembly.scheme_codes import CODES
 from fvsolve.case import load
 from fvsolve.kernels.limiters import limited
 from fvsolve.model.energy_norm import energy_weights
-from fvsolve.model.scheme_codes import CODES
 from fvsolve.step_limits.step_notices import step_limits
 from fvsolve.steppers import analyse, method_named, stability_function
 from fvsolve.studies.outcome import outcome, study_model

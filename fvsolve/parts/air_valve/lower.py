@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from fvsolve.assembly.device_lowering import Device
 from fvsolve.errors import Notice
-from fvsolve.model.device_lowering import Device
 from fvsolve.parts.air_valve import law
 
 GAS_CONSTANT = 287.05  # of air [J/kg/K]

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from fvsolve.assembly.lowering import Lowering
+from fvsolve.assembly.mechanics import point_row, pose_of
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.body_tables import point_row, pose_of
-from fvsolve.model.lowering import Lowering
 
 
 class BushingRows(Lowering, kind="bushing"):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from fvsolve.assembly.lowering import Lowering
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.lowering import Lowering
 
 
 def joins_masses(case, cylinder) -> bool:

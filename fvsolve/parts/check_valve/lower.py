@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from fvsolve.assembly.device_lowering import Device
 from fvsolve.errors import Notice
-from fvsolve.model.device_lowering import Device
 from fvsolve.parts.check_valve import law, law_slam
 from fvsolve.parts.disc.law import CHECK
 from fvsolve.parts.disc.lower import LiftedValve

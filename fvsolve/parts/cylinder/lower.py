@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from fvsolve.assembly.mechanics import PushLowering, join_ports
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.mass_tables import PushLowering, join_ports
 
 
 class CylinderRows(PushLowering, kind="cylinder"):

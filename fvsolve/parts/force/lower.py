@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from fvsolve.assembly.inputs import FORCE, Input
+from fvsolve.assembly.lowering import rows_in
+from fvsolve.assembly.mechanics import PushLowering, join_ports
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.inputs import FORCE, Input
-from fvsolve.model.lowering import rows_in
-from fvsolve.model.mass_tables import PushLowering, join_ports
 
 
 class ForceRows(PushLowering, kind="force"):

@@ -1,6 +1,6 @@
 """Frames in the tables of a model."""
 
-from fvsolve.model.mass_tables import AxisLowering
+from fvsolve.assembly.mechanics import AxisLowering
 
 
 class FrameRows(AxisLowering, kind="frame"):

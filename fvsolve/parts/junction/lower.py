@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from fvsolve.assembly.inputs import FLOW, Input
+from fvsolve.assembly.lowering import Lowering
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.inputs import FLOW, Input
-from fvsolve.model.lowering import Lowering
 
 
 class JunctionRows(Lowering, kind="junction"):

@@ -1,6 +1,6 @@
 """Masses in the tables of a model."""
 
-from fvsolve.model.mass_tables import AxisLowering
+from fvsolve.assembly.mechanics import AxisLowering
 
 
 class MassRows(AxisLowering, kind="mass"):

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+from fvsolve.assembly.device_lowering import Device
+from fvsolve.assembly.inputs import opening_input
+from fvsolve.assembly.lowering import Lowering, Restriction
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.device_lowering import Device
-from fvsolve.model.inputs import opening_input
-from fvsolve.model.lowering import Lowering, Restriction
 from fvsolve.parts.outlet import law
-from fvsolve.parts.schedule import constant
 
 SPAN = 1e5  # default drop at which an outlet has its nominal flow [Pa]
 
@@ -18,7 +17,7 @@ class OutsideRows(Lowering, kind="outside"):
     ledger_name = "outside"
 
     def place(self, draft, name, node, row) -> None:
-        row["kind"], row["schedule"] = rec.FIXED, draft.schedules.add(constant(draft.case.ambient_pressure))
+        row["kind"], row["schedule"] = rec.FIXED, draft.schedules.add_constant(draft.case.ambient_pressure)
 
     def pressure_at_start(self, start, i, node, row) -> float:
         return start.schedule_value(row["schedule"])

@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 
+from fvsolve.assembly.lowering import Lowering
+from fvsolve.assembly.model_draft import PipeMesh
+from fvsolve.assembly.probe_weights import lower_position
+from fvsolve.assembly.unsteady_terms import reserve_terms
+from fvsolve.assembly.wall_creep import add_creep
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.lowering import Lowering
-from fvsolve.model.model import PipeMesh
-from fvsolve.model.probe_weights import lower_position
-from fvsolve.model.unsteady_terms import reserve_terms
-from fvsolve.model.wall_creep import add_creep
 from fvsolve.schemes import end_rate_factor
 
 

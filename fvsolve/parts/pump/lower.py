@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
+from fvsolve.assembly.device_lowering import Device
+from fvsolve.assembly.inputs import SPEED, Input
 from fvsolve.errors import Notice
-from fvsolve.model.device_lowering import Device
-from fvsolve.model.inputs import SPEED, Input
 from fvsolve.parts.pump import law
 from fvsolve.parts.pump import law_curve as curves
 from fvsolve.parts.pump.lower_curve import curve_numbers, rated_point

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fvsolve.model.device_lowering import Device, opening_of
-from fvsolve.model.inputs import FLOW, SET_PRESSURE, Input
+from fvsolve.assembly.device_lowering import Device, opening_of
+from fvsolve.assembly.inputs import FLOW, SET_PRESSURE, Input
 from fvsolve.parts.regulating import law
 from fvsolve.steady import Edge
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from fvsolve.assembly.device_lowering import Device
 from fvsolve.errors import Notice
-from fvsolve.model.device_lowering import Device
 from fvsolve.parts.disc.law import RELIEF
 from fvsolve.parts.disc.lower import LiftedValve
 from fvsolve.parts.relief_valve import law

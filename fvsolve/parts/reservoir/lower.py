@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from fvsolve.assembly.inputs import HEAD, PRESSURE, Input, scalar_inputs
+from fvsolve.assembly.lowering import Lowering
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.inputs import HEAD, PRESSURE, Input, scalar_inputs
-from fvsolve.model.lowering import Lowering
 
 
 class ReservoirRows(Lowering, kind="reservoir"):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from fvsolve.assembly.lowering import Lowering
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.lowering import Lowering
 
 
 class RigidColumnRows(Lowering, kind="rigid-column"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fvsolve.model.device_lowering import Device
+from fvsolve.assembly.device_lowering import Device
 from fvsolve.parts.outlet.law import EVENT_COUNT
 from fvsolve.parts.outlet.lower import RelievingRows
 from fvsolve.parts.rupture_disc import law, law_outside

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from fvsolve.assembly.inputs import POSITION, Input
+from fvsolve.assembly.lowering import Restriction
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.inputs import POSITION, Input
-from fvsolve.model.lowering import Restriction
 from fvsolve.parts.spool_valve.part import EDGES
 
 FLOWS = {  # flow into the link at a port: weights of its four edges

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fvsolve.model.mass_tables import PushLowering, join_ports
+from fvsolve.assembly.mechanics import PushLowering, join_ports
 
 
 class SpringRows(PushLowering, kind="spring"):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from fvsolve.assembly.device_lowering import Device
 from fvsolve.errors import Notice
-from fvsolve.model.device_lowering import Device
 from fvsolve.parts.outlet.law import EVENT_COUNT
 from fvsolve.parts.outlet.lower import RelievingRows
 from fvsolve.parts.surge_anticipating import law, law_outside

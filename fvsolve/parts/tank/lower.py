@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from fvsolve.assembly.lowering import Lowering
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.lowering import Lowering
 
 
 class TankRows(Lowering, kind="tank"):

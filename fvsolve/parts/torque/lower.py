@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from fvsolve.assembly.inputs import TORQUE, Input
+from fvsolve.assembly.lowering import Lowering, lowering_of
+from fvsolve.assembly.mechanics import PushLowering, join_ports
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.inputs import TORQUE, Input
-from fvsolve.model.lowering import Lowering, lowering_of
-from fvsolve.model.mass_tables import PushLowering, join_ports
 from fvsolve.parts.force.lower import brace_of
 from fvsolve.parts.pump.law import OWN_NUMBERS
 from fvsolve.parts.pump.lower_drive import torques_on

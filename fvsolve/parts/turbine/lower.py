@@ -7,10 +7,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from fvsolve.assembly.device_lowering import Device
+from fvsolve.assembly.inputs import ANGULAR_SPEED, Input, opening_input
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.device_lowering import Device
-from fvsolve.model.inputs import ANGULAR_SPEED, Input, opening_input
 from fvsolve.parts.pump.law import INERTIA, RATED
 from fvsolve.parts.pump.lower_drive import ShaftLowering, numbers_of
 from fvsolve.parts.pump.lower_notes import unusual_inertia

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from fvsolve.model.cluster_tables import set_transition
-from fvsolve.model.inputs import opening_input
-from fvsolve.model.lowering import Restriction
+from fvsolve.assembly.inputs import opening_input
+from fvsolve.assembly.lowering import LAMINAR_REYNOLDS, Restriction
 
 
 class ValveRows(Restriction, kind="valve"):
@@ -27,7 +26,7 @@ class ValveRows(Restriction, kind="valve"):
         softened = part.laminar_reynolds is None and row["transition"] > 0.0
         draft.restriction(name, part, row)
         if softened:
-            set_transition(draft, name, part, row)
+            row["transition"] = draft.hydraulics.transition_flow(name, part, LAMINAR_REYNOLDS, draft.fault)
         return True
 
     def inputs(self, model, name, part):

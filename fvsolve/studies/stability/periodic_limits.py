@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fvsolve.assembly.scheme_codes import scheme_settings
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.table_handle import make_handle
-from fvsolve.model.scheme_codes import scheme_settings
 from fvsolve.step_limits.symbol import WEIGHTS, symbol, weights_of
 from fvsolve.steppers import loop_indices
 from fvsolve.steppers.analysis.method_facts import analyse

@@ -8,11 +8,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from fvsolve.assembly.lowering import Lowering, Restriction, lowering_of
 from fvsolve.errors import Notice
 from fvsolve.kernels import calls
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.valves import flow_at_drop, transition_of
-from fvsolve.model.lowering import Lowering, Restriction, lowering_of
 
 
 class Device(Restriction):

@@ -3,12 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
-
-from fvsolve.model.lowering import lowering_of
-
-if TYPE_CHECKING:
-    from fvsolve.model.model import Model
+from typing import NamedTuple
 
 
 class InputKind(NamedTuple):
@@ -57,24 +52,12 @@ class Input(NamedTuple):
     scalar: int = -1  # scalar whose value flows in
 
 
-def inputs_of(model: Model) -> dict[str, Input]:
-    """Inputs of all parts : name `PART.KEY` -> input."""
-    case = model.case
-    parts = {**case.places, **{name: case.conduits[name] for name in model.valve_names}}
-    parts |= {name: link for name, link in case.links.items() if name not in parts}
-    inputs: dict[str, Input] = {}
-    for name, part in parts.items():
-        own = lowering_of(type(part)).of(part).inputs(model, name, part)
-        inputs |= {f"{name}.{key}": value for key, value in own.items()}
-    return inputs
-
-
-def opening_input(model: Model, name: str) -> dict[str, Input]:
+def opening_input(model, name: str) -> dict[str, Input]:
     """Input "opening" of a restriction : key -> input."""
     return {"opening": Input(OPENING, int(model.tables.valves[model.valve_names.index(name)]["schedule"]))}
 
 
-def scalar_inputs(model: Model, name: str) -> dict[str, Input]:
+def scalar_inputs(model, name: str) -> dict[str, Input]:
     """Inputs for the values of scalars that flow in from a node : name of the scalar -> input."""
     i, inputs = model.node_names.index(name), {}
     for q, (scalar, row) in enumerate(zip(model.case.scalars, model.tables.scalars, strict=True)):

@@ -31,14 +31,19 @@ class Schedules:
         default_factory=dict
     )  # (index, time) -> value, after all are added
 
+    def add_constant(self, value: float) -> int:
+        """Add a schedule with a constant value; return its index."""
+        self.records.append((len(self.rows), 1))
+        self.rows.append([-np.inf, 0.0, 0.0, value, 0.0, 0.0, 0.0])
+        return len(self.records) - 1
+
     def add(self, schedule, scale: float = 1.0, offset: float = 0.0) -> int:
         """Add a schedule with the value scale * value + offset; return its index."""
         if schedule.kind == "constant":
-            pieces = [[-np.inf, 0.0, 0.0, schedule.first * scale + offset, *(0.0 * scale,) * 3]]
-        else:
-            table = schedule_pieces(schedule)
-            table[:, 3:] = scaled(table, scale, offset)
-            pieces = table.tolist()
+            return self.add_constant(schedule.first * scale + offset)
+        table = schedule_pieces(schedule)
+        table[:, 3:] = scaled(table, scale, offset)
+        pieces = table.tolist()
         self.records.append((len(self.rows), len(pieces)))
         self.rows += pieces
         for time, jump in break_times(schedule):

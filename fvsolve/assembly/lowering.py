@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from fvsolve.kernels import calls
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.restrictions import step_at
-from fvsolve.parts.schedule import constant
 from fvsolve.steady import Edge
 
 if TYPE_CHECKING:
-    from fvsolve.model.inputs import Input
+    from fvsolve.assembly.inputs import Input
 
 TYPICAL_DROP = 1e5  # a typical pressure drop [Pa]
+LAMINAR_REYNOLDS = 10.0  # Reynolds number below which a restriction is made laminar, to bound its slope at zero drop
 
 
 class Lowering:
@@ -30,7 +30,7 @@ class Lowering:
     law : module of its compiled law, whose functions are named as in `kernels.calls.HOOKS`; if it has a `step`, that
     function gives the flow through its restriction, in place of the square-root law
     events : meaning of a zero of each event function, "" if it is not reported
-    is_device : True if it is also a device, see `model.device_lowering`
+    is_device : True if it is also a device, see `assembly.device_lowering`
     ledger_name : for a node, name of the energy it supplies in the energy ledger ("" for none); for a link, category of
     its row in the ledger
     """
@@ -111,7 +111,7 @@ class Restriction(Lowering):
         if self.steps:
             row["hooks"] = draft.hooks(self)
         if row["schedule"] < 0 and (self.law is None or calls.hook_of(self.law, "set") is None):
-            row["schedule"] = draft.schedules.add(constant(1.0))
+            row["schedule"] = draft.schedules.add_constant(1.0)
         if self.law is None:
             return
         if not self.is_device:

@@ -10,17 +10,51 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.case.case import Case
+from fvsolve.assembly.device_lowering import Device
+from fvsolve.assembly.hydraulics import Hydraulics
+from fvsolve.assembly.lowering import Lowering, links_by_table
+from fvsolve.assembly.schedule_tables import Schedules
+from fvsolve.assembly.state_names import StateNames
 from fvsolve.errors import CaseError, Fault, Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import tank_limits
-from fvsolve.model.device_lowering import Device
-from fvsolve.model.hydraulics import Hydraulics
-from fvsolve.model.lowering import Lowering, links_by_table
-from fvsolve.model.model import PipeMesh
-from fvsolve.model.run_data import CACHE_LINE, aligned_zeros
-from fvsolve.model.schedule_tables import Schedules
-from fvsolve.model.state_names import StateNames
+
+CACHE_LINE = 8  # floats of a cache line
+
+
+def aligned_zeros(size: int) -> np.ndarray:
+    """Array of zeros whose first element starts a cache line."""
+    buffer = np.zeros(size + CACHE_LINE)
+    first = -(buffer.ctypes.data // 8) % CACHE_LINE
+    return buffer[first : first + size]
+
+
+@dataclass(frozen=True)
+class PipeMesh:
+    """Cells of a pipe, counted from its `from` end; for a delay line the places at which fields are computed.
+
+    x, edges : centres and edges of cells, as distances along the pipe [m]; elevation : elevations of the centres [m]
+    profile : elevation profile; None for a straight pipe
+    """
+
+    name: str
+    from_: str
+    to: str
+    length: float
+    diameter: float
+    cells: int
+    wave_speed: float
+    x: np.ndarray
+    edges: np.ndarray
+    elevation: np.ndarray
+    profile: Any  # `parts.pipe.elevation_profile.Profile`, or None
+    ends: tuple[float, float]  # elevations of the pipe's ends [m]
+
+    def height(self, distance: Any) -> Any:
+        """Elevation of the pipe at distances from its `from` end [m]."""
+        if self.profile is None:
+            return self.ends[0] + (self.ends[1] - self.ends[0]) * (distance / self.length)
+        return self.profile.at(distance)
 
 
 def no_rows(record: np.dtype) -> Any:
@@ -37,7 +71,7 @@ def byte_copy(table: np.ndarray) -> np.ndarray:
 class ModelDraft:
     """Tables, names and states of a model while it is built. It has slots: no other attributes can be added."""
 
-    case: Case
+    case: Any  # `case.Case`
     fluid: Any = None
     hydraulics: Any = None
     faults: list[Fault] = field(default_factory=list)
@@ -82,7 +116,8 @@ class ModelDraft:
     events: list[tuple[str, str]] = field(default_factory=list)  # (name, meaning); "" if an event is not reported
     meshes: list[PipeMesh] = field(default_factory=list)
     basins: list[Any] = field(default_factory=list)
-    links: dict[str, list[tuple]] = field(default_factory=dict)  # table -> links with rows in it, see `model.lowering`
+    # table -> links with rows in it, see `assembly.lowering.links_by_table`
+    links: dict[str, list[tuple]] = field(default_factory=dict)
     # pipe -> by cells or as a delay line, see `model.delay_line_selection`
     followed: dict[str, Any] = field(default_factory=dict)
 
@@ -129,7 +164,7 @@ class ModelDraft:
         self.node_index = {name: i for i, name in enumerate(case.places)}
         self.owned = {f"{name}.{place}" for name, link in case.links.items() for place in link.owns}
 
-    def copy_for(self, case: Case) -> ModelDraft:
+    def copy_for(self, case: Any) -> ModelDraft:
         """Copy of packed tables for a case with tables of the same shapes.
 
         Writable tables and lists are copied, so that later changes do not reach the original.
