@@ -30,7 +30,7 @@ from fvsolve.kernels.mechanism.body_layout import body_row as row_of_body
 from fvsolve.kernels.schedule_pieces import schedule_slopes
 from fvsolve.kernels.table_handle import open_tables
 
-FORCE_OF, POWER_OF, TRAVEL_OF = 0, 1, 2  # quantities of probes, in the order of `parts.basin.part.MovingWall`
+FORCE_OF, POWER_OF, TRAVEL_OF = 0, 1, 2  # quantities of probes, in the order of `parts.basin.MovingWall`
 LEAST_WIDTH = 1e-3  # least width of a cell over its undeformed width; below it the run stops
 VECTOR_MARGIN = 8  # additional speeds of lines that vector loops read beyond the last line
 

@@ -21,7 +21,7 @@ from fvsolve.case.sections import Output
 from fvsolve.errors import MeshError, did_you_mean, listing
 from fvsolve.fluid.laws import law_names
 from fvsolve.parts import Basin
-from fvsolve.parts.basin.part import BasinStart, MovingWall, PatchNode
+from fvsolve.parts.basin import BasinStart, MovingWall, PatchNode
 from fvsolve.parts.value import ReadContext, ValueFault
 from fvsolve.units import show
 

@@ -11,8 +11,8 @@ from fvsolve.case import sloshing
 from fvsolve.case.bodies import carrier_of, point_inertia, poses
 from fvsolve.case.cell_means import means, samples
 from fvsolve.errors import article, did_you_mean, listing
-from fvsolve.parts.basin.part import Physics
-from fvsolve.parts.body.part import Body
+from fvsolve.parts.basin import Physics
+from fvsolve.parts.body import Body
 from fvsolve.parts.node import PlaceOnBody
 from fvsolve.units import show
 

@@ -15,7 +15,7 @@ from fvsolve import attitude
 from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.exact.schedule_values import value
 from fvsolve.parts.attitude_keys import is_zero_vector
-from fvsolve.parts.body.part import Body
+from fvsolve.parts.body import Body
 from fvsolve.units import show
 
 # Largest gap of a pin at the start, relative to its lengths: typed numbers have few digits.

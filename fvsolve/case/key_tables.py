@@ -19,9 +19,9 @@ from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.parts import KINDS, Friction, Node, Scalar
 from fvsolve.parts.accumulator.shape import Compressor
 from fvsolve.parts.attitude_keys import Attitude
-from fvsolve.parts.basin.part import BasinStart, Patch
-from fvsolve.parts.body.part import Joint
-from fvsolve.parts.connection.part import Connection
+from fvsolve.parts.basin import BasinStart, Patch
+from fvsolve.parts.body import Joint
+from fvsolve.parts.connection import Connection
 from fvsolve.parts.disc.part import Disc
 from fvsolve.parts.link import TwoPort
 from fvsolve.parts.node import PlaceOnBody
@@ -29,7 +29,7 @@ from fvsolve.parts.pipe.materials import SI, materials
 from fvsolve.parts.pipe.pipe_wall import Lining, Wall
 from fvsolve.parts.table_model import Table, plain_value
 from fvsolve.parts.value import NEEDED, Quantity, Text, Value
-from fvsolve.parts.valve.part import Sized
+from fvsolve.parts.valve import Sized
 from fvsolve.units import DIMENSIONS, show
 
 TABLES: dict[str, type[Table]] = {

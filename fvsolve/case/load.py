@@ -37,7 +37,7 @@ from fvsolve.case.update_values import update_values
 from fvsolve.errors import CaseError, Fault, FluidError, did_you_mean, listing
 from fvsolve.fluid import properties
 from fvsolve.parts import KINDS, Basin, Chamber, Friction, Pipe, Scalar
-from fvsolve.parts.body.part import Body, BodyPoint
+from fvsolve.parts.body import Body, BodyPoint
 from fvsolve.parts.node import Node
 from fvsolve.parts.pipe.part import MOST_CELLS
 from fvsolve.parts.schedule import Scheduled

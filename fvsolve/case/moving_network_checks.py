@@ -9,7 +9,7 @@ import numpy as np
 
 from fvsolve.case.basins_on_bodies import free_joints, place_faults
 from fvsolve.errors import article
-from fvsolve.parts.basin.part import Basin
+from fvsolve.parts.basin import Basin
 from fvsolve.parts.node import Node, PlaceOnBody
 from fvsolve.units import show
 

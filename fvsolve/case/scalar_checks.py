@@ -10,7 +10,7 @@ from fvsolve.case.resource_checks import LONGEST_NAME
 from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.fluid.laws import LAWS, law_names
 from fvsolve.parts import KINDS, Basin
-from fvsolve.parts.basin.part import VELOCITY_FIELDS, Physics
+from fvsolve.parts.basin import VELOCITY_FIELDS, Physics
 from fvsolve.units import show
 
 Faults = Iterator[tuple[tuple, str]]

@@ -22,7 +22,7 @@ import numpy as np
 
 from fvsolve.case.bodies import point_inertia
 from fvsolve.case.cell_means import means, samples
-from fvsolve.parts.body.part import Body, Joint
+from fvsolve.parts.body import Body, Joint
 from fvsolve.parts.schedule import constant
 
 MODES = 3  # modes along x, and along y

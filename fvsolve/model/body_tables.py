@@ -8,7 +8,7 @@ from fvsolve.assembly.mechanics import PLAIN_LINE, distance_and_rate
 from fvsolve.assembly.schedule_tables import break_times
 from fvsolve.case import bodies
 from fvsolve.kernels import dtypes as rec
-from fvsolve.parts.body.part import Body
+from fvsolve.parts.body import Body
 
 SMALL_ANGLE, SMALL_TRAVEL = 1e-3, 1e-3  # [rad], [m]
 SMALL_SPIN, SMALL_SPEED = 0.1, 0.1  # [rad/s], [m/s]

@@ -3,36 +3,29 @@
 from importlib import import_module
 from pathlib import Path
 
-from fvsolve.parts.basin.part import Basin
+from fvsolve.parts.basin import Basin
 from fvsolve.parts.carried_scalar import Scalar
-from fvsolve.parts.chamber.part import Chamber
-from fvsolve.parts.cylinder.part import Cylinder
-from fvsolve.parts.damper.part import Damper
-from fvsolve.parts.end_stop.part import EndStop
-from fvsolve.parts.force.part import Force
-from fvsolve.parts.frame.part import Frame
+from fvsolve.parts.cylinder import Cylinder
 from fvsolve.parts.friction_model import Friction
-from fvsolve.parts.inflow.part import Inflow
-from fvsolve.parts.junction.part import Junction
-from fvsolve.parts.leak.part import Leak
+from fvsolve.parts.hydraulic_nodes import Chamber, Inflow, Junction, Reservoir
 from fvsolve.parts.link import Link
-from fvsolve.parts.mass.part import Mass
 from fvsolve.parts.node import Node
-from fvsolve.parts.orifice.part import Orifice
+from fvsolve.parts.outlet.part import Leak
 from fvsolve.parts.pipe.part import Pipe
 from fvsolve.parts.pipe.pipe_wall import Wall
 from fvsolve.parts.plugins import declare_installed
-from fvsolve.parts.reservoir.part import Reservoir
-from fvsolve.parts.rigid_column.part import RigidColumn
+from fvsolve.parts.rigid_column import RigidColumn
 from fvsolve.parts.schedule import Schedule
-from fvsolve.parts.spool_valve.part import EDGES, SpoolValve
-from fvsolve.parts.spring.part import Spring
-from fvsolve.parts.tank.part import AreaTable, Tank
-from fvsolve.parts.torque.part import Torque
-from fvsolve.parts.valve.part import Characteristic, Valve
+from fvsolve.parts.spool_valve import EDGES, SpoolValve
+from fvsolve.parts.tank import AreaTable, Tank
+from fvsolve.parts.torque import Torque
+from fvsolve.parts.translational import Damper, EndStop, Force, Frame, Mass, Spring
+from fvsolve.parts.valve import Characteristic, Orifice, Valve
 
-for path in sorted(Path(__file__).parent.glob("*/part.py")):
-    import_module(f"{__name__}.{path.parent.name}.part")
+package = Path(__file__).parents[1]
+for pattern in ("parts/[a-z]*.py", "parts/*/part.py", "basins/*/part.py"):  # the last declares types of basins
+    for path in sorted(package.glob(pattern)):
+        import_module(".".join((package.name, *path.relative_to(package).with_suffix("").parts)))
 
 declare_installed()
 

@@ -18,14 +18,14 @@ from fvsolve.basins.lower import rows_class
 from fvsolve.basins.lower_basin import BasinRows
 from fvsolve.errors import FvsolveError
 from fvsolve.parts import Basin
-from fvsolve.parts.basin.part import BasinStart, Physics
+from fvsolve.parts.basin import BasinStart, Physics
 from fvsolve.parts.value import Quantity
 
 SOURCES = {
     "part.py": '''
 """Heat on a belt. Knows its keys."""
 from typing import Annotated, ClassVar
-from fvsolve.parts.basin.part import Physics
+from fvsolve.parts.basin import Physics
 from fvsolve.parts.formula import SpatialField, SpatialFieldKey
 from fvsolve.parts.table_model import Table
 from fvsolve.parts.value import Quantity, positive

@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from fvsolve.parts.basin.part import VELOCITY_FIELDS, Physics, VelocityStart
+from fvsolve.parts.basin import VELOCITY_FIELDS, Physics, VelocityStart
 from fvsolve.parts.formula import SpatialField, SpatialFieldKey
 from fvsolve.parts.value import VALUE, Quantity, UsualRange, anything, nonnegative
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar
 
-from fvsolve.parts.basin.part import VELOCITY_FIELDS, Physics, VelocityStart
+from fvsolve.parts.basin import VELOCITY_FIELDS, Physics, VelocityStart
 from fvsolve.parts.formula import SpatialField, SpatialFieldKey
 from fvsolve.parts.value import Quantity, positive
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from fvsolve.errors import listing
-from fvsolve.parts.basin.part import File, Physics
+from fvsolve.parts.basin import File, Physics
 from fvsolve.parts.formula import SpatialField, SpatialFieldKey
 from fvsolve.parts.table_model import read_keys
 from fvsolve.parts.value import PROFILE, Quantity, ReadContext, Rows, Text, Value, ValueFault, positive

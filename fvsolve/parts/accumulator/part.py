@@ -6,12 +6,12 @@ import math
 from typing import Annotated, Any, ClassVar
 
 from fvsolve.parts.accumulator.shape import LEVELS, UPRIGHT, Compressor, height_of
-from fvsolve.parts.connection.part import Connection, ConnectionTable, with_connection
+from fvsolve.parts.connection import Connection, ConnectionTable, with_connection
 from fvsolve.parts.context import CaseContext, Faults
-from fvsolve.parts.junction.part import Junction
+from fvsolve.parts.hydraulic_nodes import Junction
 from fvsolve.parts.node import Node
 from fvsolve.parts.table_model import Nested, missing_key_faults
-from fvsolve.parts.tank.part import Surface
+from fvsolve.parts.tank import Surface
 from fvsolve.parts.value import Number, Quantity, Range, UsualRange, nonnegative, positive
 
 VOLUMES = UsualRange(1e-7, 1e5, "pilot accumulators to air cushions in rock")

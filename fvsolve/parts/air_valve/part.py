@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, ClassVar
 
-from fvsolve.parts.connection.part import Connection, behind_throat
+from fvsolve.parts.connection import Connection, behind_throat
 from fvsolve.parts.context import CaseContext, Faults
-from fvsolve.parts.junction.part import Junction
+from fvsolve.parts.hydraulic_nodes import Junction
 from fvsolve.parts.node import Node
 from fvsolve.parts.schedule import constant
 from fvsolve.parts.value import Number, Quantity, UsualRange, between, positive

@@ -20,7 +20,7 @@ from fvsolve.parts.value import (
     nonnegative,
     positive,
 )
-from fvsolve.parts.valve.part import Sized
+from fvsolve.parts.valve import Sized
 
 
 @dataclass(frozen=True)

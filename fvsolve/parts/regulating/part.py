@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 from fvsolve.parts.link import TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.value import VALUE, Quantity, UsualRange, positive
-from fvsolve.parts.valve.part import Sized
+from fvsolve.parts.valve import Sized
 
 STROKES = UsualRange(1e-4, 1e5, "servo valves to motor drives")
 BANDS = UsualRange(20.0, 1e8, "millimetres of water to servo valves")

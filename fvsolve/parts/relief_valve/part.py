@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 from fvsolve.parts.disc.part import DROPS, Disc
 from fvsolve.parts.link import TwoPort
 from fvsolve.parts.value import Quantity, positive
-from fvsolve.parts.valve.part import Sized
+from fvsolve.parts.valve import Sized
 
 
 class ReliefValve(Disc, Sized, TwoPort, kind="relief-valve"):

@@ -1,0 +1,404 @@
+"""Basins, their patches, and the base class for the equations of basins (`Physics`)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from copy import copy
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic.fields import FieldInfo
+
+from fvsolve.assembly.lowering import Lowering
+from fvsolve.errors import FvsolveError, listing
+from fvsolve.kernels import dtypes as rec
+from fvsolve.parts.attitude_keys import Attitude
+from fvsolve.parts.carried_scalar import ScalarValues
+from fvsolve.parts.formula import SpatialField, SpatialFieldKey, uniform
+from fvsolve.parts.node import Node, PlaceOnBody
+from fvsolve.parts.schedule import Schedule, Scheduled
+from fvsolve.parts.table_model import NamedTables, Nested, Table
+from fvsolve.parts.time_series import copy_name, find_file
+from fvsolve.parts.value import (
+    SHAPE,
+    VALUE,
+    Choice,
+    Quantity,
+    ReadContext,
+    Rows,
+    Text,
+    Value,
+    nonnegative,
+    positive,
+)
+from fvsolve.units import show
+
+SIDES = ("west", "east", "south", "north")
+RECTANGLE_KEYS = ("size", "cells", "grading", "holes")  # keys of rectangles
+SLOSHING_MODELS = ("frozen", "modes", "cells")
+VELOCITY_FIELDS = {"u": "velocity", "v": "velocity", "speed": "velocity"}  # fields of a physics that has velocities
+
+
+class Patch(Table):
+    """A section of the boundary of a basin: a node `BASIN.PATCH` for links, an open boundary, or a moving wall."""
+
+    side: Annotated[
+        str | None,
+        Choice("side", SIDES, "side of the rectangle, required for a rectangle; a mesh file names its own patches"),
+    ] = None
+    span: Annotated[
+        tuple[float, float] | None,
+        Rows(
+            "length",
+            nonnegative,
+            length=2,
+            about="start and end along the side, on grid lines [m]; the whole side if left out",
+            changes=SHAPE,
+        ),
+    ] = None
+    boundary: Annotated[
+        str | None,
+        Choice("boundary", ("wall", "open"), "boundary condition: open (waves leave); a wall if left out"),
+    ] = None
+    impedance: Annotated[
+        float | None,
+        Quantity(
+            "impedance",
+            nonnegative,
+            "ratio of pressure to velocity of waves in a liquid, instead of `boundary` [Pa s/m]",
+        ),
+    ] = None
+    body: Annotated[str | None, Text("mass, or body on a prismatic joint, that moves this wall along x or y")] = None
+    travel: Annotated[
+        Schedule | None, Scheduled("position", about="displacement of this wall along x or y, instead of `body` [m]")
+    ] = None
+    zone: Annotated[
+        float | None,
+        Quantity(
+            "length", positive, "width of the zone whose grid lines follow the wall [m]; the whole basin if left out",
+            changes=VALUE,
+        ),
+    ] = None  # fmt: skip
+    scalars: Annotated[
+        dict[str, Any], ScalarValues("scalar values of the inflow, for a given velocity or an open boundary")
+    ] = {}
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("boundary", "impedance"), ("body", "travel"))
+
+    @property
+    def moves(self) -> bool:
+        """True if the patch is a moving wall."""
+        return self.body is not None or self.travel is not None
+
+
+class Cells(Value):
+    """Numbers of cells along x and y of a rectangle."""
+
+    about = "numbers of cells along x and y; required without `mesh`"
+    takes = "[whole number, whole number]"
+
+    def read(self, given: Any, setting: ReadContext) -> tuple[int, int]:
+        is_pair = isinstance(given, (list, tuple)) and len(given) == 2 and all(type(n) is int and n > 0 for n in given)
+        if not is_pair:
+            raise ValueError(f"{show(given)} is not a pair of numbers of cells; expected for example [64, 32]")
+        return tuple(given)
+
+
+class Holes(Value):
+    """Rectangles cut out of a rectangular basin."""
+
+    about = "rectangles cut out of the basin, on grid lines"
+    takes = "list of [x0, y0, x1, y1], m"
+
+    def read(self, given: Any, setting: ReadContext) -> tuple[tuple[float, ...], ...]:
+        if not isinstance(given, (list, tuple)) or (given and not isinstance(given[0], (list, tuple))):
+            raise ValueError(f"{show(given)} is not a list of holes; expected [[x0, y0, x1, y1], ...]")
+        return tuple(Rows("length", length=4).read(hole, setting) for hole in given)
+
+
+class File(Value):
+    """Key that gives the path of a file; its value as read is the name of the copy in the run directory."""
+
+    def __init__(self, about: str) -> None:
+        self.about = about
+
+    def read(self, given: Any, setting: ReadContext) -> str:
+        return copy_name(find_file(Text().read(given, setting), setting), setting)
+
+    def json(self) -> dict[str, Any]:
+        return {"type": "string"}
+
+
+class MeshFile(Table):
+    """A mesh of triangles and quadrilaterals; its groups of lines are patches."""
+
+    file: Annotated[str, File("mesh file that meshio reads, path relative to the case")]
+    unit: Annotated[str, Text("unit of the coordinates")] = "m"
+
+
+class VelocityStart(Table):
+    """Initial velocities of a basin whose equations have velocities."""
+
+    u: Annotated[SpatialField, SpatialFieldKey("velocity", "velocity along x [m/s]")] = uniform(0.0)
+    v: Annotated[SpatialField, SpatialFieldKey("velocity", "velocity along y [m/s]")] = uniform(0.0)
+
+
+class BasinStart(Table):
+    """Initial values of a basin that is not at rest; the valid keys depend on its `physics`."""
+
+
+class PatchNode(PlaceOnBody):
+    """A patch as a node: it has the pressure of the cells behind it and carries flow into them."""
+
+    fixes_pressure: ClassVar[bool] = True
+    kind: ClassVar[str] = "patch"
+    quantities: ClassVar[dict[str, str]] = {**Node.quantities, "flow": "flow"}  # into the basin
+
+    basin: str
+    patch: str
+    depth: float | None = None  # of water at rest, mean over the cells behind the patch [m]
+    pressure: float | None = None  # of a liquid at rest [Pa]
+
+
+class MovingWall(PatchNode):
+    """A patch that is a moving wall; probes: force on the water (inward), power into the water, travel."""
+
+    wall_quantities: ClassVar[dict[str, str]] = {"force": "force", "power": "power", "travel": "position"}
+    quantities: ClassVar[dict[str, str]] = PatchNode.quantities | wall_quantities
+
+
+class Physics(Table):
+    """Base of the declarations of equations of basins: name in the file, keys, capabilities.
+
+    A key without a default must be given. A key that several declarations have must be declared equally in all.
+    The module `lower.py` beside the declaration fills the rows of tables.
+    states : quantity of cells -> its unit, the stored quantity first
+    fields : quantity that can be probed at a point -> its dimension; starts : table with the keys of `start`
+    laws : supported density laws, all if empty; description : text for messages about unsupported laws
+    joined : True if links may join its patches (False where the velocity is given); moves : True if walls may move
+    on_bodies : True if the basin may be on a body; links_on_bodies : True if links may then join its patches
+    has_modes : True if `sloshing` may be other than "cells"; carries : True if the basin carries scalars
+    allows_impedance : True if a boundary may have an impedance
+    has_shocks : True if waves steepen into lasting shocks; schemes then have at most second order in smooth plane flow
+    """
+
+    kinds: ClassVar[dict[str, type[Physics]]] = {}
+    name: ClassVar[str] = ""
+    states: ClassVar[dict[str, str]] = {}
+    fields: ClassVar[dict[str, str]] = {}
+    starts: ClassVar[type[Table]] = Table
+    laws: ClassVar[tuple[str, ...]] = ()
+    description: ClassVar[str] = "basins"
+    joined: ClassVar[bool] = True
+    moves: ClassVar[bool] = False
+    on_bodies: ClassVar[bool] = False
+    has_modes: ClassVar[bool] = False
+    links_on_bodies: ClassVar[bool] = False
+    carries: ClassVar[bool] = True
+    allows_impedance: ClassVar[bool] = False
+    has_shocks: ClassVar[bool] = False
+
+    def __init_subclass__(cls, name: str, **rest: Any) -> None:
+        super().__init_subclass__(**rest)
+        if name in Physics.kinds:
+            raise FvsolveError(f"physics {show(name)} exists already; choose another name")
+        cls.name = name
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **rest: Any) -> None:
+        both = (BasinStart, optional_keys(cls.starts)), (Basin, optional_keys(cls))
+        for table, keys in both:
+            for key in (key for key in keys if key in table.model_fields):
+                own, known = keys[key], table.model_fields[key]
+                if (own.metadata, own.default) != (known.metadata, known.default):
+                    text = f"physics {show(cls.name)} declares {key} differently from the existing key of a basin"
+                    raise FvsolveError(f"{text}; declare it identically in both, or choose another name")
+        for table, keys in both:
+            table.model_fields.update(keys)
+            if table.__pydantic_complete__:  # otherwise it is built when a case first has a basin
+                table.model_rebuild(force=True)
+        Physics.kinds[cls.name] = cls
+        Basin.__doc__ = "\n".join([BASIN_DOC, "", *(f"{name}: {kind.__doc__}" for name, kind in Physics.kinds.items())])
+
+    @classmethod
+    def has_friction(cls, basin: Basin) -> bool:
+        """True if friction of the bed or of walls acts on the flow of a basin."""
+        return False
+
+    @classmethod
+    def rest(
+        cls, basin: Basin, mean: Callable[[Any], np.ndarray], cells: np.ndarray, area: np.ndarray
+    ) -> dict[str, Any]:
+        """State of a patch at rest: "elevation" [m], "depth" of water [m] and "pressure" [Pa] -> value.
+
+        Depth and pressure are means over the cells behind the patch. A value is None for a quantity that the equations
+        do not have, and for an elevation that is not stated.
+        mean : function from a formula to its means over all cells
+        cells : numbers of the cells behind the patch; area : areas of all cells [m2]
+        """
+        return {"elevation": basin.elevation, "depth": None, "pressure": None}
+
+    @classmethod
+    def formulas(cls, basin: Basin, mesh: Any) -> Iterator[tuple[tuple[str, ...], Any, np.ndarray | None]]:
+        """Yield (key path, formula, points) for each field over the plane that the keys of these equations contain.
+
+        points : float64[n, 2]  points at which the formula is evaluated; None if its means over the cells are used
+        """
+        for key in cls.model_fields:
+            if isinstance(shape := getattr(basin, key), SpatialField):
+                yield (key,), shape, None
+
+    @classmethod
+    def own_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
+        """Faults of keys that belong to other equations, and of missing keys that these equations need."""
+        faults = cls.key_faults(given)
+        for key in given:
+            owners = [name for name, kind in Physics.kinds.items() if key in kind.model_fields]
+            if owners and cls.name not in owners:
+                faults.append(((key,), f"is not a key of physics {show(cls.name)}; it belongs to {listing(owners)}"))
+        needed = [key for key, info in cls.model_fields.items() if info.is_required()]
+        return faults + [((), f"{key} is missing") for key in needed if key not in given]
+
+    @classmethod
+    def accepts_law(cls, law: str) -> bool:
+        """True if these equations support a density law."""
+        return law in (cls.laws or (law,))
+
+
+class Basin(PlaceOnBody, kind="basin"):
+    """Water or liquid in a plane region between walls, joined to the network by patches."""
+
+    fixes_pressure: ClassVar[bool] = True
+    quantities: ClassVar[dict[str, str]] = {}
+
+    physics: Annotated[str, Choice("physics", Physics.kinds, "equations solved in the basin")] = "free-surface"
+    size: Annotated[
+        tuple[float, float] | None,
+        Rows("length", positive, length=2, about="lengths along x and y [m]; required without `mesh`", changes=SHAPE),
+    ] = None
+    cells: Annotated[Any, Cells()] = None
+    grading: Annotated[
+        tuple[float, float] | None,
+        Rows(
+            "number",
+            positive,
+            length=2,
+            about="ratio of last to first cell size along x and y [-]; 1 if left out",
+            changes=SHAPE,
+        ),
+    ] = None
+    holes: Annotated[Any, Holes()] = None
+    mesh: Annotated[
+        MeshFile | None,
+        Nested(MeshFile, "mesh file (any format of meshio) and the unit of its coordinates, instead of a rectangle"),
+    ] = None
+    patches: Annotated[Any, NamedTables(Patch, "named parts of the boundary: { outlet = { side, span } }")] = {}
+    start: Annotated[
+        BasinStart | None,
+        Nested(
+            BasinStart, "initial level, or pressure above the pressure at rest, and velocities; at rest if left out"
+        ),
+    ] = None
+
+    attitude: Annotated[Attitude | None, Nested(Attitude, "attitude of the basin axes relative to the body axes")] = (
+        None
+    )
+    sloshing: Annotated[
+        str, Choice("sloshing", SLOSHING_MODELS, "model of the water on a body: frozen (rigid), linear modes, or cells")
+    ] = "cells"
+    scalars: Annotated[
+        dict[str, Any], ScalarValues("scalar values at the start, formulas of x and y", SpatialFieldKey("number"))
+    ] = {}
+
+    @property
+    def physics_type(self) -> type[Physics]:
+        """Declaration of the equations that `physics` names."""
+        return Physics.kinds[self.physics]
+
+    @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
+        physics = given.get("physics", cls.model_fields["physics"].default)
+        known = isinstance(physics, str) and physics in Physics.kinds
+        faults = Physics.kinds[physics].own_faults(given) if known else []
+        if "mesh" in given:
+            faults += [
+                ((key,), "is a key of rectangles, but this basin has a `mesh`; remove this key or `mesh`")
+                for key in RECTANGLE_KEYS
+                if key in given
+            ]
+        else:
+            faults += [((), f"{key} is missing") for key in RECTANGLE_KEYS[:2] if key not in given]
+        for name, patch in given["patches"].items() if isinstance(given.get("patches"), dict) else ():
+            side = isinstance(patch, dict) and "side" in patch
+            if side and "mesh" in given:
+                faults.append((("patches", name), "takes its faces from the mesh; remove the keys `side` and `span`"))
+            elif isinstance(patch, dict) and not side and "mesh" not in given:
+                faults.append((("patches", name), "side is missing"))
+        return faults
+
+    @classmethod
+    def own_places(cls, given: dict[str, Any]) -> tuple[str, ...] | None:
+        patches = given.get("patches")
+        return tuple(patches) if isinstance(patches, dict) else ()
+
+    @property
+    def rotation(self) -> np.ndarray:
+        """Rotation matrix from the axes of the basin to those of its body : float64[3, 3]."""
+        return np.eye(3) if self.attitude is None else self.attitude.rotation
+
+    @property
+    def lumped(self) -> bool:
+        """True if masses on the body represent the water of the basin, which then has no cells."""
+        return self.on is not None and self.sloshing != "cells"
+
+    def inner(self, name: str) -> tuple[dict[str, Node], dict[str, Any]]:
+        return {}, {}
+
+    @classmethod
+    def bodies(cls, given: dict[str, Any]) -> tuple[str, ...]:
+        patches = given.get("patches")
+        tables = patches.values() if isinstance(patches, dict) else ()
+        stated = [entry.get("body") for entry in tables if isinstance(entry, dict)]
+        return (*(entry for entry in stated if isinstance(entry, str)), *super().bodies(given))
+
+
+BASIN_DOC = Basin.__doc__  # docstring of Basin before every physics adds a line
+
+
+def optional_keys(table: type[Table]) -> dict[str, FieldInfo]:
+    """Declarations of the keys of a table, each made optional: key -> field of pydantic."""
+    keys = {key: copy(info) for key, info in table.model_fields.items()}
+    for info in keys.values():
+        info.default = None if info.is_required() else info.default
+    return keys
+
+
+class PatchRows(Lowering, kind="patch"):
+    """Conversion to table rows of patches of basins: nodes with the pressure of the cells behind the patch."""
+
+    ledger_name = "dry patch"
+
+    def place(self, draft, name, node, row) -> None:
+        row["kind"], row["row"] = rec.PATCH, draft.stiff()
+
+    def pressure_at_start(self, start, i, node, row) -> float:
+        if node.pressure is not None:
+            return node.pressure
+        return start.law.pressure_under(node.depth) if node.depth else start.case.ambient_pressure
+
+    def motion_text(self, name, node, row, inflow, flow, amount) -> str:
+        return f"basin {name}: {amount(flow, 'flow')} flow in"
+
+    def probe(self, draft, name, probe, row) -> None:
+        if probe.quantity in ("force", "power", "travel"):
+            row["kind"], row["index"] = rec.WALL_VALUE, draft.wall_names.index(name)
+            row["side"] = ("force", "power", "travel").index(probe.quantity)
+        elif probe.quantity != "flow":
+            super().probe(draft, name, probe, row)
+        else:
+            self.probe_flow(draft, name, row)
+
+    def probe_flow(self, draft, name, row) -> None:
+        """Fill the row of a probe for the flow through a patch into the basin."""
+        row["index"], row["kind"], row["scale"] = draft.node_index[name], rec.PATCH_FLOW, 1.0 / draft.fluid.density
+        if not draft.case.nodes[draft.case.places[name].basin].physics_type.joined:
+            row["index"], row["kind"] = draft.patch_table["node"].tolist().index(row["index"]), rec.GIVEN_FLOW

@@ -1,0 +1,148 @@
+"""Hydraulic cylinders."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, ClassVar
+
+from fvsolve.assembly.mechanics import PushLowering, join_ports
+from fvsolve.kernels import dtypes as rec
+from fvsolve.parts.context import CaseContext, Faults
+from fvsolve.parts.hydraulic_nodes import Chamber
+from fvsolve.parts.link import Link, Ports
+from fvsolve.parts.value import PROFILE, VALUE, Quantity, UsualRange, nonnegative, positive
+
+SIZES = UsualRange(5e-4, 30.0, "micro-hydraulics to ship lifts")
+AREAS = UsualRange(1e-7, 30.0, "micro-hydraulics to presses")
+
+
+class Cylinder(Link, kind="cylinder"):
+    """Hydraulic cylinder: a piston between chambers A and B moves a rod relative to a case.
+
+    The volumes are dead_volume_A + area_A x and dead_volume_B + area_B (stroke - x), with the piston position
+    x = x_rod - x_case - closed_length, or between points of bodies, their distance minus closed_length.
+    The piston pushes the rod forward by area_A p_A - area_B p_B - viscous_friction (v_rod - v_case), p above ambient,
+    and the case backward by the same force. Ports: rod, case (velocity, force); places A, B (pressure, flow). Stored
+    energy: that of its chambers. Dissipated power: leakage (p_A - p_B)^2 + viscous_friction (v_rod - v_case)^2 [W].
+    """
+
+    no_scalars: ClassVar[str] = "its chambers carry no scalars yet; leave out this part, or `[scalars]`"
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("area_A", "piston_diameter"), ("area_B", "rod_diameter"))
+    joins: ClassVar[dict[str, str]] = {"rod": "translational or spatial", "case": "translational or spatial"}
+    owns: ClassVar[dict[str, str]] = {"A": "hydraulic", "B": "hydraulic"}
+    quantities: ClassVar[dict[str, str]] = {"force": "force", "position": "position", "velocity": "velocity"}
+
+    ports: Annotated[dict[str, str], Ports(("rod", "case"))]
+    stroke: Annotated[
+        float, Quantity("length", positive, "stroke, from x = 0 (rod in) to x = stroke [m]", SIZES, VALUE)
+    ]
+    closed_length: Annotated[
+        float, Quantity("length", nonnegative, "distance from case to rod at x = 0 (rod in) [m]", changes=PROFILE)
+    ] = 0.0
+    area_A: Annotated[
+        float | None,
+        Quantity("area", positive, "area of the piston at A [m2]; required without `piston_diameter`", AREAS),
+    ] = None
+    area_B: Annotated[
+        float | None,
+        Quantity("area", positive, "ring area at B, without the rod [m2]; required without `rod_diameter`", AREAS),
+    ] = None
+    piston_diameter: Annotated[
+        float | None, Quantity("length", positive, "diameter of the piston, instead of `area_A` [m]", SIZES)
+    ] = None
+    rod_diameter: Annotated[
+        float | None,
+        Quantity("length", nonnegative, "diameter of the rod, with `piston_diameter`, instead of `area_B` [m]", SIZES),
+    ] = None
+    dead_volume_A: Annotated[
+        float, Quantity("volume", positive, "volume of chamber A with the rod in, lines included [m3]", changes=VALUE)
+    ]
+    dead_volume_B: Annotated[
+        float, Quantity("volume", positive, "volume of chamber B with the rod out, lines included [m3]", changes=VALUE)
+    ]
+    initial_pressure_A: Annotated[
+        float | None,
+        Quantity(
+            "pressure",
+            about="pressure of chamber A at the start [Pa]; that of its links, or the supporting pressure of a shut "
+            "chamber if left out",
+        ),
+    ] = None
+    initial_pressure_B: Annotated[
+        float | None,
+        Quantity(
+            "pressure",
+            about="pressure of chamber B at the start [Pa]; that of its links, or the supporting pressure of a shut "
+            "chamber if left out",
+        ),
+    ] = None
+    leakage: Annotated[
+        float, Quantity("leakage", nonnegative, "leakage flow from A to B per pressure difference [m3/s/Pa]")
+    ] = 0.0
+    viscous_friction: Annotated[
+        float, Quantity("damping", nonnegative, "viscous friction of piston and rod [N s/m]", changes=VALUE)
+    ] = 0.0
+    elevation: Annotated[float | None, Quantity("length", about="elevation of both chambers [m]")] = None
+
+    @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list:
+        faults = super().key_faults(given)
+        if "area_A" not in given and "piston_diameter" not in given:
+            faults.append(((), "area_A or piston_diameter is missing"))
+        if "area_B" not in given and "rod_diameter" not in given:
+            faults.append(((), "area_B or rod_diameter is missing"))
+        if "rod_diameter" in given and "area_A" in given and "piston_diameter" not in given:
+            faults.append((("rod_diameter",), "needs the key `piston_diameter`; with `area_A` give `area_B` instead"))
+        return faults
+
+    def faults(self, name: str, around: CaseContext) -> Faults:
+        for place, pressure in (("A", self.initial_pressure_A), ("B", self.initial_pressure_B)):
+            if pressure is not None:
+                yield from around.boiling_faults("links", name, f"initial_pressure_{place}", [pressure])
+        if (distance := around.separation(self, "case", "rod")) is None:
+            return
+        x, (rod, case) = distance - self.closed_length, (self.ports["rod"], self.ports["case"])
+        if not 0.0 <= x <= self.stroke:
+            closed = " minus closed_length" if self.closed_length else ""
+            place = f"{x:g} m (distance from {case} to {rod}{closed})"
+            text = f"the piston starts at {place}; expected 0 to {self.stroke:g} m"
+            yield ("stroke",), text
+        if min(self.areas()) <= 0.0:
+            yield ("rod_diameter",), "leaves no area at B; expected a diameter below `piston_diameter`"
+
+    def areas(self) -> tuple[float, float]:
+        """(area at A [m2], area at B [m2]) of the piston."""
+        bore = self.area_A if self.area_A is not None else math.pi / 4.0 * self.piston_diameter**2
+        if self.area_B is not None:
+            return bore, self.area_B
+        return bore, math.pi / 4.0 * (self.piston_diameter**2 - self.rod_diameter**2)
+
+    def chambers(self, x: float) -> dict[str, Chamber]:
+        """Chambers "A" and "B" -> `Chamber` with the volume that it has at the piston position x [m]."""
+        a, b = self.areas()
+        volumes = {"A": self.dead_volume_A + a * x, "B": self.dead_volume_B + b * (self.stroke - x)}
+        given = {"A": self.initial_pressure_A, "B": self.initial_pressure_B}
+        return {
+            place: Chamber.model_construct(volume=volume, initial_pressure=given[place], elevation=self.elevation)
+            for place, volume in volumes.items()
+        }
+
+
+class CylinderRows(PushLowering, kind="cylinder"):
+    """Conversion to table rows of cylinders: a piston between two chambers, and between two masses or two points."""
+
+    table = "piston"
+
+    def fill(self, draft, name, link, rows) -> None:
+        (row,) = rows
+        distance, row["speed"] = join_ports(draft, row, ("case", "rod"), (link.ports["case"], link.ports["rod"]))
+        row["position"] = distance - link.closed_length
+        row["a"], row["b"] = draft.node_index[f"{name}.A"], draft.node_index[f"{name}.B"]
+        row["area_a"], row["area_b"] = link.areas()
+        row["stroke"], row["leakage"], row["damping"] = link.stroke, link.leakage, link.viscous_friction
+
+    def probe(self, draft, name, probe, row) -> None:
+        if probe.quantity == "force":
+            return super().probe(draft, name, probe, row)
+        row["index"] = draft.piston_names.index(name)
+        row["kind"] = rec.PISTON_POSITION if probe.quantity == "position" else rec.PISTON_VELOCITY
