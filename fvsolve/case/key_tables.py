@@ -17,7 +17,7 @@ from fvsolve.case.sections import FluidSpec, Numerics, Output, OutputLine
 from fvsolve.case.text import inline
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.parts import KINDS, Friction, Node, Scalar
-from fvsolve.parts.accumulator.shape import Compressor
+from fvsolve.parts.accumulator.part import Compressor
 from fvsolve.parts.attitude_keys import Attitude
 from fvsolve.parts.basin import BasinStart, Patch
 from fvsolve.parts.body import Joint

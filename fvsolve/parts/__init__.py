@@ -5,8 +5,8 @@ from pathlib import Path
 
 from fvsolve.parts.basin import Basin
 from fvsolve.parts.carried_scalar import Scalar
+from fvsolve.parts.conduit import Friction
 from fvsolve.parts.cylinder import Cylinder
-from fvsolve.parts.friction_model import Friction
 from fvsolve.parts.hydraulic_nodes import Chamber, Inflow, Junction, Reservoir
 from fvsolve.parts.link import Link
 from fvsolve.parts.node import Node

@@ -16,7 +16,7 @@ from fvsolve.parts.attitude_keys import is_zero_vector, length_notices
 from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.link import Link
 from fvsolve.parts.pump.law import OWN_NUMBERS
-from fvsolve.parts.pump.lower_drive import torques_on
+from fvsolve.parts.pump.lower_shaft import torques_on
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.translational import brace_of
 from fvsolve.parts.value import Rows, Text

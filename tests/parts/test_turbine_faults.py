@@ -15,7 +15,7 @@ import fvsolve
 from fvsolve.errors import CaseError
 from fvsolve.parts.turbine import law_chart
 from fvsolve.parts.turbine.hill_chart import HillChartValue
-from fvsolve.parts.turbine.lower_chart import chart_numbers
+from fvsolve.parts.turbine.lower import chart_numbers
 from fvsolve.parts.value import ReadContext
 
 HALF = {"opening": 0.5, "unit_speed": [40, 60, 90], "unit_flow": [0.52, 0.5, 0.41], "efficiency": [0.7, 0.85, 0.6]}

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from fvsolve.parts.conduit import pipe_size
-from fvsolve.parts.friction_model import DARCY, KEYS_OF_MODEL
+from fvsolve.parts.conduit import DARCY, KEYS_OF_MODEL, pipe_size
 from fvsolve.parts.pipe.materials import Material, materials
 from fvsolve.parts.pipe.pressure_classes import SCHEDULE, UnknownSize, class_size, unknown_class
 from fvsolve.parts.value import ValueFault

@@ -1,4 +1,9 @@
-"""Turbines in the tables of a model, and their initial steady state."""
+"""Turbines in the tables of a model, with their hill charts, and their steady start.
+
+For the kernels a hill chart is a table of values on rays from the origin of the plane of unit speed n = omega / speed
+and unit flow u = flow / (flow scale capacity), at a head of 1 m. The flow scale is the greatest flow of the chart,
+`capacity` the greatest flow of a curve over this scale.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +17,165 @@ from fvsolve.assembly.inputs import ANGULAR_SPEED, Input, opening_input
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.pump.law import INERTIA, RATED
-from fvsolve.parts.pump.lower_drive import ShaftLowering, numbers_of
-from fvsolve.parts.pump.lower_notes import unusual_inertia
+from fvsolve.parts.pump.lower import unusual_inertia
+from fvsolve.parts.pump.lower_shaft import ShaftLowering, numbers_of
 from fvsolve.parts.turbine import law
 from fvsolve.parts.turbine import law_chart as charts
-from fvsolve.parts.turbine.lower_chart import chart_numbers
 from fvsolve.steady import Edge
+
+ANGLE_TOLERANCE = 1e-7  # angle below which two rays are merged [rad]
+SPACING = math.pi / 24.0  # angle between rays outside the chart where a turning runner pumps in reverse [rad]
+PUMP_RATIO = 2.0  # shaft power over hydraulic power there
+STEEPEST = 10.0  # flow over speed up to which the shaft torque rises; the head vanishes beyond
+STANDING, BACKWARD = 0.5 * math.pi, math.pi  # angles of a runner at rest and in backward rotation without flow [rad]
+
+
+def chart_numbers(part, weight: float) -> list[float]:
+    """Parameters of the hill chart of a turbine, in the order that `law_chart` states; weight : rho g [N/m3]"""
+    chart, d = part.hill_chart, part.diameter
+    speed = max(abs(n) for entry in chart.curves for n in entry.speed) * math.pi / 30.0 / d
+    flow = max(q for entry in chart.curves for q in entry.flow) * d * d
+    torque_scale = weight * flow / speed
+    curves = [nodes_of(entry, part, speed, flow, torque_scale, weight) for entry in chart.curves]
+    rays = merge_angles(np.concatenate([angles for _, angles, *_ in curves]))
+    directions = np.column_stack([np.cos(rays), np.sin(rays)])
+    tables = [curve_at_rays(directions, rays, *entry[1:5]) for entry in curves]
+    shut_torque = 0.0
+    if chart.shut_point is not None:
+        n11, t11 = chart.shut_point
+        shut_torque = t11 * d**3 / (n11 * math.pi / 30.0 / d) ** 2
+    numbers = [len(curves), len(rays), speed, flow, shut_torque]
+    numbers += [entry.opening for entry in chart.curves] + [entry[0] for entry in curves]
+    numbers += [entry[5][0] for entry in curves] + [entry[5][1] for entry in curves]
+    numbers += [*rays, *directions[:, 0], *directions[:, 1], *np.concatenate([root for root, _ in tables])]
+    numbers += [*np.concatenate([torque for _, torque in tables])]
+    return [float(entry) for entry in numbers]
+
+
+def nodes_of(curve, part, speed: float, flow: float, torque_scale: float, weight: float):
+    """(capacity, angles, directions, roots, torques, range) of a curve: its values on its own rays from the origin.
+
+    capacity : greatest flow at 1 m over the flow scale [-]; angles : angles of the rays [rad]
+    directions : (cosine, sine) of each ray
+    roots : square root of the head at unit distance from the origin, 1 over the distance of the curve
+    torques : torque over head [N]; range : (least, greatest) angle of the given points [rad]
+    speed, flow : scales of speed [rad/s] and flow [m3/s] at 1 m; torque_scale : weight flow / speed
+    weight : rho g [N/m3]
+    Assumptions outside the given points: at standstill, forward flow is that of the last point, and reverse flow is the
+    greatest flow of the curve; no head at backward rotation without flow; at forward rotation without flow, the
+    distance of the first point from the origin.
+    """
+    d = part.diameter
+    capacity = max(curve.flow) * d * d / flow
+    n = np.array(curve.speed) * math.pi / 30.0 / d / speed
+    u = np.array(curve.flow) * d * d / flow / capacity
+    torque = np.array(curve.torques(weight)) * d**3
+    angle = np.unwrap(np.arctan2(u, n))
+    if angle[-1] < angle[0]:
+        n, u, torque, angle = n[::-1], u[::-1], torque[::-1], angle[::-1]
+    angle = angle - 2.0 * math.pi * math.floor((angle[0] + STANDING) / (2.0 * math.pi))
+    distance = np.hypot(n, u)
+    nodes = list(zip(angle, 1.0 / distance, torque, strict=True))
+    nodes = nodes_before(nodes[0], n[0], u[0], torque[0], torque_scale * capacity) + nodes
+    nodes += nodes_behind(nodes[-1], n[-1], u[-1], torque[-1], torque_scale * capacity)
+    angles, roots, torques = (np.array(column) for column in zip(*nodes, strict=True))
+    return capacity, angles, np.column_stack([np.cos(angles), np.sin(angles)]), roots, torques, (angle[0], angle[-1])
+
+
+def nodes_before(first, n: float, u: float, torque: float, torque_scale: float) -> list:
+    """(angle, root of head, torque over head) of each ray below the first angle of a curve, down to -pi / 2.
+
+    At -pi / 2 the flow is reverse and the runner stands still. first : these values on the ray of the first point
+    n, u, torque : relative speed, relative flow and torque over head of the first point
+    torque_scale : as for `pump_nodes`
+    """
+    angle, root, _ = first
+    nodes = []
+    if angle > 0.0:
+        braked = min(torque, 0.0) - max(torque, 0.0) * (1.0 / root - n) / n
+        nodes = [(0.0, root, braked)]
+        angle, torque = 0.0, braked
+    return pump_nodes(angle, root, torque, torque_scale, -1.0)[::-1] + nodes
+
+
+def nodes_behind(last, n: float, u: float, torque: float, torque_scale: float) -> list:
+    """(angle, root of head, torque over head) of each ray above the last angle of a curve, up to 3 pi / 2.
+
+    At 3 pi / 2 the flow is reverse and the runner stands still. last : these values on the ray of the last point
+    n, u, torque : relative speed, relative flow and torque over head of the last point
+    torque_scale : as for `pump_nodes`
+    """
+    angle, root, _ = last
+    nodes = []
+    if angle < STANDING:
+        nodes.append((STANDING, 1.0 / u, 2.0 * max(torque, 0.0)))
+    if angle < BACKWARD:
+        return [*nodes, (BACKWARD, 0.0, 0.0), *pump_nodes(0.0, 0.0, 0.0, torque_scale, 1.0)]
+    return pump_nodes(angle - BACKWARD, root, torque, torque_scale, 1.0)
+
+
+def pump_nodes(angle: float, root: float, torque: float, torque_scale: float, direction: float) -> list:
+    """(angle, root of head, torque over head) of each ray with reverse flow beyond a first ray, up to standstill.
+
+    The root is -1 at standstill. The torque is that at which shaft power is PUMP_RATIO times hydraulic power, constant
+    beyond STEEPEST, plus the surplus of the torque on the first ray over it.
+    angle, root, torque : these values on the first ray; direction : -1 for forward rotation, 1 for backward rotation
+    torque_scale : torque over head [N] at which shaft power is hydraulic power, at equal relative speed and flow
+    """
+    first_tilt = -angle if direction < 0.0 else angle
+    count = max(2, math.ceil((STANDING - first_tilt) / SPACING))
+    excess = abs(torque) - PUMP_RATIO * torque_scale * math.tan(first_tilt)
+    nodes = []
+    for tilt in np.linspace(first_tilt, STANDING, count + 1)[1:]:
+        ratio = min(math.tan(tilt), STEEPEST)
+        nodes.append(
+            (
+                tilt,
+                root_on_line(first_tilt, root, tilt),
+                direction * (PUMP_RATIO * torque_scale * ratio + max(excess, 0.0)),
+            )
+        )
+    return [(-tilt if direction < 0.0 else BACKWARD + tilt, value, shaft_torque) for tilt, value, shaft_torque in nodes]
+
+
+def root_on_line(first_tilt: float, root: float, tilt: float) -> float:
+    """Root of head on a ray in the quadrants of reverse flow, on the line from the first ray to -1 at standstill.
+
+    first_tilt, tilt : angles of the first ray and of this ray below the axis of speed [rad]; root : on the first ray
+    """
+    share = math.cos(tilt) / math.cos(first_tilt)
+    return share * root - (math.sin(tilt) - share * math.sin(first_tilt))
+
+
+def merge_angles(angles: np.ndarray) -> np.ndarray:
+    """Angles [rad] of the rays of all curves, ascending, with those closer than ANGLE_TOLERANCE merged.
+
+    They go from reverse flow at standstill (-pi / 2) over a full turn to 3 pi / 2, both included. The angle of a point
+    is atan2(u, n), with its relative flow u and relative speed n.
+    """
+    inner = np.sort(angles[(angles > -STANDING + ANGLE_TOLERANCE) & (angles < 3.0 * STANDING - ANGLE_TOLERANCE)])
+    distinct = inner[np.concatenate([[True], np.diff(inner) > ANGLE_TOLERANCE])]
+    return np.concatenate([[-STANDING], distinct, [3.0 * STANDING]])
+
+
+def curve_at_rays(
+    ray_directions: np.ndarray, rays: np.ndarray, angles, directions, roots, torques
+) -> tuple[np.ndarray, np.ndarray]:
+    """(roots of head, torques over head) of a curve on all rays; between its own rays the curve is a straight line.
+
+    ray_directions, rays : directions (cosine, sine) and angles [rad] of all rays
+    angles, directions, roots, torques : values on the own rays of the curve, see `nodes_of`
+    """
+    i = np.clip(np.searchsorted(angles, rays) - 1, 0, len(angles) - 2)
+    (a, b), (c, d), (x, y) = directions[i].T, directions[i + 1].T, ray_directions.T
+    share_1, share_2 = (x * d - y * c) / (a * d - b * c), (a * y - b * x) / (a * d - b * c)
+    weights = share_1 * np.maximum(roots[i], charts.LEAST_ROOT), share_2 * np.maximum(roots[i + 1], charts.LEAST_ROOT)
+    root = share_1 * roots[i] + share_2 * roots[i + 1]
+    torque = (weights[0] * torques[i] + weights[1] * torques[i + 1]) / (weights[0] + weights[1])
+    nearest = np.abs(rays[:, None] - angles).argmin(axis=1)
+    is_own = np.abs(rays - angles[nearest]) <= ANGLE_TOLERANCE
+    return np.where(is_own, roots[nearest], root), np.where(is_own, torques[nearest], torque)
+
 
 FLOW_TOLERANCE = 1e-6  # pressure difference regarded as zero, over the pressure drops
 
