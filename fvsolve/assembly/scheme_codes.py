@@ -1,6 +1,10 @@
-"""Codes and weights of schemes and limiters that kernels read."""
+"""Codes of schemes and limiters for kernels, and weights of a probe between cells."""
+
+from __future__ import annotations
 
 import functools
+
+import numpy as np
 
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.ghost_cells import difference_rows
@@ -36,3 +40,48 @@ def face_differences(scheme: str) -> tuple:
     """
     row = SCHEMES[scheme]
     return difference_rows([float(w) for w in row.weights], row.degree)
+
+
+TIE_TOLERANCE = 1e-6  # in cells; two sets of cells that differ by less count as equally near
+
+
+def lower_position(draft, row, fraction: float, degree: int | None = None) -> None:
+    """Set the position of a probe along its pipe: an end, or cells and weights of a polynomial through their means.
+
+    degree : degree of the polynomial, at most cells - 1; if None, that of the scheme, at least 1
+    """
+    if fraction in (0.0, 1.0):
+        row["side"] = -1 if fraction == 0.0 else 1
+        return
+    n = int(draft.pipe_table[row["index"]]["cells"])
+    degree = min(degree or max(SCHEMES[draft.case.numerics.scheme].degree, 1), n - 1)
+    first, weights = cells_around(fraction * n, degree, n)
+    row["cell"], row["count"], row["weights"] = first, weights.size, len(draft.floats)
+    draft.floats += weights.tolist()
+
+
+@functools.lru_cache(maxsize=4096)
+def cells_around(x: float, degree: int, n: int) -> tuple[int, np.ndarray]:
+    """First cell that a probe reads, and weights of this and the following cells.
+
+    x : position in cells from the `from` end; n : number of cells. The nearest degree + 1 cells are read. If two such
+    sets are equally near, as at a face for an even degree, the result is the mean of both, so that a pipe drawn in the
+    opposite direction reads the same value.
+    """
+    middle = x - 0.5 * (degree + 1)
+    firsts = sorted({int(np.clip(round(middle + side), 0, n - degree - 1)) for side in (-TIE_TOLERANCE, TIE_TOLERANCE)})
+    weights = np.zeros(firsts[-1] - firsts[0] + degree + 1)
+    for first in firsts:
+        weights[first - firsts[0] :][: degree + 1] += reading_weights(x - first, degree) / len(firsts)
+    return firsts[0], weights
+
+
+def reading_weights(x: float, degree: int) -> np.ndarray:
+    """Weights of the means of degree + 1 cells in the value at x, exact for polynomials up to `degree`.
+
+    Cell k lies between k and k + 1.
+    """
+    powers = np.arange(degree + 1)
+    cells = np.arange(degree + 1)[:, None]
+    averages = ((cells + 1.0) ** (powers + 1) - cells ** (powers + 1.0)) / (powers + 1)
+    return np.linalg.solve(averages.T, float(x) ** powers)

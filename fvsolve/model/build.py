@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
-from dataclasses import replace
+from collections.abc import Collection, Mapping
+from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 
 from fvsolve.assembly.device_lowering import lower_devices
 from fvsolve.assembly.lowering import lowering_of
 from fvsolve.assembly.model_draft import ModelDraft
+from fvsolve.assembly.pipe_terms import MAX_TERMS, add_terms, limit_creep_step
 from fvsolve.assembly.scheme_codes import scheme_settings
-from fvsolve.assembly.unsteady_terms import MAX_TERMS
 from fvsolve.basins.lower import basin_start, lower_basins
+from fvsolve.case import load, locate_faults
 from fvsolve.case.case import Case
-from fvsolve.errors import FvsolveError
+from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import tank_limits
-from fvsolve.model.body_tables import lower_bodies, lower_lines
-from fvsolve.model.cavities import coarse_for_cavities
+from fvsolve.model.body_tables import lower_bodies, lower_lines, lower_moving_segments
 from fvsolve.model.cluster_tables import classify_nodes
 from fvsolve.model.delay_history import history_size
 from fvsolve.model.delay_line_selection import (
@@ -30,17 +31,88 @@ from fvsolve.model.delay_line_selection import (
     lower_delays,
 )
 from fvsolve.model.equilibrium_search import with_equilibrium
-from fvsolve.model.flow_notices import flow_notices
-from fvsolve.model.mass_tables import lower_masses
+from fvsolve.model.mass_tables import find_closed_chambers, lower_masses, supporting_pressures
 from fvsolve.model.model import Model
-from fvsolve.model.moving_networks import lower_moving_segments
-from fvsolve.model.probe_tables import lower_probes
-from fvsolve.model.resolution import too_few_cells
+from fvsolve.model.probe_tables import lower_probes, probe_offsets
 from fvsolve.model.scalar_tables import lower_scalars, scale_scalars, start_amounts
-from fvsolve.model.start_tables import start_profile
-from fvsolve.model.update_tables import with_new_sizes
+from fvsolve.model.start_notices import coarse_for_cavities, flow_notices, too_few_cells
+from fvsolve.model.steady_start import SteadyStart
 from fvsolve.steppers import automatic
 from fvsolve.steppers.tableau import method_named
+from fvsolve.validation import TABLE, instance_of, validated
+
+
+def start_profile(draft) -> dict[str, Any]:
+    """Compute the initial steady state and fill it into the tables of a draft; return facts for `fvsolve check`.
+
+    Raises CaseError if no steady state is found.
+    """
+    if draft.case.law.linear:
+        start = SteadyStart(draft)
+    else:
+        from fvsolve.model.nonlinear_start import NonlinearStart  # not loaded under the linear law
+
+        start = NonlinearStart(draft)
+    start.solve()
+    find_closed_chambers(draft, start)
+    if start.set_supporting_pressures(supporting_pressures(draft, start)):
+        start.solve()
+    start.report_frictionless()
+    start.freeze_factors()
+    start.fill_nodes()
+    start.fill_pipes()
+    start.fill_columns()
+    start.fill_valves()
+    start.begin_devices()
+    probe_offsets(draft, start)
+    unsteady = add_terms(draft)
+    return {**start.report(), "unsteady": unsteady, "creep": limit_creep_step(draft, unsteady)}
+
+
+CHANGING_FIELDS = ("nodes", "links", "raw", "read")  # fields of a case that differ after a change of numbers of parts
+
+
+def with_new_sizes(packed: ModelDraft, case: Case) -> ModelDraft | None:
+    """Copy of packed tables with the restrictions of a case; None if the case differs in more than their sizes.
+
+    The result is also None with basins, and for a change that `Lowering.resize` does not support.
+    """
+    before = packed.case
+    changed = changed_links(before, case)
+    if changed is None or packed.plane_size or not all(name in packed.valve_names for name in changed):
+        return None
+    draft = packed.copy_for(case)
+    for name in changed:
+        link, row = case.links[name], draft.valve_table[draft.valve_names.index(name)]
+        if not lowering_of(type(link)).resize(draft, name, before.links[name], link, row):
+            return None
+    return draft
+
+
+def changed_links(before: Case, case: Case) -> list[str] | None:
+    """Names of the links that differ between two cases; None if anything else differs, or a link has another type.
+
+    The result is also None if the start of the first case is a static equilibrium.
+    """
+    same = all(
+        getattr(before, field.name) is getattr(case, field.name)
+        for field in fields(Case)
+        if field.name not in CHANGING_FIELDS
+    )
+    if (
+        not same
+        or before.needs_equilibrium
+        or not same_parts(before.nodes, case.nodes)
+        or before.links.keys() != case.links.keys()
+    ):
+        return None
+    changed = [name for name, link in case.links.items() if link is not before.links[name]]
+    return changed if all(type(case.links[name]) is type(before.links[name]) for name in changed) else None
+
+
+def same_parts(before: dict[str, Any], now: dict[str, Any]) -> bool:
+    """True if two tables hold the identical part objects."""
+    return before.keys() == now.keys() and all(now[name] is part for name, part in before.items())
 
 
 def build(case) -> Model:
@@ -308,3 +380,18 @@ def model_of(draft: ModelDraft) -> Model:
         draft.steady, draft.profiles, draft.devices, draft.laws, start, draft.events,
         draft.basins, case.extreme_probes, draft.watched_start, jump_tables(draft),
     )  # fmt: skip
+
+
+@validated(model=instance_of(Model), set=TABLE)
+def vary(model: Model, set: Mapping[str, Any]) -> Model:
+    """Build the model of the same case with changed keys, for example `{"links.valve.area": 0.002}`.
+
+    The result is identical to the bit to a model built from the changed file, with its faults and notices. Only parts
+    that the keys affect, and parts that read a file or a signal, are read again. The initial steady state is solved
+    from scratch, so that its last digits do not depend on the earlier model. `model` is not changed. Raises CaseError.
+    """
+    case = load(model.case, dict(set))
+    try:
+        return build_like(case, model)
+    except CaseError as error:
+        raise locate_faults(error, case) from None

@@ -18,56 +18,27 @@ def classify_nodes(draft) -> None:
     Adds faults of nodes whose pressure nothing sets.
     """
     nodes, valves = draft.node_table, draft.valve_table
-    inner = nodes["kind"] == rec.JUNCTION
-    short = np.flatnonzero(draft.delay_table["now"] > 0.0)
+    inner, short = nodes["kind"] == rec.JUNCTION, np.flatnonzero(draft.delay_table["now"] > 0.0)
     joins = [draft.pipe_table[draft.delay_table["pipe"][k]] for k in short]
     group = union(len(nodes), [(v["from_node"], v["to_node"]) for v in (*valves, *joins)
                                if inner[v["from_node"]] and inner[v["to_node"]]])  # fmt: skip
     touched: dict[int, list[int]] = {}
-    couples: dict[int, list[int]] = {}
-    for k, row in zip(short.tolist(), joins, strict=True):
-        for i in {int(row["from_node"]), int(row["to_node"])}:
-            if inner[i]:
-                touched.setdefault(group[i], [])
-                own = couples.setdefault(group[i], [])
-                own += [] if k in own else [k]
-    for k, v in enumerate(valves):
-        for i in {int(v["from_node"]), int(v["to_node"])}:
-            if inner[i]:
-                touched.setdefault(group[i], [])
-                if k not in touched[group[i]]:
-                    touched[group[i]].append(k)
+    couples = rows_by_group(group, inner, zip(short.tolist(), joins, strict=True), touched)
+    touched |= rows_by_group(group, inner, enumerate(valves), touched)
     mark_event_ends(draft, group)
-    fixed = ~inner[valves["from_node"]] & ~inner[valves["to_node"]]
-    integers = draft.integers
-    clusters = []
     members = {root: [i for i in range(len(nodes)) if group[i] == root and inner[i]] for root in touched}
-    nodes["solve"], symmetric = rec.ALONE, has_closed_root(valves)
+    nodes["solve"], clusters = rec.ALONE, []
     for root, ks in touched.items():
-        regular = np.all(nodes["admittance"][members[root]] > 0.0)
-        plain = np.all(symmetric[ks])
-        single = len(ks) == 1 and regular and plain and draft.case.law.linear and root not in couples
-        nodes["solve"][members[root]] = rec.SINGLE if single else rec.CLUSTER
-        valves["solve"][ks] = rec.SINGLE if single else rec.CLUSTER
-        if not np.any(nodes["admittance"][members[root]] > 0.0) and not follows_column(draft, members[root], ks):
-            regularise(draft, ks)
-        if single:
-            continue
-        nodes["row"][members[root]] = np.arange(len(members[root]))
-        n, own = len(members[root]), couples.get(root, [])
-        at = len(integers)
-        inverse = add_inverse(draft, members[root], own) if not ks else -1
-        clusters.append((at, n, at + n, len(ks), at + n + len(ks), len(own), inverse))
-        integers += members[root] + ks + own
-    for k in np.flatnonzero(fixed & ~symmetric):  # clusters without nodes
+        own = couples.get(root, [])
+        if not has_single_root(draft, members[root], ks, own):
+            clusters.append(add_cluster(draft, members[root], ks, own))
+    fixed = ~inner[valves["from_node"]] & ~inner[valves["to_node"]]
+    for k in np.flatnonzero(fixed & ~has_closed_root(valves)):  # clusters without nodes
         valves["solve"][k] = rec.CLUSTER
-        clusters.append((len(integers), 0, len(integers), 1, 0, 0, -1))
-        integers.append(int(k))
+        clusters.append(add_cluster(draft, [], [int(k)], []))
     if not draft.case.law.linear:
         for i in np.flatnonzero(inner & (nodes["solve"] == rec.ALONE) & (nodes["admittance"] > 0.0)):
-            nodes["row"][i] = 0
-            clusters.append((len(integers), 1, len(integers) + 1, 0, 0, 0, -1))
-            integers.append(int(i))
+            clusters.append(add_cluster(draft, [int(i)], [], []))
     store_gates(draft)
     refuse_isolated_groups(draft, members)
     for k in np.flatnonzero(fixed):
@@ -78,6 +49,45 @@ def classify_nodes(draft) -> None:
             name = list(draft.case.places)[i]
             draft.fault(f"nodes.{name}", "only rigid columns join this node, so nothing sets its pressure; "
                        "make it a chamber, or make one of its links a pipe")  # fmt: skip
+
+
+def rows_by_group(group, inner, rows, touched: dict[int, list[int]]) -> dict[int, list[int]]:
+    """Numbers of the rows that end at inner nodes of each group : label of the group -> numbers.
+
+    group, inner : label of each node, and True for a node without storage; rows : pairs of number and row
+    touched : gets an empty list for each group that it lacks, so that groups keep the order of their first row
+    """
+    found: dict[int, list[int]] = {root: [] for root in touched}
+    for k, row in rows:
+        for i in {int(row["from_node"]), int(row["to_node"])}:
+            if inner[i]:
+                touched.setdefault(group[i], [])
+                own = found.setdefault(group[i], [])
+                own += [] if k in own else [k]
+    return found
+
+
+def has_single_root(draft, members, ks, own) -> bool:
+    """True if a group is a valve whose flow has a closed formula; sets the solution method of its nodes and valves.
+
+    Valves of a group without any pipe are made laminar near zero flow. members : nodes; ks : valves; own : delay lines
+    """
+    nodes, valves = draft.node_table, draft.valve_table
+    regular, plain = np.all(nodes["admittance"][members] > 0.0), np.all(has_closed_root(valves[ks]))
+    single = len(ks) == 1 and regular and plain and draft.case.law.linear and not own
+    nodes["solve"][members] = valves["solve"][ks] = rec.SINGLE if single else rec.CLUSTER
+    if not np.any(nodes["admittance"][members] > 0.0) and not follows_column(draft, members, ks):
+        regularise(draft, ks)
+    return single
+
+
+def add_cluster(draft, members, ks, own) -> tuple[int, ...]:
+    """Append a group to `integers`, its nodes, valves and delay lines, and return its `CLUSTER_RECORD`."""
+    n, at = len(members), len(draft.integers)
+    draft.node_table["row"][members] = np.arange(n)
+    inverse = add_inverse(draft, members, own) if own and not ks else -1
+    draft.integers += [*members, *ks, *own]
+    return at, n, at + n, len(ks), at + n + len(ks), len(own), inverse
 
 
 def mark_event_ends(draft, group) -> None:

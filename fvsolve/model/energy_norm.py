@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.assembly.lowering import rows_in
-from fvsolve.assembly.unsteady_terms import memory_shares
-from fvsolve.assembly.wall_creep import elements
+from fvsolve.assembly.pipe_terms import elements, memory_shares
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.scalar_tables import bounds

@@ -1,4 +1,4 @@
-"""Model of a case, and the state that a run advances."""
+"""Model of a case, the state that a run advances, and the inputs of a model."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fvsolve.assembly.wall_creep import mass_in_creep
+from fvsolve.assembly.inputs import Input
+from fvsolve.assembly.lowering import lowering_of
+from fvsolve.assembly.pipe_terms import mass_in_creep
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import dtypes as rec
@@ -459,3 +461,15 @@ class Model(Displayable):
         from fvsolve.model.model_facts import checks
 
         return checks(self)
+
+
+def inputs_of(model: Model) -> dict[str, Input]:
+    """Inputs of all parts : name `PART.KEY` -> input."""
+    case = model.case
+    parts = {**case.places, **{name: case.conduits[name] for name in model.valve_names}}
+    parts |= {name: link for name, link in case.links.items() if name not in parts}
+    inputs: dict[str, Input] = {}
+    for name, part in parts.items():
+        own = lowering_of(type(part)).of(part).inputs(model, name, part)
+        inputs |= {f"{name}.{key}": value for key, value in own.items()}
+    return inputs

@@ -6,7 +6,7 @@ import numpy as np
 
 from fvsolve.assembly.lowering import lowering_of
 from fvsolve.assembly.mechanics import point_row
-from fvsolve.assembly.probe_weights import lower_position
+from fvsolve.assembly.scheme_codes import lower_position
 from fvsolve.case import sloshing
 from fvsolve.kernels import dtypes as rec
 

@@ -17,10 +17,10 @@ from fvsolve.kernels.schedule_pieces import value_with_limit
 from fvsolve.kernels.steady_friction import drag, drag_slope, factor_times_reynolds
 from fvsolve.kernels.table_handle import make_handle
 from fvsolve.kernels.valves import conductance_of, flow_at_drop, flow_slope, transition_of
-from fvsolve.model.bodies_start import start_bodies
+from fvsolve.model.body_tables import driven_at_start
 from fvsolve.model.mass_tables import start_masses
-from fvsolve.model.moving_networks import driven_at_start
 from fvsolve.model.run_data import zeros_for_run
+from fvsolve.model.static_forces import start_bodies
 from fvsolve.steady import Edge, solve_steady, union
 
 FIXED_PRESSURE = (rec.FIXED, rec.TANK, rec.PATCH)  # nodes whose pressure does not depend on flows

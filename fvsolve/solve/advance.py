@@ -12,8 +12,7 @@ import numpy as np
 from fvsolve.assembly.inputs import HEAD, Input
 from fvsolve.errors import FvsolveError, nearest
 from fvsolve.model import Model, State
-from fvsolve.model.model import flags_of
-from fvsolve.model.model_inputs import inputs_of
+from fvsolve.model.model import flags_of, inputs_of
 from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
 from fvsolve.steppers import automatic, loop_indices
 from fvsolve.units import show

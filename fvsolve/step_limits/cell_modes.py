@@ -11,7 +11,7 @@ import functools
 
 import numpy as np
 
-from fvsolve.assembly.wall_creep import elements
+from fvsolve.assembly.pipe_terms import elements
 from fvsolve.kernels.steady_friction import drag_slope
 from fvsolve.schemes import SCHEMES
 from fvsolve.step_limits.symbol import symbol

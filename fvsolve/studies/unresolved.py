@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import listing
-from fvsolve.model.resolution import LEAST_CELLS, answering_parts
+from fvsolve.model.start_notices import LEAST_CELLS, answering_parts
 from fvsolve.parts.schedule import Schedule
 from fvsolve.studies.accuracy.case_resolution import basins_from_files, cell_counts, pipes_with_cells, scaled
 from fvsolve.studies.delay_line_keys import delay_lines

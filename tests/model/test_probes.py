@@ -7,7 +7,7 @@ import pytest
 from reference.scenes import WATER, junction, pipe, reservoir, scene, valve
 
 import fvsolve
-from fvsolve.assembly.probe_weights import cells_around
+from fvsolve.assembly.scheme_codes import cells_around
 from fvsolve.schemes import SCHEMES
 
 CELLS = 10

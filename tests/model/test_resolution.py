@@ -10,7 +10,7 @@ from reference.scenes import junction, lake, pipe, ramp, reservoir, scene, step,
 
 import fvsolve
 from fvsolve.case import load, shipped
-from fvsolve.model.resolution import OTHER_CELLS, SCHEME_CELLS
+from fvsolve.model.start_notices import OTHER_CELLS, SCHEME_CELLS
 from fvsolve.run import model_of
 
 CLOSURE = {"output.fields": 0}

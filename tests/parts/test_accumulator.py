@@ -155,7 +155,7 @@ def test_its_energy_closes_and_it_gives_no_more_than_it_had(law):
 
 def test_its_energy_at_the_start_is_what_it_can_give():
     """Available energy of isothermal gas: p0 V0 ln(p0 / pa) minus the work against ambient pressure."""
-    from fvsolve.model.available_energy import available_energy
+    from fvsolve.model.energy_accounts import available_energy
 
     model = model_of(swing(0.0, 1.0, exponent=1.0, volume=1.0))
     volume = GAS * P0 / AMBIENT

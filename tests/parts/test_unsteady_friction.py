@@ -15,7 +15,7 @@ from reference.scenes import WATER, area, junction, reservoir, scene
 
 import fvsolve
 from fvsolve import exact
-from fvsolve.assembly import unsteady_terms
+from fvsolve.assembly import pipe_terms as unsteady_terms
 from fvsolve.errors import CaseError
 from fvsolve.studies.accuracy.model_levels import rigid_column
 from fvsolve.studies.energy.energy_balance import energy

@@ -8,9 +8,8 @@ import numpy as np
 
 from fvsolve.assembly.lowering import Lowering
 from fvsolve.assembly.model_draft import PipeMesh
-from fvsolve.assembly.probe_weights import lower_position
-from fvsolve.assembly.unsteady_terms import reserve_terms
-from fvsolve.assembly.wall_creep import add_creep
+from fvsolve.assembly.pipe_terms import add_creep, reserve_terms
+from fvsolve.assembly.scheme_codes import lower_position
 from fvsolve.kernels import dtypes as rec
 from fvsolve.schemes import end_rate_factor
 

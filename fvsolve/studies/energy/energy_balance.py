@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from fvsolve.errors import FvsolveError, did_you_mean
-from fvsolve.model.available_energy import available_energy, datum_of
-from fvsolve.model.energy_accounts import Account
+from fvsolve.model.energy_accounts import Account, available_energy, datum_of
 from fvsolve.solve import initial_state
 from fvsolve.studies.energy.step_energy import EnergyRun
 from fvsolve.studies.outcome import RowSink, study_model

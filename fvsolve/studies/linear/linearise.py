@@ -10,7 +10,7 @@ import numpy as np
 from fvsolve.assembly.inputs import PRESSURE, Input
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.kernels.schedule_pieces import value_with_limit
-from fvsolve.model.model_inputs import inputs_of
+from fvsolve.model.model import inputs_of
 from fvsolve.schemes import SCHEMES
 from fvsolve.solve.advance import hold
 from fvsolve.studies.linear.finite_differences import (

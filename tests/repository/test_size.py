@@ -1,0 +1,95 @@
+"""Size limits of the repository: lines and files of each folder, arguments and lines of functions.
+
+Limits only fall. A test fails if a folder grows beyond its limit, and also if it has shrunk far below: then lower the
+limit. `python tests/repository/test_size.py` prints the present sizes in the form of `FOLDERS`.
+"""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+TOP = Path(__file__).parents[2]
+SLACK = 0.03  # greatest unused share of a limit
+MAX_ARGUMENTS = 12
+MAX_LINES = 60
+# folder -> (lines, files), with its subfolders
+FOLDERS: dict[str, tuple[int, int]] = {}
+# functions that exceed a limit: "path: function" -> (arguments, lines). Commands and studies are excepted by rule.
+LONG: dict[str, tuple[int, int]] = {}
+# folders whose functions may be longer: commands, with an argument for each option, and studies
+EXCEPTED = ("fvsolve/cli/", "fvsolve/studies/")
+
+
+def folders() -> list[str]:
+    """Folders of the package and of the tests, and modules of the package beside its folders as "fvsolve"."""
+    inside = [f"{top}/{path.name}" for top in ("fvsolve", "tests") for path in sorted((TOP / top).iterdir())
+              if path.is_dir() and any(path.rglob("*.py"))]  # fmt: skip
+    return ["fvsolve", "tests", "benchmarks", *inside]
+
+
+def files_of(folder: str) -> list[Path]:
+    """Python files of a folder of `folders`; of the package and the tests only those in no subfolder."""
+    alone = folder in ("fvsolve", "tests")
+    return sorted((TOP / folder).glob("*.py") if alone else (TOP / folder).rglob("*.py"))
+
+
+def size_of(paths: list[Path]) -> tuple[int, int]:
+    """Number of lines and of files."""
+    return sum(path.read_text(encoding="utf8").count("\n") for path in paths), len(paths)
+
+
+def long_functions(source: str) -> dict[str, tuple[int, int]]:
+    """Functions of a text of Python that exceed a limit : name -> (arguments, lines with docstring)."""
+    found = {}
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+            own = node.args
+            size = len(own.posonlyargs) + len(own.args) + len(own.kwonlyargs), node.end_lineno - node.lineno + 1
+            if size[0] > MAX_ARGUMENTS or size[1] > MAX_LINES:
+                found[node.name] = size
+    return found
+
+
+@pytest.mark.parametrize("folder", folders())
+def test_a_folder_is_within_its_limits(folder):
+    assert folder in FOLDERS, f"{folder} has no limits; expected an entry in FOLDERS"
+    for size, limit, what in zip(size_of(files_of(folder)), FOLDERS[folder], ("lines", "files"), strict=True):
+        assert size <= limit, f"{folder} has {size} {what}, more than {limit}. Delete or unify code, or raise the limit"
+        assert size >= limit - max(1, SLACK * limit), f"{folder} has {size} {what}; lower the limit from {limit}"
+
+
+def test_limits_are_for_folders_that_exist():
+    assert set(FOLDERS) == set(folders())
+
+
+def test_functions_are_short_and_have_few_arguments():
+    found = {}
+    for path in sorted((TOP / "fvsolve").rglob("*.py")):
+        place = path.relative_to(TOP).as_posix()
+        if not place.startswith(EXCEPTED):
+            found |= {f"{place}: {name}": size for name, size in long_functions(path.read_text("utf8")).items()}
+    new = {place: size for place, size in found.items() if place not in LONG or max(
+        own - limit for own, limit in zip(size, LONG[place], strict=True)) > 0}  # fmt: skip
+    assert not new, f"more than {MAX_ARGUMENTS} arguments or {MAX_LINES} lines: {new}"
+    assert not (LONG.keys() - found.keys()), "these functions are short now; remove their entries"
+
+
+@pytest.mark.parametrize(
+    "source, found",
+    [
+        ("def f(a, b):\n    pass\n", {}),
+        (f"def f({', '.join(f'a{i}' for i in range(13))}):\n    pass\n", {"f": (13, 2)}),
+        (f"class A:\n    def g(self, *, {', '.join(f'a{i}' for i in range(12))}):\n        pass\n", {"g": (13, 2)}),
+        ("def h():\n" + "    x = 1\n" * 60, {"h": (0, 61)}),
+    ],
+)
+def test_a_long_function_is_found(source, found):
+    assert long_functions(source) == found
+
+
+if __name__ == "__main__":
+    for entry in folders():
+        print(f'    "{entry}": {size_of(files_of(entry))},')
