@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 TOP = Path(__file__).parents[1]
-QUICK_NEEDED, ALL_NEEDED = 36, 40
+QUICK_NEEDED, ALL_NEEDED = 37, 41
 WITHOUT_OWN_TEST = (
     "--deselect",
     "tests/repository/test_planted_faults.py",
@@ -57,7 +57,9 @@ FAULTS = [
         'row["sweep_a"] = a["mass"] / a["volume"] * row["area_a"]',
         'row["sweep_a"] = 1.01 * a["mass"] / a["volume"] * row["area_a"]',
     ),
-    Fault("assembly/hydraulics.py", "reynolds * math.pi / 4.0 * diameter", "1.01 * reynolds * math.pi / 4.0 * diameter"),
+    Fault(
+        "assembly/hydraulics.py", "reynolds * math.pi / 4.0 * diameter", "1.01 * reynolds * math.pi / 4.0 * diameter"
+    ),
     Fault("draw/plot.py", "np.argmin(values[a:b])", "np.argmax(values[a:b])"),
     Fault("mesh/mesh_quality.py", "angle=float(angle[sharpest])", "angle=float(1.01 * angle[sharpest])"),
     Fault("steppers/ros.py", "1.0 / (later - t) if later > t", "-1.0 / (later - t) if later > t"),
