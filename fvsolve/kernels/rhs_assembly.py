@@ -203,7 +203,7 @@ COMPONENTS = {
 DELAYS = RhsTerms(
     outgoing_waves="delay_lines.line_rates: outgoing_line_waves",
     incoming_waves="delay_lines.line_rates: incoming_line_waves",
-    observe="delay_lines.line_interior: observe_lines",
+    observe="delay_lines.line_rates: observe_lines",
     record="delay_lines.history_update: record_lines",
 )
 COUPLED = RhsTerms(solve_nodes="delay_lines.line_rates: solve_line_clusters")
