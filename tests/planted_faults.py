@@ -51,7 +51,7 @@ FAULTS = [
         "result.potential[edge.i] - result.potential[edge.j]",
         "result.potential[edge.j] - result.potential[edge.i]",
     ),
-    Fault("step_limits/pipe_end_growth.py", "face[:-1] - face[1:]", "1.01 * face[:-1] - face[1:]"),
+    Fault("step_limits/grid_limits.py", "face[:-1] - face[1:]", "1.01 * face[:-1] - face[1:]"),
     Fault("model/hydraulics.py", "reynolds * math.pi / 4.0 * diameter", "1.01 * reynolds * math.pi / 4.0 * diameter"),
     Fault("draw/plot.py", "np.argmin(values[a:b])", "np.argmax(values[a:b])"),
     Fault("mesh/mesh_quality.py", "angle=float(angle[sharpest])", "angle=float(1.01 * angle[sharpest])"),
