@@ -16,15 +16,9 @@ from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import ABOUT, BUSHING_VALUE, RATE
 from fvsolve.kernels.energy_rows import BUSHING_ROWS, bushing_power_row, bushing_stored_row
 from fvsolve.kernels.mechanism import body_layout as layout
+from fvsolve.kernels.mechanism import mass_matrix as mass
 from fvsolve.kernels.mechanism.body_kinematics import body_of_point, point_at, spin_of
 from fvsolve.kernels.mechanism.body_layout import add_force, add_torque, body_row
-from fvsolve.kernels.mechanism.mass_matrix import (
-    add_body_wrench,
-    add_pair_force,
-    clear_column,
-    mobility,
-    oscillation_rate,
-)
 from fvsolve.kernels.mechanism.vectors import cross, minus, rotate, scalar_product, scaled, vector
 from fvsolve.kernels.table_handle import open_tables
 
@@ -159,16 +153,16 @@ def bushing_rate_limit(t, y, dydt, out, handle):
         p = point_at(out, tables, bushing["to_point"], layout.POSITION)[:3]
         for axis in range(6):
             along = 1.0 * (axis % 3 == 0), 1.0 * (axis % 3 == 1), 1.0 * (axis % 3 == 2)
-            clear_column(tables, at)
+            mass.clear_column(tables, at)
             if axis < 3:
-                add_pair_force(out, tables, bushing, p, along, at)
+                mass.add_pair_force(out, tables, bushing, p, along, at)
             else:
-                add_body_wrench(tables, j, along, none, at)
-                add_body_wrench(tables, i, scaled(-1.0, along), none, at)
-            inverse_mass = mobility(tables, at)
+                mass.add_body_wrench(tables, j, along, none, at)
+                mass.add_body_wrench(tables, i, scaled(-1.0, along), none, at)
+            inverse_mass = mass.mobility(tables, at)
             stiffness += inverse_mass * (bushing["stiffness"] if axis < 3 else bushing["turn_stiffness"])
             damping += inverse_mass * (bushing["damping"] if axis < 3 else bushing["turn_damping"])
-    out[RATE] = max(out[RATE], oscillation_rate(stiffness, damping))
+    out[RATE] = max(out[RATE], mass.oscillation_rate(stiffness, damping))
 
 
 @njit

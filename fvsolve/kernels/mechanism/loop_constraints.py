@@ -18,23 +18,11 @@ from math import sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import PIN_VALUE, RATE
 from fvsolve.kernels.mechanism import body_layout as layout
+from fvsolve.kernels.mechanism import mass_matrix as mass
 from fvsolve.kernels.mechanism.body_kinematics import body_of_point, point_at
 from fvsolve.kernels.mechanism.body_layout import body_row
 from fvsolve.kernels.mechanism.body_values import acceleration_at
 from fvsolve.kernels.mechanism.force_elements import add_pair_load, relative_motion
-from fvsolve.kernels.mechanism.mass_matrix import (
-    LOAD_SIZE,
-    add_pair_force,
-    body_rate_limit,
-    clear_column,
-    factor_mass_matrix,
-    fill_mass_matrix,
-    scratch_offsets,
-    solve_factor,
-    solve_mass_matrix,
-    spread_accelerations,
-    state_rates,
-)
 from fvsolve.kernels.mechanism.vectors import cross, minus, rotate, scalar_product, scaled, vector
 from fvsolve.kernels.table_handle import open_tables
 
@@ -42,7 +30,7 @@ from fvsolve.kernels.table_handle import open_tables
 @njit(forceinline=True)
 def constraint_offset(tables):
     """Offset in `scratch` of the matrix G, which gives velocities along constrained directions."""
-    return scratch_offsets(tables)[1] + LOAD_SIZE * tables.bodies.size
+    return mass.scratch_offsets(tables)[1] + mass.LOAD_SIZE * tables.bodies.size
 
 
 @njit
@@ -93,11 +81,11 @@ def fill_constraint_rows(out, tables):
         p = point_at(out, tables, pin["to_point"], layout.POSITION)[:3]
         for r in range(pin["rows"]):
             direction, at = pin_direction(out, tables, pin, r), row * n
-            clear_column(tables, g + at)
-            add_pair_force(out, tables, pin, p, direction, g + at)
+            mass.clear_column(tables, g + at)
+            mass.add_pair_force(out, tables, pin, p, direction, g + at)
             for m in range(n):
                 work[z + at + m] = work[g + at + m]
-            solve_factor(tables, z + at)
+            mass.solve_factor(tables, z + at)
             slip, left = scalar_product(direction, velocity), scalar_product(direction, gap) - pin["gap"][r]
             work[last + row] = -(scalar_product(direction, acceleration) + 2.0 * pull * slip + pull * pull * left)
             row += 1
@@ -164,10 +152,10 @@ def solve_pinned_accelerations(t, y, dydt, out, handle):
     tables = open_tables(handle)
     pins, work, n, at = tables.pins, tables.scratch, tables.freedoms.size, tables.layout[0]["pin"]
     add_start_pin_forces(t, y, dydt, out, handle)
-    fill_mass_matrix(y, out, tables)
-    factor_mass_matrix(tables)
-    solve_mass_matrix(tables, 6 * n)
-    spread_accelerations(out, tables)
+    mass.fill_mass_matrix(y, out, tables)
+    mass.factor_mass_matrix(tables)
+    mass.solve_mass_matrix(tables, 6 * n)
+    mass.spread_accelerations(out, tables)
     rows = fill_constraint_rows(out, tables)
     multipliers(tables, rows)
     g = constraint_offset(tables)
@@ -177,7 +165,7 @@ def solve_pinned_accelerations(t, y, dydt, out, handle):
         for i in range(rows):
             total += work[last + i] * work[g + i * n + m]
         work[7 * n + m] = total
-    solve_mass_matrix(tables, 7 * n)
+    mass.solve_mass_matrix(tables, 7 * n)
     for m in range(n):
         work[6 * n + m] += work[7 * n + m]
     row, rate = 0, 0.0
@@ -188,9 +176,9 @@ def solve_pinned_accelerations(t, y, dydt, out, handle):
             add_pair_load(out, tables, pins[k], force)
             out[at + 3 * k + r] = pins[k]["force"][r] + work[last + row]
             row += 1
-    spread_accelerations(out, tables)
-    out[RATE] = max(body_rate_limit(out, tables), rate)
-    state_rates(y, dydt, tables)
+    mass.spread_accelerations(out, tables)
+    out[RATE] = max(mass.body_rate_limit(out, tables), rate)
+    mass.state_rates(y, dydt, tables)
 
 
 @njit

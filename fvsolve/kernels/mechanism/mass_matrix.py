@@ -16,14 +16,8 @@ from math import sqrt
 from fvsolve.jit import inline, njit
 from fvsolve.kernels.dtypes import ABOUT, BODY_OUT, FREE, PRISMATIC, RATE, REVOLUTE
 from fvsolve.kernels.mass_dynamics import push_stiffness
+from fvsolve.kernels.mechanism import body_kinematics as kinematics
 from fvsolve.kernels.mechanism import body_layout as layout
-from fvsolve.kernels.mechanism.body_kinematics import (
-    body_of_point,
-    joint_parameters,
-    joint_velocities,
-    origin_acceleration,
-    point_at,
-)
 from fvsolve.kernels.mechanism.body_layout import body_row, freedom_path, nearest_free_body
 from fvsolve.kernels.mechanism.fluid_inertia import add_basin_inertia, add_fluid_inertia
 from fvsolve.kernels.mechanism.vectors import (
@@ -266,7 +260,8 @@ def spread_accelerations(out, tables):
         for k in range(3):  # acceleration at o for now; that of the origin is written below
             own[layout.SPIN_RATE + k] = own[layout.SPIN_BIAS + k] + acceleration[k]
             own[layout.ACCELERATION + k] = own[layout.BIAS_AT_O + k] + acceleration[3 + k]
-        write_vector(own, layout.ACCELERATION, *origin_acceleration(own, layout.ACCELERATION, layout.SPIN_RATE))
+        of_origin = kinematics.origin_acceleration(own, layout.ACCELERATION, layout.SPIN_RATE)
+        write_vector(own, layout.ACCELERATION, *of_origin)
 
 
 @njit
@@ -280,10 +275,10 @@ def coordinate_rates(body, y, dydt):
         dydt[at] = body["speed"][0] + y[body["rate"]]
         return
     if body["joint"] == FREE:
-        write_vector(dydt, at, *joint_velocities(body, 0, y))
+        write_vector(dydt, at, *kinematics.joint_velocities(body, 0, y))
         first = 3
-    h, a, b, c = joint_parameters(body, first, y)
-    x, y0, z = joint_velocities(body, first, y)
+    h, a, b, c = kinematics.joint_parameters(body, first, y)
+    x, y0, z = kinematics.joint_velocities(body, first, y)
     dydt[at + first] = -0.5 * (a * x + b * y0 + c * z)
     write_vector(dydt, at + first + 1, 0.5 * (h * x + b * z - c * y0), 0.5 * (h * y0 + c * x - a * z),
         0.5 * (h * z + a * y0 - b * x))  # fmt: skip
@@ -295,11 +290,11 @@ def add_point_force(out, tables, point, acts, f, at):
 
     For `acts` ABOUT, f is a torque. Nothing is added for a point of the world, or point < 0.
     """
-    i = body_of_point(tables, point)
+    i = kinematics.body_of_point(tables, point)
     if acts == ABOUT:
         add_body_wrench(tables, i, f, (0.0, 0.0, 0.0), at)
     else:
-        add_body_force(out, tables, i, point_at(out, tables, point, layout.POSITION)[:3], f, at)
+        add_body_force(out, tables, i, kinematics.point_at(out, tables, point, layout.POSITION)[:3], f, at)
 
 
 @njit
@@ -320,8 +315,8 @@ def add_pair_force(out, tables, link, p, f, at):
 
     link : row of a bushing or pin; the forces are added to the vector at scratch[at]
     """
-    add_body_force(out, tables, body_of_point(tables, link["to_point"]), p, f, at)
-    add_body_force(out, tables, body_of_point(tables, link["from_point"]), p, scaled(-1.0, f), at)
+    add_body_force(out, tables, kinematics.body_of_point(tables, link["to_point"]), p, f, at)
+    add_body_force(out, tables, kinematics.body_of_point(tables, link["from_point"]), p, scaled(-1.0, f), at)
 
 
 @njit
