@@ -12,7 +12,7 @@ Arguments of the kernels here: here, row : offset in `out` of the data of a body
 
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import BODY_OUT
-from fvsolve.kernels.mechanism.vectors import add_vector, cross
+from fvsolve.kernels.mechanism.vectors import add_vector
 
 ATTITUDE = 0  # R, by rows
 POSITION = 9  # position of the origin [m]
@@ -57,17 +57,6 @@ def freedom_path(tables, i):
     """
     last = tables.freedoms[tables.bodies[i]["freedom"] + tables.bodies[i]["freedoms"] - 1]
     return last["path"], last["depth"] + 1
-
-
-@njit(forceinline=True)
-def freedom_velocity(work, s, x, y, z):
-    """Velocity of a point of a body per unit rate of one degree of freedom.
-
-    (x, y, z) : position of the point from the reference point o (module docstring)
-    s : offset in `work` of the angular velocity and the velocity at o per unit rate of that degree of freedom
-    """
-    u, v, w = cross(work, s, x, y, z)
-    return work[s + 3] + u, work[s + 4] + v, work[s + 5] + w
 
 
 @njit(forceinline=True)

@@ -14,8 +14,14 @@ from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import CHAMBER, LAW_LINEAR, TANK, TANK_OUT
 from fvsolve.kernels.mechanism import body_layout as layout
 from fvsolve.kernels.mechanism import fluid_loads as fluid
-from fvsolve.kernels.mechanism.body_layout import body_row, freedom_path, freedom_velocity, nearest_free_body
+from fvsolve.kernels.mechanism.body_layout import body_row, freedom_path, nearest_free_body
 from fvsolve.kernels.mechanism.vectors import cross, dot, plus, rotate, scalar_product, scaled, vector
+
+
+@njit(forceinline=True)
+def freedom_velocity(work, s, r):
+    """Velocity of a point of a body per unit rate of one degree of freedom; r : position of the point from o."""
+    return plus(vector(work, s + 3), cross(work, s, *r))
 
 
 @njit
@@ -30,12 +36,12 @@ def add_segment_inertia(out, tables, i, segment):
     along = rotate(out, here + layout.ATTITUDE, t, 0)
     for p in range(count):
         j = tables.integers[path + p]
-        v, a = freedom_velocity(work, 6 * j, *start), cross(work, 6 * j, *along)
+        v, a = freedom_velocity(work, 6 * j, start), cross(work, 6 * j, *along)
         first, second = plus(scaled(m[0], v), scaled(m[1], a)), plus(scaled(m[1], v), scaled(m[2], a))
         row = 8 * tables.freedoms.size + tables.freedoms[j]["row"]
         for q in range(p + 1):
             s = 6 * tables.integers[path + q]
-            v, a = freedom_velocity(work, s, *start), cross(work, s, *along)
+            v, a = freedom_velocity(work, s, start), cross(work, s, *along)
             work[row + q] += scalar_product(v, first) + scalar_product(a, second)
 
 
@@ -45,7 +51,7 @@ def path_component(out, work, here, s, flow_path):
 
     v, w : velocity of the origin of the body, and angular velocity
     """
-    v = freedom_velocity(work, s, *vector(out, here + layout.ARM))
+    v = freedom_velocity(work, s, vector(out, here + layout.ARM))
     straight = scalar_product(rotate(out, here + layout.ATTITUDE, flow_path, 0), v)
     return straight + dot(work, s, *rotate(out, here + layout.ATTITUDE, flow_path, 3))
 
@@ -141,5 +147,5 @@ def normal_accelerations(out, work, tank, s):
     They are also those of the normal acceleration per unit acceleration of that degree of freedom.
     tank : offset of the numbers of the basin in `out`
     """
-    v, w = freedom_velocity(work, s, *vector(out, tank + layout.BASIN_ARM)), vector(work, s)
+    v, w = freedom_velocity(work, s, vector(out, tank + layout.BASIN_ARM)), vector(work, s)
     return dot(out, tank + layout.NORMAL, *v), -dot(out, tank + layout.NORTH, *w), dot(out, tank + layout.EAST, *w)
