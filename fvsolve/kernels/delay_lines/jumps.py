@@ -289,7 +289,7 @@ def correct_columns(past, tables, y, i, change, times):
     """
     columns = tables.columns
     for k in range(columns.size):
-        side = (columns[k]["from_node"] == i) - (columns[k]["to_node"] == i)
+        side = 1 * (columns[k]["from_node"] == i) - 1 * (columns[k]["to_node"] == i)
         if side != 0 and change != 0.0:
             share, admittance = columns[k]["area"] / columns[k]["length"], tables.nodes[i]["admittance"]
             rate = share / admittance if admittance > 0.0 else 0.0
