@@ -74,7 +74,9 @@ def lumped_modes(model, method: str, step: float) -> list[Mode]:
     r, numerics = stability_function(method), model.case.numerics
     span, fixed = numerics.end - numerics.start, numerics.step is not None
     own = modes_outside_cells(model) if fixed else []
-    cells = cell_modes(model) if fixed else friction_modes(model)  # a Courant number limits the other modes
+    cells = friction_modes(model)
+    if fixed:  # a Courant number limits the other modes
+        cells += memory_modes(model) + pipe_scalar_modes(model) + basin_scalar_modes(model)
     candidates = [fastest_growing(r, modes, step, span, modes is own) for modes in (own, cells)]
     return [mode for mode in candidates if mode is not None]
 
@@ -150,11 +152,6 @@ def modes_outside_cells(model) -> Modes:
 
 
 # cells ----------
-
-
-def cell_modes(model) -> Modes:
-    """All modes of cells: pairs of the name of the part and the eigenvalues there [1/s]."""
-    return [*friction_modes(model), *memory_modes(model), *pipe_scalar_modes(model), *basin_scalar_modes(model)]
 
 
 def friction_modes(model) -> Modes:
@@ -265,7 +262,12 @@ def undamped_notices(model, method: str, step: float, span: float) -> list[Notic
     numerics = model.case.numerics
     if numerics.courant is None or covers_axis(method_named(method)):
         return []
-    mode = fastest_growing(stability_function(method), undamped_modes(model), step, span, True, NOTICE_GROWTH)
+    modes = [
+        (place, s)
+        for place, s in modes_outside_cells(model)
+        if np.all(np.abs(s.real) < GREATEST_DAMPING * np.abs(s.imag))
+    ]
+    mode = fastest_growing(stability_function(method), modes, step, span, True, NOTICE_GROWTH)
     if mode is None:
         return []
     grows = f"by {100.0 * (mode.growth - 1.0):.3g} %" if mode.growth < 2.0 else f"{mode.growth:.3g} times"
@@ -281,12 +283,3 @@ def undamped_notices(model, method: str, step: float, span: float) -> list[Notic
 def covers_axis(method: Method) -> bool:
     """True if the stability region of a method contains a part of the imaginary axis near 0."""
     return imaginary_interval(stability_function(method)) > 0.0
-
-
-def undamped_modes(model) -> list:
-    """Oscillating modes with little damping of states outside cells: pairs (name of the state, eigenvalue [1/s])."""
-    return [
-        (place, s)
-        for place, s in modes_outside_cells(model)
-        if np.all(np.abs(s.real) < GREATEST_DAMPING * np.abs(s.imag))
-    ]

@@ -151,7 +151,7 @@ def update_line_extremes(past, places, tables, before, t):
 
     The first times below vapour pressure along the lines are updated too.
     """
-    clock = history.reading_data(past, int(past[history.COUNT]) - 1)
+    clock, marks = history.reading_data(past, int(past[history.COUNT]) - 1), tables.marks
     for number in range(tables.delays.size):
         line, pipe = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]]
         stretches, n = line["stretches"], line["places"]
@@ -167,23 +167,14 @@ def update_line_extremes(past, places, tables, before, t):
                     found = line_extremes_at_jumps(past, places, clock, line, q, x, 1.0, before, t)
                     least, greatest = found[0] + (1.0 - 2.0 * x) * delta, found[2] + (1.0 - 2.0 * x) * delta
                     if found[0] < history.INFINITE:
-                        mark_vapour(tables, line["pipe"], j, found[1], least)
-                        update_extremes(tables.envelope, pipe["cell"] + j, found[1], least)
-                        update_extremes(tables.envelope, pipe["cell"] + j, found[3], greatest)
+                        cell, mark = pipe["cell"] + j, line["pipe"]
+                        if least < tables.profile[cell] and marks[mark] != marks[mark]:
+                            marks[mark] = found[1]
+                        update_extremes(tables.envelope, cell, found[1], least)
+                        update_extremes(tables.envelope, cell, found[3], greatest)
             if forward > 0.0 and backward > 0.0:
                 envelope_where_jumps_cross(past, places, clock, tables, line, q, before, t)
     update_probe_extremes(past, places, clock, tables, before, t)
-
-
-@njit(forceinline=True)
-def mark_vapour(tables, number, j, t, value):
-    """Record the first time at which the pressure at output point j of a pipe falls below vapour pressure.
-
-    number : number of the pipe; value : sum of both waves at the point [kg/s]; t : time of this value [s]
-    """
-    marks, cell = tables.marks, tables.pipes[number]["cell"] + j
-    if value < tables.profile[cell] and marks[number] != marks[number]:
-        marks[number] = t
 
 
 @njit

@@ -162,13 +162,6 @@ def node_segment_rates(y, dydt, out, tables, i):
     return -out[tables.layout[0]["supply"] + i], 0.0, 0.0
 
 
-@njit
-def node_load(y, dydt, out, tables, i):
-    """Force and torque of the fluid at node i, and of the fluid that leaves the network there, on its body."""
-    r, t, m = node_segment(y, tables, i)
-    return segment_load(tables.scratch, r, t, m, node_segment_rates(y, dydt, out, tables, i))
-
-
 # pipes ----------
 
 
@@ -354,7 +347,9 @@ def add_all_fluid_loads(y, dydt, out, tables, least, sign, wide, spin):
         row = nodes[i]["moving_segment"] if is_fluid_node(nodes[i]["kind"]) else -1
         here = set_carrier_motion(tables, out, row, least, wide, spin)
         if here >= 0:
-            add_load(out, here, node_load(y, dydt, out, tables, i), sign)
+            r, t, m = node_segment(y, tables, i)
+            load = segment_load(tables.scratch, r, t, m, node_segment_rates(y, dydt, out, tables, i))
+            add_load(out, here, load, sign)
     for k in range(pipes.size):
         here = set_carrier_motion(tables, out, pipes[k]["moving_segment"], least, wide, spin)
         if here >= 0:
