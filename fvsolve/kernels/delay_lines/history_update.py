@@ -1,12 +1,12 @@
 """Update of the history of delay lines after an accepted state: sent waves, jumps at joints and nodes, envelopes.
 
-Jumps pass nodes each at its own time, in order of arrival, with the values on both sides of it.
-At a junction of pipes only, the pressure is twice the sum of the arriving waves over the sum of the admittances, so a
-jump is reflected and passed on at once. At a valve the nodes are solved again with the jump. So a jump passes linear
-elements exactly, and nonlinear elements by the secant over the jump. The tables `sharp` serve this purpose: there,
-lines shorter than a step are treated like longer lines, so that a jump needs its travel time in them too. At nodes with
-instantaneous devices a step ends when a large jump arrives (`ends_step`). The state just before is recorded, then the
-jump is admitted (`admit_jumps`) and events act.
+Each jump passes nodes at its own time, in order of arrival, with the values on both sides of it. At a junction of pipes
+only, the pressure is twice the sum of the arriving waves over the sum of the admittances, so a jump is reflected and
+passed on at once. At a valve the nodes are solved again with the jump. So a jump passes linear elements exactly, and
+nonlinear elements by the secant over the jump. The tables `sharp` serve this purpose: there, lines shorter than a step
+are treated like longer lines, so that a jump needs its travel time in them too. At nodes with instantaneous devices a
+step ends when a large jump arrives (`ends_step`). The state just before is recorded, then the jump is admitted
+(`admit_jumps`) and events act.
 
 state : values of the right-hand side at the end of the step, with the jumps that have arrived so far; other arguments
 are those of `wave_history`.

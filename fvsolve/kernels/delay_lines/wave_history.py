@@ -25,7 +25,7 @@ all lines; wave : 0 forward, 1 backward; side : 0 end at `from`, 1 end at `to`; 
 from fvsolve.jit import njit
 
 HEADER_SIZE = 24
-COUNT, CAPACITY, JUMP_CAPACITY, STRETCHES = 0, 1, 2, 3  # entries so far, capacity for times, for jumps, stretches
+COUNT, CAPACITY, JUMP_CAPACITY, STRETCHES = 0, 1, 2, 3  # entries so far, capacity for times, jumps of a wave, stretches
 RING_FACTOR = 4  # factor by which rings are longer than at first
 LAST_STEP, EQUAL_STEPS = 5, 6  # length of the last step [s], number of last steps of that length
 STEP_BEFORE, EQUAL_STEPS_BEFORE = 7, 8  # values of both before the last entry
