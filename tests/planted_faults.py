@@ -51,7 +51,7 @@ FAULTS = [
         "result.potential[edge.i] - result.potential[edge.j]",
         "result.potential[edge.j] - result.potential[edge.i]",
     ),
-    Fault("step_limits/pipe_end_growth.py", "face[:-1] - face[1:]", "1.01 * face[:-1] - face[1:]"),
+    Fault("step_limits/grid_limits.py", "face[:-1] - face[1:]", "1.01 * face[:-1] - face[1:]"),
     Fault(
         "model/mass_tables.py",
         'row["sweep_a"] = a["mass"] / a["volume"] * row["area_a"]',

@@ -16,7 +16,8 @@ length.
 
 from fvsolve.jit import inline, njit
 from fvsolve.kernels.dtypes import GN, NO_WEIGHT, STATUS, WHERE
-from fvsolve.kernels.mechanism.body_layout import ATTITUDE, BIAS, SPIN, SPIN_BIAS, body_row, cross, rotate
+from fvsolve.kernels.mechanism.body_layout import ATTITUDE, BIAS, SPIN, SPIN_BIAS, body_row
+from fvsolve.kernels.mechanism.vectors import cross, rotate
 from fvsolve.kernels.table_handle import open_tables
 
 # Places of the numbers of a frame in `plane`, from the offset basin["frame"].

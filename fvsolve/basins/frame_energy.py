@@ -21,17 +21,19 @@ from fvsolve.basins.basin_frames import FRAME_GRAVITY, GN, WX, WY, WZ, bed_heigh
 from fvsolve.basins.frame_reaction import basin_offset, extra_accelerations, mass_factor
 from fvsolve.basins.free_surface.surface_energy import velocity_factor
 from fvsolve.jit import njit
-from fvsolve.kernels.mechanism.basin_inertia import BASIN_LOAD, EAST, MOMENTS, TANK_OUT
+from fvsolve.kernels.dtypes import TANK_OUT
 from fvsolve.kernels.mechanism.body_layout import (
     ACCELERATION,
+    BASIN_LOAD,
+    EAST,
+    MOMENTS,
     POSITION,
     SPIN,
     SPIN_RATE,
     VELOCITY,
     body_row,
-    cross,
-    dot,
 )
+from fvsolve.kernels.mechanism.vectors import cross, dot
 from fvsolve.kernels.table_handle import open_tables
 
 

@@ -5,7 +5,7 @@ in its basins. Lagrange's equations ((70) of docs/course.md) are those of column
 slide along the bed. The force along the bed depends on the state alone, so the rates of flow are first computed for
 zero joint accelerations. The load of the water on the body then follows from its rate of momentum (`frame_reaction`).
 Along the normal it acts by its mass and moments, together with the inertia of bodies
-(`kernels.mechanism.basin_inertia`). After the accelerations are solved, the rates of flow are corrected for them
+(`kernels.mechanism.fluid_inertia`). After the accelerations are solved, the rates of flow are corrected for them
 (`correct_for_bodies`). A liquid is a layer of this kind without height. The total momentum is conserved to the order of
 the method.
 """
@@ -14,9 +14,9 @@ from fvsolve.basins.basin_frames import AZ, WZ
 from fvsolve.basins.frame_momentum import accelerate_flow
 from fvsolve.basins.frame_reaction import extra_accelerations, load_body
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import LAW_LINEAR, RATE
-from fvsolve.kernels.mechanism.basin_inertia import EAST, TANK_OUT
-from fvsolve.kernels.mechanism.body_layout import dot
+from fvsolve.kernels.dtypes import LAW_LINEAR, RATE, TANK_OUT
+from fvsolve.kernels.mechanism.body_layout import EAST
+from fvsolve.kernels.mechanism.vectors import dot
 from fvsolve.kernels.table_handle import open_tables
 
 

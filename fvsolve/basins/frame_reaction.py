@@ -19,21 +19,23 @@ from fvsolve.basins.basin_frames import (
 )
 from fvsolve.basins.frame_momentum import accelerate_row
 from fvsolve.jit import njit
-from fvsolve.kernels.mechanism.basin_inertia import BASIN_ARM, BASIN_LOAD, EAST, MOMENTS, TANK_OUT
+from fvsolve.kernels.dtypes import TANK_OUT
 from fvsolve.kernels.mechanism.body_layout import (
     ACCELERATION,
     ARM,
     ATTITUDE,
+    BASIN_ARM,
+    BASIN_LOAD,
     BIAS,
+    EAST,
+    MOMENTS,
     SPIN_BIAS,
     SPIN_RATE,
     add_force,
     add_torque,
     body_row,
-    rotate,
-    rotate_back,
-    write_vector,
 )
+from fvsolve.kernels.mechanism.vectors import rotate, rotate_back, write_vector
 
 
 @njit
@@ -113,7 +115,7 @@ def mass_moments(tables, basin, y, rates, first, own, twice, euler):
 def load_body(tables, basin, b, y, rates, first, own, twice, euler, out):
     """Add the force and torque of the water in basin b for zero joint accelerations to the forces on its body.
 
-    The moments of mass, axes, origin and load of the basin are written to `out`, see `kernels.mechanism.basin_inertia`.
+    The moments of mass, axes, origin and load of the basin are written to `out`, see `kernels.mechanism.body_layout`.
     rates, first, own, twice, euler : as for `mass_moments`
     """
     m, sx, sy, xx, xy, yy, lever, dx, dy, dxx, dxy, dyy, qx, qy, turn, fx, fy, spin = mass_moments(

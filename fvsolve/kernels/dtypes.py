@@ -434,7 +434,7 @@ LAYOUT = np.dtype(
         ("moving_segment", "i8"),  # change of the driving energy of moving stretches since the start [J/kg]
         ("rates", "i8"),  # in `work`: rates, if `out` depends on them and they are not requested; else -1
         ("forces", "i8"),  # in `work`: rates from which forces on pipes are computed; else -1
-        ("tank", "i8"),  # inertia of basins on bodies, see `kernels.mechanism.basin_inertia`
+        ("tank", "i8"),  # inertia of basins on bodies, see `kernels.mechanism.body_layout`
         ("wall", "i8"),  # outward force of the water on moving walls, minus that of the profile [N]
         ("travel", "i8"),  # of force elements: change of length since the start and its rate [m, m/s]
         ("along", "i8"),  # unit vectors of lines, between their points
@@ -446,7 +446,7 @@ LAYOUT = np.dtype(
 )
 BODY_OUT = 45  # numbers of each body in `out`
 GN = 14  # index of g_n among the numbers of a frame, see `basins.basin_frames`
-TANK_OUT = 24  # numbers in `out` of each basin on a body, see `mechanism.basin_inertia`
+TANK_OUT = 24  # numbers in `out` of each basin on a body, see `mechanism.body_layout`
 RATE, STATUS, WHERE, CLOSING, ARRIVES = 0, 1, 2, 3, 4  # first entries of `out`
 OUT_HEAD = 5
 NEVER = -1e300  # in ARRIVES: no jump travels to a node that responds instantly
@@ -475,7 +475,7 @@ NODE_SCALAR, PIPE_SCALAR = 13, 14
 CELL_FIELD, PATCH_FLOW, CELL_SCALAR = 15, 16, 17  # probes of basins
 GIVEN_FLOW = 18  # of a patch with given velocity
 WALL_VALUE = 19  # of a moving wall
-BODY_VALUE, POINT_VALUE, PIN_VALUE, BUSHING_VALUE = 20, 21, 22, 23  # quantity in `side`, see `mechanism.body_probes`
+BODY_VALUE, POINT_VALUE, PIN_VALUE, BUSHING_VALUE = 20, 21, 22, 23  # quantity in `side`, see `mechanism.body_values`
 SURFACE_VALUE = 24  # of a surface described by modes
 PIPE_FORCE = 25  # on a whole pipe
 

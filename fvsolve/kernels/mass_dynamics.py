@@ -7,7 +7,7 @@ e / (rho0 V) under the density law `linear`, ln(rho / rho_0) = ln(1 + e V0 / (m0
 0 marks initial values. For a piston between points of bodies the state is the mass itself, which a closed chamber
 conserves to the last bit. The force of a spring, stop or piston follows from its change of length (travel) in `out`: on
 the axis from the positions of two masses, between bodies from two points, written by
-`kernels.mechanism.force_elements`. Its two masses are then the same fixed frame, on which the net force is zero.
+`kernels.mechanism.body_kinematics`. Its two masses are then the same fixed frame, on which the net force is zero.
 """
 
 from math import log, log1p, sqrt
@@ -60,7 +60,7 @@ def travel_of(out, tables, k):
 def write_travels(y, out, tables):
     """Write the change of length of all force elements between masses, and its rate, to `out`.
 
-    Elements between points of bodies are written by `kernels.mechanism.force_elements`.
+    Elements between points of bodies are written by `kernels.mechanism.body_kinematics`.
     """
     braces, stops, pistons = tables.braces, tables.stops, tables.pistons
     at = tables.layout[0]["travel"]

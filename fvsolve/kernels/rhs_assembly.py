@@ -112,8 +112,8 @@ UNSTEADY_FRICTION = {
 }
 FLUID_LOADS = {
     "boundary_inflow": "mechanism.fluid_loads: add_fluid_loads",
-    "accelerate": "mechanism.inertial_coupling: pipe_rate_limit",
-    "fluid_response": "mechanism.inertial_coupling: accelerate_network_flow",
+    "accelerate": "mechanism.inertial_forces: pipe_rate_limit",
+    "fluid_response": "mechanism.inertial_forces: accelerate_network_flow",
     "power": "mechanism.fluid_energy: add_power",
     "stored": "mechanism.fluid_energy: add_stored",
 }
@@ -131,10 +131,10 @@ COMPONENTS = {
         **COLUMNS,
     ),
     "bodies": RhsTerms(
-        prepare="mechanism.joints: kinematics",
-        observe="mechanism.body_probes: observe_bodies",
-        power="mechanism.body_energy: power_bodies",
-        stored="mechanism.body_energy: stored_bodies",
+        prepare="mechanism.body_kinematics: kinematics",
+        observe="mechanism.body_values: observe_bodies",
+        power="mechanism.body_values: power_bodies",
+        stored="mechanism.body_values: stored_bodies",
     ),
     "no pins": RhsTerms(accelerate="mechanism.mass_matrix: solve_accelerations"),
     "pins": RhsTerms(
@@ -142,24 +142,24 @@ COMPONENTS = {
         observe="mechanism.loop_constraints: observe_pins",
     ),
     "bushings": RhsTerms(
-        move="mechanism.bushings: add_bushing_loads",
-        accelerate="mechanism.bushings: bushing_rate_limit",
-        observe="mechanism.bushings: observe_bushings",
-        power="mechanism.bushings: power_bushings",
-        stored="mechanism.bushings: stored_bushings",
+        move="mechanism.force_elements: add_bushing_loads",
+        accelerate="mechanism.force_elements: bushing_rate_limit",
+        observe="mechanism.force_elements: observe_bushings",
+        power="mechanism.force_elements: power_bushings",
+        stored="mechanism.force_elements: stored_bushings",
     ),
-    "stretches": RhsTerms(events="mechanism.joints: kinematics_for_events"),
+    "stretches": RhsTerms(events="mechanism.body_kinematics: kinematics_for_events"),
     "lines": RhsTerms(move="mechanism.force_elements: add_element_forces"),
     "moving segments": RhsTerms(
-        prepare="mechanism.noninertial_forces: set_segment_drives",
-        known_pressures="mechanism.noninertial_forces: moving_tank_pressures",
-        rates="mechanism.noninertial_forces: add_cell_drives",
+        prepare="mechanism.inertial_forces: set_segment_drives",
+        known_pressures="mechanism.inertial_forces: moving_tank_pressures",
+        rates="mechanism.inertial_forces: add_cell_drives",
         **FLUID_LOADS,
     ),
     "moving segments, barotropic": RhsTerms(
-        prepare="mechanism.noninertial_forces: set_segment_drives",
-        known_pressures="mechanism.noninertial_forces_barotropic: moving_tank_pressures_barotropic",
-        rates="mechanism.noninertial_forces_barotropic: add_cell_drives_barotropic",
+        prepare="mechanism.inertial_forces: set_segment_drives",
+        known_pressures="mechanism.inertial_forces: moving_tank_pressures_barotropic",
+        rates="mechanism.inertial_forces: add_cell_drives_barotropic",
         **FLUID_LOADS,
     ),
     "masses": RhsTerms(
@@ -203,7 +203,7 @@ COMPONENTS = {
 DELAYS = RhsTerms(
     outgoing_waves="delay_lines.line_rates: outgoing_line_waves",
     incoming_waves="delay_lines.line_rates: incoming_line_waves",
-    observe="delay_lines.line_interior: observe_lines",
+    observe="delay_lines.line_rates: observe_lines",
     record="delay_lines.history_update: record_lines",
 )
 COUPLED = RhsTerms(solve_nodes="delay_lines.line_rates: solve_line_clusters")

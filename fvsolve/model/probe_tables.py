@@ -49,7 +49,7 @@ def scalar_probe(draft, row, probe) -> None:
 
 def lower_body_point(draft, row, probe) -> None:
     """Fill the row of a probe at a named point of a body or of the world."""
-    from fvsolve.kernels.mechanism.body_probes import POINT_QUANTITIES
+    from fvsolve.kernels.mechanism.body_values import POINT_QUANTITIES
 
     row["kind"], row["side"] = rec.POINT_VALUE, POINT_QUANTITIES.index(probe.quantity)
     row["index"] = point_row(draft, probe.name)

@@ -123,12 +123,12 @@ class RunData:
         """
         waves = {}
         if len(self.model.tables.delays):
-            from fvsolve.kernels.delay_lines.line_interior import waves_along_line_number
+            from fvsolve.kernels.delay_lines.line_rates import waves_along_line
 
             for index, row in enumerate(self.model.tables.delays):
                 n = parts * int(row["places"])
                 waves[int(row["pipe"])] = r, l = np.zeros(n), np.zeros(n)  # noqa: E741
-                waves_along_line_number(t, out, self.handle, index, r, l)
+                waves_along_line(t, out, self.handle, index, r, l)
         return waves
 
     def evaluate(self, t: float, y: np.ndarray, limit: float) -> tuple[np.ndarray, np.ndarray]:

@@ -11,9 +11,9 @@ from fvsolve.model.run_data import zeros_for_run
 
 PACKAGE = "fvsolve"  # package of the kernel functions
 FOLDER = "kernels.mechanism"
-MOTION, LINES = f"{FOLDER}.joints: kinematics", f"{FOLDER}.force_elements: add_element_forces"
+MOTION, LINES = f"{FOLDER}.body_kinematics: kinematics", f"{FOLDER}.force_elements: add_element_forces"
 WEIGH, ACCELERATE = f"{FOLDER}.mass_matrix: start_mass_matrix", f"{FOLDER}.mass_matrix: solve_accelerations"
-BUSHINGS = f"{FOLDER}.bushings: add_bushing_loads"
+BUSHINGS = f"{FOLDER}.force_elements: add_bushing_loads"
 PINNED, GAPS, HOLD = (
     f"{FOLDER}.loop_constraints: {name}"
     for name in ("solve_pinned_accelerations", "start_gaps", "add_start_pin_forces")
@@ -21,12 +21,12 @@ PINNED, GAPS, HOLD = (
 # loads on bodies of fluid at rest, in addition to pushes
 FLUID_LOADS = ("basins.basin_frames: set_frames", "basins.frame_forces: add_frame_forces")
 WALL_LOADS = ("basins.moving_walls: push_bodies_at_rest",)
-DRIVES = f"{FOLDER}.noninertial_forces: set_segment_drives"
+DRIVES = f"{FOLDER}.inertial_forces: set_segment_drives"
 LOADS = f"{FOLDER}.fluid_loads: add_fluid_loads"
 NETWORKS = (
     DRIVES,
     *(
-        f"{FOLDER}.noninertial_forces: {name}"
+        f"{FOLDER}.inertial_forces: {name}"
         for name in ("moving_tank_pressures", "add_cell_drives", "moving_column_rates")
     ),
     LOADS,

@@ -359,7 +359,7 @@ class BodyRows(Lowering, kind="body"):
     """Conversion to table rows of the probes of rigid bodies in space."""
 
     def probe(self, draft, name, probe, row) -> None:
-        from fvsolve.kernels.mechanism.body_probes import BODY_QUANTITIES  # not loaded by models without bodies
+        from fvsolve.kernels.mechanism.body_values import BODY_QUANTITIES  # not loaded by models without bodies
 
         quantity = "angle" if probe.quantity == "travel" else probe.quantity
         row["kind"], row["side"] = rec.BODY_VALUE, BODY_QUANTITIES.index(quantity)

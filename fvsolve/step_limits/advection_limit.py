@@ -158,7 +158,7 @@ def growth_of(weights: Sequence[Fraction], method: str, courant: float) -> tuple
 
     weights : face weights as in `limit_of`. Growth too small for floating point is computed in fractions.
     """
-    r = _function(method)
+    r = stability_function(method)
     theta = np.linspace(0.0, np.pi, 4001)
     for _ in range(6):
         size = np.abs(r(courant * symbol(weights, theta)))
@@ -207,18 +207,9 @@ def _modulus(p: Polynomial, real: Fraction, size: Fraction) -> Fraction:
 # ---- the polynomial E
 
 
-def _function(method: str) -> StabilityFunction:
-    return _stability_function(method_named(method))
-
-
-@functools.cache
-def _stability_function(method: Method) -> StabilityFunction:
-    return stability_function(method)
-
-
 @functools.cache
 def _is_a_stable(method: Method) -> bool:
-    return a_stable(_stability_function(method))
+    return a_stable(stability_function(method))
 
 
 def _rational(method: str) -> tuple[StabilityFunction, Fraction]:
@@ -226,7 +217,7 @@ def _rational(method: str) -> tuple[StabilityFunction, Fraction]:
 
     E is the polynomial of `_e_polynomial`.
     """
-    tableau, r = method_named(method), _function(method)
+    tableau, r = method_named(method), stability_function(method)
     parts = (*r.numerator.coefficients, *r.denominator.coefficients)
     exact = all(isinstance(x, Fraction) for x in parts)
     digits = tableau.digits - 2 if tableau.digits else ALGEBRAIC_DIGITS

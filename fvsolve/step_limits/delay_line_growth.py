@@ -16,7 +16,7 @@ from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.delay_lines.line_rates import drag_and_slope
 from fvsolve.kernels.delay_lines.wave_history import lagrange_four, lagrange_six, lagrange_three
-from fvsolve.step_limits.lumped_modes import LEAST_GROWTH, growth_factor
+from fvsolve.step_limits.growing_modes import LEAST_GROWTH, growth_factor
 from fvsolve.steppers.tableau import Method
 
 REFLECTION_BOUND = 4.0  # times a: upper bound of what a method adds to a wave in a single reflection

@@ -19,24 +19,20 @@ from fvsolve.model.run_data import RunData
 from fvsolve.schemes import LEAST_CELLS, SCHEMES
 from fvsolve.step_limits.advection_limit import advection_limit, growth_of
 from fvsolve.step_limits.delay_line_growth import line_growth_notices
-from fvsolve.step_limits.lumped_modes import LEAST_GROWTH, Mode, growth_factor, lumped_modes
-from fvsolve.step_limits.pipe_end_growth import LONG, pipe_growth, pipe_limit
-from fvsolve.step_limits.plane_limit import is_stable_with_margin, plane_limit
+from fvsolve.step_limits.grid_limits import LONG, is_stable_with_margin, pipe_growth, pipe_limit, plane_limit
+from fvsolve.step_limits.growing_modes import LEAST_GROWTH, Mode, growth_factor, lumped_modes, undamped_notices
 from fvsolve.step_limits.symbol import weights_of
-from fvsolve.step_limits.undamped_modes import undamped_notices
 from fvsolve.steppers import automatic
 from fvsolve.steppers.tableau import method_named
 
 SLACK = 1e-9  # relative excess over the limit that rounding may cause
 EXCESS = 0.05  # relative excess over an estimated limit up to which a step is doubtful, and above which it is wrong
-SMOOTH_GROWTH = (
-    1e6  # growth of cells from which numbers are wrong if no schedule jumps: then deviations are small at first
-)
+# growth of cells from which numbers are wrong if no schedule jumps: then deviations are small at first
+SMOOTH_GROWTH = 1e6
 # Mean error of a state outside cells, relative to its range: no error, doubtful, wrong.
 NO_ERROR, DOUBTFUL, WRONG = 1e-9, 0.005, 0.05
-LIMITED_EXCESS = (
-    0.3  # EXCESS for limiters between few cells, which are stable up to this excess (tests/step_limits/test_ends.py)
-)
+# EXCESS for limiters between few cells, which are stable up to this excess (tests/step_limits/test_ends.py)
+LIMITED_EXCESS = 0.3
 
 
 class CourantCheck(NamedTuple):
@@ -79,16 +75,13 @@ def step_limits(
         growing = undamped_notices(model, method.name, h, span(model)) if h > 0.0 else []
     except FvsolveError:  # a method without a stability function
         return lines
-    notices = [
-        courant_notice(model, check, method.name) for check in checks if check.courant > check.limit * (1.0 + SLACK)
-    ]
+    exceeded = [check for check in checks if check.courant > check.limit * (1.0 + SLACK)]
+    notices = [courant_notice(model, check, method.name) for check in exceeded]
     jumps = any(jump for _, jump in model.breaks)
-    modes = [
-        mode for mode in modes if mode.outside_cells or not notices
-    ]  # modes of cells that come with waves have a notice already
-    return (
-        notices + [mode_notice(model.case, h, mode, method.name, step_error, jumps) for mode in modes] + growing + lines
-    )
+    for mode in modes:
+        if mode.outside_cells or not exceeded:  # modes of cells that come with waves have a notice already
+            notices.append(mode_notice(model.case, h, mode, method.name, step_error, jumps))
+    return notices + growing + lines
 
 
 def first_step(model, run_data: RunData | None = None) -> float:
@@ -122,33 +115,34 @@ def mode_notice(case, h: float, mode: Mode, method: str, step_error: float | Non
     jumps : True if a schedule has a jump
     """
     numerics = case.numerics
-    seen = (
-        step_error is None or not mode.outside_cells or step_error >= WRONG or (mode.resolved and step_error > NO_ERROR)
-    )
-    enough = (
-        (LEAST_GROWTH if mode.resolved else LEAST_GROWTH**2)
-        if mode.outside_cells
-        else LEAST_GROWTH**2
-        if jumps
-        else SMOOTH_GROWTH
-    )
+    seen = step_error is None or not mode.outside_cells or step_error >= WRONG
+    seen = seen or (mode.resolved and step_error > NO_ERROR)
+    enough = LEAST_GROWTH**2
+    if mode.outside_cells and mode.resolved:
+        enough = LEAST_GROWTH
+    elif not mode.outside_cells and not jumps:
+        enough = SMOOTH_GROWTH
     wrong = seen and mode.growth >= enough
     doubt = "the results may be wrong" if seen or step_error >= DOUBTFUL else "this run shows no growth"
     ends = "the numbers are not to be trusted" if wrong else doubt
-    key, unit = ("step", " s") if numerics.step is not None else ("courant", "")
-    size = rounded_down(getattr(numerics, key) * mode.limit / h)
+    key, remedy = shorter_step(numerics, mode.limit, h)
     text = (f"{mode.place}: deviations grow by a factor of {mode.growth:.3g} in the run with {method} and steps of "
             f"{case.step_amount(h)}; the limit is {case.step_amount(mode.limit)} (estimated at the start); "
-            f"{ends}; give numerics.{key} = {size:.4g}{unit} or less")  # fmt: skip
+            f"{ends}; {remedy}")  # fmt: skip
     return Notice("step-limit", mode.place, text, key, h, mode.limit, not wrong)
+
+
+def shorter_step(numerics, limit: float, used: float) -> tuple[str, str]:
+    """(key that gives the step, text that proposes a value of it); the step is too long by the factor used / limit."""
+    key, unit = ("step", " s") if numerics.step is not None else ("courant", "")
+    return key, f"give numerics.{key} = {rounded_down(getattr(numerics, key) * limit / used):.4g}{unit} or less"
 
 
 def pipe_checks(model, method: str) -> list[CourantCheck]:
     """List with the check of the pipe whose step is the worst; empty if waves do not grow enough in any checked pipe.
 
     A check that is not `only_doubtful` is worse than others; then the ratio of Courant number to limit decides. All
-    pipes
-    of few cells are checked by `short_pipe`, and of the longer pipes the one with the greatest Courant number by
+    pipes of few cells are checked by `short_pipe`, and of the longer pipes the one with the greatest Courant number by
     `long_pipe`. The Courant number of the check may be below its limit.
     """
     own = model.tables.pipes["delay"] < 0  # pipes divided into cells
@@ -160,9 +154,8 @@ def pipe_checks(model, method: str) -> list[CourantCheck]:
     else:
         courant = numerics.courant * waves / (waves * model.tables.pipes["rate_factor"]).max()
     cells, scheme = np.array([pipe.cells for pipe in model.pipes]), SCHEMES[numerics.scheme]
-    long = cells >= (
-        LEAST_CELLS if scheme.limited and scheme.shorter else LONG
-    )  # at the ends of short pipes the order of limited schemes is lower
+    # at the ends of short pipes the order of limited schemes is lower
+    long = cells >= (LEAST_CELLS if scheme.limited and scheme.shorter else LONG)
     short = np.flatnonzero(own & ~long)
     checks = [check for k in short if (check := short_pipe(model, method, int(k), float(courant[k])))]
     inner = own & (cells >= LEAST_CELLS if proved(model) else long)  # waves of a long pipe grow in few cells, too
@@ -246,10 +239,7 @@ def basin_checks(model, method: str, rates: dict[str, float]) -> list[CourantChe
         rate, share = basin.max_rate(model.start)
         parts = float(row["unsplit"]) or 1.0
         rate = max(rate, rates.get(basin.name, 0.0))
-        if numerics.step is not None:
-            courant = numerics.step * rate * parts
-        else:
-            courant = numerics.courant
+        courant = numerics.step * rate * parts if numerics.step is not None else numerics.courant
         scheme, limited = smooth_scheme(basin.scheme)
         share = round(share, 2) if basin.is_grid else 1.0
         if is_stable_with_margin(scheme, method, courant / parts, share, basin.is_grid and basin.has_waves):
@@ -295,11 +285,10 @@ def courant_notice(model, check: CourantCheck, method: str) -> Notice:
     scheme = model.case.numerics.scheme
     about = f", which equals {check.scheme} here," if check.scheme != scheme else ""
     known = "proved" if check.proved else "an estimate"
-    size = numerics.step if numerics.step is not None else numerics.courant
-    key, unit = ("step", " s") if numerics.step is not None else ("courant", "")
+    key = "step" if numerics.step is not None else "courant"
     if check.limit > 0.0:
         limit = f"the limit is {check.limit:.6g} {check.location} ({known})"
-        remedy = f"give numerics.{key} = {rounded_down(size * check.limit / check.courant):.4g}{unit} or less"
+        remedy = shorter_step(numerics, check.limit, check.courant)[1]
     else:
         limit = f"waves grow at every Courant number {check.location} ({known})"
         remedy = f"{check.scheme} needs another method, for example ssp-rk3"

@@ -172,8 +172,8 @@ def test_a_free_tank_on_rails_keeps_its_momentum():
 
     def momentum(state):
         out = model.evaluate(state.t, state.y)[1]
+        from fvsolve.kernels.mechanism.body_kinematics import centre_of
         from fvsolve.kernels.mechanism.body_layout import body_row
-        from fvsolve.kernels.mechanism.body_probes import centre_of
 
         return sum(row["mass"] * centre_of(row, out, body_row(model.tables, k))[3] for k, row in enumerate(bodies))
 

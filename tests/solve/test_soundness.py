@@ -18,7 +18,7 @@ from fvsolve.run import model_of
 from fvsolve.solve.run_checks import LEDGER_TOLERANCE, RunChecks, ledger_notices
 from fvsolve.solve.run_loop import MOST_EVENTS_IN_SPAN, SPAN, RunLoop
 from fvsolve.step_limits.advection_limit import advection_limit
-from fvsolve.step_limits.plane_limit import plane_limit
+from fvsolve.step_limits.grid_limits import plane_limit
 from fvsolve.step_limits.step_notices import step_limits
 from fvsolve.steppers import loop_indices
 from fvsolve.studies import sweep

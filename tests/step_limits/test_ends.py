@@ -11,7 +11,7 @@ from reference.scenes import NO_FRICTION, junction, lake, pipe, scene
 import fvsolve
 from fvsolve.schemes import SCHEMES, end_rate_factor
 from fvsolve.step_limits.advection_limit import advection_limit
-from fvsolve.step_limits.pipe_end_growth import pipe_limit
+from fvsolve.step_limits.grid_limits import pipe_limit
 from fvsolve.step_limits.step_notices import step_limits
 from fvsolve.step_limits.symbol import WEIGHTS
 

@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 
 import fvsolve
 from fvsolve.run import model_of
-from fvsolve.step_limits.lumped_modes import lumped_modes
+from fvsolve.step_limits.growing_modes import lumped_modes
 from fvsolve.step_limits.step_notices import step_limits
 from fvsolve.steppers.analysis.stability_function import stability_function
 from fvsolve.steppers.tableau import method_named

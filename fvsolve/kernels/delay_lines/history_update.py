@@ -1,39 +1,31 @@
-"""Update of the history of delay lines after an accepted state: sent waves, arrived jumps, pressure envelopes."""
+"""Update of the history of delay lines after an accepted state: sent waves, jumps at joints and nodes, envelopes.
+
+Each jump passes nodes at its own time, in order of arrival, with the values on both sides of it. At a junction of pipes
+only, the pressure is twice the sum of the arriving waves over the sum of the admittances, so a jump is reflected and
+passed on at once. At a valve the nodes are solved again with the jump. So a jump passes linear elements exactly, and
+nonlinear elements by the secant over the jump. The tables `sharp` serve this purpose: there, lines shorter than a step
+are treated like longer lines, so that a jump needs its travel time in them too. At nodes with instantaneous devices a
+step ends when a large jump arrives (`ends_step`). The state just before is recorded, then the jump is admitted
+(`admit_jumps`) and events act.
+
+state : values of the right-hand side at the end of the step, with the jumps that have arrived so far; other arguments
+are those of `wave_history`.
+"""
 
 from fvsolve.jit import njit
-from fvsolve.kernels.delay_lines.extremes_at_jumps import store_values, update_line_extremes
-from fvsolve.kernels.delay_lines.jumps import (
-    detect_jumps,
-    has_short_lines,
-    pass_jumps_at_joints,
-    waves_differ,
-    write_joint_arrivals,
-)
-from fvsolve.kernels.delay_lines.jumps_at_nodes import admit_jumps, next_arrival, pass_jumps_at_ends
-from fvsolve.kernels.delay_lines.line_interior import waves_at_linear
-from fvsolve.kernels.delay_lines.wave_history import (
-    ARRIVALS_SIZE,
-    ARRIVED_COUNT,
-    CORRECTED_TIME,
-    COUNT,
-    GREATEST_WAVE,
-    HEAD_SIZE,
-    INFINITE,
-    JUMPS_TRAVELLING,
-    NEXT_ARRIVAL,
-    begin_entry,
-    jump_head,
-    offsets_of,
-    reading_data,
-    remove_arrived_jumps,
-    time_of,
-    time_tolerance,
-    write_entry,
-)
-from fvsolve.kernels.dtypes import AMENDED, ARRIVES, NEVER, STATUS
+from fvsolve.kernels.calls import CLOSE, run_job
+from fvsolve.kernels.delay_lines import jumps
+from fvsolve.kernels.delay_lines import line_extremes as extremes
+from fvsolve.kernels.delay_lines import wave_history as history
+from fvsolve.kernels.delay_lines.jumps import first_waiting_jump, least_jump, store_jump, store_large_jump
+from fvsolve.kernels.delay_lines.line_rates import has_friction
+from fvsolve.kernels.dtypes import ALONE, AMENDED, ARRIVES, JUNCTION, NEVER, STATUS
 from fvsolve.kernels.dtypes import ARRIVED as LET_ARRIVE
-from fvsolve.kernels.observation import update_envelope
 from fvsolve.kernels.table_handle import open_tables
+
+# multiple of the least jump above which a jump ends a step: about `numerics.delay_tolerance` of the greatest
+STEP_END_FACTOR = 4.0
+CROWDED_COUNT = 1e6  # jumps travelling at one time; with so many, only a jump as large as the greatest wave ends a step
 
 
 @njit
@@ -47,28 +39,28 @@ def record_lines(t, y, out, handle, values):
     """
     tables = open_tables(handle)
     past = tables.past
-    k, places, status = int(past[COUNT]), offsets_of(past), out[STATUS]
+    k, places, status = int(past[history.COUNT]), history.offsets_of(past), out[STATUS]
     if status == LET_ARRIVE:
         admit_jumps(past, places, tables, t)
-        if has_short_lines(tables):
-            detect_jumps(past, places, tables, time_of(past, k - 1), y, out, True)
-            past[CORRECTED_TIME] = -INFINITE
+        if jumps.has_short_lines(tables):
+            jumps.detect_jumps(past, places, tables, history.time_of(past, k - 1), y, out, True)
+            past[history.CORRECTED_TIME] = -history.INFINITE
         out[STATUS] = AMENDED
         return
-    if k > 0 and t <= time_of(past, k - 1) + time_tolerance(past):
+    if k > 0 and t <= history.time_of(past, k - 1) + history.time_tolerance(past):
         record_again(past, places, tables, t, y, out)
     elif k == 0:  # a wave sent at the start is a jump: before, all waves were zero
-        begin_entry(past, t)
-        detect_jumps(past, places, tables, t, y, out, has_short_lines(tables))
+        history.begin_entry(past, t)
+        jumps.detect_jumps(past, places, tables, t, y, out, jumps.has_short_lines(tables))
     else:
         record_step(past, places, tables, t, y, out, handle)
     if out[STATUS] == AMENDED:
         return
-    update_line_envelopes(t, places, tables)
-    store_values(tables, out, values)
-    if past[NEXT_ARRIVAL] > t + time_tolerance(past):
-        past[NEXT_ARRIVAL] = next_arrival(past, places, tables, t)
-        out[ARRIVES] = past[NEXT_ARRIVAL] if past[NEXT_ARRIVAL] < INFINITE else NEVER
+    extremes.update_line_envelopes(t, places, tables)
+    extremes.store_values(tables, out, values)
+    if past[history.NEXT_ARRIVAL] > t + history.time_tolerance(past):
+        past[history.NEXT_ARRIVAL] = next_arrival(past, places, tables, t)
+        out[ARRIVES] = past[history.NEXT_ARRIVAL] if past[history.NEXT_ARRIVAL] < history.INFINITE else NEVER
     else:
         out[ARRIVES] = t
 
@@ -78,16 +70,16 @@ def record_again(past, places, tables, t, y, out):
     """Record a state at the time of the last entry again: after a kink or event, or after a correction of the state.
 
     After a correction the waves that nodes send replace those of the entry; otherwise changes are jumps
-    (`detect_jumps`). An earlier state is ignored. past, places : wave history, and result of `offsets_of`
+    (`detect_jumps`). An earlier state is ignored.
     """
-    k = int(past[COUNT]) - 1
-    last = time_of(past, k)
-    if past[CORRECTED_TIME] == last:
+    k = int(past[history.COUNT]) - 1
+    last = history.time_of(past, k)
+    if past[history.CORRECTED_TIME] == last:
         write_ends(past, places, tables, k, out)
-        past[CORRECTED_TIME] = -INFINITE
-    elif t >= last - time_tolerance(past):
-        short = has_short_lines(tables) and waves_differ(past, places, tables, k, out)
-        detect_jumps(past, places, tables, last, y, out, short)
+        past[history.CORRECTED_TIME] = -history.INFINITE
+    elif t >= last - history.time_tolerance(past):
+        short = jumps.has_short_lines(tables) and jumps.waves_differ(past, places, tables, k, out)
+        jumps.detect_jumps(past, places, tables, last, y, out, short)
 
 
 @njit
@@ -95,76 +87,42 @@ def record_step(past, places, tables, t, y, out, handle):
     """Pass on the jumps that have arrived in an accepted step; then write the waves as a new entry.
 
     Jumps at nodes correct the states y; then out[STATUS] becomes AMENDED. Extremes beside jumps are updated.
-    past, places : wave history, and result of `offsets_of`
     """
-    before = time_of(past, int(past[COUNT]) - 1)
-    write_joint_arrivals(past, places, tables, t)
-    live = past[JUMPS_TRAVELLING] > 0.0
+    before = history.time_of(past, int(past[history.COUNT]) - 1)
+    jumps.write_joint_arrivals(past, places, tables, t)
+    live = past[history.JUMPS_TRAVELLING] > 0.0
     if live:
         remove_all_arrived_jumps(past, places, tables.delays, before)
-        pass_jumps_at_joints(past, places, tables, t)
+        jumps.pass_jumps_at_joints(past, places, tables, t)
         passed = pass_jumps_at_ends(past, places, tables, t, y, out, handle)
-        if passed and has_short_lines(tables):  # jumps that have already passed are missing in the node pressures
-            past[CORRECTED_TIME] = NAN
-        write_joint_arrivals(past, places, tables, t)  # again: nodes were solved without the jumps in between
-    entry, ends = begin_entry(past, t), tables.layout[0]["ends"]
-    if past[CORRECTED_TIME] != past[CORRECTED_TIME]:
-        past[CORRECTED_TIME], out[STATUS] = t, AMENDED
+        if passed and jumps.has_short_lines(tables):  # jumps that have already passed are missing in the node pressures
+            past[history.CORRECTED_TIME] = history.NAN
+        jumps.write_joint_arrivals(past, places, tables, t)  # again: nodes were solved without the jumps in between
+    entry, ends = history.begin_entry(past, t), tables.layout[0]["ends"]
+    if past[history.CORRECTED_TIME] != past[history.CORRECTED_TIME]:
+        past[history.CORRECTED_TIME], out[STATUS] = t, AMENDED
     for i in range(tables.delays.size):
         line = tables.delays[i]
         at, last = ends + 4 * line["pipe"], line["stretches"] - 1
-        write_entry(past, places, line, 0, entry, 0, out[at])
-        write_entry(past, places, line, last, entry, 1, out[at + 3])
+        history.write_entry(past, places, line, 0, entry, 0, out[at])
+        history.write_entry(past, places, line, last, entry, 1, out[at + 3])
         sent = max(abs(out[at]), abs(out[at + 3]))
-        past[GREATEST_WAVE] = max(past[GREATEST_WAVE], sent / tables.pipes[line["pipe"]]["admittance"])
+        past[history.GREATEST_WAVE] = max(past[history.GREATEST_WAVE], sent / tables.pipes[line["pipe"]]["admittance"])
         for q in range(last):
-            joint = places[0] + ARRIVALS_SIZE * (line["stretch"] + q)
-            write_entry(past, places, line, q + 1, entry, 0, past[joint + 1])
-            write_entry(past, places, line, q, entry, 1, past[joint + ARRIVALS_SIZE])
+            joint = places[0] + history.ARRIVALS_SIZE * (line["stretch"] + q)
+            history.write_entry(past, places, line, q + 1, entry, 0, past[joint + 1])
+            history.write_entry(past, places, line, q, entry, 1, past[joint + history.ARRIVALS_SIZE])
     if live:
-        update_line_extremes(past, places, tables, before, t)
-
-
-NAN = float("nan")
-
-
-@njit(forceinline=True)
-def update_line_envelope(t, places, clock, tables, number):
-    """Update the pressure envelope along a delay line at the time t of the last entry.
-
-    The first time below vapour pressure is updated too. number : number of the delay line
-    places, clock : results of `offsets_of` and `reading_data`
-    """
-    line, envelope = tables.delays[number], tables.envelope
-    n, cell = line["places"], tables.pipes[line["pipe"]]["cell"]
-    r, l, low, high = tables.scratch[:n], tables.scratch[n : 2 * n], 0, 0
-    for j in range(n):
-        r[j], l[j] = waves_at_linear(t, tables.past, places, clock, line, (j + 0.5) / n)
-        s = r[j] + l[j]
-        low += not s >= envelope[0, cell + j]
-        high += not s <= envelope[2, cell + j]
-    if low + high > 0:
-        update_envelope(t, r, l, cell, low, high, line["pipe"], tables)
-
-
-@njit
-def update_line_envelopes(t, places, tables):
-    """Update the pressure envelopes along all delay lines at the time t of the last entry."""
-    clock = reading_data(tables.past, int(tables.past[COUNT]) - 1)
-    for i in range(tables.delays.size):
-        update_line_envelope(t, places, clock, tables, i)
+        extremes.update_line_extremes(past, places, tables, before, t)
 
 
 @njit
 def write_ends(past, places, tables, entry, out):
-    """Write the waves that nodes send into delay lines, which are in `out`, again into entry number `entry`.
-
-    past, places : wave history, and result of `offsets_of`
-    """
+    """Write the waves that nodes send into delay lines, which are in `out`, again into entry number `entry`."""
     for i in range(tables.delays.size):
         line, at = tables.delays[i], tables.layout[0]["ends"] + 4 * tables.delays[i]["pipe"]
-        write_entry(past, places, line, 0, entry, 0, out[at])
-        write_entry(past, places, line, line["stretches"] - 1, entry, 1, out[at + 3])
+        history.write_entry(past, places, line, 0, entry, 0, out[at])
+        history.write_entry(past, places, line, line["stretches"] - 1, entry, 1, out[at + 3])
 
 
 @njit
@@ -176,6 +134,219 @@ def remove_all_arrived_jumps(past, places, delays, before):
     for i in range(delays.size):
         line = delays[i]
         for s in range(line["stretch"], line["stretch"] + line["stretches"]):
-            for at in range(jump_head(places, s, 0), jump_head(places, s + 1, 0), HEAD_SIZE):
-                if past[at + ARRIVED_COUNT] > 0.0:
-                    remove_arrived_jumps(past, places, at, before - line["hold"] - time_tolerance(past))
+            for at in range(history.jump_head(places, s, 0), history.jump_head(places, s + 1, 0), history.HEAD_SIZE):
+                if past[at + history.ARRIVED_COUNT] > 0.0:
+                    history.remove_arrived_jumps(past, places, at, before - line["hold"] - history.time_tolerance(past))
+
+
+# jumps at nodes ----------
+
+
+@njit(forceinline=True)
+def solved_alone(tables, i):
+    """True if node i is solved without other nodes.
+
+    Its pressure is then given by a state or schedule, or follows from arriving waves, known flows and its admittance.
+    """
+    node = tables.nodes[i]
+    return node["kind"] != JUNCTION or node["solve"] == ALONE
+
+
+@njit(forceinline=True)
+def end_stretch(line, side):
+    """Stretch at an end of a delay line, counted over all lines."""
+    return line["stretch"] + (line["stretches"] - 1 if side == 1 else 0)
+
+
+@njit(forceinline=True)
+def ends_step(past, tables, line, pipe, q, wave, size):
+    """True if a step ends when a jump of stretch q, or the part of it that friction reflects, leaves the stretch.
+
+    The step ends if the jump arrives at a node with an instantaneous device and is large; after a small jump the device
+    acts at the end of the step. The least size of a large jump never decreases in a run: otherwise a jump to be passed
+    on within a step would stay in the list.
+    size : change of the wave [kg/s]
+    """
+    acts = line["acts"]
+    if acts == 0:
+        return False
+    crowd = past[history.MOST_JUMPS_TRAVELLING] / CROWDED_COUNT
+    greatest = max(past[history.GREATEST_JUMP], past[history.GREATEST_WAVE])
+    if abs(size) <= max(STEP_END_FACTOR * least_jump(past, tables, pipe), crowd * greatest * pipe["admittance"]):
+        return False
+    first, last = q == 0 and acts % 2 == 1, q + 1 == line["stretches"] and acts >= 2
+    return (first and (wave == 1 or has_friction(pipe))) or (last and (wave == 0 or has_friction(pipe)))
+
+
+@njit
+def next_arrival(past, places, tables, t):
+    """Arrival time of the next jump after t that ends a step (`ends_step`) [s]; INFINITE for none."""
+    first_time, queue, after = history.INFINITE, int(past[history.JUMP_CAPACITY]), t + history.time_tolerance(past)
+    for number in range(tables.delays.size):
+        line, pipe = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]]
+        if line["acts"] == 0:
+            continue
+        for q in range(0, line["stretches"], max(1, line["stretches"] - 1)):
+            for wave in range(2):
+                at = history.jump_head(places, line["stretch"] + q, wave)
+                for i in range(int(past[at + history.ARRIVED_COUNT]), int(past[at + history.JUMP_COUNT])):
+                    place = history.jump_place(past, places, at, i)
+                    arrival, size = past[place] + line["tau"], past[place + queue]
+                    if arrival > after and ends_step(past, tables, line, pipe, q, wave, size):
+                        first_time = min(first_time, arrival)
+                        break
+    return first_time
+
+
+@njit
+def admit_jumps(past, places, tables, t):
+    """Let the jumps that end a step at t arrive; `detect_jumps` then computes the changes at nodes.
+
+    Their parts that stay in the line, transmitted or reflected, enter the neighbouring stretches. past[NEXT_ARRIVAL]
+    receives the time of the following such jump.
+    """
+    for number in range(tables.delays.size):
+        line = tables.delays[number]
+        for q in range(0, line["stretches"] if line["acts"] != 0 else 0, max(1, line["stretches"] - 1)):
+            for wave in range(2):
+                jumps.pass_waiting_jumps(past, places, tables, line, q, wave, t, t)
+    past[history.NEXT_ARRIVAL], past[history.ARRIVALS_TIME] = next_arrival(past, places, tables, t), history.NAN
+
+
+@njit
+def earliest_jump(past, places, tables, t):
+    """Jump that is the first to leave a first or last stretch of a delay line by t.
+
+    Returns (line, stretch within the line, wave, offset of its time in `past`); the line is -1 without a jump. Jumps
+    that end a step (`ends_step`) are left out.
+    """
+    best, result = t + history.time_tolerance(past), (-1, 0, 0, -1)
+    for number in range(tables.delays.size):
+        line = tables.delays[number]
+        for q in range(0, line["stretches"], max(1, line["stretches"] - 1)):
+            for wave in range(2):
+                place = first_waiting_jump(past, places, line["stretch"] + q, wave)
+                if place >= 0 and past[place] + line["tau"] <= best:
+                    size = past[place + int(past[history.JUMP_CAPACITY])]
+                    if not ends_step(past, tables, line, tables.pipes[line["pipe"]], q, wave, size):
+                        best, result = past[place] + line["tau"], (number, q, wave, place)
+    return result
+
+
+@njit
+def pass_jumps_at_ends(past, places, own, t, y, out, handle):
+    """Pass on the jumps that leave first and last stretches of delay lines up to t, in order; return True if any do.
+
+    Extremes are updated by the values beside each jump. Masses of storing nodes and lines and flows of columns in y are
+    corrected (`jumps`). Jumps that end a step are left out.
+    own : tables of the run, in which short lines couple their ends at once
+    """
+    number, q, wave, place = earliest_jump(past, places, own, t)
+    if number < 0:
+        return False
+    sharp = own.sharp
+    tables, size = open_tables(sharp), own.layout[0]["size"]
+    state, queue = own.spare[:size], int(past[history.JUMP_CAPACITY])
+    past[history.ONLY_PASSED_JUMPS], past[history.ARRIVALS_TIME] = 1.0, history.NAN
+    run_job(CLOSE, t, y, y[:0], state, handle)
+    past[history.ONLY_PASSED_JUMPS] = 0.0
+    past[history.ARRIVALS_TIME], past[history.ARRIVALS_COUNT] = t, past[history.COUNT]
+    for i in range(tables.delays.size):
+        line, at = tables.delays[i], tables.layout[0]["ends"] + 4 * tables.delays[i]["pipe"]
+        past[places[0] + history.ARRIVALS_SIZE * end_stretch(line, 0)] = state[at + 1]
+        past[places[0] + history.ARRIVALS_SIZE * end_stretch(line, 1) + 1] = state[at + 2]
+    extremes.store_smooth_values(t, y, state, handle)
+    together = False  # True if a jump arrives with the jump before: the state between both never occurs
+    while number >= 0:
+        line, sent, jump = tables.delays[number], past[place], past[place + queue]
+        time = min(sent + line["tau"], t)
+        share = jumps.reflected_part(past, places, line, tables.pipes[line["pipe"]], q, wave, jump, t)
+        past[history.jump_head(places, line["stretch"] + q, wave) + history.ARRIVED_COUNT] += 1.0
+        times = jumps.change_times(past, tables, t, time, sent)
+        if not together:
+            extremes.extremes_at_jump(t, time, y, state, handle)
+        closed = leave_stretch(past, places, tables, y, state, number, q, wave, time, jump - share, times)
+        closed = leave_stretch(past, places, tables, y, state, number, q, 1 - wave, time, share, times) and closed
+        if not closed:
+            solve_nodes_again(past, places, tables, t, y, state, sharp, time, times)
+        number, q, wave, place = earliest_jump(past, places, own, t)
+        together = number >= 0 and past[place] + tables.delays[number]["tau"] <= time + history.time_tolerance(past)
+        if not together:
+            extremes.extremes_at_jump(t, time, y, state, handle)
+    past[history.ARRIVALS_TIME] = history.NAN
+    return True
+
+
+@njit
+def leave_stretch(past, places, tables, y, state, number, q, wave, time, size, times):
+    """Pass a jump on from stretch q of a delay line, in the direction of a wave; False if nodes must be solved for it.
+
+    At an end of the line it is added to the arriving wave in `past`; a node that is solved alone then responds, see
+    `enter_plain_node`, which defines the arguments.
+    """
+    line, pipe = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]]
+    onward, side = q + 1 if wave == 0 else q - 1, 1 if wave == 0 else 0
+    if size == 0.0:
+        return True
+    if 0 <= onward < line["stretches"]:
+        store_large_jump(past, places, tables, line["stretch"] + onward, wave, time, size, pipe)
+        return True
+    past[places[0] + history.ARRIVALS_SIZE * end_stretch(line, side) + side] += size
+    if not solved_alone(tables, pipe["to_node"] if side == 1 else pipe["from_node"]):
+        return False
+    enter_plain_node(past, places, tables, y, state, number, side, time, size, times)
+    return True
+
+
+@njit
+def enter_plain_node(past, places, tables, y, state, number, side, time, size, times):
+    """Let a jump arrive at an end of a delay line, at a node that is solved alone: the node sends jumps at once.
+
+    y : states, corrected; state : values of the right-hand side at the end of the step, updated
+    number : number of the line; size : change of the wave [kg/s]; time : arrival time [s]
+    times : result of `change_times`
+    """
+    line, pipe, layout = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]], tables.layout[0]
+    i = pipe["to_node"] if side == 1 else pipe["from_node"]
+    node, at = tables.nodes[i], layout["ends"] + 4 * line["pipe"]
+    state[at + 1 + side] += size
+    if node["kind"] != JUNCTION:
+        state[at + 3 * side] -= size
+        store_large_jump(past, places, tables, end_stretch(line, side), side, time, -size, pipe)
+        jumps.correct_store(past, tables, y, state, pipe, i, 2.0 * size, times)
+        return
+    change = 2.0 * size / node["admittance"]
+    state[layout["pressure"] + i] += change
+    jumps.correct_columns(past, tables, y, i, change, times)
+    for k in range(node["line_count"]):
+        end = tables.integers[node["lines"] + k]
+        other, right = tables.delays[end // 2], end % 2
+        pipe = tables.pipes[other["pipe"]]
+        part = pipe["admittance"] * change - (size if end == 2 * number + side else 0.0)
+        state[layout["ends"] + 4 * other["pipe"] + 3 * right] += part
+        store_large_jump(past, places, tables, end_stretch(other, right), right, time, part, pipe)
+
+
+@njit
+def solve_nodes_again(past, places, tables, t, y, state, sharp, time, times):
+    """Solve the nodes with the waves that arrive now; store large changes of the waves that they send as jumps.
+
+    y : states, corrected; state : values of the right-hand side before the jump, replaced by the solution
+    sharp : handle, see the module; time : arrival time of the jump [s]; times : result of `change_times`
+    """
+    layout, size = tables.layout[0], state.size
+    solved = tables.spare[size : 2 * size]
+    run_job(CLOSE, t, y, y[:0], solved, sharp)
+    for i in range(tables.delays.size):
+        line = tables.delays[i]
+        pipe, at = tables.pipes[line["pipe"]], layout["ends"] + 4 * line["pipe"]
+        for side in range(2):
+            come = solved[at + 1 + side] - state[at + 1 + side]
+            change = solved[at + 3 * side] - state[at + 3 * side]
+            end = pipe["to_node"] if side == 1 else pipe["from_node"]
+            jumps.correct_store(past, tables, y, solved, pipe, end, come - change, times)
+            if abs(change) > least_jump(past, tables, pipe):
+                store_jump(past, places, end_stretch(line, side), side, time, change, pipe)
+    jumps.correct_behind_valves(past, tables, y, state, solved, times)
+    for i in range(size):
+        state[i] = solved[i]

@@ -1,47 +1,26 @@
-"""Jumps in delay lines: detection, storage, passage through friction and through the joints between stretches.
+"""Jumps in delay lines: detection, storage, passage through friction and joints, and the states that they correct.
 
 A jump is an instantaneous change of a wave by a schedule, a valve or an event. A jump below the size of `least_jump`
 joins the smooth part of the wave. Friction in the middle of a stretch reflects the difference of the friction losses
-with and without the jump. s, q : stretch, counted over all lines, or within its line; wave : 0 forward, 1 backward.
-pipe, line : row of the pipe and of its delay line; places : result of `offsets_of`.
+with and without the jump.
+
+The rates of a state change when a jump arrives within a step. The weights of the Runge-Kutta method count the new rate
+for too short or too long a time. The missing part is added after the step, so that a jump is correct to second order;
+it marks the step as corrected (past[CORRECTED_TIME] = NaN). The supply through nodes of given pressure is not
+corrected, nor is the mass in delay lines, except for the mass that they give to nodes with storage. times : result of
+`change_times`; other arguments are those of `wave_history`.
 """
+
+from math import exp, expm1
 
 from fvsolve.jit import njit
 from fvsolve.kernels.calls import CLOSE, run_job
+from fvsolve.kernels.delay_lines import wave_history as history
 from fvsolve.kernels.delay_lines.line_rates import friction_loss, has_friction, write_all_arrivals, write_arrivals
-from fvsolve.kernels.delay_lines.wave_history import (
-    ARRIVALS_COUNT,
-    ARRIVALS_SIZE,
-    ARRIVALS_TIME,
-    ARRIVED_COUNT,
-    CORRECTED_TIME,
-    COUNT,
-    FIRST_JUMP,
-    GREATEST_JUMP,
-    GREATEST_UNSTORED_JUMP,
-    GREATEST_WAVE,
-    HEAD_SIZE,
-    INFINITE,
-    JUMP_CAPACITY,
-    JUMP_COUNT,
-    arrived_until,
-    insert_jump,
-    interpolate_waves,
-    jump_head,
-    jump_list,
-    jumps_until,
-    newest_before,
-    passed_jumps,
-    reading_data,
-    ring_of,
-    stencil,
-    time_tolerance,
-    wrap_index,
-    write_entry,
-)
-from fvsolve.kernels.dtypes import AMENDED, STATUS
+from fvsolve.kernels.dtypes import AMENDED, FIXED, JUNCTION, PATCH, STATUS, TANK
+from fvsolve.kernels.network_balance import stiffness_of
+from fvsolve.kernels.tank_limits import BOTTOM, EVENTS, RIM
 
-NAN = float("nan")
 NOISE = 1e-13  # fraction of a wave of half a bar below which a change is rounding
 
 
@@ -60,7 +39,7 @@ def least_jump(past, tables, pipe):
 
     A quarter of `numerics.delay_tolerance` times the greatest jump or wave so far, and at least rounding.
     """
-    least = tables.settings[0]["jumps"] * max(past[GREATEST_JUMP], past[GREATEST_WAVE])
+    least = tables.settings[0]["jumps"] * max(past[history.GREATEST_JUMP], past[history.GREATEST_WAVE])
     return max(least, NOISE * 0.5e5) * pipe["admittance"]
 
 
@@ -69,18 +48,17 @@ def store_jump(past, places, s, wave, t, size, pipe):
     """Store a jump of a wave that enters stretch s at t; if the list is full, only update the greatest unstored jump.
 
     past[GREATEST_UNSTORED_JUMP] is the greatest pressure of the jumps that could not be stored [Pa].
-    s : stretch counted over all lines; wave : 0 forward, 1 backward; size : change of the wave [kg/s]
-    pipe : row of the line's pipe; past, places : wave history, and result of `offsets_of`
+    size : change of the wave [kg/s]
     """
-    if not insert_jump(past, places, jump_head(places, s, wave), t, size):
-        past[GREATEST_UNSTORED_JUMP] = max(past[GREATEST_UNSTORED_JUMP], abs(size) / pipe["admittance"])
+    if not history.insert_jump(past, places, history.jump_head(places, s, wave), t, size):
+        past[history.GREATEST_UNSTORED_JUMP] = max(past[history.GREATEST_UNSTORED_JUMP], abs(size) / pipe["admittance"])
 
 
 @njit
 def store_large_jump(past, places, tables, s, wave, t, size, pipe):
     """Store a jump of a wave that enters stretch s at t, unless it is small.
 
-    A jump up to the size of `least_jump` joins the smooth part of the wave. Arguments as for `store_jump`.
+    A jump up to the size of `least_jump` joins the smooth part of the wave.
     """
     if abs(size) > least_jump(past, tables, pipe):
         store_jump(past, places, s, wave, t, size, pipe)
@@ -88,31 +66,25 @@ def store_large_jump(past, places, tables, s, wave, t, size, pipe):
 
 @njit(forceinline=True)
 def first_waiting_jump(past, places, s, wave):
-    """Offset in `past` of the time of the oldest jump of a wave that has not left stretch s; -1 without such a jump.
-
-    Its size is `past[JUMP_CAPACITY]` places further. s : stretch counted over all lines; wave : 0 forward, 1 backward
-    """
-    at, queue = jump_head(places, s, wave), int(past[JUMP_CAPACITY])
-    if not past[at + ARRIVED_COUNT] < past[at + JUMP_COUNT]:
-        return -1
-    return jump_list(places, queue, at) + wrap_index(int(past[at + FIRST_JUMP]) + int(past[at + ARRIVED_COUNT]), queue)
+    """Offset in `past` of the time of the oldest jump of a wave that has not left stretch s; -1 without such a jump."""
+    at = history.jump_head(places, s, wave)
+    waits = past[at + history.ARRIVED_COUNT] < past[at + history.JUMP_COUNT]
+    return history.jump_place(past, places, at, int(past[at + history.ARRIVED_COUNT])) if waits else -1
 
 
 @njit
-def reflected_part(past, places, tables, line, pipe, q, wave, size, t):
+def reflected_part(past, places, line, pipe, q, wave, size, t):
     """Part of a jump that friction in the middle of stretch q reflects [kg/s]; the jump is not yet passed on.
 
     size : change of the wave by the jump [kg/s]; t : end of the step in which it reaches the end of the stretch [s]
-    line, pipe : rows of the delay line and of its pipe; wave : 0 forward, 1 backward
-    past, places : wave history, and result of `offsets_of`
     """
     if not has_friction(pipe):
         return 0.0
-    ring, mask = ring_of(places, line, q)
-    k, w = stencil(past, reading_data(past, newest_before(past, t)), t - line["hold"])
-    r, l = interpolate_waves(past, ring, mask, k, w)
-    head = jump_head(places, line["stretch"] + q, 0)
-    r, l = r + passed_jumps(past, places, head), l + passed_jumps(past, places, head + HEAD_SIZE)
+    clock = history.reading_data(past, history.newest_before(past, t))
+    head = history.jump_head(places, line["stretch"] + q, 0)
+    r, l = history.smooth_waves(past, places, clock, line, q, t - line["hold"])
+    r += history.passed_jumps(past, places, head)
+    l += history.passed_jumps(past, places, head + history.HEAD_SIZE)
     before = friction_loss(pipe, line, r, l)
     if wave == 0:
         return friction_loss(pipe, line, r + size, l) - before
@@ -120,26 +92,37 @@ def reflected_part(past, places, tables, line, pipe, q, wave, size, t):
 
 
 @njit
-def pass_jumps_at_joints(past, places, tables, t):
-    """Pass all jumps that leave inner stretches of delay lines by t on to the next stretches, with their reflections.
+def pass_waiting_jumps(past, places, tables, line, q, wave, t, least):
+    """Pass all jumps of a wave that leave stretch q by t on to the neighbouring stretches, with their reflections.
 
-    Inner stretches are neither the first nor the last of their line. Small jumps join the smooth part (`least_jump`).
+    At an end of the line they only arrive. Small jumps join the smooth part (`least_jump`).
+    least : earliest time at which a jump may enter the next stretch [s]
     """
-    queue = int(past[JUMP_CAPACITY])
+    queue, pipe, s = int(past[history.JUMP_CAPACITY]), tables.pipes[line["pipe"]], line["stretch"] + q
+    place = first_waiting_jump(past, places, s, wave)
+    while place >= 0 and past[place] + line["tau"] <= t + history.time_tolerance(past):
+        when, size = max(min(past[place] + line["tau"], t), least), past[place + queue]
+        share = reflected_part(past, places, line, pipe, q, wave, size, t)
+        past[history.jump_head(places, s, wave) + history.ARRIVED_COUNT] += 1.0
+        for to in range(2):
+            onward = q + 1 if to == 0 else q - 1
+            if 0 <= onward < line["stretches"]:
+                part = size - share if to == wave else share
+                store_large_jump(past, places, tables, line["stretch"] + onward, to, when, part, pipe)
+        place = first_waiting_jump(past, places, s, wave)
+
+
+@njit
+def pass_jumps_at_joints(past, places, tables, t):
+    """Pass all jumps that leave inner stretches of delay lines by t on to the next stretches.
+
+    Inner stretches are neither the first nor the last of their line.
+    """
     for number in range(tables.delays.size):
-        line, pipe = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]]
+        line = tables.delays[number]
         for q in range(1, line["stretches"] - 1):
             for wave in range(2):
-                s = line["stretch"] + q
-                place = first_waiting_jump(past, places, s, wave)
-                while place >= 0 and past[place] + line["tau"] <= t + time_tolerance(past):
-                    when, size = min(past[place] + line["tau"], t), past[place + queue]
-                    share = reflected_part(past, places, tables, line, pipe, q, wave, size, t)
-                    past[jump_head(places, s, wave) + ARRIVED_COUNT] += 1.0
-                    onward = 1 if wave == 0 else -1
-                    store_large_jump(past, places, tables, s + onward, wave, when, size - share, pipe)
-                    store_large_jump(past, places, tables, s - onward, 1 - wave, when, share, pipe)
-                    place = first_waiting_jump(past, places, s, wave)
+                pass_waiting_jumps(past, places, tables, line, q, wave, t, -history.INFINITE)
 
 
 @njit
@@ -149,7 +132,7 @@ def write_joint_arrivals(past, places, tables, t):
     See `write_arrivals`; at the ends of lines see `write_all_arrivals`.
     """
     write_all_arrivals(past, tables, t)
-    clock = reading_data(past, newest_before(past, t))
+    clock = history.reading_data(past, history.newest_before(past, t))
     for i in range(tables.delays.size):
         line = tables.delays[i]
         for q in range(1, line["stretches"] - 1):
@@ -163,40 +146,33 @@ def complete_short_arrivals(past, places, tables, t):
     They replace the waves by `write_arrivals`, which hold for zero pressure deviations at both ends. The part that
     arrives at once is computed from the waves in the last entry. t : time of that entry
     """
-    newest = int(past[COUNT]) - 1
-    clock = reading_data(past, newest)
+    newest = int(past[history.COUNT]) - 1
+    clock = history.reading_data(past, newest)
     for i in range(tables.delays.size):
         line, beta = tables.delays[i], tables.delays[i]["now"]
         if beta > 0.0:
-            ring, mask = ring_of(places, line, 0)
-            k, w = stencil(past, clock, t - line["hold"])
-            u, v = interpolate_waves(past, ring, mask, k, w)
-            head = jump_head(places, line["stretch"], 0)
-            r = arrived_until(past, places, clock, head, t, line["tau"])
-            l = arrived_until(past, places, clock, head + HEAD_SIZE, t, line["tau"])
+            ring, mask = history.ring_of(places, line, 0)
+            u, v = history.smooth_waves(past, places, clock, line, 0, t - line["hold"])
+            head = history.jump_head(places, line["stretch"], 0)
+            r = history.arrived_until(past, places, clock, head, t, line["tau"])
+            l = history.arrived_until(past, places, clock, head + history.HEAD_SIZE, t, line["tau"])
             delta, at = friction_loss(tables.pipes[line["pipe"]], line, u + r, v + l), ring + 2 * (newest & mask)
-            arrivals = places[0] + ARRIVALS_SIZE * line["stretch"]
+            arrivals = places[0] + history.ARRIVALS_SIZE * line["stretch"]
             past[arrivals] = v + beta * (past[at + 1] - v) + l + delta
             past[arrivals + 1] = u + beta * (past[at] - u) + r - delta
 
 
 @njit(forceinline=True)
-def last_sent_wave(past, places, line, q, side, k):
-    """Wave sent into stretch q of a delay line at entry k: its smooth part and all jumps so far [kg/s].
-
-    side : 0 forward, 1 backward wave; line : row of the delay line; past, places : wave history, result of `offsets_of`
-    """
-    ring, mask = ring_of(places, line, q)
-    jumps = jump_head(places, line["stretch"] + q, side)
-    return past[ring + 2 * (k & mask) + side] + jumps_until(past, places, jumps, INFINITE)
+def last_sent_wave(past, places, line, q, wave, k):
+    """Wave sent into stretch q of a delay line at entry k: its smooth part and all jumps so far [kg/s]."""
+    ring, mask = history.ring_of(places, line, q)
+    jumps = history.jump_head(places, line["stretch"] + q, wave)
+    return past[ring + 2 * (k & mask) + wave] + history.jumps_until(past, places, jumps, history.INFINITE)
 
 
 @njit
 def waves_differ(past, places, tables, k, out):
-    """True if the waves that nodes send now differ from those of entry k by more than rounding, or are NaN.
-
-    out : values of the right-hand side now; past, places : wave history, and result of `offsets_of`
-    """
+    """True if the waves in `out` that nodes send now differ from those of entry k by more than rounding, or are NaN."""
     for i in range(tables.delays.size):
         line = tables.delays[i]
         pipe, at = tables.pipes[line["pipe"]], tables.layout[0]["ends"] + 4 * line["pipe"]
@@ -214,16 +190,15 @@ def detect_jumps(past, places, tables, t, y, out, short):
     t : time of the last entry; out : values of the right-hand side now
     short : True to solve nodes again, with the waves of that entry in lines shorter than a step. A jump then sets
         out[STATUS] to AMENDED, because the state must be evaluated again.
-    past, places : wave history, and result of `offsets_of`
     """
-    k, ends, state = int(past[COUNT]) - 1, tables.layout[0]["ends"], out
+    k, ends, state = int(past[history.COUNT]) - 1, tables.layout[0]["ends"], out
     if short:
         state = tables.spare[: tables.layout[0]["size"]]
         write_all_arrivals(past, tables, t)
         complete_short_arrivals(past, places, tables, t)
-        past[ARRIVALS_TIME], past[ARRIVALS_COUNT] = t, past[COUNT]
+        past[history.ARRIVALS_TIME], past[history.ARRIVALS_COUNT] = t, past[history.COUNT]
         run_job(CLOSE, t, y, y[:0], state, tables.sharp)
-        past[ARRIVALS_TIME] = NAN
+        past[history.ARRIVALS_TIME] = history.NAN
     for stage in range(2):  # first the greatest jump, which the limit in `least_jump` needs
         for i in range(tables.delays.size):
             line = tables.delays[i]
@@ -232,10 +207,132 @@ def detect_jumps(past, places, tables, t, y, out, short):
                 q, new = line["stretches"] - 1 if side == 1 else 0, state[at + 3 * side]
                 old = last_sent_wave(past, places, line, q, side, k)
                 if stage == 0:
-                    past[GREATEST_JUMP] = max(past[GREATEST_JUMP], abs(new - old) / pipe["admittance"])
+                    past[history.GREATEST_JUMP] = max(past[history.GREATEST_JUMP], abs(new - old) / pipe["admittance"])
                     continue
                 if abs(new - old) > least_jump(past, tables, pipe):
                     store_jump(past, places, line["stretch"] + q, side, t, new - old, pipe)
                     if short:
-                        past[CORRECTED_TIME], out[STATUS] = t, AMENDED
-                write_entry(past, places, line, q, k, side, new)
+                        past[history.CORRECTED_TIME], out[STATUS] = t, AMENDED
+                history.write_entry(past, places, line, q, k, side, new)
+
+
+# correction of states ----------
+
+
+@njit(forceinline=True)
+def change_times(past, tables, t, time, sent):
+    """(time for which a change within a step acts, time for which the weights of the method count it) [s].
+
+    Stages before the change do not include it. Stages after it include it as if it had always been there. No stage
+    includes a jump that was sent since the last entry.
+    t, time : end of the step, and time of the change; sent : time at which the jump was sent
+    """
+    if sent > history.time_of(past, int(past[history.COUNT]) - 1) + history.time_tolerance(past):
+        return t - time, 0.0
+    before, settings = history.time_of(past, int(past[history.COUNT]) - 1), tables.settings[0]
+    h, booked, at, stages = t - before, 0.0, settings["weights"], settings["stages"]
+    for i in range(stages):
+        if before + tables.floats[at + stages + i] * h >= time - history.time_tolerance(past):
+            booked += tables.floats[at + i]
+    return t - time, h * booked
+
+
+@njit(forceinline=True)
+def missing_time(times, rate):
+    """Time for which a change acts but the weights of the step do not count it [s]; negative if they count it too long.
+
+    It is reduced, because a node with storage soon balances the inflow. Without the reduction, a jump at a node that
+    fills within a step would be corrected by more than it brings.
+    rate : rate at which the node adopts the new pressure [1/s]
+    """
+    since, booked = times
+    late = since - booked
+    return late if rate * abs(late) < 1e-12 else -exp(-rate * booked) * expm1(-rate * late) / rate
+
+
+@njit(forceinline=True)
+def stores_inflow(tables, i):
+    """True if node i has storage and stores its inflow now; patches, and tanks held at bottom or rim, do not."""
+    node = tables.nodes[i]
+    if node["kind"] == FIXED or node["kind"] == JUNCTION or node["kind"] == PATCH:
+        return False
+    k = EVENTS * node["row"]
+    return node["kind"] != TANK or (tables.armed[k + BOTTOM] <= 0.0 and tables.armed[k + RIM] <= 0.0)
+
+
+@njit(forceinline=True)
+def filling_rate(tables, out, i, j):
+    """Rate at which the pressure of node i, which has storage, adopts the pressure of the waves at node j [1/s]."""
+    return stiffness_of(tables.nodes, tables.layout[0], out, i) * tables.nodes[j]["admittance"]
+
+
+@njit(forceinline=True)
+def correct_store(past, tables, y, out, pipe, i, flow, times):
+    """Add the uncounted mass of a flow out of a delay line to node i, and subtract it from the line.
+
+    The flow [kg/s] began within the step, so the weights of the step have not counted a part of it. Nothing is changed
+    if the node does not store its inflow (`stores_inflow`).
+    out : values of the right-hand side after the jump
+    """
+    if flow != 0.0 and stores_inflow(tables, i):
+        mass = flow * missing_time(times, filling_rate(tables, out, i, i))
+        y[tables.nodes[i]["y"]] += mass
+        y[pipe["y"]] -= mass
+        past[history.CORRECTED_TIME] = history.NAN
+
+
+@njit
+def correct_columns(past, tables, y, i, change, times):
+    """Correct the flow of each rigid column at node i for a pressure jump there within the step.
+
+    The part of its effect that the weights of the step have not counted is added. change : jump of the pressure [Pa]
+    """
+    columns = tables.columns
+    for k in range(columns.size):
+        side = 1 * (columns[k]["from_node"] == i) - 1 * (columns[k]["to_node"] == i)
+        if side != 0 and change != 0.0:
+            share, admittance = columns[k]["area"] / columns[k]["length"], tables.nodes[i]["admittance"]
+            rate = share / admittance if admittance > 0.0 else 0.0
+            y[columns[k]["y"]] += side * change * share * missing_time(times, rate)
+            past[history.CORRECTED_TIME] = history.NAN
+
+
+@njit
+def correct_behind_valves(past, tables, y, spare, out, times):
+    """Correct nodes with storage behind valves, and rigid columns, for a jump at nodes that are solved with valves.
+
+    The mass added to these nodes is subtracted from all delay lines whose outflow into junctions the jump has changed,
+    in proportion to the change.
+    spare, out : values of the right-hand side before and after the jump
+    """
+    layout, valves, nodes = tables.layout[0], tables.valves, tables.nodes
+    pressure, given, fed = layout["pressure"], 0.0, 0.0
+    if tables.columns.size > 0:
+        for i in range(nodes.size):
+            correct_columns(past, tables, y, i, out[pressure + i] - spare[pressure + i], times)
+    for k in range(valves.size):
+        flow = out[layout["valve"] + k] - spare[layout["valve"] + k]
+        for side in range(2):
+            i, j = valves[k]["from_node"], valves[k]["to_node"]
+            if side == 1:
+                i, j, flow = j, i, -flow
+            if flow != 0.0 and stores_inflow(tables, i):
+                gain = -flow * missing_time(times, filling_rate(tables, out, i, j))
+                y[nodes[i]["y"]] += gain
+                given += gain
+                past[history.CORRECTED_TIME] = history.NAN
+    if given == 0.0:
+        return
+    for stage in range(2):  # sum of the flows out of lines; then each line's share
+        for k in range(tables.delays.size):
+            pipe = tables.pipes[tables.delays[k]["pipe"]]
+            at = layout["ends"] + 4 * tables.delays[k]["pipe"]
+            for side in range(2):
+                if nodes[pipe["to_node"] if side == 1 else pipe["from_node"]]["kind"] != JUNCTION:
+                    continue
+                come = out[at + 1 + side] - spare[at + 1 + side]
+                leaves = come - (out[at + 3 * side] - spare[at + 3 * side])
+                if stage == 0:
+                    fed += leaves
+                elif fed != 0.0:
+                    y[pipe["y"]] -= given * leaves / fed

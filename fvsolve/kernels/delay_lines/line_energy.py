@@ -18,28 +18,12 @@ beta (1 - beta) c (s - s_h)^2 of each wave s; s_h is the wave sent h before.
 import numpy as np
 
 from fvsolve.jit import njit
-from fvsolve.kernels.delay_lines.line_interior import sent_wave
-from fvsolve.kernels.delay_lines.line_rates import friction_loss
-from fvsolve.kernels.delay_lines.wave_history import (
-    COUNT,
-    FIRST_JUMP,
-    JUMP_CAPACITY,
-    JUMP_COUNT,
-    PROFILE_ENTRIES,
-    find_interval,
-    jump_head,
-    jump_list,
-    offsets_of,
-    read_waves,
-    reading_data,
-    time_of,
-    time_tolerance,
-)
+from fvsolve.kernels.delay_lines import wave_history as history
+from fvsolve.kernels.delay_lines.line_rates import friction_loss, sent_wave
 from fvsolve.kernels.steady_friction import drag
 
-GAUSS_POINTS = np.array([-0.5, 0.0, 0.5]) * np.sqrt(
-    0.6
-)  # Gauss points of a cell or interval, in widths from its centre
+# Gauss points of a cell or interval, in widths from its centre
+GAUSS_POINTS = np.array([-0.5, 0.0, 0.5]) * np.sqrt(0.6)
 GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 
 
@@ -49,9 +33,10 @@ def sent_waves(t, out, tables, number, q, at):
 
     `at` may lie in the step that ends at t, see `sent_wave`. out : values of the right-hand side at t
     """
-    past, newest = tables.past, int(tables.past[COUNT]) - 1
-    if newest >= 0 and (at <= time_of(past, newest) or t <= time_of(past, newest)):
-        return read_waves(past, offsets_of(past), reading_data(past, newest), tables.delays[number], q, at)
+    past, newest = tables.past, int(tables.past[history.COUNT]) - 1
+    if newest >= 0 and (at <= history.time_of(past, newest) or t <= history.time_of(past, newest)):
+        places, clock = history.offsets_of(past), history.reading_data(past, newest)
+        return history.read_waves(past, places, clock, tables.delays[number], q, at)
     return sent_wave(t, out, tables, number, q, 0, at), sent_wave(t, out, tables, number, q, 1, at)
 
 
@@ -59,18 +44,17 @@ def sent_waves(t, out, tables, number, q, at):
 def kink_before(past, places, line, q, t, least):
     """Latest time before t at which a wave sent into stretch q may have a kink or jump [s]; at least `least`.
 
-    Kinks may be at entries. places : result of `offsets_of`; line : row of the delay line
+    Kinks may be at entries.
     """
-    latest, queue, before = least, int(past[JUMP_CAPACITY]), t - time_tolerance(past)
-    k, x = find_interval(past, int(past[COUNT]) - 1, before)
+    latest, before = least, t - history.time_tolerance(past)
+    k, x = history.find_interval(past, int(past[history.COUNT]) - 1, before)
     k += x == 1.0
-    if k >= PROFILE_ENTRIES and time_of(past, k) < before:
-        latest = max(latest, time_of(past, k))
+    if k >= history.PROFILE_ENTRIES and history.time_of(past, k) < before:
+        latest = max(latest, history.time_of(past, k))
     for wave in range(2):
-        at = jump_head(places, line["stretch"] + q, wave)
-        times = jump_list(places, queue, at)
-        for i in range(int(past[at + JUMP_COUNT])):
-            time = past[times + (int(past[at + FIRST_JUMP]) + i) % queue]
+        at = history.jump_head(places, line["stretch"] + q, wave)
+        for i in range(int(past[at + history.JUMP_COUNT])):
+            time = past[history.jump_place(past, places, at, i)]
             if time < before:
                 latest = max(latest, time)
     return latest
@@ -82,20 +66,20 @@ def stretch_integrals(t, out, tables, number, q):
 
     R, L : forward and backward wave [kg/s]; out : values of the right-hand side at t
     The energies are those above the initial steady state, multiplied by density times area [kg/m], see the module. A
-    line
-    with a travel time tau below the step h stores the fraction tau / h of the waves sent in h. There the integrals are
-    those of the waves sent in h; the energies are multiplied by tau / h, the first result by (tau / h)^2.
+    line with a travel time tau below the step h stores the fraction tau / h of the waves sent in h. There the integrals
+    are those of the waves sent in h; the energies are multiplied by tau / h, the first result by (tau / h)^2.
     """
     past, line, st = tables.past, tables.delays[number], tables.settings[0]
-    pipe, places, hold, share = tables.pipes[line["pipe"]], offsets_of(past), line["hold"], 1.0 - line["now"]
+    pipe, places, hold, share = tables.pipes[line["pipe"]], history.offsets_of(past), line["hold"], 1.0 - line["now"]
     first, flow = tables.nodes[pipe["from_node"]], pipe["flow"]
     height = st["rho"] * st["gravity"] * (first["elevation"] - st["datum"])
     fall = pipe["drag"] * line["tau"]  # decrease of q0 along a stretch
     top = pipe["admittance"] * ((first["pressure"] - st["ambient"]) + height) - fall * q
     net, ahead, back = 0.0, 0.0, 0.0
-    end, oldest, middle = t, t - hold + time_tolerance(past), t - 0.5 * hold
+    end, oldest, middle = t, t - hold + history.time_tolerance(past), t - 0.5 * hold
     while end > oldest:
-        begin = kink_before(past, places, line, q, end, middle if end > middle + time_tolerance(past) else t - hold)
+        least = middle if end > middle + history.time_tolerance(past) else t - hold
+        begin = kink_before(past, places, line, q, end, least)
         for g in range(3):
             at = end + (GAUSS_POINTS[g] - 0.5) * (end - begin)
             r, l = sent_waves(t, out, tables, number, q, at)

@@ -1,4 +1,4 @@
-"""Delay lines in the right-hand side, under the linear density law.
+"""Delay lines in the right-hand side, under the linear density law, and waves at any point of a line.
 
 A line consists of stretches of travel time tau. The forward wave r and the backward wave l travel unchanged to the
 middle of a stretch. There friction subtracts delta = tau / 2 (drag(M) - drag0) from the forward wave and adds it to the
@@ -9,26 +9,16 @@ mass flow in the middle, M + delta = M0 + r - l, with M0 in the initial steady s
 A line shorter than the longest step h delivers the fraction beta = 1 - tau / h of a sent wave at once and the rest
 after h. Its mean delay is tau, and it amplifies no wave. Its ends are coupled at once: p' follows from two admittances
 Y tau / (2 h - tau) with a conductance between them; Y is the admittance of the pipe.
+
+At a fraction x of a stretch, from its `from` end, the forward wave is r(t, x) = sent(t - x tau) - x delta, and the
+backward wave is l(t, x) = sent(t - (1 - x) tau) + (1 - x) delta. delta is that of an earlier time: for x >= 1/2 when
+the forward wave at x passed the middle, for x < 1/2 when the backward wave at x passed it. At both ends the formulas
+give the arriving waves. Arguments are those of `wave_history`.
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.delay_lines.wave_history import (
-    ARRIVALS_COUNT,
-    ARRIVALS_SIZE,
-    ARRIVALS_TIME,
-    COUNT,
-    HEAD_SIZE,
-    arrived_until,
-    interpolate_waves,
-    jump_head,
-    jumps_until,
-    newest_before,
-    offsets_of,
-    reading_data,
-    ring_of,
-    stencil,
-)
-from fvsolve.kernels.dtypes import FRICTION_HAZEN, FRICTION_NONE, FRICTION_ROUGH
+from fvsolve.kernels.delay_lines import wave_history as history
+from fvsolve.kernels.dtypes import FRICTION_HAZEN, FRICTION_NONE, FRICTION_ROUGH, PIPE_FLOW, PIPE_PRESSURE
 from fvsolve.kernels.node_clusters import row_in_cluster
 from fvsolve.kernels.steady_friction import EXPONENT, drag, power_of_square
 from fvsolve.kernels.table_handle import open_tables
@@ -63,7 +53,7 @@ def friction_loss(pipe, line, r, l):
     """Lumped friction loss in the middle of a stretch, where waves r and l meet [kg/s], by Newton's method.
 
     delta = tau / 2 (drag(M) - drag0), M = M0 + r - l - delta; the equation is monotone in M. The loss delta is
-    subtracted from r and added to l. M0, drag0 : flow and drag of the initial steady state; line : row of the line
+    subtracted from r and added to l. M0, drag0 : flow and drag of the initial steady state
     """
     if not has_friction(pipe):
         return 0.0
@@ -86,22 +76,19 @@ def write_arrivals(past, places, clock, line, pipe, q, t):
 
     Three numbers [kg/s]: the backward wave at its beginning, the forward wave at its end, the loss. In a line shorter
     than a step both waves hold for zero pressure deviation p' at its ends. Jumps travel through it as through any line.
-    places : result of `offsets_of`; clock : result of `reading_data`; line, pipe : rows of the line and of its pipe
     """
-    ring, mask = ring_of(places, line, q)
-    k, w = stencil(past, clock, t - line["hold"])
-    u, v = interpolate_waves(past, ring, mask, k, w)
-    head = jump_head(places, line["stretch"] + q, 0)
-    r = u + arrived_until(past, places, clock, head, t, line["tau"])
-    l = v + arrived_until(past, places, clock, head + HEAD_SIZE, t, line["tau"])
+    u, v = history.smooth_waves(past, places, clock, line, q, t - line["hold"])
+    head = history.jump_head(places, line["stretch"] + q, 0)
+    r = u + history.arrived_until(past, places, clock, head, t, line["tau"])
+    l = v + history.arrived_until(past, places, clock, head + history.HEAD_SIZE, t, line["tau"])
     delta, beta = friction_loss(pipe, line, r, l), line["now"]
     back, ahead = l + delta, r - delta
     if beta > 0.0:
-        ahead -= beta * (u + jumps_until(past, places, head, t + clock[4]))
-        back -= beta * (v + jumps_until(past, places, head + HEAD_SIZE, t + clock[4]))
+        ahead -= beta * (u + history.jumps_until(past, places, head, t + clock[4]))
+        back -= beta * (v + history.jumps_until(past, places, head + history.HEAD_SIZE, t + clock[4]))
         per = 1.0 / (1.0 - beta * beta)
         ahead, back = per * (ahead - beta * back), per * (back - beta * ahead)
-    at = places[0] + ARRIVALS_SIZE * (line["stretch"] + q)
+    at = places[0] + history.ARRIVALS_SIZE * (line["stretch"] + q)
     past[at], past[at + 1], past[at + 2] = back, ahead, delta
 
 
@@ -111,9 +98,9 @@ def write_all_arrivals(past, tables, t):
 
     If nodes are solved several times for the same t, the waves are read only once.
     """
-    if past[ARRIVALS_TIME] == t and past[ARRIVALS_COUNT] == past[COUNT]:
+    if past[history.ARRIVALS_TIME] == t and past[history.ARRIVALS_COUNT] == past[history.COUNT]:
         return
-    places, clock = offsets_of(past), reading_data(past, newest_before(past, t))
+    places, clock = history.offsets_of(past), history.reading_data(past, history.newest_before(past, t))
     delays, pipes = tables.delays, tables.pipes
     for i in range(delays.size):
         line = delays[i]
@@ -121,7 +108,7 @@ def write_all_arrivals(past, tables, t):
         write_arrivals(past, places, clock, line, pipe, 0, t)
         if last > 0:
             write_arrivals(past, places, clock, line, pipe, last, t)
-    past[ARRIVALS_TIME], past[ARRIVALS_COUNT] = t, past[COUNT]
+    past[history.ARRIVALS_TIME], past[history.ARRIVALS_COUNT] = t, past[history.COUNT]
 
 
 @njit
@@ -132,15 +119,15 @@ def outgoing_line_waves(t, y, dydt, out, handle):
     """
     tables = open_tables(handle)
     past, layout, lines = tables.past, tables.layout[0], tables.delays
-    started, place, ends, net = past[COUNT] > 0.0, offsets_of(past)[0], layout["ends"], layout["net"]
+    started, place, ends, net = past[history.COUNT] > 0.0, history.offsets_of(past)[0], layout["ends"], layout["net"]
     if started:
         write_all_arrivals(past, tables, t)
     for i in range(lines.size):
         line, pipe = lines[i], tables.pipes[lines[i]["pipe"]]
-        at, first = ends + 4 * line["pipe"], place + ARRIVALS_SIZE * line["stretch"]
+        at, first = ends + 4 * line["pipe"], place + history.ARRIVALS_SIZE * line["stretch"]
         left, right = 0.0, 0.0
         if started:
-            left, right = past[first], past[first + ARRIVALS_SIZE * (line["stretches"] - 1) + 1]
+            left, right = past[first], past[first + history.ARRIVALS_SIZE * (line["stretches"] - 1) + 1]
         out[at + 1], out[at + 2] = left, right
         out[net + pipe["from_node"]] += 2.0 * left
         out[net + pipe["to_node"]] += 2.0 * right
@@ -203,3 +190,122 @@ def solve_line_clusters(t, y, dydt, out, handle):
             for j in range(n):
                 total += tables.floats[at + j] * work[j]
             out[layout["pressure"] + integers[first + i]] = total
+
+
+# waves within a line ----------
+
+
+@njit
+def sent_wave(t, out, tables, number, q, wave, at):
+    """Wave sent into stretch q of delay line `number` at a time `at` <= t, with its jumps [kg/s].
+
+    `at` may lie in the step that ends at t; there a wave from a node is linear up to its value in `out` at t. The
+    result is 0 before the first entry.
+    """
+    past, line = tables.past, tables.delays[number]
+    newest = int(past[history.COUNT]) - 1
+    if newest < 0:
+        return 0.0
+    last, places, until = history.time_of(past, newest), history.offsets_of(past), at + history.time_tolerance(past)
+    both = history.smooth_waves(past, places, history.reading_data(past, newest), line, q, min(at, last))
+    jumps = history.jump_head(places, line["stretch"] + q, wave)
+    value = (both[1] if wave == 1 else both[0]) + history.jumps_until(past, places, jumps, until)
+    if at <= last or t <= last:
+        return value
+    if q == (line["stretches"] - 1 if wave == 1 else 0):  # interpolated to the wave that its node sends now
+        now = out[tables.layout[0]["ends"] + 4 * line["pipe"] + 3 * wave]
+        return value + (now - value) * (at - last) / (t - last)
+    pipe, before = tables.pipes[line["pipe"]], q + 1 if wave == 1 else q - 1
+    r, l = history.read_waves(past, places, history.reading_data(past, newest), line, before, at - line["tau"])
+    delta = friction_loss(pipe, line, r, l)
+    return l + delta if wave == 1 else r - delta
+
+
+@njit
+def waves_at(t, out, tables, number, share):
+    """(forward, backward) wave [kg/s] at t of delay line `number` at a fraction `share` of its length from `from`.
+
+    out : values of the right-hand side at t
+    """
+    line = tables.delays[number]
+    pipe, stretches = tables.pipes[line["pipe"]], line["stretches"]
+    q = min(int(share * stretches), stretches - 1)
+    x, tau = share * stretches - q, line["tau"]
+    r = sent_wave(t, out, tables, number, q, 0, t - x * tau)
+    l = sent_wave(t, out, tables, number, q, 1, t - (1.0 - x) * tau)
+    then = t - max(x, 1.0 - x) * tau
+    near = r if x >= 0.5 else sent_wave(t, out, tables, number, q, 0, then)
+    far = l if x < 0.5 else sent_wave(t, out, tables, number, q, 1, then)
+    delta = friction_loss(pipe, line, near, far)
+    return r - x * delta, l + (1.0 - x) * delta
+
+
+@njit
+def waves_along_line(t, out, handle, number, r, l):
+    """Write forward and backward wave [kg/s] at the centres of r.size equal parts of line `number` to r and l.
+
+    out : values of the right-hand side at t
+    """
+    tables, n = open_tables(handle), r.size
+    for j in range(n):
+        r[j], l[j] = waves_at(t, out, tables, number, (j + 0.5) / n)
+
+
+@njit
+def sent_wave_linear(past, places, clock, ring, mask, jumps, wave, t):
+    """Wave sent into a stretch at t [kg/s], by linear interpolation between entries, with its jumps.
+
+    ring, mask : result of `ring_of`; jumps : offset of the head of its jumps
+    """
+    last, latest, often, even = clock[0], clock[1], clock[2], clock[3]
+    place = (t - latest) * often
+    if place > -even:
+        back = int(place)
+        k, x = last + back - 1, place - back + 1.0
+    else:
+        k, x = history.find_interval(past, last, t)
+        if k < history.PROFILE_ENTRIES and x == 0.0:  # before the first entry
+            return history.jumps_until(past, places, jumps, t + clock[4])
+    a, b = ring + 2 * (k & mask) + wave, ring + 2 * ((k + 1) & mask) + wave
+    return past[a] + x * (past[b] - past[a]) + history.jumps_until(past, places, jumps, t + clock[4])
+
+
+@njit(forceinline=True)
+def waves_at_linear(t, past, places, clock, line, share):
+    """Both waves as in `waves_at` at the time t of the last entry, by linear interpolation; used for envelopes.
+
+    The friction loss is that of the waves that arrive at the ends of the stretch at t.
+    share : distance from `from` as a fraction of the length of the line
+    """
+    stretches, tau = line["stretches"], line["tau"]
+    q = min(int(share * stretches), stretches - 1)
+    x, s = share * stretches - q, line["stretch"] + q
+    ring, mask = history.ring_of(places, line, q)
+    delta, jumps = past[places[0] + history.ARRIVALS_SIZE * s + 2], history.jump_head(places, s, 0)
+    steps, others = tau * clock[2], jumps + history.HEAD_SIZE
+    if steps + 2.0 < clock[3] and past[jumps + history.JUMP_COUNT] + past[others + history.JUMP_COUNT] == 0.0:
+        ahead, back = x * steps, (1.0 - x) * steps  # age of both waves [steps]
+        i, j = int(ahead), int(back)
+        a, b = ring + 2 * ((clock[0] - i) & mask), ring + 2 * ((clock[0] - i - 1) & mask)
+        c, d = ring + 2 * ((clock[0] - j) & mask) + 1, ring + 2 * ((clock[0] - j - 1) & mask) + 1
+        r = past[a] + (ahead - i) * (past[b] - past[a]) + past[jumps + history.REMOVED_SUM]
+        l = past[c] + (back - j) * (past[d] - past[c]) + past[others + history.REMOVED_SUM]
+    else:
+        r = sent_wave_linear(past, places, clock, ring, mask, jumps, 0, t - x * tau)
+        l = sent_wave_linear(past, places, clock, ring, mask, others, 1, t - (1.0 - x) * tau)
+    return r - x * delta, l + (1.0 - x) * delta
+
+
+@njit
+def observe_lines(t, y, out, handle, values):
+    """Write the values of the pressure and flow probes within delay lines, between their ends, to `values`."""
+    tables = open_tables(handle)
+    probes = tables.probes
+    for k in range(probes.size):
+        probe = probes[k]
+        if (probe["kind"] == PIPE_PRESSURE or probe["kind"] == PIPE_FLOW) and probe["side"] == 0:
+            pipe = tables.pipes[probe["index"]]
+            if pipe["delay"] >= 0:
+                r, l = waves_at(t, out, tables, pipe["delay"], tables.floats[probe["weights"]])
+                value = r + l if probe["kind"] == PIPE_PRESSURE else pipe["flow"] + (r - l)
+                values[k] = probe["scale"] * value + probe["offset"]

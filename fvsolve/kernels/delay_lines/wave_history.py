@@ -17,28 +17,20 @@ The array `past` contains in this order:
 
 So a step through a large network touches little memory: the ends of rings, and heads.
 
-Arguments: q : stretch within its line; s : stretch counted over all lines; wave : 0 forward, 1 backward; at : offset
-of a head in `past`; queue : capacity of a list of jumps; places : result of `offsets_of`; clock : result of
-`reading_data`; line : row of a delay line.
+Arguments of all kernels of delay lines: past : wave history; places : result of `offsets_of`; clock : result of
+`reading_data`; line, pipe : rows of a delay line and of its pipe; q : stretch within its line; s : stretch counted over
+all lines; wave : 0 forward, 1 backward; side : 0 end at `from`, 1 end at `to`; at : offset of a head in `past`.
 """
 
 from fvsolve.jit import njit
 
 HEADER_SIZE = 24
-COUNT, CAPACITY, JUMP_CAPACITY, STRETCHES = (
-    0,
-    1,
-    2,
-    3,
-)  # entries so far, capacity for times, for jumps of a wave, stretches
+COUNT, CAPACITY, JUMP_CAPACITY, STRETCHES = 0, 1, 2, 3  # entries so far, capacity for times, jumps of a wave, stretches
 RING_FACTOR = 4  # factor by which rings are longer than at first
 LAST_STEP, EQUAL_STEPS = 5, 6  # length of the last step [s], number of last steps of that length
 STEP_BEFORE, EQUAL_STEPS_BEFORE = 7, 8  # values of both before the last entry
-GREATEST_JUMP, GREATEST_UNSTORED_JUMP, JUMPS_TRAVELLING = (
-    9,
-    10,
-    11,
-)  # greatest jump [Pa], greatest jump that did not fit [Pa], number of jumps now
+GREATEST_JUMP, GREATEST_UNSTORED_JUMP = 9, 10  # greatest jump, greatest jump that did not fit [Pa]
+JUMPS_TRAVELLING = 11  # number of jumps now
 ARRIVALS_TIME, ARRIVALS_COUNT = 12, 13  # time and number of entries for which the stored arrivals hold
 CORRECTED_TIME = 14  # time of a corrected state until it is recorded again [s]; NaN before its entry; else -INFINITE
 NEXT_ARRIVAL = 15  # arrival of the next jump that ends a step [s]; until it is admitted, no reading includes it
@@ -47,21 +39,12 @@ MOST_JUMPS_TRAVELLING = 18  # greatest number of jumps travelling at one time
 GREATEST_WAVE = 17  # greatest wave so far, deviation from the initial steady state [Pa]
 INFINITE = 1e300  # time [s]
 PROFILE_ENTRIES = 8  # entries of the initial steady state (zeros) before the first entry
-REMOVED_SUM, FIRST_JUMP, JUMP_COUNT, ARRIVED_COUNT, HEAD_SIZE = (
-    0,
-    1,
-    2,
-    3,
-    4,
-)  # head of the jumps of a wave, and its size
+REMOVED_SUM, FIRST_JUMP, JUMP_COUNT, ARRIVED_COUNT, HEAD_SIZE = 0, 1, 2, 3, 4  # head of a list of jumps, its size
 ARRIVALS_SIZE = 3  # values per stretch: backward wave at its beginning, forward wave at its end, delta
-RING_GAP = (
-    8  # numbers between rings, one cache line: without them entries of the same time would share a few cache sets
-)
+RING_GAP = 8  # numbers between rings, one cache line: else entries of the same time would share a few cache sets
 TIME_TOLERANCE, ROUNDING = 1e-9, 1e-14  # tolerance of equal times: fraction of a step, and at least of the time
-GREATEST_STEP_RATIO = (
-    1.9  # ratio of neighbouring steps above which interpolation is linear; it occurs where a step was shortened
-)
+GREATEST_STEP_RATIO = 1.9  # ratio of neighbouring steps, where one was shortened, above which readings are linear
+NAN = float("nan")
 
 
 @njit(forceinline=True)
@@ -84,30 +67,26 @@ def offsets_of(past):
 
 @njit(forceinline=True)
 def ring_of(places, line, q):
-    """(offset in `past` of the entries of stretch q of a line, bit mask that wraps entry numbers).
-
-    places : result of `offsets_of`
-    """
+    """(offset in `past` of the entries of stretch q of a line, bit mask that wraps entry numbers)."""
     length = places[4] * line["ring_size"]
     return places[3] + 2 * (places[4] * line["ring"] + q * length) + RING_GAP * (line["stretch"] + q), length - 1
 
 
 @njit(forceinline=True)
 def jump_head(places, s, wave):
-    """Offset in `past` of the head of the list of jumps of a wave of stretch s; a head has HEAD_SIZE numbers.
-
-    s : stretch counted over all lines; wave : 0 forward, 1 backward; places : result of `offsets_of`
-    """
+    """Offset in `past` of the head of the list of jumps of a wave of stretch s; a head has HEAD_SIZE numbers."""
     return places[1] + HEAD_SIZE * (2 * s + wave)
 
 
 @njit(forceinline=True)
-def jump_list(places, queue, at):
-    """Offset in `past` of the times of the jumps of the head at `at`; their sizes and running sums follow.
+def jump_place(past, places, at, i):
+    """Offset in `past` of the time of jump i of a list, counted from the oldest one.
 
-    queue : capacity of the list, which is the length of each of the three parts; places : result of `offsets_of`
+    Its size is past[JUMP_CAPACITY] further, and the running sum of the list up to it as much again.
     """
-    return places[2] + 3 * queue * ((at - places[1]) // HEAD_SIZE)
+    queue = int(past[JUMP_CAPACITY])
+    k = int(past[at + FIRST_JUMP]) + i
+    return places[2] + 3 * queue * ((at - places[1]) // HEAD_SIZE) + (k if k < queue else k - queue)
 
 
 @njit(forceinline=True)
@@ -216,7 +195,7 @@ def reading_data(past, newest):
 def stencil(past, clock, t):
     """(entry k, weights of entries k - 2 .. k + 3) for the smooth part at t, up to the newest entry of `clock`.
 
-    clock : result of `reading_data`. After that entry its value is kept.
+    After that entry its value is kept.
     """
     newest, latest, per_step, even = clock[0], clock[1], clock[2], clock[3]
     if t >= latest:  # also before the first step, whose length is not known yet
@@ -236,11 +215,9 @@ def stencil(past, clock, t):
 
 
 @njit(forceinline=True)
-def interpolate_waves(past, at, mask, k, w):
-    """Smooth parts of both waves of a stretch by the weights w of entries k - 2 .. k + 3: (forward, backward) [kg/s].
-
-    at, mask : result of `ring_of`; k, w : result of `stencil`
-    """
+def smooth_waves(past, places, clock, line, q, t):
+    """Smooth parts of both waves sent into stretch q of a delay line at t: (forward, backward) [kg/s]."""
+    (at, mask), (k, w) = ring_of(places, line, q), stencil(past, clock, t)
     a, b, c = at + 2 * ((k - 2) & mask), at + 2 * ((k - 1) & mask), at + 2 * (k & mask)
     d, e, f = at + 2 * ((k + 1) & mask), at + 2 * ((k + 2) & mask), at + 2 * ((k + 3) & mask)
     r = w[0] * past[a] + w[1] * past[b] + w[2] * past[c] + w[3] * past[d] + w[4] * past[e] + w[5] * past[f]
@@ -249,23 +226,13 @@ def interpolate_waves(past, at, mask, k, w):
     return r, l
 
 
-@njit(forceinline=True)
-def wrap_index(i, queue):
-    """Index i < 2 queue, wrapped to the capacity `queue` of a list of jumps."""
-    return i if i < queue else i - queue
-
-
 @njit
-def first_after(past, queue, times, first, count, t):
-    """Number of the jumps of a list that were sent up to t; the first jump sent after t has this position in it.
-
-    Positions count from the oldest jump of the list. times : offset of the list in `past`; queue : its capacity
-    first, count : index of the oldest jump, number of jumps
-    """
-    low, high = 0, count
+def first_after(past, places, at, t):
+    """Number of the jumps of a list that were sent up to t; the first jump sent after t has this position in it."""
+    low, high = 0, int(past[at + JUMP_COUNT])
     while low < high:
         middle = (low + high) // 2
-        if past[times + wrap_index(first + middle, queue)] > t:
+        if past[jump_place(past, places, at, middle)] > t:
             high = middle
         else:
             low = middle + 1
@@ -274,35 +241,27 @@ def first_after(past, queue, times, first, count, t):
 
 @njit(forceinline=True)
 def sum_of_first(past, places, at, count):
-    """Sum of the jumps removed from the list of a wave and of the first `count` jumps in it [kg/s].
-
-    at : offset of the head of the list; places : result of `offsets_of`
-    """
+    """Sum of the jumps removed from the list of a wave and of the first `count` jumps in it [kg/s]."""
     if count == 0:
         return past[at + REMOVED_SUM]
-    queue = int(past[JUMP_CAPACITY])
-    return past[jump_list(places, queue, at) + 2 * queue + wrap_index(int(past[at + FIRST_JUMP]) + count - 1, queue)]
+    return past[jump_place(past, places, at, count - 1) + 2 * int(past[JUMP_CAPACITY])]
 
 
 @njit
 def sum_listed_jumps(past, places, at, t):
     """Sum of the jumps of a wave sent up to t [kg/s], including jumps already removed from its list.
 
-    The list must not be empty. at : offset of the head of the list in `past`
+    The list must not be empty.
     """
-    count, queue, first = int(past[at + JUMP_COUNT]), int(past[JUMP_CAPACITY]), int(past[at + FIRST_JUMP])
-    times = jump_list(places, queue, at)
-    if past[times + wrap_index(first + count - 1, queue)] <= t:
-        return sum_of_first(past, places, at, count)
-    return sum_of_first(past, places, at, first_after(past, queue, times, first, count, t))
+    count = int(past[at + JUMP_COUNT])
+    if past[jump_place(past, places, at, count - 1)] > t:
+        count = first_after(past, places, at, t)
+    return sum_of_first(past, places, at, count)
 
 
 @njit(forceinline=True)
 def jumps_until(past, places, at, t):
-    """Sum of the jumps of a wave sent up to t [kg/s], including jumps already removed from its list.
-
-    at : offset of the head of the list in `past`
-    """
+    """Sum of the jumps of a wave sent up to t [kg/s], including jumps already removed from its list."""
     return sum_listed_jumps(past, places, at, t) if past[at + JUMP_COUNT] > 0.0 else past[at + REMOVED_SUM]
 
 
@@ -310,17 +269,17 @@ def jumps_until(past, places, at, t):
 def passed_jumps(past, places, at):
     """Sum of the jumps of a wave that have been passed on at the end of their stretch [kg/s].
 
-    Jumps removed from the list are included. at : offset of the head of the list
+    Jumps removed from the list are included.
     """
     return sum_of_first(past, places, at, int(past[at + ARRIVED_COUNT]))
 
 
 @njit(forceinline=True)
 def arrived_until(past, places, clock, at, t, tau):
-    """Sum of the jumps of a wave that have arrived by t, after a travel time tau [kg/s]; at : offset of their head.
+    """Sum of the jumps of a wave that have arrived by t, after a travel time tau [kg/s].
 
     Jumps that arrive from past[NEXT_ARRIVAL] on are left out, because they end a step and are admitted later. While
-    past[ONLY_PASSED_JUMPS] is 1, the result is `passed_jumps`. clock : result of `reading_data`
+    past[ONLY_PASSED_JUMPS] is 1, the result is `passed_jumps`.
     """
     if past[ONLY_PASSED_JUMPS] > 0.0:
         return passed_jumps(past, places, at)
@@ -329,13 +288,8 @@ def arrived_until(past, places, clock, at, t, tau):
 
 @njit(forceinline=True)
 def read_waves(past, places, clock, line, q, t):
-    """Both waves sent into stretch q of a delay line at t, with their jumps: (forward, backward) [kg/s].
-
-    places : result of `offsets_of`; clock : result of `reading_data`
-    """
-    at, mask = ring_of(places, line, q)
-    k, w = stencil(past, clock, t)
-    r, l = interpolate_waves(past, at, mask, k, w)
+    """Both waves sent into stretch q of a delay line at t, with their jumps: (forward, backward) [kg/s]."""
+    r, l = smooth_waves(past, places, clock, line, q, t)
     until, ahead = t + clock[4], jump_head(places, line["stretch"] + q, 0)
     return r + jumps_until(past, places, ahead, until), l + jumps_until(past, places, ahead + HEAD_SIZE, until)
 
@@ -346,14 +300,13 @@ def insert_jump(past, places, at, t, size):
 
     If the list contains a jump of equal time that has not been passed on, the size is added to it. A jump that is not
     listed becomes part of the smooth part, see `write_entry`.
-    t : time at which the jump was sent [s]; size [kg/s]; at : offset of the head of the list
-    past, places : wave history, and result of `offsets_of`
+    t : time at which the jump was sent [s]; size [kg/s]
     """
-    queue, first, count = int(past[JUMP_CAPACITY]), int(past[at + FIRST_JUMP]), int(past[at + JUMP_COUNT])
-    i, times = count, jump_list(places, queue, at)
-    while i > 0 and past[times + wrap_index(first + i - 1, queue)] > t + time_tolerance(past):
+    queue, count = int(past[JUMP_CAPACITY]), int(past[at + JUMP_COUNT])
+    i = count
+    while i > 0 and past[jump_place(past, places, at, i - 1)] > t + time_tolerance(past):
         i -= 1
-    before = times + wrap_index(first + i - 1, queue) if i > 0 else times
+    before = jump_place(past, places, at, max(i - 1, 0))
     if i > int(past[at + ARRIVED_COUNT]) and abs(past[before] - t) <= time_tolerance(past):
         past[before + queue] += size
         update_running_sums(past, places, at, i - 1)
@@ -361,9 +314,9 @@ def insert_jump(past, places, at, t, size):
     if count == queue:
         return False
     for j in range(count, i, -1):
-        here, there = times + wrap_index(first + j, queue), times + wrap_index(first + j - 1, queue)
+        here, there = jump_place(past, places, at, j), jump_place(past, places, at, j - 1)
         past[here], past[here + queue] = past[there], past[there + queue]
-    here = times + wrap_index(first + i, queue)
+    here = jump_place(past, places, at, i)
     past[here], past[here + queue] = t, size
     past[at + JUMP_COUNT] = count + 1.0
     past[JUMPS_TRAVELLING] += 1.0
@@ -374,11 +327,10 @@ def insert_jump(past, places, at, t, size):
 
 @njit
 def update_running_sums(past, places, at, begin):
-    """Update the running sums of the jumps of a wave from position `begin` of its list on; at : offset of its head."""
-    queue, first = int(past[JUMP_CAPACITY]), int(past[at + FIRST_JUMP])
-    total, times = sum_of_first(past, places, at, begin), jump_list(places, queue, at)
+    """Update the running sums of the jumps of a wave from position `begin` of its list on."""
+    queue, total = int(past[JUMP_CAPACITY]), sum_of_first(past, places, at, begin)
     for j in range(begin, int(past[at + JUMP_COUNT])):
-        here = times + wrap_index(first + j, queue)
+        here = jump_place(past, places, at, j)
         total += past[here + queue]
         past[here + 2 * queue] = total
 
@@ -387,13 +339,13 @@ def update_running_sums(past, places, at, begin):
 def remove_arrived_jumps(past, places, at, t):
     """Remove the jumps that have been passed on and were sent before t from the list of a wave.
 
-    They are added to its sum of removed jumps. at : offset of the head of the list
+    They are added to its sum of removed jumps.
     """
     queue = int(past[JUMP_CAPACITY])
-    times = jump_list(places, queue, at)
-    while past[at + ARRIVED_COUNT] > 0.0 and past[times + int(past[at + FIRST_JUMP])] < t:
-        past[at + REMOVED_SUM] += past[times + int(past[at + FIRST_JUMP]) + queue]
-        past[at + FIRST_JUMP] = wrap_index(int(past[at + FIRST_JUMP]) + 1, queue)
+    while past[at + ARRIVED_COUNT] > 0.0 and past[jump_place(past, places, at, 0)] < t:
+        past[at + REMOVED_SUM] += past[jump_place(past, places, at, 0) + queue]
+        first = int(past[at + FIRST_JUMP]) + 1
+        past[at + FIRST_JUMP] = first if first < queue else 0
         past[at + JUMP_COUNT] -= 1.0
         past[at + ARRIVED_COUNT] -= 1.0
         past[JUMPS_TRAVELLING] -= 1.0
@@ -425,8 +377,7 @@ def begin_entry(past, t):
 def write_entry(past, places, line, q, k, wave, value):
     """Store the smooth part of a wave of stretch q as entry k: `value` minus all its jumps so far [kg/s].
 
-    value : whole wave [kg/s]; wave : 0 forward, 1 backward; line : row of the delay line
-    past, places : wave history, and result of `offsets_of`
+    value : whole wave [kg/s]
     """
     at, mask = ring_of(places, line, q)
     jumps = jumps_until(past, places, jump_head(places, line["stretch"] + q, wave), INFINITE)

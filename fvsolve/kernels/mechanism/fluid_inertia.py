@@ -1,31 +1,27 @@
-"""Contribution of the fluid of networks to the mass matrix M of bodies that forces can move.
+"""Contribution of the fluid of networks and of the water in basins to the mass matrix M of bodies that forces can move.
 
-First all fluid counts as fixed to its body. Then the inertia of its sliding along the flow path (C, Z) is subtracted; C
-and Z are the integrals of dr and r x dr along the path. For a rigid column of density rho, area A and length L this
-inertia is rho (A / L) c c' with c = (C, Z), taken from surface to surface. For each cell of a pipe, the mass of the
-cell over the square of its length replaces rho A / L. M contains the products over degrees of freedom, see
-`mass_matrix`.
+First all fluid of a network counts as fixed to its body. Then the inertia of its sliding along the flow path (C, Z) is
+subtracted; C and Z are the integrals of dr and r x dr along the path. For a rigid column of density rho, area A and
+length L this inertia is rho (A / L) c c' with c = (C, Z), taken from surface to surface. For each cell of a pipe, the
+mass of the cell over the square of its length replaces rho A / L. M contains the products over degrees of freedom, see
+`mass_matrix`. The water in a basin moves with its body only along the normal of the bed; along the bed it slides.
+
+s : offset in `work`, or `scratch`, of the angular velocity and the velocity at o (`body_layout`) per unit rate of one
+degree of freedom
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import CHAMBER, LAW_LINEAR, TANK
-from fvsolve.kernels.mechanism.body_layout import (
-    ARM,
-    body_row,
-    cross,
-    freedom_path,
-    freedom_velocity,
-    nearest_free_body,
-)
-from fvsolve.kernels.mechanism.fluid_loads import (
-    column_path,
-    column_segment,
-    node_segment,
-    pipe_moments,
-    pipe_segment,
-    straight_path,
-    to_world,
-)
+from fvsolve.kernels.dtypes import CHAMBER, LAW_LINEAR, TANK, TANK_OUT
+from fvsolve.kernels.mechanism import body_layout as layout
+from fvsolve.kernels.mechanism import fluid_loads as fluid
+from fvsolve.kernels.mechanism.body_layout import body_row, freedom_path, nearest_free_body
+from fvsolve.kernels.mechanism.vectors import cross, dot, plus, rotate, scalar_product, scaled, vector
+
+
+@njit(forceinline=True)
+def freedom_velocity(work, s, r):
+    """Velocity of a point of a body per unit rate of one degree of freedom; r : position of the point from o."""
+    return plus(vector(work, s + 3), cross(work, s, *r))
 
 
 @njit
@@ -34,38 +30,30 @@ def add_segment_inertia(out, tables, i, segment):
 
     Velocities are linear along the segment. segment : (start r, direction t, mass moments m), see `fluid_loads`
     """
-    r, t, m = segment
-    work, n, here = tables.scratch, tables.freedoms.size, body_row(tables, i)
+    (r, t, m), work, here = segment, tables.scratch, body_row(tables, i)
     path, count = freedom_path(tables, nearest_free_body(tables, i))
-    x, y, z = to_world(out, here, r[0], r[1], r[2])
-    x, y, z = x + out[here + ARM], y + out[here + ARM + 1], z + out[here + ARM + 2]
-    tx, ty, tz = to_world(out, here, t[0], t[1], t[2])
+    start = plus(rotate(out, here + layout.ATTITUDE, r, 0), vector(out, here + layout.ARM))
+    along = rotate(out, here + layout.ATTITUDE, t, 0)
     for p in range(count):
         j = tables.integers[path + p]
-        u, v, w = freedom_velocity(work, 6 * j, x, y, z)
-        a, b, c = cross(work, 6 * j, tx, ty, tz)
-        ux, uy, uz = m[0] * u + m[1] * a, m[0] * v + m[1] * b, m[0] * w + m[1] * c
-        ax, ay, az = m[1] * u + m[2] * a, m[1] * v + m[2] * b, m[1] * w + m[2] * c
-        row = 8 * n + tables.freedoms[j]["row"]
+        v, a = freedom_velocity(work, 6 * j, start), cross(work, 6 * j, *along)
+        first, second = plus(scaled(m[0], v), scaled(m[1], a)), plus(scaled(m[1], v), scaled(m[2], a))
+        row = 8 * tables.freedoms.size + tables.freedoms[j]["row"]
         for q in range(p + 1):
             s = 6 * tables.integers[path + q]
-            u, v, w = freedom_velocity(work, s, x, y, z)
-            a, b, c = cross(work, s, tx, ty, tz)
-            work[row + q] += u * ux + v * uy + w * uz + (a * ax + b * ay + c * az)
+            v, a = freedom_velocity(work, s, start), cross(work, s, *along)
+            work[row + q] += scalar_product(v, first) + scalar_product(a, second)
 
 
 @njit(forceinline=True)
 def path_component(out, work, here, s, flow_path):
     """Velocity of a body integrated along a flow path (C, Z), C . v + Z . w, per unit rate of one degree of freedom.
 
-    C, Z : integrals of dr and r x dr along the path; v, w : velocity of the origin of the body, and angular velocity
-    s : offset in `work` of the angular velocity and the velocity at o per unit rate; here : offset of the body in `out`
+    v, w : velocity of the origin of the body, and angular velocity
     """
-    u, v, w = freedom_velocity(work, s, out[here + ARM], out[here + ARM + 1], out[here + ARM + 2])
-    cx, cy, cz = to_world(out, here, flow_path[0], flow_path[1], flow_path[2])
-    zx, zy, zz = to_world(out, here, flow_path[3], flow_path[4], flow_path[5])
-    straight = cx * u + cy * v + cz * w
-    return straight + (zx * work[s] + zy * work[s + 1] + zz * work[s + 2])
+    v = freedom_velocity(work, s, vector(out, here + layout.ARM))
+    straight = scalar_product(rotate(out, here + layout.ATTITUDE, flow_path, 0), v)
+    return straight + dot(work, s, *rotate(out, here + layout.ATTITUDE, flow_path, 3))
 
 
 @njit
@@ -92,36 +80,72 @@ def add_pipe_inertia(y, out, tables, k):
 
     Under the linear density law, the mass that pressure waves add does not slide.
     """
-    pipe, (r, t, span) = tables.pipes[k], pipe_segment(tables, k)
-    i, m = tables.moving_segments[pipe["moving_segment"]]["body"], pipe_moments(tables, y, k, span, 1.0)[0]
+    pipe, (r, t, span) = tables.pipes[k], fluid.pipe_segment(tables, k)
+    i, m = tables.moving_segments[pipe["moving_segment"]]["body"], fluid.pipe_moments(tables, y, k, span, 1.0)[0]
     add_segment_inertia(out, tables, i, (r, t, m))
     length, slides = pipe["cells"] * pipe["dx"], m[0]
     if tables.settings[0]["law"] == LAW_LINEAR:
         slides = tables.settings[0]["rho"] * pipe["area"] * length
-    subtract_sliding_inertia(out, tables, i, straight_path(r, t), slides * (span / length) ** 2)
+    subtract_sliding_inertia(out, tables, i, fluid.straight_path(r, t), slides * (span / length) ** 2)
 
 
 @njit
 def add_fluid_inertia(y, out, tables):
     """Add the fluid of nodes, pipes and rigid columns to the mass matrix M of bodies that forces can move."""
-    nodes, segments, pipes, columns = tables.nodes, tables.moving_segments, tables.pipes, tables.columns
-    if segments.size == 0:
+    nodes, pipes, columns = tables.nodes, tables.pipes, tables.columns
+    if tables.moving_segments.size == 0:
         return
     for i in range(nodes.size):
-        kind, at = nodes[i]["kind"], nodes[i]["moving_segment"]
-        if at >= 0 and (kind == TANK or kind == CHAMBER) and nearest_free_body(tables, segments[at]["body"]) >= 0:
-            add_segment_inertia(out, tables, segments[at]["body"], node_segment(y, tables, i))
+        kind, body = nodes[i]["kind"], fluid.free_carrier(tables, nodes[i]["moving_segment"])
+        if body >= 0 and (kind == TANK or kind == CHAMBER):
+            add_segment_inertia(out, tables, body, fluid.node_segment(y, tables, i))
     for k in range(pipes.size):
-        if (
-            pipes[k]["moving_segment"] >= 0
-            and nearest_free_body(tables, segments[pipes[k]["moving_segment"]]["body"]) >= 0
-        ):
+        if fluid.free_carrier(tables, pipes[k]["moving_segment"]) >= 0:
             add_pipe_inertia(y, out, tables, k)
     for k in range(columns.size):
-        column = columns[k]
-        if column["moving_segment"] >= 0 and nearest_free_body(tables, segments[column["moving_segment"]]["body"]) >= 0:
-            i = segments[column["moving_segment"]]["body"]
+        column, body = columns[k], fluid.free_carrier(tables, columns[k]["moving_segment"])
+        if body >= 0:
             for m in range(column["moving_segments"]):
-                add_segment_inertia(out, tables, i, column_segment(tables, column, m))
+                add_segment_inertia(out, tables, body, fluid.column_segment(tables, column, m))
             slides = tables.settings[0]["rho"] * column["area"] / column["length"]
-            subtract_sliding_inertia(out, tables, i, column_path(y, tables, column), slides)
+            subtract_sliding_inertia(out, tables, body, fluid.column_path(y, tables, column), slides)
+
+
+# basins ----------
+
+
+@njit
+def add_basin_inertia(out, tables):
+    """Add the inertia of the water in all basins on bodies, J' N J for each basin, to the mass matrix in `scratch`.
+
+    Basins on bodies that no degree of freedom moves are left out.
+    J : coefficients of 1, x, y in the normal acceleration of the bed, a column for each degree of freedom
+    N : matrix of the moments of mass of 1, x, y
+    """
+    work, freedoms, paths, n = tables.scratch, tables.freedoms, tables.integers, tables.freedoms.size
+    for b in range(tables.basins.size):
+        i, tank = nearest_free_body(tables, tables.basins[b]["body"]), tables.layout[0]["tank"] + TANK_OUT * b
+        if i < 0:
+            continue
+        path, count = freedom_path(tables, i)
+        for p in range(count):
+            j = paths[path + p]
+            row, (a, c, d) = 8 * n + freedoms[j]["row"], normal_accelerations(out, work, tank, 6 * j)
+            m = tank + layout.MOMENTS
+            e = out[m] * a + out[m + 1] * c + out[m + 2] * d
+            f = out[m + 1] * a + out[m + 3] * c + out[m + 4] * d
+            g = out[m + 2] * a + out[m + 4] * c + out[m + 5] * d
+            for q in range(p + 1):
+                x, y, z = normal_accelerations(out, work, tank, 6 * paths[path + q])
+                work[row + q] += e * x + f * y + g * z
+
+
+@njit(forceinline=True)
+def normal_accelerations(out, work, tank, s):
+    """Normal velocity of the bed of a basin per unit rate of one degree of freedom, as coefficients of 1, x and y.
+
+    They are also those of the normal acceleration per unit acceleration of that degree of freedom.
+    tank : offset of the numbers of the basin in `out`
+    """
+    v, w = freedom_velocity(work, s, vector(out, tank + layout.BASIN_ARM)), vector(work, s)
+    return dot(out, tank + layout.NORMAL, *v), -dot(out, tank + layout.NORTH, *w), dot(out, tank + layout.EAST, *w)

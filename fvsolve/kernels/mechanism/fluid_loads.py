@@ -9,42 +9,53 @@ docs/course.md) for all fluid, the load on the body is
     torque  S x G - J W' - J' W - W x J W - (M Z)' - W x M Z
 
 A prime is d/dt. S is the sum of mass times position, J the inertia about the origin. G = g - a_o is gravity minus the
-acceleration of the origin, W the angular velocity; `noninertial_forces.set_body_motion` writes G, W and W' to `scratch`
-(also named `motion`). Fluid leaves a network with the velocity of its node. The flow inside a tank is that of the first
-cell of each connected pipe, and of each connected rigid column. A load is a tuple of six numbers: force [N], torque
-[N m].
+acceleration of the origin, W the angular velocity; `set_body_motion` writes G, W and W' to `scratch`. Fluid leaves a
+network with the velocity of its node. The flow inside a tank is that of the first cell of each connected pipe, and of
+each connected rigid column. A load is a tuple of six numbers: force [N], torque [N m].
+
+Arguments: r, t : start and direction of a segment; m, d : its mass moments and their rates; path, change : (C, Z) and
+its rate; flow, rate : mass flow [kg/s] and its derivative [kg/s2]; motion : `scratch` after `set_body_motion`; wide,
+spin : offsets, in the data of a body, of the acceleration of its origin and of its angular acceleration.
 """
 
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import CHAMBER, FIXED, JUNCTION, LAW_LINEAR, MOVED_BY_FORCES, TANK
-from fvsolve.kernels.mechanism.body_layout import (
-    ATTITUDE,
-    BIAS,
-    SPIN_BIAS,
-    add_force,
-    add_torque,
-    body_row,
+from fvsolve.kernels.mechanism import body_layout as layout
+from fvsolve.kernels.mechanism.body_layout import add_force, add_torque, body_row, nearest_free_body
+from fvsolve.kernels.mechanism.vectors import (
     cross,
+    minus,
+    plus,
     rotate,
+    rotate_back,
+    scalar_product,
+    scaled,
+    vector,
+    vector_product,
+    write_vector,
 )
-from fvsolve.kernels.mechanism.noninertial_forces import BODY_GRAVITY, BODY_SPIN, BODY_SPIN_RATE, set_body_motion
 from fvsolve.kernels.table_handle import open_tables
 from fvsolve.kernels.tank_levels import tank_level
 
 ZERO_VECTOR = (0.0, 0.0, 0.0)
 ZERO_FLOW_PATH = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+# in `scratch`, written by `set_body_motion`: g - a_o, W, W' and velocity of the origin, in axes of a body
+BODY_GRAVITY, BODY_SPIN, BODY_SPIN_RATE, BODY_VELOCITY = 0, 3, 6, 9
 
 
-@njit(forceinline=True)
-def to_world(out, here, x, y, z):
-    """Vector (x, y, z) in axes of a body, transformed to axes of the world; here : offset of the body in `out`."""
-    return rotate(out, here + ATTITUDE, (x, y, z), 0)
+@njit
+def set_body_motion(tables, out, i, wide, spin):
+    """Write g - a_o, W, W' and the velocity of the origin of body i, in its own axes, to scratch[:12].
 
-
-@njit(forceinline=True)
-def as_tuple(a):
-    """Vector of the first three numbers of an array, as a tuple."""
-    return a[0], a[1], a[2]
+    g : acceleration of gravity; a_o : acceleration of its origin; W, W' : its angular velocity and acceleration
+    wide, spin : offsets of a_o and W' in the data of the body in `out`
+    """
+    here, motion, down = body_row(tables, i), tables.scratch, -tables.settings[0]["gravity"]
+    r, (x, y, z) = here + layout.ATTITUDE, vector(out, here + wide)
+    write_vector(motion, BODY_GRAVITY, *rotate_back(out, r, -x, -y, down - z))
+    write_vector(motion, BODY_SPIN, *rotate_back(out, r, *vector(out, here + layout.SPIN)))
+    write_vector(motion, BODY_SPIN_RATE, *rotate_back(out, r, *vector(out, here + spin)))
+    write_vector(motion, BODY_VELOCITY, *rotate_back(out, r, *vector(out, here + layout.VELOCITY)))
 
 
 @njit(forceinline=True)
@@ -54,59 +65,33 @@ def add_six(a, b):
 
 
 @njit
-def inertia_times(r, t, m, x, y, z):
-    """Inertia of a segment times the vector w = (x, y, z): integral of p x (w x p) over its mass; p : position.
-
-    r, t, m : start, direction and mass moments of the segment
-    """
-    square = m[0] * (r[0] * r[0] + r[1] * r[1] + r[2] * r[2]) + m[2] * (t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
-    square += 2.0 * m[1] * (r[0] * t[0] + r[1] * t[1] + r[2] * t[2])
-    a, b = r[0] * x + r[1] * y + r[2] * z, t[0] * x + t[1] * y + t[2] * z
-    p, q = m[0] * a + m[1] * b, m[1] * a + m[2] * b
-    return (
-        square * x - p * r[0] - q * t[0],
-        square * y - p * r[1] - q * t[1],
-        square * z - p * r[2] - q * t[2],
-    )
+def inertia_times(r, t, m, w):
+    """Inertia of a segment times the vector w: integral of p x (w x p) over its mass; p : position."""
+    square = m[0] * scalar_product(r, r) + m[2] * scalar_product(t, t)
+    square += 2.0 * m[1] * scalar_product(r, t)
+    a, b = scalar_product(r, w), scalar_product(t, w)
+    along = scaled(m[0] * a + m[1] * b, r)
+    return minus(minus(scaled(square, w), along), scaled(m[1] * a + m[2] * b, t))
 
 
 @njit
 def segment_load(motion, r, t, m, d):
-    """Force and torque of a segment of fluid on its body; r, t : start and direction of the segment.
-
-    m, d : integrals of 1, s and s^2 over the mass of the segment, s : distance from r; and their rates
-    motion : `scratch` after `set_body_motion`
-    """
-    sx, sy, sz = m[0] * r[0] + m[1] * t[0], m[0] * r[1] + m[1] * t[1], m[0] * r[2] + m[1] * t[2]
-    gx, gy, gz = as_tuple(motion[BODY_GRAVITY : BODY_GRAVITY + 3])
-    ex, ey, ez = cross(motion, BODY_SPIN_RATE, sx, sy, sz)
-    px, py, pz = cross(motion, BODY_SPIN, sx, sy, sz)
-    px, py, pz = px + d[0] * r[0] + d[1] * t[0], py + d[0] * r[1] + d[1] * t[1], pz + d[0] * r[2] + d[1] * t[2]
-    cx, cy, cz = cross(motion, BODY_SPIN, px, py, pz)
-    wx, wy, wz = as_tuple(motion[BODY_SPIN : BODY_SPIN + 3])
-    hx, hy, hz = cross(motion, BODY_SPIN, *inertia_times(r, t, m, wx, wy, wz))
-    dx, dy, dz = inertia_times(r, t, d, wx, wy, wz)
-    jx, jy, jz = inertia_times(r, t, m, motion[BODY_SPIN_RATE], motion[BODY_SPIN_RATE + 1], motion[BODY_SPIN_RATE + 2])
-    return (
-        m[0] * gx - ex - cx, m[0] * gy - ey - cy, m[0] * gz - ez - cz,
-        sy * gz - sz * gy - jx - dx - hx, sz * gx - sx * gz - jy - dy - hy, sx * gy - sy * gx - jz - dz - hz,
-    )  # fmt: skip
+    """Force and torque of a segment of fluid on its body."""
+    g = vector(motion, BODY_GRAVITY)
+    w, e = vector(motion, BODY_SPIN), vector(motion, BODY_SPIN_RATE)
+    s = plus(scaled(m[0], r), scaled(m[1], t))
+    momentum = plus(plus(vector_product(w, s), scaled(d[0], r)), scaled(d[1], t))
+    force = minus(minus(scaled(m[0], g), vector_product(e, s)), vector_product(w, momentum))
+    torque = minus(minus(vector_product(s, g), inertia_times(r, t, m, e)), inertia_times(r, t, d, w))
+    return force + minus(torque, vector_product(w, inertia_times(r, t, m, w)))
 
 
 @njit
 def flow_load(motion, path, change, flow, rate):
-    """Force and torque of a mass flow along a flow path on its body.
-
-    path, change : integrals of dr and r x dr along the path, and their rates
-    flow, rate : mass flow [kg/s] and its derivative [kg/s2]; motion : `scratch` after `set_body_motion`
-    """
-    cx, cy, cz = cross(motion, BODY_SPIN, path[0], path[1], path[2])
-    zx, zy, zz = cross(motion, BODY_SPIN, path[3], path[4], path[5])
-    return (
-        -rate * path[0] - flow * (change[0] + cx), -rate * path[1] - flow * (change[1] + cy),
-        -rate * path[2] - flow * (change[2] + cz), -rate * path[3] - flow * (change[3] + zx),
-        -rate * path[4] - flow * (change[4] + zy), -rate * path[5] - flow * (change[5] + zz),
-    )  # fmt: skip
+    """Force and torque of a mass flow along a flow path on its body."""
+    straight = plus(change, cross(motion, BODY_SPIN, *path[:3]))
+    around = plus(change[3:], cross(motion, BODY_SPIN, *path[3:]))
+    return minus(scaled(-rate, path), scaled(flow, straight)) + minus(scaled(-rate, path[3:]), scaled(flow, around))
 
 
 # tanks ----------
@@ -155,7 +140,7 @@ def vertical_moments(mass, high):
 def node_segment(y, tables, i):
     """Segment of the fluid stored at node i: (start r, unit vector t, mass moments m); no mass without storage."""
     node = tables.nodes[i]
-    r = as_tuple(tables.moving_segments[node["moving_segment"]]["start"])
+    r = vector(tables.moving_segments[node["moving_segment"]]["start"], 0)
     if node["kind"] == TANK:
         return r, (0.0, 0.0, 1.0), vertical_moments(node["mass"] + y[node["y"]], level_at(y, tables, i))
     return r, ZERO_VECTOR, (node["mass"] + y[node["y"]] if node["kind"] == CHAMBER else 0.0, 0.0, 0.0)
@@ -177,16 +162,6 @@ def node_segment_rates(y, dydt, out, tables, i):
     return -out[tables.layout[0]["supply"] + i], 0.0, 0.0
 
 
-@njit
-def node_load(y, dydt, out, tables, i):
-    """Force and torque of the fluid at node i, and of the fluid that leaves the network there, on its body.
-
-    `set_body_motion` must have written the motion of the body to `scratch`.
-    """
-    r, t, m = node_segment(y, tables, i)
-    return segment_load(tables.scratch, r, t, m, node_segment_rates(y, dydt, out, tables, i))
-
-
 # pipes ----------
 
 
@@ -204,15 +179,11 @@ def pipe_segment(tables, k):
 
     t is zero if both ends are at the same point.
     """
-    pipe = tables.pipes[k]
-    r, s = (
-        tables.moving_segments[pipe["moving_segment"]]["start"],
-        tables.moving_segments[pipe["moving_segment"] + pipe["cells"] - 1]["end"],
-    )
-    x, y, z = s[0] - r[0], s[1] - r[1], s[2] - r[2]
-    length = (x * x + y * y + z * z) ** 0.5
-    per = 1.0 / length if length > 0.0 else 0.0
-    return as_tuple(r), (per * x, per * y, per * z), length
+    pipe, segments = tables.pipes[k], tables.moving_segments
+    r = vector(segments[pipe["moving_segment"]]["start"], 0)
+    span = minus(vector(segments[pipe["moving_segment"] + pipe["cells"] - 1]["end"], 0), r)
+    length = scalar_product(span, span) ** 0.5
+    return r, scaled(1.0 / length if length > 0.0 else 0.0, span), length
 
 
 @njit
@@ -235,7 +206,7 @@ def pipe_moments(tables, y, k, length, share):
 @njit(forceinline=True)
 def straight_path(r, t):
     """Integrals of dr and r x dr along a flow path of unit length from r in the direction t."""
-    return t[0], t[1], t[2], r[1] * t[2] - r[2] * t[1], r[2] * t[0] - r[0] * t[2], r[0] * t[1] - r[1] * t[0]
+    return t + vector_product(r, t)
 
 
 @njit
@@ -256,7 +227,6 @@ def pipe_load(y, dydt, tables, k):
     """Force and torque of the fluid in pipe k, and of the flow between its ends and the surfaces of tanks, on its body.
 
     Axes and origin are those of the body.
-    `set_body_motion` must have written the motion of the body to `scratch`.
     """
     motion, (r, t, length) = tables.scratch, pipe_segment(tables, k)
     m, flow = pipe_moments(tables, y, k, length, 1.0)
@@ -266,10 +236,8 @@ def pipe_load(y, dydt, tables, k):
         i, flow = pipe_end(y, tables, k, right, 1.0)
         if i >= 0:
             sign = 2.0 * right - 1.0
-            up, faster = (
-                tank_path(tables, i, sign * level_at(y, tables, i)),
-                tank_path(tables, i, sign * level_rate(dydt, tables, i)),
-            )
+            up = tank_path(tables, i, sign * level_at(y, tables, i))
+            faster = tank_path(tables, i, sign * level_rate(dydt, tables, i))
             load = add_six(load, flow_load(motion, up, faster, flow, pipe_end(dydt, tables, k, right, 0.0)[1]))
     return load
 
@@ -283,17 +251,13 @@ def column_path(y, tables, column):
 
     The paths in tanks at the ends of the column are included.
     """
-    first, last = (
-        tables.moving_segments[column["moving_segment"]]["start"],
-        tables.moving_segments[column["moving_segment"] + column["moving_segments"] - 1]["end"],
-    )
-    x, z, w = 0.0, 0.0, 0.0
-    for k in range(column["moving_segments"]):
-        swept = tables.moving_segments[column["moving_segment"] + k]["swept"]
-        x, z, w = x + swept[0], z + swept[1], w + swept[2]
+    segments, first, count = tables.moving_segments, column["moving_segment"], column["moving_segments"]
+    span = minus(vector(segments[first + count - 1]["end"], 0), vector(segments[first]["start"], 0))
+    swept = ZERO_VECTOR
+    for k in range(count):
+        swept = plus(swept, vector(segments[first + k]["swept"], 0))
     i, j = column["from_node"], column["to_node"]
-    path = last[0] - first[0], last[1] - first[1], last[2] - first[2], x, z, w
-    return add_six(path, tank_paths(tables, i, j, level_at(y, tables, i), level_at(y, tables, j)))
+    return add_six(span + swept, tank_paths(tables, i, j, level_at(y, tables, i), level_at(y, tables, j)))
 
 
 @njit
@@ -307,27 +271,23 @@ def column_segment(tables, column, k):
         total += segment_length(tables.moving_segments[column["moving_segment"] + m])
     segment = tables.moving_segments[column["moving_segment"] + k]
     long, mass = segment_length(segment), tables.settings[0]["rho"] * column["area"] * column["length"]
+    r = vector(segment["start"], 0)
     if not long > 0.0:
-        return as_tuple(segment["start"]), ZERO_VECTOR, (mass if total == 0.0 else 0.0, 0.0, 0.0)
-    r, s = segment["start"], segment["end"]
-    t = (s[0] - r[0]) / long, (s[1] - r[1]) / long, (s[2] - r[2]) / long
-    return as_tuple(r), t, vertical_moments(mass * long / total, long)
+        return r, ZERO_VECTOR, (mass if total == 0.0 else 0.0, 0.0, 0.0)
+    span = minus(vector(segment["end"], 0), r)
+    return r, (span[0] / long, span[1] / long, span[2] / long), vertical_moments(mass * long / total, long)
 
 
 @njit(forceinline=True)
 def segment_length(segment):
     """Length of a segment [m]."""
-    r, s = segment["start"], segment["end"]
-    x, y, z = s[0] - r[0], s[1] - r[1], s[2] - r[2]
-    return (x * x + y * y + z * z) ** 0.5
+    span = minus(vector(segment["end"], 0), vector(segment["start"], 0))
+    return scalar_product(span, span) ** 0.5
 
 
 @njit
 def column_load(y, dydt, tables, k):
-    """Force and torque of the fluid in rigid column k, and of the flow between its ends and surfaces of tanks.
-
-    They act on its body, whose motion `set_body_motion` must have written to `scratch`.
-    """
+    """Force and torque of the fluid in rigid column k, and of the flow between its ends and surfaces of tanks."""
     column, motion = tables.columns[k], tables.scratch
     i, j = column["from_node"], column["to_node"]
     faster = tank_paths(tables, i, j, level_rate(dydt, tables, i), level_rate(dydt, tables, j))
@@ -348,45 +308,56 @@ def is_fluid_node(kind):
     return kind == TANK or kind == CHAMBER or kind == FIXED or kind == JUNCTION
 
 
+@njit(forceinline=True)
+def free_carrier(tables, row):
+    """Body that carries the fluid with a row of `moving_segments`, if forces can move it; else, or for row < 0, -1."""
+    i = tables.moving_segments[row]["body"] if row >= 0 else -1
+    return i if nearest_free_body(tables, i) >= 0 else -1
+
+
+@njit
+def set_carrier_motion(tables, out, row, least, wide, spin):
+    """Write the motion of the body that carries the fluid with a row of `moving_segments` to `scratch`.
+
+    Returns the offset of the body in `out`. It is -1, and nothing is written, for row < 0 and for a code `loads_body`
+    below `least`: 1 : forces move the body, 2 : a joint load is an output.
+    """
+    if row < 0 or tables.moving_segments[row]["loads_body"] < least:
+        return -1
+    body = tables.moving_segments[row]["body"]
+    set_body_motion(tables, out, body, wide, spin)
+    return body_row(tables, body)
+
+
 @njit
 def add_load(out, here, load, sign):
-    """Add a load in axes of a body to its sums FORCE and TORQUE (sign +1), or subtract it (sign -1).
-
-    load : force [N], torque about the origin [N m]; here : offset of the body in `out`
-    """
-    x, y, z = to_world(out, here, sign * load[0], sign * load[1], sign * load[2])
-    add_force(out, here, 0.0, 0.0, 0.0, x, y, z)
-    x, y, z = to_world(out, here, sign * load[3], sign * load[4], sign * load[5])
-    add_torque(out, here, x, y, z)
+    """Add a load in axes of a body to its sums FORCE and TORQUE (sign +1), or subtract it (sign -1)."""
+    add_force(out, here, 0.0, 0.0, 0.0, *rotate(out, here + layout.ATTITUDE, scaled(sign, load), 0))
+    add_torque(out, here, *rotate(out, here + layout.ATTITUDE, scaled(sign, load[3:]), 0))
 
 
 @njit
 def add_all_fluid_loads(y, dydt, out, tables, least, sign, wide, spin):
     """Add (sign +1) or subtract (sign -1) the loads of the fluid in nodes, pipes and rigid columns on their bodies.
 
-    least : least code `loads_body` that is included; 1 : forces move the body, 2 : a joint load is an output
-    wide, spin : offsets, in the data of a body, of the acceleration of its origin and of its angular acceleration
+    least : least code `loads_body` that is included, see `set_carrier_motion`
     """
-    nodes, pipes, columns, segments = tables.nodes, tables.pipes, tables.columns, tables.moving_segments
+    nodes, pipes, columns = tables.nodes, tables.pipes, tables.columns
     for i in range(nodes.size):
-        if (
-            nodes[i]["moving_segment"] >= 0
-            and is_fluid_node(nodes[i]["kind"])
-            and segments[nodes[i]["moving_segment"]]["loads_body"] >= least
-        ):
-            body = segments[nodes[i]["moving_segment"]]["body"]
-            set_body_motion(tables, out, body, wide, spin)
-            add_load(out, body_row(tables, body), node_load(y, dydt, out, tables, i), sign)
+        row = nodes[i]["moving_segment"] if is_fluid_node(nodes[i]["kind"]) else -1
+        here = set_carrier_motion(tables, out, row, least, wide, spin)
+        if here >= 0:
+            r, t, m = node_segment(y, tables, i)
+            load = segment_load(tables.scratch, r, t, m, node_segment_rates(y, dydt, out, tables, i))
+            add_load(out, here, load, sign)
     for k in range(pipes.size):
-        if pipes[k]["moving_segment"] >= 0 and segments[pipes[k]["moving_segment"]]["loads_body"] >= least:
-            body = segments[pipes[k]["moving_segment"]]["body"]
-            set_body_motion(tables, out, body, wide, spin)
-            add_load(out, body_row(tables, body), pipe_load(y, dydt, tables, k), sign)
+        here = set_carrier_motion(tables, out, pipes[k]["moving_segment"], least, wide, spin)
+        if here >= 0:
+            add_load(out, here, pipe_load(y, dydt, tables, k), sign)
     for k in range(columns.size):
-        if columns[k]["moving_segment"] >= 0 and segments[columns[k]["moving_segment"]]["loads_body"] >= least:
-            body = segments[columns[k]["moving_segment"]]["body"]
-            set_body_motion(tables, out, body, wide, spin)
-            add_load(out, body_row(tables, body), column_load(y, dydt, tables, k), sign)
+        here = set_carrier_motion(tables, out, columns[k]["moving_segment"], least, wide, spin)
+        if here >= 0:
+            add_load(out, here, column_load(y, dydt, tables, k), sign)
 
 
 @njit
@@ -396,4 +367,4 @@ def add_fluid_loads(t, y, dydt, out, handle):
     The loads of moving segments with `loads_body` 0 are left out.
     """
     if dydt.size > 0:
-        add_all_fluid_loads(y, dydt, out, open_tables(handle), MOVED_BY_FORCES, 1.0, BIAS, SPIN_BIAS)
+        add_all_fluid_loads(y, dydt, out, open_tables(handle), MOVED_BY_FORCES, 1.0, layout.BIAS, layout.SPIN_BIAS)

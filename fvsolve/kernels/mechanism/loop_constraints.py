@@ -17,97 +17,49 @@ from math import sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import PIN_VALUE, RATE
-from fvsolve.kernels.mechanism.body_layout import (
-    ACCELERATION,
-    ATTITUDE,
-    POSITION,
-    SPIN,
-    VELOCITY,
-    add_force,
-    body_row,
-    cross,
-    rotate,
-)
-from fvsolve.kernels.mechanism.body_probes import acceleration_at
-from fvsolve.kernels.mechanism.force_elements import point_at
-from fvsolve.kernels.mechanism.mass_matrix import (
-    LOAD_SIZE,
-    add_body_force,
-    body_rate_limit,
-    factor_mass_matrix,
-    fill_mass_matrix,
-    scratch_offsets,
-    solve_factor,
-    solve_mass_matrix,
-    spread_accelerations,
-    state_rates,
-)
+from fvsolve.kernels.mechanism import body_layout as layout
+from fvsolve.kernels.mechanism import mass_matrix as mass
+from fvsolve.kernels.mechanism.body_kinematics import body_of_point, point_at
+from fvsolve.kernels.mechanism.body_layout import body_row
+from fvsolve.kernels.mechanism.body_values import acceleration_at
+from fvsolve.kernels.mechanism.force_elements import add_pair_load, relative_motion
+from fvsolve.kernels.mechanism.vectors import cross, minus, rotate, scalar_product, scaled, vector
 from fvsolve.kernels.table_handle import open_tables
 
 
 @njit(forceinline=True)
 def constraint_offset(tables):
     """Offset in `scratch` of the matrix G, which gives velocities along constrained directions."""
-    return scratch_offsets(tables)[1] + LOAD_SIZE * tables.bodies.size
-
-
-@njit(forceinline=True)
-def body_of(tables, point):
-    """Number of the body of a point; -1 for the world."""
-    return tables.points[point]["body"]
+    return mass.scratch_offsets(tables)[1] + mass.LOAD_SIZE * tables.bodies.size
 
 
 @njit
 def pin_direction(out, tables, pin, r):
     """Unit vector of constrained direction r of a pin, at its present attitude, in axes of the world."""
-    i = body_of(tables, pin["from_point"])
+    i = body_of_point(tables, pin["from_point"])
     if i < 0:
-        return pin["directions"][3 * r], pin["directions"][3 * r + 1], pin["directions"][3 * r + 2]
-    return rotate(out, body_row(tables, i) + ATTITUDE, pin["directions"], 3 * r)
+        return vector(pin["directions"], 3 * r)
+    return rotate(out, body_row(tables, i) + layout.ATTITUDE, pin["directions"], 3 * r)
 
 
 @njit
-def relative_motion(out, tables, pin):
-    """Position of `to` minus that of `from` [m], and velocity and acceleration of `to` relative to the body of `from`.
+def relative_acceleration(out, tables, pin, velocity):
+    """Acceleration of the point `to` relative to the axes of the body of `from`; (65) of docs/course.md.
 
-    Returns 9 numbers, as components in axes of the world; (65) of docs/course.md. The accelerations of both bodies in
-    `out` are used.
+    velocity : velocity of `to` relative to these axes. The accelerations of both bodies in `out` are used.
     """
-    i, j = body_of(tables, pin["from_point"]), body_of(tables, pin["to_point"])
-    x, y, z, u, v, w = point_at(out, tables, pin["to_point"], POSITION)
-    p, q, s, _, _, _ = point_at(out, tables, pin["from_point"], POSITION)
-    a, b, c = 0.0, 0.0, 0.0
+    i, j = body_of_point(tables, pin["from_point"]), body_of_point(tables, pin["to_point"])
+    a = 0.0, 0.0, 0.0
     if j >= 0:
         here = body_row(tables, j)
-        a, b, c = acceleration_at(
-            out, here, here + ACCELERATION, *rotate(out, here + ATTITUDE, tables.points[pin["to_point"]]["place"], 0)
-        )
+        place = rotate(out, here + layout.ATTITUDE, tables.points[pin["to_point"]]["place"], 0)
+        a = acceleration_at(out, here, here + layout.ACCELERATION, *place)
     if i >= 0:
         here = body_row(tables, i)
-        rx, ry, rz = x - out[here + POSITION], y - out[here + POSITION + 1], z - out[here + POSITION + 2]
-        dx, dy, dz = cross(out, here + SPIN, rx, ry, rz)
-        k = here + VELOCITY
-        u, v, w = u - out[k] - dx, v - out[k + 1] - dy, w - out[k + 2] - dz
-        ex, ey, ez = acceleration_at(out, here, here + ACCELERATION, rx, ry, rz)
-        fx, fy, fz = cross(out, here + SPIN, 2.0 * u, 2.0 * v, 2.0 * w)
-        a, b, c = a - ex - fx, b - ey - fy, c - ez - fz
-    return x - p, y - q, z - s, u, v, w, a, b, c
-
-
-@njit
-def add_pin_force(out, tables, pin, r, size):
-    """Add the force `size` [N] along constrained direction r of a pin to both bodies, at the point `to`.
-
-    It is positive on the body of `to`, and negative on the body of `from`.
-    """
-    nx, ny, nz = pin_direction(out, tables, pin, r)
-    x, y, z, _, _, _ = point_at(out, tables, pin["to_point"], POSITION)
-    for end, sign in ((pin["to_point"], size), (pin["from_point"], -size)):
-        i = body_of(tables, end)
-        if i >= 0:
-            here = body_row(tables, i)
-            rx, ry, rz = x - out[here + POSITION], y - out[here + POSITION + 1], z - out[here + POSITION + 2]
-            add_force(out, here, rx, ry, rz, sign * nx, sign * ny, sign * nz)
+        arm = minus(point_at(out, tables, pin["to_point"], layout.POSITION), vector(out, here + layout.POSITION))
+        coriolis = cross(out, here + layout.SPIN, *scaled(2.0, velocity))
+        a = minus(minus(a, acceleration_at(out, here, here + layout.ACCELERATION, *arm)), coriolis)
+    return a
 
 
 @njit
@@ -123,21 +75,19 @@ def fill_constraint_rows(out, tables):
     z, last = g + rows * n, g + 2 * rows * n + rows * rows
     row = 0
     for k in range(pins.size):
-        pin = pins[k]
-        gx, gy, gz, u, v, w, a, b, c = relative_motion(out, tables, pin)
-        x, y0, z0, _, _, _ = point_at(out, tables, pin["to_point"], POSITION)
+        pin, pull = pins[k], pins[k]["pull"]
+        gap, velocity = relative_motion(out, tables, pin)
+        acceleration = relative_acceleration(out, tables, pin, velocity)
+        p = point_at(out, tables, pin["to_point"], layout.POSITION)[:3]
         for r in range(pin["rows"]):
-            nx, ny, nz = pin_direction(out, tables, pin, r)
+            direction, at = pin_direction(out, tables, pin, r), row * n
+            mass.clear_column(tables, g + at)
+            mass.add_pair_force(out, tables, pin, p, direction, g + at)
             for m in range(n):
-                work[g + row * n + m] = 0.0
-            add_body_force(out, tables, body_of(tables, pin["to_point"]), x, y0, z0, nx, ny, nz, g + row * n)
-            add_body_force(out, tables, body_of(tables, pin["from_point"]), x, y0, z0, -nx, -ny, -nz, g + row * n)
-            for m in range(n):
-                work[z + row * n + m] = work[g + row * n + m]
-            solve_factor(tables, z + row * n)
-            gap = nx * gx + ny * gy + nz * gz - pin["gap"][r]
-            slip, pull = nx * u + ny * v + nz * w, pin["pull"]
-            work[last + row] = -(nx * a + ny * b + nz * c + 2.0 * pull * slip + pull * pull * gap)
+                work[z + at + m] = work[g + at + m]
+            mass.solve_factor(tables, z + at)
+            slip, left = scalar_product(direction, velocity), scalar_product(direction, gap) - pin["gap"][r]
+            work[last + row] = -(scalar_product(direction, acceleration) + 2.0 * pull * slip + pull * pull * left)
             row += 1
     return rows
 
@@ -177,10 +127,9 @@ def start_gaps(t, y, dydt, out, handle):
     tables = open_tables(handle)
     pins, at = tables.pins, tables.layout[0]["pin"]
     for k in range(pins.size):
-        x, y0, z, _, _, _, _, _, _ = relative_motion(out, tables, pins[k])
+        gap = relative_motion(out, tables, pins[k])[0]
         for r in range(pins[k]["rows"]):
-            nx, ny, nz = pin_direction(out, tables, pins[k], r)
-            out[at + 3 * k + r] = nx * x + ny * y0 + nz * z
+            out[at + 3 * k + r] = scalar_product(pin_direction(out, tables, pins[k], r), gap)
 
 
 @njit
@@ -190,7 +139,8 @@ def add_start_pin_forces(t, y, dydt, out, handle):
     pins = tables.pins
     for k in range(pins.size):
         for r in range(pins[k]["rows"]):
-            add_pin_force(out, tables, pins[k], r, pins[k]["force"][r])
+            force = scaled(pins[k]["force"][r], pin_direction(out, tables, pins[k], r))
+            add_pair_load(out, tables, pins[k], force)
 
 
 @njit
@@ -202,10 +152,10 @@ def solve_pinned_accelerations(t, y, dydt, out, handle):
     tables = open_tables(handle)
     pins, work, n, at = tables.pins, tables.scratch, tables.freedoms.size, tables.layout[0]["pin"]
     add_start_pin_forces(t, y, dydt, out, handle)
-    fill_mass_matrix(y, out, tables)
-    factor_mass_matrix(tables)
-    solve_mass_matrix(tables, 6 * n)
-    spread_accelerations(out, tables)
+    mass.fill_mass_matrix(y, out, tables)
+    mass.factor_mass_matrix(tables)
+    mass.solve_mass_matrix(tables, 6 * n)
+    mass.spread_accelerations(out, tables)
     rows = fill_constraint_rows(out, tables)
     multipliers(tables, rows)
     g = constraint_offset(tables)
@@ -215,19 +165,20 @@ def solve_pinned_accelerations(t, y, dydt, out, handle):
         for i in range(rows):
             total += work[last + i] * work[g + i * n + m]
         work[7 * n + m] = total
-    solve_mass_matrix(tables, 7 * n)
+    mass.solve_mass_matrix(tables, 7 * n)
     for m in range(n):
         work[6 * n + m] += work[7 * n + m]
     row, rate = 0, 0.0
     for k in range(pins.size):
         rate = max(rate, pins[k]["pull"])
         for r in range(pins[k]["rows"]):
-            add_pin_force(out, tables, pins[k], r, work[last + row])
+            force = scaled(work[last + row], pin_direction(out, tables, pins[k], r))
+            add_pair_load(out, tables, pins[k], force)
             out[at + 3 * k + r] = pins[k]["force"][r] + work[last + row]
             row += 1
-    spread_accelerations(out, tables)
-    out[RATE] = max(body_rate_limit(out, tables), rate)
-    state_rates(y, dydt, tables)
+    mass.spread_accelerations(out, tables)
+    out[RATE] = max(mass.body_rate_limit(out, tables), rate)
+    mass.state_rates(y, dydt, tables)
 
 
 @njit
@@ -240,10 +191,9 @@ def observe_pins(t, y, out, handle, values):
             pin, at = pins[probes[k]["index"]], tables.layout[0]["pin"] + 3 * probes[k]["index"]
             total = 0.0
             if probes[k]["side"] == 0:
-                x, y0, z, _, _, _, _, _, _ = relative_motion(out, tables, pin)
+                gap = relative_motion(out, tables, pin)[0]
                 for r in range(pin["rows"]):
-                    nx, ny, nz = pin_direction(out, tables, pin, r)
-                    total += (nx * x + ny * y0 + nz * z) ** 2
+                    total += scalar_product(pin_direction(out, tables, pin, r), gap) ** 2
             else:
                 for r in range(pin["rows"]):
                     total += out[at + r] * out[at + r]

@@ -16,28 +16,21 @@ from math import sqrt
 from fvsolve.jit import inline, njit
 from fvsolve.kernels.dtypes import ABOUT, BODY_OUT, FREE, PRISMATIC, RATE, REVOLUTE
 from fvsolve.kernels.mass_dynamics import push_stiffness
-from fvsolve.kernels.mechanism.basin_inertia import add_basin_inertia
-from fvsolve.kernels.mechanism.body_layout import (
-    ACCELERATION,
-    ARM,
-    ATTITUDE,
-    BIAS_AT_O,
-    FORCE,
-    POSITION,
-    SPIN,
-    SPIN_BIAS,
-    SPIN_RATE,
-    TORQUE,
-    VELOCITY_AT_O,
-    body_row,
+from fvsolve.kernels.mechanism import body_kinematics as kinematics
+from fvsolve.kernels.mechanism import body_layout as layout
+from fvsolve.kernels.mechanism.body_layout import body_row, freedom_path, nearest_free_body
+from fvsolve.kernels.mechanism.fluid_inertia import add_basin_inertia, add_fluid_inertia
+from fvsolve.kernels.mechanism.vectors import (
     cross,
-    freedom_path,
-    nearest_free_body,
+    dot,
+    minus,
+    plus,
     rotate,
+    scaled,
+    vector,
+    vector_product,
     write_vector,
 )
-from fvsolve.kernels.mechanism.fluid_inertia import add_fluid_inertia
-from fvsolve.kernels.mechanism.joints import joint_parameters, joint_velocities, origin_acceleration
 from fvsolve.kernels.table_handle import open_tables
 
 INERTIA_SIZE, LOAD_SIZE = 10, 6  # numbers per body
@@ -56,32 +49,30 @@ def scratch_offsets(tables):
 def joint_columns(body, own, s):
     """Write the angular velocity and the velocity at o per unit rate of each degree of freedom of a joint to s.
 
-    They are the columns S of the joint, six numbers each. own : data of the body in `out`
-    o : reference point, see `body_layout`
+    They are the columns S of the joint, six numbers each; o : reference point, see `body_layout`
     """
-    kind, x, y, z = body["joint"], own[ARM], own[ARM + 1], own[ARM + 2]
-    first = 0
+    kind, arm, first = body["joint"], vector(own, layout.ARM), 0
     if kind == FREE:
         for k in range(18):
             s[k] = 0.0
         s[3] = s[10] = s[17] = 1.0
         first = 18
     if kind == REVOLUTE or kind == PRISMATIC:
-        a, b, c = rotate(own, ATTITUDE, body["axis"], 0)
+        axis = rotate(own, layout.ATTITUDE, body["axis"], 0)
         if kind == PRISMATIC:
             write_vector(s, 0, 0.0, 0.0, 0.0)
-            write_vector(s, 3, a, b, c)
+            write_vector(s, 3, *axis)
         else:
-            write_vector(s, 0, a, b, c)
-            write_vector(s, 3, y * c - z * b, z * a - x * c, x * b - y * a)
+            write_vector(s, 0, *axis)
+            write_vector(s, 3, *vector_product(arm, axis))
         return
     for k in range(3):
-        a, b, c = own[ATTITUDE + k], own[ATTITUDE + 3 + k], own[ATTITUDE + 6 + k]
-        write_vector(s, first + 6 * k, a, b, c)
+        axis = own[layout.ATTITUDE + k], own[layout.ATTITUDE + 3 + k], own[layout.ATTITUDE + 6 + k]
+        write_vector(s, first + 6 * k, *axis)
         if kind == FREE:
             write_vector(s, first + 6 * k + 3, 0.0, 0.0, 0.0)
         else:
-            write_vector(s, first + 6 * k + 3, y * c - z * b, z * a - x * c, x * b - y * a)
+            write_vector(s, first + 6 * k + 3, *vector_product(arm, axis))
 
 
 @inline
@@ -90,9 +81,9 @@ def inertia_about_o(body, own, result):
 
     The numbers are mass, mass times centre (3), and moments of inertia xx yy zz xy xz yz.
     """
-    m, inertia, r = body["mass"], body["inertia"], ATTITUDE
+    m, inertia, r = body["mass"], body["inertia"], layout.ATTITUDE
     gx, gy, gz = rotate(own, r, body["centre"], 0)
-    gx, gy, gz = gx + own[ARM], gy + own[ARM + 1], gz + own[ARM + 2]
+    gx, gy, gz = gx + own[layout.ARM], gy + own[layout.ARM + 1], gz + own[layout.ARM + 2]
     result[0] = m
     write_vector(result, 1, m * gx, m * gy, m * gz)
     ax, ay, az = inertia_row(own, r, inertia)
@@ -118,22 +109,24 @@ def inertia_row(own, r, inertia):
 
 
 @njit(forceinline=True)
-def spatial_momentum(inertia, wx, wy, wz, vx, vy, vz):
+def spatial_momentum(inertia, w, v):
     """Angular momentum about the point o, and momentum, of an inertia at angular velocity w and velocity v at o.
 
-    inertia : ten numbers, see `inertia_about_o`; the result has six numbers. For accelerations in place of (w, v), the
-    result is torque and force.
+    inertia : ten numbers, see `inertia_about_o`. For accelerations in place of w and v, the result is torque and force.
     """
-    m, hx, hy, hz = inertia[0], inertia[1], inertia[2], inertia[3]
+    m, h = inertia[0], vector(inertia, 1)
     xx, yy, zz, xy, xz, yz = inertia[4], inertia[5], inertia[6], inertia[7], inertia[8], inertia[9]
-    return (
-        xx * wx + xy * wy + xz * wz + hy * vz - hz * vy,
-        xy * wx + yy * wy + yz * wz + hz * vx - hx * vz,
-        xz * wx + yz * wy + zz * wz + hx * vy - hy * vx,
-        m * vx + wy * hz - wz * hy,
-        m * vy + wz * hx - wx * hz,
-        m * vz + wx * hy - wy * hx,
+    angular = (
+        xx * w[0] + xy * w[1] + xz * w[2] + h[1] * v[2] - h[2] * v[1],
+        xy * w[0] + yy * w[1] + yz * w[2] + h[2] * v[0] - h[0] * v[2],
+        xz * w[0] + yz * w[1] + zz * w[2] + h[0] * v[1] - h[1] * v[0],
     )
+    linear = (
+        m * v[0] + w[1] * h[2] - w[2] * h[1],
+        m * v[1] + w[2] * h[0] - w[0] * h[2],
+        m * v[2] + w[0] * h[1] - w[1] * h[0],
+    )
+    return angular, linear
 
 
 @inline
@@ -143,16 +136,12 @@ def bias_load(own, inertia, load):
     They are I A + V x* I V - applied loads on the body. I : inertia; V : spatial velocity; A : spatial acceleration for
     q'' = 0; x* : spatial cross product of motion and force (Featherstone 2008); o : reference point, see `body_layout`
     """
-    w, v, a, c = SPIN, VELOCITY_AT_O, SPIN_BIAS, BIAS_AT_O
-    lx, ly, lz, px, py, pz = spatial_momentum(inertia, own[w], own[w + 1], own[w + 2], own[v], own[v + 1], own[v + 2])
-    tx, ty, tz, fx, fy, fz = spatial_momentum(inertia, own[a], own[a + 1], own[a + 2], own[c], own[c + 1], own[c + 2])
-    ax, ay, az = cross(own, w, lx, ly, lz)
-    bx, by, bz = cross(own, v, px, py, pz)
-    gx, gy, gz = cross(own, w, px, py, pz)
-    f, m = FORCE, TORQUE
-    ex, ey, ez = cross(own, ARM, own[f], own[f + 1], own[f + 2])
-    write_vector(load, 0, tx + ax + bx - own[m] - ex, ty + ay + by - own[m + 1] - ey, tz + az + bz - own[m + 2] - ez)
-    write_vector(load, 3, fx + gx - own[f], fy + gy - own[f + 1], fz + gz - own[f + 2])
+    angular, linear = spatial_momentum(inertia, vector(own, layout.SPIN), vector(own, layout.VELOCITY_AT_O))
+    torque, force = spatial_momentum(inertia, vector(own, layout.SPIN_BIAS), vector(own, layout.BIAS_AT_O))
+    torque = plus(plus(torque, cross(own, layout.SPIN, *angular)), cross(own, layout.VELOCITY_AT_O, *linear))
+    applied = vector(own, layout.FORCE)
+    write_vector(load, 0, *minus(minus(torque, vector(own, layout.TORQUE)), cross(own, layout.ARM, *applied)))
+    write_vector(load, 3, *minus(plus(force, cross(own, layout.SPIN, *linear)), applied))
 
 
 @njit
@@ -160,8 +149,7 @@ def fill_mass_matrix(y, out, tables):
     """Write joint columns S, mass matrix M and the forces of all degrees of freedom to `scratch`, see the module.
 
     The forces contain the loads of all bodies, bias, and springs and dampers of joints. Forces at the start that are
-    only
-    rounding of its equilibrium are subtracted. M contains the fluid in basins and networks on bodies.
+    only rounding of its equilibrium are subtracted. M contains the fluid in basins and networks on bodies.
     """
     bodies, freedoms, work, paths = tables.bodies, tables.freedoms, tables.scratch, tables.integers
     n = freedoms.size
@@ -179,21 +167,18 @@ def fill_mass_matrix(y, out, tables):
         for j in range(body["freedom"], body["freedom"] + body["freedoms"]):
             s, path, depth = work[6 * j :], paths[freedoms[j]["path"] :], freedoms[j]["depth"]
             row = work[8 * n + freedoms[j]["row"] :]
-            force = -(s[0] * load[0] + s[1] * load[1] + s[2] * load[2])
-            force -= s[3] * load[3] + s[4] * load[4] + s[5] * load[5]
+            force = -dot(s, 0, *vector(load, 0)) - dot(s, 3, *vector(load, 3))
             if body["damping"] > 0.0:
                 k = body["rate"] + (j - body["freedom"])
                 force -= body["damping"] * (body["speed"][j - body["freedom"]] + y[k])
             if body["stiffness"] > 0.0:
                 force -= body["stiffness"] * (body["start"][0] + y[body["y"]])
-            work[6 * n + j] = (
-                force - freedoms[j]["balance"]
-            )  # last: forces balanced at the start cancel without rounding
-            tx, ty, tz, fx, fy, fz = spatial_momentum(inertia, s[0], s[1], s[2], s[3], s[4], s[5])
+            # last: forces balanced at the start cancel without rounding
+            work[6 * n + j] = force - freedoms[j]["balance"]
+            torque, push = spatial_momentum(inertia, vector(s, 0), vector(s, 3))
             for k in range(depth + 1):
                 c = work[6 * path[k] :]
-                turn = c[0] * tx + c[1] * ty + c[2] * tz
-                row[k] = turn + (c[3] * fx + c[4] * fy + c[5] * fz)
+                row[k] = dot(c, 0, *torque) + dot(c, 3, *push)
         if body["parent"] >= 0:
             over, up = work[first + INERTIA_SIZE * body["parent"] :], work[loads + LOAD_SIZE * body["parent"] :]
             for k in range(INERTIA_SIZE):
@@ -273,9 +258,10 @@ def spread_accelerations(out, tables):
             for k in range(LOAD_SIZE):
                 acceleration[k] += s[k] * rate
         for k in range(3):  # acceleration at o for now; that of the origin is written below
-            own[SPIN_RATE + k] = own[SPIN_BIAS + k] + acceleration[k]
-            own[ACCELERATION + k] = own[BIAS_AT_O + k] + acceleration[3 + k]
-        write_vector(own, ACCELERATION, *origin_acceleration(own, 0, ACCELERATION, SPIN_RATE))
+            own[layout.SPIN_RATE + k] = own[layout.SPIN_BIAS + k] + acceleration[k]
+            own[layout.ACCELERATION + k] = own[layout.BIAS_AT_O + k] + acceleration[3 + k]
+        of_origin = kinematics.origin_acceleration(own, layout.ACCELERATION, layout.SPIN_RATE)
+        write_vector(own, layout.ACCELERATION, *of_origin)
 
 
 @njit
@@ -289,54 +275,55 @@ def coordinate_rates(body, y, dydt):
         dydt[at] = body["speed"][0] + y[body["rate"]]
         return
     if body["joint"] == FREE:
-        write_vector(dydt, at, *joint_velocities(body, 0, y))
+        write_vector(dydt, at, *kinematics.joint_velocities(body, 0, y))
         first = 3
-    h, a, b, c = joint_parameters(body, first, y)
-    x, y0, z = joint_velocities(body, first, y)
+    h, a, b, c = kinematics.joint_parameters(body, first, y)
+    x, y0, z = kinematics.joint_velocities(body, first, y)
     dydt[at + first] = -0.5 * (a * x + b * y0 + c * z)
     write_vector(dydt, at + first + 1, 0.5 * (h * x + b * z - c * y0), 0.5 * (h * y0 + c * x - a * z),
         0.5 * (h * z + a * y0 - b * x))  # fmt: skip
 
 
 @njit
-def add_point_force(out, tables, point, acts, x, y, z, at):
-    """Add the generalised forces of a force (x, y, z) at a point of a body to the vector at scratch[at].
+def add_point_force(out, tables, point, acts, f, at):
+    """Add the generalised forces of a force f at a point of a body to the vector at scratch[at].
 
-    For `acts` ABOUT, (x, y, z) is a torque. Nothing is added for a point of the world, or point < 0.
+    For `acts` ABOUT, f is a torque. Nothing is added for a point of the world, or point < 0.
     """
-    if point < 0 or tables.points[point]["body"] < 0:
-        return
-    i = tables.points[point]["body"]
-    here = body_row(tables, i)
+    i = kinematics.body_of_point(tables, point)
     if acts == ABOUT:
-        add_body_wrench(tables, i, x, y, z, 0.0, 0.0, 0.0, at)
-        return
-    a, b, c = rotate(out, here + ATTITUDE, tables.points[point]["place"], 0)
-    k = here + POSITION
-    add_body_force(out, tables, i, out[k] + a, out[k + 1] + b, out[k + 2] + c, x, y, z, at)
+        add_body_wrench(tables, i, f, (0.0, 0.0, 0.0), at)
+    else:
+        add_body_force(out, tables, i, kinematics.point_at(out, tables, point, layout.POSITION)[:3], f, at)
 
 
 @njit
-def add_body_force(out, tables, i, px, py, pz, x, y, z, at):
-    """Add the generalised forces of a force (x, y, z) on body i at (px, py, pz) to the vector at scratch[at].
+def add_body_force(out, tables, i, p, f, at):
+    """Add the generalised forces of a force f on body i at the position p to the vector at scratch[at].
 
-    All are in axes of the world. Nothing is added for the world (i < 0).
+    Both are in axes of the world. Nothing is added for the world (i < 0).
     """
     if i >= 0:
         here = body_row(tables, i)
-        a, b, c = (
-            px - out[here + POSITION] + out[here + ARM],
-            py - out[here + POSITION + 1] + out[here + ARM + 1],
-            pz - out[here + POSITION + 2] + out[here + ARM + 2],
-        )
-        add_body_wrench(tables, i, b * z - c * y, c * x - a * z, a * y - b * x, x, y, z, at)
+        arm = plus(minus(p, vector(out, here + layout.POSITION)), vector(out, here + layout.ARM))
+        add_body_wrench(tables, i, vector_product(arm, f), f, at)
 
 
 @njit
-def add_body_wrench(tables, i, tx, ty, tz, fx, fy, fz, at):
+def add_pair_force(out, tables, link, p, f, at):
+    """Add the generalised forces of f on the body of point `to`, and of -f on that of `from`, both at the position p.
+
+    link : row of a bushing or pin; the forces are added to the vector at scratch[at]
+    """
+    add_body_force(out, tables, kinematics.body_of_point(tables, link["to_point"]), p, f, at)
+    add_body_force(out, tables, kinematics.body_of_point(tables, link["from_point"]), p, scaled(-1.0, f), at)
+
+
+@njit
+def add_body_wrench(tables, i, torque, force, at):
     """Add the generalised forces of a load on body i, per degree of freedom, to the vector at scratch[at].
 
-    (tx, ty, tz), (fx, fy, fz) : torque about the reference point o, and force, in axes of the world
+    torque, force : torque about the reference point o, and force, in axes of the world
     Nothing is added if no degree of freedom moves the body, or for the world (i < 0).
     """
     work, i = tables.scratch, nearest_free_body(tables, i)
@@ -345,9 +332,14 @@ def add_body_wrench(tables, i, tx, ty, tz, fx, fy, fz, at):
     path, count = freedom_path(tables, i)
     for k in range(count):
         j = tables.integers[path + k]
-        s = 6 * j
-        turn = work[s] * tx + work[s + 1] * ty + work[s + 2] * tz
-        work[at + j] += turn + (work[s + 3] * fx + work[s + 4] * fy + work[s + 5] * fz)
+        work[at + j] += dot(work, 6 * j, *torque) + dot(work, 6 * j + 3, *force)
+
+
+@njit(forceinline=True)
+def clear_column(tables, at):
+    """Set the vector over degrees of freedom at scratch[at] to zero."""
+    for m in range(tables.freedoms.size):
+        tables.scratch[at + m] = 0.0
 
 
 @njit
@@ -363,40 +355,47 @@ def mobility(tables, at):
     return total
 
 
+@njit(forceinline=True)
+def oscillation_rate(stiffness, damping):
+    """Upper bound of the rates of damped oscillations [1/s], c / 2 + sqrt(c^2 / 4 + k).
+
+    k, c : sums over springs and dampers of stiffness and damping, each times b' M^-1 b; M : factored mass matrix, b :
+    direction of the force. The trace of M^-1 K is at least its greatest eigenvalue; K : stiffness matrix.
+    """
+    return 0.5 * damping + sqrt(0.25 * damping * damping + stiffness)
+
+
 @njit
 def body_rate_limit(out, tables):
-    """Upper bound of the rates of bodies [1/s], c / 2 + sqrt(c^2 / 4 + k), at least the greatest angular velocity.
+    """Upper bound of the rates of bodies [1/s], with springs and dampers of joints and force elements.
 
-    It is at least out[RATE] too. k, c : sums over springs and dampers, also of joints, of stiffness and damping, each
-    times b' M^-1 b; M : factored mass matrix, b : direction of the force. The trace of M^-1 K is at least its greatest
-    eigenvalue; K : stiffness matrix.
+    It is the `oscillation_rate`, and at least the greatest angular velocity and out[RATE].
     """
-    rate, freedoms, work, lines = out[RATE], tables.freedoms, tables.scratch, tables.lines
-    stiffness, damping, n, at = 0.0, 0.0, freedoms.size, 7 * freedoms.size
-    turns = 0.0
-    for i in range(tables.bodies.size):
+    bodies, work, lines = tables.bodies, tables.scratch, tables.lines
+    stiffness, damping, turns, at = 0.0, 0.0, 0.0, 7 * tables.freedoms.size
+    for i in range(bodies.size):
         own = out[body_row(tables, i) :]
-        turns = max(turns, own[SPIN] * own[SPIN] + own[SPIN + 1] * own[SPIN + 1] + own[SPIN + 2] * own[SPIN + 2])
-        if tables.bodies[i]["damping"] > 0.0 or tables.bodies[i]["stiffness"] > 0.0:
-            for j in range(tables.bodies[i]["freedom"], tables.bodies[i]["freedom"] + tables.bodies[i]["freedoms"]):
-                for m in range(n):
-                    work[at + m] = 1.0 if m == j else 0.0
+        turns = max(turns, dot(own, layout.SPIN, *vector(own, layout.SPIN)))
+        if bodies[i]["damping"] > 0.0 or bodies[i]["stiffness"] > 0.0:
+            for j in range(bodies[i]["freedom"], bodies[i]["freedom"] + bodies[i]["freedoms"]):
+                clear_column(tables, at)
+                work[at + j] = 1.0
                 inverse_mass = mobility(tables, at)
-                damping += tables.bodies[i]["damping"] * inverse_mass
-                stiffness += tables.bodies[i]["stiffness"] * inverse_mass
+                damping += bodies[i]["damping"] * inverse_mass
+                stiffness += bodies[i]["stiffness"] * inverse_mass
     for k in range(lines.size):
-        line, u = lines[k], tables.layout[0]["along"] + 3 * k
+        line = lines[k]
         spring, damper = push_stiffness(out, tables, line["push"])
         if spring == 0.0 and damper == 0.0:
             continue
-        for m in range(n):
-            work[at + m] = 0.0
-        add_point_force(out, tables, line["to_point"], line["acts"], out[u], out[u + 1], out[u + 2], at)
-        add_point_force(out, tables, line["from_point"], line["acts"], -out[u], -out[u + 1], -out[u + 2], at)
+        along = vector(out, tables.layout[0]["along"] + 3 * k)
+        clear_column(tables, at)
+        add_point_force(out, tables, line["to_point"], line["acts"], along, at)
+        add_point_force(out, tables, line["from_point"], line["acts"], scaled(-1.0, along), at)
         inverse_mass = mobility(tables, at)
         stiffness += spring * inverse_mass
         damping += damper * inverse_mass
-    return max(max(rate, sqrt(turns)), 0.5 * damping + sqrt(0.25 * damping * damping + stiffness))
+    return max(max(out[RATE], sqrt(turns)), oscillation_rate(stiffness, damping))
 
 
 @njit
