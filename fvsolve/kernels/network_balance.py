@@ -10,7 +10,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import CHAMBER, FIXED, JUNCTION, MOVING, OK, PATCH, RATE, STATUS, TANK, WHERE
 from fvsolve.kernels.restrictions import conductance, head_drop, open_scheduled, restriction_slope
 from fvsolve.kernels.table_handle import open_tables
-from fvsolve.kernels.tank_limits import BOTTOM, EVENTS, RIM
+from fvsolve.kernels.tanks import BOTTOM, EVENTS, RIM
 
 
 @njit(forceinline=True)

@@ -11,7 +11,7 @@ import numpy as np
 from fvsolve.errors import Notice
 from fvsolve.kernels import calls
 from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.valves import flow_at_drop, transition_of
+from fvsolve.kernels.restrictions import flow_at_drop, transition_of
 from fvsolve.model.lowering import Lowering, Restriction, lowering_of
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from fvsolve.case.case import Case
 from fvsolve.errors import CaseError, Fault, Notice
 from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels import tank_limits
+from fvsolve.kernels import tanks
 from fvsolve.model.device_lowering import Device
 from fvsolve.model.hydraulics import Hydraulics
 from fvsolve.model.lowering import Lowering, links_by_table
@@ -190,7 +190,7 @@ class ModelDraft:
 
     def flags(self, name: str, events: tuple[str, ...]) -> int:
         """Reserve flags in `armed`, one for each event function of a part; return the offset of the first."""
-        first = tank_limits.EVENTS * self.tanks + len(self.events)
+        first = tanks.EVENTS * self.tanks + len(self.events)
         self.events += [(name.removesuffix(".inside"), text) for text in events]
         return first
 

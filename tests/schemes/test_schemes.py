@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.limiters import limited
+from fvsolve.kernels.reconstruction import limited
 from fvsolve.model.scheme_codes import CODES, FAMILIES, family
 from fvsolve.schemes import LEAST_CELLS, LIMITED, LINEAR, SCHEMES, Scheme
 

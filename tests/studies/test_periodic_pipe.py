@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from fvsolve.kernels.limiters import limited
+from fvsolve.kernels.reconstruction import limited
 from fvsolve.model.scheme_codes import CODES
 from fvsolve.schemes import LIMITERS, branches
 from fvsolve.step_limits.advection_limit import advection_limit

@@ -26,7 +26,7 @@ from reference.scenes import (
 
 import fvsolve
 from fvsolve.case import load
-from fvsolve.kernels.limiters import limited
+from fvsolve.kernels.reconstruction import limited
 from fvsolve.model.energy_norm import energy_weights
 from fvsolve.model.scheme_codes import CODES
 from fvsolve.step_limits.step_notices import step_limits

@@ -12,7 +12,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.delay_lines.wave_history import CORRECTED_TIME, COUNT, time_of, time_tolerance
 from fvsolve.kernels.dtypes import FIXED, JUNCTION, PATCH, TANK
 from fvsolve.kernels.network_balance import stiffness_of
-from fvsolve.kernels.tank_limits import BOTTOM, EVENTS, RIM
+from fvsolve.kernels.tanks import BOTTOM, EVENTS, RIM
 
 NAN = float("nan")
 

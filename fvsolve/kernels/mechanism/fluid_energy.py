@@ -11,9 +11,7 @@ Other arguments: here : offset of a body in `out`; motion : `scratch` after `set
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.barotropic_energy import energy_head
 from fvsolve.kernels.dtypes import CHAMBER, FIXED, JUNCTION, TANK
-from fvsolve.kernels.linear_energy import COLUMN, NODE, PIPE, VALVE
 from fvsolve.kernels.mechanism.body_layout import ACCELERATION, ATTITUDE, POSITION, SPIN_RATE, body_row, cross, dot
 from fvsolve.kernels.mechanism.fluid_loads import (
     ZERO_FLOW_PATH,
@@ -43,6 +41,7 @@ from fvsolve.kernels.mechanism.noninertial_forces import (
     BODY_VELOCITY,
     set_body_motion,
 )
+from fvsolve.kernels.network_energy import COLUMN, NODE, PIPE, VALVE, energy_head
 from fvsolve.kernels.table_handle import open_tables
 
 

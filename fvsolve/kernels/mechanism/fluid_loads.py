@@ -29,7 +29,7 @@ from fvsolve.kernels.mechanism.body_layout import (
 )
 from fvsolve.kernels.mechanism.noninertial_forces import BODY_GRAVITY, BODY_SPIN, BODY_SPIN_RATE, set_body_motion
 from fvsolve.kernels.table_handle import open_tables
-from fvsolve.kernels.tank_levels import tank_level
+from fvsolve.kernels.tanks import tank_level
 
 ZERO_VECTOR = (0.0, 0.0, 0.0)
 ZERO_FLOW_PATH = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

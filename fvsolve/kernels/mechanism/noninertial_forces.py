@@ -25,7 +25,7 @@ from fvsolve.kernels.mechanism.body_layout import (
     write_vector,
 )
 from fvsolve.kernels.table_handle import open_tables
-from fvsolve.kernels.tank_levels import tank_level
+from fvsolve.kernels.tanks import tank_level
 
 BODY_GRAVITY, BODY_SPIN, BODY_SPIN_RATE, BODY_VELOCITY = (
     0,

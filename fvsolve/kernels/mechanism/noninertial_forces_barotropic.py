@@ -5,7 +5,7 @@ from fvsolve.kernels.density import enthalpy, pressure_of_enthalpy
 from fvsolve.kernels.dtypes import TANK
 from fvsolve.kernels.mechanism.noninertial_forces import bottom_pressure_per_density, mark_weightless
 from fvsolve.kernels.table_handle import open_tables
-from fvsolve.kernels.tank_levels import tank_level
+from fvsolve.kernels.tanks import tank_level
 
 
 @njit
