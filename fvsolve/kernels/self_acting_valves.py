@@ -10,7 +10,7 @@ from math import sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import JUNCTION
-from fvsolve.kernels.network_balance import stiffness_of
+from fvsolve.kernels.network_balance import node_impedance, stiffness_of
 from fvsolve.kernels.restrictions import head_drop, restriction_slope
 
 CONTROL_LIFT = 1e-4  # lift up to which a valve controls its column, at least
@@ -27,13 +27,6 @@ def event_pair(tables, g, at, left):
     if left == 0.0:
         left = TINY if tables.armed[at] > 0.0 else -TINY
     g[at], g[at + 1] = left, -left
-
-
-@njit
-def node_impedance(tables, i):
-    """Pressure rise at junction i per flow into it [Pa s/kg], 1 / admittance of its pipes; 0 for other nodes."""
-    node = tables.nodes[i]
-    return 1.0 / node["admittance"] if node["kind"] == JUNCTION and node["admittance"] > 0.0 else 0.0
 
 
 @njit
