@@ -101,6 +101,8 @@ def wall_area(st, floats, pipe, p):
     """Area of a pipe with elastic wall at the pressure p [m2]."""
     if st["law"] == LAW_MIXTURE:
         return mixture_law.wall_area(st, floats, pipe, p)
+    if st["law"] != LAW_LOG and st["law"] != LAW_TABLE:
+        return nan
     return pipe["area"] * exp(pipe["compliance"] * (p - st["reference"]))
 
 
@@ -109,6 +111,8 @@ def thrust(st, floats, pipe, p):
     """Pressure force in a pipe: integral of A dp from the reference pressure to p [N], A : area of the pipe."""
     if st["law"] == LAW_MIXTURE:
         return mixture_law.thrust(st, floats, pipe, p)
+    if st["law"] != LAW_LOG and st["law"] != LAW_TABLE:
+        return nan
     x = pipe["compliance"] * (p - st["reference"])
     if abs(x) < 1e-14:
         return pipe["area"] * (p - st["reference"])
