@@ -1,7 +1,7 @@
 """Schemes and limiters as data: weights of cell averages in the value at a face.
 
 A linear scheme is a single entry here: order, reach, ends and step limits are derived from its weights. A limited
-scheme has a kernel too (`kernels.reconstruction`, `kernels.limiters`); in smooth solutions it equals a linear scheme.
+scheme has a kernel too (`kernels.reconstruction`); in smooth solutions it equals a linear scheme.
 """
 
 from __future__ import annotations
@@ -168,7 +168,7 @@ def end_rate_factor(scheme: str, cells: int) -> float:
 
 
 class Limiter(NamedTuple):
-    """Limiter of slopes; its code in `kernels.limiters` is its position in `LIMITERS`.
+    """Limiter of slopes; its code in `kernels.reconstruction` is its position in `LIMITERS`.
 
     tangents : (a, b) for each branch in which the limited slope is not zero but a d + b e; d and e are the differences
     of values to the cells behind and ahead. The slope of van Leer's limiter is smooth: its branches are the tangents at

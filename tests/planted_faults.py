@@ -75,13 +75,13 @@ FAULTS = [
     ),
     Fault("kernels/delay_lines/line_rates.py", "per = 1.0 / (1.0 - beta * beta)", "per = 1.0 / (1.0 + beta * beta)"),
     Fault(
-        "kernels/unsteady_friction/relaxation_terms_barotropic.py",
+        "kernels/relaxation.py",
         "reference * (0.5 * u - flow / m0)",
         "reference * (0.505 * u - flow / m0)",
     ),
     Fault("kernels/mechanism/body_layout.py", "rz * fx - rx * fz", "rz * fx + rx * fz"),
     Fault(
-        "kernels/viscoelastic_wall/wall_energy.py",
+        "kernels/relaxation_energy.py",
         "return per * taken, per * rate",
         "return per * taken, 1.01 * per * rate",
     ),

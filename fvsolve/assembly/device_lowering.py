@@ -12,7 +12,7 @@ from fvsolve.assembly.lowering import Lowering, Restriction, lowering_of
 from fvsolve.errors import Notice
 from fvsolve.kernels import calls
 from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.valves import flow_at_drop, transition_of
+from fvsolve.kernels.restrictions import flow_at_drop, transition_of
 
 
 class Device(Restriction):

@@ -17,7 +17,7 @@ from fvsolve.assembly.schedule_tables import Schedules
 from fvsolve.assembly.state_names import StateNames
 from fvsolve.errors import CaseError, Fault, Notice
 from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels import tank_limits
+from fvsolve.kernels import tanks
 
 CACHE_LINE = 8  # floats of a cache line
 
@@ -225,7 +225,7 @@ class ModelDraft:
 
     def flags(self, name: str, events: tuple[str, ...]) -> int:
         """Reserve flags in `armed`, one for each event function of a part; return the offset of the first."""
-        first = tank_limits.EVENTS * self.tanks + len(self.events)
+        first = tanks.EVENTS * self.tanks + len(self.events)
         self.events += [(name.removesuffix(".inside"), text) for text in events]
         return first
 

@@ -10,7 +10,7 @@ computed from squares of cell means.
 
 from fvsolve.jit import njit
 from fvsolve.kernels.energy_rows import BASIN_ROWS, basin_power_row
-from fvsolve.kernels.linear_energy import total_pressure
+from fvsolve.kernels.network_energy import total_pressure
 from fvsolve.kernels.table_handle import open_tables
 
 

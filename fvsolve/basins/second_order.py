@@ -10,7 +10,7 @@ Arguments: factor : factor on all flows; b, c, d, e : values of four cells in li
 
 from fvsolve.jit import inline, njit
 from fvsolve.kernels.dtypes import UPWIND
-from fvsolve.kernels.limiters import by_limiter, limited, slope
+from fvsolve.kernels.reconstruction import by_limiter, limited, slope
 
 
 @njit

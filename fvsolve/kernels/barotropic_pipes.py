@@ -7,34 +7,19 @@ the state which both waves form there (a linearised Riemann solution), minus the
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.density import (
-    density,
-    enthalpy,
-    force_of_mass,
-    local_speed,
-    pressure_of_mass,
-)
+from fvsolve.kernels import density as law
+from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.density.steady_profile import add_slope_force
-from fvsolve.kernels.dtypes import (
-    COLUMN_FLOW,
-    LEVEL,
-    PIPE_FLOW,
-    PIPE_PRESSURE,
-    PRESSURE,
-    RATE,
-    SPOOL_FLOW,
-    VALVE_FLOW,
-)
 from fvsolve.kernels.pipes import GAUSS, both_faces
 from fvsolve.kernels.steady_friction import drag
 from fvsolve.kernels.table_handle import open_tables
-from fvsolve.kernels.tank_levels import tank_level
+from fvsolve.kernels.tanks import tank_level
 
 
 @njit
 def momentum_flux(st, floats, pipe, m, flow):
     """Momentum flux M^2 / m + integral of A dp [N] at mass flow M = `flow` [kg/s] and mass per length m [kg/m]."""
-    return flow * flow / m + force_of_mass(st, floats, pipe, m)
+    return flow * flow / m + law.force_of_mass(st, floats, pipe, m)
 
 
 @njit
@@ -83,8 +68,8 @@ def pipe_rates_barotropic(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
         left_flow, left_flux, left_mass = dflow, flux, dm
     if pipe["rise"] >= 0:
         add_slope_force(st, profile, pipe, r, l, dr, dl)
-    low = local_speed(st, floats, pipe, pressure_of_mass(st, floats, pipe, least))
-    high = local_speed(st, floats, pipe, pressure_of_mass(st, floats, pipe, greatest))
+    low = law.local_speed(st, floats, pipe, law.pressure_of_mass(st, floats, pipe, least))
+    high = law.local_speed(st, floats, pipe, law.pressure_of_mass(st, floats, pipe, greatest))
     return (quickest / least + max(low, high)) / dx * pipe["rate_factor"]
 
 
@@ -102,7 +87,7 @@ def rates_barotropic(t, y, dydt, out, handle):
             st, tables.floats, tables.profile, pipes[i], y[o : o + n], y[o + n : o + 2 * n], out[at : at + 4],
             tables.scratch, dydt[o : o + n], dydt[o + n : o + 2 * n],
         )  # fmt: skip
-        out[RATE] = max(out[RATE], own)
+        out[rec.RATE] = max(out[rec.RATE], own)
 
 
 @njit
@@ -128,7 +113,7 @@ def pressure_or_head(st, floats, probe, p):
     The head is (h(p) - h(ambient)) / g plus elevation, h : specific enthalpy.
     """
     if probe["head"] == 1:
-        return (enthalpy(st, floats, p) - enthalpy(st, floats, st["ambient"])) / st["gravity"] + probe["offset"]
+        return (law.enthalpy(st, floats, p) - law.enthalpy(st, floats, st["ambient"])) / st["gravity"] + probe["offset"]
     return p + probe["offset"]
 
 
@@ -138,7 +123,7 @@ def valve_volume_flow(st, floats, tables, out, k):
     layout, nodes, valve = tables.layout[0], tables.nodes, tables.valves[k]
     flow = out[layout["valve"] + k]
     up = valve["from_node"] if flow >= 0.0 else valve["to_node"]
-    return flow / density(st, floats, nodes[up]["pressure"] + out[layout["pressure"] + up])
+    return flow / law.density(st, floats, nodes[up]["pressure"] + out[layout["pressure"] + up])
 
 
 @njit
@@ -155,22 +140,22 @@ def observe_barotropic(t, y, out, handle, values):
         probe = probes[k]
         kind, i = probe["kind"], probe["index"]
         value = 0.0
-        if kind == PRESSURE:
+        if kind == rec.PRESSURE:
             value = pressure_or_head(st, floats, probe, nodes[i]["pressure"] + out[layout["pressure"] + i])
-        elif kind == LEVEL:
+        elif kind == rec.LEVEL:
             value = tank_level(nodes[i], floats, nodes[i]["density"], y[nodes[i]["y"]])
-        elif kind == PIPE_PRESSURE or kind == PIPE_FLOW:
+        elif kind == rec.PIPE_PRESSURE or kind == rec.PIPE_FLOW:
             m, flow = pipe_state_at(probe, i, y, out, tables)
-            p = pressure_of_mass(st, floats, tables.pipes[i], m)
-            if kind == PIPE_PRESSURE:
+            p = law.pressure_of_mass(st, floats, tables.pipes[i], m)
+            if kind == rec.PIPE_PRESSURE:
                 value = pressure_or_head(st, floats, probe, p)
             else:
-                value = flow / m if probe["head"] == 2 else flow / density(st, floats, p)
-        elif kind == VALVE_FLOW:
+                value = flow / m if probe["head"] == 2 else flow / law.density(st, floats, p)
+        elif kind == rec.VALVE_FLOW:
             value = valve_volume_flow(st, floats, tables, out, i)
-        elif kind == SPOOL_FLOW:
+        elif kind == rec.SPOOL_FLOW:
             for e in range(4):
                 value += floats[probe["weights"] + e] * valve_volume_flow(st, floats, tables, out, i + e)
-        elif kind == COLUMN_FLOW:
+        elif kind == rec.COLUMN_FLOW:
             value = out[layout["column"] + i] / st["rho"]
         values[k] = value

@@ -7,18 +7,25 @@ the floor pressure of the law.
 
 from fvsolve.jit import njit
 from fvsolve.kernels.barotropic_nodes import (
-    begin_clusters,
-    check_clusters,
-    cluster_work,
+    add_end_inflow,
+    clear_inflows,
     given_flows,
-    node_work,
-    step_clusters,
-    write_clusters,
+    node_beyond,
+    write_end_waves,
 )
 from fvsolve.kernels.density import pressure_of_mass
 from fvsolve.kernels.density.mixture_law import enthalpy, relative_volume
 from fvsolve.kernels.dtypes import JUNCTION, NOT_CONVERGED, STATUS, WHERE
-from fvsolve.kernels.node_clusters import BAR
+from fvsolve.kernels.node_clusters import (
+    MAX_SWEEPS,
+    begin_clusters,
+    check_clusters,
+    cluster_work,
+    node_work,
+    step_clusters,
+    write_clusters,
+)
+from fvsolve.kernels.node_newton import BAR
 from fvsolve.kernels.riemann import FALL, UNBOUNDED, intermediate_pressure, sample_wave, state_at, wave_jump
 from fvsolve.kernels.table_handle import open_tables
 
@@ -38,8 +45,7 @@ def end_side(st, floats, pipe, inside, v_in, p_node, still):
     p_node : pressure of the node [Pa]
     still : True for any node except a junction
     Where the flow runs into the node at more than half the speed of sound, or into a node with `still` True, the
-    pressure
-    of the end is that of the node: v^2 / 2 is lost.
+    pressure of the end is that of the node: v^2 / 2 is lost.
     """
     floor, target, side = st["floor"], enthalpy(st, floats, p_node), state_at(st, floats, pipe, p_node)
     change, rise = wave_jump(st, floats, pipe, inside, side)
@@ -102,28 +108,18 @@ def end_inflows_cavitating(out, tables, slope, final):
     On entry out[ends] holds pressure [Pa] and velocity [m/s] at each pipe end, extrapolated from the cells. If `final`
     is True, they are replaced with the waves of the solved end states [kg/s].
     """
-    st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
-    pipes = tables.pipes
-    for i in range(nodes.size):
-        out[layout["net"] + i], slope[i] = 0.0, 0.0
+    layout, pipes = tables.layout[0], tables.pipes
+    clear_inflows(out, tables, slope)
     for k in range(pipes.size):
-        pipe = pipes[k]
         for side in range(2):
-            at = layout["ends"] + 4 * k + 2 * side
-            i = pipe["to_node"] if side == 1 else pipe["from_node"]
-            sign = 2.0 * side - 1.0
-            base = pipe["to_base"] if side == 1 else pipe["from_base"]
-            base_mass = pipe["to_mass"] if side == 1 else pipe["from_mass"]
-            p = nodes[i]["pressure"] + out[layout["pressure"] + i]
-            still = nodes[i]["kind"] != JUNCTION
-            into, rise, m = end_flow_of_state(st, floats, pipe, out[at], sign * out[at + 1], p, still)
-            change = into - base
-            out[layout["net"] + i] += change
-            slope[i] += rise
+            at, sign = layout["ends"] + 4 * k + 2 * side, 2.0 * side - 1.0
+            p, still = node_beyond(out, tables, pipes[k], side)
+            into, rise, m = end_flow_of_state(
+                tables.settings[0], tables.floats, pipes[k], out[at], sign * out[at + 1], p, still
+            )
+            add_end_inflow(out, tables, slope, k, side, into, rise)
             if final:
-                dm = pipe["speed"] * (m - base_mass)
-                out[at] = 0.5 * (dm + sign * change)
-                out[at + 1] = 0.5 * (dm - sign * change)
+                write_end_waves(out, tables, k, side, into, m)
 
 
 @njit
@@ -196,7 +192,7 @@ def solve_nodes_cavitating(t, y, dydt, out, handle):
     low, high = work[work.size - 2 * n : work.size - n], work[work.size - n :]
     given_flows(t, y, out, tables)
     begin_clusters(out, tables, space)
-    for sweep in range(1, 101):
+    for sweep in range(1, MAX_SWEEPS + 1):
         reset_bounds(tables, low, high, sweep == 1)
         end_inflows_cavitating(out, tables, space[0], False)
         for i in range(n):

@@ -4,6 +4,10 @@ m_t + M_x = 0, M_t + (M^2 / m + F)_x = -drag - m g slope, with mass per length m
 F the integral of A dp [N]. Pressure and velocity are reconstructed from both sides of a face. The flux is that of the
 Riemann problem there (`riemann.py`), minus the initial steady flux. So each front moves at its own speed: sound in the
 liquid, or the edge of a cavity a thousand times slower.
+
+Arguments common to these functions: r, l : float64[cells]  forward and backward wave [kg/s]; profile : values of the
+initial steady state; p, v : float64[n + 2]  pressure [Pa] and velocity [m/s] of n cells and of an extrapolated cell
+beyond each end; dp, dv : their changes since the initial steady state.
 """
 
 from fvsolve.jit import njit
@@ -23,10 +27,7 @@ DRY = 1e-8  # below it the velocity of a cell goes to zero with its content
 
 @njit
 def cell_state(st, floats, profile, pipe, i, r, l):
-    """(pressure [Pa], velocity [m/s] of cell i, pressure [Pa], velocity [m/s] of its initial steady state).
-
-    r, l : forward and backward wave of the cells [kg/s]; profile : values of the initial steady state
-    """
+    """(pressure [Pa], velocity [m/s] of cell i, pressure [Pa], velocity [m/s] of its initial steady state)."""
     m0, flow = profile[pipe["center"] + i], pipe["flow"]
     m, dry = m0 + (r[i] + l[i]) / pipe["speed"], DRY * st["rho"] * pipe["area"]
     p0, v0 = pressure_of_mass(st, floats, pipe, m0), flow / m0
@@ -51,12 +52,7 @@ def extrapolate_ends(a, n):
 
 @njit
 def fill_cells(st, floats, profile, pipe, first, r, l, p, v, dp, dv):
-    """Write pressures and velocities of the cells from number `first` on, and of an extrapolated cell beyond each end.
-
-    r, l : forward and backward wave of all cells of the pipe [kg/s]; profile : values of the initial steady state
-    p, v : float64[n + 2]  receive pressure [Pa] and velocity [m/s] of n cells and of the two extrapolated cells
-    dp, dv : float64[n + 2]  receive their changes since the initial steady state
-    """
+    """Write pressures and velocities of the cells from number `first` on, and of an extrapolated cell past each end."""
     n = p.size - 2
     for i in range(n):
         p[i + 1], v[i + 1], p0, v0 = cell_state(st, floats, profile, pipe, first + i, r, l)
@@ -105,8 +101,6 @@ def face_state(st, floats, profile, pipe, i, k, ahead, p, v, dp, dv):
 def end_states(st, floats, profile, pipe, r, l, ends, scratch):
     """Extrapolate pressure and velocity from the cells to both ends of a pipe.
 
-    profile : values of the initial steady state
-    r, l : float64[cells]  forward and backward wave [kg/s]
     ends : float64[4]  receives pressure and velocity at the `from` end, then at the `to` end [Pa, m/s]
     """
     n = r.size
@@ -123,8 +117,7 @@ def end_states(st, floats, profile, pipe, r, l, ends, scratch):
 def pipe_rates_cavitating(st, floats, profile, pipe, r, l, ends, scratch, dr, dl):
     """Write d/dt of both waves of a pipe [kg/s2] to dr and dl; return its greatest wave rate (|v| + c) / dx [1/s].
 
-    v, c : velocity and wave speed; dx : length of a cell; profile : values of the initial steady state
-    r, l : float64[cells]  forward and backward wave [kg/s]
+    v, c : velocity and wave speed; dx : length of a cell
     ends : float64[4]  waves at the ends [kg/s]: forward and backward at `from`, then at `to`
     """
     n, c, dx, flow = r.size, pipe["speed"], pipe["dx"], pipe["flow"]
@@ -162,7 +155,7 @@ def pipe_rates_cavitating(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
 def end_flux(st, floats, profile, pipe, i, r, l):
     """(mass flow [kg/s], momentum flux [N]) at end face i, as changes since the initial steady state.
 
-    r, l : forward and backward wave at this face [kg/s]; profile : values of the initial steady state
+    r, l : waves at this face
     """
     if r == 0.0 and l == 0.0:
         return 0.0, 0.0
@@ -205,7 +198,6 @@ def record_cavity(t, pipe, r, l, at, tables):
 
     The entries are: position of the first cavity (fraction of the length), greatest volume [m3], time of this volume
     [s].
-    r, l : float64[cells]  forward and backward wave [kg/s]
     """
     st, floats, profile, marks = tables.settings[0], tables.floats, tables.profile, tables.marks
     volume, first = 0.0, -1

@@ -5,13 +5,17 @@ No flow leaves such a junction, so the flows of its columns into it add up to ze
 Flows M that do not add up are equalised by an impulse J [Pa s] of pressure, dM = (A / L) J away from the junction:
 momentum is conserved (an inelastic impact). The rounding of the sum is removed in the same way. Columns controlled by
 valves have a given flow here.
+
+A column junction joins at least two rigid columns, and otherwise only closed valves. Arguments common to these
+functions: n : number of column junctions; k : number of a column, -1 for none; seen : float64[nodes]  work array;
+rows, right : see `junction_work`; solved : True if the pressures of nodes are solved, False if they are estimates.
 """
 
 from math import sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import JUNCTION, NO_SOLUTION, STATUS, WHERE
-from fvsolve.kernels.node_clusters import solve_dense
+from fvsolve.kernels.node_newton import solve_dense
 from fvsolve.kernels.restrictions import conductance
 from fvsolve.kernels.steady_friction import drag
 
@@ -99,8 +103,7 @@ def pressure_at(tables, out, i, extra, solved):
 def has_pressure_reference(tables, out, i, k, seen):
     """True if rigid columns other than k join junction i, also through column junctions, to a node of another kind.
 
-    A column junction joins rigid columns and otherwise only closed valves. Columns that valves control are left out.
-    seen : float64[nodes]  work array; 1 for the nodes that these columns join
+    Columns that valves control are left out. seen : receives 1 for the nodes that these columns join
     """
     columns, controlled = tables.columns, tables.layout[0]["valve_controlled"]
     seen[:] = 0.0
@@ -122,8 +125,7 @@ def has_pressure_reference(tables, out, i, k, seen):
 def is_pinned(tables, out, i, seen):
     """True if column junction i is the first of a connected group in which no node sets the level of pressure.
 
-    A column junction joins rigid columns and otherwise only closed valves. The pressure of the first one of such a
-    group is held. seen : float64[nodes]  work array
+    The pressure of the first one of such a group is held.
     """
     if has_pressure_reference(tables, out, i, -1, seen):
         return False
@@ -191,10 +193,7 @@ def assemble_junctions(tables, out, n, k):
 
 @njit
 def assemble_with_given(tables, out, n):
-    """Call `assemble_junctions`, and copy the flow rates of valve-controlled columns [kg/s2] to the right-hand side.
-
-    n : number of column junctions; the rates are read from `given`, see `junction_work`
-    """
+    """Call `assemble_junctions`, and copy the flow rates of valve-controlled columns [kg/s2] to the right-hand side."""
     assemble_junctions(tables, out, n, -1)
     _, _, _, right, _, given = junction_work(tables, n)
     for r in range(n):
@@ -219,7 +218,7 @@ def solve_junctions(tables, out, n):
 
 @njit
 def value_at(rows, right, i):
-    """Entry of `right` for node i, 0 if the node is not a column junction; rows : see `junction_work`."""
+    """Entry of `right` for node i, 0 if the node is not a column junction."""
     return right[int(rows[i])] if rows[i] >= 0.0 else 0.0
 
 
@@ -261,10 +260,7 @@ def gate_inflow(tables, i):
 
 @njit
 def add_flow_sums(tables, out, rows, right):
-    """Add the sum of the flows of columns into each column junction [kg/s] to `right`; it is exactly zero at the start.
-
-    rows, right : see `junction_work`
-    """
+    """Add the sum of the flows of columns into each column junction [kg/s] to `right`; it is exactly 0 at the start."""
     nodes, columns, at = tables.nodes, tables.columns, tables.layout[0]["column"]
     for i in range(rows.size):
         if rows[i] >= 0.0:
@@ -313,7 +309,6 @@ def far_end_pressure(y, tables, out, k, end, solved):
 
     The pressure change is that since the start of the run.
     end : 1 if the near end is the `to` end, -1 if it is the `from` end
-    solved : True if the pressures of nodes are solved, False if they are estimates
     """
     column = tables.columns[k]
     i = column["from_node"] if end == 1 else column["to_node"]

@@ -11,6 +11,11 @@ A column whose only outlet is a self-acting valve follows its disc that leaves t
 valve near its seat. Lift x and flow M start as powers of time, and dP = M^2 / (G x^2), there 0 / 0, would relax at an
 infinite rate. Until x has grown, dP drives both: (L / A) sqrt(G dP) dx/dt(dP) + dP = the stationary drop. The momentum
 of the column is conserved.
+
+Arguments common to these functions: k : number of a rigid column; index : number of a valve; x : node at the end of the
+column that valves control; end : 1 if this is the `to` end, -1 if it is the `from` end; solved : True if the pressures
+of nodes are solved, False if they are estimates; stationary : pressure change of x since the start, as if the column
+were at rest [Pa]; inertia : pressure per d/dt of the flow, L / A of the column or more [Pa s2/kg].
 """
 
 from math import sqrt
@@ -28,7 +33,7 @@ from fvsolve.kernels.column_junctions import (
 )
 from fvsolve.kernels.devices import LEAD
 from fvsolve.kernels.restrictions import conductance, conductance_at
-from fvsolve.kernels.valve_seating import controls_column
+from fvsolve.kernels.self_acting_valves import controls_column
 
 NEARLY_CLOSED = 1e-3  # fraction of their full area below which valves control their column
 SWITCH_LOSS = 0.05  # fraction of the flow at the switch to valve control; larger than the error made there
@@ -105,8 +110,6 @@ def stationary_pressure(y, tables, out, k, end, solved):
     """Pressure change since the start at the controlled end of column k, as if the column were at rest [Pa].
 
     The second result is the fall of this pressure per d/dt of the flow [Pa s2/kg].
-    end : 1 if the controlled end is the `to` end, -1 if it is the `from` end
-    solved : True if the pressures of nodes are solved, False if they are estimates
     """
     column = tables.columns[k]
     p, softness = far_end_pressure(y, tables, out, k, end, solved)
@@ -149,8 +152,6 @@ def seating_valve(tables, i):
 def seating_drop(t, y, tables, out, k, index, stationary, inertia, other, drop):
     """(drop across valve `index`, which controls column k near its seat [Pa], rate dx/dt of its lift x [1/s]).
 
-    stationary : pressure change since the start at the controlled end, as if the column were at rest [Pa]
-    inertia : pressure per d/dt of the flow, L / A of the column or more [Pa s2/kg]
     other : pressure change since the start at the opposite end of the valve [Pa]
     drop : drop across the valve for the column at rest [Pa]
     """
@@ -175,7 +176,7 @@ def relaxed_root(y, tables, out, k, index, way, root, slope, heavy):
     conductance G at full lift and step h. M relaxes to x sqrt(G) r0 over at least two steps, and not faster than
     without this correction. The sum x / slope + (L / A) M, with length L and area A of column k, is not changed by it.
 
-    index : number of the valve; slope, heavy : see `lift_drop`
+    slope, heavy : see `lift_drop`
     way : 1 if the flow of the column from `from` to `to` passes the valve in the valve's own direction, else -1
     """
     dense, column = tables.valves[index]["conductance"], tables.columns[k]
@@ -187,10 +188,7 @@ def relaxed_root(y, tables, out, k, index, way, root, slope, heavy):
 
 @njit
 def seating_flow(t, y, tables, out, k, end, index, solved):
-    """Results of `controlled_flow` for column k, which valve `index` controls near its seat.
-
-    end, solved : as for `controlled_flow`
-    """
+    """Results of `controlled_flow` for column k, which valve `index` controls near its seat."""
     valve, column = tables.valves[index], tables.columns[k]
     side = 1.0 if valve["from_node"] == (column["to_node"] if end == 1 else column["from_node"]) else -1.0
     stationary, inertia = stationary_pressure(y, tables, out, k, end, solved)
@@ -208,7 +206,6 @@ def gate_flow(t, tables, out, x, p, solved):
 
     The slope is the derivative of the rate with respect to the pressure of the node [kg/s2/Pa].
     p : pressure change of the node since the start [Pa]
-    solved : True if the pressures of nodes are solved, False if they are estimates
     """
     flow, rate, rise = 0.0, 0.0, 0.0
     for e in range(tables.nodes[x]["gate_count"]):
@@ -225,10 +222,7 @@ def gate_flow(t, tables, out, x, p, solved):
 
 @njit
 def zero_flow_pressure(tables, out, x, index, solved):
-    """Pressure change of node x since the start [Pa] at which there is no flow through its valve `index`.
-
-    solved : True if the pressures of nodes are solved, False if they are estimates
-    """
+    """Pressure change of node x since the start [Pa] at which there is no flow through its valve `index`."""
     valve = tables.valves[index]
     side = 1.0 if valve["from_node"] == x else -1.0
     other = pressure_at(tables, out, valve["to_node"] if side > 0.0 else valve["from_node"], 0.0, solved)
@@ -237,7 +231,7 @@ def zero_flow_pressure(tables, out, x, index, solved):
 
 @njit
 def zero_flow_range(tables, out, x, solved):
-    """(least, greatest) result of `zero_flow_pressure` for all valves of node x [Pa]; solved : as for that function."""
+    """(least, greatest) result of `zero_flow_pressure` for all valves of node x [Pa]."""
     least, most = 1e300, -1e300
     for e in range(tables.nodes[x]["gate_count"]):
         level = zero_flow_pressure(tables, out, x, tables.integers[tables.nodes[x]["gates"] + e], solved)
@@ -250,9 +244,6 @@ def opening_pressure(t, tables, out, x, stationary, inertia, solved):
     """Pressure change of node x since the start [Pa] while its opening valves control a column, by bounded Newton.
 
     It is the only root p of p - stationary + inertia rate(p) = 0, with the rate of flow in the results of `gate_flow`.
-    stationary : pressure change as if the column were at rest [Pa]
-    inertia : pressure per d/dt of the flow [Pa s2/kg]
-    solved : True if the pressures of nodes are solved, False if they are estimates
     """
     low, high = zero_flow_range(tables, out, x, solved)
     low, high, p = min(low, stationary), max(high, stationary), stationary
@@ -277,7 +268,6 @@ def closing_pressure(t, tables, out, x, way, start, stationary, inertia, solved)
     left side is convex there, and flows tend to the outermost root.
     way : direction of the flow, 1 out of the node, -1 into it
     start : pressure at which Newton starts, outside all roots [Pa]
-    stationary, inertia, solved : see `opening_pressure`
     """
     p = start
     for _ in range(200):
@@ -296,7 +286,7 @@ def closing_pressure(t, tables, out, x, way, start, stationary, inertia, solved)
 def controlled_pressure(t, tables, out, x, own, stationary, inertia, solved):
     """Pressure change of node x since the start [Pa] while its valves control the flow of a column.
 
-    own : flow of the column into the node by its state [kg/s]; stationary, inertia, solved : see `opening_pressure`
+    own : flow of the column into the node by its state [kg/s]
     Closing valves may allow a flow in either direction: the direction of the present flow is tried first.
     """
     flow, rate, _ = gate_flow(t, tables, out, x, stationary, solved)
@@ -323,7 +313,6 @@ def controlled_rate(t, y, tables, out, k, end):
 
     At the switch to valve control the state has an error of about 1 %. Below the fraction SWITCH_LOSS of the flow at
     the switch, the flow is relaxed to zero instead of changing its sign.
-    end : 1 if the controlled end is the `to` end, -1 if it is the `from` end
     """
     flow, rate, _ = controlled_flow(t, y, tables, out, k, end, True)
     column = tables.columns[k]
@@ -339,8 +328,6 @@ def controlled_flow(t, y, tables, out, k, end, solved):
     """(flow of column k out of its controlled end [kg/s], d/dt of this flow [kg/s2], pressure change of the end [Pa]).
 
     The pressure change is that since the start.
-    end : 1 if the controlled end is the `to` end, -1 if it is the `from` end
-    solved : True if the pressures of nodes are solved, False if they are estimates
     """
     column, limit = tables.columns[k], tables.clock[0]["limit"]
     x = column["to_node"] if end == 1 else column["from_node"]

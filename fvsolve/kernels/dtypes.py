@@ -15,13 +15,7 @@ FIXED, TANK, CHAMBER, JUNCTION = 0, 1, 2, 3  # node kinds: given pressure, stora
 MOVING, VESSEL = 4, 5  # storage with pressure known before nodes are solved: chamber of a piston, vessel of a device
 PATCH = 6  # patch of a basin, which sets its pressure and receives its flow
 FRICTION_NONE, FRICTION_FACTOR, FRICTION_ROUGH, FRICTION_HAZEN = 0, 1, 2, 3
-UPWIND, LINEAR, MUSCL, WENO5, SHORT = (
-    0,
-    1,
-    2,
-    3,
-    4,
-)  # scheme families; LINEAR: six weights, SHORT: upwind3
+UPWIND, LINEAR, MUSCL, WENO5, SHORT = 0, 1, 2, 3, 4  # scheme families; LINEAR: six weights, SHORT: upwind3
 MINMOD, VAN_LEER, MONOTONIZED_CENTRAL, FLAT = 0, 1, 2, 3  # FLAT: no slope, for scalars in linearisation
 ALONE, SINGLE, CLUSTER = 0, 1, 2  # how a node without storage is solved
 LAW_LINEAR, LAW_LOG, LAW_TABLE, LAW_MIXTURE = 0, 1, 2, 3
@@ -31,418 +25,364 @@ OK, NO_SOLUTION, NOT_CONVERGED, NOT_FINITE, NO_VOLUME, NO_WIDTH, NO_WEIGHT = 0, 
 AMENDED = 7  # no fault: a record function has corrected the accepted state; evaluate it again
 ARRIVED = 8  # no fault: record functions must let the jumps arrive that end the step
 
-SETTINGS = np.dtype(
-    [
-        ("scheme", "i8"),
-        ("limiter", "i8"),
-        ("degree", "i8"),  # degree of the polynomials next to an end
-        ("w0", "f8"),  # weights of cells i-3 .. i+2 in the value at face i, for forward waves
-        ("w1", "f8"),
-        ("w2", "f8"),
-        ("w3", "f8"),
-        ("w4", "f8"),
-        ("w5", "f8"),
-        # Linear schemes: weights in the difference F[i] - F[i+1], nearest cell first.
-        ("inside", "f8", (6,)),  # of cells i-3 .. i+2
-        ("enter", "f8", (3, 6)),  # of the datum and five cells, for the three cells at the end where the wave enters
-        ("leave", "f8", (2, 5)),  # of five cells, for the two cells at the end where it leaves
-        ("rho", "f8"),  # reference density [kg/m3]
-        ("viscosity", "f8"),  # dynamic [Pa s]
-        ("ambient", "f8"),  # ambient pressure [Pa]
-        ("gravity", "f8"),
-        ("datum", "f8"),  # elevation of zero height in energy studies [m]
-        ("vapor", "f8"),  # vapour pressure [Pa]
-        ("rate", "f8"),  # greatest constant wave rate, speed / dx [1/s]
-        ("stop_below", "i8"),  # 1: a pressure below vapour pressure ends the run
-        ("law", "i8"),
-        ("beta", "f8"),  # bulk modulus of the fluid [Pa]
-        ("reference", "f8"),  # pressure at which the density is rho [Pa]
-        ("table", "i8"),  # offset of the density table in `floats`, its length and pressure step
-        ("table_size", "i8"),
-        ("table_start", "f8"),
-        ("table_step", "f8"),
-        ("floor", "f8"),  # mixture: pressure below that of the gas, vapour pressure or 0 [Pa]
-        ("gas", "f8"),  # gas volume over liquid volume, times pressure to the power gas_power [Pa^gas_power]
-        ("gas_power", "f8"),  # 1 / (gas exponent)
-        ("weights", "i8"),  # offset in `floats` of the weights b of the method, followed by its c; number of stages
-        ("stages", "i8"),
-        ("jumps", "f8"),  # least jump in a delay line that is stored as a jump, as fraction of the greatest wave
-        ("saturation", "f8"),  # gas pressure at which all gas is dissolved; infinite for no dissolution [Pa]
-    ],
-    align=True,
+i8, f8 = "i8", "f8"
+
+
+def record(**columns: str) -> np.dtype:
+    """Aligned record type with these columns, in this order; a text such as "(3,)f8" gives the shape of a column."""
+    return np.dtype(list(columns.items()), align=True)
+
+
+SETTINGS = record(
+    scheme=i8,
+    limiter=i8,
+    degree=i8,  # degree of the polynomials next to an end
+    w0=f8,  # weights of cells i-3 .. i+2 in the value at face i, for forward waves
+    w1=f8,
+    w2=f8,
+    w3=f8,
+    w4=f8,
+    w5=f8,
+    # Linear schemes: weights in the difference F[i] - F[i+1], nearest cell first.
+    inside="(6,)f8",  # of cells i-3 .. i+2
+    enter="(3, 6)f8",  # of the datum and five cells, for the three cells at the end where the wave enters
+    leave="(2, 5)f8",  # of five cells, for the two cells at the end where it leaves
+    rho=f8,  # reference density [kg/m3]
+    viscosity=f8,  # dynamic [Pa s]
+    ambient=f8,  # ambient pressure [Pa]
+    gravity=f8,
+    datum=f8,  # elevation of zero height in energy studies [m]
+    vapor=f8,  # vapour pressure [Pa]
+    rate=f8,  # greatest constant wave rate, speed / dx [1/s]
+    stop_below=i8,  # 1: a pressure below vapour pressure ends the run
+    law=i8,
+    beta=f8,  # bulk modulus of the fluid [Pa]
+    reference=f8,  # pressure at which the density is rho [Pa]
+    table=i8,  # offset of the density table in `floats`, its length and pressure step
+    table_size=i8,
+    table_start=f8,
+    table_step=f8,
+    floor=f8,  # mixture: pressure below that of the gas, vapour pressure or 0 [Pa]
+    gas=f8,  # gas volume over liquid volume, times pressure to the power gas_power [Pa^gas_power]
+    gas_power=f8,  # 1 / (gas exponent)
+    weights=i8,  # offset in `floats` of the weights b of the method, followed by its c; number of stages
+    stages=i8,
+    jumps=f8,  # least jump in a delay line that is stored as a jump, as fraction of the greatest wave
+    saturation=f8,  # gas pressure at which all gas is dissolved; infinite for no dissolution [Pa]
 )
 
-PIPE = np.dtype(  # columns read by delay lines come first, in as few cache lines as possible
-    [
-        ("y", "i8"),  # offset of the forward wave in y; the backward wave follows it
-        ("cell", "i8"),  # offset of its cells in per-cell arrays
-        ("from_node", "i8"),
-        ("to_node", "i8"),
-        ("admittance", "f8"),  # area / speed [kg/s per Pa]
-        ("flow", "f8"),  # mass flow of the profile [kg/s]
-        ("drag", "f8"),  # balances the pressure gradient of the profile; its friction if steady [kg/s2]
-        ("friction", "i8"),
-        ("loss", "f8"),  # dM/dt = -loss |M| M, the part with a fixed factor [1/kg]
-        ("rough", "f8"),  # dM/dt = -rough f(Re) |M| M  [1/kg]
-        ("cells", "i8"),
-        ("dx", "f8"),
-        ("speed", "f8"),  # wave speed [m/s]
-        ("rate_factor", "f8"),  # factor on speed / dx for the ends of a short pipe
-        ("area", "f8"),
-        ("diameter", "f8"),
-        ("roughness", "f8"),  # relative roughness
-        ("reynolds", "f8"),  # Reynolds number per mass flow [s/kg]
-        ("noise", "f8"),  # square of a negligible flow [kg2/s2]
-        ("compliance", "f8"),  # of the wall, d ln(area) / dp [1/Pa]
-        ("slope", "f8"),  # rise per length, 0 for a pipe with an elevation profile
-        ("rise", "i8"),  # offset in `profile` of rises above its `from` end at faces and centres [m]; -1: straight
-        ("terms", "i8"),  # number of exponentials of unsteady friction; 0 for none
-        ("term", "i8"),  # offset in `floats` of pairs: drag per lag of the flow [1/s], rate of the lag [1/s]
-        ("memory", "i8"),  # offset in y of the lagged flows, a row of cells for each term [kg/s]
-        ("elements", "i8"),  # number of Kelvin-Voigt elements of the wall; 0 for none
-        ("element", "i8"),  # offset in `floats` of pairs: loss of both waves per lag of w [1/s], rate of the lag [1/s]
-        ("strain", "i8"),  # offset in y of the lagged w = r + l, a row of cells for each element [kg/s]
-        ("face", "i8"),  # offset in `profile` of mass per length at faces
-        ("flux", "i8"),  # offset in `profile` of momentum flux at faces
-        ("center", "i8"),  # offset in `profile` of mass per length at centres; with scalars under the linear law too
-        ("from_base", "f8"),  # laws log and table: flow into the node, computed for the profile [kg/s]
-        ("to_base", "f8"),
-        ("from_mass", "f8"),  # mass per length at the end, computed for the profile [kg/m]
-        ("to_mass", "f8"),
-        ("moving_segment", "i8"),  # row of its first cell in `moving_segments`; -1 for a fixed pipe
-        ("delay", "i8"),  # row of `delays` for a delay line, which has no cells; else -1
-    ],
-    align=True,
+PIPE = record(  # columns read by delay lines come first, in as few cache lines as possible
+    y=i8,  # offset of the forward wave in y; the backward wave follows it
+    cell=i8,  # offset of its cells in per-cell arrays
+    from_node=i8,
+    to_node=i8,
+    admittance=f8,  # area / speed [kg/s per Pa]
+    flow=f8,  # mass flow of the profile [kg/s]
+    drag=f8,  # balances the pressure gradient of the profile; its friction if steady [kg/s2]
+    friction=i8,
+    loss=f8,  # dM/dt = -loss |M| M, the part with a fixed factor [1/kg]
+    rough=f8,  # dM/dt = -rough f(Re) |M| M  [1/kg]
+    cells=i8,
+    dx=f8,
+    speed=f8,  # wave speed [m/s]
+    rate_factor=f8,  # factor on speed / dx for the ends of a short pipe
+    area=f8,
+    diameter=f8,
+    roughness=f8,  # relative roughness
+    reynolds=f8,  # Reynolds number per mass flow [s/kg]
+    noise=f8,  # square of a negligible flow [kg2/s2]
+    compliance=f8,  # of the wall, d ln(area) / dp [1/Pa]
+    slope=f8,  # rise per length, 0 for a pipe with an elevation profile
+    rise=i8,  # offset in `profile` of rises above its `from` end at faces and centres [m]; -1: straight
+    terms=i8,  # number of exponentials of unsteady friction; 0 for none
+    term=i8,  # offset in `floats` of pairs: drag per lag of the flow [1/s], rate of the lag [1/s]
+    memory=i8,  # offset in y of the lagged flows, a row of cells for each term [kg/s]
+    elements=i8,  # number of Kelvin-Voigt elements of the wall; 0 for none
+    element=i8,  # offset in `floats` of pairs: loss of both waves per lag of w [1/s], rate of the lag [1/s]
+    strain=i8,  # offset in y of the lagged w = r + l, a row of cells for each element [kg/s]
+    face=i8,  # offset in `profile` of mass per length at faces
+    flux=i8,  # offset in `profile` of momentum flux at faces
+    center=i8,  # offset in `profile` of mass per length at centres; with scalars under the linear law too
+    from_base=f8,  # laws log and table: flow into the node, computed for the profile [kg/s]
+    to_base=f8,
+    from_mass=f8,  # mass per length at the end, computed for the profile [kg/m]
+    to_mass=f8,
+    moving_segment=i8,  # row of its first cell in `moving_segments`; -1 for a fixed pipe
+    delay=i8,  # row of `delays` for a delay line, which has no cells; else -1
 )
 
-DELAY = np.dtype(  # delay line: stretches of equal travel time, friction in the middle of each
-    [
-        ("pipe", "i8"),
-        ("stretch", "i8"),  # first stretch
-        ("stretches", "i8"),
-        ("tau", "f8"),  # travel time of a stretch [s]
-        ("hold", "f8"),  # age of the waves that are read: tau, or the longest step for a shorter stretch [s]
-        ("now", "f8"),  # fraction that arrives instantly in a shorter stretch, 1 - tau / hold; else 0
-        ("ring", "i8"),  # number of entries of `past` before its own, see `kernels.delay_lines.wave_history`
-        ("ring_size", "i8"),  # number of entries of each stretch
-        (
-            "transmission",
-            "f8",
-        ),  # fraction of a small change of flow transmitted by the friction in the middle of a stretch
-        ("places", "i8"),  # number of places of fields and envelopes
-        ("couple", "f8"),  # instantaneous flow between the ends of a shorter stretch per pressure [kg/s per Pa]
-        ("acts", "i8"),  # ends whose nodes respond instantly: 1 `from`, 2 `to`, 3 both
-    ],
-    align=True,
+DELAY = record(  # delay line: stretches of equal travel time, friction in the middle of each
+    pipe=i8,
+    stretch=i8,  # first stretch
+    stretches=i8,
+    tau=f8,  # travel time of a stretch [s]
+    hold=f8,  # age of the waves that are read: tau, or the longest step for a shorter stretch [s]
+    now=f8,  # fraction that arrives instantly in a shorter stretch, 1 - tau / hold; else 0
+    ring=i8,  # number of entries of `past` before its own, see `kernels.delay_lines.wave_history`
+    ring_size=i8,  # number of entries of each stretch
+    transmission=f8,  # fraction of a small change of flow transmitted by the friction in the middle of a stretch
+    places=i8,  # number of places of fields and envelopes
+    couple=f8,  # instantaneous flow between the ends of a shorter stretch per pressure [kg/s per Pa]
+    acts=i8,  # ends whose nodes respond instantly: 1 `from`, 2 `to`, 3 both
 )
 
-NODE = np.dtype(
-    [
-        ("kind", "i8"),
-        ("y", "i8"),  # offset of the stored mass in y
-        ("schedule", "i8"),  # pressure [Pa] of a fixed node, mass demand [kg/s] of a junction; -1 for none
-        ("solve", "i8"),  # ALONE, SINGLE or CLUSTER
-        ("pressure", "f8"),  # of the profile [Pa]
-        ("elevation", "f8"),
-        ("demand", "f8"),  # of the profile [kg/s]
-        ("inflow", "f8"),  # link flows of the profile into it minus demand, rounding set to zero [kg/s]
-        ("admittance", "f8"),  # sum of area / speed of its pipe ends [kg/s per Pa]
-        ("stiffness", "f8"),  # chamber and prism: pressure per stored mass [Pa/kg]
-        ("area", "f8"),  # tank [m2]
-        ("level", "f8"),  # level of a tank in the profile [m]
-        ("mass", "f8"),  # mass stored in the profile [kg]
-        ("full", "f8"),  # stored mass above which a tank spills [kg]
-        ("shape", "i8"),  # offset of a tank's table in `floats` (levels, areas, volumes); -1 for a prism
-        ("shapes", "i8"),  # number of rows of that table
-        ("volume", "f8"),  # volume of a chamber [m3]; of a moving chamber at the start
-        ("row", "i8"),  # row in its cluster; number of a tank or moving chamber
-        ("gates", "i8"),  # at a node of rigid columns and valves only: offset of the valves in `integers`, else -1
-        ("gate_count", "i8"),
-        ("columns", "i8"),  # number of these columns
-        ("head_given", "i8"),  # laws log and table: 1 if the schedule is a head [m]
-        ("density", "f8"),  # density in a tank [kg/m3]
-        ("moving_segment", "i8"),  # row of `moving_segments`; -1 for a fixed node
-        ("lines", "i8"),  # offset in `integers` of the ends of delay lines at it, 2 line + side
-        ("line_count", "i8"),
-    ],
-    align=True,
+NODE = record(
+    kind=i8,
+    y=i8,  # offset of the stored mass in y
+    schedule=i8,  # pressure [Pa] of a fixed node, mass demand [kg/s] of a junction; -1 for none
+    solve=i8,  # ALONE, SINGLE or CLUSTER
+    pressure=f8,  # of the profile [Pa]
+    elevation=f8,
+    demand=f8,  # of the profile [kg/s]
+    inflow=f8,  # link flows of the profile into it minus demand, rounding set to zero [kg/s]
+    admittance=f8,  # sum of area / speed of its pipe ends [kg/s per Pa]
+    stiffness=f8,  # chamber and prism: pressure per stored mass [Pa/kg]
+    area=f8,  # tank [m2]
+    level=f8,  # level of a tank in the profile [m]
+    mass=f8,  # mass stored in the profile [kg]
+    full=f8,  # stored mass above which a tank spills [kg]
+    shape=i8,  # offset of a tank's table in `floats` (levels, areas, volumes); -1 for a prism
+    shapes=i8,  # number of rows of that table
+    volume=f8,  # volume of a chamber [m3]; of a moving chamber at the start
+    row=i8,  # row in its cluster; number of a tank or moving chamber
+    gates=i8,  # at a node of rigid columns and valves only: offset of the valves in `integers`, else -1
+    gate_count=i8,
+    columns=i8,  # number of these columns
+    head_given=i8,  # laws log and table: 1 if the schedule is a head [m]
+    density=f8,  # density in a tank [kg/m3]
+    moving_segment=i8,  # row of `moving_segments`; -1 for a fixed node
+    lines=i8,  # offset in `integers` of the ends of delay lines at it, 2 line + side
+    line_count=i8,
 )
 
-VALVE = np.dtype(
-    [
-        ("from_node", "i8"),
-        ("to_node", "i8"),
-        ("schedule", "i8"),
-        ("characteristic", "i8"),  # 0 linear, 1 equal-percentage, else table
-        ("table", "i8"),
-        ("table_size", "i8"),
-        ("solve", "i8"),  # SINGLE, CLUSTER, or ALONE between two stored or given pressures
-        ("conductance", "f8"),  # 2 rho (Cd A)^2 at full opening: M |M| = conductance * dp
-        ("transition", "f8"),  # flow below which the law is laminar [kg/s]; 0 if pipes bound the slope of the root
-        ("rounding_drop", "f8"),  # drop below which the law is laminar at any opening [Pa]: too small for error control
-        ("hooks", "i8"),  # row of `hooks`, the functions of its own law; -1 for the square-root law
-        ("device", "i8"),  # device that sets its conductance; -1: its schedule sets it
-        ("data", "i8"),  # offset of the numbers of its law in `floats`
-        ("event", "i8"),  # offset of its flags in `armed`, for a law with kinks
-        ("back", "f8"),  # square-root law: fraction of the conductance for flow from `to` to `from`
-        ("drive", "f8"),  # relative speed of a pump in the profile
-        ("open", "f8"),  # conductance of the profile; 0 if the flow does not obey its law
-        ("flow", "f8"),  # of the profile [kg/s]
-        ("drop", "f8"),  # of the profile [Pa]
-    ],
-    align=True,
+VALVE = record(
+    from_node=i8,
+    to_node=i8,
+    schedule=i8,
+    characteristic=i8,  # 0 linear, 1 equal-percentage, else table
+    table=i8,
+    table_size=i8,
+    solve=i8,  # SINGLE, CLUSTER, or ALONE between two stored or given pressures
+    conductance=f8,  # 2 rho (Cd A)^2 at full opening: M |M| = conductance * dp
+    transition=f8,  # flow below which the law is laminar [kg/s]; 0 if pipes bound the slope of the root
+    rounding_drop=f8,  # drop below which the law is laminar at any opening [Pa]: too small for error control
+    hooks=i8,  # row of `hooks`, the functions of its own law; -1 for the square-root law
+    device=i8,  # device that sets its conductance; -1: its schedule sets it
+    data=i8,  # offset of the numbers of its law in `floats`
+    event=i8,  # offset of its flags in `armed`, for a law with kinks
+    back=f8,  # square-root law: fraction of the conductance for flow from `to` to `from`
+    drive=f8,  # relative speed of a pump in the profile
+    open=f8,  # conductance of the profile; 0 if the flow does not obey its law
+    flow=f8,  # of the profile [kg/s]
+    drop=f8,  # of the profile [Pa]
 )
 
-COLUMN = np.dtype(
-    [
-        ("y", "i8"),
-        ("from_node", "i8"),
-        ("to_node", "i8"),
-        ("area", "f8"),
-        ("length", "f8"),
-        ("friction", "i8"),
-        ("loss", "f8"),
-        ("rough", "f8"),
-        ("roughness", "f8"),
-        ("reynolds", "f8"),
-        ("flow", "f8"),
-        ("drag", "f8"),
-        ("offset", "f8"),  # driving pressure of the profile not balanced by friction [Pa]
-        ("base", "f8"),  # laws log and table: driving pressure of the profile [Pa]
-        ("moving_segment", "i8"),  # row of its first stretch in `moving_segments`; -1 for a fixed column
-        ("moving_segments", "i8"),  # number of these stretches
-    ],
-    align=True,
+COLUMN = record(
+    y=i8,
+    from_node=i8,
+    to_node=i8,
+    area=f8,
+    length=f8,
+    friction=i8,
+    loss=f8,
+    rough=f8,
+    roughness=f8,
+    reynolds=f8,
+    flow=f8,
+    drag=f8,
+    offset=f8,  # driving pressure of the profile not balanced by friction [Pa]
+    base=f8,  # laws log and table: driving pressure of the profile [Pa]
+    moving_segment=i8,  # row of its first stretch in `moving_segments`; -1 for a fixed column
+    moving_segments=i8,  # number of these stretches
 )
 
-BODY = np.dtype(  # its axes have their origin at its joint
-    [
-        ("parent", "i8"),  # row of its parent body, a smaller number; -1 for the world
-        ("root", "i8"),  # row of the first body of its tree
-        ("joint", "i8"),  # REVOLUTE ...
-        ("y", "i8"),  # offset in y of its coordinates, as deviations; -1 for none
-        ("rate", "i8"),  # offset in y of its velocities, as deviations; -1 for none
-        ("freedom", "i8"),  # its first row of `freedoms`
-        ("freedoms", "i8"),  # number of its degrees of freedom
-        ("schedule", "i8"),  # angle [rad] or travel [m] of a driven joint; -1 for none
-        ("at", "f8", (3,)),  # position of the joint in the axes of the parent [m]
-        ("attitude", "f8", (9,)),  # rotation matrix of the joint axes in the axes of the parent, by rows
-        ("axis", "f8", (3,)),  # axis of the joint, in the joint axes and in its own
-        ("mass", "f8"),
-        ("centre", "f8", (3,)),  # centre of mass [m]
-        ("inertia", "f8", (9,)),  # about the centre of mass [kg m2]
-        ("damping", "f8"),  # damping of its joint [N m s] or [N s/m]
-        ("stiffness", "f8"),  # stiffness of its joint [N m/rad] or [N/m]
-        ("start", "f8", (7,)),  # coordinates at the start
-        ("speed", "f8", (6,)),  # velocities at the start
-        ("height", "f8"),  # height of its centre of mass at the start [m]
-        ("energy", "f8"),  # kinetic energy at the start [J]
-    ],
-    align=True,
+BODY = record(  # its axes have their origin at its joint
+    parent=i8,  # row of its parent body, a smaller number; -1 for the world
+    root=i8,  # row of the first body of its tree
+    joint=i8,  # REVOLUTE ...
+    y=i8,  # offset in y of its coordinates, as deviations; -1 for none
+    rate=i8,  # offset in y of its velocities, as deviations; -1 for none
+    freedom=i8,  # its first row of `freedoms`
+    freedoms=i8,  # number of its degrees of freedom
+    schedule=i8,  # angle [rad] or travel [m] of a driven joint; -1 for none
+    at="(3,)f8",  # position of the joint in the axes of the parent [m]
+    attitude="(9,)f8",  # rotation matrix of the joint axes in the axes of the parent, by rows
+    axis="(3,)f8",  # axis of the joint, in the joint axes and in its own
+    mass=f8,
+    centre="(3,)f8",  # centre of mass [m]
+    inertia="(9,)f8",  # about the centre of mass [kg m2]
+    damping=f8,  # damping of its joint [N m s] or [N s/m]
+    stiffness=f8,  # stiffness of its joint [N m/rad] or [N/m]
+    start="(7,)f8",  # coordinates at the start
+    speed="(6,)f8",  # velocities at the start
+    height=f8,  # height of its centre of mass at the start [m]
+    energy=f8,  # kinetic energy at the start [J]
 )
 REVOLUTE, PRISMATIC, BALL, FREE, WELD = 0, 1, 2, 3, 4  # joints
 
-FREEDOM = np.dtype(
-    [
-        ("depth", "i8"),  # number of degrees of freedom on which its position depends
-        ("path", "i8"),  # offset in `integers` of these, from the root on, and of itself
-        ("row", "i8"),  # offset of its row of the mass matrix, for those on its path
-        ("balance", "f8"),  # generalised force at the start that is rounding [N] or [N m]
-    ],
-    align=True,
+FREEDOM = record(
+    depth=i8,  # number of degrees of freedom on which its position depends
+    path=i8,  # offset in `integers` of these, from the root on, and of itself
+    row=i8,  # offset of its row of the mass matrix, for those on its path
+    balance=f8,  # generalised force at the start that is rounding [N] or [N m]
 )
 
-POINT = np.dtype(
-    [("body", "i8"), ("place", "f8", (3,))], align=True
-)  # body -1: the world; place in the axes of the body
+POINT = record(
+    body=i8,  # -1: the world
+    place="(3,)f8",  # in the axes of the body
+)
 
-LINE = np.dtype(  # line of action of a force element on points of bodies
-    [
-        ("push", "i8"),
-        ("from_point", "i8"),  # -1 for none
-        ("to_point", "i8"),
-        ("acts", "i8"),  # ALONG the line between points, TOWARD a direction of the world, ABOUT an axis of `to`
-        ("direction", "f8", (3,)),
-        ("length", "f8"),  # length at the start [m]
-    ],
-    align=True,
+LINE = record(  # line of action of a force element on points of bodies
+    push=i8,
+    from_point=i8,  # -1 for none
+    to_point=i8,
+    acts=i8,  # ALONG the line between points, TOWARD a direction of the world, ABOUT an axis of `to`
+    direction="(3,)f8",
+    length=f8,  # length at the start [m]
 )
 ALONG, TOWARD, ABOUT = 0, 1, 2
 
-PIN = np.dtype(
-    [
-        ("from_point", "i8"),
-        ("to_point", "i8"),
-        ("rows", "i8"),  # number of constrained directions
-        ("directions", "f8", (9,)),  # in the axes of the body of `from`
-        ("pull", "f8"),  # rate of stabilisation (Baumgarte) [1/s]
-        ("gap", "f8", (3,)),  # gap along each direction at the start [m]
-        ("force", "f8", (3,)),  # constraint force at the start [N]
-    ],
-    align=True,
+PIN = record(
+    from_point=i8,
+    to_point=i8,
+    rows=i8,  # number of constrained directions
+    directions="(9,)f8",  # in the axes of the body of `from`
+    pull=f8,  # rate of stabilisation (Baumgarte) [1/s]
+    gap="(3,)f8",  # gap along each direction at the start [m]
+    force="(3,)f8",  # constraint force at the start [N]
 )
 
-BUSHING = np.dtype(
-    [
-        ("from_point", "i8"),
-        ("to_point", "i8"),
-        ("stiffness", "f8"),
-        ("damping", "f8"),
-        ("turn_stiffness", "f8"),
-        ("turn_damping", "f8"),
-        ("attitude", "f8", (9,)),  # rotation matrix of the body of `to` in the axes of that of `from` at the start
-        ("energy", "f8"),  # energy stored at the start [J]
-    ],
-    align=True,
+BUSHING = record(
+    from_point=i8,
+    to_point=i8,
+    stiffness=f8,
+    damping=f8,
+    turn_stiffness=f8,
+    turn_damping=f8,
+    attitude="(9,)f8",  # rotation matrix of the body of `to` in the axes of that of `from` at the start
+    energy=f8,  # energy stored at the start [J]
 )
 
-MOVING_SEGMENT = np.dtype(  # moving stretch of a pipe or column, or content of a node, on a body and in its axes
-    [
-        ("body", "i8"),
-        ("start", "f8", (3,)),  # its start [m]; position of a node
-        ("end", "f8", (3,)),  # its end [m]; the level of a tank rises along z
-        ("swept", "f8", (3,)),  # integral of r x dr along it [m2]
-        ("rest", "f8"),  # work of gravity along it at the start [J/kg]
-        ("loads_body", "i8"),  # load on the body: MOVED_BY_FORCES, JOINT_LOAD_READ, or 0 if neither applies
-    ],
-    align=True,
+MOVING_SEGMENT = record(  # moving stretch of a pipe or column, or content of a node, on a body and in its axes
+    body=i8,
+    start="(3,)f8",  # its start [m]; position of a node
+    end="(3,)f8",  # its end [m]; the level of a tank rises along z
+    swept="(3,)f8",  # integral of r x dr along it [m2]
+    rest=f8,  # work of gravity along it at the start [J/kg]
+    loads_body=i8,  # load on the body: MOVED_BY_FORCES, JOINT_LOAD_READ, or 0 if neither applies
 )
 
-MASS = np.dtype(
-    [
-        ("y", "i8"),  # offset in y of its position, then velocity, both as deviations; -1 for a frame
-        ("lightness", "f8"),  # 1 / mass, 0 for a frame [1/kg]
-        ("position", "f8"),  # at the start [m]
-        ("velocity", "f8"),  # at the start [m/s]
-        ("force", "f8"),  # sum of all forces at the start, rounding set to zero [N]
-    ],
-    align=True,
+MASS = record(
+    y=i8,  # offset in y of its position, then velocity, both as deviations; -1 for a frame
+    lightness=f8,  # 1 / mass, 0 for a frame [1/kg]
+    position=f8,  # at the start [m]
+    velocity=f8,  # at the start [m/s]
+    force=f8,  # sum of all forces at the start, rounding set to zero [N]
 )
 
-BRACE = np.dtype(  # spring, damper or force: push = force + (schedule - given) - stiffness dx - damping (v - speed)
-    [
-        ("from_mass", "i8"),
-        ("to_mass", "i8"),
-        ("schedule", "i8"),  # -1 for none
-        ("given", "f8"),  # value of the schedule at the start [N]
-        ("stiffness", "f8"),
-        ("damping", "f8"),
-        ("speed", "f8"),  # v_to - v_from at the start [m/s]
-        ("force", "f8"),  # push at the start [N]
-        ("line", "i8"),  # row of `lines` if it joins points of bodies; -1 on the axis of masses
-    ],
-    align=True,
+BRACE = record(  # spring, damper or force: push = force + (schedule - given) - stiffness dx - damping (v - speed)
+    from_mass=i8,
+    to_mass=i8,
+    schedule=i8,  # -1 for none
+    given=f8,  # value of the schedule at the start [N]
+    stiffness=f8,
+    damping=f8,
+    speed=f8,  # v_to - v_from at the start [m/s]
+    force=f8,  # push at the start [N]
+    line=i8,  # row of `lines` if it joins points of bodies; -1 on the axis of masses
 )
 
-STOP = np.dtype(
-    [
-        ("from_mass", "i8"),
-        ("to_mass", "i8"),
-        ("stiffness", "f8"),
-        ("damping", "f8"),
-        ("below", "f8"),  # free travel at the start before it pushes forward, infinite for none [m]
-        ("above", "f8"),  # free travel at the start before it pushes back [m]
-        ("force", "f8"),
-        ("line", "i8"),  # row of `lines` if it joins points of bodies; -1 on the axis of masses
-    ],
-    align=True,
+STOP = record(
+    from_mass=i8,
+    to_mass=i8,
+    stiffness=f8,
+    damping=f8,
+    below=f8,  # free travel at the start before it pushes forward, infinite for none [m]
+    above=f8,  # free travel at the start before it pushes back [m]
+    force=f8,
+    line=i8,  # row of `lines` if it joins points of bodies; -1 on the axis of masses
 )
 
-PISTON = np.dtype(
-    [
-        ("case", "i8"),  # masses
-        ("rod", "i8"),
-        ("a", "i8"),  # nodes
-        ("b", "i8"),
-        ("area_a", "f8"),
-        ("area_b", "f8"),
-        ("sweep_a", "f8"),  # mass in A per travel at the density of the start, not part of the excess [kg/m]
-        ("sweep_b", "f8"),  # likewise in B, negative
-        ("position", "f8"),  # x at the start [m]
-        ("stroke", "f8"),
-        ("leakage", "f8"),  # [m3/s/Pa]
-        ("leak", "f8"),  # mass flow from A to B in the profile [kg/s]
-        ("damping", "f8"),
-        ("speed", "f8"),
-        ("force", "f8"),
-        ("line", "i8"),  # row of `lines` if it joins points of bodies; -1 on the axis of masses
-    ],
-    align=True,
+PISTON = record(
+    case=i8,  # masses
+    rod=i8,
+    a=i8,  # nodes
+    b=i8,
+    area_a=f8,
+    area_b=f8,
+    sweep_a=f8,  # mass in A per travel at the density of the start, not part of the excess [kg/m]
+    sweep_b=f8,  # likewise in B, negative
+    position=f8,  # x at the start [m]
+    stroke=f8,
+    leakage=f8,  # [m3/s/Pa]
+    leak=f8,  # mass flow from A to B in the profile [kg/s]
+    damping=f8,
+    speed=f8,
+    force=f8,
+    line=i8,  # row of `lines` if it joins points of bodies; -1 on the axis of masses
 )
 
-DEVICE = np.dtype(
-    [
-        ("hooks", "i8"),  # row of `hooks`, the functions of its law
-        ("mode", "i8"),  # kind of device within its law, if several kinds share a law
-        ("y", "i8"),  # offset in y of its states; -1 for none
-        ("states", "i8"),
-        ("valve", "i8"),  # restriction that it opens and closes; -1 for none
-        ("node", "i8"),  # vessel whose pressure it computes, or sensed node; -1 for none
-        ("event", "i8"),  # its first event function
-        ("data", "i8"),  # offset of its numbers in `floats`
-        ("schedule", "i8"),  # -1 for none
-        ("row", "i8"),  # number of the vessel that it fills, among nodes of variable stiffness; -1 for none
-        ("opens_by_event", "i8"),  # 1 if only events open it
-        (
-            "controls_column",
-            "i8",
-        ),  # offset in `armed` of the flag that it controls its rigid column; -1 if it never does
-    ],
-    align=True,
+DEVICE = record(
+    hooks=i8,  # row of `hooks`, the functions of its law
+    mode=i8,  # kind of device within its law, if several kinds share a law
+    y=i8,  # offset in y of its states; -1 for none
+    states=i8,
+    valve=i8,  # restriction that it opens and closes; -1 for none
+    node=i8,  # vessel whose pressure it computes, or sensed node; -1 for none
+    event=i8,  # its first event function
+    data=i8,  # offset of its numbers in `floats`
+    schedule=i8,  # -1 for none
+    row=i8,  # number of the vessel that it fills, among nodes of variable stiffness; -1 for none
+    opens_by_event=i8,  # 1 if only events open it
+    controls_column=i8,  # offset in `armed` of the flag that it controls its rigid column; -1 if it never does
 )
 
-SCHEDULE = np.dtype([("first", "i8"), ("pieces", "i8")], align=True)
+SCHEDULE = record(first=i8, pieces=i8)
 # Piece: start, kind (0 polynomial in t - origin, 1 power, 2 wave, 3 wave cut off below zero), origin, then
 # a, b, c, d or v0, v1, duration, exponent or mean, amplitude, frequency [1/s], phase
 PIECE_COLUMNS = 7
 
-CLUSTER_RECORD = np.dtype(
-    [
-        ("first_node", "i8"),
-        ("nodes", "i8"),
-        ("first_valve", "i8"),
-        ("valves", "i8"),
-        ("first_couple", "i8"),
-        ("couples", "i8"),
-        ("inverse", "i8"),
-    ],
-    align=True,
+CLUSTER_RECORD = record(
+    first_node=i8,
+    nodes=i8,
+    first_valve=i8,
+    valves=i8,
+    first_couple=i8,
+    couples=i8,
+    inverse=i8,
 )
 
-LAYOUT = np.dtype(
-    [
-        ("pressure", "i8"),  # offsets in `out`
-        ("supply", "i8"),
-        ("net", "i8"),
-        ("ends", "i8"),
-        ("valve", "i8"),
-        ("column", "i8"),
-        ("valve_controlled", "i8"),  # of columns: 1 or -1 if valves control it at its `to` or `from` end, else 0
-        ("stiffness", "i8"),  # of moving chambers: pressure per mass [Pa/kg]
-        ("outflow_fraction", "i8"),  # of patches: fraction of the requested outflow for which there is water
-        ("swept", "i8"),  # mass flow out of moving chambers by piston and leak [kg/s]
-        ("net_force", "i8"),  # on masses [N]
-        ("push", "i8"),  # forces of braces, then of stops, then of pistons [N]
-        ("conductance", "i8"),  # present conductances of valves, 0 if closed [kg2/s2/Pa]
-        ("drive", "i8"),  # present relative speeds of pumps, an entry for each valve
-        ("gain", "i8"),  # after `supply` in the ledger: inflow of each scalar through nodes [kg/s]
-        ("loss", "i8"),  # then the negative decay of each scalar [kg/s]
-        ("value", "i8"),  # of each scalar at all nodes
-        ("edge", "i8"),  # values of scalars in pipes at both ends
-        ("carried", "i8"),  # flow of scalars along pipes through both ends [kg/s]
-        ("scalar_inflow", "i8"),  # flow of scalars from links into nodes [kg/s]
-        ("moving_segment", "i8"),  # change of the driving energy of moving stretches since the start [J/kg]
-        ("rates", "i8"),  # in `work`: rates, if `out` depends on them and they are not requested; else -1
-        ("forces", "i8"),  # in `work`: rates from which forces on pipes are computed; else -1
-        ("tank", "i8"),  # inertia of basins on bodies, see `kernels.mechanism.body_layout`
-        ("wall", "i8"),  # outward force of the water on moving walls, minus that of the profile [N]
-        ("travel", "i8"),  # of force elements: change of length since the start and its rate [m, m/s]
-        ("along", "i8"),  # unit vectors of lines, between their points
-        ("pin", "i8"),  # forces of pins, three for each [N]
-        ("body", "i8"),  # data of bodies, see `kernels.mechanism.body_layout`
-        ("size", "i8"),
-    ],
-    align=True,
+LAYOUT = record(
+    pressure=i8,  # offsets in `out`
+    supply=i8,
+    net=i8,
+    ends=i8,
+    valve=i8,
+    column=i8,
+    valve_controlled=i8,  # of columns: 1 or -1 if valves control it at its `to` or `from` end, else 0
+    stiffness=i8,  # of moving chambers: pressure per mass [Pa/kg]
+    outflow_fraction=i8,  # of patches: fraction of the requested outflow for which there is water
+    swept=i8,  # mass flow out of moving chambers by piston and leak [kg/s]
+    net_force=i8,  # on masses [N]
+    push=i8,  # forces of braces, then of stops, then of pistons [N]
+    conductance=i8,  # present conductances of valves, 0 if closed [kg2/s2/Pa]
+    drive=i8,  # present relative speeds of pumps, an entry for each valve
+    gain=i8,  # after `supply` in the ledger: inflow of each scalar through nodes [kg/s]
+    loss=i8,  # then the negative decay of each scalar [kg/s]
+    value=i8,  # of each scalar at all nodes
+    edge=i8,  # values of scalars in pipes at both ends
+    carried=i8,  # flow of scalars along pipes through both ends [kg/s]
+    scalar_inflow=i8,  # flow of scalars from links into nodes [kg/s]
+    moving_segment=i8,  # change of the driving energy of moving stretches since the start [J/kg]
+    rates=i8,  # in `work`: rates, if `out` depends on them and they are not requested; else -1
+    forces=i8,  # in `work`: rates from which forces on pipes are computed; else -1
+    tank=i8,  # inertia of basins on bodies, see `kernels.mechanism.body_layout`
+    wall=i8,  # outward force of the water on moving walls, minus that of the profile [N]
+    travel=i8,  # of force elements: change of length since the start and its rate [m, m/s]
+    along=i8,  # unit vectors of lines, between their points
+    pin=i8,  # forces of pins, three for each [N]
+    body=i8,  # data of bodies, see `kernels.mechanism.body_layout`
+    size=i8,
 )
 BODY_OUT = 45  # numbers of each body in `out`
 GN = 14  # index of g_n among the numbers of a frame, see `basins.basin_frames`
@@ -452,22 +392,19 @@ OUT_HEAD = 5
 NEVER = -1e300  # in ARRIVES: no jump travels to a node that responds instantly
 MOVED_BY_FORCES, JOINT_LOAD_READ = 1, 2  # load of a stretch: forces move its body; or the joint load is an output
 
-PROBE = np.dtype(
-    [
-        ("kind", "i8"),
-        ("index", "i8"),  # of the node, pipe, valve, column, mass, push, piston or basin
-        ("side", "i8"),  # -1 and 1: ends of the pipe; 0: inside; CELL_FIELD: number of the field in its physics
-        ("cell", "i8"),  # first cell that is read; for a basin offset of the cell numbers in `integers`
-        ("count", "i8"),  # number of these cells
-        ("weights", "i8"),  # offset of their weights in `floats`
-        ("scale", "f8"),
-        ("offset", "f8"),
-        ("head", "i8"),  # laws log and table: 1 a head, 2 a velocity
-        ("mass", "f8"),  # laws log and table: mass per length of the profile there [kg/m]
-        ("scalar", "i8"),
-        ("mark", "i8"),  # pipe to be marked when this pressure is below vapour pressure; -1: none
-    ],
-    align=True,
+PROBE = record(
+    kind=i8,
+    index=i8,  # of the node, pipe, valve, column, mass, push, piston or basin
+    side=i8,  # -1 and 1: ends of the pipe; 0: inside; CELL_FIELD: number of the field in its physics
+    cell=i8,  # first cell that is read; for a basin offset of the cell numbers in `integers`
+    count=i8,  # number of these cells
+    weights=i8,  # offset of their weights in `floats`
+    scale=f8,
+    offset=f8,
+    head=i8,  # laws log and table: 1 a head, 2 a velocity
+    mass=f8,  # laws log and table: mass per length of the profile there [kg/m]
+    scalar=i8,
+    mark=i8,  # pipe to be marked when this pressure is below vapour pressure; -1: none
 )
 PRESSURE, LEVEL, PIPE_PRESSURE, PIPE_FLOW, VALVE_FLOW, COLUMN_FLOW, SPOOL_FLOW = 0, 1, 2, 3, 4, 5, 6  # probe kinds
 POSITION, VELOCITY, FORCE, PISTON_POSITION, PISTON_VELOCITY, DEVICE_VALUE = 7, 8, 9, 10, 11, 12
@@ -479,128 +416,113 @@ BODY_VALUE, POINT_VALUE, PIN_VALUE, BUSHING_VALUE = 20, 21, 22, 23  # quantity i
 SURFACE_VALUE = 24  # of a surface described by modes
 PIPE_FORCE = 25  # on a whole pipe
 
-BASIN = np.dtype(
-    [
-        ("kind", "i8"),  # code of its physics, see `basins.physics_codes`
-        ("deep", "i8"),  # 1: its first quantity is a depth above that in `plan`, which carries scalars
-        ("given", "i8"),  # 1: flows through its faces follow a given velocity, in `plane`; others are in `work`
-        ("scheme", "i8"),
-        ("limiter", "i8"),  # on rectangles
-        ("wide", "f8"),  # limiter of meshes: how far values at sides of cells may exceed those of neighbours
-        ("n", "i8"),  # number of cells
-        ("nx", "i8"),  # columns and rows of a rectangle; 0 for other meshes
-        ("ny", "i8"),
-        ("faces", "i8"),  # number of faces of a mesh, the last ones on the boundary
-        ("outer", "i8"),  # number of faces on the boundary
-        ("y", "i8"),  # first state; quantities follow each other, a row of cells each
-        ("spacing", "i8"),  # offset in `plane` of 1 / widths of columns, then of rows [1/m]
-        ("plan", "i8"),  # offset in `plane` of constant data, rows of cells
-        ("area", "i8"),  # offset in `plane` of areas of cells [m2]
-        ("reflect", "i8"),  # offset in `plane` of reflected fractions of waves, a value for each face of the boundary
-        ("outer_given", "i8"),  # number of these values: 0 if the whole boundary is wall
-        ("through", "i8"),  # offset in `work` of inflows through faces of the boundary; -1 if none is open
-        ("boundary_rates", "i8"),  # offset in `work` of rates that are computed only for flows through the boundary
-        ("mesh", "i8"),  # offset in `plane` of numbers of a mesh
-        ("links", "i8"),  # offset in `integers` of numbers of a mesh
-        ("work", "i8"),  # offset of its part of `work`
-        ("thickness", "f8"),  # [m]
-        ("speed", "f8"),  # wave speed in a liquid at rest [m/s]
-        ("density", "f8"),  # of a liquid at rest [kg/m3]
-        ("table", "i8"),  # offset in `plane` of the table of its waves under law table
-        ("small", "f8"),  # square of a negligible value
-        ("carried", "i8"),  # first state of scalars, depth times value, scalar after scalar; -1 for none
-        ("lost", "i8"),  # offset of its cells among the losses of a scalar
-        ("flows", "i8"),  # offset of flows through faces: of columns, then of rows, or of a mesh; -1 if not needed
-        ("outside", "i8"),  # offset in `work` of values of each scalar beyond the boundary
-        ("scalar_work", "i8"),  # offset in `work` of work arrays for scalars
-        ("fastest", "f8"),  # rate of a given velocity [1/s]
-        ("period", "f8"),  # period of the reversal of a given velocity [s]; 0 for none
-        ("friction", "i8"),  # NO_DRAG, MANNING or DARCY
-        ("roughness", "f8"),  # Manning's n, or a friction factor
-        ("held", "f8"),  # bound of the rate of friction [1/s]; infinity if it does not limit steps
-        ("damped", "i8"),  # 1 if rates are divided by 1 + h r of friction, which then does not limit steps
-        ("unsplit", "f8"),  # rate of its cells for the step limit over the rate from the kernels
-        ("rest", "f8"),  # p - p_ambient + rho g z of the profile, the same in all cells [Pa]
-        ("wall", "i8"),  # first of its moving walls
-        ("walls", "i8"),  # number of its moving walls; with any, its states are contents, see `basins.moving_walls`
-        ("drawn", "i8"),  # offset in `plane` of areas of cells as drawn; `area` is that of present areas
-        ("stretch", "i8"),  # offset in `plane` of present over drawn areas; of a grid for its columns or rows
-        ("lines", "i8"),  # offset in `plane` of speeds of grid lines, or of corners of a mesh [m/s]
-        ("thrust", "i8"),  # offset in `work` of forces on boundary faces, see `free_surface.surface_grid`
-        ("turn", "i8"),  # 0 if grid lines move along x, 1 if along y
-        ("body", "i8"),  # body that carries it; -1 for none
-        ("loads_body", "i8"),  # 1 if its load acts on that body: forces move the body, or the joint load is an output
-        ("frame", "i8"),  # offset in `plane` of the position and motion of its axes; see `basins.basin_frames`
-        ("corners", "i8"),  # number of corners of a mesh
-        ("places", "i8"),  # offset in `plane` of positions of corners, then of centres of cells, see `moving_meshes`
-        ("sides", "i8"),  # offset in `plane` of normal speeds of sides, by block, side of four and cell [m/s]
-        ("ends", "i8"),  # offset in `integers` of corners of sides and cells, see `moving_meshes`
-    ],
-    align=True,
+BASIN = record(
+    kind=i8,  # code of its physics, see `basins.physics_codes`
+    deep=i8,  # 1: its first quantity is a depth above that in `plan`, which carries scalars
+    given=i8,  # 1: flows through its faces follow a given velocity, in `plane`; others are in `work`
+    scheme=i8,
+    limiter=i8,  # on rectangles
+    wide=f8,  # limiter of meshes: how far values at sides of cells may exceed those of neighbours
+    n=i8,  # number of cells
+    nx=i8,  # columns and rows of a rectangle; 0 for other meshes
+    ny=i8,
+    faces=i8,  # number of faces of a mesh, the last ones on the boundary
+    outer=i8,  # number of faces on the boundary
+    y=i8,  # first state; quantities follow each other, a row of cells each
+    spacing=i8,  # offset in `plane` of 1 / widths of columns, then of rows [1/m]
+    plan=i8,  # offset in `plane` of constant data, rows of cells
+    area=i8,  # offset in `plane` of areas of cells [m2]
+    reflect=i8,  # offset in `plane` of reflected fractions of waves, a value for each face of the boundary
+    outer_given=i8,  # number of these values: 0 if the whole boundary is wall
+    through=i8,  # offset in `work` of inflows through faces of the boundary; -1 if none is open
+    boundary_rates=i8,  # offset in `work` of rates that are computed only for flows through the boundary
+    mesh=i8,  # offset in `plane` of numbers of a mesh
+    links=i8,  # offset in `integers` of numbers of a mesh
+    work=i8,  # offset of its part of `work`
+    thickness=f8,  # [m]
+    speed=f8,  # wave speed in a liquid at rest [m/s]
+    density=f8,  # of a liquid at rest [kg/m3]
+    table=i8,  # offset in `plane` of the table of its waves under law table
+    small=f8,  # square of a negligible value
+    carried=i8,  # first state of scalars, depth times value, scalar after scalar; -1 for none
+    lost=i8,  # offset of its cells among the losses of a scalar
+    flows=i8,  # offset of flows through faces: of columns, then of rows, or of a mesh; -1 if not needed
+    outside=i8,  # offset in `work` of values of each scalar beyond the boundary
+    scalar_work=i8,  # offset in `work` of work arrays for scalars
+    fastest=f8,  # rate of a given velocity [1/s]
+    period=f8,  # period of the reversal of a given velocity [s]; 0 for none
+    friction=i8,  # NO_DRAG, MANNING or DARCY
+    roughness=f8,  # Manning's n, or a friction factor
+    held=f8,  # bound of the rate of friction [1/s]; infinity if it does not limit steps
+    damped=i8,  # 1 if rates are divided by 1 + h r of friction, which then does not limit steps
+    unsplit=f8,  # rate of its cells for the step limit over the rate from the kernels
+    rest=f8,  # p - p_ambient + rho g z of the profile, the same in all cells [Pa]
+    wall=i8,  # first of its moving walls
+    walls=i8,  # number of its moving walls; with any, its states are contents, see `basins.moving_walls`
+    drawn=i8,  # offset in `plane` of areas of cells as drawn; `area` is that of present areas
+    stretch=i8,  # offset in `plane` of present over drawn areas; of a grid for its columns or rows
+    lines=i8,  # offset in `plane` of speeds of grid lines, or of corners of a mesh [m/s]
+    thrust=i8,  # offset in `work` of forces on boundary faces, see `free_surface.surface_grid`
+    turn=i8,  # 0 if grid lines move along x, 1 if along y
+    body=i8,  # body that carries it; -1 for none
+    loads_body=i8,  # 1 if its load acts on that body: forces move the body, or the joint load is an output
+    frame=i8,  # offset in `plane` of the position and motion of its axes; see `basins.basin_frames`
+    corners=i8,  # number of corners of a mesh
+    places=i8,  # offset in `plane` of positions of corners, then of centres of cells, see `moving_meshes`
+    sides=i8,  # offset in `plane` of normal speeds of sides, by block, side of four and cell [m/s]
+    ends=i8,  # offset in `integers` of corners of sides and cells, see `moving_meshes`
 )
 NO_DRAG, MANNING, DARCY = 0, 1, 2
-PATCHES = np.dtype(
-    [
-        ("basin", "i8"),
-        ("node", "i8"),
-        ("first", "i8"),  # offset of its cells in `integers`
-        ("count", "i8"),  # number of its cells
-        ("sizes", "i8"),  # offset in `plane` of the present area of these [m2] and length of its faces [m]
-        ("ring", "i8"),  # offset in `integers` of its face numbers on the boundary, then of the cells behind the faces
-        ("faces", "i8"),  # number of its faces
-        # Offset in `plane` of outward normals along x, along y, and length over area of cells, for each face; with
-        # moving walls also those as drawn.
-        ("normals", "i8"),
-        ("open", "i8"),  # 1 if it is not a wall and joins no link: its flow is that of the boundary
-        ("moves", "i8"),  # 1 if it is a moving wall
-        ("values", "i8"),  # offset in `integers` of schedules of inflow values, for each scalar; -1: its initial value
-    ],
-    align=True,
+PATCHES = record(
+    basin=i8,
+    node=i8,
+    first=i8,  # offset of its cells in `integers`
+    count=i8,  # number of its cells
+    sizes=i8,  # offset in `plane` of the present area of these [m2] and length of its faces [m]
+    ring=i8,  # offset in `integers` of its face numbers on the boundary, then of the cells behind the faces
+    faces=i8,  # number of its faces
+    # Offset in `plane` of outward normals along x, along y, and length over area of cells, for each face; with
+    # moving walls also those as drawn.
+    normals=i8,
+    open=i8,  # 1 if it is not a wall and joins no link: its flow is that of the boundary
+    moves=i8,  # 1 if it is a moving wall
+    values=i8,  # offset in `integers` of schedules of inflow values, for each scalar; -1: its initial value
 )
 
-WALL = np.dtype(
-    [
-        ("basin", "i8"),
-        ("node", "i8"),  # node of its patch
-        ("y", "i8"),  # offset of its travel since the start [m]
-        ("mass", "i8"),  # mass that moves with it
-        ("body", "i8"),  # or body whose prismatic joint moves it
-        ("toward", "f8"),  # 1 if mass or body travels in the direction of the wall, -1 if in the opposite
-        ("schedule", "i8"),  # or schedule of its travel; -1 for none
-        ("weights", "i8"),  # offset in `plane`: travel of lines over its travel, then stretch of cells per travel [1/m]
-        ("faces", "i8"),  # offset in `integers` of its face numbers on the boundary
-        ("count", "i8"),  # number of its faces
-        ("lengths", "i8"),  # offset in `plane` of lengths of its faces [m]
-        ("outward", "f8"),  # 1 if its travel is positive outward, -1 inward
-        ("rest", "f8"),  # force of the profile on it [N]
-    ],
-    align=True,
+WALL = record(
+    basin=i8,
+    node=i8,  # node of its patch
+    y=i8,  # offset of its travel since the start [m]
+    mass=i8,  # mass that moves with it
+    body=i8,  # or body whose prismatic joint moves it
+    toward=f8,  # 1 if mass or body travels in the direction of the wall, -1 if in the opposite
+    schedule=i8,  # or schedule of its travel; -1 for none
+    weights=i8,  # offset in `plane`: travel of lines over its travel, then stretch of cells per travel [1/m]
+    faces=i8,  # offset in `integers` of its face numbers on the boundary
+    count=i8,  # number of its faces
+    lengths=i8,  # offset in `plane` of lengths of its faces [m]
+    outward=f8,  # 1 if its travel is positive outward, -1 inward
+    rest=f8,  # force of the profile on it [N]
 )
 
-SCALAR = np.dtype(
-    [
-        ("y", "i8"),  # offset in y of its amounts per length [kg/m], pipe by pipe, then of those in nodes with storage
-        ("places", "i8"),  # offset in `integers`, by node: offset of its amount in y, or schedule of its value
-        ("diffusivity", "f8"),
-        ("decay", "f8"),  # [1/s]
-        ("ambient", "f8"),  # value to which it decays
-        ("loss", "i8"),  # first of its rows in the ledger of decay
-        # Number of these rows: 0 without decay, 1, or a row for each state if steps are implicit, because rows of the
-        # Jacobian must depend on few states.
-        ("losses", "i8"),
-        ("initial", "f8"),  # inflow value if no other is given
-        ("least", "f8"),  # bounds of all possible values
-        ("greatest", "f8"),
-    ],
-    align=True,
+SCALAR = record(
+    y=i8,  # offset in y of its amounts per length [kg/m], pipe by pipe, then of those in nodes with storage
+    places=i8,  # offset in `integers`, by node: offset of its amount in y, or schedule of its value
+    diffusivity=f8,
+    decay=f8,  # [1/s]
+    ambient=f8,  # value to which it decays
+    loss=i8,  # first of its rows in the ledger of decay
+    # Number of these rows: 0 without decay, 1, or a row for each state if steps are implicit, because rows of the
+    # Jacobian must depend on few states.
+    losses=i8,
+    initial=f8,  # inflow value if no other is given
+    least=f8,  # bounds of all possible values
+    greatest=f8,
 )
 
-CLOCK = np.dtype(
-    [
-        ("limit", "f8"),  # end of the segment: schedules take their left limit from here on [s]
-        ("step", "f8"),  # fixed step; 0 for adaptive steps [s]
-    ],
-    align=True,
+CLOCK = record(
+    limit=f8,  # end of the segment: schedules take their left limit from here on [s]
+    step=f8,  # fixed step; 0 for adaptive steps [s]
 )
 
 RECORDS = {

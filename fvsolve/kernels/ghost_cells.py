@@ -3,6 +3,10 @@
 A wave leaves through one end and enters through the other. Where it leaves, a polynomial through the last cells gives
 its value at the end. Where it enters, the polynomial passes through the value from the node (the datum). A closure from
 cells alone is slightly unstable; with the datum no growing mode is known (tests/step_limits/test_ends.py).
+
+Arguments common to these functions: edge : float64[5]  cells nearest to an end, nearest first; n : number of cells of
+the pipe; family, degree, limiter : scheme family, degree of the polynomial at an end, and limiter; small : square of a
+negligible value.
 """
 
 from fractions import Fraction
@@ -117,12 +121,7 @@ def roughness(d1, d2, d3, d4, small):
 
 @njit
 def leaving_ghosts(edge, n, family, degree, limiter, small, ghosts):
-    """Write three ghost cells beyond the end where a wave leaves, nearest first, to ghosts[3].
-
-    edge : float64[5]  cells nearest to this end; n : number of cells of the pipe
-    family, degree, limiter : scheme family, degree of the polynomial, and limiter
-    small : square of a negligible value
-    """
+    """Write three ghost cells beyond the end where a wave leaves, nearest first, to ghosts[3]."""
     if family == UPWIND or family == LINEAR or family == SHORT:
         d = end_degree(degree, n)
         for g in range(3):
@@ -149,11 +148,7 @@ def leaving_ghosts(edge, n, family, degree, limiter, small, ghosts):
 
 @njit
 def entering_ghosts(edge, n, family, degree, datum, small, ghosts):
-    """Write three ghost cells beyond the end where a wave enters with the value `datum`, nearest first, to ghosts[3].
-
-    edge : float64[5]  cells nearest to this end; n : number of cells of the pipe
-    family, degree : scheme family, degree of the polynomial; small : square of a negligible value
-    """
+    """Write three ghost cells beyond the end where a wave enters with the value `datum`, nearest first, to ghosts."""
     if family == UPWIND or family == LINEAR or family == SHORT:
         d = min(min(degree, 2) if n < 5 else degree, n)
         for g in range(3):
@@ -177,11 +172,7 @@ def entering_ghosts(edge, n, family, degree, datum, small, ghosts):
 
 @njit
 def end_value(c, right, family, degree, limiter, small, scratch):
-    """Value of a wave at the left (0) or right (1) end of a pipe, through which it leaves, from its cell averages c.
-
-    family, degree, limiter : scheme family, degree of the polynomial, and limiter
-    small : square of a negligible value
-    """
+    """Value of a wave at the left (0) or right (1) end of a pipe, through which it leaves, from its cell averages c."""
     n, edge, ghosts = c.size, scratch[:5], scratch[5:8]
     edge_cells(c, right, edge)
     if family == UPWIND or family == LINEAR or family == SHORT:

@@ -2,6 +2,10 @@
 
 No flow passes there, so any pressure would satisfy the balance. The pressure chosen is that at which equal small leaks
 would balance: sum of sqrt|dP| over the closed valves, each with the sign of its drop dP, is zero. P = p + rho g z.
+
+Arguments common to these functions: `cluster`, row of a cluster (nodes that are solved together); g : conductances of
+its valves [kg2/s2/Pa], 0 if closed, -1 if open at isolated nodes; connected : 0 for its isolated nodes; group : group
+number of each of its nodes.
 """
 
 from math import sqrt
@@ -20,10 +24,7 @@ def inner_row(nodes, i):
 
 @njit
 def find_connected(cluster, tables, g, connected):
-    """Set connected[i] to 1 if open valves join node i of a cluster to a pipe or to a known pressure, else to 0.
-
-    cluster : nodes that are solved together; g : conductances of its valves [kg2/s2/Pa], 0 if closed
-    """
+    """Set connected[i] to 1 if open valves join node i of a cluster to a pipe or to a known pressure, else to 0."""
     nodes, valves, integers = tables.nodes, tables.valves, tables.integers
     for i in range(connected.size):
         connected[i] = 1.0 if nodes[integers[cluster["first_node"] + i]]["admittance"] > 0.0 else 0.0
@@ -56,8 +57,6 @@ def leak_balance(cluster, tables, out, g, group, number, level):
 
     The group has the potential `level` [Pa]. dP is the drop of a closed valve between the group and another node;
     outflow counts as negative. The potentials are those of the nodes behind these valves.
-    g : conductances of the valves of the cluster (nodes solved together), 0 if closed
-    group, number : group number of each node, and number of this group
     """
     nodes, valves, integers = tables.nodes, tables.valves, tables.integers
     total, low, high = 0.0, 1e300, -1e300
@@ -76,10 +75,7 @@ def leak_balance(cluster, tables, out, g, group, number, level):
 
 @njit
 def group_by_open_valves(cluster, tables, g, group):
-    """Write the same number to group[i] for all isolated nodes i that open valves join to each other.
-
-    g : conductances of the valves of the cluster (nodes solved together); -1 marks an open valve at isolated nodes
-    """
+    """Write the same number to group[i] for all isolated nodes i that open valves join to each other."""
     nodes, valves, integers = tables.nodes, tables.valves, tables.integers
     for i in range(group.size):
         group[i] = i
@@ -93,11 +89,7 @@ def group_by_open_valves(cluster, tables, g, group):
 
 @njit
 def isolated_pressures(cluster, tables, out, g, connected, group):
-    """Set the pressures of isolated nodes of a cluster by bisection, group by group until no pressure changes.
-
-    cluster : nodes that are solved together; g : conductances of its valves, 0 if closed, -1 if open but isolated
-    connected : float64[n]  0 for isolated nodes; group : float64[n]  receives the group number of each node
-    """
+    """Set the pressures of isolated nodes of a cluster by bisection, group by group until no pressure changes."""
     layout, integers = tables.layout[0], tables.integers
     group_by_open_valves(cluster, tables, g, group)
     for _ in range(200):
@@ -130,8 +122,7 @@ def isolated_pressures(cluster, tables, out, g, connected, group):
 def check_demand(cluster, tables, out, c, connected, group, scale):
     """Set STATUS to NO_SOLUTION if a group of isolated nodes has a demand.
 
-    c : float64[n]  given inflow of the nodes of the cluster (nodes solved together) [kg/s]
-    scale : flow relative to which a demand counts as rounding [kg/s]; connected, group : see `isolated_pressures`
+    c : given inflow of the nodes [kg/s]; scale : flow relative to which a demand counts as rounding [kg/s]
     """
     for number in range(group.size):
         total = 0.0

@@ -7,16 +7,18 @@ flow. At a node without storage the flows of pipe ends and other links add up to
 
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import ALONE, CHAMBER, CLUSTER, FIXED, JUNCTION, TANK
-from fvsolve.kernels.restrictions import conductance
-from fvsolve.kernels.schedule_pieces import schedule_value
-from fvsolve.kernels.table_handle import open_tables
-from fvsolve.kernels.tank_levels import tank_level
-from fvsolve.kernels.valves import (
+from fvsolve.kernels.network_balance import clear_outputs
+from fvsolve.kernels.restrictions import (
+    conductance,
     flow_at_drop,
     flow_change,
     flow_change_laminar,
+    open_scheduled,
     transition_of,
 )
+from fvsolve.kernels.schedule_pieces import schedule_value
+from fvsolve.kernels.table_handle import open_tables
+from fvsolve.kernels.tanks import tank_level
 
 
 @njit(forceinline=True)
@@ -57,6 +59,19 @@ def known_pressures_linear(t, y, dydt, out, handle):
     The change of given flow into each junction [kg/s] is added to out[net], see `junction_flows`.
     """
     tables = open_tables(handle)
+    stored_pressures(t, y, out, tables)
+    junction_flows(t, out, tables)
+
+
+@njit
+def begin_lumped(t, y, dydt, out, handle):
+    """Do the work of `begin_network` and `known_pressures_linear` at once, for models without pipes.
+
+    It clears outputs, writes conductances of restrictions and known pressures, and adds given flows into junctions.
+    """
+    tables = open_tables(handle)
+    clear_outputs(out, tables)
+    open_scheduled(t, out, tables)
     stored_pressures(t, y, out, tables)
     junction_flows(t, out, tables)
 

@@ -13,19 +13,8 @@ the axis from the positions of two masses, between bodies from two points, writt
 from math import log, log1p, sqrt
 
 from fvsolve.jit import njit
+from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.density import density, log_density, pressure_of_log
-from fvsolve.kernels.dtypes import (
-    FORCE,
-    LAW_LINEAR,
-    NO_VOLUME,
-    PISTON_POSITION,
-    PISTON_VELOCITY,
-    POSITION,
-    RATE,
-    STATUS,
-    VELOCITY,
-    WHERE,
-)
 from fvsolve.kernels.schedule_pieces import schedule_value
 from fvsolve.kernels.table_handle import open_tables
 
@@ -107,7 +96,7 @@ def leak_flow(tables, piston, p_a, p_b):
     """
     st = tables.settings[0]
     rho = st["rho"]
-    if st["law"] != LAW_LINEAR:
+    if st["law"] != rec.LAW_LINEAR:
         rho = density(st, tables.floats, max(p_a, p_b))
     return rho * piston["leakage"] * (p_a - p_b)
 
@@ -120,7 +109,7 @@ def chamber_state(tables, node, volume, excess):
     excess : mass minus the mass in this volume at the initial density [kg]
     """
     st, floats = tables.settings[0], tables.floats
-    if st["law"] == LAW_LINEAR:
+    if st["law"] == rec.LAW_LINEAR:
         stiffness = node["stiffness"] * node["volume"] / volume
         return stiffness * excess, stiffness
     share = node["volume"] / volume * excess / node["mass"]
@@ -282,11 +271,11 @@ def mass_rates(t, y, dydt, out, handle):
     tables = open_tables(handle)
     layout, nodes, masses = tables.layout[0], tables.nodes, tables.masses
     forces(t, y, out, tables)
-    out[RATE] = max(out[RATE], mechanical_rate(out, tables))
+    out[rec.RATE] = max(out[rec.RATE], mechanical_rate(out, tables))
     for k in range(tables.pistons.size):
         for i in (tables.pistons[k]["a"], tables.pistons[k]["b"]):
             if not out[layout["stiffness"] + nodes[i]["row"]] > 0.0:
-                out[STATUS], out[WHERE] = NO_VOLUME, i
+                out[rec.STATUS], out[rec.WHERE] = rec.NO_VOLUME, i
     if dydt.size == 0:
         return
     for i in range(masses.size):
@@ -303,15 +292,15 @@ def observe_masses(t, y, out, handle, values):
     layout, masses, pistons, probes = tables.layout[0], tables.masses, tables.pistons, tables.probes
     for k in range(probes.size):
         kind, i = probes[k]["kind"], probes[k]["index"]
-        if kind == POSITION:
+        if kind == rec.POSITION:
             values[k] = masses[i]["position"] + motion(masses[i], y)[0]
-        elif kind == VELOCITY:
+        elif kind == rec.VELOCITY:
             values[k] = motion(masses[i], y)[1]
-        elif kind == FORCE:
+        elif kind == rec.FORCE:
             values[k] = out[layout["push"] + i]
-        elif kind == PISTON_POSITION:
+        elif kind == rec.PISTON_POSITION:
             values[k] = pistons[i]["position"] + piston_travel(out, tables, i)[0]
-        elif kind == PISTON_VELOCITY:
+        elif kind == rec.PISTON_VELOCITY:
             values[k] = piston_travel(out, tables, i)[1]
 
 

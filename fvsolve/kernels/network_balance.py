@@ -10,7 +10,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import CHAMBER, FIXED, JUNCTION, MOVING, OK, PATCH, RATE, STATUS, TANK, WHERE
 from fvsolve.kernels.restrictions import conductance, head_drop, open_scheduled, restriction_slope
 from fvsolve.kernels.table_handle import open_tables
-from fvsolve.kernels.tank_limits import BOTTOM, EVENTS, RIM
+from fvsolve.kernels.tanks import BOTTOM, EVENTS, RIM
 
 
 @njit(forceinline=True)
@@ -73,6 +73,13 @@ def stiffness_of(nodes, layout, out, i):
     if kind >= MOVING or (kind == CHAMBER and nodes[i]["row"] >= 0):  # a chamber softened by gas
         return out[layout["stiffness"] + nodes[i]["row"]]
     return nodes[i]["stiffness"]
+
+
+@njit(forceinline=True)
+def node_impedance(tables, i):
+    """Pressure rise at junction i per flow into it [Pa s/kg], 1 / admittance of its pipes; 0 for other nodes."""
+    node = tables.nodes[i]
+    return 1.0 / node["admittance"] if node["kind"] == JUNCTION and node["admittance"] > 0.0 else 0.0
 
 
 @njit(forceinline=True)
@@ -146,11 +153,7 @@ def valve_rate_limit(t, y, dydt, out, handle):
         if stiff > 0.0:
             g = conductance(tables, out, k)
             slope = restriction_slope(tables, out, k, drop)
-            soft = 0.0
-            if nodes[i]["kind"] == JUNCTION and nodes[i]["admittance"] > 0.0:
-                soft += 1.0 / nodes[i]["admittance"]
-            if nodes[j]["kind"] == JUNCTION and nodes[j]["admittance"] > 0.0:
-                soft += 1.0 / nodes[j]["admittance"]
+            soft = node_impedance(tables, i) + node_impedance(tables, j)
             rate = max(rate, stiff * slope / (1.0 + soft * slope))
             if valve["transition"] > 0.0 and g > 0.0:
                 change = stiff_i * out[layout["net"] + i]

@@ -8,7 +8,7 @@ node, diffusivity D [m2/s], mass per length m [kg/m] and cell length dx.
 
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import CHAMBER, FIXED, JUNCTION, PATCH, RATE, TANK, UPWIND
-from fvsolve.kernels.limiters import limited
+from fvsolve.kernels.reconstruction import limited
 from fvsolve.kernels.schedule_pieces import schedule_value
 
 # Flow in a loop of nodes without volume is mixed by iteration: greatest number of sweeps, relative tolerance.

@@ -1,21 +1,14 @@
-"""Observation of a state: probes, extremes, times of first occurrence, events of tanks. No state is changed."""
+"""Observation of a state: probes, extremes, times of first occurrence, events of tanks. No state is changed.
 
-from fvsolve.jit import njit
+Arguments common to these functions: r, l : forward and backward wave of cells [kg/s], whose sum is a measure of the
+pressure change; t : present time [s].
+"""
+
+from fvsolve.jit import njit, specialise
+from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.calls import CLOSE, run_job
-from fvsolve.kernels.dtypes import (
-    COLUMN_FLOW,
-    LEVEL,
-    PIPE_FLOW,
-    PIPE_PRESSURE,
-    PRESSURE,
-    SPOOL_FLOW,
-    TANK,
-    VALVE_FLOW,
-    WHERE,
-)
 from fvsolve.kernels.table_handle import open_tables
-from fvsolve.kernels.tank_levels import tank_level
-from fvsolve.kernels.tank_limits import BOTTOM, EVENTS, RIM, is_near, limit_events, mass_per_metre
+from fvsolve.kernels.tanks import BOTTOM, EVENTS, RIM, is_near, limit_events, mass_per_metre, tank_level
 
 HUGE = 1e100  # waves beyond it count as not finite, although their squares may be finite
 BLOCK = 64  # cells compared with the envelope at a time
@@ -51,22 +44,22 @@ def observe_linear(t, y, out, handle, values):
         probe = probes[k]
         kind, i = probe["kind"], probe["index"]
         value = 0.0
-        if kind == PRESSURE:
+        if kind == rec.PRESSURE:
             value = out[layout["pressure"] + i]
-        elif kind == LEVEL:
+        elif kind == rec.LEVEL:
             node = tables.nodes[i]
             value = tank_level(node, tables.floats, tables.settings[0]["rho"], y[node["y"]])
-        elif kind == PIPE_PRESSURE:
+        elif kind == rec.PIPE_PRESSURE:
             pipe = tables.pipes[i]
             value = wave_sum(probe, pipe, 1.0, i, y, out, tables)
-        elif kind == PIPE_FLOW:
+        elif kind == rec.PIPE_FLOW:
             pipe = tables.pipes[i]
             value = pipe["flow"] + wave_sum(probe, pipe, -1.0, i, y, out, tables)
-        elif kind == VALVE_FLOW:
+        elif kind == rec.VALVE_FLOW:
             value = out[layout["valve"] + i]
-        elif kind == COLUMN_FLOW:
+        elif kind == rec.COLUMN_FLOW:
             value = out[layout["column"] + i]
-        elif kind == SPOOL_FLOW:
+        elif kind == rec.SPOOL_FLOW:
             for e in range(4):
                 value += tables.floats[probe["weights"] + e] * out[layout["valve"] + i + e]
         values[k] = probe["scale"] * value + probe["offset"]
@@ -86,10 +79,7 @@ def update_extremes(envelope, c, t, value):
 
 @njit(forceinline=True)
 def count_new_extremes(r, l, least, greatest):
-    """(number of cells with r + l below `least`, number with r + l above `greatest`); NaN counts as below and above.
-
-    r, l : forward and backward wave of cells [kg/s]; their sum is a measure of the pressure change
-    """
+    """(number of cells with r + l below `least`, number with r + l above `greatest`); NaN counts as below and above."""
     low, high = 0, 0
     for i in range(r.size):
         s = r[i] + l[i]
@@ -98,45 +88,34 @@ def count_new_extremes(r, l, least, greatest):
     return low, high
 
 
-@njit
-def update_minima(t, r, l, least, t_least):
-    """Update least values of r + l of cells and their times, without a branch; return how many waves are not finite.
+MINIMA = None  # constant of the template
 
-    r, l : forward and backward wave of cells [kg/s]; their sum is a measure of the pressure change
-    t : present time [s]; least, t_least : float64[cells]  least values so far and their times
+
+def _update_sums(t, r, l, extreme, t_extreme):
+    """Update least or greatest values of r + l of cells and their times, without a branch.
+
+    extreme, t_extreme : float64[cells]  extremes of the sum so far and their times
+    Returns how many waves are not finite.
     """
     bad = 0
     for i in range(r.size):
         s = r[i] + l[i]
-        low = s < least[i]
-        least[i] = s if low else least[i]
-        t_least[i] = t if low else t_least[i]
+        new = s < extreme[i] if MINIMA else s > extreme[i]
+        extreme[i] = s if new else extreme[i]
+        t_extreme[i] = t if new else t_extreme[i]
         bad += not (abs(r[i]) < HUGE and abs(l[i]) < HUGE)
     return bad
 
 
-@njit
-def update_maxima(t, r, l, greatest, t_greatest):
-    """Update greatest values of r + l of cells and their times; return how many waves are not finite.
-
-    r, l : forward and backward wave of cells [kg/s]; their sum is a measure of the pressure change
-    t : present time [s]; greatest, t_greatest : float64[cells]  greatest values so far and their times
-    """
-    bad = 0
-    for i in range(r.size):
-        s = r[i] + l[i]
-        high = s > greatest[i]
-        greatest[i] = s if high else greatest[i]
-        t_greatest[i] = t if high else t_greatest[i]
-        bad += not (abs(r[i]) < HUGE and abs(l[i]) < HUGE)
-    return bad
+update_minima = specialise(_update_sums, "update_minima", MINIMA=True)
+update_maxima = specialise(_update_sums, "update_maxima", MINIMA=False)
 
 
 @njit
 def count_below(r, l, boiling):
     """Number of cells below vapour pressure, where the sum of the waves r + l is below `boiling` [kg/s].
 
-    r, l : forward and backward wave of cells [kg/s]; boiling : float64[cells]  values of r + l at vapour pressure
+    boiling : float64[cells]  values of r + l at vapour pressure
     """
     count = 0
     for i in range(r.size):
@@ -148,7 +127,6 @@ def count_below(r, l, boiling):
 def update_envelope(t, r, l, at, low, high, index, tables):
     """Update the envelope of r + l from cell `at` on; record the first time that pipe `index` is below vapour pressure.
 
-    r, l : forward and backward wave of these cells [kg/s]; their sum is a measure of the pressure change
     low, high : numbers of cells below and above the envelope so far
     Returns 0 if all values are finite.
     """
@@ -166,10 +144,7 @@ def update_envelope(t, r, l, at, low, high, index, tables):
 
 @njit
 def record_pipe(t, r, l, pipe, index, tables):
-    """Update the envelope of r + l of pipe number `index`; blocks of cells without a new extreme are only compared.
-
-    r, l : float64[cells]  forward and backward wave [kg/s]; their sum is a measure of the pressure change
-    """
+    """Update the envelope of r + l of pipe number `index`; blocks of cells without a new extreme are only compared."""
     start, at, envelope = 0, pipe["cell"], tables.envelope
     while start < r.size:
         stop = min(start + BLOCK, r.size)
@@ -210,14 +185,14 @@ def record_nodes(t, y, out, handle, values):
         at = pipes.size + i
         if nodes[i]["pressure"] + out[layout["pressure"] + i] < vapor and marks[at] != marks[at]:
             marks[at] = t
-        if nodes[i]["kind"] == TANK and abs(out[layout["supply"] + i]) > SUPPLY_ROUNDING * mass_per_metre(nodes[i]):
+        if nodes[i]["kind"] == rec.TANK and abs(out[layout["supply"] + i]) > SUPPLY_ROUNDING * mass_per_metre(nodes[i]):
             at += nodes.size if out[layout["supply"] + i] > 0.0 else 2 * nodes.size
             if marks[at] != marks[at]:
                 marks[at] = t
     if tables.settings[0]["stop_below"] == 1:
         for i in range(pipes.size + nodes.size):
             if marks[i] == marks[i]:
-                out[WHERE] = STOP_HERE
+                out[rec.WHERE] = STOP_HERE
 
 
 @njit
@@ -230,7 +205,7 @@ def tank_events(t, y, out, handle, g):
     # event functions of devices have solved the nodes
     nodes, armed, solved = tables.nodes, tables.armed, tables.devices.size > 0
     for i in range(nodes.size):
-        if nodes[i]["kind"] == TANK:
+        if nodes[i]["kind"] == rec.TANK:
             node, k = nodes[i], EVENTS * nodes[i]["row"]
             stored = node["mass"] + y[node["y"]]
             space = node["full"] - stored

@@ -4,14 +4,13 @@ The force is the rate of momentum loss of the fluid, - d/dt of the integral of M
 ends and wall in addition to the initial steady force; positive from `from` to `to`.
 """
 
-from fvsolve.jit import njit
+from fvsolve.jit import njit, specialise
 from fvsolve.kernels.barotropic_pipes import rates_barotropic
 from fvsolve.kernels.cavitating_pipes import rates_cavitating
 from fvsolve.kernels.dtypes import PIPE_FORCE
-from fvsolve.kernels.linear_pipes import wave_rates
+from fvsolve.kernels.pipes import wave_rates
+from fvsolve.kernels.relaxation import add_unsteady_friction, add_unsteady_friction_barotropic
 from fvsolve.kernels.table_handle import open_tables
-from fvsolve.kernels.unsteady_friction.relaxation_terms import add_unsteady_friction
-from fvsolve.kernels.unsteady_friction.relaxation_terms_barotropic import add_unsteady_friction_barotropic
 
 
 @njit
@@ -30,34 +29,25 @@ def read_forces(dydt, tables, values):
             values[k] = (0.0 - total) * pipe["dx"]
 
 
-@njit
-def observe_forces_linear(t, y, out, handle, values):
-    """Write the forces of the fluid on pipes [N] to `values`, under the density law `linear`."""
+RATES = FRICTION = None  # constants of the template
+
+
+def _observe_forces(t, y, out, handle, values):
+    """Write the forces of the fluid on pipes [N] to `values`."""
     tables = open_tables(handle)
     at = tables.layout[0]["forces"]
     dydt = tables.work[at : at + y.size]
-    wave_rates(t, y, dydt, out, handle)
-    add_unsteady_friction(t, y, dydt, out, handle)
+    RATES(t, y, dydt, out, handle)
+    FRICTION(t, y, dydt, out, handle)
     read_forces(dydt, tables, values)
 
 
-@njit
-def observe_forces_barotropic(t, y, out, handle, values):
-    """Write the forces of the fluid on pipes [N] to `values`, under the density laws `log` and `table`."""
-    tables = open_tables(handle)
-    at = tables.layout[0]["forces"]
-    dydt = tables.work[at : at + y.size]
-    rates_barotropic(t, y, dydt, out, handle)
-    add_unsteady_friction_barotropic(t, y, dydt, out, handle)
-    read_forces(dydt, tables, values)
-
-
-@njit
-def observe_forces_cavitating(t, y, out, handle, values):
-    """Write the forces of the fluid on pipes [N] to `values`, under the density law `mixture`, with cavities."""
-    tables = open_tables(handle)
-    at = tables.layout[0]["forces"]
-    dydt = tables.work[at : at + y.size]
-    rates_cavitating(t, y, dydt, out, handle)
-    add_unsteady_friction_barotropic(t, y, dydt, out, handle)
-    read_forces(dydt, tables, values)
+observe_forces_linear = specialise(
+    _observe_forces, "observe_forces_linear", RATES=wave_rates, FRICTION=add_unsteady_friction
+)
+observe_forces_barotropic = specialise(
+    _observe_forces, "observe_forces_barotropic", RATES=rates_barotropic, FRICTION=add_unsteady_friction_barotropic
+)
+observe_forces_cavitating = specialise(
+    _observe_forces, "observe_forces_cavitating", RATES=rates_cavitating, FRICTION=add_unsteady_friction_barotropic
+)

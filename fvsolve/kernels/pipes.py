@@ -3,13 +3,26 @@
 State, for each cell: forward wave r = (c m' + M') / 2 and backward wave l = (c m' - M') / 2 [kg/s], from the changes of
 mass per length m = rho A and mass flow M since the initial steady state, with wave speed c. r_t + c r_x = -drag' / 2,
 l_t - c l_x = drag' / 2, with the change drag' of wall friction [kg/s2].
+
+Arguments common to these functions:
+r, l : float64[cells]  forward and backward wave [kg/s]
+dr, dl : float64[cells]  their rates [kg/s2]
+fr, fl : float64[cells + 1]  their values at faces [kg/s]
+r_in, l_in : waves that enter from the nodes at the `from` and the `to` end [kg/s]
+r_out, l_out : waves that leave at the `to` and the `from` end, extrapolated from cells [kg/s]
+k : wave speed over cell length [1/s]
+flow, base : initial steady mass flow [kg/s], half of the initial steady drag [kg/s2]
+loss : coefficient of |M| M [1/kg]
+family, backward : scheme family; 1 for the backward wave
+small : square of a negligible value
 """
 
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import FRICTION_HAZEN, FRICTION_ROUGH, LINEAR, MUSCL, SHORT, UPWIND, WENO5
-from fvsolve.kernels.ghost_cells import edge_cells, entering_ghosts, leaving_ghosts
+from fvsolve.kernels.ghost_cells import edge_cells, end_value, entering_ghosts, leaving_ghosts
 from fvsolve.kernels.reconstruction import faces
 from fvsolve.kernels.steady_friction import EXPONENT, drag, power_of_square
+from fvsolve.kernels.table_handle import open_tables
 
 GAUSS = 0.28867513459481287  # 1 / sqrt(12): two Gauss points of a cell, in cell widths from its centre
 
@@ -31,8 +44,7 @@ def scheme_family(settings, n):
 def wave_faces(settings, family, small, backward, c, left, right, scratch, f):
     """Write the values of a wave at all faces to f, from its cells c and three ghost cells beyond each end.
 
-    left, right : float64[3]  ghost cells, nearest first; backward : 1 for the backward wave
-    family : scheme family; small : square of a negligible value
+    left, right : float64[3]  ghost cells, nearest first
     """
     n = c.size
     if n <= 5:
@@ -56,12 +68,7 @@ def wave_faces(settings, family, small, backward, c, left, right, scratch, f):
 
 @njit
 def both_faces(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, fr, fl):
-    """Write the face values of forward wave (fr) and backward wave (fl), all [kg/s].
-
-    r, l : float64[cells]  forward and backward wave of cells
-    r_in, l_in : waves that enter from the nodes at the `from` and the `to` end
-    r_out, l_out : waves that leave at the `to` and the `from` end, extrapolated from cells
-    """
+    """Write the face values of forward wave (fr) and backward wave (fl), all [kg/s]."""
     n, small = r.size, pipe["noise"]
     family, degree, limiter = scheme_family(settings, n), settings["degree"], settings["limiter"]
     edge, ghosts, beyond = scratch[16:21], scratch[21:24], scratch[24:27]
@@ -79,10 +86,7 @@ def both_faces(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, fr, fl):
 
 @njit
 def rates_from_faces(k, fr, fl, dr, dl):
-    """Write d/dt of forward and backward wave (dr, dl) without friction, from their face values fr and fl.
-
-    k : wave speed over cell length [1/s]
-    """
+    """Write d/dt of forward and backward wave (dr, dl) without friction, from their face values fr and fl."""
     for i in range(dr.size):
         dr[i] = -k * (fr[i + 1] - fr[i])
         dl[i] = k * (fl[i + 1] - fl[i])
@@ -103,7 +107,7 @@ def convolve(e0, e1, e2, e3, e4, e5, c, d):
 def rates_linear(settings, k, backward, c, datum, edge, d):
     """Write k (F[i] - F[i+1]) along a wave to d, by a linear scheme with face values F, from its cells c.
 
-    k : wave speed / dx [1/s]; backward : 1 for the backward wave; c must have at least five cells
+    c must have at least five cells.
     datum : value of the wave at the end where it enters [kg/s]; edge : float64[5]  work array
     """
     n, inside, enter, leave = c.size, settings["inside"], settings["enter"], settings["leave"]
@@ -130,11 +134,8 @@ def rates_linear(settings, k, backward, c, datum, edge, d):
 def subtract_friction(k, flow, loss, base, r, l, dr, dl):
     """Subtract half of the friction from the rate of the forward wave; add half to the rate of the backward wave.
 
-    The friction is loss |M| M minus the initial steady drag [kg/s2], M : mass flow.
-    dr, dl : float64[cells]  rates; on entry -k and k times the differences of face values [kg/s2], k = wave speed / dx
-    r, l : float64[cells]  forward and backward wave [kg/s]
-    flow : initial steady mass flow [kg/s]; base : half of the initial steady drag [kg/s2]
-    loss : coefficient of |M| M [1/kg]
+    The friction is loss |M| M minus the initial steady drag [kg/s2], M : mass flow. On entry dr and dl are -k and k
+    times the differences of face values.
     The friction is averaged over two Gauss points of a cell: fourth order, and no kink of the law is missed.
     """
     half, spread = 0.25 * loss, GAUSS / k
@@ -149,10 +150,7 @@ def subtract_friction(k, flow, loss, base, r, l, dr, dl):
 
 @njit
 def subtract_friction_rough(k, pipe, base, r, l, dr, dl):
-    """Subtract friction as `subtract_friction` does, with a friction factor that follows from the wall roughness.
-
-    k : wave speed / dx [1/s]; base : half of the initial steady drag [kg/s2]; r, l, dr, dl : see `subtract_friction`
-    """
+    """Subtract friction as `subtract_friction` does, with a friction factor that follows from the wall roughness."""
     loss, rough = pipe["loss"], pipe["rough"]
     e, reynolds, flow, spread = pipe["roughness"], pipe["reynolds"], pipe["flow"], GAUSS / k
     for i in range(r.size):
@@ -171,7 +169,7 @@ def subtract_friction_hazen(k, flow, loss, rough, base, r, l, dr, dl):
 
     M (M^2 + 1.852 d^2)^0.426 is the mean of |M|^0.852 M over M - d and M + d with a relative error of 0.43 (d/M)^4. M
     is the mass flow at the centre of a cell, M - d and M + d are its values at the Gauss points.
-    rough : coefficient of |M|^0.852 M; other arguments as for `subtract_friction`
+    rough : coefficient of |M|^0.852 M
     """
     spread, half, quarter = GAUSS / k, 0.5 * rough, 0.25 * loss
     for i in range(r.size):
@@ -189,12 +187,7 @@ def subtract_friction_hazen(k, flow, loss, rough, base, r, l, dr, dl):
 
 @njit
 def rates_upwind(k, flow, loss, base, r, l, r_in, l_in, dr, dl):
-    """Write d/dt of both waves by the first-order upwind scheme with friction, in a single loop without face arrays.
-
-    k : wave speed / dx [1/s]; flow : initial steady mass flow M [kg/s]
-    loss : coefficient of |M| M [1/kg]; base : half of the initial steady drag [kg/s2]
-    r, l, dr, dl : float64[cells]  forward and backward wave [kg/s], their rates; r_in, l_in : waves from the nodes
-    """
+    """Write d/dt of both waves by the first-order upwind scheme with friction, in a single loop without face arrays."""
     n = r.size
     half = 0.5 * loss
     m = flow + (r[0] - l[0])
@@ -215,11 +208,7 @@ def rates_upwind(k, flow, loss, base, r, l, r_in, l_in, dr, dl):
 
 @njit(forceinline=True)
 def pipe_rates(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, dr, dl):
-    """Write d/dt of forward and backward wave of a pipe to dr and dl, from its cells and four wave values at its ends.
-
-    r, l : float64[cells]  waves of cells [kg/s]
-    r_in, l_out : forward and backward wave at the `from` end [kg/s]; r_out, l_in : at the `to` end
-    """
+    """Write d/dt of forward and backward wave of a pipe to dr and dl, from its cells and four waves at its ends."""
     n = r.size
     k = pipe["speed"] / pipe["dx"]
     base = 0.5 * pipe["drag"]
@@ -242,3 +231,61 @@ def pipe_rates(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, dr, dl):
         subtract_friction_hazen(k, pipe["flow"], pipe["loss"], pipe["rough"], base, r, l, dr, dl)
     elif pipe["loss"] != 0.0 or base != 0.0:
         subtract_friction(k, pipe["flow"], pipe["loss"], base, r, l, dr, dl)
+
+
+@njit
+def outgoing_waves_linear(t, y, dydt, out, handle):
+    """Write the outgoing waves of pipes to out[ends]; add their flow into nodes at unchanged pressure to out[net]."""
+    tables = open_tables(handle)
+    settings, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
+    scratch = tables.scratch
+    for i in range(pipes.size):
+        pipe = pipes[i]
+        if pipe["delay"] >= 0:
+            continue
+        n, at = pipe["cells"], layout["ends"] + 4 * i
+        r, l = y[pipe["y"] : pipe["y"] + n], y[pipe["y"] + n : pipe["y"] + 2 * n]
+        family = scheme_family(settings, n)
+        degree, limiter, small = settings["degree"], settings["limiter"], pipe["noise"]
+        for right in range(2):
+            wave = end_value(r if right == 1 else l, right, family, degree, limiter, small, scratch)
+            out[at + 1 + right] = wave
+            node = pipe["to_node"] if right == 1 else pipe["from_node"]
+            out[layout["net"] + node] += 2.0 * wave
+
+
+@njit
+def incoming_waves_linear(t, y, dydt, out, handle):
+    """Write the waves from nodes into pipes to out[ends]: incoming wave = Y p' - outgoing wave [kg/s].
+
+    p' : pressure change of the node since the start [Pa]; Y : admittance of the pipe [kg/s per Pa]
+    """
+    tables = open_tables(handle)
+    layout, pipes = tables.layout[0], tables.pipes
+    for i in range(pipes.size):
+        pipe = pipes[i]
+        if pipe["delay"] >= 0:
+            continue
+        at = layout["ends"] + 4 * i
+        p_from = out[layout["pressure"] + pipe["from_node"]]
+        p_to = out[layout["pressure"] + pipe["to_node"]]
+        out[at] = pipe["admittance"] * p_from - out[at + 1]
+        out[at + 3] = pipe["admittance"] * p_to - out[at + 2]
+
+
+@njit
+def wave_rates(t, y, dydt, out, handle):
+    """Write d/dt of the waves in all pipe cells [kg/s2] to `dydt`, unless it is empty."""
+    tables = open_tables(handle)
+    settings, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
+    if dydt.size == 0:
+        return
+    for i in range(pipes.size):
+        pipe = pipes[i]
+        if pipe["delay"] >= 0:
+            continue
+        n, o, at = pipe["cells"], pipe["y"], layout["ends"] + 4 * i
+        pipe_rates(
+            settings, pipe, y[o : o + n], y[o + n : o + 2 * n], out[at], out[at + 1], out[at + 2], out[at + 3],
+            tables.scratch, dydt[o : o + n], dydt[o + n : o + 2 * n],
+        )  # fmt: skip

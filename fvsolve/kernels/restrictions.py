@@ -1,6 +1,10 @@
-"""Restrictions (valves, pumps, orifices): conductance, Newton step, slope and events of each law."""
+"""Restrictions (valves, pumps, orifices): valve equation, driving pressure, Newton step, slope and events of each law.
 
-from math import sqrt
+Valve equation: M |M| = G dp with G = 2 rho (Cd A)^2, which is q = Cd A sqrt(2 dp / rho), equation (79) of
+docs/course.md. M is the mass flow, q the volume flow, dp the drop, Cd A the effective area.
+"""
+
+from math import exp, log, sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.calls import call_bends, call_lift, call_slope, call_step
@@ -8,8 +12,154 @@ from fvsolve.kernels.density import density, enthalpy
 from fvsolve.kernels.devices import BENDS, LIFT, SLOPE, STEP
 from fvsolve.kernels.dtypes import LAW_LINEAR
 from fvsolve.kernels.isolated_nodes import inner_row
+from fvsolve.kernels.schedule_pieces import schedule_value
 from fvsolve.kernels.table_handle import open_tables
-from fvsolve.kernels.valves import LEAST, flow_slope, transition_of, valve_conductance, valve_step
+
+LEAST = 1e-4  # chords are not steeper than at a drop of LEAST squared [Pa], the rounding of pressures
+
+
+@njit(forceinline=True)
+def relative_area(kind, floats, table, size, opening):
+    """Relative flow area at a stem position `opening`, by the characteristic `kind`.
+
+    0 : linear
+    1 : equal-percentage, rangeability 50, shut at 0
+    else : table of `size` openings, then areas, in `floats` from index `table` on
+    """
+    if kind == 0:
+        return opening
+    if kind == 1:
+        return exp(log(50.0) * (opening - 1.0)) if opening > 0.0 else 0.0
+    if opening <= floats[table]:
+        return floats[table + size]
+    for k in range(1, size):
+        if opening <= floats[table + k]:
+            s = (opening - floats[table + k - 1]) / (floats[table + k] - floats[table + k - 1])
+            low, high = floats[table + size + k - 1], floats[table + size + k]
+            return low + s * (high - low)
+    return floats[table + 2 * size - 1]
+
+
+@njit(forceinline=True)
+def valve_conductance(tables, index, t):
+    """Conductance G = 2 rho (Cd A)^2 of valve `index` at time t [kg2/s2/Pa]."""
+    return conductance_of(tables, index, schedule_value(tables, tables.valves[index]["schedule"], t))
+
+
+@njit(forceinline=True)
+def conductance_of(tables, index, opening):
+    """Conductance G = 2 rho (Cd A)^2 of valve `index` at an opening [kg2/s2/Pa]."""
+    valve = tables.valves[index]
+    area = relative_area(valve["characteristic"], tables.floats, valve["table"], valve["table_size"], opening)
+    return valve["conductance"] * area * area
+
+
+@njit(forceinline=True)
+def transition_of(valve, g):
+    """Flow below which the law of a restriction with conductance g is laminar [kg/s]."""
+    return max(valve["transition"], sqrt(g * valve["rounding_drop"]))
+
+
+@njit(forceinline=True)
+def flow_at_drop(conductance, transition, drop):
+    """Mass flow of a valve at a pressure drop [kg/s], sqrt(conductance * drop) with the sign of the drop.
+
+    Below the flow `transition` [kg/s] it is an odd polynomial with a bounded slope, joined with continuous second
+    derivative.
+    """
+    if conductance <= 0.0:
+        return 0.0
+    size = conductance * abs(drop)
+    if transition > 0.0 and size < transition * transition:
+        x = size / (transition * transition)
+        flow = transition * x * (45.0 + x * x * (5.0 * x * x - 18.0)) / 32.0
+    else:
+        flow = sqrt(size)
+    return flow if drop >= 0.0 else -flow
+
+
+@njit(forceinline=True)
+def flow_slope(conductance, transition, drop):
+    """Derivative of the mass flow of a valve with respect to its drop [kg/s per Pa].
+
+    Law and arguments as for `flow_at_drop`.
+    """
+    if conductance <= 0.0:
+        return 0.0
+    size = conductance * abs(drop)
+    if transition > 0.0 and size < transition * transition:
+        x = size / (transition * transition)
+        return conductance / transition * (45.0 + x * x * (25.0 * x * x - 54.0)) / 32.0
+    return 0.5 * conductance / sqrt(size) if size > 0.0 else 0.0
+
+
+@njit(forceinline=True)
+def valve_step(g, transition, m, drop):
+    """(a, s) of the change of flow a + s d(drop) in the next Newton step of a valve [kg/s, kg/s/Pa].
+
+    g : conductance [kg2/s2/Pa]; m, drop : present flow [kg/s] and drop [Pa]
+    transition : flow below which the law is laminar [kg/s]
+    The chord of the square root replaces its slope: between the present flow and the flow of the law at this drop it is
+    finite and never too steep.
+    """
+    if transition > 0.0:
+        target = flow_at_drop(g, transition, drop)
+        steepest = 45.0 / 32.0 * g / transition
+        return target - m, min(steepest, g / max(abs(target) + abs(m), 1e-300))
+    chord = max(abs(m) + sqrt(g * abs(drop)), LEAST * sqrt(g))
+    return (g * drop - abs(m) * m) / chord, g / chord
+
+
+@njit(forceinline=True)
+def flow_change(conductance, impedance, flow, surplus, target):
+    """Change x [kg/s] of the flow M of a valve between pipe ends: exact root of |M + x| (M + x) = G (dp0 + dp' - Z x).
+
+    conductance : G [kg2/s2/Pa]; flow : initial steady flow M [kg/s]
+    impedance : Z of both pipe ends together [Pa s/kg], zero for given pressures
+    target : G (dp0 + dp') [kg2/s2], with initial drop dp0 and its change dp' at unchanged flow
+    surplus : target - |M| M, computed so that it is zero if nothing changes: then x is zero too
+    """
+    if conductance <= 0.0:
+        return -flow
+    gz = conductance * impedance
+    side = 1.0 if flow >= 0.0 else -1.0
+    if abs(surplus) <= 0.5 * flow * flow:
+        b = 2.0 * abs(flow) + gz
+        return 2.0 * surplus / (b + sqrt(b * b + 4.0 * side * surplus)) if b > 0.0 else 0.0
+    total = target + gz * flow
+    root = gz + sqrt(gz * gz + 4.0 * abs(total))
+    return (2.0 * total / root if root > 0.0 else 0.0) - flow
+
+
+@njit
+def flow_change_laminar(conductance, transition, impedance, flow, base, drop):
+    """Change x [kg/s] of the flow M of a valve between pipe ends: root of M + x = law(drop - Z x), by bounded Newton.
+
+    The law is that of `flow_at_drop`, with a laminar part below the flow `transition` [kg/s].
+    conductance, impedance, flow : see `flow_change`; drop : drop at unchanged flow [Pa]
+    base : flow of the law at the initial drop minus M, so that x is zero if nothing changes
+    """
+    if conductance <= 0.0:
+        return -flow
+    x = flow_at_drop(conductance, transition, drop) - flow - base
+    if impedance == 0.0 or x == 0.0:
+        return x
+    low, high = min(x, 0.0), max(x, 0.0)
+    for _ in range(100):
+        rest = drop - impedance * x
+        g = flow + x + base - flow_at_drop(conductance, transition, rest)
+        if g > 0.0:
+            high = x
+        else:
+            low = x
+        step = g / (1.0 + impedance * flow_slope(conductance, transition, rest))
+        new = x - step
+        if not (low <= new <= high):
+            new = 0.5 * (low + high)
+        if abs(new - x) <= 1e-15 * (abs(flow) + abs(new)):
+            return new
+        x = new
+    return x
 
 
 @njit(forceinline=True)
@@ -88,6 +238,59 @@ def head_drop(tables, out, k):
     rise = st["gravity"] * (nodes[j]["elevation"] - nodes[i]["elevation"])
     rho = density(st, floats, p_i)
     return rho, rho * (enthalpy(st, floats, p_i) - enthalpy(st, floats, p_j) - rise)
+
+
+@njit
+def mean_density(st, floats, p_i, p_j):
+    """Mean density dp / dh between the pressures p_i and p_j [kg/m3], h : specific enthalpy."""
+    dp = p_i - p_j
+    if abs(dp) > 1e-3:
+        return dp / (enthalpy(st, floats, p_i) - enthalpy(st, floats, p_j))
+    return density(st, floats, p_i)
+
+
+@njit
+def driving_pressure(st, floats, p_i, z_i, p_j, z_j):
+    """(driving pressure of a link from node i to node j [Pa], upstream density [kg/m3]).
+
+    The driving pressure is rho_mean (h_i - h_j + g (z_i - z_j)), with specific enthalpy h and elevation z [m]. At equal
+    elevations it is p_i - p_j.
+    """
+    dp = p_i - p_j
+    if z_i != z_j:
+        dh = enthalpy(st, floats, p_i) - enthalpy(st, floats, p_j)
+        dp = mean_density(st, floats, p_i, p_j) * (dh + st["gravity"] * (z_i - z_j))
+    return dp, density(st, floats, p_i if dp >= 0.0 else p_j)
+
+
+@njit
+def valve_driving_pressure(tables, out, k):
+    """(driving pressure of valve k [Pa], upstream density over reference density [-]), from the present pressures."""
+    st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
+    valve = tables.valves[k]
+    i, j = valve["from_node"], valve["to_node"]
+    p_i = nodes[i]["pressure"] + out[layout["pressure"] + i]
+    p_j = nodes[j]["pressure"] + out[layout["pressure"] + j]
+    drop, rho = driving_pressure(st, floats, p_i, nodes[i]["elevation"], p_j, nodes[j]["elevation"])
+    return drop, rho / st["rho"]
+
+
+@njit
+def valve_target(tables, out, k, g):
+    """(flow by the law of valve k at the present pressures, its conductance at the upstream density [kg2/s2/Pa]).
+
+    The first result is M |M| [kg2/s2] under the square-root law M |M| = G dp. If the law has a laminar part, it is the
+    flow M [kg/s].
+    g : conductance G at the reference density [kg2/s2/Pa]
+    """
+    valve = tables.valves[k]
+    drop, denser = valve_driving_pressure(tables, out, k)
+    dense = g * denser
+    if drop < 0.0:
+        dense *= valve["back"]
+    if valve["transition"] > 0.0:
+        return flow_at_drop(dense, transition_of(valve, dense), drop), dense
+    return dense * drop, dense
 
 
 @njit

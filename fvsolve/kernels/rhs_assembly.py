@@ -73,16 +73,16 @@ NODES = {  # nodes, by the family of the density law
 }
 NETWORK = RhsTerms(prepare="network_balance: begin_network", balance="network_balance: balance_network")
 LUMPED = RhsTerms(
-    prepare="fused_lumped: begin_lumped",
+    prepare="linear_nodes: begin_lumped",
     solve_nodes="linear_nodes: solve_nodes_linear",
     balance="network_balance: balance_network",
 )
 ALONE = RhsTerms(prepare="network_balance: begin_basins")
 PIPES = {
     "linear": RhsTerms(
-        outgoing_waves="linear_pipes: outgoing_waves_linear",
-        incoming_waves="linear_pipes: incoming_waves_linear",
-        rates="linear_pipes: wave_rates",
+        outgoing_waves="pipes: outgoing_waves_linear",
+        incoming_waves="pipes: incoming_waves_linear",
+        rates="pipes: wave_rates",
     ),
     "barotropic": RhsTerms(
         outgoing_waves="barotropic_nodes: outgoing_waves_barotropic", rates="barotropic_pipes: rates_barotropic"
@@ -97,18 +97,18 @@ PIPES = {
 READ = {
     "linear": RhsTerms(
         observe="observation: observe_linear",
-        power="linear_energy: power_linear",
-        stored="linear_energy: stored_linear",
+        power="network_energy: power_linear",
+        stored="network_energy: stored_linear",
     ),
     "barotropic": RhsTerms(
         observe="barotropic_pipes: observe_barotropic",
-        power="barotropic_energy: power_barotropic",
-        stored="barotropic_energy: stored_barotropic",
+        power="network_energy: power_barotropic",
+        stored="network_energy: stored_barotropic",
     ),
 }
 UNSTEADY_FRICTION = {
-    "power": "unsteady_friction.relaxation_energy: add_power",
-    "stored": "unsteady_friction.relaxation_energy: add_stored",
+    "power": "relaxation_energy: add_friction_power",
+    "stored": "relaxation_energy: add_friction_stored",
 }
 FLUID_LOADS = {
     "boundary_inflow": "mechanism.fluid_loads: add_fluid_loads",
@@ -126,8 +126,8 @@ COMPONENTS = {
     "clusters": RhsTerms(solve_nodes="node_clusters: solve_clusters"),
     "columns": RhsTerms(column_nodes="rigid_columns: column_pressures", move="rigid_columns: column_rates", **COLUMNS),
     "columns, barotropic": RhsTerms(
-        column_nodes="barotropic_columns: column_pressures_barotropic",
-        move="barotropic_columns: column_rates_barotropic",
+        column_nodes="rigid_columns: column_pressures_barotropic",
+        move="rigid_columns: column_rates_barotropic",
         **COLUMNS,
     ),
     "bodies": RhsTerms(
@@ -185,19 +185,17 @@ COMPONENTS = {
     "forces, linear": RhsTerms(observe="pipe_forces: observe_forces_linear"),
     "forces, barotropic": RhsTerms(observe="pipe_forces: observe_forces_barotropic"),
     "forces, cavitating": RhsTerms(observe="pipe_forces: observe_forces_cavitating"),
-    "memory": RhsTerms(rates="unsteady_friction.relaxation_terms: add_unsteady_friction", **UNSTEADY_FRICTION),
-    "memory, barotropic": RhsTerms(
-        rates="unsteady_friction.relaxation_terms_barotropic: add_unsteady_friction_barotropic", **UNSTEADY_FRICTION
-    ),
+    "memory": RhsTerms(rates="relaxation: add_unsteady_friction", **UNSTEADY_FRICTION),
+    "memory, barotropic": RhsTerms(rates="relaxation: add_unsteady_friction_barotropic", **UNSTEADY_FRICTION),
     "creep, barotropic": RhsTerms(
-        rates="viscoelastic_wall.kelvin_voigt_barotropic: add_wall_creep_barotropic",
-        power="viscoelastic_wall.wall_energy_barotropic: add_power_barotropic",
-        stored="viscoelastic_wall.wall_energy_barotropic: add_stored_barotropic",
+        rates="relaxation: add_wall_creep_barotropic",
+        power="relaxation_energy: add_creep_power_barotropic",
+        stored="relaxation_energy: add_creep_stored_barotropic",
     ),
     "creep": RhsTerms(
-        rates="viscoelastic_wall.kelvin_voigt: add_wall_creep",
-        power="viscoelastic_wall.wall_energy: add_power",
-        stored="viscoelastic_wall.wall_energy: add_stored",
+        rates="relaxation: add_wall_creep",
+        power="relaxation_energy: add_creep_power",
+        stored="relaxation_energy: add_creep_stored",
     ),
 }
 DELAYS = RhsTerms(

@@ -11,8 +11,8 @@ remains uniform.
 
 from fvsolve.jit import inline, njit
 from fvsolve.kernels.dtypes import FLAT, NODE_SCALAR, PIPE_SCALAR, RATE, UPWIND
-from fvsolve.kernels.limiters import by_limiter, limited, slope
 from fvsolve.kernels.node_mixing import end_flow, exchange_amounts, mix_nodes, outlet_values, record_loss
+from fvsolve.kernels.reconstruction import by_limiter, limited, slope
 from fvsolve.kernels.table_handle import open_tables
 
 

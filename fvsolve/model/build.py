@@ -19,7 +19,7 @@ from fvsolve.case import load, locate_faults
 from fvsolve.case.case import Case
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels import tank_limits
+from fvsolve.kernels import tanks
 from fvsolve.model.body_tables import lower_bodies, lower_lines, lower_moving_segments
 from fvsolve.model.cluster_tables import classify_nodes
 from fvsolve.model.delay_history import history_size
@@ -256,7 +256,7 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
     )  # fmt: skip
     draft.shapes = rec.RunArrays(
         clock=1, work=draft.work_size, marks=mark_count(draft),
-        armed=tank_limits.EVENTS * draft.tanks + len(draft.events) + 2 * len(draft.stop_table),
+        armed=tanks.EVENTS * draft.tanks + len(draft.events) + 2 * len(draft.stop_table),
         scratch=scratch_size(draft), spare=spare_size(draft), seen=draft.size if len(draft.wall_table) else 0,
         bands=2 * len(draft.basin_table), joint=0, sums=0, sharp=int(len(draft.delay_table) > 0),
         envelope=(4, draft.cells), extremes=(4, len(draft.probe_table)), past=history_size(draft.delay_table),

@@ -68,8 +68,8 @@ def vessel_energy_function(model: Model):
     st, floats = model.tables.settings[0], model.tables.floats
     if model.case.law.linear:
         return lambda row: 0.5 * row["volume"] * potential(model, row) ** 2 / model.case.properties.bulk_modulus
-    from fvsolve.kernels.barotropic_energy import vessel_energy
     from fvsolve.kernels.density import density, enthalpy, pressure_of_enthalpy
+    from fvsolve.kernels.network_energy import vessel_energy
 
     def energy(row) -> float:
         ambient, height = float(st["ambient"]), float(row["elevation"] - st["datum"])
@@ -145,8 +145,8 @@ def tank_energy_above_datum(model: Model, row) -> float:
 
     If the bottom or the rim of the tank does not allow this level, the nearest possible level counts.
     """
-    from fvsolve.kernels.linear_energy import tank_energy
-    from fvsolve.kernels.tank_levels import tank_level
+    from fvsolve.kernels.network_energy import tank_energy
+    from fvsolve.kernels.tanks import tank_level
 
     st, floats = model.tables.settings[0], model.tables.floats
     rho, target = float(row["density"]), float(st["datum"] - row["elevation"])

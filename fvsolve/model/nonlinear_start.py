@@ -8,8 +8,9 @@ import numpy as np
 
 from fvsolve.kernels import density as kernels
 from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.barotropic_nodes import driving_pressure, end_flow, valve_target
+from fvsolve.kernels.barotropic_nodes import end_flow
 from fvsolve.kernels.density.steady_profile import profile_along
+from fvsolve.kernels.restrictions import driving_pressure, valve_target
 from fvsolve.model.steady_start import PRESSURE_SCALE, SteadyStart
 
 

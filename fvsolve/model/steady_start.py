@@ -13,10 +13,10 @@ import numpy as np
 from fvsolve.assembly.lowering import lowering_of
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.restrictions import conductance_of, flow_at_drop, flow_slope, transition_of
 from fvsolve.kernels.schedule_pieces import value_with_limit
 from fvsolve.kernels.steady_friction import drag, drag_slope, factor_times_reynolds
 from fvsolve.kernels.table_handle import make_handle
-from fvsolve.kernels.valves import conductance_of, flow_at_drop, flow_slope, transition_of
 from fvsolve.model.body_tables import driven_at_start
 from fvsolve.model.mass_tables import start_masses
 from fvsolve.model.run_data import zeros_for_run

@@ -9,7 +9,7 @@ import numpy as np
 
 from fvsolve.errors import listing
 from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels import tank_limits
+from fvsolve.kernels import tanks
 from fvsolve.kernels.compiled_functions import fused_step_function
 from fvsolve.model import Model, RunData
 from fvsolve.model.scalar_tables import amount_indices
@@ -190,7 +190,7 @@ class RunLoop:
 
     def record_events(self, before: np.ndarray) -> None:
         """Record the events since the event flags were `before`, and apply their immediate effects."""
-        first, count = tank_limits.EVENTS * self.tanks.size, len(self.model.events)
+        first, count = tanks.EVENTS * self.tanks.size, len(self.model.events)
         now = self.armed[first : first + count] > before[first : first + count]
         self.switched += [(self.t, int(k)) for k in np.flatnonzero(now) if self.model.events[k][1]]
         self.apply_events()
@@ -202,7 +202,7 @@ class RunLoop:
         """
         for i in self.tanks:
             node, sums = self.model.tables.nodes[i], self.stepper.ledger.reshape(LEDGER_ROWS, -1)
-            part = tank_limits.overshoot_correction(node, self.armed, float(node["mass"] + self.now[node["y"]]))
+            part = tanks.overshoot_correction(node, self.armed, float(node["mass"] + self.now[node["y"]]))
             self.now[node["y"]] += part
             sums[0 if part > 0.0 else 1, i] += part
         for (_, _, device), row in zip(self.model.devices, self.model.tables.devices, strict=True):

@@ -21,8 +21,8 @@ AMBIENT, GRAVITY, REFERENCE = 98000.0, 9.81, 2e5
 GIVEN = {"mixture": {"air_fraction": 0.004}}  # further keys of a law
 PRESSURES = [3e4, 1e5, 2e5, 7e5, 4e6, 3e7]
 DENSE = [name for name, law in LAWS.items() if issubclass(law, DenseLaw)]
-QUESTIONS = {name: one for name, one in vars(kernels).items()
-             if getattr(one, "__module__", "") == kernels.__name__ and name != "dispatch_law"}  # fmt: skip
+QUESTIONS = {name: one for name, one in vars(kernels).items() if getattr(one, "__module__", "") == kernels.__name__}
+OF_THE_FLUID = {"log_density", "enthalpy", "pressure_of_log", "pressure_of_enthalpy"}
 
 
 @cache
@@ -61,7 +61,10 @@ def test_each_answers_the_same_questions():
         assert public(LinearLaw) <= public(one), name
     for name in set(DENSE):
         module = getattr(kernels, f"{name}_law")
-        for question, asked in QUESTIONS.items():
+        answered = QUESTIONS.keys() & vars(module).keys()  # questions of walls too, if the walls of a law are its own
+        assert answered in (OF_THE_FLUID, QUESTIONS.keys() - {"force_of_mass"}), name
+        for question in answered:
+            asked = QUESTIONS[question]
             own = inspect.signature(getattr(getattr(module, question), "py_func", getattr(module, question)))
             assert own.parameters.keys() == inspect.signature(getattr(asked, "py_func", asked)).parameters.keys()
 

@@ -14,8 +14,8 @@ from fvsolve.basins.free_surface import surface_rows as shallow_rows
 from fvsolve.basins.liquid import grid_linear as liquid
 from fvsolve.basins.liquid import grid_nonlinear as liquid_log
 from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels import limiters, reconstruction, scalar_transport
-from fvsolve.kernels.limiters import by_limiter, limited
+from fvsolve.kernels import reconstruction, scalar_transport
+from fvsolve.kernels.reconstruction import by_limiter, limited
 
 CELLS, NONE = 40, 99
 
@@ -107,11 +107,11 @@ def test_a_code_that_is_no_limiter_gives_nan_and_never_another(kernel):
 def test_a_pair_of_halves_is_two_slopes():
     """One division gives both half slopes."""
     a, b, c, d = (row - 2.0 for row in waves(4))
-    for limiter in (limiters.minmod, limiters.van_leer, limiters.monotonized_central):
+    for limiter in (reconstruction.minmod, reconstruction.van_leer, reconstruction.monotonized_central):
         for four in zip(a, b, c, d, strict=True):
-            one, two = limiters.half_slopes(limiter, *four)
-            assert one == pytest.approx(0.5 * limiters.slope(limiter, *four[:2]), rel=1e-15)
-            assert two == pytest.approx(0.5 * limiters.slope(limiter, *four[2:]), rel=1e-15)
+            one, two = reconstruction.half_slopes(limiter, *four)
+            assert one == pytest.approx(0.5 * reconstruction.slope(limiter, *four[:2]), rel=1e-15)
+            assert two == pytest.approx(0.5 * reconstruction.slope(limiter, *four[2:]), rel=1e-15)
 
 
 def test_what_is_flat_has_no_slope():

@@ -18,11 +18,11 @@ from fvsolve.model import RunData
 from fvsolve.solve.run_loop import RunLoop
 from fvsolve.steppers import loop_indices
 
-PIPES = {"pipes", "ghost_cells", "reconstruction", "limiters", "fused_step"}
+PIPES = {"pipes", "ghost_cells", "reconstruction", "fused_step"}
 MASSES = {"mass_dynamics"}
 BODIES = {"joints", "mass_matrix", "body_layout", "loop_constraints", "bushings"}
 DEVICES = {"check_valve", "regulator", "pump", "accumulator"}
-MEMORY = {"relaxation_terms"}  # of unsteady friction
+MEMORY = {"relaxation"}  # of unsteady friction
 IMPLICIT = {"newton", "dirk", "irk", "ros", "differences", "linear_dense", "linear_banded", "linear_sparse"}
 CAVITIES = {"cavitating_pipes", "cavitating_nodes", "riemann"}
 JOBS = (*PHASES, "observe", "record", "events")
@@ -98,7 +98,7 @@ def test_each_room_is_compiled_where_it_is_used(compiling):
     assert files(fvsolve.build(fvsolve.load(log))) & ALL == PIPES - {"fused_step"}
     wet = {**WATER, "law": "mixture", "air_fraction": 1e-6, "cavitation": True}
     found = files(fvsolve.build(fvsolve.load(line(scheme="muscl") | {"fluid": wet})))
-    assert found & ALL == CAVITIES | {"reconstruction", "limiters"}
+    assert found & ALL == CAVITIES | {"reconstruction"}
     cylinder = fvsolve.build(fvsolve.load(CASES / "closed-cylinder.toml"))  # law: log
     assert files(cylinder) & (PIPES | MASSES | BODIES) == MASSES
     arm = fvsolve.build(fvsolve.load(bodies({"arm": pendulum()}, 1.0)))
@@ -157,10 +157,13 @@ def test_a_basin_alone_has_the_rates_that_it_has_beside_a_link(physics, law):
 
 
 def test_a_basin_compiles_no_links_and_no_other_scheme(compiling):
-    network, fifth = {"restrictions", "linear_nodes", "basin_patches", "limiters"}, {"fifth_order", "flux_correction"}
+    network, fifth = (
+        {"restrictions", "linear_nodes", "basin_patches", "reconstruction"},
+        {"fifth_order", "flux_correction"},
+    )
     muscl, weno5 = (files(fvsolve.build(fvsolve.load(pool("transport", False, scheme=s)))) for s in ("muscl", "weno5"))
-    assert muscl & (network | fifth) == {"limiters"}
-    assert weno5 & (network | fifth) == fifth | {"limiters"}
+    assert muscl & (network | fifth) == {"reconstruction"}
+    assert weno5 & (network | fifth) == fifth | {"reconstruction"}
 
 
 def test_the_rates_are_called_no_more_often_than_the_steps_ask_for():

@@ -9,7 +9,7 @@ import pytest
 
 from fvsolve.assembly.scheme_codes import CODES, FAMILIES, family
 from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.limiters import limited
+from fvsolve.kernels.reconstruction import limited
 from fvsolve.schemes import LEAST_CELLS, LIMITED, LINEAR, SCHEMES, Scheme
 
 KNOWN = {  # order, reach, scheme on grids of basins, True if it computes cavities

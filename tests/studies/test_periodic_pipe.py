@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fvsolve.assembly.scheme_codes import CODES
-from fvsolve.kernels.limiters import limited
+from fvsolve.kernels.reconstruction import limited
 from fvsolve.schemes import LIMITERS, branches
 from fvsolve.step_limits.advection_limit import advection_limit
 from fvsolve.step_limits.symbol import WEIGHTS, weights_of

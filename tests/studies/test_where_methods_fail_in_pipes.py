@@ -27,7 +27,7 @@ from reference.scenes import (
 import fvsolve
 from fvsolve.assembly.scheme_codes import CODES
 from fvsolve.case import load
-from fvsolve.kernels.limiters import limited
+from fvsolve.kernels.reconstruction import limited
 from fvsolve.model.energy_norm import energy_weights
 from fvsolve.step_limits.step_notices import step_limits
 from fvsolve.steppers import analyse, method_named, stability_function

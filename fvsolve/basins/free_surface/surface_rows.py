@@ -11,7 +11,7 @@ from math import sqrt
 
 from fvsolve.jit import inline, njit
 from fvsolve.kernels.dtypes import UPWIND
-from fvsolve.kernels.limiters import by_limiter, half_slopes
+from fvsolve.kernels.reconstruction import by_limiter, half_slopes
 
 THIN = 1e-6  # depth below which velocities fade to zero [m]
 TINY = 1e-300

@@ -20,8 +20,7 @@ from fvsolve.basins.liquid.moving_wall_waves import (
 from fvsolve.jit import inline, njit
 from fvsolve.kernels.dtypes import LINEAR, MUSCL, UPWIND, WENO5
 from fvsolve.kernels.ghost_cells import entering_ghosts, leaving_ghosts
-from fvsolve.kernels.limiters import by_limiter, slope
-from fvsolve.kernels.reconstruction import value_muscl, value_weno5
+from fvsolve.kernels.reconstruction import by_limiter, slope, value_muscl, value_weno5
 
 WALLS, MIRRORS, OPEN = 0, 1, 2  # kinds of sides
 RING = 8  # stored rows of waves: the six of the stencil of a row of faces, and space for all three beyond a side

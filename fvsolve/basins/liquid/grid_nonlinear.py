@@ -43,8 +43,7 @@ from fvsolve.basins.liquid.moving_wall_waves import (
 from fvsolve.basins.liquid.riemann_invariants import invariant, invariant_at_potential, state
 from fvsolve.jit import inline, njit
 from fvsolve.kernels.dtypes import LINEAR, UPWIND, WENO5
-from fvsolve.kernels.limiters import by_limiter, slope
-from fvsolve.kernels.reconstruction import value_weno5
+from fvsolve.kernels.reconstruction import by_limiter, slope, value_weno5
 
 
 @njit(forceinline=True)

@@ -19,7 +19,7 @@ from fvsolve.kernels.delay_lines import wave_history as history
 from fvsolve.kernels.delay_lines.line_rates import friction_loss, has_friction, write_all_arrivals, write_arrivals
 from fvsolve.kernels.dtypes import AMENDED, FIXED, JUNCTION, PATCH, STATUS, TANK
 from fvsolve.kernels.network_balance import stiffness_of
-from fvsolve.kernels.tank_limits import BOTTOM, EVENTS, RIM
+from fvsolve.kernels.tanks import BOTTOM, EVENTS, RIM
 
 NOISE = 1e-13  # fraction of a wave of half a bar below which a change is rounding
 

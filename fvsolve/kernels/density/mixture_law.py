@@ -74,8 +74,7 @@ def pressure_of_enthalpy(st, floats, h):
     """Pressure p [Pa] at which the specific enthalpy is h [J/kg], by Newton.
 
     Newton's method is applied to p, or to the logarithm of the gas pressure where a step would reduce the gas pressure
-    to
-    a fifth or less.
+    to a fifth or less.
     """
     prevent_inlining()
     floor, beta = st["floor"], st["beta"]
@@ -175,12 +174,6 @@ def mass_of_pressure(st, floats, pipe, p):
     stretch = area_ratio(st, pipe["compliance"], p)
     m = st["rho"] * pipe["area"] * stretch / size
     return m, m * (fall / size + pipe["compliance"] / stretch)
-
-
-@inline
-def force_of_mass(st, floats, pipe, m):
-    """Pressure force (`thrust`) [N] in a pipe that contains the mass per length m [kg/m]."""
-    return thrust(st, floats, pipe, pressure_of_mass(st, floats, pipe, m))
 
 
 @law_njit

@@ -3,10 +3,9 @@
 Beyond both ends of the table ln(rho / rho_ref) is linear in pressure, and the enthalpy is its exact integral.
 """
 
-from math import exp, expm1, log
+from math import exp, expm1
 
-from fvsolve.jit import inline, njit
-from fvsolve.kernels.density import elastic_wall
+from fvsolve.jit import njit
 from fvsolve.kernels.density.no_inline import law_njit, prevent_inlining
 
 
@@ -39,12 +38,6 @@ def log_density(st, floats, p):
     return value, slope
 
 
-@inline
-def density(st, floats, p):
-    """Density rho [kg/m3] at the pressure p [Pa]."""
-    return elastic_wall.density(st, log_density(st, floats, p)[0])
-
-
 @njit
 def enthalpy(st, floats, p):
     """Specific enthalpy h at the pressure p: integral of dp / rho from the reference pressure [J/kg]."""
@@ -64,7 +57,7 @@ def pressure_of_enthalpy(st, floats, h):
     prevent_inlining()
     p = st["reference"] + st["rho"] * h
     for _ in range(30):
-        step = (enthalpy(st, floats, p) - h) * density(st, floats, p)
+        step = (enthalpy(st, floats, p) - h) * (st["rho"] * exp(log_density(st, floats, p)[0]))
         p -= step
         if abs(step) <= 1e-15 * abs(p):
             break
@@ -86,57 +79,3 @@ def pressure_of_log(st, floats, compliance, q):
         if abs(step) <= 1e-13 * (abs(p) + 1.0):
             break
     return p
-
-
-@inline
-def pressure_of_mass(st, floats, pipe, m):
-    """Pressure [Pa] of a pipe that contains the mass per length m [kg/m]."""
-    return pressure_of_log(st, floats, pipe["compliance"], log(elastic_wall.mass_ratio(st, pipe, m)))
-
-
-@inline
-def mass_of_pressure(st, floats, pipe, p):
-    """Mass per length m = rho A [kg/m] and dm/dp [kg/m/Pa] of a pipe at the pressure p, with density rho and area A."""
-    value, slope = log_density(st, floats, p)
-    return elastic_wall.mass(st, pipe, p, value, slope)
-
-
-@inline
-def wall_area(st, floats, pipe, p):
-    """Area of a pipe at the pressure p [m2]."""
-    return elastic_wall.area(st, pipe, p)
-
-
-@inline
-def thrust(st, floats, pipe, p):
-    """Pressure force in a pipe: integral of A dp from the reference pressure to p [N], A : area of the pipe."""
-    return elastic_wall.thrust(st, pipe, p)
-
-
-@inline
-def force_of_mass(st, floats, pipe, m):
-    """Pressure force (`thrust`) [N] in a pipe that contains the mass per length m [kg/m]."""
-    return thrust(st, floats, pipe, pressure_of_mass(st, floats, pipe, m))
-
-
-@inline
-def impedance(st, floats, pipe, p):
-    """Impedance rho c of a pipe at the pressure p [kg/m2/s]: density times wave speed."""
-    value, slope = log_density(st, floats, p)
-    return elastic_wall.impedance(st, pipe, value, slope)
-
-
-@njit
-def velocity_change(st, floats, pipe, p_from, p_to):
-    """Integral of dp / (rho c) in a pipe from p_from to p_to [m/s] by three Gauss points; rho c as in `impedance`."""
-    middle, half = 0.5 * (p_from + p_to), 0.5 * (p_to - p_from)
-    low, high = middle - elastic_wall.GAUSS_POINT * half, middle + elastic_wall.GAUSS_POINT * half
-    here, there = impedance(st, floats, pipe, low), impedance(st, floats, pipe, high)
-    return elastic_wall.gauss_integral(half, impedance(st, floats, pipe, middle), here, there)
-
-
-@inline
-def local_speed(st, floats, pipe, p):
-    """Wave speed of a pipe at the pressure p [m/s]."""
-    value, slope = log_density(st, floats, p)
-    return elastic_wall.speed(st, pipe, value, slope)

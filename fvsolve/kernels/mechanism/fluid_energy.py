@@ -12,12 +12,11 @@ increase per distance along the segment.
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.barotropic_energy import energy_head
 from fvsolve.kernels.dtypes import CHAMBER, FIXED, JUNCTION, TANK
-from fvsolve.kernels.linear_energy import COLUMN, NODE, PIPE, VALVE
 from fvsolve.kernels.mechanism import body_layout as layout
 from fvsolve.kernels.mechanism import fluid_loads as fluid
 from fvsolve.kernels.mechanism.vectors import cross, dot, plus, scalar_product, scaled, vector
+from fvsolve.kernels.network_energy import COLUMN, NODE, PIPE, VALVE, energy_head
 from fvsolve.kernels.table_handle import open_tables
 
 

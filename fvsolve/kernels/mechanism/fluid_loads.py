@@ -35,7 +35,7 @@ from fvsolve.kernels.mechanism.vectors import (
     write_vector,
 )
 from fvsolve.kernels.table_handle import open_tables
-from fvsolve.kernels.tank_levels import tank_level
+from fvsolve.kernels.tanks import tank_level
 
 ZERO_VECTOR = (0.0, 0.0, 0.0)
 ZERO_FLOW_PATH = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

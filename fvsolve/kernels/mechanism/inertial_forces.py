@@ -23,7 +23,7 @@ from fvsolve.kernels.mechanism.body_layout import body_row
 from fvsolve.kernels.mechanism.mass_matrix import add_body_force, clear_column, mobility
 from fvsolve.kernels.mechanism.vectors import cross, dot, minus, plus, rotate, rotate_back, scalar_product, vector
 from fvsolve.kernels.table_handle import open_tables
-from fvsolve.kernels.tank_levels import tank_level
+from fvsolve.kernels.tanks import tank_level
 
 THIN_LAYER = 1e-6  # thickness of a layer added at the surface to test if fluid has weight there [m]
 

@@ -11,10 +11,9 @@ is that of a small chamber.
 from math import exp, expm1, log, log1p
 
 from fvsolve.jit import njit
-from fvsolve.kernels.barotropic_energy import vessel_energy, vessel_power
 from fvsolve.kernels.density import density, log_density, pressure_of_log
 from fvsolve.kernels.dtypes import LAW_LINEAR
-from fvsolve.kernels.linear_energy import height_pressure
+from fvsolve.kernels.network_energy import height_pressure, vessel_energy, vessel_power
 
 EXPONENT, GAS_VOLUME, TOTAL_VOLUME, NECK_STIFFNESS, EMPTY_MASS, EMPTY_PRESSURE = (
     0,

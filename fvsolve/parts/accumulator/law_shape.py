@@ -9,8 +9,8 @@ integral over d. Then the volume is V = R^3 cot(slope) (T(d) - T(d')), and dV/dz
 from math import acos, cos, pi, sin, sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.linear_energy import level_moment
-from fvsolve.kernels.tank_levels import level_of_volume
+from fvsolve.kernels.network_energy import level_moment
+from fvsolve.kernels.tanks import level_of_volume
 
 KIND, FULL_LEVEL, FIRST_SIZE, SECOND_SIZE, THIRD_SIZE = 0, 1, 2, 3, 4
 """Numbers of a shape: its kind; the level at which it is full [m]; then an area [m2], or the radius [m], length [m] and

@@ -12,11 +12,10 @@ All these values then follow from one energy of gas and fluid.
 from math import exp, expm1, log, log1p
 
 from fvsolve.jit import njit
-from fvsolve.kernels.barotropic_energy import vessel_energy, vessel_power
 from fvsolve.kernels.density import density, enthalpy, log_density, pressure_of_enthalpy
 from fvsolve.kernels.dtypes import LAW_LINEAR
-from fvsolve.kernels.event_pair import event_pair
-from fvsolve.kernels.linear_energy import height_pressure
+from fvsolve.kernels.network_energy import height_pressure, vessel_energy, vessel_power
+from fvsolve.kernels.self_acting_valves import event_pair
 from fvsolve.parts.accumulator.law import EMPTY_MASS, EXPONENT, GAS_VOLUME, TOTAL_VOLUME, gas_energy
 from fvsolve.parts.accumulator.law import NUMBER_COUNT as SHAPED
 from fvsolve.parts.accumulator.law_shape import FULL_LEVEL, level_at, moment_below, surface_at

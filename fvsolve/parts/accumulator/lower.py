@@ -166,7 +166,7 @@ class AccumulatorRows(Device, kind="accumulator"):
         It is the stored energy at the start minus the least stored energy. In the state of least energy, the energy per
         mass of the fluid at the node (`energy_head`) is 0, or no fluid is left.
         """
-        from fvsolve.kernels.barotropic_energy import energy_head
+        from fvsolve.kernels.network_energy import energy_head
 
         st, floats = model.tables.settings[0], model.tables.floats
         node, at = model.tables.nodes[row["node"]], int(row["data"])

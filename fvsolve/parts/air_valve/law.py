@@ -15,12 +15,11 @@ through a small bore, until the air is at ambient pressure. An automatic bore re
 from math import expm1, log1p, sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.barotropic_energy import vessel_power
 from fvsolve.kernels.density import enthalpy, pressure_of_enthalpy
 from fvsolve.kernels.dtypes import LAW_LINEAR, RATE
-from fvsolve.kernels.event_pair import event_pair
-from fvsolve.kernels.restrictions import restriction_slope
-from fvsolve.kernels.valves import flow_at_drop
+from fvsolve.kernels.network_energy import vessel_power
+from fvsolve.kernels.restrictions import flow_at_drop, restriction_slope
+from fvsolve.kernels.self_acting_valves import event_pair
 
 VOLUME, AIR_MASS, RT, INLET_AREA, OUTLET_AREA, SWITCH_PRESSURE, THROTTLED_AREA, SWITCH_FLOW = 0, 1, 2, 3, 4, 5, 6, 7
 """Numbers of an air valve: chamber volume V0 [m3], mass of air in V0 at ambient pressure [kg], R T [J/kg], Cd A of the

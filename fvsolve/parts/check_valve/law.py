@@ -7,8 +7,8 @@ changes on accepted states only.
 
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import JUNCTION
-from fvsolve.kernels.event_pair import event_pair
 from fvsolve.kernels.restrictions import head_drop
+from fvsolve.kernels.self_acting_valves import event_pair
 
 PRESSURE_MARGIN = 1.0  # excess over the cracking pressure at which it opens, so that rounding does not [Pa]
 

@@ -6,17 +6,15 @@ damping ratio zeta. target = (lifting pressure - opening pressure) / span; the l
 of a relief valve, or the drop across a check valve. The disc rests at its stop (flag armed[event]) and on its seat
 (armed[event + 2]).
 
-A disc that alone joins a rigid column controls its flow near the seat (armed[event + 4]): `kernels.valve_seating`.
+A disc that alone joins a rigid column controls its flow near the seat (armed[event + 4]): `kernels.self_acting_valves`.
 """
 
 from math import sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import CLOSING, RATE
-from fvsolve.kernels.event_pair import event_pair
 from fvsolve.kernels.restrictions import head_drop
-from fvsolve.kernels.valve_feedback import loop_rate
-from fvsolve.kernels.valve_seating import control_events, controls_column
+from fvsolve.kernels.self_acting_valves import control_events, controls_column, event_pair, loop_rate
 
 RELIEF, CHECK = 0, 1  # modes
 # indices into its numbers: lift, target and lifting pressure at the start, then the keys

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from fvsolve.assembly.device_lowering import Device, opening_of
-from fvsolve.kernels.valves import LEAST, flow_at_drop, flow_slope, transition_of
+from fvsolve.kernels.restrictions import LEAST, flow_at_drop, flow_slope, transition_of
 from fvsolve.parts.disc import law
 from fvsolve.steady import Edge
 

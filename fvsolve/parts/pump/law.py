@@ -11,9 +11,9 @@ from math import sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.devices import TEMPORARY
 from fvsolve.kernels.dtypes import RATE
-from fvsolve.kernels.event_pair import event_pair
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.schedule_pieces import schedule_value
+from fvsolve.kernels.self_acting_valves import event_pair
 from fvsolve.parts.check_valve.law import PRESSURE_MARGIN
 from fvsolve.parts.pump.law_curve import (
     COUNT,

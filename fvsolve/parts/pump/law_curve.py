@@ -14,7 +14,7 @@ zero at standstill: at x = pi/2 (already in the values of the table) and at x = 
 from math import atan2, pi, sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.valves import LEAST
+from fvsolve.kernels.restrictions import LEAST
 
 CHORD_CHANGE = 1e-9  # relative change of flow below which the tangent replaces the chord
 

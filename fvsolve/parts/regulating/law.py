@@ -10,11 +10,9 @@ from math import sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import RATE
-from fvsolve.kernels.event_pair import event_pair
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.schedule_pieces import schedule_value
-from fvsolve.kernels.valve_feedback import loop_rate
-from fvsolve.kernels.valve_seating import control_events, controls_column
+from fvsolve.kernels.self_acting_valves import control_events, controls_column, event_pair, loop_rate
 
 REDUCING, SUSTAINING, FLOW_CONTROL = 0, 1, 2  # modes
 OPENING, ERROR, SET, BAND, TIME = 0, 1, 2, 3, 4  # numbers of a device: three at the start, then its keys

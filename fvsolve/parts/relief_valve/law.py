@@ -8,9 +8,16 @@ armed[event + 2], it is fully open. Both change on accepted states only, so that
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.event_pair import event_pair
-from fvsolve.kernels.restrictions import is_lifted, root_slope, root_step
-from fvsolve.kernels.valves import LEAST, flow_at_drop, flow_slope, transition_of
+from fvsolve.kernels.restrictions import (
+    LEAST,
+    flow_at_drop,
+    flow_slope,
+    is_lifted,
+    root_slope,
+    root_step,
+    transition_of,
+)
+from fvsolve.kernels.self_acting_valves import event_pair
 
 RELUCTANCE = 1e-10  # margin of lift at events, so that rounding does not open the valve
 

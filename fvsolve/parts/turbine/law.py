@@ -10,8 +10,7 @@ from math import sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.devices import TEMPORARY
 from fvsolve.kernels.dtypes import JUNCTION, RATE
-from fvsolve.kernels.restrictions import head_drop
-from fvsolve.kernels.valves import valve_conductance
+from fvsolve.kernels.restrictions import head_drop, valve_conductance
 from fvsolve.parts.pump.law import (
     HELD_SPEED,
     INERTIA,

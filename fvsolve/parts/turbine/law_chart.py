@@ -11,7 +11,7 @@ tends to the torque behind shut vanes.
 from math import atan2, copysign, pi, sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.valves import LEAST
+from fvsolve.kernels.restrictions import LEAST
 
 LEAST_ROOT = 0.1  # least root in the weight of the torque of a ray; given points have greater roots
 CHORD_CHANGE = 1e-9  # relative change of flow below which the tangent replaces the chord

@@ -195,7 +195,7 @@ def energy_matrix(settings, n: int) -> np.ndarray:
 
     c : averages of the quantity over the cells; settings : settings of a model, which contain the scheme
     """
-    from fvsolve.kernels.linear_energy import GAUSS_WEIGHTS, POINTS, polynomial_width
+    from fvsolve.kernels.pipe_energy import GAUSS_WEIGHTS, POINTS, polynomial_width
 
     width = int(polynomial_width(settings, n))
     points = np.zeros((3 * n, n))

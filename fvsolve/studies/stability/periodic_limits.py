@@ -175,7 +175,7 @@ def _tables(scheme: str, limiter: str, cells: int) -> tuple:
 
 
 def _rhs():
-    from fvsolve.kernels.periodic_advection import rhs_periodic
+    from fvsolve.kernels.reconstruction import rhs_periodic
     from fvsolve.steppers.signatures import RHS, compiled_as
 
     return compiled_as(rhs_periodic, RHS)

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from fvsolve.kernels.unsteady_friction.relaxation_terms_barotropic import velocity_change
+from fvsolve.kernels.relaxation import velocity_change
 
 CELLS, SPEED, FLOW, REFERENCE = 7, 1100.0, 12.0, 31.0
-PIPE = {"speed": SPEED, "flow": FLOW, "center": 0}
+PIPE = {"speed": SPEED, "flow": FLOW, "center": 0, "area": 1.0}
 
 
 def changes(mass, forward, backward) -> np.ndarray:
     result = np.empty(CELLS)
-    velocity_change.py_func(PIPE, mass, REFERENCE, forward, backward, result)
+    velocity_change.py_func({"rho": REFERENCE}, None, mass, PIPE, forward, backward, result)
     return result
 
 

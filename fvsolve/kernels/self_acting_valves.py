@@ -1,18 +1,48 @@
-"""Valves near their seat that control the single rigid column connected to them.
+"""Common functions of self-acting valves and other switching parts: event functions, feedback of the pressure, seat.
 
-A disc controls its column from the time at which it leaves its seat; the stem of a regulating valve also before it
-reaches its seat. The flag is armed[event + 4], that of a stem armed[event + 6]. Control ends when the lift exceeds
-CONTROL_LIFT and a given step resolves the exchange between lift and flow: `kernels.column_valve_control`. A disc that
-moves to its seat may slam.
+A disc controls the single rigid column connected to it from the time at which it leaves its seat; the stem of a
+regulating valve also before it reaches its seat. The flag is armed[event + 4], that of a stem armed[event + 6]. Control
+ends when the lift exceeds CONTROL_LIFT and a given step resolves the exchange between lift and flow:
+`kernels.column_valve_control`. A disc that moves to its seat may slam.
 """
 
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.event_pair import event_pair
-from fvsolve.kernels.restrictions import head_drop
+from fvsolve.kernels.dtypes import JUNCTION
+from fvsolve.kernels.network_balance import node_impedance, stiffness_of
+from fvsolve.kernels.restrictions import head_drop, restriction_slope
 
 CONTROL_LIFT = 1e-4  # lift up to which a valve controls its column, at least
+TINY = 1e-300  # in place of a zero of an event function
+
+
+@njit(forceinline=True)
+def event_pair(tables, g, at, left):
+    """Write `left` and -`left` to g[at] and g[at + 1], the event functions of the switch between two rules.
+
+    left : distance to the end of the first rule, negative while it holds (armed[at] > 0) and positive while the second
+        rule holds. Zero becomes a tiny number beyond the end of the present rule, so that the switch takes place.
+    """
+    if left == 0.0:
+        left = TINY if tables.armed[at] > 0.0 else -TINY
+    g[at], g[at + 1] = left, -left
+
+
+@njit
+def loop_rate(out, tables, k, i, speed):
+    """Rate of the feedback loop [1/s] of restriction k, whose opening x follows the pressure at node i.
+
+    speed : rate dx/dt per fall of the pressure, dx/dt = -speed p' [1/s/Pa], p' : pressure change
+    The pressure follows the flow M: dM/dx = sqrt(G dP), with conductance G and drop dP, reduced because the drop falls
+    as the flow rises. The pressure of the node responds by its pipes or by its stored mass.
+    """
+    layout, valve = tables.layout[0], tables.valves[k]
+    drop = head_drop(tables, out, k)[1]
+    soft = node_impedance(tables, valve["from_node"]) + node_impedance(tables, valve["to_node"])
+    gain = speed * sqrt(valve["conductance"] * abs(drop)) / (1.0 + soft * restriction_slope(tables, out, k, drop))
+    stiff = stiffness_of(tables.nodes, layout, out, i) if tables.nodes[i]["kind"] != JUNCTION else 0.0
+    return max(gain * node_impedance(tables, i), sqrt(gain * stiff))
 
 
 @njit

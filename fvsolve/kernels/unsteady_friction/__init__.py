@@ -1,1 +1,0 @@
-"""Unsteady friction; imported and compiled only for models that use it."""

@@ -1,1 +1,0 @@
-"""Viscoelastic pipe walls; imported and compiled only for models that contain them."""
