@@ -11,7 +11,7 @@ from reference.scenes import AMBIENT, WATER, reservoir, scene
 from fvsolve import run
 from fvsolve.case.load import load
 from fvsolve.errors import CaseError
-from fvsolve.exact.schedule_values import value
+from fvsolve.exact.solution import value
 from fvsolve.kernels.schedule_pieces import piece_slopes, piece_value
 from fvsolve.model.schedule_tables import Schedules
 from fvsolve.parts.schedule import Schedule
