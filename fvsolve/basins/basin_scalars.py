@@ -123,17 +123,17 @@ def flow_factor(t, basin):
 
 
 @njit(forceinline=True)
-def depths_of(tables, basin):
-    """Depths of the cells of a basin that `prepare_scalars` computes; empty for a basin without depth."""
+def depth_range(basin):
+    """(first, last + 1) in `tables.work` of the depths that `prepare_scalars` computes; empty without depth."""
     first = basin["scalar_work"]
-    return tables.work[first : first + (basin["n"] if basin["deep"] == 1 else 0)]
+    return first, first + (basin["n"] if basin["deep"] == 1 else 0)
 
 
 @njit(forceinline=True)
-def outside_values(tables, basin, q):
-    """Values of scalar q beyond all boundary faces of a basin."""
+def outside_range(basin, q):
+    """(first, last + 1) in `tables.work` of the values of scalar q beyond all boundary faces of a basin."""
     first = basin["outside"] + q * basin["outer"]
-    return tables.work[first : first + basin["outer"]]
+    return first, first + basin["outer"]
 
 
 @njit(forceinline=True)
@@ -148,7 +148,8 @@ def grid_arrays(tables, b):
     basin = tables.basins[b]
     plane, nx, ny, k = tables.plane, basin["nx"], basin["ny"], basin["spacing"]
     grid = Grid(nx, ny, tables.bands[2 * b], tables.bands[2 * b + 1], plane[k : k + nx], plane[k + nx : k + nx + ny])
-    return grid, depths_of(tables, basin), tables.work[basin["scalar_work"] + basin["n"] :]
+    first, last = depth_range(basin)
+    return grid, tables.work[first:last], tables.work[basin["scalar_work"] + basin["n"] :]
 
 
 @njit(forceinline=True)
@@ -157,8 +158,9 @@ def grid_flows(t, tables, basin, q):
     nx, ny, f = basin["nx"], basin["ny"], basin["flows"]
     flows = tables.plane if has_given_flows(basin) else tables.work
     across = f + ny * (nx + 1)
-    outside = outside_values(tables, basin, q)
-    return GridFlows(flow_factor(t, basin), flows[f:across], flows[across : across + (ny + 1) * nx], outside)
+    first, last = outside_range(basin, q)
+    flow_y, outside = flows[across : across + (ny + 1) * nx], tables.work[first:last]
+    return GridFlows(flow_factor(t, basin), flows[f:across], flow_y, outside)
 
 
 @njit
@@ -271,12 +273,14 @@ def advect_on_meshes(t, y, dydt, out, handle):
         n, through = basin["n"], tables.plane if has_given_flows(basin) else tables.work
         prepare_scalars(t, tables, b, y)
         seen, factor = deviations_of(basin, tables.seen, y), flow_factor(t, basin)
-        depth, work = depths_of(tables, basin), tables.work[basin["scalar_work"] + n :]
+        first, last = depth_range(basin)
+        depth, work = tables.work[first:last], tables.work[basin["scalar_work"] + n :]
         mesh = tables.plane[basin["mesh"] :], tables.integers[basin["links"] :]
         for q in range(scalars.size):
             at, bounds = basin["carried"] + q * n, (scalars[q]["least"], scalars[q]["greatest"])
             flow = through[basin["flows"] : basin["flows"] + basin["faces"]]
-            flows = MeshFlows(factor, flow, outside_values(tables, basin, q))
+            first, last = outside_range(basin, q)
+            flows = MeshFlows(factor, flow, tables.work[first:last])
             quickest = advection_rates(
                 basin["scheme"], basin["wide"], scalars[q]["diffusivity"], mesh, flows, depth, bounds,
                 seen[at : at + n], work, dydt[at : at + n],
@@ -312,7 +316,8 @@ def add_decay(tables, basin, q, per, s, rate, out):
 
     per : factor from amounts per area to mass per area: density [kg/m3], or density times thickness [kg/m2] for depth 1
     """
-    scalar, depth = tables.scalars[q], depths_of(tables, basin)
+    scalar, (first, last) = tables.scalars[q], depth_range(basin)
+    depth = tables.work[first:last]
     decay, ambient, area = scalar["decay"], scalar["ambient"], tables.plane[basin["area"] : basin["area"] + s.size]
     for i in range(s.size):
         cell_depth = depth[i] if depth.size > 0 else 1.0
@@ -328,7 +333,8 @@ def record_boundary(t, tables, b, q, per, rate, out):
     at the patch with the greatest outflow.
     """
     plane, patches, nodes, basin = tables.plane, tables.patches, tables.nodes.size, tables.basins[b]
-    factor, outside = flow_factor(t, basin), outside_values(tables, basin, q)
+    factor, (begin, end) = flow_factor(t, basin), outside_range(basin, q)
+    outside = tables.work[begin:end]
     flows = plane if has_given_flows(basin) else tables.work
     first, total = tables.layout[0]["gain"] + q * nodes, 0.0
     for i in range(basin["n"]):
