@@ -61,7 +61,7 @@ FAULTS = [
         "assembly/hydraulics.py", "reynolds * math.pi / 4.0 * diameter", "1.01 * reynolds * math.pi / 4.0 * diameter"
     ),
     Fault("draw/plot.py", "np.argmin(values[a:b])", "np.argmax(values[a:b])"),
-    Fault("mesh/mesh_quality.py", "angle=float(angle[sharpest])", "angle=float(1.01 * angle[sharpest])"),
+    Fault("mesh/mesh.py", "angle=float(angle[sharpest])", "angle=float(1.01 * angle[sharpest])"),
     Fault("steppers/ros.py", "1.0 / (later - t) if later > t", "-1.0 / (later - t) if later > t"),
     Fault("steppers/analysis/trees.py", "return nodes * math.prod(", "return (nodes + 1) * math.prod("),
     Fault("steppers/numbers/sturm.py", "x - ratio * y for x, y", "x + ratio * y for x, y"),
@@ -123,14 +123,14 @@ FAULTS = [
     Fault(
         "cli/models_output.py", "gain = richest.seconds / cheapest.seconds", "gain = cheapest.seconds / richest.seconds"
     ),
-    Fault("basins/frame_reaction.py", "spin + f1 - p1 * z", "spin + f1 + p1 * z"),
+    Fault("basins/frame_forces.py", "spin + f1 - p1 * z", "spin + f1 + p1 * z"),
     Fault(
         "basins/liquid/liquid_mesh.py",
         "m, pressure = forward - backward, c0 * (forward + backward)\n        mass",
         "m, pressure = forward - backward, 1.01 * c0 * (forward + backward)\n        mass",
     ),
     Fault(
-        "basins/transport/lower_velocity.py",
+        "basins/transport/lower.py",
         "return speed * size / np.pi * np.sin(x) ** 2",
         "return 1.01 * speed * size / np.pi * np.sin(x) ** 2",
     ),

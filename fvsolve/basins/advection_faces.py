@@ -13,51 +13,59 @@ face, the mean of the gradients of both cells gives the oblique part: this is of
 Diffusion has no flux through walls and where the flow leaves. Where a given velocity enters, the value outside holds at
 the face.
 
-c, d : values and depths of the cells of a block; w : scratch of a block, float64[ROWS BLOCK]; geo, far : first and last
-group of measures of sides in `floats`, see `cell_sides`.
+Arguments: mesh : (floats, integers), see `cell_sides`; c, d : values and depths of the cells of a block; w : scratch of
+a block, float64[ROWS BLOCK]; geo, far : first and last group of measures of sides; bounds : (least, most) value,
+infinite for none; wide_by : factor on the range of the neighbours that limits values at sides (with 1 they stay within
+that range), 0 for upwind.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
-from fvsolve.basins.cell_sides import (
-    BLOCK,
-    CELL,
-    DISTANCES,
-    HEAD,
-    INDICES,
-    MEASURES,
-    OBLIQUE_X,
-    OBLIQUE_Y,
-    PER_AREA,
-    PER_DISTANCE,
-    REACH,
-    SIDE,
-    TINY,
-    WX,
-    WY,
-    blocks,
-    edges_before,
-    gather,
-    limited_sides,
-    ring_place,
-)
+from fvsolve.basins import cell_sides as side
+from fvsolve.basins.advection import THIN
+from fvsolve.basins.cell_sides import BLOCK, HEAD, INDICES, MEASURES, TINY, edges_before, gather, side_numbers
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import UPWIND
-
-THIN = 1e-6  # depth below which values fade to zero [m]
 
 # Rows of BLOCK in the scratch of a block: four for `limited_sides`, also used for value, depth and gradients beyond;
 # then value beyond the side, outward flow, rate, divergence, sum for the step.
 _DEPTH, _GX, _GY, _VALUE, _FLOW, _RATE, _DIVERGENCE, _OUTFLOW, _TOP, _FREE = (k * BLOCK for k in range(1, 11))
-_REACH, _WX, _WY, _PER_DISTANCE, _OBLIQUE_X, _OBLIQUE_Y = (
-    REACH * BLOCK,
-    WX * BLOCK,
-    WY * BLOCK,
-    PER_DISTANCE * BLOCK,
-    OBLIQUE_X * BLOCK,
-    OBLIQUE_Y * BLOCK,
-)
+_REACH, _WX, _WY = side.REACH * BLOCK, side.WX * BLOCK, side.WY * BLOCK
+_PER_AREA, _PER_DISTANCE = side.PER_AREA * BLOCK, side.PER_DISTANCE * BLOCK
+_OBLIQUE_X, _OBLIQUE_Y = side.OBLIQUE_X * BLOCK, side.OBLIQUE_Y * BLOCK
 ROWS = 11
+
+
+class MeshFlows(NamedTuple):
+    """Flows through the faces of a mesh, all times `factor`, and values of the inflow at boundary faces.
+
+    through : float64[faces]  flows from the left to the right cell: velocity [m/s] times length [m2/s], and also times
+    the depth [m3/s] if the array of depths is not empty
+    outside : float64[boundary faces]
+    """
+
+    factor: float
+    through: np.ndarray
+    outside: np.ndarray
+
+
+class MeshValues(NamedTuple):
+    """Temporary values in the ring of blocks that `cell_sides` describes.
+
+    c, d, gx, gy : values, depths and gradients of cells; at_sides : values at their sides
+    beyond : float64[2 b]  values beyond the boundary sides, for the limiter, then for gradients
+    w : scratch of a block
+    """
+
+    c: np.ndarray
+    d: np.ndarray
+    gx: np.ndarray
+    gy: np.ndarray
+    at_sides: np.ndarray
+    beyond: np.ndarray
+    w: np.ndarray
 
 
 @njit
@@ -75,20 +83,19 @@ def put_values(s, depth, c, d):
 
 
 @njit
-def put_gradients(j, floats, integers, values, shown, edges, w, gx, gy):
-    """Write the least-squares gradients gx, gy of the values in block j of cells.
+def put_gradients(j, mesh, edges, shown, values):
+    """Write the least-squares gradients of the values in block j of cells to the ring of `values` (`MeshValues`).
 
-    floats, integers : mesh, see `cell_sides`
-    values, gx, gy : float64[ring BLOCK], stored in the ring of blocks that `cell_sides` describes
-    edges : numbers of the boundary sides of the block; shown : values beyond them; w : float64[BLOCK]  scratch
+    edges : numbers of the boundary sides of the block; shown : values beyond them
     """
+    floats, integers = mesh
     slots, at, places = integers[0], j % integers[4] * BLOCK, integers[HEAD:].view(np.int32)
-    c, gx, gy = values[at:], gx[at:], gy[at:]
+    c, gx, gy, w = values.c[at:], values.gx[at:], values.gy[at:], values.w
     for i in range(BLOCK):
         gx[i], gy[i] = 0.0, 0.0
     for k in range(slots):
         slot = j * slots + k
-        gather(values, places[(slot * INDICES + CELL) * BLOCK :], w)
+        gather(values.c, places[(slot * INDICES + side.CELL) * BLOCK :], w)
         for q in range(edges.size):
             if edges[q] // BLOCK == 4 * j + k:
                 w[edges[q] % BLOCK] = shown[q]
@@ -127,12 +134,10 @@ def add_advection(count, c, d, cl, far, w):
 
     Only the outflow of the difference between the value at the side and the cell value c is subtracted; `put_rates`
     subtracts that of c for all sides. The flows, the values beyond the side and sums over the sides are in w too.
-    c, d : values and depths of the cells; cl : values at the side inside the cells
-    far : last group of measures of the side in `floats`, see `cell_sides`
-    count : factor on the outflow in the rate that limits the step
+    cl : values at the side inside the cells; count : factor on the outflow in the rate that limits the step
     """
     for i in range(BLOCK):
-        q = far[PER_AREA * BLOCK + i] * w[_FLOW + i]
+        q = far[_PER_AREA + i] * w[_FLOW + i]
         w[_RATE + i] -= q * ((cl[i] if q > 0.0 else w[_VALUE + i]) - c[i])
         w[_DIVERGENCE + i] += q
         w[_OUTFLOW + i] += count * max(q, 0.0) / max(d[i], THIN)
@@ -142,9 +147,7 @@ def add_advection(count, c, d, cl, far, w):
 def add_diffusion(diffusivity, c, d, gx, gy, geo, far, w):
     """Add the inflow by diffusion through one side of each cell of a block to the rates in the scratch w.
 
-    c, d, gx, gy : values, depths and gradients of the cells; those of the cells beyond the side are in w
-    geo, far : first and last group of measures of the side in `floats`, see `cell_sides`
-    diffusivity : [m2/s]
+    gx, gy : gradients of the cells; values, depths and gradients of the cells beyond the side are in w
     """
     for i in range(BLOCK):
         a, b = d[i], w[_DEPTH + i]
@@ -165,7 +168,7 @@ def clear(w):
 def put_rates(c, w, rate):
     """Write the rates of a block of cells to `rate` from the scratch w, and update the greatest outflow rate in w.
 
-    The part c times the divergence of the flow, which `add_advection` leaves out, is subtracted here. c : cell values
+    The part c times the divergence of the flow, which `add_advection` leaves out, is subtracted here.
     """
     for i in range(BLOCK):
         w[_TOP + i] = max(w[_TOP + i], w[_OUTFLOW + i])
@@ -179,85 +182,110 @@ def work_size(integers):
 
 
 @njit
-def advection_rates(
-    scheme, wide_by, diffusivity, factor, floats, integers, flow, depth, outside, least, most, s, work, rate
-):
+def mesh_values(integers, limited, work):
+    """`MeshValues` in a work array; without `limited` the values at sides are those of the cells."""
+    near, b = integers[4] * BLOCK, integers[3]
+    c, sides, rest = work[:near], work[4 * near : 8 * near], work[8 * near :]
+    at_sides = sides if limited else c
+    return MeshValues(
+        c, work[near : 2 * near], work[2 * near : 3 * near], work[3 * near : 4 * near], at_sides, rest[: 2 * b],
+        rest[2 * b :],
+    )  # fmt: skip
+
+
+@njit
+def put_sides(j, first, last, wide_by, diffuses, mesh, flows, depth, bounds, values):
+    """Write the values at the sides of block j and, for diffusion, its gradients to the ring of `values`.
+
+    first, last : its boundary sides are the entries first to last - 1 of the list of boundary sides
+    """
+    floats, integers = mesh
+    f, b, ring = integers[2], integers[3], integers[4]
+    _, edges, number, _ = side_numbers(integers)
+    shown, free, here = values.beyond, values.w[_FREE:], edges[first:last]
+    for q in range(first, last):
+        value, face = values.c[side.ring_place(edges[q], ring)], f - b + number[q]
+        enters = flows.factor * flows.through[face] < 0.0
+        shown[q] = flows.outside[number[q]] if enters else value
+        shown[b + q] = 2.0 * shown[q] - value if depth.size == 0 else value
+    if wide_by > 0.0:
+        put_allowed(values.c[j % ring * BLOCK :], bounds[0], bounds[1], free)
+        side.limited_sides(
+            j, floats, integers, values.c, wide_by, free, shown[first:], here, values.w, values.at_sides
+        )  # fmt: skip
+    if diffuses:
+        put_gradients(j, mesh, here, shown[b + first :], values)
+
+
+@njit
+def put_block_rates(j, edge, limited, diffusivity, mesh, flows, values, rate):
+    """Write the rates of block j of cells; return the number of boundary sides of the blocks up to j.
+
+    edge : number of boundary sides of the blocks before j
+    """
+    floats, integers = mesh
+    slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]
+    _, edges, number, faces = side_numbers(integers)
+    places, w = integers[HEAD:].view(np.int32), values.w
+    distances = floats[MEASURES * side.blocks(integers) * slots * BLOCK + 2 * b + f :]
+    first, last, o = j * BLOCK, min((j + 1) * BLOCK, n), (j % ring) * BLOCK
+    c, d, gx, gy, at_sides = values.c, values.d, values.gx, values.gy, values.at_sides
+    clear(w)
+    for k in range(slots):
+        slot = j * slots + k
+        where, geo = places[slot * INDICES * BLOCK :], floats[slot * MEASURES * BLOCK :]
+        far, own = distances[slot * side.DISTANCES * BLOCK :], 4 * o + k * BLOCK if limited else o
+        gather(at_sides, where[side.SIDE * BLOCK :] if limited else where, w[_VALUE:])
+        gather_flows(faces[slot * BLOCK :], flows.factor, flows.through, w[_FLOW:])
+        i, edge = edge, edges_before(edges, edge, (4 * j + k + 1) * BLOCK)
+        for q in range(i, edge):
+            w[_VALUE + edges[q] % BLOCK] = flows.outside[number[q]]
+        add_advection(2.0 if limited else 1.0, c[o:], d[o:], at_sides[own:], far, w)
+        if diffusivity > 0.0:
+            gather(c, where, w)
+            gather(d, where, w[_DEPTH:])
+            gather(gx, where, w[_GX:])
+            gather(gy, where, w[_GY:])
+            for q in range(i, edge):
+                w[edges[q] % BLOCK] = values.beyond[b + q]
+            add_diffusion(diffusivity, c[o:], d[o:], gx[o:], gy[o:], geo, far, w)
+    put_rates(c[o:], w, rate[first:last])
+    return edge
+
+
+@njit
+def advection_rates(scheme, wide_by, diffusivity, mesh, flows, depth, bounds, s, work, rate):
     """Write the rates of the amounts `s` of a scalar; return the inverse of the Euler step that keeps bounds [1/s].
 
     The returned rate is the greatest fraction of a cell that leaves it per time, for `muscl` twice that, and more with
     diffusion.
 
-    scheme : UPWIND or MUSCL; wide_by : factor on the range of the neighbours that limits values at sides; with 1 they
-    stay within that range
-    diffusivity : [m2/s], 0 without diffusion; factor : factor on all flows
-    floats, integers : mesh, see `cell_sides`; least, most : bounds of c, infinite for none
-    flow : float64[faces]  flows through faces, from the left to the right cell: velocity [m/s] times length [m2/s], and
-    also times the depth [m3/s] if `depth` is not empty
+    scheme : UPWIND or MUSCL; wide_by : factor on the range of the neighbours, above 0
+    diffusivity : [m2/s], 0 without diffusion
     depth : float64[cells]  depths [m]; empty if s contains the values c themselves
-    outside : float64[boundary faces]  values of the inflow; s, rate : float64[cells]  amounts per area, and their rates
-    work : float64[work_size(integers)]
+    s, rate : float64[cells]  amounts per area, and their rates; work : float64[work_size(integers)]
     """
-    slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]
-    count, limited, diffuses = blocks(integers), scheme != UPWIND, diffusivity > 0.0
-    m = count * slots * BLOCK
-    at, to = HEAD + INDICES * m // 2, MEASURES * m + 2 * b + f
-    need, edges, number = integers[at : at + count], integers[at + count :][:b], integers[at + count + b :][:b]
-    faces, distances = integers[at + count + 2 * b :], floats[to:]
-    places = integers[HEAD:].view(np.int32)
-    near, wide = ring * BLOCK, 4 * ring * BLOCK
-    c, d, gx, gy = work[:near], work[near : 2 * near], work[2 * near : 3 * near], work[3 * near : 4 * near]
-    cs = work[4 * near : 4 * near + wide] if limited else c
-    shown, w = work[4 * near + wide :][: 2 * b], work[4 * near + wide + 2 * b :]
-    free = w[_FREE:]
+    integers = mesh[1]
+    n, ring = integers[1], integers[4]
+    limited, diffuses = scheme != UPWIND, diffusivity > 0.0
+    wide_by = wide_by if limited else 0.0
+    need, edges, _, _ = side_numbers(integers)
+    values = mesh_values(integers, limited, work)
+    c, d, w = values.c, values.d, values.w
     for i in range(BLOCK):
         w[_TOP + i] = 0.0
-    twice = 2.0 if limited else 1.0
-    cells_done, sides_done, wall, edge = (
-        0,
-        0,
-        0,
-        0,
-    )  # blocks with computed cells and sides; boundary sides done in both loops
-    for j in range(count):
+    cells_done, sides_done = 0, 0  # blocks with computed cells and sides
+    wall, edge = 0, 0  # boundary sides done in both loops
+    for j in range(need.size):
         while sides_done < need[j]:
             while cells_done < need[sides_done]:
                 i, k, o = cells_done * BLOCK, min((cells_done + 1) * BLOCK, n), (cells_done % ring) * BLOCK
                 put_values(s[i:k], depth[i:k], c[o:], d[o:])
                 cells_done += 1
             k, wall = wall, edges_before(edges, wall, 4 * (sides_done + 1) * BLOCK)
-            here, bounds, ends = edges[k:wall], shown[k:], shown[b + k :]
-            for q in range(k, wall):
-                value, face = c[ring_place(edges[q], ring)], f - b + number[q]
-                enters = factor * flow[face] < 0.0
-                shown[q] = outside[number[q]] if enters else value
-                shown[b + q] = 2.0 * shown[q] - value if depth.size == 0 else value
-            if limited:
-                put_allowed(c[sides_done % ring * BLOCK :], least, most, free)
-                limited_sides(sides_done, floats, integers, c, wide_by, free, bounds, here, w, cs)
-            if diffuses:
-                put_gradients(sides_done, floats, integers, c, ends, here, w, gx, gy)
+            put_sides(sides_done, k, wall, wide_by, diffuses, mesh, flows, depth, bounds, values)
             sides_done += 1
-        clear(w)
-        first, last, o = j * BLOCK, min((j + 1) * BLOCK, n), (j % ring) * BLOCK
-        for k in range(slots):
-            slot = j * slots + k
-            where, geo = places[slot * INDICES * BLOCK :], floats[slot * MEASURES * BLOCK :]
-            far, own = distances[slot * DISTANCES * BLOCK :], 4 * o + k * BLOCK if limited else o
-            gather(cs, where[SIDE * BLOCK :] if limited else where, w[_VALUE:])
-            gather_flows(faces[slot * BLOCK :], factor, flow, w[_FLOW:])
-            i, edge = edge, edges_before(edges, edge, (4 * j + k + 1) * BLOCK)
-            for q in range(i, edge):
-                w[_VALUE + edges[q] % BLOCK] = outside[number[q]]
-            add_advection(twice, c[o:], d[o:], cs[own:], far, w)
-            if diffuses:
-                gather(c, where, w)
-                gather(d, where, w[_DEPTH:])
-                gather(gx, where, w[_GX:])
-                gather(gy, where, w[_GY:])
-                for q in range(i, edge):
-                    w[edges[q] % BLOCK] = shown[b + q]
-                add_diffusion(diffusivity, c[o:], d[o:], gx[o:], gy[o:], geo, far, w)
-        put_rates(c[o:], w, rate[first:last])
+        edge = put_block_rates(j, edge, limited, diffusivity, mesh, flows, values, rate)
     max_rate = 0.0
     for i in range(BLOCK):
         max_rate = max(max_rate, w[_TOP + i])

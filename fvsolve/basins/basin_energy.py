@@ -3,8 +3,8 @@
 The last entries of the array `power` belong to basins, five for each basin [W]: power of the inflow through patches at
 their potential p - p_ambient + rho g z, and of moving walls and bodies; loss at patches (inflow has no kinetic energy,
 and the potential does not include that of outflow); friction; rate of storage; on a body, power that the model of the
-water dissipates (`frame_energy`). An entry of `stored` for each basin contains its energy minus that at rest [J]; on a
-body see `frame_energy.add_stored`. Each type of basin writes the entries that are not zero for it. Kinetic energy is
+water dissipates (`frame_forces`). An entry of `stored` for each basin contains its energy minus that at rest [J]; on a
+body see `frame_forces.add_stored`. Each type of basin writes the entries that are not zero for it. Kinetic energy is
 computed from squares of cell means.
 """
 

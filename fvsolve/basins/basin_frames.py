@@ -23,15 +23,12 @@ from fvsolve.kernels.table_handle import open_tables
 # Places of the numbers of a frame in `plane`, from the offset basin["frame"].
 ORIGIN, AXES = 0, 3  # position of the origin and rotation matrix (by rows) in the axes of the body
 GX, GY, _, WX, WY, WZ, AX, AY, AZ = range(12, 21)  # G, g_n (GN of the kernels), W and dW/dt in the axes of the basin
-REST_SURFACE = (
-    21  # offset in `plane` of the undisturbed surface above the level at rest [m]: 0, or a bed above that level
-)
+REST_SURFACE = 21  # offset in `plane` of the undisturbed surface above the level at rest [m]: 0, or a bed above it
 CELL_POSITIONS = 22  # offset in `plane` of the positions of columns and rows of a grid, or of cells
 FRAME_GRAVITY = 23  # gravity alone, three numbers
 REST_LEVEL = 26  # level of the water at rest above the origin [m]
-POTENTIALS = (
-    27  # liquid: offset in `work` of potentials; positions of grid lines or of sides of cells follow those at PLACES
-)
+# liquid: offset in `work` of potentials; positions of grid lines or of sides of cells follow those of the cells
+POTENTIALS = 27
 FRAME_SIZE = 28  # number of numbers
 
 
@@ -78,7 +75,8 @@ def set_frame(tables, basin, out):
     cx, cy, cz = cross(out, row + SPIN, vx, vy, vz)
     b, s, e = row + BIAS, row + SPIN, row + SPIN_BIAS
     gx, gy = -(out[b] + ex + cx), -(out[b + 1] + ey + cy)
-    gz = -tables.settings[0]["gravity"] - (out[b + 2] + ez + cz)
+    weight = -tables.settings[0]["gravity"]
+    gz = weight - (out[b + 2] + ez + cz)
     axes = at + AXES
     plane[at + GX] = frame_component(out, row, plane, axes, 0, gx, gy, gz)
     plane[at + GY] = frame_component(out, row, plane, axes, 1, gx, gy, gz)
@@ -86,9 +84,7 @@ def set_frame(tables, basin, out):
     for k in range(3):
         plane[at + WX + k] = frame_component(out, row, plane, axes, k, out[s], out[s + 1], out[s + 2])
         plane[at + AX + k] = frame_component(out, row, plane, axes, k, out[e], out[e + 1], out[e + 2])
-        plane[at + FRAME_GRAVITY + k] = frame_component(
-            out, row, plane, axes, k, 0.0, 0.0, -tables.settings[0]["gravity"]
-        )
+        plane[at + FRAME_GRAVITY + k] = frame_component(out, row, plane, axes, k, 0.0, 0.0, weight)
 
 
 @njit(forceinline=True)
@@ -117,10 +113,7 @@ def tilt_bed(plane, basin):
 
 @njit
 def add_potential(plane, basin, per, values, lifted):
-    """Write values of all cells of a basin plus `per` times the potential of its frame [J/kg] to `lifted`.
-
-    values, lifted : float64[n]
-    """
+    """Write values of all cells of a basin plus `per` times the potential of its frame [J/kg] to `lifted`."""
     n, nx, at = basin["n"], basin["nx"], int(plane[basin["frame"] + CELL_POSITIONS])
     phi = potential_coefficients(plane, basin["frame"], per)
     if nx == 0:
@@ -143,10 +136,7 @@ def add_potential_points(phi, x, y, values, lifted):
 
 @njit
 def add_potential_rows(phi, x, y, values, lifted):
-    """Write values plus the potential at the cells of a grid with columns at x and rows at y to `lifted`.
-
-    phi, values : as for `add_potential_points`
-    """
+    """Write values (or None) plus the potential at the cells of a grid with columns at x and rows at y to `lifted`."""
     fx, fy, xx, xy, yy = phi
     for j in range(y.size):
         a, z = j * x.size, (j + 1) * x.size

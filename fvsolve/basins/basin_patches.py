@@ -2,6 +2,7 @@
 
 from fvsolve.basins.boundary_cells import patch_inflow
 from fvsolve.jit import njit
+from fvsolve.kernels import band_exchange
 from fvsolve.kernels.dtypes import GN
 from fvsolve.kernels.table_handle import open_tables
 
@@ -31,6 +32,20 @@ def put_open_flows(tables, b, per, out):
     for k in range(patches.size):
         if patches[k]["basin"] == b and patches[k]["open"] == 1:
             out[tables.layout[0]["supply"] + patches[k]["node"]] = per * patch_inflow(tables, patches[k])
+
+
+@njit
+def put_boundary_flows(t, y, dydt, out, handle):
+    """Write the flows through open patches again, after all bands have computed their fluxes.
+
+    Basins with a given velocity are left out, as their flows are not computed.
+    """
+    tables = open_tables(handle)
+    band_exchange.get_runs(tables.joint, band_exchange.SEND_FLOWS, tables.work)
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
+        if basin["given"] == 0 and basin["through"] >= 0:
+            put_open_flows(tables, b, tables.settings[0]["rho"] if basin["deep"] == 1 else basin["thickness"], out)
 
 
 @njit

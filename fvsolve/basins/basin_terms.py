@@ -27,26 +27,19 @@ FRAME_FORCES = RhsTerms(
     package=PACKAGE,
     boundary_inflow="frame_forces: add_frame_forces",
     fluid_response="frame_forces: correct_for_bodies",
-    power="frame_energy: add_power",
-    stored="frame_energy: add_stored",
+    power="frame_forces: add_power",
+    stored="frame_forces: add_stored",
 )
 PATCH_VALUES = RhsTerms(
     package=PACKAGE, outlet_values="basin_scalars: patch_values", observe="basin_scalars: observe_values"
 )
-GRIDS = RhsTerms(package=PACKAGE, scalar_rates="grid_scalars: advect_on_grids")
-FIFTH = RhsTerms(package=PACKAGE, scalar_rates="grid_scalars: add_fifth_order_on_grids")
-DIFFUSION = RhsTerms(package=PACKAGE, scalar_rates="grid_scalars: diffuse_on_grids")
-MESHES = RhsTerms(package=PACKAGE, scalar_rates="mesh_scalars: advect_on_meshes")
+GRIDS = RhsTerms(package=PACKAGE, scalar_rates="basin_scalars: advect_on_grids")
+FIFTH = RhsTerms(package=PACKAGE, scalar_rates="basin_scalars: add_fifth_order_on_grids")
+DIFFUSION = RhsTerms(package=PACKAGE, scalar_rates="basin_scalars: diffuse_on_grids")
+MESHES = RhsTerms(package=PACKAGE, scalar_rates="basin_scalars: advect_on_meshes")
 SOURCES = RhsTerms(package=PACKAGE, scalar_rates="basin_scalars: add_sources")
-SCALAR_TERMS = (
-    PATCH_VALUES,
-    MIXED,
-    GRIDS,
-    FIFTH,
-    DIFFUSION,
-    MESHES,
-    SOURCES,
-)  # in the order in which they run within a phase
+# in the order in which they run within a phase
+SCALAR_TERMS = (PATCH_VALUES, MIXED, GRIDS, FIFTH, DIFFUSION, MESHES, SOURCES)
 
 
 def terms_of_basins(basins: list, valves: bool) -> tuple[RhsTerms, ...]:

@@ -1,9 +1,13 @@
-"""Cells of basins next to a patch, and their weights in the flow through the patch."""
+"""Cells of basins next to a patch, with their weights in the flow through the patch, and cells of bands of rows.
+
+A band is a range of rows of cells that one thread steps.
+"""
 
 from fvsolve.jit import njit
 
 SHALLOW = 1e-3  # depth at a patch below which only a fraction of the demanded outflow can leave [m]
 LEAST_DEPTH = 1e-9  # volume at a patch over its area below which its surface tends to the lowest bed [m]
+BAND_MARGIN = 5  # rows beyond a band that its rates read: three, or the five of the boundary closure of a liquid
 
 
 @njit
@@ -83,3 +87,18 @@ def patch_inflow(tables, patch):
     for m in range(patch["faces"]):
         total += flows[basin["through"] + tables.integers[patch["ring"] + m]]
     return total
+
+
+@njit(forceinline=True)
+def band_cells(tables, b):
+    """(first, last + 1) of the cells of basin b in the band of this thread."""
+    wide = max(tables.basins[b]["nx"], 1)
+    return wide * tables.bands[2 * b], wide * tables.bands[2 * b + 1]
+
+
+@njit(forceinline=True)
+def stencil_cells(tables, b):
+    """(first, last + 1) of the cells of basin b whose values the rates in the band of this thread read."""
+    basin = tables.basins[b]
+    begin, stop = max(tables.bands[2 * b] - BAND_MARGIN, 0), min(tables.bands[2 * b + 1] + BAND_MARGIN, basin["ny"])
+    return (basin["nx"] * begin, basin["nx"] * stop) if basin["nx"] > 0 else (0, basin["n"])

@@ -46,12 +46,18 @@ def blocks(integers):
     return (integers[1] + BLOCK - 1) // BLOCK
 
 
+@njit(forceinline=True)
+def side_numbers(integers):
+    """(need of blocks, boundary sides, numbers of their boundary faces, faces of all sides) of a mesh: four arrays."""
+    count, b = blocks(integers), integers[3]
+    at = HEAD + INDICES * count * integers[0] * BLOCK // 2
+    edges = integers[at + count :]
+    return integers[at : at + count], edges[:b], edges[b : 2 * b], edges[2 * b :]
+
+
 @njit
 def edges_before(edges, first, side):
-    """Index of the first entry of `edges`, from index `first` on, that is at least `side`.
-
-    edges : numbers of boundary sides, ascending
-    """
+    """Index of the first entry of the ascending array `edges`, from index `first` on, that is at least `side`."""
     while first < edges.size and edges[first] < side:
         first += 1
     return first
@@ -59,10 +65,7 @@ def edges_before(edges, first, side):
 
 @njit
 def ring_place(side, ring):
-    """Place in the ring of blocks (see `cell_sides`) of the cell with the boundary side number `side`.
-
-    ring : number of blocks in the ring
-    """
+    """Place in the ring of `ring` blocks (see `cell_sides`) of the cell with the boundary side number `side`."""
     return (side // (4 * BLOCK)) % ring * BLOCK + side % BLOCK
 
 
@@ -77,7 +80,7 @@ def gather(values, where, out):
 def put_inward(edges, number, flux, length, through):
     """Write the inward flows through boundary sides of a block that have the same side number k in their cells.
 
-    edges, number : these boundary sides, and the numbers of their boundary faces, see `cell_sides`
+    edges, number : these boundary sides, and the numbers of their boundary faces
     flux : outward flux through side k of each cell of the block; length : lengths of all boundary faces [m]
     through : inward flows through all boundary faces
     """
@@ -126,12 +129,10 @@ def limit_four_sides(p, wide, cap, beyond, geo, out):
         here = p[i]
         a, b = beyond[i] - here, beyond[BLOCK + i] - here
         c, d = beyond[2 * BLOCK + i] - here, beyond[3 * BLOCK + i] - here
-        gx = (geo[_WX + i] * a + geo[2 * _SIDE + _WX + i] * c) + (
-            geo[_SIDE + _WX + i] * b + geo[3 * _SIDE + _WX + i] * d
-        )
-        gy = (geo[_WY + i] * a + geo[2 * _SIDE + _WY + i] * c) + (
-            geo[_SIDE + _WY + i] * b + geo[3 * _SIDE + _WY + i] * d
-        )
+        gx = geo[_WX + i] * a + geo[2 * _SIDE + _WX + i] * c
+        gx += geo[_SIDE + _WX + i] * b + geo[3 * _SIDE + _WX + i] * d
+        gy = geo[_WY + i] * a + geo[2 * _SIDE + _WY + i] * c
+        gy += geo[_SIDE + _WY + i] * b + geo[3 * _SIDE + _WY + i] * d
         r = gx * geo[_DX + i] + gy * geo[_DY + i]
         s = gx * geo[_SIDE + _DX + i] + gy * geo[_SIDE + _DY + i]
         t = gx * geo[2 * _SIDE + _DX + i] + gy * geo[2 * _SIDE + _DY + i]
@@ -148,9 +149,8 @@ def limit_four_sides(p, wide, cap, beyond, geo, out):
 def limited_sides(j, floats, integers, values, wide, cap, shown, edges, scratch, sides):
     """Write the limited values at the sides of all cells of block j to `sides`.
 
-    floats, integers : mesh, see `cell_sides`; wide, cap : see `limit_three_sides`
-    values, sides : float64[ring BLOCK], float64[4 ring BLOCK]  values of cells and at sides, in the ring of
-    `cell_sides`
+    values, sides : float64[ring BLOCK], float64[4 ring BLOCK]  values of cells and at sides, in the ring
+    wide, cap : see `limit_three_sides`
     edges : int64[:]  boundary sides of the block; shown : float64[:]  values beyond them; scratch : float64[4 BLOCK]
     """
     slots, ring, places = integers[0], integers[4], integers[HEAD:].view(np.int32)

@@ -65,7 +65,6 @@ def depth_deviations(rest, wide, narrow, content, seen):
     """Write deviations of depths from those at rest to `seen`.
 
     rest : depths at rest [m]; content : states, changes of the amount in a cell over its undeformed area [m]
-    wide : ratio of present to undeformed area; narrow : 1 / wide
     """
     for i in range(seen.size):
         seen[i] = (content[i] - rest[i] * (wide[i] - 1.0)) * narrow[i]
@@ -80,10 +79,7 @@ def density_deviations(rest, wide, narrow, content, seen):
 
 @njit
 def stretch_rates(wide, first, second, third):
-    """Convert three arrays of rates per present area to rates of the states, in place.
-
-    wide : ratio of present to undeformed area of each cell, to which the states refer
-    """
+    """Convert three arrays of rates per present area to rates of the states, in place."""
     multiply_in_place(wide, first)
     multiply_in_place(wide, second)
     multiply_in_place(wide, third)
@@ -93,7 +89,7 @@ def stretch_rates(wide, first, second, third):
 def stretch_row_rates(columns, wide, first, j, rate_1, rate_2, rate_3):
     """Convert three arrays of rates of row j of a grid, from column `first` on, as `stretch_rates` does.
 
-    wide : present over undeformed area of all columns or rows; columns : True if columns stretch, False if rows do
+    wide : ratios of all columns or rows; columns : True if columns stretch, False if rows do
     """
     if columns:
         stretch_rates(wide[first:], rate_1, rate_2, rate_3)

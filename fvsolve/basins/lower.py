@@ -17,7 +17,7 @@ def lower_basins(draft) -> None:
     for basin, row in zip(draft.basins, draft.basin_table, strict=True):
         basin.lower_common(draft, row)
     if any(basin.moves for basin in draft.basins):
-        from fvsolve.basins.lower_walls import lower_walls
+        from fvsolve.basins.lower_motion import lower_walls
 
         lower_walls(draft)
     patches = [(name, place) for name, place in case.places.items() if place.kind == "patch"]

@@ -11,9 +11,9 @@ import numpy as np
 from fvsolve.assembly.scheme_codes import CODES, family
 from fvsolve.assembly.state_names import Numbered
 from fvsolve.basins import advection_faces
-from fvsolve.basins.advection import THIN, advection_work
+from fvsolve.basins.advection import THIN, advection_work, diffusion_work
 from fvsolve.basins.basin_probes import SPEED, U, V
-from fvsolve.basins.diffusion import diffusion_work
+from fvsolve.basins.fifth_order import fifth_order_work
 from fvsolve.basins.lower_mesh import lower_mesh
 from fvsolve.basins.physics_codes import physics_code
 from fvsolve.case.basins import boundary_cells
@@ -34,7 +34,12 @@ VELOCITIES = {"u": U, "v": V, "speed": SPEED}
 
 
 class BasinRows:
-    """Basin of a model: its part of the case, its mesh, and (after `lower_common`) its row of the table of basins."""
+    """Basin of a model: its part of the case, its mesh, and (after `lower_common`) its row of the table of basins.
+
+    Arguments of the methods: draft : draft of a model; row : row of the basin in the table of basins
+    y : deviations of cells from rest, float64[quantities, n]; or the states of the model, where so stated
+    out, layout : output array of the right-hand side, and the places of its parts
+    """
 
     physics: ClassVar[dict[str, type[BasinRows]]] = {}  # by the package that declares it
     units: ClassVar[dict[str, str]] = {}  # of fields
@@ -54,26 +59,18 @@ class BasinRows:
         self.memory = 0  # size of its tables and its state [bytes]
         self.is_grid = is_grid(self.mesh)
         self.scalars = list(case.scalars) if self.part.physics_type.carries else []
-        self.quantities = tuple(
-            self.part.physics_type.states
-        )  # state quantities of cells; the first is the stored quantity
+        self.quantities = tuple(self.part.physics_type.states)  # of cells; the first is the stored quantity
         # for each moving wall: state, stretch of cells per travel [1/m], displacement of corners per travel
         self.stretches: list[tuple[int, np.ndarray, np.ndarray]] = []
 
     # defined by each physics --------------------------------------------------------------------------------
 
     def lower(self, draft, row) -> None:
-        """Fill the columns of the row of the basin that only its type has, and reserve the work arrays of its kernels.
-
-        row : row of the basin in the table of basins
-        """
+        """Fill the columns of the row that only its type has, and reserve the work arrays of its kernels."""
         raise NotImplementedError
 
     def pieces(self, valves: bool) -> Iterator[RhsTerms]:
-        """Yield the `RhsTerms` of the basin for the right-hand side and probes, in their order within a phase.
-
-        valves : True if the network contains valves
-        """
+        """Yield the `RhsTerms` of the basin, in their order within a phase; valves : True if the network has valves."""
         raise NotImplementedError
 
     def scales(self) -> list[float]:
@@ -88,10 +85,7 @@ class BasinRows:
         return np.zeros((len(self.quantities), self.n))
 
     def fields(self, y: np.ndarray) -> dict[str, np.ndarray]:
-        """Output fields by name, with a value (a vector of three for the velocity) for each cell, in SI units.
-
-        y : float64[quantities, n]  deviations of cells from rest
-        """
+        """Output fields by name, with a value (a vector of three for the velocity) for each cell, in SI units."""
         return {}
 
     def ground(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -122,10 +116,7 @@ class BasinRows:
         return rate, float(along[worst]) / rate if rate > 0.0 else 1.0
 
     def speeds(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(velocities, wave speeds) in cells at deviations y : float64[n, 3], float64[n] [m/s].
-
-        y : float64[quantities, n]
-        """
+        """(velocities, wave speeds) in cells at deviations y : float64[n, 3], float64[n] [m/s]."""
         raise NotImplementedError
 
     @property
@@ -155,10 +146,7 @@ class BasinRows:
         return 0.0, np.zeros(self.n)
 
     def weights(self, y: np.ndarray) -> np.ndarray:
-        """Weights w, for which a small deviation d from y stores the energy w d^2 [J] : float64[quantities, n].
-
-        y : float64[quantities, n]  deviations of cells from rest
-        """
+        """Weights w, for which a small deviation d from y stores the energy w d^2 [J] : float64[quantities, n]."""
         return np.tile(0.5 * self.mesh.area, (len(self.quantities), 1))
 
     def above(self, y: np.ndarray, datum: float) -> float:
@@ -222,10 +210,7 @@ class BasinRows:
         return MeshPoints(self.mesh)
 
     def formula(self, shape) -> np.ndarray:
-        """Mean of a formula over each cell : float64[n]; by nine Gauss points on grids, else by the centre alone.
-
-        shape : the formula, None for zero
-        """
+        """Mean of a formula (None for zero) over each cell : float64[n]; by nine Gauss points on grids, else one."""
         return means(samples(shape, self.mesh))
 
     def reflections(self) -> np.ndarray:
@@ -295,10 +280,9 @@ class BasinRows:
     def vectors_at(self, fields: dict[str, np.ndarray], out: np.ndarray, layout) -> dict[str, np.ndarray]:
         """Vectors in cells of a basin on a body, in axes of the world: "velocity" and "normal" -> float64[n, 3].
 
-        "normal" is the unit normal of the basin. fields : result of `fields`; out, layout : output array of the
-        right-hand side, and the places of its parts
+        "normal" is the unit normal of the basin. fields : result of `fields`
         """
-        from fvsolve.basins.lower_frames import axes_in_world
+        from fvsolve.basins.lower_motion import axes_in_world
 
         axes = axes_in_world(self, out, layout)[1]
         return {"velocity": fields["velocity"] @ axes.T, "normal": np.tile(axes[:, 2], (self.n, 1))}
@@ -306,14 +290,14 @@ class BasinRows:
     def points_at(self, y: np.ndarray, out: np.ndarray, layout) -> np.ndarray:
         """Positions of corners of cells at the states y of the model : float64[p, 3] [m].
 
-        For a basin on a body they are in axes of the world. out, layout : as for `vectors_at`
+        For a basin on a body they are in axes of the world.
         """
         x, z = np.ascontiguousarray(self.mesh.points.T)
         plan = self.mesh.points + sum((y[at] * weights for at, _, weights in self.stretches), np.zeros((1, 2)))
         points = np.column_stack([plan, self.ground(x, z)])
         if self.part.on is None:
             return points
-        from fvsolve.basins.lower_frames import axes_in_world
+        from fvsolve.basins.lower_motion import axes_in_world
 
         origin, axes = axes_in_world(self, out, layout)
         return origin + points @ axes.T
@@ -333,11 +317,8 @@ class BasinRows:
         """
         numerics, mesh, before = self.case.numerics, self.mesh, draft.used_size()
         self.row, row["n"] = row, self.n
-        row["kind"], row["deep"], row["given"] = (
-            physics_code(type(self).__module__.rpartition(".")[0]),
-            self.deep,
-            self.given,
-        )
+        row["kind"] = physics_code(type(self).__module__.rpartition(".")[0])
+        row["deep"], row["given"] = self.deep, self.given
         row["scheme"] = family(self.scheme)
         row["limiter"], row["wide"] = CODES[numerics.limiter], LIMITERS[numerics.limiter].overshoot
         row["area"] = row["drawn"] = draft.to_plane(mesh.area)
@@ -357,18 +338,17 @@ class BasinRows:
         row["reflect"], row["outer_given"] = draft.to_plane(reflections), reflections.size
         row["outer"] = mesh.left.size - mesh.inner
         row["through"] = draft.to_work(reflections.size) if reflections.size else -1
-        row["boundary_rates"] = draft.to_work(
-            len(self.quantities) * self.n if reflections.size or self.moves or self.part.on else 0
-        )
+        has_boundary_rates = reflections.size or self.moves or self.part.on
+        row["boundary_rates"] = draft.to_work(len(self.quantities) * self.n if has_boundary_rates else 0)
         row["carried"] = row["flows"] = -1
         if self.moves:
-            from fvsolve.basins.lower_walls import lower_lines
+            from fvsolve.basins.lower_motion import lower_lines
 
             lower_lines(draft, self, row)
         row["body"] = row["frame"] = -1
         self.lower(draft, row)
         if self.part.on is not None:
-            from fvsolve.basins.lower_frames import lower_frame
+            from fvsolve.basins.lower_motion import lower_frame
 
             lower_frame(draft, self, row)
         if self.scalars:
@@ -389,7 +369,8 @@ class BasinRows:
         row["outside"] = draft.to_work(len(self.scalars) * int(row["outer"]))
         if self.is_grid:
             flows = grid.ny * (grid.nx + 1) + (grid.ny + 1) * grid.nx
-            work_size = self.n + max(advection_work(row["scheme"], grid.nx, grid.ny), diffusion_work(grid.nx, grid.ny))
+            sizes = [advection_work, diffusion_work, *([fifth_order_work] if self.is_fifth_order else [])]
+            work_size = self.n + max(size(grid.nx, grid.ny) for size in sizes)
         else:
             flows, work_size = mesh.left.size, self.n + advection_faces.work_size(self.integers)
         if row["flows"] < 0:
@@ -416,25 +397,17 @@ class BasinRows:
             return key, f"ssp-rk3 with courant = {COURANT:g} or less keeps the bounds", None, None
         diffusing = [name for name in self.scalars if self.case.scalars[name].diffusivity > 0.0]
         if diffusing and not self.is_grid:
-            return (
-                None,
-                f"{listing(diffusing)} {'diffuse' if len(diffusing) > 1 else 'diffuses'} on a mesh that is "
-                "not a full rectangle; a full rectangle keeps the bounds",
-                None,
-                None,
-            )
+            text = f"{listing(diffusing)} {'diffuse' if len(diffusing) > 1 else 'diffuses'} on a mesh that is "
+            return None, f"{text}not a full rectangle; a full rectangle keeps the bounds", None, None
         if self.max_divergence > ROUNDING * row["fastest"]:
             reason = f"the velocity has a divergence of up to {self.max_divergence:.3g} 1/s"
             text = f"{reason}, which concentrates or dilutes scalars; a velocity by a stream function has no divergence"
             return "velocity", text, self.max_divergence, 0.0
         radius = ssp_radius(method)
         if numerics.courant > radius:
-            advice = (
-                f"Courant numbers up to {radius:g} keep the bounds"
-                if radius
-                else "with this method no Courant number keeps the bounds"
-            )
-            key = "courant" if radius else "method"
+            key, advice = "courant", f"Courant numbers up to {radius:g} keep the bounds"
+            if not radius:
+                key, advice = "method", "with this method no Courant number keeps the bounds"
             return key, f"{advice}; ssp-rk3 keeps the bounds up to a Courant number of 1", numerics.courant, radius
         return None
 
@@ -490,7 +463,7 @@ class BasinRows:
         length = self.mesh.length[faces]
         sizes = [self.mesh.area[cells].sum(), length.sum()]
         if self.deep and self.part.on is not None:
-            from fvsolve.basins.lower_frames import position_in_frame
+            from fvsolve.basins.lower_motion import position_in_frame
 
             sizes += position_in_frame(draft, self, patch)
         row["sizes"] = draft.to_plane(np.array(sizes))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fvsolve.basins import cell_sides, moving_meshes
+from fvsolve.basins.cell_sides import BLOCK
 
 if TYPE_CHECKING:
     from fvsolve.mesh import Mesh
@@ -19,18 +20,18 @@ def lower_mesh(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     """
     n, f, inner = len(mesh.area), len(mesh.left), mesh.inner
     slots, face, own, side = _sides(mesh)
-    block, lane, count = own // cell_sides.BLOCK, own % cell_sides.BLOCK, -(-n // cell_sides.BLOCK)
-    slot, at = (4 * block + side) * cell_sides.BLOCK + lane, (slots * block + side) * cell_sides.BLOCK + lane
+    block, lane, count = own // BLOCK, own % BLOCK, -(-n // BLOCK)
+    slot, at = (4 * block + side) * BLOCK + lane, (slots * block + side) * BLOCK + lane
     other = np.concatenate([f + np.arange(inner), np.arange(inner, f), np.arange(inner)])  # the side beyond, or itself
     step = np.abs(block[other] - block)
     ring = 1 << int(3 * step.max()).bit_length()
     need = np.zeros(count, np.int64)
     np.maximum.at(need, block, block[other] + 1)
-    indices = np.zeros((cell_sides.INDICES, count * slots * cell_sides.BLOCK), np.int64)
-    k, i = np.divmod(np.arange(indices.shape[1]), cell_sides.BLOCK)
+    indices = np.zeros((cell_sides.INDICES, count * slots * BLOCK), np.int64)
+    k, i = np.divmod(np.arange(indices.shape[1]), BLOCK)
     j, k = np.divmod(k, slots)
-    indices[cell_sides.CELL] = (j % ring) * cell_sides.BLOCK + i  # missing side of a cell: the cell itself
-    indices[cell_sides.SIDE] = (4 * (j % ring) + k) * cell_sides.BLOCK + i
+    indices[cell_sides.CELL] = (j % ring) * BLOCK + i  # missing side of a cell: the cell itself
+    indices[cell_sides.SIDE] = (4 * (j % ring) + k) * BLOCK + i
     indices[:, at] = indices[:, at[other]]
     face_of = np.full(indices.shape[1], ~0)
     face_of[at] = face
@@ -54,12 +55,9 @@ def lower_ends(mesh: Mesh, moves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """
     n, inner = len(mesh.area), mesh.inner
     slots, face, own, side = _sides(mesh)
-    at, count = (
-        (slots * (own // cell_sides.BLOCK) + side) * cell_sides.BLOCK + own % cell_sides.BLOCK,
-        -(-n // cell_sides.BLOCK),
-    )
+    at, count = (slots * (own // BLOCK) + side) * BLOCK + own % BLOCK, -(-n // BLOCK)
     number, left = np.where(face >= 0, face, ~face), face >= 0
-    ends = np.zeros((moving_meshes.ENDS, count * slots * cell_sides.BLOCK), np.int64)
+    ends = np.zeros((moving_meshes.ENDS, count * slots * BLOCK), np.int64)
     ends[:, at] = [
         mesh.ends[number, np.where(left, 0, 1)], mesh.ends[number, np.where(left, 1, 0)],
         np.maximum(np.where(left, mesh.right[number], mesh.left[number]), -1),
@@ -69,7 +67,7 @@ def lower_ends(mesh: Mesh, moves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     is_affected = has_moving_corner.copy()
     np.logical_or.at(is_affected, mesh.left[:inner], has_moving_corner[mesh.right[:inner]])
     np.logical_or.at(is_affected, mesh.right[:inner], has_moving_corner[mesh.left[:inner]])
-    moving_blocks = np.bincount(np.arange(n) // cell_sides.BLOCK, is_affected, count) > 0.0
+    moving_blocks = np.bincount(np.arange(n) // BLOCK, is_affected, count) > 0.0
     pairs = [table.ravel().astype(np.int32).view(np.int64) for table in (corners, _by_block(ends))]
     return moving_blocks.astype(np.int64), np.concatenate(pairs)
 
@@ -83,7 +81,10 @@ def _sides(mesh: Mesh) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
     slots = 4 if (mesh.cells[:, 3] >= 0).any() else 3
     face = np.concatenate([np.arange(f), ~np.arange(inner)])  # ~f where the cell is on the right of it
     own = np.concatenate([mesh.left, mesh.right[:inner]])
-    sort = np.lexsort((_side_direction(mesh, face), own))
+    normal = np.where(face[:, None] >= 0, 1.0, -1.0) * mesh.normal[np.where(face >= 0, face, ~face)]
+    # angle of the outward normal plus pi: sides of rectangles in the order west, south, east, north
+    direction = np.round(np.arctan2(-normal[:, 1], -normal[:, 0]), 9) % round(2.0 * np.pi, 9)
+    sort = np.lexsort((direction, own))
     first = np.concatenate([[0], np.cumsum(np.bincount(own, minlength=n))[:-1]])
     side = np.empty(own.size, np.int64)
     side[sort] = np.arange(own.size) - first[own[sort]]
@@ -95,16 +96,7 @@ def _by_block(table: np.ndarray) -> np.ndarray:
 
     table : [rows, sides], its sides ordered by block, side number and cell, with BLOCK cells in every block
     """
-    return table.reshape(len(table), -1, cell_sides.BLOCK).swapaxes(0, 1).ravel()
-
-
-def _side_direction(mesh: Mesh, face: np.ndarray) -> np.ndarray:
-    """Angle of each side by which the sides of a cell are ordered [rad]: for rectangles west, south, east, north.
-
-    It is the angle of the outward normal plus pi. face : face of each side, ~f if the cell is to the right of face f
-    """
-    normal = np.where(face[:, None] >= 0, 1.0, -1.0) * mesh.normal[np.where(face >= 0, face, ~face)]
-    return np.round(np.arctan2(-normal[:, 1], -normal[:, 0]), 9) % round(2.0 * np.pi, 9)
+    return table.reshape(len(table), -1, BLOCK).swapaxes(0, 1).ravel()
 
 
 def _measures(mesh: Mesh, face: np.ndarray, own: np.ndarray, n: int) -> np.ndarray:

@@ -9,32 +9,18 @@ places : float64[:]  x and y of corners, and their undeformed coordinate along t
 ends : int64[:]  number of blocks, and for each 1 if corners move there; four corners of each cell, two int32 in an
     int64, the first corner of a triangle again as fourth; then for each block, side and row of BLOCK cells, in such
     pairs too: corners where the side begins and ends (equal for a missing side), cell beyond, -1 for none
+
+x, y, cx, cy : positions of corners, centres of cells; scratch : values of the current side of each cell of a block, see
+the names of its rows; geo, far : first and last group of measures of that side, see `cell_sides`
 """
 
 from math import sqrt
 
 import numpy as np
 
-from fvsolve.basins.cell_sides import (
-    BLOCK,
-    DISTANCES,
-    DX,
-    DY,
-    HEAD,
-    INDICES,
-    MEASURES,
-    NX,
-    NY,
-    OBLIQUE_X,
-    OBLIQUE_Y,
-    PER_AREA,
-    PER_DISTANCE,
-    REACH,
-    TINY,
-    WX,
-    WY,
-    blocks,
-)
+from fvsolve.basins import cell_sides as side
+from fvsolve.basins.cell_sides import BLOCK, DISTANCES, MEASURES, TINY, blocks, side_numbers
+from fvsolve.basins.moving_walls import size_patch
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import RATE
 from fvsolve.kernels.table_handle import open_tables
@@ -44,7 +30,7 @@ START, STOP, BEYOND, ENDS = range(4)
 # beyond, 1 where there is a cell, length.
 _XX, _XY, _YY, _SHARE, _CX, _CY, _XA, _YA, _XB, _YB, _OX, _OY, _INSIDE, _LENGTH = (k * BLOCK for k in range(14))
 SCRATCH = 14 * BLOCK
-_NX, _NY, _REACH, _DX, _DY, _WX, _WY = (k * BLOCK for k in (NX, NY, REACH, DX, DY, WX, WY))
+_NX, _NY, _REACH, _DX, _DY, _WX, _WY = (k * BLOCK for k in range(7))  # groups of `cell_sides`, in its order
 
 
 @njit(forceinline=True)
@@ -55,10 +41,7 @@ def on_moving_mesh(basin):
 
 @njit(forceinline=True)
 def mesh_positions(plane, basin):
-    """(x, y, undeformed coordinate of corners; x, y of centres of cells; scratch) of a mesh: six arrays.
-
-    The undeformed coordinate is that along the axis of motion [m].
-    """
+    """(x, y, undeformed coordinate of corners; x, y of centres of cells; scratch) of a mesh: the parts of `places`."""
     at, p, n = basin["places"], basin["corners"], basin["n"]
     x, y, drawn = plane[at : at + p], plane[at + p : at + 2 * p], plane[at + 2 * p : at + 3 * p]
     at += 3 * p
@@ -104,9 +87,9 @@ def move_corners(tables, basin, y):
 
 @njit
 def put_centres(first, last, corners, x, y, cx, cy):
-    """Write the centroids (cx, cy) of the cells `first` to `last` - 1; for the formula see `mesh.shapes`.
+    """Write the centroids (cx, cy) of the cells `first` to `last` - 1; for the formula see `mesh.area_and_centre`.
 
-    corners : four corners of each cell; x, y : positions of corners
+    corners : four corners of each cell
     """
     for i in range(first, last):
         own = corners[4 * i : 4 * i + 4]
@@ -121,10 +104,7 @@ def put_centres(first, last, corners, x, y, cx, cy):
 
 @njit
 def gather_cells(area, cx, cy, scratch):
-    """Write 1 / areas and centres of a block of cells to `scratch`, and set the sums over their sides there to zero.
-
-    area, cx, cy : areas and centres of these cells
-    """
+    """Write 1 / areas and centres of a block of cells to `scratch`, and set the sums over their sides there to zero."""
     for i in range(BLOCK):
         scratch[i], scratch[_XY + i], scratch[_YY + i], scratch[_SHARE + i] = 0.0, 0.0, 0.0, 0.0
     for i in range(area.size):
@@ -136,7 +116,6 @@ def gather_ends(start, stop, beyond, x, y, cx, cy, scratch):
     """Write the ends of one side of each cell of a block, and the centre of the cell beyond it, to `scratch`.
 
     start, stop : corners where the side begins and ends; beyond : cell beyond the side, -1 at the boundary
-    x, y : positions of corners; cx, cy : centres of cells
     """
     for i in range(BLOCK):
         a, b, other = start[i], stop[i], max(beyond[i], 0)
@@ -148,8 +127,7 @@ def gather_ends(start, stop, beyond, x, y, cx, cy, scratch):
 def put_side(scratch, geo):
     """Write the measures of one side of each cell of a block to `geo`, and add to the sums over sides in `scratch`.
 
-    scratch : ends of the side, see `gather_ends`, and sums for the least-squares gradient
-    geo : first group of measures of the side, see `cell_sides`; weights of the gradient are final after `put_weights`
+    Weights of the least-squares gradient are final after `put_weights`.
     """
     for i in range(BLOCK):
         xa, ya, xb, yb, cx, cy = (
@@ -163,10 +141,8 @@ def put_side(scratch, geo):
         to_x, to_y = 0.5 * (xa + xb) - cx if exists else 0.0, 0.5 * (ya + yb) - cy if exists else 0.0
         mirror_distance = 2.0 * (to_x * nx + to_y * ny)  # to the mirror image
         inside = scratch[_INSIDE + i] > 0.0
-        ax, ay = (
-            scratch[_OX + i] - cx if inside else mirror_distance * nx,
-            scratch[_OY + i] - cy if inside else mirror_distance * ny,
-        )
+        ax = scratch[_OX + i] - cx if inside else mirror_distance * nx
+        ay = scratch[_OY + i] - cy if inside else mirror_distance * ny
         weight = 1.0 / (ax * ax + ay * ay) if exists else 0.0
         scratch[_LENGTH + i] = length
         geo[_NX + i], geo[_NY + i], geo[_REACH + i] = nx, ny, length * scratch[_SHARE + i]
@@ -181,8 +157,7 @@ def put_side(scratch, geo):
 def put_distance(scratch, geo, far):
     """Write to `far` those measures of one side of each cell of a block that only scalars need.
 
-    They are 1 / area, 1 / distance to the next centre and obliqueness, see the last group in `cell_sides`.
-    scratch, geo : as for `put_side`
+    They are 1 / area, 1 / distance to the next centre and obliqueness.
     """
     for i in range(BLOCK):
         nx, ny = geo[_NX + i], geo[_NY + i]
@@ -191,9 +166,9 @@ def put_distance(scratch, geo, far):
         ax = scratch[_OX + i] - scratch[_CX + i] if inside else mirror_distance * nx
         ay = scratch[_OY + i] - scratch[_CY + i] if inside else mirror_distance * ny
         gap = 1.0 / (ax * nx + ay * ny) if exists else 0.0
-        far[PER_AREA * BLOCK + i], far[PER_DISTANCE * BLOCK + i] = scratch[_SHARE + i] if exists else 0.0, gap
-        far[OBLIQUE_X * BLOCK + i] = nx - ax * gap if exists else 0.0
-        far[OBLIQUE_Y * BLOCK + i] = ny - ay * gap if exists else 0.0
+        far[side.PER_AREA * BLOCK + i], far[side.PER_DISTANCE * BLOCK + i] = scratch[_SHARE + i] if exists else 0.0, gap
+        far[side.OBLIQUE_X * BLOCK + i] = nx - ax * gap if exists else 0.0
+        far[side.OBLIQUE_Y * BLOCK + i] = ny - ay * gap if exists else 0.0
 
 
 @njit
@@ -210,10 +185,7 @@ def invert(scratch):
 
 @njit
 def put_weights(scratch, geo):
-    """Write the weights of the difference across one side in the gradient, for each cell of a block, to `geo`.
-
-    scratch : result of `invert`; geo : as for `put_side`
-    """
+    """Write the weights of the difference across one side in the gradient, for each cell of a block, to `geo`."""
     for i in range(BLOCK):
         wx, wy, cross = geo[_WX + i], geo[_WY + i], scratch[_XY + i]
         geo[_WX + i], geo[_WY + i] = scratch[i] * wx - cross * wy, scratch[_YY + i] * wy - cross * wx
@@ -231,12 +203,7 @@ def update_sides(tables, basin):
     moving_blocks, corners, ends = ends_of(tables.integers, basin)
     slots, n, f, b = integers[0], integers[1], integers[2], integers[3]
     m = moving_blocks.size * slots * BLOCK
-    offset = HEAD + INDICES * m // 2 + moving_blocks.size
-    edges, number, face = (
-        integers[offset : offset + b],
-        integers[offset + b : offset + 2 * b],
-        integers[offset + 2 * b :],
-    )
+    _, edges, number, face = side_numbers(integers)
     lengths, distances = floats[MEASURES * m + 2 * b :], floats[MEASURES * m + 2 * b + f :]
     for j in range(moving_blocks.size):
         if moving_blocks[j] == 1:
@@ -258,10 +225,10 @@ def update_sides(tables, basin):
         for slot in range(j * slots, (j + 1) * slots):
             put_weights(scratch, floats[slot * MEASURES * BLOCK :])
     for q in range(b):
-        side = edges[q] // BLOCK
-        geo = floats[(side // 4 * slots + side % 4) * MEASURES * BLOCK + edges[q] % BLOCK :]
+        j, k, i = edges[q] // BLOCK // 4, edges[q] // BLOCK % 4, edges[q] % BLOCK
+        geo = floats[(j * slots + k) * MEASURES * BLOCK + i :]
         floats[MEASURES * m + q], floats[MEASURES * m + b + q] = geo[_NX], geo[_NY]
-        lengths[f - b + number[q]] = geo[_REACH] * area[side // 4 * BLOCK + edges[q] % BLOCK]
+        lengths[f - b + number[q]] = geo[_REACH] * area[j * BLOCK + i]
 
 
 @njit
@@ -273,22 +240,6 @@ def put_lengths(face, side_lengths, lengths):
     for i in range(BLOCK):
         if face[i] >= 0:
             lengths[face[i]] = side_lengths[i]
-
-
-@njit
-def size_patch(tables, basin, patch):
-    """Write the present sizes of a patch: lengths of its faces, area of the cells next to it."""
-    plane, integers, area, length = tables.plane, tables.integers, 0.0, 0.0
-    links = integers[basin["links"] :]
-    at = basin["mesh"] + MEASURES * blocks(links) * links[0] * BLOCK + 2 * links[3] + links[2] - links[3]
-    for m in range(patch["count"]):
-        area += plane[basin["area"] + integers[patch["first"] + m]]
-    for m in range(patch["faces"]):
-        own = plane[at + integers[patch["ring"] + m]]
-        i = integers[patch["ring"] + patch["faces"] + m]
-        plane[patch["normals"] + 2 * patch["faces"] + m] = own / plane[basin["drawn"] + i]
-        length += own
-    plane[patch["sizes"]], plane[patch["sizes"] + 1] = area, length
 
 
 @njit

@@ -11,16 +11,10 @@ in `plane`. On other meshes, corners take the place of grid lines (see `moving_m
 
 from math import sqrt
 
+from fvsolve.basins import cell_stretching as stretching
 from fvsolve.basins.basin_energy import basin_first_row
-from fvsolve.basins.cell_stretching import (
-    density_deviations,
-    depth_deviations,
-    fill,
-    multiply,
-    multiply_in_place,
-    row_across,
-    stretch_of_cell,
-)
+from fvsolve.basins.cell_sides import BLOCK, MEASURES, blocks
+from fvsolve.basins.cell_stretching import row_across, stretch_of_cell
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import NO_DRAG, NO_WIDTH, RATE, STATUS, WALL_VALUE, WHERE
 from fvsolve.kernels.energy_rows import WALL_ROWS, wall_power_row
@@ -61,20 +55,17 @@ def update_geometry(t, y, seen, out, handle):
         if basin["walls"] > 0:
             stretch_cells(tables, basin, y)
             copy(y[done : basin["y"]], tables.seen[done:])
-            if seen.size == 0 and reads_contents(basin) and basin["carried"] < 0 and basin["friction"] == NO_DRAG:
+            # kernels of rates of water on grids read the states (amounts in cells), not values per area
+            reads_contents = basin["deep"] == 1 and basin["nx"] > 0
+            if seen.size == 0 and reads_contents and basin["carried"] < 0 and basin["friction"] == NO_DRAG:
                 deviations_at_patches(tables, b, y)
             else:
                 deviations_of_rows(tables, basin, y)
-            if basin["nx"] > 0:
-                stretch_patches(tables, b)
+            for p in range(tables.patches.size if basin["nx"] > 0 else 0):
+                if tables.patches[p]["basin"] == b:
+                    size_patch(tables, basin, tables.patches[p])
             done = basin["y"] + (3 + (tables.scalars.size if basin["carried"] >= 0 else 0)) * basin["n"]
     copy(y[done:], tables.seen[done:])
-
-
-@njit(forceinline=True)
-def reads_contents(basin):
-    """True if the kernel of rates reads the states (amounts in cells), not values per area: for water on grids."""
-    return basin["deep"] == 1 and basin["nx"] > 0
 
 
 @njit
@@ -93,7 +84,7 @@ def stretch_cells(tables, basin, y):
     plane, walls, at = tables.plane, tables.walls, basin["stretch"]
     count, lines = stretching_counts(basin)
     wide, narrow = plane[at : at + count], plane[at + count : at + 2 * count]
-    fill(1.0, wide)
+    stretching.fill(1.0, wide)
     for k in range(basin["wall"], basin["wall"] + basin["walls"]):
         weights, travel = plane[walls[k]["weights"] + lines :], y[walls[k]["y"]]
         for i in range(count):
@@ -102,7 +93,7 @@ def stretch_cells(tables, basin, y):
         narrow[i] = 1.0 / wide[i]
     if basin["nx"] > 0:
         spacing = basin["spacing"] + (basin["nx"] if basin["turn"] == 1 else 0)
-        multiply(plane[at + 2 * count :], narrow, plane[spacing : spacing + count])  # 1 / widths as drawn
+        stretching.multiply(plane[at + 2 * count :], narrow, plane[spacing : spacing + count])  # 1 / widths as drawn
 
 
 @njit
@@ -112,38 +103,34 @@ def factors_of(tables, basin, j):
     if nx == 0 or basin["turn"] == 0:
         return plane[at : at + count], plane[at + count : at + 2 * count]
     row = at + 3 * count
-    fill(plane[at + j], plane[row : row + nx])
-    fill(plane[at + count + j], plane[row + nx : row + 2 * nx])
+    stretching.fill(plane[at + j], plane[row : row + nx])
+    stretching.fill(plane[at + count + j], plane[row + nx : row + 2 * nx])
     return plane[row : row + nx], plane[row + nx : row + 2 * nx]
 
 
 @njit
 def deviations_of_rows(tables, basin, y):
-    """Write areas and deviations U - U0 of all cells of a basin, from the states (A U - A0 U0) / A0.
-
-    U, U0 : value per area, and its value at rest; A, A0 : present and undeformed area of a cell
-    """
+    """Write areas and deviations U - U0 of all cells of a basin, from the states (A U - A0 U0) / A0."""
     plane, seen, n, first = tables.plane, tables.seen, basin["n"], basin["y"]
     rows, size = (basin["ny"], basin["nx"]) if basin["nx"] > 0 else (1, n)
     scalar_count = tables.scalars.size if basin["carried"] >= 0 else 0
     for j in range(rows):
         a, z, (wide, narrow) = j * size, (j + 1) * size, factors_of(tables, basin, j)
-        multiply(plane[basin["drawn"] + a :], wide, plane[basin["area"] + a : basin["area"] + z])
+        stretching.multiply(plane[basin["drawn"] + a :], wide, plane[basin["area"] + a : basin["area"] + z])
         if basin["deep"] == 1:
-            depth_deviations(plane[basin["plan"] + a :], wide, narrow, y[first + a :], seen[first + a : first + z])
+            stretching.depth_deviations(
+                plane[basin["plan"] + a :], wide, narrow, y[first + a :], seen[first + a : first + z]
+            )
         else:
-            density_deviations(basin["density"], wide, narrow, y[first + a :], seen[first + a : first + z])
+            stretching.density_deviations(basin["density"], wide, narrow, y[first + a :], seen[first + a : first + z])
         for q in range(1, 3 + scalar_count):
             at = first + q * n if q < 3 else basin["carried"] + (q - 3) * n
-            multiply(y[at + a :], narrow, seen[at + a : at + z])
+            stretching.multiply(y[at + a :], narrow, seen[at + a : at + z])
 
 
 @njit
 def deviations_at_patches(tables, b, y):
-    """Write areas and deviations from rest, as `deviations_of_rows` does, for the cells of water at patches and walls.
-
-    b : number of the basin; y : states
-    """
+    """Write areas and deviations from rest, as `deviations_of_rows`, for the cells of water at patches and walls."""
     plane, seen, basin, patches = tables.plane, tables.seen, tables.basins[b], tables.patches
     n, first = basin["n"], basin["y"]
     for p in range(patches.size):
@@ -156,30 +143,38 @@ def deviations_at_patches(tables, b, y):
 
 
 @njit
-def stretch_patches(tables, b):
-    """Write the present sizes of all patches of basin b, a grid; see `stretch_patch`."""
-    for p in range(tables.patches.size):
-        if tables.patches[p]["basin"] == b:
-            stretch_patch(tables, tables.basins[b], tables.patches[p])
+def size_patch(tables, basin, patch):
+    """Write the present sizes of a patch: length over area of its faces, total length, area of its cells.
 
-
-@njit
-def stretch_patch(tables, basin, patch):
-    """Write the present sizes of a patch of a grid: length over area of its faces, total length, area of its cells.
-
-    Length is over the undeformed area of the cell, because the rates of the states refer to that area.
+    Length is over the undeformed area of the cell, because the rates of the states refer to that area. On a mesh, the
+    lengths of faces are those that `moving_meshes` has computed.
     """
     plane, integers, area, length = tables.plane, tables.integers, 0.0, 0.0
     for m in range(patch["count"]):
         area += plane[basin["area"] + integers[patch["first"] + m]]
-    at, count = patch["normals"], patch["faces"]
+    at, count, lengths = patch["normals"], patch["faces"], first_length(tables, basin)
     for m in range(count):
         i = integers[patch["ring"] + count + m]
-        is_normal = abs(plane[at + (1 if basin["turn"] == 1 else 0) * count + m]) < 0.5
-        per_area = plane[at + 3 * count + m] * (stretch_of_cell(plane, basin, i) if is_normal else 1.0)
+        drawn = plane[basin["drawn"] + i]
+        if basin["nx"] > 0:
+            is_normal = abs(plane[at + (1 if basin["turn"] == 1 else 0) * count + m]) < 0.5
+            per_area = plane[at + 3 * count + m] * (stretch_of_cell(plane, basin, i) if is_normal else 1.0)
+            own = per_area * drawn
+        else:
+            own = plane[lengths + integers[patch["ring"] + m]]
+            per_area = own / drawn
         plane[at + 2 * count + m] = per_area
-        length += per_area * plane[basin["drawn"] + i]
+        length += own
     plane[patch["sizes"]], plane[patch["sizes"] + 1] = area, length
+
+
+@njit
+def first_length(tables, basin):
+    """Index in `plane` of the length of the first boundary face of a mesh, see `cell_sides`; 0 for a grid."""
+    if basin["nx"] > 0:
+        return 0
+    links = tables.integers[basin["links"] :]
+    return basin["mesh"] + MEASURES * blocks(links) * links[0] * BLOCK + 2 * links[3] + links[2] - links[3]
 
 
 @njit
@@ -274,12 +269,8 @@ def push_body(out, tables, wall, force):
 
     It acts through the origin of the body, without torque.
     """
-    row, along, force_along = (
-        row_of_body(tables, wall["body"]),
-        tables.basins[wall["basin"]]["turn"],
-        wall["outward"] * force,
-    )
-    out[row + FORCE + along] += force_along
+    along = tables.basins[wall["basin"]]["turn"]
+    out[row_of_body(tables, wall["body"]) + FORCE + along] += wall["outward"] * force
 
 
 @njit
@@ -298,8 +289,7 @@ def add_wall_forces(t, y, dydt, out, handle):
     The waves that walls radiate raise out[RATE], which limits the step. On bodies, the forces at rest are added too.
     """
     tables = open_tables(handle)
-    layout, walls, masses, st = tables.layout[0], tables.walls, tables.masses, tables.settings[0]
-    seen = tables.seen
+    layout, walls, st, seen = tables.layout[0], tables.walls, tables.settings[0], tables.seen
     for k in range(walls.size):
         wall, total, waves = walls[k], 0.0, 0.0
         basin = tables.basins[wall["basin"]]
@@ -315,7 +305,7 @@ def add_wall_forces(t, y, dydt, out, handle):
             push_body(out, tables, wall, wall["rest"] + total)
         if wall["mass"] < 0:
             continue
-        mass = masses[wall["mass"]]
+        mass = tables.masses[wall["mass"]]
         force = wall["outward"] * total
         out[layout["net_force"] + wall["mass"]] += force
         out[RATE] = max(out[RATE], waves * mass["lightness"])
@@ -339,7 +329,7 @@ def stretch_scalar_rates(t, y, dydt, out, handle):
             wide = factors_of(tables, basin, j)[0]
             for q in range(tables.scalars.size):
                 at = basin["carried"] + q * n + j * size
-                multiply_in_place(wide, dydt[at : at + size])
+                stretching.multiply_in_place(wide, dydt[at : at + size])
 
 
 @njit

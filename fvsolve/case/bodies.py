@@ -13,7 +13,7 @@ import numpy as np
 
 from fvsolve import attitude
 from fvsolve.errors import article, did_you_mean, listing
-from fvsolve.exact.schedule_values import value
+from fvsolve.exact.solution import value
 from fvsolve.parts.attitude_keys import is_zero_vector
 from fvsolve.parts.body import Body
 from fvsolve.units import show

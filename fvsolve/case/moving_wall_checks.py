@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import article, did_you_mean, listing
-from fvsolve.exact.schedule_values import value
+from fvsolve.exact.solution import value
 from fvsolve.parts.formula import SpatialField
 from fvsolve.units import show
 

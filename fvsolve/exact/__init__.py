@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from importlib import import_module
 
-from fvsolve.exact.solution import ExactStart, Solution, law_faults, type_faults
+from fvsolve.exact.solution import Exact, ExactStart, Solution, law_faults, type_faults
 
 __all__ = ["NAMES", "Solution", "ExactStart", "find_faults", "solution"]
 
@@ -13,16 +13,16 @@ NAMES = {  # name in the case file -> (module of this package, description)
     "rays": ("rays", "waves in frictionless pipes between reservoirs, junctions and valves, by ray tracing"),
     "laminar-line": ("laminar_line", "a laminar pipe from a reservoir to a demand, with its velocity profile"),
     "creeping-line": (
-        "creeping_line",
+        "laminar_line",
         "a pipe with wall creep from a reservoir to a demand, frictionless or laminar",
     ),
     "levelling": (
-        "levelling",
+        "lumped",
         "a tank or chamber joined by an orifice to a reservoir, or to another tank or chamber: a parabola in time",
     ),
-    "column": ("column", "one rigid column between given pressures: tanh in time"),
-    "oscillation": ("oscillation", "two open tanks, or a tank and a reservoir, joined by a frictionless rigid column"),
-    "spring-mass": ("spring_mass", "one mass on linear springs and dampers under constant force"),
+    "column": ("lumped", "one rigid column between given pressures: tanh in time"),
+    "oscillation": ("lumped", "two open tanks, or a tank and a reservoir, joined by a frictionless rigid column"),
+    "spring-mass": ("lumped", "one mass on linear springs and dampers under constant force"),
 }
 
 
@@ -32,15 +32,15 @@ def find_faults(case) -> Iterator[tuple[tuple, str]]:
     keys : key path as a tuple. Parts of types that the solution does not support are reported first; the keys of parts
     are checked only if there are no such parts.
     """
-    module = _module(case.exact.name)
+    exact = _exact(case.exact.name)
     yield from law_faults(case)
-    yield from list(type_faults(case, module.NODES, module.LINKS)) or module.find_faults(case)
+    yield from list(type_faults(case, exact.nodes, exact.links)) or exact.find_faults(case)
 
 
 def solution(case, start: ExactStart) -> Solution:
     """Exact solution that a case names under `[exact]`, from the flows and pressures at the start."""
-    return _module(case.exact.name).solution(case, start)
+    return _exact(case.exact.name).solution(case, start)
 
 
-def _module(name: str):
-    return import_module(f"{__name__}.{NAMES[name][0]}")
+def _exact(name: str) -> Exact:
+    return getattr(import_module(f"{__name__}.{NAMES[name][0]}"), name.replace("-", "_").upper())

@@ -1,4 +1,4 @@
-"""Laminar pipe between a reservoir and a changing demand, with the exact velocity profile.
+"""Pipe between a reservoir and a changing demand, by its Laplace transform: laminar, or with wall creep.
 
 With the Laplace variable s and x = R sqrt(s / nu), radius R and kinematic viscosity nu, the momentum of the laminar
 profile is s M I0(x) / I2(x) = -A dp/dx (Zielke 1968): mass flow M, area A, modified Bessel functions I0 and I2. Waves
@@ -7,6 +7,10 @@ Z = (a / A) sqrt(I0 / I2). If liquid and wall store C times their instantaneous 
 and sqrt(I0 / (C I2)). For a demand with jumps the response is the series of all reflections; each is inverted after its
 pure delay exp(-s d / a) is split off (Talbot's contour). For a smooth demand the sum of all reflections is inverted
 along a Bromwich line.
+
+The storage of a wall of Kelvin-Voigt elements with compliance J [1/Pa] and retardation time tau [s], relative to the
+instantaneous storage, is C(s) = 1 + sum of g / (1 + tau s), g = c D rho a^2 J / e (Covas et al. 2005): density rho,
+diameter D, wall thickness e, restraint factor c.
 """
 
 from __future__ import annotations
@@ -15,52 +19,53 @@ import math
 
 import numpy as np
 
-from fvsolve.exact.schedule_values import value
-from fvsolve.exact.solution import ExactStart, Solution, count_faults, reservoirs
+from fvsolve.exact.solution import Exact, ExactStart, Solution, count_faults, fault, reservoirs, value
 
-NODES, LINKS = ("reservoir", "junction"), ("pipe",)
 LAMINAR = 2000.0  # largest Reynolds number that is certainly laminar
 TALBOT = 24  # points of the contour: twelve digits for smooth functions
 PERIOD, DAMPING = 2.5, 18.0  # of the Bromwich line: period / time span, and damping exponent of the next period
 TAIL = 1e-10  # relative size at which the transform of a smooth demand is cut off
 
 
-def find_faults(case):
+def laminar_faults(case):
     """Yield a fault (keys, message) for each difference of a case from one laminar pipe with a demand at its end."""
     name, pipes = case.exact.name, list(case.links.items())
     yield from count_faults(case, pipes, "pipe")
     for node, part in case.nodes.items():
         if part.kind == "reservoir" and not (part.pressure or part.head).constant:
-            yield ("nodes", node), f'the exact solution "{name}" needs a constant pressure'
+            yield fault(case, ("nodes", node), "needs a constant pressure")
         if part.kind == "junction" and part.demand.kind not in ("constant", "step", "smooth"):
-            yield (
-                ("nodes", node, "demand"),
-                f'the exact solution "{name}" needs a demand that is constant, jumps or is "smooth"',
-            )
+            text = 'needs a demand that is constant, jumps or is "smooth"'
+            yield fault(case, ("nodes", node, "demand"), text)
     for link, pipe in pipes:
         kinds = sorted(case.nodes[end].kind for end in (pipe.from_, pipe.to))
         if kinds != ["junction", "reservoir"]:
-            yield (
-                ("links", link),
-                f'the exact solution "{name}" needs a reservoir at one end and a junction at the other end',
-            )
+            text = "needs a reservoir at one end and a junction at the other end"
+            yield fault(case, ("links", link), text)
             continue
         if pipe.creep_elements and name == "laminar-line":
-            yield ("links", link, "wall", "creep"), f'the exact solution "{name}" holds only for walls without creep'
+            yield fault(case, ("links", link, "wall", "creep"), "holds only for walls without creep")
         law = pipe.friction
         if law.model != "unsteady" or law.weighting == "vardy-brown" or law.roughness is None or pipe.minor_loss:
             other = ' (or model = "none")' if name == "creeping-line" else ""
-            message = (
-                f'the exact solution "{name}" needs friction with model = "unsteady", `roughness` instead of `factor`, '
-                f'and `weighting` "zielke" or left out{other}, and no `minor_loss`'
-            )
-            yield ("links", link, "friction"), message
+            text = 'needs friction with model = "unsteady", `roughness` instead of `factor`, and `weighting` "zielke" '
+            yield fault(case, ("links", link, "friction"), f"{text}or left out{other}, and no `minor_loss`")
         elif case.properties.viscosity is None:
             yield ("fluid",), f'viscosity is missing; the exact solution "{name}" needs it'
         elif reynolds(case, pipe) >= LAMINAR:
-            message = f'the exact solution "{name}" is laminar, but the demand reaches the Reynolds number '
-            message += f"{reynolds(case, pipe):.0f}; expected below {LAMINAR:g}"
-            yield ("links", link, "friction"), message
+            text = f"is laminar, but the demand reaches the Reynolds number {reynolds(case, pipe):.0f}"
+            yield fault(case, ("links", link, "friction"), f"{text}; expected below {LAMINAR:g}")
+
+
+def creep_faults(case):
+    """Yield a fault (keys, message) for each difference of a case from one pipe with wall creep and a demand."""
+    for keys, text in laminar_faults(case):
+        link = case.links[keys[1]] if keys[0] == "links" and len(keys) > 2 else None
+        if link is None or keys[2] != "friction" or link.friction.model != "none" or link.minor_loss:
+            yield keys, text
+    for link, pipe in case.links.items():
+        if not pipe.creep_elements:
+            yield fault(case, ("links", link, "wall"), "needs a wall with creep")
 
 
 def reynolds(case, pipe) -> float:
@@ -71,20 +76,9 @@ def reynolds(case, pipe) -> float:
 
 
 def solution(case, start: ExactStart) -> Solution:
-    """Pressures [Pa] and flows [m3/s] along the pipe of a case, as functions of time.
-
-    The case must be one for which `find_faults` yields nothing.
-    """
+    """Pressures [Pa] and flows [m3/s] along the only pipe of a case, as functions of time."""
     [(name, pipe)] = case.links.items()
-    return line_solution(case, start, LineDeviation(case, pipe))
-
-
-def line_solution(case, start: ExactStart, line: LineDeviation) -> Solution:
-    """Pressures [Pa] and flows [m3/s] of a case with a single pipe, as functions of time.
-
-    start : state at the start; line : deviations from it along the pipe
-    """
-    [(name, pipe)] = case.links.items()
+    line = LineDeviation(case, pipe)
     drop = start.pressure[pipe.to] - start.pressure[pipe.from_]
     flow = start.flow[name]
 
@@ -106,9 +100,11 @@ class LineDeviation:
         self.reversed = case.nodes[pipe.to].kind == "reservoir"
         self.gate = pipe.from_ if self.reversed else pipe.to
         self.demand, self.rho, self.t0 = case.nodes[self.gate].demand, case.properties.density, case.numerics.start
-        self.end, self.length, self.a = case.numerics.end, pipe.length, case.wave_speed(first_link(case))
+        self.end, self.length, self.a = case.numerics.end, pipe.length, case.wave_speed(next(iter(case.links)))
         self.area, self.viscosity = math.pi / 4.0 * pipe.diameter**2, case.properties.viscosity
         self.scale = 0.25 * pipe.diameter**2 * self.rho / (self.viscosity or 1.0)  # R^2 / nu [s]
+        self.plug_flow = pipe.friction.model == "none"
+        self.elements = [(growth * self.rho * self.a**2, time) for growth, time in pipe.creep_elements]
 
     def waves(self, x, t):
         """Deviations of pressure [Pa] and mass flow [kg/s] at distances x [m] and times t [s].
@@ -144,13 +140,21 @@ class LineDeviation:
 
         s : Laplace variable [1/s]
         """
-        return 1.0
+        if not self.elements:
+            return 1.0
+        total = np.ones(np.shape(s), dtype=complex)
+        for share, time in self.elements:
+            total = total + share / (1.0 + time * s)
+        return total
 
     def ratio(self, s):
         """Inertia of the laminar profile relative to plug flow, I0(x) / I2(x) with x = R sqrt(s / nu) [-].
 
+        It is 1 for a pipe without friction.
         s : Laplace variable [1/s]; R : radius of the pipe; nu : kinematic viscosity; I0, I2 : modified Bessel functions
         """
+        if self.plug_flow:
+            return np.ones(np.shape(s), dtype=complex)
         from scipy.special import ive
 
         x = np.sqrt(s * self.scale)
@@ -244,6 +248,5 @@ class LineDeviation:
         return self.rho * value(self.demand, t)
 
 
-def first_link(case) -> str:
-    """Name of the first link of a case."""
-    return next(iter(case.links))
+LAMINAR_LINE = Exact(("reservoir", "junction"), ("pipe",), laminar_faults, solution)
+CREEPING_LINE = Exact(("reservoir", "junction"), ("pipe",), creep_faults, solution)

@@ -11,10 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.exact.schedule_values import kinks, value
-from fvsolve.exact.solution import ExactStart, Solution, reservoirs
+from fvsolve.exact.solution import Exact, ExactStart, Solution, fault, kinks, reservoirs, value, valve_faults
 
-NODES, LINKS = ("reservoir", "junction", "inflow"), ("pipe", "valve", "orifice")
 MAX_PATHS = 20000
 BLOCK = 400_000  # values traced together: number of times x number of paths
 MERGE = 1e-11  # sums of travel times closer than this are merged, relative to the duration of the run
@@ -24,39 +22,25 @@ def find_faults(case):
     """Yield a fault (keys, message) for everything in a case that ray tracing does not cover."""
     valves: dict[str, list[str]] = {}
     for name, link in case.links.items():
-        if link.kind == "pipe":
-            if link.friction.model != "none":
-                yield (
-                    ("links", name, "friction"),
-                    'the exact solution "rays" holds only without friction; expected model = "none"',
-                )
-            if link.creep_elements:
-                yield ("links", name, "wall", "creep"), 'the exact solution "rays" holds only for walls without creep'
-            if link.minor_loss != 0.0:
-                yield ("links", name, "minor_loss"), 'the exact solution "rays" holds only without losses; expected 0'
-        else:
-            if link.characteristic != "linear":
-                yield (
-                    ("links", name, "characteristic"),
-                    'the exact solution "rays" supports only characteristic = "linear"',
-                )
-            if link.laminar_reynolds is not None:
-                yield (
-                    ("links", name, "laminar_reynolds"),
-                    'the exact solution "rays" supports no laminar flow. Remove this key',
-                )
+        if link.kind != "pipe":
+            yield from valve_faults(case, name)
             for end in (link.from_, link.to):
                 valves.setdefault(end, []).append(name)
+            continue
+        if link.friction.model != "none":
+            yield fault(case, ("links", name, "friction"), 'holds only without friction; expected model = "none"')
+        if link.creep_elements:
+            yield fault(case, ("links", name, "wall", "creep"), "holds only for walls without creep")
+        if link.minor_loss != 0.0:
+            yield fault(case, ("links", name, "minor_loss"), "holds only without losses; expected 0")
     for node, names in valves.items():
         if case.nodes[node].kind != "reservoir" and len(names) > 1:
-            yield (
-                ("links", names[1]),
-                f'the exact solution "rays" supports a single valve at {node}; the case has {len(names)} there',
-            )
+            text = f"supports a single valve at {node}; the case has {len(names)} there"
+            yield fault(case, ("links", names[1]), text)
     piped = {end for link in case.links.values() if link.kind == "pipe" for end in (link.from_, link.to)}
     for node in valves:
         if case.nodes[node].kind in ("junction", "inflow") and node not in piped:
-            yield ("nodes", node), 'the exact solution "rays" needs a pipe at every junction'
+            yield fault(case, ("nodes", node), "needs a pipe at every junction")
 
 
 def solution(case, start: ExactStart) -> Solution:
@@ -181,26 +165,22 @@ class RayPaths:
                 level[node], admittance[node] = self.reservoirs[node](now) + self.weight * self.z[node], np.inf
                 continue
             admittance[node] = sum(1.0 / self.impedance[pipe] for pipe, _ in ends)
-            incoming = sum(arrived[end] / self.impedance[end[0]] for end in ends) - self.rho * self._demand(node, now)
+            part = self.case.nodes[node]
+            demand = value(part.demand, now) if part.kind == "junction" else -value(part.flow, now)
+            incoming = sum(arrived[end] / self.impedance[end[0]] for end in ends) - self.rho * demand
             level[node] = incoming / admittance[node]
         for name, valve in self.valves.items():
             if self.group[valve.to] != group:
                 continue
             i, j = valve.from_, valve.to
             slack = 1.0 / admittance[i] + 1.0 / admittance[j]  # decrease of the potential drop per flow
-            flow = valve_equation_flow(self._conductance(valve, now), slack, level[i] - level[j])
+            conductance = 2.0 * self.rho * (valve.flow_area() * value(valve.opening, now)) ** 2
+            flow = valve_equation_flow(conductance, slack, level[i] - level[j])
             result["valve", name, 0] = flow / self.rho
             level[i], level[j] = level[i] - flow / admittance[i], level[j] + flow / admittance[j]
         result |= {("node", node, 0): values for node, values in level.items()}
         result |= {("sent", *end): 2.0 * level[self.node(*end)] - incoming for end, incoming in arrived.items()}
         return result
-
-    def _demand(self, node, now):
-        part = self.case.nodes[node]
-        return value(part.demand, now) if part.kind == "junction" else -value(part.flow, now)
-
-    def _conductance(self, valve, now):
-        return 2.0 * self.rho * (valve.flow_area() * value(valve.opening, now)) ** 2
 
     # results ---------------------------------------------------------------------------------------------------------
 
@@ -284,3 +264,6 @@ def valve_equation_flow(conductance, slack, drop) -> np.ndarray:
     root = np.sqrt(b * b + 4.0 * conductance * size)
     flow = np.where(size > 0.0, 2.0 * conductance * size / np.where(b + root > 0.0, b + root, 1.0), 0.0)
     return np.copysign(flow, drop)
+
+
+RAYS = Exact(("reservoir", "junction", "inflow"), ("pipe", "valve", "orifice"), find_faults, solution)

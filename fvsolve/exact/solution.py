@@ -1,17 +1,33 @@
-"""Exact solution as values of probes over time and fields of pipes; messages for cases without such a solution."""
+"""Exact solution as values of probes over time and fields of pipes; faults of cases without such a solution.
+
+Values of schedules are computed independently of the compiled functions, so that tests can compare both.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from fvsolve.errors import article
-from fvsolve.exact.schedule_values import value
 
 Law = Callable[[np.ndarray], np.ndarray]  # values at times
 GAUSS = np.polynomial.legendre.leggauss(5)
+
+
+class Exact(NamedTuple):
+    """Exact solution by its name in a case file: types of nodes and links that it supports, and two functions.
+
+    find_faults(case) yields a fault (keys, message) for each difference of a case from those that it covers
+    solution(case, start) computes the `Solution` of a case for which `find_faults` yields nothing
+    """
+
+    nodes: tuple[str, ...]
+    links: tuple[str, ...]
+    find_faults: Callable
+    solution: Callable
 
 
 @dataclass(frozen=True)
@@ -126,10 +142,51 @@ def reservoirs(case) -> dict[str, Law]:
     return {name: law(name, node) for name, node in case.nodes.items() if node.kind == "reservoir"}
 
 
+def value(schedule, t: np.ndarray, left: bool = False) -> np.ndarray:
+    """Values of a schedule at times t in SI units; at jumps the right limit, or the left limit if `left` is True."""
+    t = np.asarray(t, dtype=float)
+    times, values = schedule.time, schedule.value
+    if schedule.kind == "constant":
+        return np.full(t.shape, values[0])
+    if schedule.kind == "step":
+        side = "left" if left else "right"
+        return values[np.clip(np.searchsorted(times, t, side=side) - 1, 0, len(times) - 1)]
+    if schedule.kind == "harmonic":
+        mean, amplitude, period, phase = schedule.wave
+        return mean + amplitude * np.sin(2.0 * np.pi * t / period + phase)
+    inside = np.clip(t, times[0], times[-1])
+    if schedule.kind == "ramp":
+        s = (inside - times[0]) / (times[1] - times[0])
+        return values[1] + (values[0] - values[1]) * (1.0 - s) ** schedule.exponent
+    if schedule.kind == "linear":
+        return np.interp(inside, times, values)
+    from scipy.interpolate import PchipInterpolator
+
+    return PchipInterpolator(times, values)(inside)
+
+
+def kinks(schedule) -> list[float]:
+    """Times at which a schedule or its slope jumps; for a smooth schedule only its two ends."""
+    if schedule.kind in ("constant", "harmonic"):
+        return []
+    return [float(t) for t in (schedule.time[[0, -1]] if schedule.kind == "smooth" else schedule.time)]
+
+
+def constant_from(schedule, t: float) -> bool:
+    """True if a schedule is constant from time t on."""
+    later = schedule.time > t
+    return schedule.constant or not np.any(later) or bool(np.all(schedule.value[later] == value(schedule, t)))
+
+
+def fault(case, keys: tuple, text: str) -> tuple[tuple, str]:
+    """Fault (keys, message) of a case; the message is the name of its exact solution and `text`, a predicate."""
+    return keys, f'the exact solution "{case.exact.name}" {text}'
+
+
 def law_faults(case):
     """Yield a fault (keys, message) if the density law of a case is not `linear`."""
     if not case.law.linear:
-        yield ("fluid", "law"), f'the exact solution "{case.exact.name}" holds only with the law "linear"'
+        yield fault(case, ("fluid", "law"), 'holds only with the law "linear"')
 
 
 def type_faults(case, nodes: tuple[str, ...], links: tuple[str, ...]):
@@ -137,12 +194,11 @@ def type_faults(case, nodes: tuple[str, ...], links: tuple[str, ...]):
 
     nodes, links : types that it supports
     """
-    name = case.exact.name
     for group, parts, known in (("nodes", case.nodes, nodes), ("links", case.links, links)):
         for part, item in parts.items():
             if item.kind not in known:
-                text = f'the exact solution "{name}" does not support {article(item.kind)}'
-                yield (group, part), f"{text}; it supports {', '.join(known)}"
+                text = f"does not support {article(item.kind)}; it supports {', '.join(known)}"
+                yield fault(case, (group, part), text)
 
 
 def count_faults(case, items: list, noun: str):
@@ -152,6 +208,15 @@ def count_faults(case, items: list, noun: str):
     """
     if len(items) != 1:
         yield ("exact", "name"), f'"{case.exact.name}" needs exactly one {noun}; the case has {len(items)}'
+
+
+def valve_faults(case, name: str):
+    """Yield a fault (keys, message) if a valve or orifice of a case has a law other than the turbulent one."""
+    part = case.links[name]
+    if part.characteristic != "linear":
+        yield fault(case, ("links", name, "characteristic"), 'supports only characteristic = "linear"')
+    if part.laminar_reynolds is not None:
+        yield fault(case, ("links", name, "laminar_reynolds"), "supports no laminar flow. Remove this key")
 
 
 def level_faults(exact: Solution):
@@ -166,5 +231,5 @@ def level_faults(exact: Solution):
         rim = exact.case.nodes[name].height
         if low < -1e-9 or (rim is not None and high > rim + 1e-9):
             event = "runs dry" if low < -1e-9 else "overflows"
-            text = f'the exact solution "{exact.case.exact.name}" is not valid after the tank {event}'
-            yield ("nodes", name), f"{text}; expected an earlier end of the run"
+            text = f"is not valid after the tank {event}; expected an earlier end of the run"
+            yield fault(exact.case, ("nodes", name), text)

@@ -206,7 +206,7 @@ DELAYS = RhsTerms(
 )
 COUPLED = RhsTerms(solve_nodes="delay_lines.line_rates: solve_line_clusters")
 BANDS = RhsTerms(exchange="band_exchange: exchange_states", reduce_rate="band_exchange: reduce_rate")
-BOUNDARY_EXCHANGE = RhsTerms(package="fvsolve.basins", boundary_exchange="row_bands: put_boundary_flows")
+BOUNDARY_EXCHANGE = RhsTerms(package="fvsolve.basins", boundary_exchange="basin_patches: put_boundary_flows")
 MIXED = RhsTerms(mix="scalar_transport: mix_scalars")
 ALWAYS = RhsTerms(record="observation: record_nodes", events="observation: tank_events")
 

@@ -1,12 +1,17 @@
-"""Data of a plane mesh: cells, faces and named patches, all SI."""
+"""Data of a plane mesh, all SI: cells, faces and named patches; their assembly from cells, and quality measures."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee
 
 WALL = "wall"  # patch of all boundary faces without a name
+NO_NEIGHBOUR, CROWDED = -1, -2  # no mate: a boundary edge; more than one neighbour, or a neighbour on the same side
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,3 +73,187 @@ class Mesh:
         k = self.patches.index(name)
         first, last = np.searchsorted(-self.right, [k + 1, k + 2])  # -right of inner faces is 0 or less, in any order
         return slice(int(first), int(last))
+
+
+@dataclass(frozen=True, eq=False)
+class Edges:
+    """Edges of all cells, by cell and corner, anticlockwise; an edge between two cells occurs twice.
+
+    cell : int64[e]  cell of the edge; start, stop : int64[e]  points at its ends
+    key : int64[e]  number of the pair of points, equal for both directions
+    mate : int64[e]  index of the same edge in the neighbour, NO_NEIGHBOUR on the boundary, CROWDED where cells overlap
+    The argument `cells` of the methods is the number of cells.
+    """
+
+    cell: np.ndarray
+    start: np.ndarray
+    stop: np.ndarray
+    key: np.ndarray
+    mate: np.ndarray
+
+    @cached_property
+    def inner(self) -> np.ndarray:
+        """Indices of the edges between two cells, each once: that in the cell with the lower number."""
+        return np.flatnonzero(np.arange(self.mate.size) < self.mate)
+
+    @cached_property
+    def outer(self) -> np.ndarray:
+        """Indices of the edges on the boundary."""
+        return np.flatnonzero(self.mate == NO_NEIGHBOUR)
+
+    def pieces(self, cells: int) -> np.ndarray:
+        """Number of the part to which each cell belongs, connected by shared faces : int64[cells]."""
+        return connected_components(self.graph(cells), directed=False)[1].astype(np.int64)
+
+    def order(self, cells: int) -> np.ndarray:
+        """Order of the cells in which neighbours are close together (reverse Cuthill-McKee) : int64[cells]."""
+        graph = self.graph(cells)
+        return reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True).astype(np.int64)
+
+    def graph(self, cells: int) -> coo_array:
+        """Adjacency matrix : int8[cells, cells], 1 at (lower number, higher number) of two cells that share a face."""
+        pair = self.cell[self.inner], self.cell[self.mate[self.inner]]
+        return coo_array((np.ones(self.inner.size, np.int8), pair), shape=(cells, cells))
+
+
+def edges_of(cells: np.ndarray, points: int) -> Edges:
+    """Edges of cells.
+
+    cells : int64[n, 4]  corners of cells, anticlockwise, -1 last in a triangle; points : number of points
+    """
+    stop = np.roll(cells, -1, axis=1)
+    triangle = cells[:, 3] < 0
+    stop[triangle, 2] = cells[triangle, 0]
+    real = (cells >= 0).ravel()
+    cell = np.repeat(np.arange(len(cells)), 4)[real]
+    start, stop = cells.ravel()[real], stop.ravel()[real]
+    key = np.minimum(start, stop) * points + np.maximum(start, stop)
+    return Edges(cell, start, stop, key, _mates(key, start))
+
+
+def _mates(key: np.ndarray, start: np.ndarray) -> np.ndarray:
+    order = np.argsort(key, kind="stable")
+    runs = np.flatnonzero(np.diff(key[order], prepend=-1))
+    count = np.diff(runs, append=key.size)
+    mate = np.full(key.size, CROWDED)
+    mate[order[runs[count == 1]]] = NO_NEIGHBOUR
+    pairs = runs[count == 2]
+    first, second = order[pairs], order[pairs + 1]
+    opposite = start[first] != start[second]
+    first, second = first[opposite], second[opposite]
+    mate[first], mate[second] = second, first
+    return mate
+
+
+def key_of(ends: np.ndarray, points: int) -> np.ndarray:
+    """Keys of pairs of points, as in `Edges` : int64[k]. ends : int64[k, 2]; points : number of points"""
+    return ends.min(axis=1) * points + ends.max(axis=1)
+
+
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Cross product a_x b_y - a_y b_x of plane vectors over the last axis."""
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def area_and_centre(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Signed areas and centroids of cells, exact for rectangles : float64[n], float64[n, 2].
+
+    With corners p0 to p3, and the areas a1, a2 on both sides of the diagonal p0 p2, A = a1 + a2:
+    centroid = (p0 + p1 + p2 + p3) / 4 - ((p1 + p3) - (p0 + p2)) / 12 - (a1 - a2) (p3 - p1) / (6 A).
+    A triangle is a quadrilateral whose p3 is p0.
+    """
+    p0, p1, p2 = (points[cells[:, k]] for k in range(3))
+    p3 = points[np.where(cells[:, 3] < 0, cells[:, 0], cells[:, 3])]
+    area = 0.5 * cross(p2 - p0, p3 - p1)
+    difference = 0.5 * (cross(p1 - p0, p2 - p0) - cross(p2 - p0, p3 - p0))
+    even, odd = p0 + p2, p1 + p3
+    safe = np.where(area == 0.0, 1.0, area)
+    return area, 0.25 * (even + odd) - (odd - even) / 12.0 - (difference / (6.0 * safe))[:, None] * (p3 - p1)
+
+
+def corners(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(cross product, scalar product, length) for the corners of cells : three float64[n, 4].
+
+    The products are those of the side into a corner and the side out of it; the length is that of the side out of it.
+    In a triangle the fourth corner is the first again.
+    """
+    out = np.empty((3, len(cells), 4))
+    for selected, count in ((cells[:, 3] < 0, 3), (cells[:, 3] >= 0, 4)):
+        at = points[cells[selected, :count]]
+        outgoing = np.roll(at, -1, axis=1) - at
+        incoming = np.roll(outgoing, 1, axis=1)
+        values = np.stack(
+            [
+                cross(incoming, outgoing),
+                np.sum(incoming * outgoing, axis=2),
+                np.hypot(outgoing[..., 0], outgoing[..., 1]),
+            ]
+        )
+        out[:, selected, :count] = values
+        out[:, selected, 3] = values[:, :, 0 if count == 3 else 3]
+    return out[0], out[1], out[2]
+
+
+def assemble(
+    points: np.ndarray,
+    cells: np.ndarray,
+    edges: Edges,
+    patches: Sequence[str],
+    patch: np.ndarray,
+    grid: Grid | None = None,
+    notes: Sequence[str] = (),
+) -> Mesh:
+    """Mesh of valid, anticlockwise cells.
+
+    points, cells, grid, notes : as in `Mesh`; patches : names of the patches
+    patch : int64[outer]  number of the patch of each boundary edge
+    """
+    area, centre = area_and_centre(points, cells)
+    order = np.argsort(patch, kind="stable")
+    chosen = np.concatenate([edges.inner, edges.outer[order]])
+    right = np.concatenate([edges.cell[edges.mate[edges.inner]], -1 - patch[order]])
+    ends = np.stack([edges.start[chosen], edges.stop[chosen]], axis=1)
+    a, b = points[ends[:, 0]], points[ends[:, 1]]
+    along = b - a
+    length = np.hypot(along[:, 0], along[:, 1])
+    normal = np.stack([along[:, 1], 0.0 - along[:, 0]], axis=1) / length[:, None]  # 0 - x avoids negative zeros
+    left, middle = edges.cell[chosen], 0.5 * (a + b)
+    return Mesh(
+        points, cells, area, centre, left, right, normal, length, middle, ends, tuple(patches), grid, tuple(notes)
+    )
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Quality measures of a mesh.
+
+    smallest, largest : least and greatest area of a cell [m2]
+    angle : least angle at a corner [rad]; sharpest : cell with this angle
+    ratio : greatest ratio of the areas of two neighbours [-]; steepest : face between them
+    A mesh without inner faces has ratio 1 and steepest -1.
+    """
+
+    smallest: float
+    largest: float
+    angle: float
+    sharpest: int
+    ratio: float
+    steepest: int
+
+
+def quality(mesh: Mesh) -> Quality:
+    """Compute the quality measures of a mesh."""
+    turn, straight, _ = corners(mesh.points, mesh.cells)
+    angle = np.arctan2(turn, -straight).min(axis=1)
+    sharpest = int(np.argmin(angle))
+    left, right = mesh.area[mesh.left[: mesh.inner]], mesh.area[mesh.right[: mesh.inner]]
+    ratio = np.maximum(left, right) / np.minimum(left, right)
+    steepest = int(np.argmax(ratio)) if ratio.size else -1
+    return Quality(
+        smallest=float(mesh.area.min()),
+        largest=float(mesh.area.max()),
+        angle=float(angle[sharpest]),
+        sharpest=sharpest,
+        ratio=float(ratio[steepest]) if ratio.size else 1.0,
+        steepest=steepest,
+    )

@@ -8,9 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from fvsolve.errors import Fault, MeshError, did_you_mean
-from fvsolve.mesh.edges import Edges, edges_of
-from fvsolve.mesh.mesh import WALL, Grid, Mesh
-from fvsolve.mesh.shapes import assemble
+from fvsolve.mesh.mesh import WALL, Edges, Grid, Mesh, assemble, edges_of
 
 SIDES = {"west": 1, "east": 1, "south": 0, "north": 0}  # axis along each side
 LINE_TOLERANCE = 1e-6  # of the size: greatest distance of a number from its grid line
@@ -39,10 +37,8 @@ def rectangle(
         raise MeshError(faults, "rectangle")
     lines = [_graded(*axis) for axis in zip(origin, size, cells, grading, strict=True)]
     if any(np.diff(axis).min() <= 0.0 for axis in lines):
-        raise MeshError(
-            [Fault("grading", f"{_list_text(grading)}: the smallest cells vanish; expected ratios nearer to 1")],
-            "rectangle",
-        )
+        text = f"{_list_text(grading)}: the smallest cells vanish; expected ratios nearer to 1"
+        raise MeshError([Fault("grading", text)], "rectangle")
     solid = np.ones((cells[1], cells[0]), bool)
     for k, hole in enumerate(holes):
         faults += _cut(solid, lines, f"holes[{k}]", hole)
@@ -137,9 +133,8 @@ def _cut(solid: np.ndarray, lines: Sequence[np.ndarray], place: str, hole: Seque
         if indices[k] is None
     ]
     if not faults and (indices[0] == indices[2] or indices[1] == indices[3]):
-        return [
-            Fault(place, f"{_list_text(hole)} contains no cells; expected x0 and x1, y0 and y1 on different grid lines")
-        ]
+        text = f"{_list_text(hole)} contains no cells; expected x0 and x1, y0 and y1 on different grid lines"
+        return [Fault(place, text)]
     if not faults:
         solid[indices[1] : indices[3], indices[0] : indices[2]] = False
     return faults
@@ -210,9 +205,8 @@ def _patch_range(place: str, side: str, span: list, lines: Sequence[np.ndarray],
     if not span:
         return along[0], along[-1]
     if len(span) != 2 or not all(math.isfinite(value) for value in span) or not span[0] < span[1]:
-        return Fault(
-            place, f"{_list_text(span)}; expected two coordinates along the {side} side [m], the first below the second"
-        )
+        text = f"expected two coordinates along the {side} side [m], the first below the second"
+        return Fault(place, f"{_list_text(span)}; {text}")
     first, last = (_line(along, value) for value in span)
     text = f"{span[0]:.9g} to {span[1]:.9g} m"
     if first is None or last is None or first == last:

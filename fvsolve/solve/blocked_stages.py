@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.basins.row_bands import BAND_MARGIN
+from fvsolve.basins.boundary_cells import BAND_MARGIN
 from fvsolve.kernels import stage_sums
 from fvsolve.solve.partition import Partition, common_cells, quantities
 

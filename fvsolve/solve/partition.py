@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fvsolve.basins.row_bands import BAND_MARGIN
+from fvsolve.basins.boundary_cells import BAND_MARGIN
 from fvsolve.errors import FvsolveError, Notice, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model import Model

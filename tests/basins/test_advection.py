@@ -10,8 +10,8 @@ from pytest import approx
 from reference.carried import NONE, SCHEMES, Carried, carried, means, ring_rates
 from scipy.special import erfc
 
-from fvsolve.basins import diffusion
-from fvsolve.basins.transport.lower_velocity import face_flows, grid_flows
+from fvsolve.basins import advection
+from fvsolve.basins.transport.lower import face_flows, grid_flows
 from fvsolve.mesh import rectangle
 
 TURN = {"expression": "rotation", "centre": (0.5, 0.5), "angular_velocity": 2.0 * np.pi}
@@ -277,9 +277,7 @@ def test_a_step_of_euler_as_long_as_diffusion_allows_keeps_bounds():
     for seed in range(20):
         case, s = random_case("upwind", seed, through=True, deep=True)
         rate = np.zeros_like(s)
-        flows = 1.0, case.flow_x, case.flow_y, case.depth, case.outside
-        size = case.nx, case.ny, 0, case.ny, case.kx, case.ky
-        most = diffusion.grid_diffusion(*size, 0.01, *flows, s, case.other, rate)
+        most = advection.grid_diffusion(case.grid, 0.01, case.flows(), case.depth, s, case.other, rate)
         low, high = surroundings(case, s / case.depth)
         after = (s + rate / most) / case.depth
         assert np.all(after > low - 1e-14) and np.all(after < high + 1e-14)
@@ -288,18 +286,17 @@ def test_a_step_of_euler_as_long_as_diffusion_allows_keeps_bounds():
 def test_the_rates_that_set_the_step_are_those_of_plain_grids():
     case = carried("upwind", 8, {"expression": "constant", "u": 3.0, "v": -2.0}, size=(4.0, 2.0))
     assert case.fastest == approx(3.0 / 0.5 + 2.0 / 0.25)
-    size, s = (case.nx, case.ny, 0, case.ny, case.kx, case.ky), np.zeros(64)
-    flows = 1.0, 0.0 * case.flow_x, 0.0 * case.flow_y, NONE, case.outside
-    most = diffusion.grid_diffusion(*size, 0.1, *flows, s, case.other, s.copy())
+    s, flows = np.zeros(64), case.flows(0.0)
+    most = advection.grid_diffusion(case.grid, 0.1, flows, NONE, s, case.other, s.copy())
     assert most == approx(2.0 * 0.1 * (1.0 / 0.5**2 + 1.0 / 0.25**2))
 
 
 def test_decay_leads_to_the_ambient_value():
     depth, s, rate = np.array([1.0, 2.0, 0.0]), np.array([3.0, 4.0, 0.0]), np.ones(3)
-    diffusion.add_decay(0.1, 2.0, depth, s, rate)
+    advection.add_decay(0.1, 2.0, depth, s, rate)
     assert rate == approx([1.0 - 0.1, 1.0, 1.0])
     rate = np.zeros(3)
-    diffusion.add_decay(0.1, 2.0, NONE, s, rate)
+    advection.add_decay(0.1, 2.0, NONE, s, rate)
     assert rate == approx([-0.1, -0.2, 0.2])
 
 

@@ -57,20 +57,9 @@ class Field:
     def advection(self, scheme, flow, s, outside=None, depth=NONE, diffusivity=0.0, wide=2.0, bounds=FREE):
         work, found = np.full(advection_faces.work_size(self.integers), np.nan), np.full_like(s, np.nan)
         outside = np.zeros(len(self.edge)) if outside is None else outside
+        flows, mesh = advection_faces.MeshFlows(1.0, flow, outside), (self.floats, self.integers)
         return found, advection_faces.advection_rates(
-            scheme,
-            wide,
-            diffusivity,
-            1.0,
-            self.floats,
-            self.integers,
-            flow,
-            depth,
-            outside,
-            *bounds,
-            s,
-            work,
-            found,
+            scheme, wide, diffusivity, mesh, flows, depth, bounds, s, work, found
         )
 
     def stream(self, psi) -> np.ndarray:

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fvsolve.basins import frame_reaction
+from fvsolve.basins import frame_forces
 from fvsolve.basins.basin_frames import CELL_POSITIONS, REST_LEVEL, REST_SURFACE
 
 WIDE, LONG, DENSITY, THICKNESS, LEVEL = 4, 3, 998.0, 0.7, 0.25
@@ -17,7 +17,7 @@ N = WIDE * LONG
 def test_moments_are_sums_over_cells(monkeypatch, deep, grid):
     """deep : water with a free surface, else a liquid of constant thickness; grid : rows of cells, else any mesh"""
     for name in ("mass_factor", "row_sums"):
-        monkeypatch.setattr(frame_reaction, name, getattr(frame_reaction, name).py_func)
+        monkeypatch.setattr(frame_forces, name, getattr(frame_forces, name).py_func)
     random = np.random.default_rng(8)
     columns, lines = random.normal(0.0, 2.0, WIDE), random.normal(0.0, 2.0, LONG)
     x, y = np.tile(columns, LONG), np.repeat(lines, WIDE)
@@ -31,7 +31,7 @@ def test_moments_are_sums_over_cells(monkeypatch, deep, grid):
     basin = {"n": N, "y": 0, "frame": 0, "deep": int(deep), "thickness": THICKNESS, "area": start, "plan": start + N,
              "nx": WIDE if grid else 0, "ny": LONG if grid else 0}  # fmt: skip
     tables = SimpleNamespace(plane=np.concatenate([frame, places, area, rest, surface]), settings=[{"rho": DENSITY}])
-    found = frame_reaction.mass_moments.py_func(
+    found = frame_forces.mass_moments.py_func(
         tables, basin, np.concatenate([h, qx, qy]), np.concatenate([dh, dx, dy]), 0, 0.0, 0.0, 0.0
     )
 

@@ -15,8 +15,7 @@ from fvsolve import advance, build, load, run
 from fvsolve.basins.lower_mesh import lower_mesh
 from fvsolve.errors import CaseError
 from fvsolve.mesh import rectangle
-from fvsolve.mesh.edges import edges_of
-from fvsolve.mesh.shapes import assemble
+from fvsolve.mesh.mesh import assemble, edges_of
 from fvsolve.model.model import State
 from fvsolve.studies.energy.energy_balance import energy
 

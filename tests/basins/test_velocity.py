@@ -12,7 +12,7 @@ from reference.plain import triangles, write_msh
 from reference.scenes import scene
 
 import fvsolve
-from fvsolve.basins.transport.lower_velocity import EXPRESSIONS, face_flows, grid_flows
+from fvsolve.basins.transport.lower import EXPRESSIONS, face_flows, grid_flows
 from fvsolve.errors import CaseError, MeshError
 from fvsolve.mesh import read, rectangle
 

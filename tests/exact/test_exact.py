@@ -290,7 +290,7 @@ def test_schedules_have_the_values_that_kernels_read(schedule):
     case = pulses.front()
     case["nodes"]["gate"] = scenes.junction(schedule)
     model = model_of(load({key: value for key, value in case.items() if key != "exact"}))
-    from fvsolve.exact.schedule_values import value
+    from fvsolve.exact.solution import value
 
     index = int(model.tables.nodes[model.node_names.index("gate")]["schedule"])
     t = np.array([0.0, 0.1, 0.15, 0.2, 0.33, 0.5, 0.7])

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from fvsolve.assembly.scheme_codes import CODES
-from fvsolve.basins import second_order
+from fvsolve.basins import advection
 from fvsolve.basins.free_surface import surface_rows as shallow_rows
 from fvsolve.basins.liquid import grid_linear as liquid
 from fvsolve.basins.liquid import grid_nonlinear as liquid_log
@@ -49,11 +49,10 @@ def carried(code: int) -> np.ndarray:
     n = 8
     rng, rate = np.random.default_rng(4), np.zeros(n * n)
     flows, c, outside = rng.normal(size=2 * n * (n + 1)), rng.random(n * n), rng.random(4 * n)
-    ones, work = np.ones(n), np.zeros(second_order.second_order_work(n, n))
-    along, across = flows[: n * (n + 1)], flows[n * (n + 1) :]
-    second_order.second_order_rates(
-        rec.MUSCL, code, n, n, 0, n, n, True, ones, ones, 1.0, along, across, outside, c, work, rate
-    )
+    ones, work = np.ones(n), np.zeros(advection.second_order_work(n, n))
+    grid = advection.Grid(n, n, 0, n, ones, ones)
+    flows = advection.GridFlows(1.0, flows[: n * (n + 1)], flows[n * (n + 1) :], outside)
+    advection.second_order_rates(rec.MUSCL, code, grid, 0, n, flows, c, work, rate)
     return rate
 
 

@@ -8,7 +8,7 @@ from pytest import approx
 from reference.scenes import lake, scene, tank, valve
 
 import fvsolve
-from fvsolve.basins.transport.lower_velocity import face_flows
+from fvsolve.basins.transport.lower import face_flows
 from fvsolve.errors import CaseError, MeshError
 from fvsolve.mesh import rectangle
 from fvsolve.parts.formula import SpatialFieldKey

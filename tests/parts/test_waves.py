@@ -12,7 +12,7 @@ from fvsolve import run
 from fvsolve.assembly.schedule_tables import Schedules
 from fvsolve.case.load import load
 from fvsolve.errors import CaseError
-from fvsolve.exact.schedule_values import value
+from fvsolve.exact.solution import value
 from fvsolve.kernels.schedule_pieces import piece_slopes, piece_value
 from fvsolve.parts.schedule import Schedule
 

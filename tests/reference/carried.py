@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.basins import advection, diffusion
-from fvsolve.basins.transport.lower_velocity import face_flows, grid_flows
+from fvsolve.basins import advection, fifth_order
+from fvsolve.basins.advection import Grid, GridFlows
+from fvsolve.basins.transport.lower import face_flows, grid_flows
 from fvsolve.kernels import dtypes as rec
 from fvsolve.mesh import rectangle
 
@@ -32,20 +33,27 @@ class Carried:
         self.flow_x, self.flow_y, self.depth, self.bounds = flow_x, flow_y, depth, bounds
         self.outside = np.broadcast_to(outside, 2 * (self.nx + self.ny)).astype(float).copy()
         self.scheme, self.limiter = SCHEMES[scheme]
-        self.work = np.full(advection.advection_work(self.scheme, self.nx, self.ny), np.nan)
-        self.other = np.full(diffusion.diffusion_work(self.nx, self.ny), np.nan)
-        size = self.nx, self.ny, self.kx, self.ky
-        self.fastest = advection.grid_fastest(*size, flow_x, flow_y, depth, self.work)
+        size = self.nx, self.ny
+        self.work = np.full(max(advection.advection_work(*size), fifth_order.fifth_order_work(*size)), np.nan)
+        self.other = np.full(advection.diffusion_work(*size), np.nan)
+        self.fastest = advection.grid_fastest(self.grid, self.flows(), depth, self.work)
+
+    @property
+    def grid(self):
+        return Grid(self.nx, self.ny, 0, self.ny, self.kx, self.ky)
+
+    def flows(self, factor=1.0):
+        return GridFlows(factor, self.flow_x, self.flow_y, self.outside)
 
     def rates(self, s, factor=1.0):
-        size, rate = (self.nx, self.ny, self.kx, self.ky), np.empty_like(s)
-        rows = self.nx, self.ny, 0, self.ny, self.kx, self.ky
-        flows = factor, self.flow_x, self.flow_y, self.depth, self.outside
-        advection.grid_advection(self.scheme, self.limiter, *rows, *flows, s, self.work, rate)
+        rate, field = np.empty_like(s), (self.flows(factor), self.depth)
+        advection.grid_advection(self.scheme, self.limiter, self.grid, *field, s, self.work, rate)
         if self.scheme in (rec.LINEAR, rec.WENO5):
-            advection.add_fifth_order(self.scheme, *size, *flows, *self.bounds, self.fastest, s, self.work, rate)
+            fifth_order.add_fifth_order(
+                self.scheme, self.grid, *field, self.bounds, self.fastest, s, self.work, rate
+            )  # fmt: skip
         if self.diffusivity:
-            diffusion.grid_diffusion(*rows, self.diffusivity, *flows, s, self.other, rate)
+            advection.grid_diffusion(self.grid, self.diffusivity, *field, s, self.other, rate)
         return rate
 
     def run(self, s, end, courant, method="ssp-rk3", factor=lambda t: 1.0):

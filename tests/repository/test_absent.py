@@ -157,10 +157,7 @@ def test_a_basin_alone_has_the_rates_that_it_has_beside_a_link(physics, law):
 
 
 def test_a_basin_compiles_no_links_and_no_other_scheme(compiling):
-    network, fifth = (
-        {"restrictions", "linear_nodes", "basin_patches", "reconstruction"},
-        {"fifth_order", "flux_correction"},
-    )
+    network, fifth = {"restrictions", "linear_nodes", "basin_patches", "reconstruction"}, {"fifth_order"}
     muscl, weno5 = (files(fvsolve.build(fvsolve.load(pool("transport", False, scheme=s)))) for s in ("muscl", "weno5"))
     assert muscl & (network | fifth) == {"reconstruction"}
     assert weno5 & (network | fifth) == fifth | {"reconstruction"}

@@ -163,7 +163,7 @@ class FreeSurfaceRows(BasinRows):
         states, given = np.zeros((3, self.n)), self.part.start
         depth = self.depth
         if self.part.on is not None:
-            from fvsolve.basins.lower_frames import level_at_start
+            from fvsolve.basins.lower_motion import level_at_start
 
             depth = level_at_start(self, attitude)
             states[0] = depth - self.depth

@@ -3,11 +3,11 @@
 from math import inf
 
 from fvsolve.basins.basin_patches import needs_rates, normal_gravity, put_open_flows
+from fvsolve.basins.boundary_cells import band_cells
 from fvsolve.basins.cell_stretching import deviations_of
 from fvsolve.basins.free_surface import surface_grid, surface_mesh
 from fvsolve.basins.free_surface.bed_friction import add_capped_friction, add_friction, damp_flows
 from fvsolve.basins.physics_codes import physics_code
-from fvsolve.basins.row_bands import band_cells
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import NO_DRAG, RATE
 from fvsolve.kernels.stage_sums import (

@@ -154,7 +154,7 @@ class LiquidRows(BasinRows):
 
         It is that on a body without acceleration: dp / rho = -d(phi) with the gravity potential phi.
         """
-        from fvsolve.basins.lower_frames import potential_at_start
+        from fvsolve.basins.lower_motion import potential_at_start
 
         phi = potential_at_start(self)
         if self.linear:
