@@ -14,7 +14,7 @@ from scipy.sparse.linalg import expm_multiply
 
 from fvsolve.case import load
 from fvsolve.model import RunData, State, build
-from fvsolve.steppers.signatures import addresses, rhs_at
+from fvsolve.steppers.run_handle import addresses, rhs_at
 
 LENGTH = SPEED = 1000.0  # [m, m/s]
 END = 2.0  # twice the travel time of the pipe [s]

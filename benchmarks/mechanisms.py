@@ -64,7 +64,7 @@ def rates(bodies: dict):
     from reference.bodies import bodies as scene_of
 
     import fvsolve
-    from fvsolve.steppers.signatures import addresses, rhs_at
+    from fvsolve.steppers.run_handle import addresses, rhs_at
 
     model = fvsolve.build(fvsolve.load(scene_of(bodies, 1.0)))
     y, dydt, out = model.start.copy(), np.zeros(model.y_size), model.new_out()

@@ -15,7 +15,7 @@ from fvsolve.errors import Notice
 from fvsolve.kernels.delay_lines.wave_history import CORRECTED_TIME
 from fvsolve.step_limits.forcing_ranges import state_ranges, states_outside_cells
 from fvsolve.step_limits.step_notices import DOUBTFUL, WRONG
-from fvsolve.steppers import automatic, loop_indices
+from fvsolve.steppers import automatic
 from fvsolve.steppers.integrator import Integrator
 from fvsolve.steppers.tableau import method_named
 
@@ -72,13 +72,13 @@ class StepDoubling:
 
     def check(self, loop) -> None:
         """Repeat the last step as two half steps if a check is due; `loop` is a `RunLoop` at an accepted state."""
-        memory = loop.loop_state
-        steps, h = memory[loop_indices.STEPS], memory[loop_indices.LAST]
+        memory = loop.state
+        steps, h = memory["steps"], memory["last"]
         if not self.states.size or steps < self.restart_data[1]:
             return
         self.restart_data[1] = steps + 1.0  # check the next step if this step cannot be checked
-        end = loop.controls[loop_indices.END]
-        full_step = self.step if loop.t < end else min(self.step, end - memory[loop_indices.T_MARK])
+        end = loop.control["end"]
+        full_step = self.step if loop.t < end else min(self.step, end - memory["t_mark"])
         if h < FULL_STEP * full_step or corrected_store(loop):
             return
         before, now = loop.before[self.states], loop.now[self.states]
@@ -134,7 +134,7 @@ class StepDoubling:
             self.stepper.out = model.new_out()
         if first:
             self.stepper.discard_history()
-        self.stepper.controls[:] = loop.controls
+        self.stepper.control[0] = loop.control
         return self.stepper.single_step(loop.rhs, loop.run_data.handle, int(self.model.layout["supply"]), t, h, y)
 
     def widths(self) -> np.ndarray:

@@ -9,18 +9,17 @@ LEAST = 2.0**-34
 
 
 @njit(forceinline=True)
-def differences(rhs, handle, structure, ledger_offset, t, y, f, rates0, scale, y_work, f_work, out, jacobian):
-    """Compute the Jacobian of f and of the ledger rates by one-sided differences; returns the number of rhs calls.
+def differences(rhs, handle, r, t, y, f, ledger_rates, f_work):
+    """Write the Jacobian of f and of the ledger rates to `r.jacobian`, column by column; returns the number of calls.
 
-    f, rates0 : float64[n], float64[m]  f(t, y) and the ledger rates out[ledger_offset : ledger_offset + m] at y,
-    evaluated there and not taken from a stage
-    structure : flat array of `Structure.shape`
-    scale : float64[n]  size of a small deviation; the increment is 2^-26 max(|y|, scale), with 2^-34 |y| in place of
-    2^-26 |y| for states marked fine in the structure, and 2^-26 |scale| for a negative scale
-    y_work, f_work : float64[n]  work arrays
-    jacobian : float64[nnz]  result, in the order of the pattern, column by column
+    rhs : right-hand side, which is called once for each colour of columns, for one-sided differences
+    handle, r : handle of the model, open handle of the run; f_work : float64[n]  work array for rates
+    f, ledger_rates : float64[n], float64[m]  rates at (t, y), evaluated there and not taken from a stage
+    The increment of a state is 2^-26 max(|y|, scale), with 2^-34 |y| in place of 2^-26 |y| for states marked fine in
+    the structure, and 2^-26 |scale| for a negative scale.
     """
-    n = structure[SIZE]
+    structure, scale, y_work, out, jacobian = r.structure, r.scale, r.moved, r.out, r.jacobian
+    n, offset = structure[SIZE], r.control[0]["ledger_offset"]
     starts, rows = structure[structure[STARTS] :], structure[structure[ROWS] :]
     color_starts, columns = structure[structure[COLOR_STARTS] :], structure[structure[COLOR_COLUMNS] :]
     fine = structure[structure[FINE] :]
@@ -39,7 +38,7 @@ def differences(rhs, handle, structure, ledger_offset, t, y, f, rates0, scale, y
             per = 1.0 / (y_work[j] - y[j])  # the increment as rounded in the sum
             for p in range(starts[j], starts[j + 1]):
                 i = rows[p]
-                change = f_work[i] - f[i] if i < n else out[ledger_offset + i - n] - rates0[i - n]
+                change = f_work[i] - f[i] if i < n else out[offset + i - n] - ledger_rates[i - n]
                 jacobian[p] = change * per
             y_work[j] = y[j]
     return structure[COLORS]

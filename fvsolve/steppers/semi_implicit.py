@@ -8,8 +8,9 @@ state does not change, so steady states do not depend on h. The rate R [1/s] may
 from fvsolve.jit import njit
 from fvsolve.kernels.calls import damp_in_turn
 from fvsolve.steppers.coefficients import nodes_of, row_of, weights_of
-from fvsolve.steppers.loop_indices import CALLS
-from fvsolve.steppers.step_operations import BEGIN, STOP, combine, copy
+from fvsolve.steppers.erk import form_sum
+from fvsolve.steppers.run_handle import evaluate, open_run, store_ledger_rates
+from fvsolve.steppers.step_operations import BEGIN, STOP, copy
 
 
 @njit
@@ -29,32 +30,27 @@ def second_order_correction(begin, end, b, damping, k):
 
 
 @njit
-def attempt(
-    rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure, row_blocks, sums, t, h, y,
-    now, new, k, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, vectors, factors, complex_factors,
-):  # fmt: skip
+def attempt(handle, run, t, h, now, new):
     """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]), a stage of weight zero; returns 0.
 
-    k[1] is k[0] divided by 1 + h R, with the step h and the rate R of fast decay of each state.
-    factors : float64[2 n]  h R of the first two stages, then of the later stages; zero for states without fast decay
-    Other arguments as for `erk.attempt`; those for linear algebra and Newton iterations are not used.
+    k[1] is k[0] divided by 1 + h R, with the step h and the rate R of fast decay of each state. `factors` receives h R
+    of the first two stages, then of the later stages : float64[2 n]; zero for states without fast decay.
+    Arguments as for `erk.attempt`.
     """
-    s, b, c, n = k.shape[0], weights_of(coefficients, k.shape[0]), nodes_of(coefficients, k.shape[0]), scale.size
+    r = open_run(run)
+    k, row_blocks, ledger_rates, n = r.k, r.row_blocks, r.ledger_rates, r.scale.size
+    s, b, c = k.shape[0], weights_of(r.coefficients, k.shape[0]), nodes_of(r.coefficients, k.shape[0])
+    early, late = r.factors[:n], r.factors[n:]
     for m in range(row_blocks.shape[0]):
         copy(k[0, row_blocks[m, BEGIN] : row_blocks[m, STOP]], k[1, row_blocks[m, BEGIN] : row_blocks[m, STOP]])
-    for m in range(ledger_rates.shape[1]):
-        ledger_rates[1, m] = ledger_rates[0, m]
-    damp_in_turn(h, y[now], k[1], factors[:n], handle)
+    copy(ledger_rates[0], ledger_rates[1])
+    damp_in_turn(h, r.y[now], k[1], early, handle)
     for i in range(2, s):
-        for m in range(row_blocks.shape[0]):
-            combine(row_blocks[m, BEGIN], row_blocks[m, STOP], y[now], h, row_of(coefficients, s, i), i, k, y[3])
-        rhs(t + c[i] * h, y[3], k[i], out, handle)
-        for m in range(ledger_rates.shape[1]):
-            ledger_rates[i, m] = out[ledger_offset + m]
-        damp_in_turn(h, y[3], k[i], factors[:n] if i == 2 else factors[n:], handle)
-    for m in range(row_blocks.shape[0]):
-        if s > 2:
-            second_order_correction(row_blocks[m, BEGIN], row_blocks[m, STOP], b, factors[:n], k)
-        combine(row_blocks[m, BEGIN], row_blocks[m, STOP], y[now], h, b, s, k, y[new])
-    loop_state[CALLS] += s - 2.0
+        form_sum(r, h, row_of(r.coefficients, s, i), i, now, r.y[3])
+        evaluate(handle, r, t + c[i] * h, r.y[3], k[i])
+        store_ledger_rates(r, i)
+        damp_in_turn(h, r.y[3], k[i], early if i == 2 else late, handle)
+    for m in range(row_blocks.shape[0] if s > 2 else 0):
+        second_order_correction(row_blocks[m, BEGIN], row_blocks[m, STOP], b, early, k)
+    form_sum(r, h, b, s, now, r.y[new])
     return 0.0

@@ -15,7 +15,7 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, nearest
 from fvsolve.jit import compile_once, njit
-from fvsolve.steppers.signatures import FACTOR, FACTOR_COMPLEX, SOLVE, SOLVE_COMPLEX, compiled_as
+from fvsolve.steppers.run_handle import FACTOR, FACTOR_COMPLEX, SOLVE, SOLVE_COMPLEX, compiled_as
 
 # The header: lengths, then offsets into the same array.
 SIZE, LEDGERS, COLORS = 0, 1, 2  # states n, ledger rows m, colours

@@ -12,11 +12,13 @@ from reference.scenes import NO_FRICTION, SHARP, lake, pipe, scene
 from scipy.sparse import csc_array
 
 import fvsolve
-from fvsolve.jit import COMPILING, njit
+from fvsolve.jit import njit
 from fvsolve.model import RunData
 from fvsolve.model.jacobian_pattern import jacobian_pattern
+from fvsolve.steppers import METHODS
 from fvsolve.steppers.differences import differences, multiply
-from fvsolve.steppers.signatures import addresses, compiled_as
+from fvsolve.steppers.integrator import Integrator
+from fvsolve.steppers.run_handle import RATES, addresses, compiled_as, open_run, rhs_at
 from fvsolve.steppers.structure import KINDS, Structure
 
 CASES = sorted(folders.CASES.glob("*.toml"))
@@ -117,16 +119,13 @@ def test_a_pipe_couples_no_more_than_its_scheme_reads():
 @functools.cache
 def compiled_differences():
     """Function `differences`, compiled as in a stepper for a right-hand side given by its address."""
-    if not COMPILING:
-        return lambda calls, *others: differences(*calls, *others)
-    from fvsolve.steppers.signatures import rhs_at
 
     @njit
-    def differences_at(calls, handle, shape, where, t, y, f, supply, scale, y_work, f_work, out, jacobian):
-        rhs = rhs_at(calls[0])
-        return differences(rhs, handle, shape, where, t, y, f, supply, scale, y_work, f_work, out, jacobian)
+    def differences_of(handle, run, t, y, f, supply, f_work):
+        r = open_run(run)
+        return differences(rhs_at(r.calls[RATES]), handle, r, t, y, f, supply, f_work)
 
-    return compiled_as(differences_at, "hhhitvvvvvvvv")
+    return compiled_as(differences_of, "hhtvvvv")
 
 
 def slopes(model, t: float, y: np.ndarray, structure: Structure) -> np.ndarray:
@@ -134,9 +133,12 @@ def slopes(model, t: float, y: np.ndarray, structure: Structure) -> np.ndarray:
     n, m, at = model.y_size, len(model.node_names), int(model.layout["supply"])
     slate = RunData(model)
     f, out = slate.evaluate(t, y, np.inf)
-    supply, jacobian = out[at : at + m].copy(), np.full(structure.nnz, np.nan)
-    given = (addresses((model.functions.rhs,)), slate.handle, structure.shape, at, t, y, f, supply, model.scale.copy())
-    calls = compiled_differences()(*given, np.zeros(n), np.zeros(n), model.new_out(), jacobian)
+    supply = out[at : at + m].copy()
+    stepper = Integrator(METHODS["implicit-euler"], n, structure.m, lambda: structure, model.scale.copy())
+    stepper.calls, stepper.out = addresses((model.functions.rhs,) * (RATES + 1)), model.new_out()
+    stepper.control["ledger_offset"], stepper.jacobian[:] = at, np.nan
+    calls = compiled_differences()(slate.handle, stepper.handle(False), t, y, f, supply, np.zeros(n))
+    jacobian = stepper.jacobian
     assert calls == structure.color_count
     x, product = np.random.default_rng(0).normal(size=n), np.zeros(n + m)
     multiply(structure.shape, jacobian, x, product)

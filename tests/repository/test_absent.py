@@ -16,7 +16,6 @@ from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.rhs_assembly import PHASES
 from fvsolve.model import RunData
 from fvsolve.solve.run_loop import RunLoop
-from fvsolve.steppers import loop_indices
 
 PIPES = {"pipes", "ghost_cells", "reconstruction", "limiters", "fused_step"}
 MASSES = {"mass_dynamics"}
@@ -167,4 +166,4 @@ def test_the_rates_are_called_no_more_often_than_the_steps_ask_for():
     loop = RunLoop(fvsolve.build(fvsolve.load(tanks(method="rk4", step=0.1))))
     loop.begin(10.0, 1e308)
     loop.run(1e308)
-    assert loop.loop_state[loop_indices.STEPS] == 100 and loop.loop_state[loop_indices.CALLS] <= 4 * 100 + 1
+    assert loop.state["steps"] == 100 and loop.state["calls"] <= 4 * 100 + 1

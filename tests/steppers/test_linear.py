@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.sparse import csc_array
@@ -212,12 +214,16 @@ def test_differences_meet_the_slopes(n, m, density):
         dydt[:], out[where : where + m] = found[:n], found[n:]
 
     y = np.random.default_rng(2).normal(size=n)
-    f, f_work, y_work, out = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(where + m)
+    f, f_work, out = np.zeros(n), np.zeros(n), np.zeros(where + m)
     rhs(0.3, y, f, out, None)
     supply = out[where:].copy()
     jacobian = np.full(structure.nnz, np.nan)
     python = getattr(differences, "py_func", differences)
-    calls = python(rhs, None, structure.shape, where, 0.3, y, f, supply, np.ones(n), y_work, f_work, out, jacobian)
+    run = SimpleNamespace(
+        structure=structure.shape, scale=np.ones(n), moved=np.zeros(n), out=out, jacobian=jacobian,
+        control=[{"ledger_offset": where}],
+    )  # fmt: skip
+    calls = python(rhs, None, run, 0.3, y, f, supply, f_work)
     assert calls == structure.color_count
     slope = np.cos(a @ y + 0.3)[:, None] * a
     pattern = structure.pattern
