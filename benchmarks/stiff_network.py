@@ -15,10 +15,9 @@ from fvsolve.case import load
 from fvsolve.jit import njit
 from fvsolve.model import RunData, build
 from fvsolve.model.jacobian_pattern import jacobian_pattern
-from fvsolve.steppers.differences import differences
 from fvsolve.steppers.integrator import Integrator
 from fvsolve.steppers.run_handle import RATES, addresses, open_run, rhs_at
-from fvsolve.steppers.structure import Structure
+from fvsolve.steppers.structure import Structure, differences
 from fvsolve.steppers.tableau import method_named
 
 SIZES = ((10, 100), (50, 200))  # (pipes, cells of each)

@@ -14,9 +14,8 @@ from fvsolve.kernels.compiled_functions import fused_step_function
 from fvsolve.model import Model, RunData
 from fvsolve.model.scalar_tables import amount_indices
 from fvsolve.model.state_bounds import state_bounds
-from fvsolve.solve.blocked_stages import blocked_sums
 from fvsolve.solve.column_impact import separate, shut_places
-from fvsolve.solve.partition import make_partition
+from fvsolve.solve.partition import blocked_sums, make_partition
 from fvsolve.steppers import automatic, loop_records
 from fvsolve.steppers.integrator import Integrator
 from fvsolve.steppers.ledger import LEDGER_ROWS

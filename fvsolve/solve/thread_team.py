@@ -23,8 +23,7 @@ from fvsolve.kernels.compiled_functions import functions
 from fvsolve.model import RunData
 from fvsolve.model.run_data import aligned_zeros
 from fvsolve.model.state_bounds import state_bounds
-from fvsolve.solve.blocked_stages import blocked_sums
-from fvsolve.solve.partition import Partition
+from fvsolve.solve.partition import Partition, blocked_sums
 from fvsolve.steppers import loop_records
 from fvsolve.steppers.integrator import Integrator
 from fvsolve.steppers.run_handle import JOIN, compiled_as

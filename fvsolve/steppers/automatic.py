@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from fvsolve.steppers.built_in_methods import AUTO
 from fvsolve.steppers.integrator import Integrator
 from fvsolve.steppers.structure import Structure
-from fvsolve.steppers.tableau import method_named
+from fvsolve.steppers.tableau import AUTO, method_named
 
 EXPLICIT, IMPLICIT, TIGHT_IMPLICIT = "dormand-prince", "rodas-5p", "radau-iia-5"
 TIGHT_BELOW = 1e-6  # rtol below which TIGHT_IMPLICIT costs less: `benchmarks/stiff.py auto`

@@ -24,7 +24,7 @@ from fvsolve.steppers.run_handle import (
 )  # fmt: skip
 from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import Method
-from fvsolve.steppers.time_loop import compiled, compiled_attempt
+from fvsolve.steppers.time_loop import compiled
 
 IMPLICIT_VECTORS = ("first", "increment", "weights", "moved", "rate", "base", "fallback")
 all_arrays = attrgetter(*RunArrays._fields)
@@ -219,7 +219,7 @@ class Integrator:
             self.calls = addresses((self.attempt, rhs, rhs, rhs, rhs, rhs, *self.algebra, self.join))
         rhs(t, self.y[0], self.k[0], self.out, handle)
         self.ledger_rates[0] = self.out[ledger_offset : ledger_offset + self.ledger_rates.shape[1]]
-        error = compiled_attempt()(handle, self.handle(False), t, h, 0, 1)
+        error = self.attempt(handle, self.handle(False), t, h, 0, 1)
         return self.y[1].copy() if error != rec.NEWTON_FAILED else np.full(y.size, np.nan)
 
     def call(self, fused_step, observe, record, events, rhs, handle, ledger_offset: int, armed: np.ndarray) -> int:

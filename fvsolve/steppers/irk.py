@@ -67,7 +67,7 @@ def pairs_of(method: Method) -> int:
 def matrix(coefficients, s, index):
     """Flat coefficients of a method from matrix number `index` of its Newton data on.
 
-    The data are listed in `newton_transform.transformed`; each of its matrices has q x q entries, row by row.
+    The data are listed in `coefficients.transformed`; each of its matrices has q x q entries, row by row.
     s : number of stages, q = s - 1
     """
     return coefficients[s * s + 3 * s + index * (s - 1) * (s - 1) :]
@@ -101,7 +101,7 @@ def is_pair(blocks, q, b):
 def predict(r, h):
     """Predict the transformed stage increments W = T^-1 Z by extrapolation of the slopes of the last step.
 
-    Z : increments of the implicit stages over the start of the step; T : see `newton_transform.transformed`
+    Z : increments of the implicit stages over the start of the step; T : see `coefficients.transformed`
     """
     s, h_last, buffer = r.k.shape[0], r.state[0]["last"], r.buffer
     q, c = s - 1, nodes_of(r.coefficients, s)
@@ -124,7 +124,7 @@ def predict(r, h):
 def factor_blocks(r, h):
     """Factor shift I - J for every block (real or complex shift) of L / h, and store the factors one after another.
 
-    L : block diagonal matrix of `newton_transform.transformed`; J : Jacobian
+    L : block diagonal matrix of `coefficients.transformed`; J : Jacobian
     Returns the number of factors, or 0 if a block has no good pivot.
     """
     q, b, real, pair, count = r.k.shape[0] - 1, 0, 0, r.scale.size, 0
@@ -149,7 +149,7 @@ def factor_blocks(r, h):
 def solve_blocks(r):
     """Solve (L / h x I - I x J) dW = R with the factors of `factor_blocks`; dW replaces R in `transformed`.
 
-    L : block diagonal matrix of `newton_transform.transformed`; J : Jacobian; x : Kronecker product
+    L : block diagonal matrix of `coefficients.transformed`; J : Jacobian; x : Kronecker product
     """
     q, n, b, real, pair = r.k.shape[0] - 1, r.scale.size, 0, 0, r.scale.size
     blocks, size, both = matrix(r.coefficients, q + 1, BLOCKS), int(r.newton[0]["factor_size"]), r.complex_factors[:n]
@@ -219,7 +219,7 @@ def iterate(handle, r, t, h, now):
     """Compute the transformed stage increments W = T^-1 Z by Newton iterations; returns CONVERGED or FAILED.
 
     W is stored in `transformed`, in place of its prediction.
-    Z : increments of the implicit stages over the start of the step; T : see `newton_transform.transformed`
+    Z : increments of the implicit stages over the start of the step; T : see `coefficients.transformed`
     """
     rows, f, q, before, status = r.transformed, r.rate, r.k.shape[0] - 1, 0.0, FAILED
     for turn in range(MOST):

@@ -65,6 +65,9 @@ DONE, BUDGET_SPENT, ROWS_FULL, FIELD, BAD_VALUE, TINY_STEP, BAD_STATUS, STOPPED,
 REPEAT = -1  # in place of a reason: compute the rates of the present state again
 FRESH, FUSED, EMIT, READY = range(4)  # values of `phase`
 
+LEAST_TOLERANCE = 1e-13  # least relative tolerance: below it rounding errors dominate
+LEAST_STEP = 4e-16  # least step, relative to the time
+
 RATE, STATUS, PLACE, CLOSING_RATE, JUMP_TIME = 0, 1, 2, 3, 4  # entries of `out` that the loop reads
 NO_JUMP = -1e300  # in JUMP_TIME: no jump will arrive
 CORRECTED, ARRIVED = 7, 8  # in STATUS: the record has corrected the accepted state; the record lets a jump arrive now

@@ -19,7 +19,6 @@ import numpy as np
 
 from fvsolve.jit import inline
 from fvsolve.steppers import loop_records as rec
-from fvsolve.steppers.differences import differences, multiply
 from fvsolve.steppers.run_handle import (
     RATES,
     REAL_FACTOR,
@@ -31,6 +30,7 @@ from fvsolve.steppers.run_handle import (
     store_ledger_rates,
 )
 from fvsolve.steppers.step_operations import copy, error_scale
+from fvsolve.steppers.structure import differences, multiply
 
 MOST = 10  # greatest number of iterations
 # For given steps, relative: target accuracy, error that counts as rounding, and greatest error accepted.

@@ -15,12 +15,11 @@ from numba import objmode
 from fvsolve.errors import FvsolveError
 from fvsolve.jit import COMPILING, DeclaredFunction, code_of, compile_once
 from fvsolve.steppers import automatic, loop_records
-from fvsolve.steppers.built_in_methods import AUTO
 from fvsolve.steppers.integrator import Integrator
+from fvsolve.steppers.loop_records import LEAST_STEP, LEAST_TOLERANCE
 from fvsolve.steppers.run_handle import EVENTS, FUSED_STEP, OBSERVE, RHS, argument_types
 from fvsolve.steppers.structure import Structure
-from fvsolve.steppers.tableau import METHODS, Method, method_named
-from fvsolve.steppers.tolerances import LEAST_STEP, LEAST_TOLERANCE
+from fvsolve.steppers.tableau import AUTO, METHODS, Method, method_named
 
 NO_LIMIT = 1e308
 

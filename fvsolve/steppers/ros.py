@@ -10,10 +10,10 @@ from __future__ import annotations
 from fvsolve.jit import inline, njit
 from fvsolve.steppers import loop_records as rec
 from fvsolve.steppers.coefficients import nodes_of, row_of, weights_of
-from fvsolve.steppers.differences import multiply
 from fvsolve.steppers.newton import factor_for, follow_stages, renew_at_start, spectral_radius
 from fvsolve.steppers.run_handle import REAL_SOLVE, evaluate, open_run, solve_at
 from fvsolve.steppers.step_operations import combine, copy, error_norm
+from fvsolve.steppers.structure import multiply
 
 # The array `base` of the run contains df/dt, `ledger_slopes` the time slopes of the ledger rates.
 

@@ -70,7 +70,7 @@ def sweep_once(handle, r, low, t, h, now, turn):
 def sweep(handle, r, low, t, h, now):
     """Compute the slopes k of the stages and their ledger rates in sweeps; returns CONVERGED or FAILED.
 
-    low : float64[q q]  lower triangular matrix C by rows, with A = C U, see `newton_transform.lower`
+    low : float64[q q]  lower triangular matrix C by rows, with A = C U, see `coefficients.lower`
     The rows of `transformed` receive the slopes before a sweep, their changes, and the slopes after it.
     handle, r : handle of the model, open handle of the run; t, h, now : as for `irk.attempt`
     """

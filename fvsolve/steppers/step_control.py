@@ -4,7 +4,7 @@ from math import sqrt
 
 from fvsolve.jit import njit
 from fvsolve.steppers import loop_records as rec
-from fvsolve.steppers.tolerances import LEAST_STEP
+from fvsolve.steppers.loop_records import LEAST_STEP
 
 STEPS_TO_SWITCH = (
     15  # net count of steps in favour of the other kind of method before a switch; doubled by every switch

@@ -360,17 +360,6 @@ def store_start_slopes(r):
             copy(k[0, begin:end], f_old[begin:end])
 
 
-@njit
-def attempt_with(handle, run, t, h, now, new):
-    """Take one step with the method of the run; arguments and result as for `erk.attempt`."""
-    return attempt_at(open_run(run).calls[STEP])(handle, run, t, h, now, new)
-
-
 def compiled():
     """Time loop `run_steps`, compiled for calls from Python."""
     return compiled_as(run_steps, "hh")
-
-
-def compiled_attempt():
-    """Single step `attempt_with`, compiled for calls from Python."""
-    return compiled_as(attempt_with, "hhttii")

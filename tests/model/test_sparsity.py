@@ -16,10 +16,9 @@ from fvsolve.jit import njit
 from fvsolve.model import RunData
 from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.steppers import METHODS
-from fvsolve.steppers.differences import differences, multiply
 from fvsolve.steppers.integrator import Integrator
 from fvsolve.steppers.run_handle import RATES, addresses, compiled_as, open_run, rhs_at
-from fvsolve.steppers.structure import KINDS, Structure
+from fvsolve.steppers.structure import KINDS, Structure, differences, multiply
 
 CASES = sorted(folders.CASES.glob("*.toml"))
 SCHEMES = ["upwind", "linear-upwind", "fromm", "central", "upwind3", "upwind5", "muscl", "weno5"]

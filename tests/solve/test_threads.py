@@ -155,7 +155,7 @@ FORMED = ("muscl, ssp-rk2", "muscl, a limiter of its own, rk4", "upwind5, ssp-rk
 def test_stages_formed_beside_rates_have_the_bits_of_those_formed_after_all(name, cells, monkeypatch):
     """Blocked stages have the bits of whole stages, for several block sizes and numbers of threads."""
     bits, _ = told(SCENES[name], 1)
-    here = importlib.import_module("fvsolve.solve.blocked_stages")
+    here = importlib.import_module("fvsolve.solve.partition")
     monkeypatch.setattr(here, "LEAST_STATES", 0)
     monkeypatch.setattr(here, "BLOCK", cells)
     model = fvsolve.build(fvsolve.load(SCENES[name]))

@@ -9,9 +9,8 @@ import pytest
 from scipy.sparse import csc_array
 
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers.differences import differences, multiply
-from fvsolve.steppers.state_pairs import pairs
-from fvsolve.steppers.structure import Structure
+from fvsolve.steppers.linear_sparse import pairs
+from fvsolve.steppers.structure import Structure, differences, multiply
 
 KINDS = ("dense", "banded", "sparse")
 

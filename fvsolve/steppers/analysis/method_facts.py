@@ -7,8 +7,8 @@ import math
 from dataclasses import dataclass, fields
 
 from fvsolve.steppers.analysis import stability_properties
-from fvsolve.steppers.analysis.absolute_monotonicity import ssp_radius
 from fvsolve.steppers.analysis.stability_function import StabilityFunction, stability_function
+from fvsolve.steppers.analysis.stability_properties import ssp_radius
 from fvsolve.steppers.tableau import Method, method_named
 
 

@@ -6,14 +6,15 @@ import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from math import factorial
 
 import numpy as np
 
-from fvsolve.steppers.analysis.pade import pade
+from fvsolve.steppers.analysis.method_facts import analyse
 from fvsolve.steppers.analysis.trees import short
 from fvsolve.steppers.numbers.polynomial import Polynomial
 from fvsolve.steppers.tableau import Method, method_named
-from fvsolve.validation import Kind, is_array, validated
+from fvsolve.validation import COUNT_FROM_ZERO, NAME, NUMBER, POINT, POSITIVE, Kind, is_array, validated
 
 NOTHING = Polynomial([])
 PLANE = Kind(lambda given: is_array(given, "fiuc", 0, 9, finite=False), "complex numbers")
@@ -148,3 +149,55 @@ def _leverrier(a: Sequence[Sequence]) -> tuple[list, list]:
         for i in range(s):
             m[i][i] = m[i][i] + characteristic[-1]
     return characteristic, adjugate
+
+
+@validated(k=COUNT_FROM_ZERO, m=COUNT_FROM_ZERO)
+def pade(k: int, m: int) -> tuple[Polynomial, Polynomial]:
+    """Numerator N(s) and denominator D(s) of the Pade approximation of e^s, with the degrees k and m.
+
+    Its power series agrees with that of e^s in the first k + m + 1 terms.
+    N(s) = sum_j (k+m-j)! k! / ((k+m)! j! (k-j)!) s^j; D is the same sum with m in place of k and -s in place of s
+    (Hairer and Wanner 1996, IV.3).
+    """
+
+    def part(degree: int, sign: int) -> Polynomial:
+        weight = Fraction(factorial(degree), factorial(k + m))
+        return Polynomial(
+            weight * sign**j * Fraction(factorial(k + m - j), factorial(j) * factorial(degree - j))
+            for j in range(degree + 1)
+        )
+
+    return part(k, 1), part(m, -1)
+
+
+@validated(method=NAME, lam=POINT, h=NUMBER, y=POINT)
+def local_error(method: str | Method, lam: complex, h: float, y: complex = 1.0) -> complex:
+    """Error R(h lambda) y - exp(h lambda) y of one step from y, of order h^(p+1).
+
+    It is given by equations (5), (28), (29) of docs/course.md.
+    R : stability function; p : order of the method; lam : lambda [1/s]; h : step [s]
+    """
+    r = analyse(method).stability_function
+    return complex((r(h * lam) - np.exp(h * lam)) * y)
+
+
+@validated(method=NAME, lam=POINT, h=NUMBER, steps=COUNT_FROM_ZERO, y=POINT)
+def global_error(method: str | Method, lam: complex, h: float, steps: int, y: complex = 1.0) -> complex:
+    """Error R(h lambda)^n y - exp(n h lambda) y after n = `steps` steps from y, of order h^p at a fixed time n h.
+
+    It is the sum of the propagated local errors e_k: sum_k R^(n-1-k) e_k+1 (docs/course.md, (6)).
+    R : stability function; p : order of the method; lam : lambda [1/s]; h : step [s]
+    """
+    r = analyse(method).stability_function
+    return complex((r(h * lam) ** steps - np.exp(steps * h * lam)) * y)
+
+
+@validated(method=NAME, omega=NUMBER, h=POSITIVE)
+def seen_frequency(method: str | Method, omega: float, h: float) -> float:
+    """Frequency of the numerical solution [rad/s] for an oscillation with the frequency `omega` [rad/s].
+
+    It is |arg R(i omega h)| / h with the stability function R and the step h [s]. It never exceeds pi / h: an A-stable
+    method aliases faster oscillations to slower oscillations (docs/course.md, 5.8).
+    """
+    r = analyse(method).stability_function
+    return float(abs(np.angle(r(1j * omega * h))) / h)
