@@ -9,12 +9,12 @@ _HOMES = {
     "Method": "tableau",
     "StabilityFunction": "analysis.stability_function",
     "analyse": "analysis.method_facts",
-    "global_error": "analysis.stability_function",
+    "global_error": "analysis.method_facts",
     "integrate": "ode",
-    "local_error": "analysis.stability_function",
+    "local_error": "analysis.method_facts",
     "method_named": "tableau",
     "pade": "analysis.stability_function",
-    "seen_frequency": "analysis.stability_function",
+    "seen_frequency": "analysis.method_facts",
     "stability_function": "analysis.stability_function",
 }
 
