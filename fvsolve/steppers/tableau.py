@@ -269,6 +269,16 @@ def declare(
     return method
 
 
+def declare_each(texts: dict[str, str], also: Mapping[str, str] | None = None) -> None:
+    """Declare built-in methods by name; the first line of each text is the source, the other lines are the tableau.
+
+    also : second names of some methods, see `declare`
+    """
+    for name, text in texts.items():
+        source, rows = text.split("\n", 1)
+        declare(name, f"\n{rows.rstrip()}\n", source, also=(also or {}).get(name))
+
+
 def method_named(name: str | Method) -> Method:
     """Method with the given name, or the given `Method`; raises FvsolveError with the nearest name if it is unknown."""
     if isinstance(name, Method):
