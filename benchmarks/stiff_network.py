@@ -16,7 +16,7 @@ from fvsolve.jit import njit
 from fvsolve.model import RunData, build
 from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.steppers.integrator import Integrator
-from fvsolve.steppers.run_handle import RATES, addresses, open_run, rhs_at
+from fvsolve.steppers.run_handle import RATES, addresses, call_rhs, evaluate, open_run
 from fvsolve.steppers.structure import Structure, differences
 from fvsolve.steppers.tableau import method_named
 
@@ -130,14 +130,13 @@ def parts(model) -> tuple[Structure, Costs, csc_array]:
 def many(at, times, y, dydt, out, handle):
     """Evaluate the right-hand side at an address `times` times."""
     for _ in range(times):
-        rhs_at(at)(0.0, y, dydt, out, handle)
+        call_rhs(at, 0.0, y, dydt, out, handle)
 
 
 @njit
 def change(handle, run, t, y, f, supply, f_work):
     """Compute the Jacobian by differences of the right-hand side of a run."""
-    r = open_run(run)
-    differences(rhs_at(r.calls[RATES]), handle, r, t, y, f, supply, f_work)
+    differences(evaluate, handle, open_run(run), t, y, f, supply, f_work)
 
 
 def superlu(matrix: csc_array) -> tuple[float, float]:

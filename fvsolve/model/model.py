@@ -264,7 +264,7 @@ class Model(Displayable):
 
     @property
     def damped(self) -> bool:
-        """True if explicit steps divide the rates of basins by a factor for friction, see `steppers.semi_implicit`."""
+        """True if explicit steps divide the rates of basins by a factor for friction, see `steppers.erk`."""
         return bool(self.tables.basins["damped"].any())
 
     @property

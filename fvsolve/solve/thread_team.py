@@ -19,6 +19,7 @@ from queue import SimpleQueue
 import numpy as np
 
 from fvsolve.kernels import band_exchange
+from fvsolve.kernels.calls import compile_as
 from fvsolve.kernels.compiled_functions import functions
 from fvsolve.model import RunData
 from fvsolve.model.run_data import aligned_zeros
@@ -26,7 +27,7 @@ from fvsolve.model.state_bounds import state_bounds
 from fvsolve.solve.partition import Partition, blocked_sums
 from fvsolve.steppers import loop_records
 from fvsolve.steppers.integrator import Integrator
-from fvsolve.steppers.run_handle import JOIN, compiled_as
+from fvsolve.steppers.run_handle import JOIN
 
 COPIED = (
     "state",
@@ -153,7 +154,7 @@ def copy_integrator(stepper: Integrator) -> Integrator:
 def band_functions(cut: Partition) -> tuple:
     """Compiled functions of a model with exchange between bands, and compiled function that adds up partial sums."""
     features = replace(cut.model.functions.cast, bands=True, boundary_exchange=cut.exchanges_flows)
-    return functions(features), compiled_as(band_exchange.gather_sums, JOIN)
+    return functions(features), compile_as(band_exchange.gather_sums, JOIN)
 
 
 class ThreadTeam:

@@ -23,7 +23,7 @@ def coefficients(method: Method, damped: bool = False) -> tuple[np.ndarray, np.n
 
     The flat coefficients are listed at the top of this file, those of Rosenbrock methods in `Rosenbrock.coefficients`.
     The stages include the start of the step as an explicit stage where the method is implicit.
-    damped : True for `semi_implicit`, which stores the rates at the start in addition to the rates of its first stage.
+    damped : True for `erk.damped_attempt`, which stores the rates at the start in addition to those of its first stage.
     Raises FvsolveError if A of a fully implicit method is singular or has no basis of eigenvectors; an explicit first
     stage is left out of A.
     """

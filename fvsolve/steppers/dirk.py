@@ -22,7 +22,7 @@ from fvsolve.steppers.newton import (
     smoothed_error,
     solve_stage_from_start,
 )
-from fvsolve.steppers.run_handle import REAL_SOLVE, evaluate, open_run, solve_at, store_ledger_rates
+from fvsolve.steppers.run_handle import REAL_SOLVE, call_solve, evaluate, open_run, store_ledger_rates
 from fvsolve.steppers.step_operations import combine, copy, error_norm
 
 
@@ -57,7 +57,7 @@ def solve_stage(handle, r, t, h_gamma, i):
     d, before, status, shift, ki = r.increment, 0.0, FAILED, 1.0 / h_gamma, r.k[i]
     for turn in range(MOST):
         evaluate_stage(handle, r, t, h_gamma, ki, d)
-        solve_at(r.calls[REAL_SOLVE])(r.structure, r.factors, d)
+        call_solve(r.calls[REAL_SOLVE], r.structure, r.factors, d)
         for j in range(ki.size):
             ki[j] += shift * d[j]
         size = sqrt(size_of(d, r.weights) / max(ki.size, 1))

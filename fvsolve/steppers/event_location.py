@@ -2,7 +2,7 @@
 
 from fvsolve.jit import njit
 from fvsolve.steppers import loop_records as rec
-from fvsolve.steppers.run_handle import EVENT_FUNCTIONS, STEP, attempt_at, events_at
+from fvsolve.steppers.run_handle import EVENT_FUNCTIONS, STEP, call_attempt, call_events
 
 EVENT_TOLERANCE = 1e-13
 JUMP = 1e-6  # fraction of an event function, and of a given step; smaller changes do not count as a jump
@@ -57,7 +57,7 @@ def locate(handle, run, r, h, now, new, e):
     The error is NEWTON_FAILED if a stage could not be solved, or if an event function jumps over zero in an implicit
     step (Newton) of given length: then the stages of the step have several solutions, those of a shorter step only one.
     """
-    attempt, events, g, g_new = attempt_at(r.calls[STEP]), events_at(r.calls[EVENT_FUNCTIONS]), r.g, r.g_new
+    g, g_new = r.g, r.g_new
     t, low, high, at_low, past = r.state[0]["t"], 0.0, h, 1.0, event_ratio(g, g_new)
     guess, at_high, side = h, past, 0
     for turn in range(101):
@@ -70,10 +70,10 @@ def locate(handle, run, r, h, now, new, e):
             guess = 0.5 * (low + high)
         if done:
             guess = high
-        e = attempt(handle, run, t, guess, now, new)
+        e = call_attempt(r.calls[STEP], handle, run, t, guess, now, new)
         if e == rec.NEWTON_FAILED:
             break
-        events(t + guess, r.y[new], handle, g_new)
+        call_events(r.calls[EVENT_FUNCTIONS], t + guess, r.y[new], handle, g_new)
         if done:
             break
         here = event_ratio(g, g_new)

@@ -9,6 +9,7 @@ from operator import attrgetter, is_not
 import numpy as np
 
 from fvsolve.jit import compile_in_parallel, compile_once
+from fvsolve.kernels.calls import compile_as
 from fvsolve.steppers import loop_records as rec
 from fvsolve.steppers.coefficients import coefficients, start_slope_correction
 from fvsolve.steppers.ledger import LEDGER_ROWS
@@ -17,7 +18,6 @@ from fvsolve.steppers.run_handle import (
     RunArrays,
     addresses,
     boxed_run,
-    compiled_as,
     no_algebra,
     no_exchange,
     run_handle,
@@ -39,7 +39,7 @@ class Integrator:
     jacobian_structure : function without arguments that returns the structure of the Jacobian, used for implicit
     methods only
     scale : float64[n]  reference size of small deviations of each state; negative: see `error_scale`
-    damped : True for semi-implicit stages, see `semi_implicit`
+    damped : True for semi-implicit stages, see `erk.damped_attempt`
     """
 
     def __init__(
@@ -240,13 +240,13 @@ class Integrator:
         return self.run_steps(handle, self.handle(True))
 
 
-# Kinds of methods: module of their steps, and value of KIND in the time loop.
+# Kinds of methods: module and function of their steps, and value of `kind` in the time loop.
 KINDS = {
-    "explicit": ("erk", rec.EXPLICIT),
-    "damped": ("semi_implicit", rec.EXPLICIT),
-    "diagonal": ("dirk", rec.NEWTON_SOLVED),
-    "full": ("irk", rec.NEWTON_SOLVED),
-    "linear": ("ros", rec.LINEARLY_IMPLICIT),
+    "explicit": ("erk.attempt", rec.EXPLICIT),
+    "damped": ("erk.damped_attempt", rec.EXPLICIT),
+    "diagonal": ("dirk.attempt", rec.NEWTON_SOLVED),
+    "full": ("irk.attempt", rec.NEWTON_SOLVED),
+    "linear": ("ros.attempt", rec.LINEARLY_IMPLICIT),
 }
 
 
@@ -258,10 +258,11 @@ def attempt_of(kind: str, algebra: str = ""):
     A second process compiles the linear algebra at the same time: with real shifts, and with complex shifts too for
     fully implicit methods.
     """
-    module = f"fvsolve.steppers.{KINDS[kind][0]}"
+    module, name = KINDS[kind][0].split(".")
+    step = getattr(importlib.import_module(f"fvsolve.steppers.{module}"), name)
     if not algebra:
-        return compiled_as(importlib.import_module(module).attempt, ATTEMPT)
+        return compile_as(step, ATTEMPT)
     shifts = {False, kind == "full"}
     code = f"from fvsolve.steppers.structure import functions; [functions({algebra!r}, of) for of in {shifts}]"
     with compile_in_parallel(code, "factor"):
-        return compiled_as(importlib.import_module(module).attempt, ATTEMPT)
+        return compile_as(step, ATTEMPT)

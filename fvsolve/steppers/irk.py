@@ -17,6 +17,7 @@ import numpy as np
 
 from fvsolve.jit import inline, njit
 from fvsolve.steppers import loop_records as rec
+from fvsolve.steppers import run_handle
 from fvsolve.steppers.coefficients import error_of, nodes_of, weights_of
 from fvsolve.steppers.newton import (
     CONVERGED,
@@ -30,19 +31,7 @@ from fvsolve.steppers.newton import (
     smoothed_error,
     spectral_radius,
 )
-from fvsolve.steppers.run_handle import (
-    PAIR_FACTOR,
-    PAIR_SOLVE,
-    REAL_FACTOR,
-    REAL_SOLVE,
-    evaluate,
-    factor_at,
-    factor_complex_at,
-    open_run,
-    solve_at,
-    solve_complex_at,
-    store_ledger_rates,
-)
+from fvsolve.steppers.run_handle import evaluate, open_run, store_ledger_rates
 from fvsolve.steppers.stage_sweeps import sweep
 from fvsolve.steppers.step_operations import combine, copy, error_norm, error_scale
 from fvsolve.steppers.tableau import Method
@@ -129,16 +118,17 @@ def factor_blocks(r, h):
     """
     q, b, real, pair, count = r.k.shape[0] - 1, 0, 0, r.scale.size, 0
     blocks, size = matrix(r.coefficients, q + 1, BLOCKS), int(r.newton[0]["factor_size"])
-    factor, factor_complex = factor_at(r.calls[REAL_FACTOR]), factor_complex_at(r.calls[PAIR_FACTOR])
     while b < q:
         shift = blocks[b * q + b] / h
         if is_pair(blocks, q, b):
             pair_shift = complex(shift, blocks[(b + 1) * q + b] / h)
-            if factor_complex(r.structure, r.jacobian, pair_shift, r.complex_factors[pair:]) != 0:
+            pair_factors, address = r.complex_factors[pair:], r.calls[run_handle.PAIR_FACTOR]
+            if run_handle.call_factor_complex(address, r.structure, r.jacobian, pair_shift, pair_factors) != 0:
                 return 0
             b, pair = b + 2, pair + size
         else:
-            if factor(r.structure, r.jacobian, shift, r.factors[real:]) != 0:
+            address = r.calls[run_handle.REAL_FACTOR]
+            if run_handle.call_factor(address, r.structure, r.jacobian, shift, r.factors[real:]) != 0:
                 return 0
             b, real = b + 1, real + size
         count += 1
@@ -153,19 +143,19 @@ def solve_blocks(r):
     """
     q, n, b, real, pair = r.k.shape[0] - 1, r.scale.size, 0, 0, r.scale.size
     blocks, size, both = matrix(r.coefficients, q + 1, BLOCKS), int(r.newton[0]["factor_size"]), r.complex_factors[:n]
-    solve, solve_complex = solve_at(r.calls[REAL_SOLVE]), solve_complex_at(r.calls[PAIR_SOLVE])
     while b < q:
         u = r.transformed[R * q + b]
         if is_pair(blocks, q, b):
             v = r.transformed[R * q + b + 1]
             for e in range(n):
                 both[e] = complex(u[e], v[e])
-            solve_complex(r.structure, r.complex_factors[pair:], both)
+            address = r.calls[run_handle.PAIR_SOLVE]
+            run_handle.call_solve_complex(address, r.structure, r.complex_factors[pair:], both)
             for e in range(n):
                 u[e], v[e] = both[e].real, both[e].imag
             b, pair = b + 2, pair + size
         else:
-            solve(r.structure, r.factors[real:], u)
+            run_handle.call_solve(r.calls[run_handle.REAL_SOLVE], r.structure, r.factors[real:], u)
             b, real = b + 1, real + size
 
 
@@ -302,7 +292,7 @@ def filtered_error(handle, r, t, now, new, retry):
             for j in range(1, s):
                 total += error[j] * k[j, e]
             d[e] = total * shift
-        solve_at(r.calls[REAL_SOLVE])(r.structure, r.factors, d)
+        run_handle.call_solve(r.calls[run_handle.REAL_SOLVE], r.structure, r.factors, d)
         norm = 0.0
         for e in range(y.size):
             w = d[e] / (size * error_scale(scale[e], max(abs(y[e]), abs(y_new[e]))))
@@ -340,7 +330,7 @@ def defect_at(handle, r, t, h, new, x):
             w = step * d[e] / (size * error_scale(scale[e], abs(y[e])))
             total = total + w * w if turn == 1 else 0.0
         if turn == 0:
-            solve_at(r.calls[REAL_SOLVE])(r.structure, r.factors, d)
+            run_handle.call_solve(r.calls[run_handle.REAL_SOLVE], r.structure, r.factors, d)
             for e in range(y.size):
                 stage[e] += d[e]
     return sqrt(total / max(y.size, 1))

@@ -19,16 +19,8 @@ import numpy as np
 
 from fvsolve.jit import inline
 from fvsolve.steppers import loop_records as rec
-from fvsolve.steppers.run_handle import (
-    RATES,
-    REAL_FACTOR,
-    REAL_SOLVE,
-    evaluate,
-    factor_at,
-    rhs_at,
-    solve_at,
-    store_ledger_rates,
-)
+from fvsolve.steppers import run_handle
+from fvsolve.steppers.run_handle import evaluate, store_ledger_rates
 from fvsolve.steppers.step_operations import copy, error_scale
 from fvsolve.steppers.structure import differences, multiply
 
@@ -89,7 +81,7 @@ def renew(handle, r, t, y, f, ledger_rates, f_work):
     f, ledger_rates : rates evaluated at (t, y); f_work : float64[n]  work array for rates
     """
     newton, state = r.newton[0], r.state[0]
-    state["calls"] += differences(rhs_at(r.calls[RATES]), handle, r, t, y, f, ledger_rates, f_work)
+    differences(evaluate, handle, r, t, y, f, ledger_rates, f_work)
     state["jacobians"] += 1.0
     newton["has_jacobian"], newton["jacobian_step"] = 1.0, state["steps"]
     newton["shift"] = newton["increment_ratio"] = 0.0
@@ -112,7 +104,7 @@ def factor_for(r, shift):
         return 0
     r.state[0]["factorisations"] += 0.0 if newton["shift"] == -shift else 1.0
     newton["shift"] = 0.0
-    bad = factor_at(r.calls[REAL_FACTOR])(r.structure, r.jacobian, shift, r.factors)
+    bad = run_handle.call_factor(r.calls[run_handle.REAL_FACTOR], r.structure, r.jacobian, shift, r.factors)
     if bad == 0:
         newton["shift"] = shift
     return bad
@@ -272,12 +264,12 @@ def damped_increment(handle, r, t, h_gamma, i):
     store_ledger_rates(r, i)
     renew(handle, r, t, r.y[3], f, r.ledger_rates[i], d)
     r.state[0]["factorisations"] += 1.0
-    if factor_at(r.calls[REAL_FACTOR])(r.structure, r.jacobian, shift, r.factors) != 0:
+    if run_handle.call_factor(r.calls[run_handle.REAL_FACTOR], r.structure, r.jacobian, shift, r.factors) != 0:
         return -1.0
     newton["shift"] = shift
     for j in range(ki.size):
         d[j] = f[j] - ki[j]
-    solve_at(r.calls[REAL_SOLVE])(r.structure, r.factors, d)
+    run_handle.call_solve(r.calls[run_handle.REAL_SOLVE], r.structure, r.factors, d)
     return sqrt(size_of(d, r.weights) / max(ki.size, 1))
 
 
@@ -298,7 +290,7 @@ def damped_update(handle, r, t, h_gamma, i, size, rounded):
         if size <= rounded:  # the direction of the next increment is rounding
             tried = part
             break
-        solve_at(r.calls[REAL_SOLVE])(r.structure, r.factors, other)
+        run_handle.call_solve(r.calls[run_handle.REAL_SOLVE], r.structure, r.factors, other)
         ahead, length = next_increment(d, other, r.weights)
         tried, part = part, damping_factor(part, ahead, length)
     return part, tried, length
@@ -387,14 +379,14 @@ def smoothed_error(handle, r, t, h, now, new, error, shift):
     renew_at_start(handle, r, t, now)
     r.state[0]["factorisations"] += 1.0
     r.newton[0]["increment_ratio"] = 1.0
-    if factor_at(r.calls[REAL_FACTOR])(r.structure, r.jacobian, shift, r.factors) != 0:
+    if run_handle.call_factor(r.calls[run_handle.REAL_FACTOR], r.structure, r.jacobian, shift, r.factors) != 0:
         return rec.NEWTON_FAILED
     for i in range(y.size):
         f[i] = 0.0
         for j in range(k.shape[0]):
             f[i] += h * error[j] * k[j, i]
         d[i] = shift * f[i]
-    solve_at(r.calls[REAL_SOLVE])(r.structure, r.factors, d)
+    run_handle.call_solve(r.calls[run_handle.REAL_SOLVE], r.structure, r.factors, d)
     for i in range(y.size):
         w = 1.0 / (size * (scale[i] + max(abs(y[i]), abs(y_new[i]))))
         plain += (w * f[i]) * (w * f[i])

@@ -14,10 +14,11 @@ from numba import objmode
 
 from fvsolve.errors import FvsolveError
 from fvsolve.jit import COMPILING, DeclaredFunction, code_of, compile_once
+from fvsolve.kernels.calls import argument_types
 from fvsolve.steppers import automatic, loop_records
 from fvsolve.steppers.integrator import Integrator
 from fvsolve.steppers.loop_records import LEAST_STEP, LEAST_TOLERANCE
-from fvsolve.steppers.run_handle import EVENTS, FUSED_STEP, OBSERVE, RHS, argument_types
+from fvsolve.steppers.run_handle import EVENTS, FUSED_STEP, OBSERVE, RHS
 from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import AUTO, METHODS, Method, method_named
 

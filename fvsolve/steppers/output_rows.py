@@ -3,18 +3,9 @@
 from fvsolve.jit import njit
 from fvsolve.kernels.stage_sums import HUGE
 from fvsolve.steppers import loop_records as rec
+from fvsolve.steppers import run_handle
 from fvsolve.steppers.coefficients import start_slope_of
-from fvsolve.steppers.run_handle import (
-    OBSERVER,
-    RATES,
-    STEP,
-    attempt_at,
-    evaluate,
-    observe_at,
-    open_run,
-    rhs_at,
-    store_ledger_rates,
-)
+from fvsolve.steppers.run_handle import evaluate, open_run, store_ledger_rates
 from fvsolve.steppers.step_control import NEVER
 from fvsolve.steppers.step_operations import BEGIN, STOP, copy, interpolate
 
@@ -118,7 +109,7 @@ def separate_step(handle, r, t, h, old, new):
     newton["convergence_factor"], newton["factor_size"] = 1.0, r.newton[0]["factor_size"]
     evaluate(handle, own, t, r.y[old], own.k[0])
     store_ledger_rates(own, 0)
-    e = attempt_at(r.calls[STEP])(handle, r.spare, t, h, old, new)
+    e = run_handle.call_attempt(r.calls[run_handle.STEP], handle, r.spare, t, h, old, new)
     state["worst"], state["radius"] = worst, radius
     return e != rec.NEWTON_FAILED
 
@@ -158,7 +149,7 @@ def compute_row(handle, r, t_old, due, now, old):
     else:
         interpolate_row(r, t_old, due, separate, now, old)
     limit_to_bounds(r.bounded_states, r.bounds, r.y[old], r.y[now], y_out)
-    rhs_at(r.calls[RATES])(due, y_out, y_out[:0], r.out_row, handle)
+    run_handle.call_rhs(r.calls[run_handle.RATES], due, y_out, y_out[:0], r.out_row, handle)
 
 
 @njit
@@ -179,8 +170,9 @@ def emit(handle, r):
             return rec.ROWS_FULL
         compute_row(handle, r, t_old, due, now, old)
         if row <= due:
+            values = rows[progress["rows"], 1:]
             rows[progress["rows"], 0] = due
-            observe_at(r.calls[OBSERVER])(due, r.y_out, r.out_row, handle, rows[progress["rows"], 1:])
+            run_handle.call_observer(r.calls[run_handle.OBSERVER], due, r.y_out, r.out_row, handle, values)
             progress["rows"] += 1
             state["next_output"] += 1.0
         if field <= due:

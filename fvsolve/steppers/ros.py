@@ -11,7 +11,7 @@ from fvsolve.jit import inline, njit
 from fvsolve.steppers import loop_records as rec
 from fvsolve.steppers.coefficients import nodes_of, row_of, weights_of
 from fvsolve.steppers.newton import factor_for, follow_stages, renew_at_start, spectral_radius
-from fvsolve.steppers.run_handle import REAL_SOLVE, evaluate, open_run, solve_at
+from fvsolve.steppers.run_handle import REAL_SOLVE, call_solve, evaluate, open_run
 from fvsolve.steppers.step_operations import combine, copy, error_norm
 from fvsolve.steppers.structure import multiply
 
@@ -103,7 +103,7 @@ def attempt(handle, run, t, h, now, new):
                 d[e] = f[e] + time_weight * slope[e]
             f = d
         combine(0, n, f, 1.0, row, i, k, u)
-        solve_at(r.calls[REAL_SOLVE])(r.structure, r.factors, u)
+        call_solve(r.calls[REAL_SOLVE], r.structure, r.factors, u)
         if r.ledger_rates.shape[1] > 0:
             copy(u, d)
             book_stage(r, i, gamma, time_weight, row, d)

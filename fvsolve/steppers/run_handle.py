@@ -11,7 +11,8 @@ from collections import namedtuple
 
 import numpy as np
 
-from fvsolve.jit import ARRAYS, COMPILING, Intrinsic, declare_function, njit, plain_kinds
+from fvsolve.jit import ARRAYS, COMPILING, Intrinsic, njit, plain_kinds
+from fvsolve.kernels.calls import compile_as
 from fvsolve.kernels.table_handle import addresses_of, handle_of
 from fvsolve.steppers import loop_records as rec
 
@@ -22,7 +23,7 @@ FUSED_STEP, OBSERVE, EVENTS, RHS, JOIN = "ttvvvhv", "tvvhv", "tvhv", "tvvvh", "v
 # Arrays of a run, for n states, s stages and m ledger rates : record, or letter of the type.
 ARRAY_KINDS = {
     "state": rec.STATE, "control": rec.CONTROL, "progress": rec.PROGRESS, "newton": rec.NEWTON,
-    "calls": "h",  # addresses of the functions, in the order of `function_types`
+    "calls": "h",  # addresses of the functions, see below
     "spare": "h",  # handle of a run with the same states and other arrays of a step, for `output_rows.separate_step`
     "coefficients": "v",  # flat coefficients of the method, see `coefficients`
     "dense": "w",  # coefficients of its dense output
@@ -105,29 +106,8 @@ def boxed_run(arrays: RunArrays) -> np.ndarray:
     return box
 
 
-@functools.cache
-def function_types():
-    """Numba types of the functions attempt, fused step, observe, record, events, rhs, linear algebra and join."""
-    from numba import types
-
-    def of(letters, returned=types.void):
-        return types.FunctionType(returned(*argument_types(letters)))
-
-    algebra = (
-        of(FACTOR, types.int64), of(SOLVE),
-        of(FACTOR_COMPLEX, types.int64), of(SOLVE_COMPLEX),
-    )  # fmt: skip
-    attempt = of(ATTEMPT, types.float64)
-    return attempt, of(FUSED_STEP), of(OBSERVE), of(OBSERVE), of(EVENTS), of(RHS), *algebra, of(JOIN)
-
-
-def argument_types(letters: str) -> tuple:
-    """Numba types of arguments given as letters of `jit.plain_kinds`."""
-    kinds = plain_kinds()
-    return tuple(kinds[letter] for letter in letters)
-
-
 if COMPILING:
+    from fvsolve.kernels.calls import call
 
     @Intrinsic
     def open_run(typingctx, run):
@@ -136,45 +116,73 @@ if COMPILING:
 
         return Tables("Run", run_types)(run), handle_address
 
-    def function_from_address(index: int):
-        """Intrinsic that turns an address into a callable function of type number `index` in `function_types`."""
+    @Intrinsic
+    def call_attempt(typingctx, address, handle, run, t, h, now, new):
+        """Call the step of a method at `address`, with arguments as `erk.attempt`."""
+        return call(ATTEMPT, "t")
 
-        @Intrinsic
-        def function_at(typingctx, address):
-            from numba.core import cgutils, types
+    @Intrinsic
+    def call_fused_step(typingctx, address, t, h, y, y_new, out, handle, values):
+        """Call the fused step at `address`, see `Integrator.call`."""
+        return call(FUSED_STEP)
 
-            kind = function_types()[index]
+    @Intrinsic
+    def call_observer(typingctx, address, t, y, out, handle, values):
+        """Call the function at `address` for the probes of a row or the record of a state, see `Integrator.call`."""
+        return call(OBSERVE)
 
-            def generate(context, builder, signature, arguments):
-                proxy = cgutils.create_struct_proxy(kind)(context, builder)
-                proxy.c_addr = builder.inttoptr(arguments[0], cgutils.voidptr_t)
-                proxy.py_addr = proxy.jit_addr = cgutils.voidptr_t(None)
-                return proxy._getvalue()
+    @Intrinsic
+    def call_events(typingctx, address, t, y, handle, g):
+        """Call the event functions at `address`, which are written to g."""
+        return call(EVENTS)
 
-            return kind(types.int64), generate
+    @Intrinsic
+    def call_rhs(typingctx, address, t, y, dydt, out, handle):
+        """Call the right-hand side at `address`."""
+        return call(RHS)
 
-        return function_at
+    @Intrinsic
+    def call_factor(typingctx, address, structure, jacobian, shift, factors):
+        """Call the function at `address` that factors shift I - J for a real shift, see `Structure.functions`."""
+        return call(FACTOR, "i")
 
-    attempt_at, fused_step_at, observe_at, record_at, events_at, rhs_at = map(function_from_address, range(6))
-    factor_at, solve_at, factor_complex_at, solve_complex_at, join_at = map(function_from_address, range(6, 11))
+    @Intrinsic
+    def call_solve(typingctx, address, structure, factors, x):
+        """Call the function at `address` that solves with the factors for a real shift."""
+        return call(SOLVE)
+
+    @Intrinsic
+    def call_factor_complex(typingctx, address, structure, jacobian, shift, factors):
+        """Call the function at `address` that factors shift I - J for a complex shift."""
+        return call(FACTOR_COMPLEX, "i")
+
+    @Intrinsic
+    def call_solve_complex(typingctx, address, structure, factors, x):
+        """Call the function at `address` that solves with the factors for a complex shift."""
+        return call(SOLVE_COMPLEX)
+
+    @Intrinsic
+    def call_join(typingctx, address, sums, row_blocks, handle):
+        """Call the function at `address` that exchanges partial sums between bands."""
+        return call(JOIN)
 else:
 
     def open_run(run):
         """Arrays of a run, given as `RunArrays` or as an array that contains it."""
         return run[0] if isinstance(run, np.ndarray) else run
 
-    def attempt_at(function):
-        """Function itself, in place of its address."""
-        return function
+    def call_attempt(function, *arguments):
+        """Call a function with these arguments."""
+        return function(*arguments)
 
-    fused_step_at = observe_at = record_at = events_at = rhs_at = join_at = attempt_at
-    factor_at = solve_at = factor_complex_at = solve_complex_at = attempt_at
+    call_fused_step = call_observer = call_events = call_rhs = call_join = call_attempt
+    call_factor = call_solve = call_factor_complex = call_solve_complex = call_attempt
 
 
 def addresses(functions: tuple):
     """Addresses of functions, to pass from Python to compiled code : int64[n]; the functions themselves without JIT."""
     if COMPILING:
-        return np.array([function.address for function in functions])
+        return np.array([function.code.address for function in functions])
     table = np.empty(len(functions), dtype=object)
     table[:] = functions
     return table
@@ -183,7 +191,7 @@ def addresses(functions: tuple):
 @njit(forceinline=True)
 def evaluate(handle, r, t, y, dydt):
     """Write the rates of the model at (t, y) to `dydt` and other results to `r.out`, and count the call."""
-    rhs_at(r.calls[RATES])(t, y, dydt, r.out, handle)
+    call_rhs(r.calls[RATES], t, y, dydt, r.out, handle)
     r.state[0]["calls"] += 1.0
 
 
@@ -208,7 +216,7 @@ def no_solve(structure, factors, x):
 def no_algebra():
     """Functions factor, solve, factor_complex and solve_complex that do nothing, for explicit steps."""
     letters = (FACTOR, SOLVE, FACTOR_COMPLEX, SOLVE_COMPLEX)
-    return tuple(compiled_as(njit(f), kinds) for f, kinds in zip((no_factor, no_solve) * 2, letters, strict=True))
+    return tuple(compile_as(njit(f), kinds) for f, kinds in zip((no_factor, no_solve) * 2, letters, strict=True))
 
 
 def single_band(sums, row_blocks, handle):
@@ -218,9 +226,4 @@ def single_band(sums, row_blocks, handle):
 @functools.cache
 def no_exchange():
     """Compiled function that exchanges no data, for a model that is not divided into bands."""
-    return compiled_as(njit(single_band), JOIN)
-
-
-def compiled_as(function, letters: str):
-    """Compile a function for arguments of the types `letters` only, in the form that the time loop calls."""
-    return declare_function(function, letters, argument_types)
+    return compile_as(njit(single_band), JOIN)

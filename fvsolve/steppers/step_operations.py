@@ -5,7 +5,7 @@ from math import sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.stage_sums import BAD, BASINS, HEAD, OTHERS, combine, copy, count_not_finite
 from fvsolve.steppers.coefficients import error_of, weights_of
-from fvsolve.steppers.run_handle import BANDS, join_at
+from fvsolve.steppers.run_handle import BANDS, call_join
 
 __all__ = ["combine", "copy"]
 
@@ -69,7 +69,7 @@ def error_of_bands(handle, r, h, now, new):
         for row in range(count):
             at = begin + row * length
             sums[row_blocks[m, FIRST] + row] = squares(at, at + length, h, error, k, y, y_new, scale, tolerance)
-    join_at(r.calls[BANDS])(sums, row_blocks, handle)
+    call_join(r.calls[BANDS], sums, row_blocks, handle)
     total = 0.0
     for row in range(sums.size):
         total += sums[row]
@@ -169,7 +169,7 @@ def sum_of_bands(own, handle, r):
         for row in range(row_blocks[m, FIRST], row_blocks[m, FIRST] + row_blocks[m, SUMS]):
             sums[row] = 0.0
     sums[row_blocks[row_blocks.shape[0] - 1, FIRST]] = own  # of rows of this band, or of states common to all bands
-    join_at(r.calls[BANDS])(sums, row_blocks, handle)
+    call_join(r.calls[BANDS], sums, row_blocks, handle)
     total = 0.0
     for row in range(sums.size):
         total += sums[row]

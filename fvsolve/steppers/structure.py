@@ -16,7 +16,8 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, nearest
 from fvsolve.jit import compile_once, njit
-from fvsolve.steppers.run_handle import FACTOR, FACTOR_COMPLEX, SOLVE, SOLVE_COMPLEX, compiled_as
+from fvsolve.kernels.calls import compile_as
+from fvsolve.steppers.run_handle import FACTOR, FACTOR_COMPLEX, SOLVE, SOLVE_COMPLEX
 
 # The header: lengths, then offsets into the same array.
 SIZE, LEDGERS, COLORS = 0, 1, 2  # states n, ledger rows m, colours
@@ -142,7 +143,7 @@ def functions(kind: str, complex: bool) -> tuple:
     """Functions `factor` and `solve` of a kind of structure, compiled for real or complex shifts."""
     module = kind_module(kind)
     letters = (FACTOR_COMPLEX, SOLVE_COMPLEX) if complex else (FACTOR, SOLVE)
-    return tuple(compiled_as(njit(f), kinds) for f, kinds in zip((module.factor, module.solve), letters, strict=True))
+    return tuple(compile_as(njit(f), kinds) for f, kinds in zip((module.factor, module.solve), letters, strict=True))
 
 
 PYTHON_ENTRIES = 200  # number of entries below which plain Python is quicker than loading compiled code
@@ -195,10 +196,10 @@ LEAST_ROOT = 2.0**-34
 
 
 @njit(forceinline=True)
-def differences(rhs, handle, r, t, y, f, ledger_rates, f_work):
+def differences(evaluate, handle, r, t, y, f, ledger_rates, f_work):
     """Write the Jacobian of f and of the ledger rates to `r.jacobian`, column by column; returns the number of calls.
 
-    rhs : right-hand side, which is called once for each colour of columns, for one-sided differences
+    evaluate : function `run_handle.evaluate`, which is called once for each colour, for one-sided differences
     handle, r : handle of the model, open handle of the run; f_work : float64[n]  work array for rates
     f, ledger_rates : float64[n], float64[m]  rates at (t, y), evaluated there and not taken from a stage
     The increment of a state is 2^-26 max(|y|, scale), with 2^-34 |y| in place of 2^-26 |y| for states marked fine in
@@ -218,7 +219,7 @@ def differences(rhs, handle, r, t, y, f, ledger_rates, f_work):
                 y_work[j] = y[j] - ROOT * scale[j]
             else:
                 y_work[j] = y[j] + max((LEAST_ROOT if fine[j] == 1 else ROOT) * abs(y[j]), ROOT * scale[j])
-        rhs(t, y_work, f_work, out, handle)
+        evaluate(handle, r, t, y_work, f_work)
         for e in range(color_starts[color], color_starts[color + 1]):
             j = columns[e]
             per = 1.0 / (y_work[j] - y[j])  # the increment as rounded in the sum

@@ -11,27 +11,15 @@ tolerance.
 from math import isfinite
 
 from fvsolve.jit import inline, njit
+from fvsolve.kernels.calls import compile_as
 from fvsolve.kernels.stage_sums import BAD, CHECK, MODE, OFF
 from fvsolve.steppers import loop_records as rec
-from fvsolve.steppers import step_control
+from fvsolve.steppers import run_handle, step_control
 from fvsolve.steppers.coefficients import error_of, start_slope_of, weights_of
 from fvsolve.steppers.event_location import crossed, has_switched, locate, set_flags
 from fvsolve.steppers.ledger import book, book_error
 from fvsolve.steppers.output_rows import emit, next_due, row_due
-from fvsolve.steppers.run_handle import (
-    EVENT_FUNCTIONS,
-    FUSED_CALL,
-    RECORDER,
-    STEP,
-    attempt_at,
-    compiled_as,
-    evaluate,
-    events_at,
-    fused_step_at,
-    open_run,
-    record_at,
-    store_ledger_rates,
-)
+from fvsolve.steppers.run_handle import evaluate, open_run, store_ledger_rates
 from fvsolve.steppers.step_control import NEVER, too_short
 from fvsolve.steppers.step_operations import (
     BEGIN,
@@ -85,7 +73,7 @@ def switches_at_start(handle, r):
     if progress["event_known"] == 1:
         copy(r.g_new, g)
     elif g.size > 0:
-        events_at(r.calls[EVENT_FUNCTIONS])(r.state[0]["t"], r.y[progress["now"]], handle, g)
+        run_handle.call_events(r.calls[run_handle.EVENT_FUNCTIONS], r.state[0]["t"], r.y[progress["now"]], handle, g)
     progress["event_known"] = 0
     if not has_switched(g, r.armed):
         return False
@@ -113,11 +101,10 @@ def evaluate_state(handle, r):
         if checked:
             structure[MODE] = OFF
     progress["reuse"], progress["phase"] = 0, rec.EMIT
-    record = record_at(r.calls[RECORDER])
-    record(t, y, out, handle, r.values)
+    run_handle.call_observer(r.calls[run_handle.RECORDER], t, y, out, handle, r.values)
     if out[rec.STATUS] == rec.CORRECTED:
         evaluate(handle, r, t, y, k[0])
-        record(t, y, out, handle, r.values)
+        run_handle.call_observer(r.calls[run_handle.RECORDER], t, y, out, handle, r.values)
     if not all_finite(handle, r, y, checked):
         out[rec.STATUS] = rec.NOT_FINITE
 
@@ -159,7 +146,7 @@ def finish_last_step(handle, r):
     # a jump arrives now, after events have acted: the next record is of the state after it
     if out[rec.JUMP_TIME] == state["t"]:
         out[rec.STATUS] = rec.ARRIVED
-        record_at(r.calls[RECORDER])(state["t"], r.y[progress["now"]], out, handle, r.values)
+        run_handle.call_observer(r.calls[run_handle.RECORDER], state["t"], r.y[progress["now"]], out, handle, r.values)
         progress["has_last_step"], progress["phase"] = 0, rec.FRESH
         discard_stages(r)
         return rec.REPEAT
@@ -206,8 +193,8 @@ def take_step(handle, run, r):
     h = step_control.arriving_step(control, state, r.out[rec.JUMP_TIME], full)
     if can_use_fused_step(r, h):
         state["calls"] += 1.0
-        t_new = state["t_mark"] + (state["n_mark"] + 1.0) * h
-        fused_step_at(r.calls[FUSED_CALL])(t_new, h, r.y[now], r.y[new], r.out, handle, r.values)
+        t_new, address = state["t_mark"] + (state["n_mark"] + 1.0) * h, r.calls[run_handle.FUSED_CALL]
+        run_handle.call_fused_step(address, t_new, h, r.y[now], r.y[new], r.out, handle, r.values)
         accept(handle, r, h, False, NEVER)
         progress["phase"] = rec.FUSED
         return rec.DONE
@@ -273,13 +260,13 @@ def try_step(handle, run, r, h, last, due, now, new, near_kink):
     near_kink : True if the segment ends so soon that rounding dominates
     """
     state, progress, g = r.state[0], r.progress[0], r.g
-    e = error_with_ledger(r, h, attempt_at(r.calls[STEP])(handle, run, state["t"], h, now, new))
+    e = error_with_ledger(r, h, run_handle.call_attempt(r.calls[run_handle.STEP], handle, run, state["t"], h, now, new))
     if e == rec.NEWTON_FAILED or not acceptable(e, near_kink):
         return e, h, last
     progress["event_known"] = 1
     end_step(r, h, last, due, now, new)
     if g.size > 0:
-        events_at(r.calls[EVENT_FUNCTIONS])(progress["t_new"], r.y[new], handle, r.g_new)
+        run_handle.call_events(r.calls[run_handle.EVENT_FUNCTIONS], progress["t_new"], r.y[new], handle, r.g_new)
     if not crossed(g, r.g_new):
         return e, h, last
     progress["event_known"] = 0
@@ -362,4 +349,4 @@ def store_start_slopes(r):
 
 def compiled():
     """Time loop `run_steps`, compiled for calls from Python."""
-    return compiled_as(run_steps, "hh")
+    return compile_as(run_steps, "hh")

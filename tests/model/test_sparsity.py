@@ -13,11 +13,12 @@ from scipy.sparse import csc_array
 
 import fvsolve
 from fvsolve.jit import njit
+from fvsolve.kernels.calls import compile_as
 from fvsolve.model import RunData
 from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.steppers import METHODS
 from fvsolve.steppers.integrator import Integrator
-from fvsolve.steppers.run_handle import RATES, addresses, compiled_as, open_run, rhs_at
+from fvsolve.steppers.run_handle import RATES, addresses, evaluate, open_run
 from fvsolve.steppers.structure import KINDS, Structure, differences, multiply
 
 CASES = sorted(folders.CASES.glob("*.toml"))
@@ -121,10 +122,9 @@ def compiled_differences():
 
     @njit
     def differences_of(handle, run, t, y, f, supply, f_work):
-        r = open_run(run)
-        return differences(rhs_at(r.calls[RATES]), handle, r, t, y, f, supply, f_work)
+        return differences(evaluate, handle, open_run(run), t, y, f, supply, f_work)
 
-    return compiled_as(differences_of, "hhtvvvv")
+    return compile_as(differences_of, "hhtvvvv")
 
 
 def slopes(model, t: float, y: np.ndarray, structure: Structure) -> np.ndarray:

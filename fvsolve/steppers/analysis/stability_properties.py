@@ -9,8 +9,7 @@ from fractions import Fraction
 import numpy as np
 
 from fvsolve.steppers.analysis.stability_function import StabilityFunction, chopped
-from fvsolve.steppers.numbers.polynomial import Polynomial, sign
-from fvsolve.steppers.numbers.sturm import first_sign_change, nowhere_negative, roots_right
+from fvsolve.steppers.numbers.polynomial import Polynomial, first_sign_change, nowhere_negative, roots_right, sign
 from fvsolve.steppers.tableau import Method
 
 ANGLE_BITS = 36  # precision of the cosine of alpha in A(alpha)

@@ -17,6 +17,7 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.calls import compile_as
 from fvsolve.kernels.table_handle import make_handle
 from fvsolve.model.scheme_codes import scheme_settings
 from fvsolve.step_limits.symbol import WEIGHTS, symbol, weights_of
@@ -176,6 +177,6 @@ def _tables(scheme: str, limiter: str, cells: int) -> tuple:
 
 def _rhs():
     from fvsolve.kernels.periodic_advection import rhs_periodic
-    from fvsolve.steppers.run_handle import RHS, compiled_as
+    from fvsolve.steppers.run_handle import RHS
 
-    return compiled_as(rhs_periodic, RHS)
+    return compile_as(rhs_periodic, RHS)
