@@ -13,15 +13,7 @@ from fvsolve.kernels.calls import compile_as
 from fvsolve.steppers import loop_records as rec
 from fvsolve.steppers.coefficients import coefficients, start_slope_correction
 from fvsolve.steppers.ledger import LEDGER_ROWS
-from fvsolve.steppers.run_handle import (
-    ATTEMPT,
-    RunArrays,
-    addresses,
-    boxed_run,
-    no_algebra,
-    no_exchange,
-    run_handle,
-)  # fmt: skip
+from fvsolve.steppers.run_handle import ATTEMPT, RunArrays, addresses, boxed_run, handle_of_run, no_algebra, no_exchange
 from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import Method
 from fvsolve.steppers.time_loop import compiled
@@ -190,7 +182,7 @@ class Integrator:
             if separate_rows:
                 self.prepare_spare()
             self.linked = RunArrays(*all_arrays(self))
-            self.run = run_handle(self.linked)
+            self.run = handle_of_run(self.linked)
         return self.run
 
     def prepare_spare(self) -> None:

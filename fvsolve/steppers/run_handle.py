@@ -53,19 +53,8 @@ ARRAY_KINDS = {
 }  # fmt: skip
 RunArrays = namedtuple("RunArrays", ARRAY_KINDS)
 # Indices into `calls`.
-(
-    STEP,
-    FUSED_CALL,
-    OBSERVER,
-    RECORDER,
-    EVENT_FUNCTIONS,
-    RATES,
-    REAL_FACTOR,
-    REAL_SOLVE,
-    PAIR_FACTOR,
-    PAIR_SOLVE,
-    BANDS,
-) = range(11)
+STEP, FUSED_CALL, OBSERVER, RECORDER, EVENT_FUNCTIONS, RATES = range(6)
+REAL_FACTOR, REAL_SOLVE, PAIR_FACTOR, PAIR_SOLVE, BANDS = range(6, 11)
 
 
 @functools.cache
@@ -79,7 +68,7 @@ def run_types() -> RunArrays:
     return RunArrays(*map(of, ARRAY_KINDS.values()))
 
 
-def run_handle(arrays: RunArrays):
+def handle_of_run(arrays: RunArrays):
     """Handle of the arrays of a run; raises TypeError for an array of another type than in `ARRAY_KINDS`."""
     if not COMPILING:
         return arrays
@@ -91,14 +80,9 @@ def run_handle(arrays: RunArrays):
     return handle_of(addresses_of(arrays))
 
 
-def empty_run():
-    """Empty array for the handle `spare`."""
-    return np.zeros(0, dtype=np.int64 if COMPILING else object)
-
-
 def boxed_run(arrays: RunArrays) -> np.ndarray:
     """Handle of the arrays of a run as an array that can itself be an array of a run."""
-    handle = run_handle(arrays)
+    handle = handle_of_run(arrays)
     if COMPILING:
         return handle
     box = np.empty(1, dtype=object)
