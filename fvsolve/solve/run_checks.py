@@ -15,8 +15,10 @@ import numpy as np
 from fvsolve.case import sloshing
 from fvsolve.case.basins_on_bodies import free_joints
 from fvsolve.errors import Notice
+from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.delay_lines.wave_history import CORRECTED_TIME
 from fvsolve.model.delay_history import jump_overflow_notices
+from fvsolve.solve.run_loop import STATUS_FAILURES
 from fvsolve.step_limits.forcing_ranges import forcing_sizes, state_ranges, states_outside_cells
 from fvsolve.step_limits.step_notices import DOUBTFUL, WRONG, step_limits
 from fvsolve.steppers import automatic
@@ -123,7 +125,6 @@ SMALL_WAVE = 0.2  # wave height up to which a wave is small, as a fraction of th
 WEIGHT_CHANGE = (
     0.1  # change of the water's weight by the motion of its body that may be neglected in its waves, as a fraction
 )
-WEIGHTLESS = "the water in {name} has no weight left at t = {when}; reduce the downward acceleration of its body"
 WEIGHT_ROUNDING = 1e-6  # fraction of the weight that counts as rounding
 RISE, LOSS = slice(0, 2), slice(2, 4)
 
@@ -160,7 +161,8 @@ class SloshingCheck:
                 keep_greatest(record[RISE], rise(y, *lifting), t)
             weight, reference = self.weight(out, *about, modal)
             if weight <= WEIGHT_ROUNDING * reference:
-                return f"stopped: {WEIGHTLESS.format(name=name, when=self.model.case.amount(t, 'time', 6))}"
+                when = f"t = {self.model.case.amount(t, 'time', 6)}"
+                return f"stopped: {STATUS_FAILURES[rec.NO_WEIGHT].format(name=name, when=when)}"
             keep_greatest(record[LOSS], abs(weight / reference - 1.0), t)
         return ""
 

@@ -25,10 +25,23 @@ from fvsolve.steppers.tableau import Method, method_named
 ROW_CAPACITY = 512
 NO_LIMIT = 1e308
 MOST_EVENTS_AT_ONCE = 20  # events at the same time; more is chattering
-MOST_EVENTS_IN_SPAN, SPAN = (
-    2000,
-    1e-6,
-)  # events within this fraction of the run, or within a given step; more is chattering
+# events within this fraction of the run, or within a given step; more is chattering
+MOST_EVENTS_IN_SPAN, SPAN = 2000, 1e-6
+
+FAILURES = {  # reason for the return of the loop -> text
+    loop_records.STOPPED: '{event} at {when}, and numerics.below_vapor = "stop" ends the run there',
+    loop_records.NEWTON_STUCK: "Newton did not converge at {when}, however short the step, worst in {worst}; check the "
+    "parts there for jumps, or try an explicit method",
+    loop_records.TINY_STEP: "the step became too small at {when}; try a larger rtol, or numerics.courant instead",
+    loop_records.BAD_VALUE: "a value is not finite{place} at {when}; the step is too long for the method: "
+    "halve the step",
+}
+STATUS_FAILURES = {  # status of the right-hand side -> text
+    rec.NO_SOLUTION: "the demand{place} cannot be supplied at {when}; all connections to its node are shut",
+    rec.NO_VOLUME: "the chamber volume{place} is zero at {when}; give the piston an end-stop",
+    rec.NO_WIDTH: "the wall has no space left{place} at {when}; give its mass an end-stop, or a wider zone",
+    rec.NO_WEIGHT: "the water in {name} has no weight left at {when}; reduce the downward acceleration of its body",
+}
 
 
 class RunLoop:
@@ -265,50 +278,39 @@ class RunLoop:
 
         For BAD_VALUE and BAD_STATUS the loop returns to the state before the last step, see `step_back`.
         """
-        model = self.model
-        place = ""
-        if code == loop_records.BAD_VALUE:
-            bad = np.flatnonzero(~np.isfinite(self.now))
-            place = f" at {model.state_names[bad[0]]}" if bad.size else ""
-        elif code == loop_records.BAD_STATUS and self.out[rec.WHERE] >= 0 and self.out[rec.STATUS] != rec.NO_WEIGHT:
-            place = f" at {model.node_names[int(self.out[rec.WHERE])]}"
-        when = f"t = {model.case.amount(self.t, 'time', 6)}"
+        model, text, names = self.model, FAILURES.get(code, ""), {}
+        names["when"] = f"t = {model.case.amount(self.t, 'time', 6)}"
         if code == loop_records.CHATTERING:
-            first = self.t if self.at_once > 1 else self.recent_events[0]  # at the same time, or within a short span
-            names = sorted({model.events[k][0] for t, k in self.switched if t >= first})
-            remedies = {
-                device.remedy: None for name, _, device in model.devices if name.removesuffix(".inside") in names
-            }
-            parts_text = listing(names) if names else "a leak, or a demand that follows the pressure,"
-            verbs = "change their states" if len(names) > 1 else "changes its state"
-            remedy = ", or ".join(remedies) or "put a chamber at the node of this part"
-            return f"{parts_text} {verbs} without end at {when}; {remedy}"
+            return self.chattering_text(names["when"])
         if code == loop_records.STOPPED:
-            event = "a cavity opened" if model.cavitates else "pressure fell below vapour pressure"
-            return f'{event} at {when}, and numerics.below_vapor = "stop" ends the run there'
-        if code in (loop_records.BAD_VALUE, loop_records.BAD_STATUS):
+            names["event"] = "a cavity opened" if model.cavitates else "pressure fell below vapour pressure"
+        elif code == loop_records.NEWTON_STUCK:
+            names["worst"] = model.state_names[int(self.state["worst"])]
+        elif code == loop_records.BAD_VALUE:
+            bad = np.flatnonzero(~np.isfinite(self.now))
+            names["place"] = f" at {model.state_names[bad[0]]}" if bad.size else ""
             self.step_back()
-        if code == loop_records.NEWTON_STUCK:
-            worst = model.state_names[int(self.state["worst"])]
-            return (f"Newton did not converge at {when}, however short the step, worst in {worst}; check the "
-                    "parts there for jumps, or try an explicit method")  # fmt: skip
-        if code == loop_records.TINY_STEP:
-            return f"the step became too small at {when}; try a larger rtol, or numerics.courant instead"
-        if code == loop_records.BAD_STATUS and self.out[rec.STATUS] == rec.NO_SOLUTION:
-            return f"the demand{place} cannot be supplied at {when}; all connections to its node are shut"
-        if code == loop_records.BAD_STATUS and self.out[rec.STATUS] == rec.NO_VOLUME:
-            return f"the chamber volume{place} is zero at {when}; give the piston an end-stop"
-        if code == loop_records.BAD_STATUS and self.out[rec.STATUS] == rec.NO_WIDTH:
-            return f"the wall has no space left{place} at {when}; give its mass an end-stop, or a wider zone"
-        if code == loop_records.BAD_STATUS and self.out[rec.STATUS] == rec.NO_WEIGHT:
-            index = int(self.out[rec.WHERE])
-            names = [*(basin.name for basin in model.basins), *model.node_names]
-            name = names[index].removesuffix(".inside")
-            return (f"the water in {name} has no weight left at {when}; reduce the downward acceleration of "
-                    "its body")  # fmt: skip
-        if code == loop_records.BAD_STATUS:
-            return f"Newton did not converge{place} at {when}; try a smaller step"
-        return f"a value is not finite{place} at {when}; the step is too long for the method: halve the step"
+        elif code == loop_records.BAD_STATUS:
+            index, status = int(self.out[rec.WHERE]), int(self.out[rec.STATUS])
+            text = STATUS_FAILURES.get(status, "Newton did not converge{place} at {when}; try a smaller step")
+            if status == rec.NO_WEIGHT:
+                bodies = [*(basin.name for basin in model.basins), *model.node_names]
+                names["name"] = bodies[index].removesuffix(".inside")
+            else:
+                names["place"] = f" at {model.node_names[index]}" if index >= 0 else ""
+            self.step_back()
+        return text.format(**names)
+
+    def chattering_text(self, when: str) -> str:
+        """Text with the devices that change their states without end, and a remedy; when : time of the failure."""
+        model = self.model
+        first = self.t if self.at_once > 1 else self.recent_events[0]  # at the same time, or within a short span
+        names = sorted({model.events[k][0] for t, k in self.switched if t >= first})
+        remedies = {device.remedy: None for name, _, device in model.devices if name.removesuffix(".inside") in names}
+        parts_text = listing(names) if names else "a leak, or a demand that follows the pressure,"
+        verbs = "change their states" if len(names) > 1 else "changes its state"
+        remedy = ", or ".join(remedies) or "put a chamber at the node of this part"
+        return f"{parts_text} {verbs} without end at {when}; {remedy}"
 
 
 def longest_step(model: Model) -> float:

@@ -64,23 +64,14 @@ class BandWorker:
         self.loop, self.number, self.run_data, self.stepper = loop, k, run_data, stepper
         self.stepper.join, self.stepper.row_blocks = team.join, cut.row_blocks(k)
         self.stepper.sums = np.zeros(cut.sum_count)
-        self.own = [
-            slice(begin, stop) for begin, stop, *_ in self.stepper.row_blocks[len(cut.common_states()) :].tolist()
-        ]
+        blocks, common = self.stepper.row_blocks.tolist(), len(cut.common_states())
+        self.own = [slice(begin, stop) for begin, stop, *_ in blocks[common:]]
         states, flows = cut.states(k), cut.flows(k)
         own = np.zeros(band_exchange.HEAD + 3 * (len(states) + len(flows)), dtype=np.int64)
-        (
-            own[band_exchange.BAND],
-            own[band_exchange.BAND_COUNT],
-            own[band_exchange.YIELD],
-            own[band_exchange.PROCESS_CALL],
-        ) = k, cut.count, team.yield_address, team.callback
-        own[band_exchange.BOARD], own[band_exchange.SUM_BUFFER] = team.board.ctypes.data, team.buffer.ctypes.data
-        own[band_exchange.COMMON_SPANS], own[band_exchange.STATES], own[band_exchange.FLOWS] = (
-            len(cut.common_states()),
-            len(states),
-            len(flows),
-        )
+        own[[band_exchange.BAND, band_exchange.BAND_COUNT]] = k, cut.count
+        own[[band_exchange.YIELD, band_exchange.PROCESS_CALL]] = team.yield_address, team.callback
+        own[[band_exchange.BOARD, band_exchange.SUM_BUFFER]] = team.board.ctypes.data, team.buffer.ctypes.data
+        own[[band_exchange.COMMON_SPANS, band_exchange.STATES, band_exchange.FLOWS]] = common, len(states), len(flows)
         own[band_exchange.HEAD :] = np.concatenate([states, flows]).ravel()
         self.stepper.structure = blocked_sums(cut, k)
         self.own_arrays = {"bands": cut.bands(k), "joint": own, "sums": self.stepper.structure}
@@ -88,7 +79,7 @@ class BandWorker:
         self.open()
         at, bounds = state_bounds(loop.model)
         own_states = np.zeros(loop.model.y_size, dtype=bool)
-        for begin, stop, *_ in self.stepper.row_blocks.tolist():
+        for begin, stop, *_ in blocks:
             own_states[begin:stop] = True
         owned = own_states[at[::3]]
         stepper.bounded_states, stepper.bounds = np.ascontiguousarray(at.reshape(-1, 3)[owned]).ravel(), bounds[owned]
