@@ -180,6 +180,8 @@ class Run:
         loop.recent_events.extend(memory["recent events"].tolist())
         names = [basin.name for basin in self.checks.moving]
         self.checks.rates.update(zip(names, memory["rates"].tolist(), strict=True))
+        if memory.keys() != self.memory().keys():
+            raise ValueError("names of the arrays do not match")
         for name, view in self.views().items():
             if memory[name].shape != view.shape or memory[name].dtype != view.dtype:
                 raise ValueError(f"array {name} does not match")

@@ -133,6 +133,7 @@ HARM = {
     "memory with numbers in place of a record": lambda kept: {"memory.state": np.zeros(1)},
     "a segment there is not": lambda kept: {"memory.run": np.append(99.0, kept["memory.run"][1:])},
     "a segment that is no number": lambda kept: {"memory.run": np.append(np.nan, kept["memory.run"][1:])},
+    "one array more": lambda kept: {"memory.more": np.zeros(1)},
     "changes without end": lambda kept: {"memory.changes": np.zeros(1)},
     "changes in text": lambda kept: {"memory.changes": np.array([["a"] * 3])},
 }  # fmt: skip
