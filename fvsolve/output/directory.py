@@ -82,7 +82,7 @@ class RunDirectory:
         if self.restart is None:
             self._start()
             self._write_case()
-            self.checkpoint(state)
+            self.checkpoint(state, {})
             return
         self._write_case()
         self.history.continue_from(self.restart.rows, self.restart.history_bytes)
@@ -112,10 +112,10 @@ class RunDirectory:
         if self.fields:
             self.fields.pieces = ParallelBasinWriter(comm, rows)
 
-    def checkpoint(self, state) -> None:
+    def checkpoint(self, state, extra: dict) -> None:
         """Replace restart.npz by a checkpoint.
 
-        It contains the state with its memory, and the numbers of rows and frames written so far.
+        It contains the state with its memory, not `extra`, which is empty, and the numbers of rows and frames written so far.
         """
         with self.report_write_errors():
             size = self.history.flush()

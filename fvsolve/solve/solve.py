@@ -360,7 +360,7 @@ class Run:
             self.save()
 
     def save(self) -> None:
-        self.sink.checkpoint(self.state())
+        self.sink.checkpoint(self.state(), {})
         self.saved = time.perf_counter()
 
     def failure(self, code: int) -> str:

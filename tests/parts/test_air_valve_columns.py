@@ -260,7 +260,7 @@ class Kept:
     def field(self, t, fields):
         pass
 
-    def checkpoint(self, state):
+    def checkpoint(self, state, extra):
         self.states.append(state)
 
     def end(self, summary):
