@@ -115,7 +115,7 @@ class RunDirectory:
     def checkpoint(self, state, extra: dict) -> None:
         """Replace restart.npz by a checkpoint.
 
-        It contains the state with its memory, not `extra`, which is empty, and the numbers of rows and frames written so far.
+        It contains the state with its memory, and the numbers of rows and frames written so far; `extra` is empty.
         """
         with self.report_write_errors():
             size = self.history.flush()

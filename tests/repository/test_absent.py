@@ -90,7 +90,7 @@ def test_other_laws_compile_no_more_for_two_tanks(law, compiling):
 def test_each_room_is_compiled_where_it_is_used(compiling):
     assert files(fvsolve.build(fvsolve.load(line()))) & ALL == PIPES - {"fused_step"}
     found = files(fvsolve.build(fvsolve.load(tanks(method="implicit-euler", step=0.1))))
-    assert found & ALL == {"newton", "dirk", "differences", "linear_dense"}
+    assert found & ALL == {"newton", "dirk", "structure", "linear_dense"}
     dyed = line() | {"scalars": {"dye": {}}}
     assert files(fvsolve.build(fvsolve.load(dyed))) & ALL == PIPES - {"fused_step"} | SCALARS
     log = line() | {"fluid": {"name": "Water", "law": "log"}}
