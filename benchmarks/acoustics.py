@@ -14,7 +14,7 @@ from scipy.sparse.linalg import expm_multiply
 
 from fvsolve.case import load
 from fvsolve.model import RunData, State, build
-from fvsolve.steppers.signatures import addresses, rhs_at
+from fvsolve.steppers.run_handle import addresses, call_rhs
 
 LENGTH = SPEED = 1000.0  # [m, m/s]
 END = 2.0  # twice the travel time of the pipe [s]
@@ -94,7 +94,7 @@ class Acoustics:
         def function(t, y, dydt):
             tables = numba.carray(pointer(handle_at), handle_size, np.int64)
             beside = numba.carray(pointer(out_at), out_size, np.float64)
-            rhs_at(at)(t, y, dydt, beside, tables)
+            call_rhs(at, t, y, dydt, beside, tables)
 
         return function
 

@@ -91,9 +91,17 @@ def shorter(path: Path, names: Names) -> dict | None:
 def state_values(label: str, model, state, names: Names) -> Dump:
     """Values of a state: time, vector, memory, right-hand side by vector and by state, and all probes."""
     own, of = Named(state, names), Named(model, names)
-    found = {(label, "t"): float(own.t), (label, "y"): own.y.copy(), (label, "memory"): own.memory.copy()}
+    found = {(label, "t"): float(own.t), (label, "y"): own.y.copy(), (label, "memory"): flat(own.memory)}
     found |= rates(label, model, own.t, own.y, names)
     return found | {(label, "rates by memory"): of.rhs(state), (label, "probes"): of.observe(state)}
+
+
+def flat(memory) -> np.ndarray:
+    """Memory of a state as a vector; versions before the named arrays had this vector, with the size of the history."""
+    if not isinstance(memory, dict):
+        return memory.copy()
+    size = [np.array([float(memory["past"].size)])] if "past" in memory else []
+    return np.concatenate([array.ravel() for array in memory.values()] + size) if memory else np.zeros(0)
 
 
 def rates(label: str, model, t: float, y, names: Names) -> Dump:

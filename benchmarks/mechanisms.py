@@ -64,7 +64,7 @@ def rates(bodies: dict):
     from reference.bodies import bodies as scene_of
 
     import fvsolve
-    from fvsolve.steppers.signatures import addresses, rhs_at
+    from fvsolve.steppers.run_handle import addresses, call_rhs
 
     model = fvsolve.build(fvsolve.load(scene_of(bodies, 1.0)))
     y, dydt, out = model.start.copy(), np.zeros(model.y_size), model.new_out()
@@ -76,7 +76,7 @@ def rates(bodies: dict):
     @numba.njit
     def many(calls, y, dydt, out, handle):
         for _ in range(calls):
-            rhs_at(at)(0.0, y, dydt, out, handle)
+            call_rhs(at, 0.0, y, dydt, out, handle)
 
     return slate, lambda: rhs(0.0, y, dydt, out, handle), lambda calls: many(calls, y, dydt, out, handle), dydt
 

@@ -80,10 +80,11 @@ def part(cells: int, begin: str, end: str, *parts: str) -> None:
     state = initial_state(model)
     if begin != "-":
         with np.load(begin) as found:
-            state = State(float(found["t"]), found["y"], found["memory"])
+            memory = {name: found[name] for name in found.files if name not in ("t", "y")}
+            state = State(float(found["t"]), found["y"], memory)
     states = stepped(model, state, [int(one) for one in parts], comm)
     if end != "-":
-        np.savez(end, t=states[0].t, y=states[0].y, memory=states[0].memory)
+        np.savez(end, t=states[0].t, y=states[0].y, **states[0].memory)
     said = " ".join(hashlib.sha256(one.y.tobytes()).hexdigest()[:16] for one in states)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     print(f"{said}; {perf_counter() - start:.0f} s, peak {peak:.1f} GiB", flush=True)

@@ -10,7 +10,7 @@ from price import front, price
 
 from fvsolve.case import load
 from fvsolve.solve.solve import Run
-from fvsolve.steppers.built_in_methods import METHODS
+from fvsolve.steppers.tableau import METHODS
 from fvsolve.studies.accuracy.timing import CappedRun
 from fvsolve.studies.outcome import Outcome, outcome, study_model
 

@@ -13,7 +13,7 @@ from peers_ode import Problem, explicit_reference, peers
 from price import front, price
 
 import fvsolve
-from fvsolve.steppers.built_in_methods import METHODS
+from fvsolve.steppers.tableau import METHODS
 
 TARGETS = (1e-3, 1e-5, 1e-6, 1e-7, 1e-9)
 DEFAULT = "radau-iia-5"

@@ -15,9 +15,10 @@ from fvsolve.case import load
 from fvsolve.jit import njit
 from fvsolve.model import RunData, build
 from fvsolve.model.jacobian_pattern import jacobian_pattern
-from fvsolve.steppers.differences import differences
-from fvsolve.steppers.signatures import addresses, rhs_at
-from fvsolve.steppers.structure import Structure
+from fvsolve.steppers.integrator import Integrator
+from fvsolve.steppers.run_handle import RATES, addresses, call_rhs, evaluate, open_run
+from fvsolve.steppers.structure import Structure, differences
+from fvsolve.steppers.tableau import method_named
 
 SIZES = ((10, 100), (50, 200))  # (pipes, cells of each)
 SCHEMES = ("upwind", "upwind5")
@@ -90,14 +91,16 @@ def parts(model) -> tuple[Structure, Costs, csc_array]:
     slate = RunData(model)
     shape, n, m, handle = structure.shape, structure.n, structure.m, slate.handle
     where, out, y = int(model.layout["supply"]), model.new_out(), np.zeros(n)
-    jacobian, store = np.zeros(structure.nnz), np.zeros(structure.store_size)
-    f, y_work, f_work, x = np.zeros((4, n))
+    stepper = Integrator(method_named(METHOD), n, m, lambda: structure, model.scale.copy())
+    stepper.out, stepper.calls, stepper.control["ledger_offset"] = out, addresses((rhs,) * (RATES + 1)), where
+    jacobian, store = stepper.jacobian, np.zeros(structure.store_size)
+    f, f_work, x = np.zeros((3, n))
     step = COURANT * min(p.length / p.cells / p.wave_speed for p in model.pipes)
     shift = 1.0 / (step * (1.0 - np.sqrt(0.5)))
     rhs(0.0, y, f, out, handle)
     supply = out[where : where + m].copy()
     at = int(addresses((rhs,))[0])
-    given = (at, handle, shape, where, 0.0, y, f, supply, model.scale, y_work, f_work, out, jacobian)
+    given = (handle, stepper.handle(False), 0.0, y, f, supply, f_work)
     change(*given)
     if factor(shape, jacobian, shift, store) != 0:
         raise SystemExit("no pivot")
@@ -127,13 +130,13 @@ def parts(model) -> tuple[Structure, Costs, csc_array]:
 def many(at, times, y, dydt, out, handle):
     """Evaluate the right-hand side at an address `times` times."""
     for _ in range(times):
-        rhs_at(at)(0.0, y, dydt, out, handle)
+        call_rhs(at, 0.0, y, dydt, out, handle)
 
 
 @njit
-def change(at, handle, shape, where, t, y, f, supply, scale, y_work, f_work, out, jacobian):
-    """Compute the Jacobian by differences of the right-hand side at an address."""
-    differences(rhs_at(at), handle, shape, where, t, y, f, supply, scale, y_work, f_work, out, jacobian)
+def change(handle, run, t, y, f, supply, f_work):
+    """Compute the Jacobian by differences of the right-hand side of a run."""
+    differences(evaluate, handle, open_run(run), t, y, f, supply, f_work)
 
 
 def superlu(matrix: csc_array) -> tuple[float, float]:

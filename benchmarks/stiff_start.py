@@ -20,7 +20,7 @@ from start_up import cache
 EXPLICIT, IMPLICIT = "ssp-rk3", ("radau-iia-5", "esdirk-4")
 GOALS = {"cold": 8.0, "warm": 0.8}  # in addition to the explicit run [s]
 SCENES = {"dense": (1, 5), "banded": (1, 60), "sparse": (3, 30)}  # linear algebra -> (pipes, cells of each)
-ROOMS = ("irk", "dirk", "newton", "differences", "linear_", "structure", "pivots", "auto")  # of implicit steps
+ROOMS = ("irk", "dirk", "newton", "linear_", "structure", "auto")  # of implicit steps
 
 
 def scene(kind: str, method: str) -> dict:

@@ -154,10 +154,10 @@ def by_size(sizes) -> None:
         row, speeds = f"| {name} |", []
         for n in sizes:
             loop = begun(model_of(name, n, n))
-            formed, steps, best = loop.stepper.shape, steps_of(loop), np.full(2, np.inf)
+            formed, steps, best = loop.stepper.structure, steps_of(loop), np.full(2, np.inf)
             for _ in range(20 if n < 2048 else 3):
                 for k, shape in enumerate((formed, formed[:0])):
-                    loop.stepper.shape, start = shape, process_time()
+                    loop.stepper.structure, start = shape, process_time()
                     loop.run(steps)
                     best[k] = min(best[k], (process_time() - start) / steps)
             found = n * n / best / 1e6

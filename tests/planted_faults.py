@@ -64,7 +64,7 @@ FAULTS = [
     Fault("mesh/mesh.py", "angle=float(angle[sharpest])", "angle=float(1.01 * angle[sharpest])"),
     Fault("steppers/ros.py", "1.0 / (later - t) if later > t", "-1.0 / (later - t) if later > t"),
     Fault("steppers/analysis/trees.py", "return nodes * math.prod(", "return (nodes + 1) * math.prod("),
-    Fault("steppers/numbers/sturm.py", "x - ratio * y for x, y", "x + ratio * y for x, y"),
+    Fault("steppers/numbers/polynomial.py", "x - ratio * y for x, y", "x + ratio * y for x, y"),
     Fault("report/cycles.py", "return self.cycles * (", "return 1.01 * self.cycles * ("),
     Fault("kernels/pipes.py", "dl[i] = k * (fl[i + 1] - fl[i])", "dl[i] = 1.01 * k * (fl[i + 1] - fl[i])"),
     Fault("kernels/steady_friction.py", "force = loss * (size * flow)", "force = 1.01 * loss * (size * flow)"),

@@ -26,8 +26,7 @@ import numpy as np
 
 from fvsolve.jit import inline, njit
 from fvsolve.kernels.dtypes import MUSCL, UPWIND
-from fvsolve.kernels.limiters import slope
-from fvsolve.kernels.reconstruction import by_limiter, minmod
+from fvsolve.kernels.reconstruction import by_limiter, minmod, slope
 
 THIN = 1e-6  # depth below which values fade to zero [m]
 

@@ -35,8 +35,7 @@ from fvsolve.basins.free_surface.surface_energy import velocity_factor
 from fvsolve.jit import inline, njit
 from fvsolve.kernels.dtypes import LAW_LINEAR, RATE, TANK_OUT
 from fvsolve.kernels.mechanism import body_layout as body
-from fvsolve.kernels.mechanism.basin_inertia import EAST
-from fvsolve.kernels.mechanism.body_layout import BASIN_ARM, BASIN_LOAD, MOMENTS, body_row
+from fvsolve.kernels.mechanism.body_layout import BASIN_ARM, BASIN_LOAD, EAST, MOMENTS, body_row
 from fvsolve.kernels.mechanism.vectors import cross, dot, rotate, write_vector
 from fvsolve.kernels.table_handle import open_tables
 

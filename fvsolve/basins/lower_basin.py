@@ -22,8 +22,8 @@ from fvsolve.case.sections import DEFAULT_COURANT as COURANT
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.schemes import LIMITERS, SCHEMES
-from fvsolve.steppers.analysis.absolute_monotonicity import ssp_radius
-from fvsolve.steppers.built_in_methods import METHODS
+from fvsolve.steppers.analysis.stability_properties import ssp_radius
+from fvsolve.steppers.tableau import METHODS
 
 if TYPE_CHECKING:
     from fvsolve.kernels.rhs_assembly import RhsTerms

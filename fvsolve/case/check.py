@@ -15,8 +15,8 @@ from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.parts import KINDS, Chamber
 from fvsolve.parts.context import CaseContext
 from fvsolve.parts.value import ROOT
-from fvsolve.steppers.built_in_methods import AUTO, METHODS
-from fvsolve.steppers.tolerances import LEAST_STEP, LEAST_TOLERANCE
+from fvsolve.steppers.loop_records import LEAST_STEP, LEAST_TOLERANCE
+from fvsolve.steppers.tableau import AUTO, METHODS
 from fvsolve.units import show
 
 Faults = Iterator[tuple[tuple, str]]

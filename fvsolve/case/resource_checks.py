@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from fvsolve.parts import Pipe
-from fvsolve.steppers.built_in_methods import METHODS
-from fvsolve.steppers.tolerances import LEAST_STEP
+from fvsolve.steppers.loop_records import LEAST_STEP
+from fvsolve.steppers.tableau import METHODS
 
 LONGEST_NAME = 60  # letters; names are parts of file names, which may have 255 bytes
 CELL, IMPLICIT_CELL, BASIN_CELL = 500, 3000, 600  # memory of a cell [B]

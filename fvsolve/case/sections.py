@@ -37,9 +37,8 @@ from fvsolve.parts.value import (
     positive,
 )
 from fvsolve.schemes import LIMITERS, SCHEMES
-from fvsolve.steppers.built_in_methods import AUTO, METHODS
 from fvsolve.steppers.structure import KINDS
-from fvsolve.steppers.tableau import BUILT_IN, method_of_file
+from fvsolve.steppers.tableau import AUTO, BUILT_IN, METHODS, method_of_file
 from fvsolve.units import show
 
 STARTS = ("steady", "equilibrium", "rest")

@@ -20,7 +20,7 @@ from fvsolve.kernels.table_handle import open_tables
 
 # Jobs: rows of `calls`, each ended by a zero. CLOSE, the first phases of RHS, must run before event functions.
 # DERIVE computes from a state the values that functions of all jobs but RHS read, where these are not the state itself
-# (`basins.moving_walls`). DAMP divides the rates of a stage by 1 + h r, r their fast part (`steppers.semi_implicit`).
+# (`basins.moving_walls`). DAMP divides the rates of a stage by 1 + h r, r their fast part (`steppers.erk`).
 RHS, CLOSE, OBSERVE, RECORD, EVENTS, POWER, STORED, DERIVE, DAMP, JOBS = range(10)
 RATES, READS, ENERGIES = "tVVVH", "tVVHV", "tVVVHV"  # argument types of the functions of jobs
 ARGUMENTS = dict.fromkeys((RHS, CLOSE, DERIVE, DAMP), RATES)

@@ -6,14 +6,19 @@ from numba.core.typing.templates import AttributeTemplate, infer_getattr
 from numba.extending import models, register_model
 from numba.np.arrayobj import make_array, populate_array
 
-from fvsolve.kernels.dtypes import HandleTables, table_types
+from fvsolve.kernels.dtypes import table_types
 
 
 class Tables(types.Opaque):
-    """Result of `open_tables`: a bare address, whose attributes are the tables."""
+    """Open handle: a bare address, whose attributes are the tables.
 
-    def __init__(self) -> None:
-        super().__init__("Tables")
+    name : name of the kind of handle; members : function without arguments that returns the numba types of its tables,
+    a named tuple. The default is the handle of a model, opened by `open_tables`.
+    """
+
+    def __init__(self, name: str = "Tables", members=table_types) -> None:
+        super().__init__(name)
+        self.members = members
 
 
 register_model(Tables)(models.OpaqueModel)
@@ -32,7 +37,7 @@ class TableOf(AttributeTemplate):
     key = Tables
 
     def generic_resolve(self, kind, name):
-        return getattr(table_types(), name, None)
+        return getattr(kind.members(), name, None)
 
 
 @lower_getattr_generic(Tables)
@@ -41,8 +46,9 @@ def load_table(context, builder, kind, value, name):
 
     Address, rows and columns of the table are three words of the handle, which never change.
     """
-    member, word = getattr(table_types(), name), context.get_value_type(types.intp)
-    base, first = builder.bitcast(value, word.as_pointer()), 3 * HandleTables._fields.index(name)
+    members, word = kind.members(), context.get_value_type(types.intp)
+    member, first = getattr(members, name), 3 * members._fields.index(name)
+    base = builder.bitcast(value, word.as_pointer())
 
     def entry(i):
         loaded = builder.load(cgutils.gep_inbounds(builder, base, first + i))

@@ -69,17 +69,13 @@ def ring_factor(past: np.ndarray, delays: np.ndarray) -> int:
     return wider
 
 
-def split_memory(memory: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Split the memory of a state : (memory of the integrator, history of delay lines).
-
-    Raises ValueError if the memory contains no history.
-    """
-    size = int(memory[-1]) if memory.size and np.isfinite(memory[-1]) else -1
-    if not 0 <= size < memory.size:
+def stored_history(memory: dict[str, np.ndarray]) -> np.ndarray:
+    """History of delay lines in the memory of a state; raises ValueError if the memory contains no history."""
+    if "past" not in memory:
         raise ValueError(
             "the memory of the state contains no history of delay lines; expected a State that a run returned"
         )
-    return memory[: memory.size - 1 - size], memory[memory.size - 1 - size : -1]
+    return memory["past"].copy()
 
 
 def stored_entries(past: np.ndarray) -> np.ndarray:

@@ -22,8 +22,7 @@ from fvsolve.kernels.schedule_pieces import POWER, WAVE
 from fvsolve.model.cluster_tables import classify_nodes
 from fvsolve.model.delay_history import history_size, set_rings
 from fvsolve.steppers import automatic
-from fvsolve.steppers.built_in_methods import AUTO
-from fvsolve.steppers.tableau import method_named
+from fvsolve.steppers.tableau import AUTO, method_named
 
 FRICTION_PRESSURE = 0.02 * 1e5  # pressure [Pa] whose flow is added to that of the start to evaluate friction
 UNBALANCED_SHARE = 1e-9  # relative to the wave of 1 bar: pressure drop that friction does not balance

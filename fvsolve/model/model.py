@@ -17,7 +17,6 @@ from fvsolve.assembly.pipe_terms import mass_in_creep
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.delay_history import split_memory
 from fvsolve.model.run_data import RunData
 from fvsolve.model.scalar_tables import node_values, pipe_values
 from fvsolve.units import show
@@ -32,23 +31,24 @@ if TYPE_CHECKING:
 
 @dataclass(repr=False)
 class State(Displayable):
-    """Time [s], flat state vector y, and memory of the run in one flat array (empty at a fresh start).
+    """Time [s], flat state vector y, and memory of the run as arrays by name (empty at a fresh start).
 
     memory : data of step control, event flags, and with delay lines the history of their waves
     """
 
     t: float
     y: np.ndarray
-    memory: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    memory: dict[str, np.ndarray] = field(default_factory=dict)
 
     picture = "fvsolve.draw.object_pictures:state_figure"
 
     def __post_init__(self) -> None:
         self.t = as_time(self.t)
-        self.y, self.memory = as_numbers("y", self.y), as_numbers("memory", self.memory)
-        for name, array in (("y", self.y), ("memory", self.memory)):
-            if array.ndim != 1:
-                raise FvsolveError(f"{name} has shape {array.shape}; expected a one-dimensional array of numbers")
+        self.y = as_numbers("y", self.y)
+        if self.y.ndim != 1:
+            raise FvsolveError(f"y has shape {self.y.shape}; expected a one-dimensional array of numbers")
+        if not isinstance(self.memory, dict):
+            raise FvsolveError(f"memory is of type {type(self.memory).__name__}; expected a dict of arrays by name")
 
     def summary_line(self) -> str:
         return f"at t = {self.t:g} s: {self.y.size} numbers"
@@ -59,10 +59,8 @@ class State(Displayable):
 
 def flags_of(state: State, model: Model) -> np.ndarray | float:
     """Event flags (as `RunData.armed`) of a state that `advance` returned; 0 for any other state."""
-    memory = state.memory
-    if len(model.tables.delays) and memory.size:
-        memory = split_memory(memory)[0]
-    return memory[2:] if memory.size == 2 + model.shapes.armed else 0.0
+    flags = state.memory["armed"] if "step" in state.memory else None
+    return flags if flags is not None and flags.size == model.shapes.armed else 0.0
 
 
 def as_numbers(name: str, values: Any) -> np.ndarray:
@@ -240,7 +238,7 @@ class Model(Displayable):
 
     @property
     def damped(self) -> bool:
-        """True if explicit steps divide the rates of basins by a factor for friction, see `steppers.semi_implicit`."""
+        """True if explicit steps divide the rates of basins by a factor for friction, see `steppers.erk`."""
         return bool(self.tables.basins["damped"].any())
 
     @property

@@ -17,8 +17,7 @@ from fvsolve.kernels.steady_friction import drag
 from fvsolve.parts.pipe.materials import materials
 from fvsolve.parts.pipe.pipe_wall import Wall, restraint_factor
 from fvsolve.steppers.automatic import first_method
-from fvsolve.steppers.built_in_methods import AUTO
-from fvsolve.steppers.tableau import method_named
+from fvsolve.steppers.tableau import AUTO, method_named
 
 TEST_DEVIATION = 1e-3  # relative to a small deviation: states for the timing of rates, as much is skipped at rest
 LEAST_TIMING = 1e-3  # least duration of a timing [s]

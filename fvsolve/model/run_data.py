@@ -10,7 +10,7 @@ import numpy as np
 from fvsolve.assembly.model_draft import aligned_zeros
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.delay_lines.wave_history import COUNT
-from fvsolve.model.delay_history import LEAST_STEPS, reset_history, split_memory, steps_left, with_doubled_rings
+from fvsolve.model.delay_history import LEAST_STEPS, reset_history, steps_left, stored_history, with_doubled_rings
 
 if TYPE_CHECKING:
     from fvsolve.model.model import Model
@@ -96,8 +96,8 @@ class RunData:
 
         Raises ValueError if the memory contains no history.
         """
-        if len(self.model.tables.delays) and state is not None and state.memory.size:
-            self.past = split_memory(state.memory)[1].copy()
+        if len(self.model.tables.delays) and state is not None and state.memory:
+            self.past = stored_history(state.memory)
 
     def history_capacity(self) -> float:
         """Number of steps that fit before a ring of delay-line history would lose an entry that is still needed.

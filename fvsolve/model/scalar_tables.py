@@ -9,7 +9,7 @@ import numpy as np
 
 from fvsolve.case.cell_means import means, samples
 from fvsolve.kernels import dtypes as rec
-from fvsolve.steppers.built_in_methods import METHODS
+from fvsolve.steppers.tableau import METHODS
 
 STORES = (rec.TANK, rec.CHAMBER)
 

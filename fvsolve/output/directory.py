@@ -115,12 +115,12 @@ class RunDirectory:
     def checkpoint(self, state, extra: dict) -> None:
         """Replace restart.npz by a checkpoint.
 
-        It contains the state, the arrays `extra` of the solver, and the numbers of rows and frames written so far.
+        It contains the state with its memory, and the numbers of rows and frames written so far; `extra` is empty.
         """
         with self.report_write_errors():
             size = self.history.flush()
             frames = self.fields.frames if self.fields else 0
-            restart = Restart(state.t, state.y, state.memory, extra, self.history.rows, size, frames)
+            restart = Restart(state.t, state.y, state.memory, self.history.rows, size, frames)
             write_restart(self.folder / "restart.npz", restart, self.identity)
 
     def end(self, summary) -> None:

@@ -22,15 +22,13 @@ UNCHECKED_KEYS = ("title", "expect", "compare")
 class Restart:
     """Checkpoint of a run.
 
-    t : time [s]; y : state; memory : memory of step control, switches and delay lines; extra : arrays of the solver by
-    name
+    t : time [s]; y : state; memory : arrays of the solver by name, such as those of step control and delay lines
     rows, history_bytes, frames : rows and bytes of history.csv, and frames of fields, written so far
     """
 
     t: float
     y: np.ndarray
-    memory: np.ndarray
-    extra: dict[str, np.ndarray]
+    memory: dict[str, np.ndarray]
     rows: int
     history_bytes: int
     frames: int
@@ -77,8 +75,8 @@ def write_restart(path: Path, restart: Restart, who: dict[str, str]) -> None:
 
     who : result of `identity`
     """
-    arrays = {f"extra.{name}": np.asarray(value) for name, value in restart.extra.items()}
-    arrays |= {"t": np.float64(restart.t), "y": restart.y, "memory": restart.memory}
+    arrays = {f"memory.{name}": array for name, array in restart.memory.items()}
+    arrays |= {"t": np.float64(restart.t), "y": restart.y}
     arrays["counts"] = np.array([restart.rows, restart.history_bytes, restart.frames])
     arrays["identity"] = np.array(json.dumps(who))
     fresh = path.with_suffix(".tmp")
@@ -96,11 +94,11 @@ def read_restart(path: Path, who: dict[str, str]) -> Restart:
         with np.load(path) as file:
             arrays = {name: file[name] for name in file.files}
         stored = json.loads(str(arrays.pop("identity")))
-        t, y, memory, counts = (arrays.pop(name) for name in ("t", "y", "memory", "counts"))
+        t, y, counts = (arrays.pop(name) for name in ("t", "y", "counts"))
     except Exception as error:  # zip, numpy and json raise many types on a damaged file
         reason = f"{error} is missing" if isinstance(error, KeyError) else error
         raise RunError(f"{path} cannot be read ({reason}); start the run again with --force") from None
-    damaged = [name for name, array, axes in (("t", t, 0), ("y", y, 1), ("memory", memory, 1))
+    damaged = [name for name, array, axes in (("t", t, 0), ("y", y, 1))
               if array.dtype != np.float64 or array.ndim != axes]  # fmt: skip
     damaged = damaged or [name for name, array in (("t", t), ("y", y)) if not np.isfinite(array).all()]
     damaged += ["counts"] if counts.shape != (3,) or counts.dtype.kind != "i" or counts.min() < 0 else []
@@ -108,8 +106,8 @@ def read_restart(path: Path, who: dict[str, str]) -> Restart:
     if damaged:
         raise RunError(f"{path}: damaged or edited data ({listing(damaged)}); start the run again with --force")
     _check_identity(path, stored, who)
-    extra = {name.removeprefix("extra."): value for name, value in arrays.items()}
-    return Restart(float(t), y, memory, extra, *counts.tolist())
+    memory = {name.removeprefix("memory."): array for name, array in arrays.items()}
+    return Restart(float(t), y, memory, *counts.tolist())
 
 
 def _check_identity(path: Path, stored: dict[str, str], expected: dict[str, str]) -> None:

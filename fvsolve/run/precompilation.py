@@ -114,10 +114,10 @@ def run_task(task: tuple[str, str]) -> None:
 
 def steps(_: str) -> None:
     """Compile the time loop, and the empty linear algebra of explicit methods."""
-    from fvsolve.steppers.signatures import no_algebra
-    from fvsolve.steppers.time_loop import compiled, compiled_attempt
+    from fvsolve.steppers.run_handle import no_algebra
+    from fvsolve.steppers.time_loop import compiled
 
-    compiled(), compiled_attempt(), no_algebra()
+    compiled(), no_algebra()
 
 
 def attempt(kind: str) -> None:

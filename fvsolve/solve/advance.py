@@ -14,7 +14,7 @@ from fvsolve.errors import FvsolveError, nearest
 from fvsolve.model import Model, State
 from fvsolve.model.model import flags_of, inputs_of
 from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
-from fvsolve.steppers import automatic, loop_indices
+from fvsolve.steppers import automatic, loop_records
 from fvsolve.units import show
 
 
@@ -41,28 +41,28 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
     held = hold(model, inputs or {})
     loop = RunLoop(held, lambda: model.structure)  # the structure does not depend on the held inputs
     loop.now[:] = state.y
-    loop.loop_state[loop_indices.T] = state.t
+    loop.state["t"] = state.t
     loop.armed[:] = flags_of(state, model)
     loop.run_data.restore_history(state)
-    loop.on_switch = lambda: loop.stop_columns(loop.controls[loop_indices.END])
-    adaptive = loop.controls[loop_indices.CONTROL] == loop_indices.TOLERANCE
+    loop.on_switch = lambda: loop.stop_columns(loop.control["end"])
+    adaptive = loop.control["mode"] == loop_records.TOLERANCE
     for end in [*(t for t, _ in model.breaks if state.t < t < until), until]:
         if end == loop.t:
             continue
         first = loop.t == state.t
         loop.stop_columns(end)
         loop.begin(end, NO_LIMIT)
-        if first and adaptive and state.memory.size >= 2 + loop.armed.size:
-            loop.loop_state[[loop_indices.STEP, loop_indices.ERROR_OLD]] = state.memory[:2]
+        if first and adaptive and "step" in state.memory:
+            loop.state["step"], loop.state["error_old"] = state.memory["step"]
         code = loop.run(NO_LIMIT)
-        while code == loop_indices.BUDGET_SPENT and automatic.is_change_due(loop.stepper):
+        while code == loop_records.BUDGET_SPENT and automatic.is_change_due(loop.stepper):
             automatic.change(loop.stepper)
             code = loop.run(NO_LIMIT)
-        if code != loop_indices.DONE:
+        if code != loop_records.DONE:
             raise FvsolveError(f"advance stopped: {loop.failure_text(code)}")
-    memory = np.append(loop.loop_state[[loop_indices.STEP, loop_indices.ERROR_OLD]], loop.armed)
+    memory = {"step": np.array([loop.state["step"], loop.state["error_old"]]), "armed": loop.armed.copy()}
     if len(model.tables.delays):
-        memory = np.concatenate([memory, loop.run_data.past, [float(loop.run_data.past.size)]])
+        memory["past"] = loop.run_data.past.copy()
     return State(loop.t, loop.now.copy(), memory)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from fvsolve.kernels import band_exchange
 from fvsolve.solve.partition import Partition
 from fvsolve.solve.thread_team import COPIED, WRITTEN, BandWorker, band_functions, postponed_interrupts, yield_address
-from fvsolve.steppers import loop_indices
+from fvsolve.steppers import loop_records
 
 CALLBACK = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
 RUN_LOOP, SEND_STATES, CLOSE = range(3)  # requests of rank 0: run the time loop, send states, end
@@ -100,12 +100,12 @@ class MpiRanks:
         return self.comm.allreduce(math.inf if math.isnan(rate) else float(rate), MPI.MAX)
 
     def call(self, functions: tuple, where: int) -> int:
-        """Run the time loop on all ranks; returns a code of `steppers.loop_indices`.
+        """Run the time loop on all ranks; returns a code of `steppers.loop_records`.
 
         functions, where : compiled functions, and index of the first ledger rate, from `RunLoop.functions`
         """
         loop = self.loop
-        now = loop.progress[loop_indices.NOW]
+        now = loop.progress["now"]
         runs = [(0, loop.model.y_size)] if self.stale else self.cut.common_states()
         small = {name: getattr(loop.stepper, name) for name in COPIED}
         written = {name: getattr(loop.run_data.written, name) for name in WRITTEN}
@@ -114,8 +114,8 @@ class MpiRanks:
         with postponed_interrupts():
             self.comm.bcast((RUN_LOOP, (small, written, runs, states)))
             code = self.member.run_steps(functions, where)
-            self.gather("y", loop.progress[loop_indices.NOW])
-            if code == loop_indices.FIELD:
+            self.gather("y", loop.progress["now"])
+            if code == loop_records.FIELD:
                 self.gather("y_out", ...)
             self.seconds += sum(self.comm.gather(0.0))  # CPU time of the other ranks
         return code
@@ -161,10 +161,10 @@ class MpiRanks:
             for name, array in written.items():
                 self.member.store(name, array)
             for (begin, stop), values in zip(runs, states, strict=True):
-                stepper.y[stepper.progress[loop_indices.NOW], begin:stop] = values
+                stepper.y[stepper.progress[0]["now"], begin:stop] = values
             start_time = time.thread_time()
             code = self.member.run_steps(functions, where)
-            self.gather("y", stepper.progress[loop_indices.NOW])
-            if code == loop_indices.FIELD:
+            self.gather("y", stepper.progress[0]["now"])
+            if code == loop_records.FIELD:
                 self.gather("y_out", ...)
             self.comm.gather(time.thread_time() - start_time)

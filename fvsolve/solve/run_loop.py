@@ -14,10 +14,9 @@ from fvsolve.kernels.compiled_functions import fused_step_function
 from fvsolve.model import Model, RunData
 from fvsolve.model.scalar_tables import amount_indices
 from fvsolve.model.state_bounds import state_bounds
-from fvsolve.solve.blocked_stages import blocked_sums
 from fvsolve.solve.column_impact import separate, shut_places
-from fvsolve.solve.partition import make_partition
-from fvsolve.steppers import automatic, loop_indices
+from fvsolve.solve.partition import blocked_sums, make_partition
+from fvsolve.steppers import automatic, loop_records
 from fvsolve.steppers.integrator import Integrator
 from fvsolve.steppers.ledger import LEDGER_ROWS
 from fvsolve.steppers.structure import Structure
@@ -26,10 +25,23 @@ from fvsolve.steppers.tableau import Method, method_named
 ROW_CAPACITY = 512
 NO_LIMIT = 1e308
 MOST_EVENTS_AT_ONCE = 20  # events at the same time; more is chattering
-MOST_EVENTS_IN_SPAN, SPAN = (
-    2000,
-    1e-6,
-)  # events within this fraction of the run, or within a given step; more is chattering
+# events within this fraction of the run, or within a given step; more is chattering
+MOST_EVENTS_IN_SPAN, SPAN = 2000, 1e-6
+
+FAILURES = {  # reason for the return of the loop -> text
+    loop_records.STOPPED: '{event} at {when}, and numerics.below_vapor = "stop" ends the run there',
+    loop_records.NEWTON_STUCK: "Newton did not converge at {when}, however short the step, worst in {worst}; check the "
+    "parts there for jumps, or try an explicit method",
+    loop_records.TINY_STEP: "the step became too small at {when}; try a larger rtol, or numerics.courant instead",
+    loop_records.BAD_VALUE: "a value is not finite{place} at {when}; the step is too long for the method: "
+    "halve the step",
+}
+STATUS_FAILURES = {  # status of the right-hand side -> text
+    rec.NO_SOLUTION: "the demand{place} cannot be supplied at {when}; all connections to its node are shut",
+    rec.NO_VOLUME: "the chamber volume{place} is zero at {when}; give the piston an end-stop",
+    rec.NO_WIDTH: "the wall has no space left{place} at {when}; give its mass an end-stop, or a wider zone",
+    rec.NO_WEIGHT: "the water in {name} has no weight left at {when}; reduce the downward acceleration of its body",
+}
 
 
 class RunLoop:
@@ -65,46 +77,31 @@ class RunLoop:
         ]  # travel is stored too
         stepper.stored = np.array([at for at in sums if at >= 0], dtype=np.int64)
         stepper.carry = np.zeros(len(stepper.stored))
-        stepper.bounds = state_bounds(model)
-        stepper.out, stepper.out_row, stepper.values = (
-            model.new_out(),
-            model.new_out(),
-            np.zeros(len(model.tables.probes)),
-        )
+        stepper.bounded_states, stepper.bounds = state_bounds(model)
+        stepper.out, stepper.out_row = model.new_out(), model.new_out()
+        stepper.values = np.zeros(len(model.tables.probes))
         self.tanks = np.flatnonzero(model.tables.nodes["kind"] == rec.TANK)
         events = self.armed.size
         stepper.g, stepper.g_new = np.zeros(events), np.zeros(events)
         stepper.rows = np.zeros((ROW_CAPACITY, 1 + len(model.tables.probes)))
-        self.loop_state, self.controls, self.progress, self.out = (
-            stepper.loop_state,
-            stepper.controls,
-            stepper.progress,
-            stepper.out,
-        )
-        self.controls[loop_indices.STEP_MAX] = (
-            min(model.step_max, longest_step(model)) if numerics.rtol is not None else NO_LIMIT
-        )
-        self.controls[loop_indices.STOP_AT], self.controls[loop_indices.ALLOW_FUSED] = NO_LIMIT, fused_allowed
-        for control, key in (
-            (loop_indices.COURANT, "courant"),
-            (loop_indices.FIXED_STEP, "step"),
-            (loop_indices.TOLERANCE, "rtol"),
-        ):
+        self.state, self.control, self.progress = stepper.state[0], stepper.control[0], stepper.progress[0]
+        self.out, control = stepper.out, self.control
+        control["step_max"] = min(model.step_max, longest_step(model)) if numerics.rtol is not None else NO_LIMIT
+        control["stop_at"], control["allow_fused"] = NO_LIMIT, fused_allowed
+        for mode, key in enumerate(("courant", "step", "rtol")):  # COURANT, FIXED_STEP, TOLERANCE of `loop_records`
             if getattr(numerics, key) is not None:
-                self.controls[loop_indices.CONTROL], self.controls[loop_indices.SIZE] = control, getattr(numerics, key)
+                control["mode"], control["size"] = mode, getattr(numerics, key)
         if numerics.method == automatic.AUTO:
             automatic.watch(stepper, structure())
         if (
             numerics.courant is not None and not method.explicit
         ):  # of waves only: implicit steps are stable for the rest
-            self.controls[loop_indices.CONTROL] = loop_indices.FIXED_STEP
-            self.controls[loop_indices.SIZE] = numerics.courant / model.wave_rate
-        given = self.controls[loop_indices.CONTROL] == loop_indices.FIXED_STEP
-        self.run_data.clock["step"] = self.controls[loop_indices.SIZE] if given else 0.0
+            control["mode"], control["size"] = loop_records.FIXED_STEP, numerics.courant / model.wave_rate
+        self.run_data.clock["step"] = self.given_step
         self.team, single_band = None, make_partition(model, 1)
         if method.explicit and numerics.method != automatic.AUTO:
-            stepper.shape = blocked_sums(single_band, 0)
-            self.run_data.written = self.run_data.written._replace(sums=stepper.shape)
+            stepper.structure = blocked_sums(single_band, 0)
+            self.run_data.written = self.run_data.written._replace(sums=stepper.structure)
         if numerics.rtol is not None:  # errors are summed by rows
             stepper.row_blocks, stepper.sums = single_band.row_blocks(0), np.zeros(single_band.sum_count)
         if comm is not None:
@@ -119,19 +116,24 @@ class RunLoop:
     @property
     def now(self) -> np.ndarray:
         """Present state y (a view)."""
-        return self.stepper.y[self.progress[loop_indices.NOW]]
+        return self.stepper.y[self.progress["now"]]
 
     @property
     def before(self) -> np.ndarray:
         """State before the last step (a view)."""
         if self.team is not None:
-            self.team.gather_states(self.progress[loop_indices.OLD])
-        return self.stepper.y[self.progress[loop_indices.OLD]]
+            self.team.gather_states(self.progress["old"])
+        return self.stepper.y[self.progress["old"]]
+
+    @property
+    def given_step(self) -> float:
+        """Given step [s]; 0 under error control and where it depends on the wave rate."""
+        return float(self.control["size"]) if self.control["mode"] == loop_records.FIXED_STEP else 0.0
 
     @property
     def t(self) -> float:
         """Present time [s]."""
-        return float(self.loop_state[loop_indices.T])
+        return float(self.state["t"])
 
     def begin(self, end: float, stop_at: float) -> None:
         """Start a segment of the run that ends at `end` [s], and discard the data of steps before its start.
@@ -143,33 +145,33 @@ class RunLoop:
 
     def resume(self, end: float, stop_at: float) -> None:
         """Continue a segment of the run up to the time `end` [s]; the loop writes no output rows from `stop_at` on."""
-        self.controls[loop_indices.END], self.controls[loop_indices.STOP_AT] = end, stop_at
-        self.progress[loop_indices.PHASE], self.progress[loop_indices.HAS_LAST_STEP] = loop_indices.FRESH, 0
+        self.control["end"], self.control["stop_at"] = end, stop_at
+        self.stepper.restart_segment()
         self.apply_events()
         self.run_data.clock["limit"] = end
 
     def run(self, budget: float) -> int:
-        """Take at most `budget` steps; returns a code of `steppers.loop_indices`, from DONE to CHATTERING."""
+        """Take at most `budget` steps; returns a code of `steppers.loop_records`, from DONE to CHATTERING."""
         while (capacity := self.run_data.history_capacity()) < budget:
             code = self.steps(capacity)
-            left, budget = self.controls[loop_indices.BUDGET], budget - capacity
-            if code != loop_indices.BUDGET_SPENT or left != 0.0 or automatic.is_change_due(self.stepper):
+            left, budget = self.control["budget"], budget - capacity
+            if code != loop_records.BUDGET_SPENT or left != 0.0 or automatic.is_change_due(self.stepper):
                 return code
         return self.steps(budget)
 
     def steps(self, budget: float) -> int:
         """Take at most `budget` steps, for which the wave history has space; returns a code, see `run`."""
-        self.controls[loop_indices.BUDGET] = budget
-        code = loop_indices.SWITCHED
-        while code == loop_indices.SWITCHED:
+        self.control["budget"] = budget
+        code = loop_records.SWITCHED
+        while code == loop_records.SWITCHED:
             before = self.armed.copy()
             functions, where = self.functions
             if self.team is None:
                 code = self.stepper.call(*functions, self.run_data.handle, where, self.armed)
             else:
                 code = self.team.call(functions, where)
-            if code == loop_indices.SWITCHED:
-                code = loop_indices.SWITCHED if self.handle_events(before) else loop_indices.CHATTERING
+            if code == loop_records.SWITCHED:
+                code = loop_records.SWITCHED if self.handle_events(before) else loop_records.CHATTERING
                 self.on_switch()
         return code
 
@@ -214,9 +216,7 @@ class RunLoop:
         self.at_once = self.at_once + 1 if self.t == self.last_switch else 1
         self.last_switch = self.t
         self.recent_events.append(self.t)
-        step = (
-            self.controls[loop_indices.SIZE] if self.controls[loop_indices.CONTROL] == loop_indices.FIXED_STEP else 0.0
-        )
+        step = self.given_step
         crowded = len(self.recent_events) == self.recent_events.maxlen and self.t - self.recent_events[0] <= max(
             self.span, step
         )
@@ -260,71 +260,57 @@ class RunLoop:
 
     def take_rows(self) -> np.ndarray:
         """Copy of the output rows (time and probe values) written since the last call."""
-        count = int(self.progress[loop_indices.ROWS])
-        self.progress[loop_indices.ROWS] = 0
+        count = int(self.progress["rows"])
+        self.progress["rows"] = 0
         return self.stepper.rows[:count].copy()
 
     def step_back(self) -> None:
         """Return to the state before the last step, unless the ledgers include that step already; it is valid then."""
-        if self.progress[loop_indices.HAS_LAST_STEP] == 1 and self.loop_state[loop_indices.UNBOOKED] > 0.0:
+        if self.progress["has_last_step"] == 1 and self.state["unbooked"] > 0.0:
             self.before  # noqa: B018  (copies that state from the other threads or ranks)
-            self.loop_state[loop_indices.T] -= self.loop_state[loop_indices.LAST]
-            self.loop_state[loop_indices.UNBOOKED] = 0.0
-            self.progress[loop_indices.NOW], self.progress[loop_indices.OLD] = (
-                self.progress[loop_indices.OLD],
-                self.progress[loop_indices.NOW],
-            )
-            self.progress[loop_indices.HAS_LAST_STEP] = 0
+            self.state["t"] -= self.state["last"]
+            self.state["unbooked"] = 0.0
+            self.progress["now"], self.progress["old"] = self.progress["old"], self.progress["now"]
+            self.progress["has_last_step"] = 0
 
     def failure_text(self, code: int) -> str:
-        """Text with failure, place, time and remedy for a code of `steppers.loop_indices`.
+        """Text with failure, place, time and remedy for a code of `steppers.loop_records`.
 
         For BAD_VALUE and BAD_STATUS the loop returns to the state before the last step, see `step_back`.
         """
-        model = self.model
-        place = ""
-        if code == loop_indices.BAD_VALUE:
+        model, text, names = self.model, FAILURES.get(code, ""), {}
+        names["when"] = f"t = {model.case.amount(self.t, 'time', 6)}"
+        if code == loop_records.CHATTERING:
+            return self.chattering_text(names["when"])
+        if code == loop_records.STOPPED:
+            names["event"] = "a cavity opened" if model.cavitates else "pressure fell below vapour pressure"
+        elif code == loop_records.NEWTON_STUCK:
+            names["worst"] = model.state_names[int(self.state["worst"])]
+        elif code == loop_records.BAD_VALUE:
             bad = np.flatnonzero(~np.isfinite(self.now))
-            place = f" at {model.state_names[bad[0]]}" if bad.size else ""
-        elif code == loop_indices.BAD_STATUS and self.out[rec.WHERE] >= 0 and self.out[rec.STATUS] != rec.NO_WEIGHT:
-            place = f" at {model.node_names[int(self.out[rec.WHERE])]}"
-        when = f"t = {model.case.amount(self.t, 'time', 6)}"
-        if code == loop_indices.CHATTERING:
-            first = self.t if self.at_once > 1 else self.recent_events[0]  # at the same time, or within a short span
-            names = sorted({model.events[k][0] for t, k in self.switched if t >= first})
-            remedies = {
-                device.remedy: None for name, _, device in model.devices if name.removesuffix(".inside") in names
-            }
-            parts_text = listing(names) if names else "a leak, or a demand that follows the pressure,"
-            verbs = "change their states" if len(names) > 1 else "changes its state"
-            remedy = ", or ".join(remedies) or "put a chamber at the node of this part"
-            return f"{parts_text} {verbs} without end at {when}; {remedy}"
-        if code == loop_indices.STOPPED:
-            event = "a cavity opened" if model.cavitates else "pressure fell below vapour pressure"
-            return f'{event} at {when}, and numerics.below_vapor = "stop" ends the run there'
-        if code in (loop_indices.BAD_VALUE, loop_indices.BAD_STATUS):
+            names["place"] = f" at {model.state_names[bad[0]]}" if bad.size else ""
             self.step_back()
-        if code == loop_indices.NEWTON_STUCK:
-            worst = model.state_names[int(self.loop_state[loop_indices.WORST])]
-            return (f"Newton did not converge at {when}, however short the step, worst in {worst}; check the "
-                    "parts there for jumps, or try an explicit method")  # fmt: skip
-        if code == loop_indices.TINY_STEP:
-            return f"the step became too small at {when}; try a larger rtol, or numerics.courant instead"
-        if code == loop_indices.BAD_STATUS and self.out[rec.STATUS] == rec.NO_SOLUTION:
-            return f"the demand{place} cannot be supplied at {when}; all connections to its node are shut"
-        if code == loop_indices.BAD_STATUS and self.out[rec.STATUS] == rec.NO_VOLUME:
-            return f"the chamber volume{place} is zero at {when}; give the piston an end-stop"
-        if code == loop_indices.BAD_STATUS and self.out[rec.STATUS] == rec.NO_WIDTH:
-            return f"the wall has no space left{place} at {when}; give its mass an end-stop, or a wider zone"
-        if code == loop_indices.BAD_STATUS and self.out[rec.STATUS] == rec.NO_WEIGHT:
-            index = int(self.out[rec.WHERE])
-            names = [*(basin.name for basin in model.basins), *model.node_names]
-            name = names[index].removesuffix(".inside")
-            return (f"the water in {name} has no weight left at {when}; reduce the downward acceleration of "
-                    "its body")  # fmt: skip
-        if code == loop_indices.BAD_STATUS:
-            return f"Newton did not converge{place} at {when}; try a smaller step"
-        return f"a value is not finite{place} at {when}; the step is too long for the method: halve the step"
+        elif code == loop_records.BAD_STATUS:
+            index, status = int(self.out[rec.WHERE]), int(self.out[rec.STATUS])
+            text = STATUS_FAILURES.get(status, "Newton did not converge{place} at {when}; try a smaller step")
+            if status == rec.NO_WEIGHT:
+                bodies = [*(basin.name for basin in model.basins), *model.node_names]
+                names["name"] = bodies[index].removesuffix(".inside")
+            else:
+                names["place"] = f" at {model.node_names[index]}" if index >= 0 else ""
+            self.step_back()
+        return text.format(**names)
+
+    def chattering_text(self, when: str) -> str:
+        """Text with the devices that change their states without end, and a remedy; when : time of the failure."""
+        model = self.model
+        first = self.t if self.at_once > 1 else self.recent_events[0]  # at the same time, or within a short span
+        names = sorted({model.events[k][0] for t, k in self.switched if t >= first})
+        remedies = {device.remedy: None for name, _, device in model.devices if name.removesuffix(".inside") in names}
+        parts_text = listing(names) if names else "a leak, or a demand that follows the pressure,"
+        verbs = "change their states" if len(names) > 1 else "changes its state"
+        remedy = ", or ".join(remedies) or "put a chamber at the node of this part"
+        return f"{parts_text} {verbs} without end at {when}; {remedy}"
 
 
 def longest_step(model: Model) -> float:

@@ -8,7 +8,6 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.model import Model, State
-from fvsolve.model.delay_history import split_memory
 from fvsolve.model.scalar_tables import scalar_ledgers
 from fvsolve.solve.mpi_ranks import CLOSE_MESSAGE
 from fvsolve.solve.partition import threads_of
@@ -29,15 +28,14 @@ from fvsolve.solve.run_summary import (
     spill_notices,
 )
 from fvsolve.solve.thread_team import postponed_interrupts
-from fvsolve.steppers import automatic, loop_indices
+from fvsolve.steppers import automatic, loop_records
 from fvsolve.steppers.ledger import LEDGER_ROWS
 from fvsolve.units import show
 
 CHECKPOINT_SECONDS = 1.0
 CHUNK_SECONDS = 0.1
-FREQUENT_CHECK_STEPS = (
-    loop_indices.GROWTH_CHECK_STEPS
-)  # steps between two checks by `RunChecks.check` where it is needed often
+# steps between two checks by `RunChecks.check` where it is needed often
+FREQUENT_CHECK_STEPS = loop_records.GROWTH_CHECK_STEPS
 PERSISTENT = ("extremes", "envelope", "marks", "armed")
 
 
@@ -107,17 +105,14 @@ class Run:
         jumps = {t: jump for t, jump in model.breaks if self.start <= t <= self.end}
         self.starts_with_jump, self.ends_with_jump = jumps.pop(self.start, False), jumps.pop(self.end, False)
         self.bounds = [(t, jump) for t, jump in sorted(jumps.items())] + [(self.end, True)]
-        orders = self.loop.controls
-        orders[loop_indices.START], orders[loop_indices.EVERY] = (
-            self.start,
-            output.every or (self.end - self.start) / 1000,
-        )
-        orders[loop_indices.FIELD_EVERY] = (self.end - self.start) / output.fields if output.fields else 0.0
-        orders[loop_indices.FIELD_COUNT] = output.fields
-        self.segment, self.fresh = 0, state.memory.size == 0
+        self.loop.stepper.set_control(
+            start=self.start, every=output.every or (self.end - self.start) / 1000, field_count=output.fields,
+            field_every=(self.end - self.start) / output.fields if output.fields else 0.0,
+        )  # fmt: skip
+        self.segment, self.fresh = 0, not state.memory
         self.changes: list[tuple[float, float, float]] = []  # changes of the method under `auto`
         self.loop.now[:] = state.y
-        self.loop.loop_state[loop_indices.T] = state.t
+        self.loop.state["t"] = state.t
         self.budget, self.seconds, self.saved = 1000.0, 0.0, time.perf_counter()
         self.watches = [watch for basin in model.basins for watch in basin.watches(basin.deviations(model.start))]
         self.checks = RunChecks(self.run_data)
@@ -131,68 +126,67 @@ class Run:
         if not self.fresh:
             try:
                 self.restore(state.memory)
-            except (ValueError, IndexError, OverflowError):  # damaged checkpoint, or from another solver
+            except (
+                KeyError,
+                TypeError,
+                ValueError,
+                IndexError,
+                OverflowError,
+            ):  # damaged checkpoint, or from another solver
                 if comm is None:
                     self.loop.close()
+                numbers = sum(map(np.size, state.memory.values()))
                 raise MemoryMismatch(
-                    f"the checkpoint does not match this run ({state.memory.size} numbers of restart data); "
+                    f"the checkpoint does not match this run ({numbers} numbers of restart data); "
                     "start again with --force, or with a State with an empty `memory`"
                 ) from None
         self.setup = time.perf_counter() - self.began
 
     # memory -------------------------------------------------------------------------------------------------
 
-    def memory(self) -> np.ndarray:
-        """All data that a resumed run needs in addition to t and y, as one flat array."""
-        arrays = [getattr(self.run_data, name).ravel() for name in PERSISTENT]
-        changes = [x for change in self.changes for x in change]
-        switched = [x for event in self.loop.switched for x in event]
-        own = [float(self.segment), self.seconds, self.processor, float(len(self.changes)), *changes]
-        crowd = self.loop.recent_events
-        own += [float(len(switched)), *switched, float(len(crowd)), *crowd, self.loop.last_switch, self.loop.at_once]
-        own += [x for watch in self.watches for x in watch.greatest]
-        own += [self.checks.rates.get(watch.name, 0.0) for watch in self.checks.moving]
-        views = (view.ravel() for view in self.loop.stepper.restart_arrays())
-        own += self.checks.sloshing.restart_data.ravel().tolist()
-        past = self.run_data.past
-        return np.concatenate([own, *views, *arrays, self.checks.step_doubling.restart_data, past, [float(past.size)]])
+    def views(self) -> dict[str, np.ndarray]:
+        """Arrays of fixed size that change during the run and that a resumed run needs, by name."""
+        views = {name: getattr(self.run_data, name) for name in PERSISTENT} | self.loop.stepper.restart_arrays()
+        views |= {f"watch {k}": watch.greatest for k, watch in enumerate(self.watches)}
+        return views | {
+            "sloshing": self.checks.sloshing.restart_data, "step doubling": self.checks.step_doubling.restart_data
+        }  # fmt: skip
 
-    def restore(self, memory: np.ndarray) -> None:
-        memory, past = split_memory(memory)
+    def memory(self) -> dict[str, np.ndarray]:
+        """All data that a resumed run needs in addition to t and y, as arrays by name."""
+        loop, rates = self.loop, self.checks.rates
+        own = {
+            "run": [self.segment, self.seconds, self.processor, loop.last_switch, loop.at_once],
+            "changes": self.changes, "switched": loop.switched, "recent events": loop.recent_events,
+            "rates": [rates.get(basin.name, 0.0) for basin in self.checks.moving],
+        }  # fmt: skip
+        memory = {name: np.array(values, dtype=np.float64) for name, values in own.items()}
+        return memory | {"past": self.run_data.past.copy()} | {name: view.copy() for name, view in self.views().items()}
+
+    def restore(self, memory: dict[str, np.ndarray]) -> None:
+        """Restore the result of `memory`; raises ValueError or KeyError if it does not match this run."""
+        loop, past = self.loop, memory["past"]
         if (past.size == 0) != (self.run_data.past.size == 0):
             raise ValueError("history of delay lines does not match")
         self.run_data.past = past.copy()
-        self.segment, self.seconds, self.processor, changes = int(memory[0]), *map(float, memory[1:3]), int(memory[3])
-        if not (0 <= self.segment < len(self.bounds) and changes >= 0 and memory[4 + 3 * changes] >= 0):
-            raise ValueError("counts out of range")
-        self.changes = [tuple(row) for row in memory[4 : 4 + 3 * changes].reshape(-1, 3).tolist()]
-        if changes % 2 == 1:
-            automatic.change(self.loop.stepper)
-        memory = memory[4 + 3 * changes :]
-        events, memory = memory[1 : 1 + int(memory[0])], memory[1 + int(memory[0]) :]
-        self.loop.switched = [(float(t), int(k)) for t, k in events.reshape(-1, 2)]
-        crowd, memory = memory[1 : 1 + int(memory[0])], memory[1 + int(memory[0]) :]
-        self.loop.recent_events.extend(crowd.tolist())
-        self.loop.last_switch, self.loop.at_once, memory = float(memory[0]), int(memory[1]), memory[2:]
-        for watch in self.watches:
-            watch.greatest[:], memory = memory[: watch.greatest.size], memory[watch.greatest.size :]
-        for basin in self.checks.moving:
-            self.checks.rates[basin.name], memory = float(memory[0]), memory[1:]
-        sloshing_data = self.checks.sloshing.restart_data.ravel()
-        sloshing_data[:], memory = memory[: sloshing_data.size], memory[sloshing_data.size :]
-        step_doubling_data = self.checks.step_doubling.restart_data
-        arrays = [getattr(self.run_data, name) for name in PERSISTENT] + [
-            *self.loop.stepper.restart_arrays(),
-            step_doubling_data,
-        ]
-        if memory.size != sum(array.size for array in arrays):
-            raise ValueError("wrong number of values")
-        memory = self.loop.stepper.restore(memory)
-        for name in PERSISTENT:
-            array = getattr(self.run_data, name).ravel()
-            array[:] = memory[: array.size]
-            memory = memory[array.size :]
-        step_doubling_data[:] = memory
+        segment, self.seconds, self.processor, loop.last_switch, at_once = memory["run"].tolist()
+        self.segment, loop.at_once = int(segment), int(at_once)
+        if not 0 <= self.segment < len(self.bounds):
+            raise ValueError("number of the segment out of range")
+        self.changes = [tuple(row) for row in memory["changes"].reshape(-1, 3).tolist()]
+        if len(self.changes) % 2 == 1:
+            automatic.change(loop.stepper)
+        loop.switched = [(t, int(k)) for t, k in memory["switched"].reshape(-1, 2).tolist()]
+        loop.recent_events.extend(memory["recent events"].tolist())
+        names = [basin.name for basin in self.checks.moving]
+        self.checks.rates.update(zip(names, memory["rates"].tolist(), strict=True))
+        if memory.keys() != self.memory().keys():
+            raise ValueError("names of the arrays do not match")
+        for name, view in self.views().items():
+            if memory[name].shape != view.shape or memory[name].dtype != view.dtype:
+                raise ValueError(f"array {name} does not match")
+            view[...] = memory[name]
+        loop.stepper.after_restore()
 
     def state(self) -> State:
         return State(self.loop.t, self.loop.now.copy(), self.memory())
@@ -210,7 +204,7 @@ class Run:
         return out
 
     def flush(self) -> None:
-        if self.loop.progress[loop_indices.ROWS]:
+        if self.loop.progress["rows"]:
             rows = self.loop.take_rows()
             self.sink.rows(rows[:, 0], rows[:, 1 : 1 + len(self.model.probes)])
             self.update_extremes(rows)
@@ -247,19 +241,13 @@ class Run:
         t : time of a jump or of the end of the run, whose row is written already
         out : output array of the right-hand side at t
         """
-        memory, orders = self.loop.loop_state, self.loop.controls
-        near = 1e-12 * max(abs(t), abs(self.end))
-        if orders[loop_indices.EVERY] > 0:
-            while (
-                orders[loop_indices.START] + memory[loop_indices.NEXT_OUTPUT] * orders[loop_indices.EVERY] <= t + near
-            ):
-                memory[loop_indices.NEXT_OUTPUT] += 1
-        if orders[loop_indices.FIELD_EVERY] > 0 and memory[loop_indices.NEXT_FIELD] <= orders[loop_indices.FIELD_COUNT]:
-            if (
-                orders[loop_indices.START] + memory[loop_indices.NEXT_FIELD] * orders[loop_indices.FIELD_EVERY]
-                <= t + near
-            ):
-                memory[loop_indices.NEXT_FIELD] += 1
+        state, control = self.loop.state, self.loop.control
+        start, near = control["start"], 1e-12 * max(abs(t), abs(self.end))
+        while control["every"] > 0 and start + state["next_output"] * control["every"] <= t + near:
+            state["next_output"] += 1
+        if control["field_every"] > 0 and state["next_field"] <= control["field_count"]:
+            if start + state["next_field"] * control["field_every"] <= t + near:
+                state["next_field"] += 1
                 self.frame(t, self.loop.now, out)
 
     # the run ------------------------------------------------------------------------------------------------
@@ -280,9 +268,9 @@ class Run:
     def open(self) -> None:
         out = self.row(self.start, self.start)
         self.loop.switched.clear()  # initial device states are not events
-        if self.loop.controls[loop_indices.FIELD_EVERY] > 0:
+        if self.loop.control["field_every"] > 0:
             self.frame(self.start, self.loop.now, out)
-        self.loop.loop_state[loop_indices.NEXT_OUTPUT] = self.loop.loop_state[loop_indices.NEXT_FIELD] = 1.0
+        self.loop.state["next_output"] = self.loop.state["next_field"] = 1.0
         self.begin_segment(self.starts_with_jump)
 
     def stop_columns(self) -> None:
@@ -302,7 +290,7 @@ class Run:
     def begin_segment(self, jumped: bool) -> None:
         end, jump = self.bounds[self.segment]
         self.stop_columns()
-        self.checks.step_doubling.begin(self.loop.loop_state[loop_indices.STEPS])
+        self.checks.step_doubling.begin(self.loop.state["steps"])
         if jumped:
             self.row(self.loop.t, end)
         self.loop.begin(end, end if jump else NO_LIMIT)
@@ -330,29 +318,29 @@ class Run:
     def steps(self) -> str:
         """Step to the end of the segment; returns "", or the reason why the run cannot continue."""
         while True:
-            before, steps, busy = time.perf_counter(), self.loop.loop_state[loop_indices.STEPS], self.busy
+            before, steps, busy = time.perf_counter(), self.loop.state["steps"], self.busy
             code = self.loop.run(min(self.left, self.checks.step_doubling.steps_left(steps)))
             self.processor += self.busy - busy
-            self.left = max(0.0, self.left - (self.loop.loop_state[loop_indices.STEPS] - steps))
+            self.left = max(0.0, self.left - (self.loop.state["steps"] - steps))
             self.seconds += time.perf_counter() - before
             self.flush()
             self.checks.step_doubling.check(self.loop)
             grown = self.checks.check(self.loop.t, self.loop.now)
-            if grown and code != loop_indices.CHATTERING:  # the message about chattering names the parts
+            if grown and code != loop_records.CHATTERING:  # the message about chattering names the parts
                 self.invalid_from = self.checks.sound
                 return grown
-            if code == loop_indices.FIELD:
-                count = self.loop.loop_state[loop_indices.NEXT_FIELD] - 1
-                due = self.start + count * self.loop.controls[loop_indices.FIELD_EVERY]
+            if code == loop_records.FIELD:
+                count = self.loop.state["next_field"] - 1
+                due = self.start + count * self.loop.control["field_every"]
                 self.frame(due, self.loop.stepper.y_out, self.loop.stepper.out_row)
-            elif code == loop_indices.BUDGET_SPENT and automatic.is_change_due(self.loop.stepper):
+            elif code == loop_records.BUDGET_SPENT and automatic.is_change_due(self.loop.stepper):
                 self.changes.append(automatic.change(self.loop.stepper))
-            elif code == loop_indices.BUDGET_SPENT and self.left <= 0.0:
+            elif code == loop_records.BUDGET_SPENT and self.left <= 0.0:
                 self.pause()
                 self.left, self.paused = self.budget, time.perf_counter()
-            elif code == loop_indices.DONE:
+            elif code == loop_records.DONE:
                 return ""
-            elif code not in (loop_indices.BUDGET_SPENT, loop_indices.ROWS_FULL):
+            elif code not in (loop_records.BUDGET_SPENT, loop_records.ROWS_FULL):
                 return self.failure(code)
 
     @property
@@ -367,7 +355,7 @@ class Run:
         most = FREQUENT_CHECK_STEPS if self.checks.needs_frequent_checks else 1e9
         self.budget = float(np.clip(self.budget * np.clip(factor, 0.25, 4.0), 10, most))
         if self.progress is not None:
-            self.progress(self.loop.t, time.perf_counter() - self.began, int(self.loop.loop_state[loop_indices.STEPS]))
+            self.progress(self.loop.t, time.perf_counter() - self.began, int(self.loop.state["steps"]))
         if time.perf_counter() - self.saved > CHECKPOINT_SECONDS:
             self.save()
 
@@ -378,13 +366,13 @@ class Run:
     def failure(self, code: int) -> str:
         """Reason why a run stopped: failure, place, time and remedy.
 
-        code : code of `steppers.loop_indices` that the time loop returned
+        code : code of `steppers.loop_records` that the time loop returned
         The advice of the density law is added for BAD_VALUE, NEWTON_STUCK and TINY_STEP. For BAD_VALUE, `invalid_from`
         is set.
         """
-        if code == loop_indices.BAD_VALUE:
+        if code == loop_records.BAD_VALUE:
             self.invalid_from = self.checks.sound
-        numbers = code in (loop_indices.BAD_VALUE, loop_indices.NEWTON_STUCK, loop_indices.TINY_STEP)
+        numbers = code in (loop_records.BAD_VALUE, loop_records.NEWTON_STUCK, loop_records.TINY_STEP)
         return "stopped: " + self.loop.failure_text(code) + (self.model.case.law.advice if numbers else "")
 
     def methods(self) -> list[dict]:
@@ -392,9 +380,8 @@ class Run:
         name = self.model.case.numerics.method
         if name != automatic.AUTO:
             return [{"time": self.start, "method": name, "why": "given by numerics.method"}]
-        return automatic.method_history(
-            self.start, self.changes, *self.loop.controls[[loop_indices.PRICE, loop_indices.SIZE]]
-        )
+        control = self.loop.control
+        return automatic.method_history(self.start, self.changes, control["price"], control["size"])
 
     def close(self, reason: str, saved: bool = True) -> Summary:
         model, loop = self.model, self.loop

@@ -20,17 +20,18 @@ import numpy as np
 
 from fvsolve.assembly.model_draft import aligned_zeros
 from fvsolve.kernels import band_exchange
+from fvsolve.kernels.calls import compile_as
 from fvsolve.kernels.compiled_functions import functions
 from fvsolve.model import RunData
-from fvsolve.solve.blocked_stages import blocked_sums
-from fvsolve.solve.partition import Partition
-from fvsolve.steppers import loop_indices
+from fvsolve.model.state_bounds import state_bounds
+from fvsolve.solve.partition import Partition, blocked_sums
+from fvsolve.steppers import loop_records
 from fvsolve.steppers.integrator import Integrator
-from fvsolve.steppers.signatures import JOIN, compiled_as
+from fvsolve.steppers.run_handle import JOIN
 
 COPIED = (
-    "loop_state",
-    "controls",
+    "state",
+    "control",
     "progress",
     "ledger",
     "carry",
@@ -63,34 +64,25 @@ class BandWorker:
         self.loop, self.number, self.run_data, self.stepper = loop, k, run_data, stepper
         self.stepper.join, self.stepper.row_blocks = team.join, cut.row_blocks(k)
         self.stepper.sums = np.zeros(cut.sum_count)
-        self.own = [
-            slice(begin, stop) for begin, stop, *_ in self.stepper.row_blocks[len(cut.common_states()) :].tolist()
-        ]
+        blocks, common = self.stepper.row_blocks.tolist(), len(cut.common_states())
+        self.own = [slice(begin, stop) for begin, stop, *_ in blocks[common:]]
         states, flows = cut.states(k), cut.flows(k)
         own = np.zeros(band_exchange.HEAD + 3 * (len(states) + len(flows)), dtype=np.int64)
-        (
-            own[band_exchange.BAND],
-            own[band_exchange.BAND_COUNT],
-            own[band_exchange.YIELD],
-            own[band_exchange.PROCESS_CALL],
-        ) = k, cut.count, team.yield_address, team.callback
-        own[band_exchange.BOARD], own[band_exchange.SUM_BUFFER] = team.board.ctypes.data, team.buffer.ctypes.data
-        own[band_exchange.COMMON_SPANS], own[band_exchange.STATES], own[band_exchange.FLOWS] = (
-            len(cut.common_states()),
-            len(states),
-            len(flows),
-        )
+        own[[band_exchange.BAND, band_exchange.BAND_COUNT]] = k, cut.count
+        own[[band_exchange.YIELD, band_exchange.PROCESS_CALL]] = team.yield_address, team.callback
+        own[[band_exchange.BOARD, band_exchange.SUM_BUFFER]] = team.board.ctypes.data, team.buffer.ctypes.data
+        own[[band_exchange.COMMON_SPANS, band_exchange.STATES, band_exchange.FLOWS]] = common, len(states), len(flows)
         own[band_exchange.HEAD :] = np.concatenate([states, flows]).ravel()
-        self.stepper.shape = blocked_sums(cut, k)
-        self.own_arrays = {"bands": cut.bands(k), "joint": own, "sums": self.stepper.shape}
+        self.stepper.structure = blocked_sums(cut, k)
+        self.own_arrays = {"bands": cut.bands(k), "joint": own, "sums": self.stepper.structure}
         self.call_tables = team.functions.calls, team.functions.hooks
         self.open()
-        at, bounds = loop.stepper.bounds
+        at, bounds = state_bounds(loop.model)
         own_states = np.zeros(loop.model.y_size, dtype=bool)
-        for begin, stop, *_ in self.stepper.row_blocks.tolist():
+        for begin, stop, *_ in blocks:
             own_states[begin:stop] = True
         owned = own_states[at[::3]]
-        self.bounds = np.ascontiguousarray(at.reshape(-1, 3)[owned]).ravel(), bounds[owned]
+        stepper.bounded_states, stepper.bounds = np.ascontiguousarray(at.reshape(-1, 3)[owned]).ravel(), bounds[owned]
 
     def open(self) -> None:
         """Make the handle of the arrays that the run writes; repeated when the wave history has grown."""
@@ -112,19 +104,16 @@ class BandWorker:
         for name in WRITTEN:
             self.store(name, getattr(self.loop.run_data.written, name))
         self.stepper.times, self.stepper.largest = self.loop.stepper.times, self.loop.stepper.largest
-        now = self.loop.progress[loop_indices.NOW]
+        now = self.loop.progress["now"]
         for rows in states:
             self.stepper.y[now, rows] = self.loop.stepper.y[now, rows]
 
     def run_steps(self, functions: tuple, where: int) -> int:
-        """Run the time loop on this band; returns a code of `steppers.loop_indices`; arguments as `ThreadTeam.call`."""
+        """Run the time loop on this band; returns a code of `steppers.loop_records`; arguments as `ThreadTeam.call`."""
         stepper = self.stepper
         if self.run_data.past is not self.written.past:
             self.open()
-        within, stepper.bounds = stepper.bounds, self.bounds
-        code = stepper.call(*functions, self.handle, where, self.run_data.armed)
-        stepper.bounds = within
-        return code
+        return stepper.call(*functions, self.handle, where, self.run_data.armed)
 
     def copy_to_loop(self, name: str, at) -> None:
         """Copy the rows of this band, in row `at` of the integrator's array `name`, to the run loop."""
@@ -143,11 +132,11 @@ def copy_integrator(stepper: Integrator) -> Integrator:
         stepper.method,
         stepper.scale.size,
         stepper.ledger_rates.shape[1],
-        stepper.structure,
+        stepper.jacobian_structure,
         stepper.scale,
         stepper.damped,
     )
-    copy.stored, copy.carry, copy.bounds = stepper.stored, stepper.carry.copy(), stepper.bounds
+    copy.stored, copy.carry = stepper.stored, stepper.carry.copy()
     for name in ("out", "out_row", "values", "g", "g_new", "rows"):
         setattr(copy, name, getattr(stepper, name).copy())
     return copy
@@ -156,7 +145,7 @@ def copy_integrator(stepper: Integrator) -> Integrator:
 def band_functions(cut: Partition) -> tuple:
     """Compiled functions of a model with exchange between bands, and compiled function that adds up partial sums."""
     features = replace(cut.model.functions.cast, bands=True, boundary_exchange=cut.exchanges_flows)
-    return functions(features), compiled_as(band_exchange.gather_sums, JOIN)
+    return functions(features), compile_as(band_exchange.gather_sums, JOIN)
 
 
 class ThreadTeam:
@@ -185,15 +174,15 @@ class ThreadTeam:
             start = time.thread_time()
             try:
                 answer = member.run_steps(*task)
-                member.copy_to_loop("y", member.stepper.progress[loop_indices.NOW])
-                if answer == loop_indices.FIELD:
+                member.copy_to_loop("y", member.stepper.progress[0]["now"])
+                if answer == loop_records.FIELD:
                     member.copy_to_loop("y_out", ...)
             except BaseException as error:  # raised again in the calling thread
                 answer = error
             self.answers.put((answer, time.thread_time() - start))
 
     def call(self, functions: tuple, where: int) -> int:
-        """Run the time loop on all bands; returns a code of `steppers.loop_indices`.
+        """Run the time loop on all bands; returns a code of `steppers.loop_records`.
 
         functions, where : compiled functions, and index of the first ledger rate, from `RunLoop.functions`
         An exception in a thread is raised again here.

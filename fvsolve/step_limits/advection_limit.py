@@ -22,8 +22,7 @@ from fvsolve.step_limits.polynomial_sign import negative_point, polynomial_value
 from fvsolve.step_limits.symbol import WEIGHTS, real_part, square, symbol, weights_of
 from fvsolve.steppers.analysis.stability_function import StabilityFunction, stability_function
 from fvsolve.steppers.analysis.stability_properties import a_stable
-from fvsolve.steppers.numbers.polynomial import Polynomial, sign
-from fvsolve.steppers.numbers.sturm import count_roots, odd_part
+from fvsolve.steppers.numbers.polynomial import Polynomial, count_roots, odd_part, sign
 from fvsolve.steppers.tableau import METHODS, Method, method_named
 from fvsolve.validation import NAME, NAMES, POSITIVE, TEXT, Kind, is_row, validated
 

@@ -57,7 +57,7 @@ def step_limits(
     """Notices for the worst pipe, the basins, delay lines and other modes for which the step exceeds the limit.
 
     rates : greatest wave rate of each basin in the run so far, by name [1/s]; default: the initial rates
-    step_error : greatest mean error of a state, relative to its range (`solve.step_doubling`); None before a run
+    step_error : greatest mean error of a state, relative to its range (`solve.run_checks`); None before a run
     run_data : data of a run, used for the initial rates as in `first_step`
     The list is empty under error control. For implicit methods it contains only the notice on delay lines.
     """

@@ -1,7 +1,7 @@
 """Runge-Kutta methods as data, their properties, and the compiled time loop that steps them."""
 
 from fvsolve.lazy_exports import lazy_names
-from fvsolve.steppers import built_in_methods  # noqa: F401  (declares them)
+from fvsolve.steppers import explicit, implicit, rosenbrock  # noqa: F401  (declare the built-in methods)
 
 _HOMES = {
     "Facts": "analysis.method_facts",
@@ -9,12 +9,12 @@ _HOMES = {
     "Method": "tableau",
     "StabilityFunction": "analysis.stability_function",
     "analyse": "analysis.method_facts",
-    "global_error": "analysis.test_equation_errors",
+    "global_error": "analysis.method_facts",
     "integrate": "ode",
-    "local_error": "analysis.test_equation_errors",
+    "local_error": "analysis.method_facts",
     "method_named": "tableau",
-    "pade": "analysis.pade",
-    "seen_frequency": "analysis.test_equation_errors",
+    "pade": "analysis.stability_function",
+    "seen_frequency": "analysis.method_facts",
     "stability_function": "analysis.stability_function",
 }
 

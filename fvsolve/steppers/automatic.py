@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from fvsolve.steppers import loop_indices
-from fvsolve.steppers.built_in_methods import AUTO
 from fvsolve.steppers.integrator import Integrator
 from fvsolve.steppers.structure import Structure
-from fvsolve.steppers.tableau import method_named
+from fvsolve.steppers.tableau import AUTO, method_named
 
 EXPLICIT, IMPLICIT, TIGHT_IMPLICIT = "dormand-prince", "rodas-5p", "radau-iia-5"
 TIGHT_BELOW = 1e-6  # rtol below which TIGHT_IMPLICIT costs less: `benchmarks/stiff.py auto`
@@ -36,12 +34,12 @@ def step_cost_ratio(structure: Structure) -> float:
 
 def watch(stepper: Integrator, structure: Structure) -> None:
     """Switch on the stiffness test of the time loop, by which the method `auto` chooses between its two methods."""
-    stepper.controls[loop_indices.WATCH], stepper.controls[loop_indices.PRICE] = 1.0, step_cost_ratio(structure)
+    stepper.set_control(watch=1, price=step_cost_ratio(structure))
 
 
 def is_change_due(stepper: Integrator) -> bool:
     """True if the time loop has returned because the other kind of method (explicit or implicit) would be cheaper."""
-    return stepper.loop_state[loop_indices.SWITCH_COUNT] < 0.0
+    return bool(stepper.state[0]["switch_count"] < 0.0)
 
 
 def change(stepper: Integrator) -> tuple[float, float, float]:
@@ -49,16 +47,12 @@ def change(stepper: Integrator) -> tuple[float, float, float]:
 
     Returns (time [s], spectral radius [1/s], last step [s]) at the switch.
     """
-    loop_state = stepper.loop_state
-    implicit = implicit_method(stepper.controls[loop_indices.SIZE])
+    state = stepper.state[0]
+    implicit = implicit_method(stepper.control[0]["size"])
     stepper.use(method_named(implicit if stepper.method.explicit else EXPLICIT))
-    loop_state[loop_indices.SWITCHES] += 1.0
-    loop_state[loop_indices.SWITCH_COUNT] = 0.0
-    return (
-        float(loop_state[loop_indices.T]),
-        float(loop_state[loop_indices.RADIUS]),
-        float(loop_state[loop_indices.LAST]),
-    )
+    state["switches"] += 1.0
+    state["switch_count"] = 0.0
+    return float(state["t"]), float(state["radius"]), float(state["last"])
 
 
 def method_history(start: float, changes: list[tuple[float, float, float]], price: float, rtol: float) -> list[dict]:

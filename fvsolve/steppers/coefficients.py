@@ -1,7 +1,7 @@
 """Butcher array of a method as one flat array that the compiled steps read.
 
 The array holds A (s x s), b, c and the weights of the error estimate, for s stages. For fully implicit methods the data
-of their Newton iterations follow (`newton_transform.py`), and last the result of `start_slope_correction` and its
+of their Newton iterations follow (`transformed`), and last the result of `start_slope_correction` and its
 length. If the first stage of an implicit method is not the rate f at the start of the step, this rate is an extra
 first stage with weight zero.
 """
@@ -14,7 +14,6 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError
 from fvsolve.jit import njit
-from fvsolve.steppers.newton_transform import transformed
 from fvsolve.steppers.tableau import Method
 
 
@@ -24,7 +23,7 @@ def coefficients(method: Method, damped: bool = False) -> tuple[np.ndarray, np.n
 
     The flat coefficients are listed at the top of this file, those of Rosenbrock methods in `Rosenbrock.coefficients`.
     The stages include the start of the step as an explicit stage where the method is implicit.
-    damped : True for `semi_implicit`, which stores the rates at the start in addition to the rates of its first stage.
+    damped : True for `erk.damped_attempt`, which stores the rates at the start in addition to those of its first stage.
     Raises FvsolveError if A of a fully implicit method is singular or has no basis of eigenvectors; an explicit first
     stage is left out of A.
     """
@@ -95,3 +94,50 @@ def nodes_of(coefficients, s):
 def error_of(coefficients, s):
     """Weights of the stages in the error estimate of a method, in its flat coefficients; zeros without an estimate."""
     return coefficients[s * s + 2 * s : s * s + 3 * s]
+
+
+def transformed(a: np.ndarray, c: np.ndarray, a0: np.ndarray) -> np.ndarray:
+    """Matrices T, T^-1, L, T L, P, C, T^-1 A^-1 a0, A^-1 a0 by rows in one flat array, for `irk` and `stage_sweeps`.
+
+    a : float64[q, q]  coefficients A of the implicit stages; c : their times
+    a0 : float64[q]  weights of the explicit first stage in these stages
+    A^-1 = T L T^-1; a complex pair of eigenvalues is a block [[a, -b], [b, a]] of L with b > 0. C : see `lower`.
+    P extrapolates the slopes of the last step to this step: the sum of P[j, d] x^(d+1) is the integral from 1 to 1 + x
+    of the j-th Lagrange polynomial on c; zero if c has equal entries.
+    Raises LinAlgError for a singular A, ValueError for an A without a basis of eigenvectors.
+    """
+    q = len(c)
+    inverse = np.linalg.inv(a)
+    values, vectors = np.linalg.eig(inverse)
+    t, blocks = np.zeros((q, q)), np.zeros((q, q))
+    real = np.abs(values.imag) <= 1e-12 * np.abs(values)
+    at = 0
+    for i in [*np.flatnonzero(real), *np.flatnonzero(~real & (values.imag > 0))]:
+        v = vectors[:, i] / np.abs(vectors[:, i]).max()
+        if real[i]:
+            t[:, at], blocks[at, at], at = v.real, values[i].real, at + 1
+        else:  # A^-1 (u - i w) = (a + i b) (u - i w): in the basis u, w A^-1 is [[a, -b], [b, a]]
+            t[:, at], t[:, at + 1] = v.real, -v.imag
+            blocks[at : at + 2, at : at + 2] = [[values[i].real, -values[i].imag], [values[i].imag, values[i].real]]
+            at += 2
+    if at < q or np.linalg.cond(t) > 1e8:
+        raise ValueError("no basis of eigenvectors")
+    back, ahead = np.linalg.inv(t), np.zeros((q, q))
+    if len(np.unique(c)) == q:
+        lagrange = np.linalg.inv(np.vander(c - 1.0, increasing=True))  # in x, by columns
+        ahead = (lagrange / (1.0 + np.arange(q))[:, None]).T
+    parts = (t, back, blocks, t @ blocks, ahead, lower(a), back @ inverse @ a0, inverse @ a0)
+    return np.concatenate([part.ravel() for part in parts])
+
+
+def lower(a: np.ndarray) -> np.ndarray:
+    """Lower triangular factor C of the matrix A = C U, with unit diagonal of U (Crout) : float64[q, q].
+
+    It can be used only if its diagonal has no zero.
+    """
+    rest, c = a.copy(), np.zeros_like(a)
+    for j in range(len(a)):
+        c[j:, j] = rest[j:, j]
+        if rest[j, j] != 0.0:
+            rest -= np.outer(rest[:, j], rest[j]) / rest[j, j]
+    return c

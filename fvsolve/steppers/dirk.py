@@ -5,192 +5,131 @@ from __future__ import annotations
 from math import sqrt
 
 from fvsolve.jit import inline, njit
+from fvsolve.steppers import loop_records as rec
 from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
-from fvsolve.steppers.loop_indices import (
-    CALLS,
-    CONTROL,
-    DAMPED_STEP,
-    FACTORS,
-    HAS_JACOBIAN,
-    HEADER,
-    JACOBIAN_STEP,
-    KNOWN_STEPS,
-    LAST,
-    NEWTON_FAILED,
-    SHIFT,
-    SIZE,
-    STEPS,
-    TOLERANCE,
-)
 from fvsolve.steppers.newton import (
-    BASE,
     CONVERGED,
     FAILED,
-    INCREMENT,
     MOST,
-    MOVED,
-    RATE,
-    WEIGHTS,
     begin,
     book_increment,
     convergence,
-    evaluate,
+    evaluate_stage,
+    factor_for,
     find_worst,
-    renew,
+    renew_at_start,
     size_of,
     smoothed_error,
     solve_stage_from_start,
 )
-from fvsolve.steppers.step_operations import combine, error_norm
-from fvsolve.steppers.structure import SIZE as STATES
-from fvsolve.steppers.structure import STARTS
+from fvsolve.steppers.run_handle import REAL_SOLVE, call_solve, evaluate, open_run, store_ledger_rates
+from fvsolve.steppers.step_operations import combine, copy, error_norm
 
 
 @inline
-def predict(b, c, x, first, vectors, k):
+def predict(b, c, x, first, last_stages, k):
     """Predict the slope k of a stage at the time x h_last after the last step, whose length is h_last.
 
     The prediction is the slope of a parabola through both ends of the last step, with the slope at its end. The slope
     at the end is the slope of the last stage if c_s = 1, because a new evaluation of a stiff f would amplify the Newton
     residual; otherwise it is `first`, the rate f.
-    b, c : weights and nodes of the method; vectors : rows with the slopes of the stages of the last step
+    b, c : weights and nodes of the method; last_stages : slopes of the stages of the last step
     """
     s, n = b.size, k.size
-    slopes = vectors[s - 1] if c[s - 1] == 1.0 else first
+    slopes = last_stages[s - 1] if c[s - 1] == 1.0 else first
     for i in range(n):
         k[i] = slopes[i] * (1.0 + 2.0 * x)
     for j in range(s):
         if b[j] != 0.0:
-            w, last = 2.0 * x * b[j], vectors[j]
+            w, last = 2.0 * x * b[j], last_stages[j]
             for i in range(n):
                 k[i] -= w * last[i]
 
 
 @inline
-def solve_stage(
-    rhs, solve, handle, structure, t, h_gamma, i, k, y_stage, ledger_rates, ledger_offset, out, controls, loop_state,
-    nnz, work, vectors, factors
-):  # fmt: skip
+def solve_stage(handle, r, t, h_gamma, i):
     """Solve stage i, k[i] = f(t, base + h_gamma k[i]), by Newton iterations; returns CONVERGED or FAILED.
 
-    base : state from earlier stages, in `vectors`; h_gamma : step times the diagonal coefficient of the method
-    nnz : number of Jacobian entries; other arguments as for `attempt`
+    t : time of the stage; base : state from earlier stages; h_gamma : step times the diagonal coefficient of the method
     The stored stage is exactly f + J d with the last increment d, so it conserves the quantities that f and the
     Jacobian J conserve.
     """
-    s, n = k.shape
-    base, d, f, weights = vectors[s + BASE], vectors[s + INCREMENT], vectors[s + RATE], vectors[s + WEIGHTS]
-    before, status, shift, ki = 0.0, FAILED, 1.0 / h_gamma, k[i]
+    d, before, status, shift, ki = r.increment, 0.0, FAILED, 1.0 / h_gamma, r.k[i]
     for turn in range(MOST):
-        evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, loop_state, d)
-        solve(structure, factors, d)
-        for j in range(n):
+        evaluate_stage(handle, r, t, h_gamma, ki, d)
+        call_solve(r.calls[REAL_SOLVE], r.structure, r.factors, d)
+        for j in range(ki.size):
             ki[j] += shift * d[j]
-        size = sqrt(size_of(d, weights) / max(n, 1))
-        done, status = convergence(turn, size, before, controls, work)
+        size = sqrt(size_of(d, r.weights) / max(ki.size, 1))
+        done, status = convergence(r, turn, size, before)
         before = size
         if done:
             break
     if status == FAILED:
-        find_worst(d, f, weights, loop_state)
-    elif ledger_rates.shape[1] > 0:
-        for m in range(ledger_rates.shape[1]):
-            ledger_rates[i, m] = out[ledger_offset + m]
-        book_increment(structure, nnz, d, ledger_rates, i, work)
+        find_worst(r, d, r.rate)
+    elif r.ledger_rates.shape[1] > 0:
+        store_ledger_rates(r, i)
+        book_increment(r, d, i)
     return status
 
 
 @inline
-def try_stages(
-    rhs, factor, solve, handle, coefficients, structure, t, h, y, y_stage, k, ledger_rates, ledger_offset, out, scale,
-    controls, loop_state, nnz, work, vectors, factors,
-):  # fmt: skip
+def try_stages(handle, r, t, h, now):
     """Solve all stages with the current Jacobian; returns CONVERGED or FAILED.
 
-    A stage that fails is solved again by damped Newton if the Jacobian is of this step.
-    y : state at the start of the step; y_stage : work array; nnz : number of Jacobian entries
-    Other arguments as for `attempt`.
+    A stage that fails is solved again by damped Newton if the Jacobian is of this step. Arguments as for `attempt`.
     """
-    s, fresh = k.shape[0], work[JACOBIAN_STEP] == loop_state[STEPS]
-    c, b, base = nodes_of(coefficients, s), weights_of(coefficients, s), vectors[s + BASE]
+    state, k, y, base, s = r.state[0], r.k, r.y[now], r.base, r.k.shape[0]
+    fresh, adaptive = r.newton[0]["jacobian_step"] == state["steps"], r.control[0]["mode"] == rec.TOLERANCE
+    c, b = nodes_of(r.coefficients, s), weights_of(r.coefficients, s)
     for i in range(1, s):
-        row = row_of(coefficients, s, i)
+        row, ki = row_of(r.coefficients, s, i), k[i]
         combine(0, y.size, y, h, row, i, k, base)
         if row[i] == 0.0:
-            rhs(t + c[i] * h, base, k[i], out, handle)
-            loop_state[CALLS] += 1.0
-            for m in range(ledger_rates.shape[1]):
-                ledger_rates[i, m] = out[ledger_offset + m]
+            evaluate(handle, r, t + c[i] * h, base, ki)
+            store_ledger_rates(r, i)
             continue
         shift = 1.0 / (h * row[i])
-        if work[SHIFT] != shift:
-            loop_state[FACTORS] += 0.0 if work[SHIFT] == -shift else 1.0
-            work[SHIFT] = 0.0
-            if factor(structure, work[HEADER:], shift, factors) != 0:
-                return FAILED
-            work[SHIFT] = shift
-        if work[KNOWN_STEPS] > 0.0:
-            predict(b, c, c[i] * h / loop_state[LAST], k[0], vectors, k[i])
+        if factor_for(r, shift) != 0:
+            return FAILED
+        if r.newton[0]["known_steps"] > 0.0:
+            predict(b, c, c[i] * h / state["last"], k[0], r.last_stages, ki)
         else:
-            for j in range(y.size):
-                k[i, j] = k[i - 1, j]
-        status = solve_stage(
-            rhs, solve, handle, structure, t + c[i] * h, h * row[i], i, k, y_stage, ledger_rates, ledger_offset, out,
-            controls, loop_state, nnz, work, vectors, factors,
-        )  # fmt: skip
+            copy(k[i - 1], ki)
+        status = solve_stage(handle, r, t + c[i] * h, h * row[i], i)
         if status == FAILED and fresh:
-            if controls[CONTROL] == TOLERANCE:
+            if adaptive:
                 for j in range(y.size):
-                    k[i, j] = shift * (y[j] - base[j])
-            status = solve_stage_from_start(
-                rhs, factor, solve, handle, structure, t + c[i] * h, h * row[i], i, k, y, y_stage, ledger_rates,
-                ledger_offset, out, scale, controls, loop_state, nnz, work, vectors, factors,
-            )  # fmt: skip
+                    ki[j] = shift * (y[j] - base[j])
+            status = solve_stage_from_start(handle, r, t + c[i] * h, h * row[i], i, y)
         if status == FAILED:
             return FAILED
     return CONVERGED
 
 
 @njit
-def attempt(
-    rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure, row_blocks, sums, t, h, y,
-    now, new, k, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, vectors, factors, complex_factors,
-):  # fmt: skip
+def attempt(handle, run, t, h, now, new):
     """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
     The error is 0 unless the step is under error control, and NEWTON_FAILED if simplified and damped Newton fail with a
-    fresh Jacobian.
-    structure : flat array of `Structure.shape`; factor, solve : its functions for real shifts (`Structure.functions`)
-    work : header of `loop_indices`, Jacobian and work space, kept between steps
-    vectors : float64[rows, n]  data of the last step and work space, listed in `newton`
-    factors : factors of the matrix shift I - J with the Jacobian J; other arguments as for `erk.attempt`
-    Functions and factors for complex shifts are not used.
+    fresh Jacobian. Arguments as for `erk.attempt`.
     """
-    s = k.shape[0]
-    nnz = structure[structure[STARTS] + structure[STATES]]
-    begin(k, y[now], scale, controls, loop_state, work, vectors)
+    r = open_run(run)
+    k, y, state, newton = r.k, r.y[now], r.state[0], r.newton[0]
+    s, error = k.shape[0], error_of(r.coefficients, k.shape[0])
+    begin(r, now)
     while True:
-        if work[HAS_JACOBIAN] == 0.0:
-            renew(
-                rhs, handle, structure, ledger_offset, t, y[now], k[0], ledger_rates[0], scale, out, loop_state, work,
-                vectors[s + MOVED], vectors[s + RATE],
-            )  # fmt: skip
-        status = try_stages(
-            rhs, factor, solve, handle, coefficients, structure, t, h, y[now], y[3], k, ledger_rates, ledger_offset,
-            out, scale, controls, loop_state, nnz, work, vectors, factors,
-        )  # fmt: skip
-        if status == CONVERGED:
+        if newton["has_jacobian"] == 0.0:
+            renew_at_start(handle, r, t, now)
+        if try_stages(handle, r, t, h, now) == CONVERGED:
             break
-        if work[JACOBIAN_STEP] == loop_state[STEPS]:
-            return NEWTON_FAILED
-        work[HAS_JACOBIAN] = 0.0
-    combine(0, y[now].size, y[now], h, weights_of(coefficients, s), s, k, y[new])
-    if controls[CONTROL] != TOLERANCE:
+        if newton["jacobian_step"] == state["steps"]:
+            return rec.NEWTON_FAILED
+        newton["has_jacobian"] = 0.0
+    combine(0, y.size, y, h, weights_of(r.coefficients, s), s, k, r.y[new])
+    if r.control[0]["mode"] != rec.TOLERANCE:
         return 0.0
-    if work[DAMPED_STEP] == loop_state[STEPS]:
-        return smoothed_error(
-            rhs, factor, solve, handle, structure, ledger_offset, t, h, y[now], y[new], k, ledger_rates,
-            error_of(coefficients, s), 1.0 / (h * row_of(coefficients, s, s - 1)[s - 1]), scale, out, controls,
-            loop_state, work, vectors, factors,
-        )  # fmt: skip
-    return error_norm(h, error_of(coefficients, s), k, y[now], y[new], scale, controls[SIZE])
+    if newton["damped_step"] == state["steps"]:
+        shift = 1.0 / (h * row_of(r.coefficients, s, s - 1)[s - 1])
+        return smoothed_error(handle, r, t, h, now, new, error, shift)
+    return error_norm(r, h, now, new)

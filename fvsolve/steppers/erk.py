@@ -1,12 +1,20 @@
-"""One explicit Runge-Kutta step, equation (14) of docs/course.md."""
+"""One explicit Runge-Kutta step, equation (14) of docs/course.md, and one semi-implicit step with fast decay.
+
+Semi-implicit SSP methods solve y' = f + G y, with a fast decay G = -r of each state (bed friction). Each stage is a
+mean of Euler steps of the full length h, y + h (f + G y) / (1 + h R) (Chertock, Cui, Kurganov and Wu 2015, SIAM J.
+Numer. Anal. 53). A correction at the end of the step makes it second order. Where f + G y is zero the state does not
+change, so steady states do not depend on h. The rate R [1/s] may be greater than the decay rate r.
+"""
 
 from math import sqrt
 
 from fvsolve.jit import njit
+from fvsolve.kernels.calls import damp_in_turn
 from fvsolve.kernels.stage_sums import CHECKED, EDGES, MODE, OFF, OTHERS, STAGE, STAGE_AND_END, request_sums, sum_runs
-from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
-from fvsolve.steppers.loop_indices import CALLS, CONTROL, FSAL, RADIUS, SIZE, TOLERANCE, WATCH
-from fvsolve.steppers.step_operations import BEGIN, STOP, combine, error_of_bands
+from fvsolve.steppers import loop_records as rec
+from fvsolve.steppers.coefficients import nodes_of, row_of, weights_of
+from fvsolve.steppers.run_handle import evaluate, open_run, store_ledger_rates
+from fvsolve.steppers.step_operations import BEGIN, STOP, combine, copy, error_of_bands
 
 
 @njit
@@ -25,53 +33,89 @@ def quotient(f_new, f, y_new, y, scale):
 
 
 @njit
-def attempt(
-    rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure, row_blocks, sums, t, h, y,
-    now, new, k, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, vectors, factors, complex_factors,
-):  # fmt: skip
+def form_sum(r, h, weights, count, now, target):
+    """Write y[now] + h sum over j < count of weights[j] k[j] to `target`, for all states of this band."""
+    row_blocks, k, y = r.row_blocks, r.k, r.y[now]
+    for m in range(row_blocks.shape[0]):
+        combine(row_blocks[m, BEGIN], row_blocks[m, STOP], y, h, weights, count, k, target)
+
+
+@njit
+def attempt(handle, run, t, h, now, new):
     """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
-    The error is 0 unless the step is under error control. If controls[WATCH] is set, the spectral radius is written to
-    `loop_state`.
-    t, h : start and length of the step; rhs(t, y, dydt, out, handle) : function for the rates f
-    y : float64[4, n]  states, y[3] is work space; k : float64[s, n]  rates at the stages
-    ledger_rates : float64[s, m]  receives out[ledger_offset : ledger_offset + m] at the stages
-    coefficients : flat array, see `coefficients.coefficients`; scale : see `step_operations.error_scale`
-    controls, loop_state : arrays of the time loop, see `loop_indices`
-    join, row_blocks, sums : exchange of partial sums between bands of states, see `step_operations`
-    structure : description of stage sums that rhs forms in blocks, see `kernels.stage_sums`; empty if rhs forms none
-    Arguments for linear algebra and Newton iterations are not used.
+    The error is 0 unless the step is under error control. Under the stiffness test the spectral radius is stored.
+    handle, run : handles of the model and of the run, see `run_handle`; t, h : start and length of the step
+    now, new : rows of y; y[3] is work space. The ledger rates of all stages are stored too.
+    `structure` describes stage sums that rhs forms in blocks, see `kernels.stage_sums`; it is empty if rhs forms none.
     """
-    s, b = k.shape[0], weights_of(coefficients, k.shape[0])
-    c, last_is_new, blocked = nodes_of(coefficients, s), controls[FSAL] == 1.0, structure.size > 0
+    r = open_run(run)
+    control, k, structure, y = r.control[0], r.k, r.structure, r.y[now]
+    s, b, c = k.shape[0], weights_of(r.coefficients, k.shape[0]), nodes_of(r.coefficients, k.shape[0])
+    last_is_new, blocked = control["fsal"] == 1, structure.size > 0
     for i in range(1, s):
-        last, row = i == s - 1, row_of(coefficients, s, i)
-        target = y[new] if last and (last_is_new or blocked) else y[3]
+        last, row = i == s - 1, row_of(r.coefficients, s, i)
+        target = r.y[new] if last and (last_is_new or blocked) else r.y[3]
         if blocked:
-            sum_runs(
-                structure, 0, structure[OTHERS] + structure[CHECKED] + structure[EDGES], y[now], h, row, i, k, target
-            )
-            request_sums(
-                structure, STAGE_AND_END if last and not last_is_new else STAGE, y[now], h, row, i, k, target, b
-            )
+            runs = structure[OTHERS] + structure[CHECKED] + structure[EDGES]
+            sum_runs(structure, 0, runs, y, h, row, i, k, target)
+            mode = STAGE_AND_END if last and not last_is_new else STAGE
+            request_sums(structure, mode, y, h, row, i, k, target, b)
         else:
-            for m in range(row_blocks.shape[0]):
-                combine(row_blocks[m, BEGIN], row_blocks[m, STOP], y[now], h, row, i, k, target)
-        rhs(t + c[i] * h, target, k[i], out, handle)
+            form_sum(r, h, row, i, now, target)
+        evaluate(handle, r, t + c[i] * h, target, k[i])
         if blocked:
             structure[MODE] = OFF
-        for m in range(ledger_rates.shape[1]):
-            ledger_rates[i, m] = out[ledger_offset + m]
+        store_ledger_rates(r, i)
     if blocked and s > 1 and not last_is_new:
-        sum_runs(structure, 0, structure[OTHERS] + structure[CHECKED], y[now], h, b, s, k, y[new])
+        sum_runs(structure, 0, structure[OTHERS] + structure[CHECKED], y, h, b, s, k, r.y[new])
     elif not last_is_new:
-        for m in range(row_blocks.shape[0]):
-            combine(row_blocks[m, BEGIN], row_blocks[m, STOP], y[now], h, b, s, k, y[new])
-    loop_state[CALLS] += s - 1.0
-    if controls[WATCH] != 0.0:
-        loop_state[RADIUS] = quotient(k[s - 1], k[s - 2], y[new], y[3], scale)
-    if controls[CONTROL] != TOLERANCE:
+        form_sum(r, h, b, s, now, r.y[new])
+    if control["watch"] != 0:
+        r.state[0]["radius"] = quotient(k[s - 1], k[s - 2], r.y[new], r.y[3], r.scale)
+    if control["mode"] != rec.TOLERANCE:
         return 0.0
-    return error_of_bands(
-        join, handle, row_blocks, sums, h, error_of(coefficients, s), k, y[now], y[new], scale, controls[SIZE]
-    )
+    return error_of_bands(handle, r, h, now, new)
+
+
+@njit
+def second_order_correction(begin, end, b, damping, k):
+    """Correct k of the last stage so that y + h sum b_j k_j is second order in h, for states from `begin` to `end` - 1.
+
+    The correction is an Euler step of length h (h R) from the end of the step, implicit in the decay. Its rate f + G y
+    is that of the stage at the end of the step, k[2] (1 + h R). f + G y are the rates, with a fast decay G = -r.
+    b : weights of the stages; damping : float64[n]  h R with the rate R of each state
+    """
+    last = b.size - 1
+    for i in range(begin, end):
+        q, mean = damping[i], 0.0
+        for j in range(1, b.size):
+            mean += b[j] * k[j, i]
+        k[last, i] += q * (k[2, i] * (1.0 + q) + q * (k[1, i] - mean)) / ((1.0 + q * q) * b[last])
+
+
+@njit
+def damped_attempt(handle, run, t, h, now, new):
+    """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]), a stage of weight zero; returns 0.
+
+    k[1] is k[0] divided by 1 + h R, with the step h and the rate R of fast decay of each state. `factors` receives h R
+    of the first two stages, then of the later stages : float64[2 n]; zero for states without fast decay.
+    Arguments as for `attempt`.
+    """
+    r = open_run(run)
+    k, row_blocks, ledger_rates, n = r.k, r.row_blocks, r.ledger_rates, r.scale.size
+    s, b, c = k.shape[0], weights_of(r.coefficients, k.shape[0]), nodes_of(r.coefficients, k.shape[0])
+    early, late = r.factors[:n], r.factors[n:]
+    for m in range(row_blocks.shape[0]):
+        copy(k[0, row_blocks[m, BEGIN] : row_blocks[m, STOP]], k[1, row_blocks[m, BEGIN] : row_blocks[m, STOP]])
+    copy(ledger_rates[0], ledger_rates[1])
+    damp_in_turn(h, r.y[now], k[1], early, handle)
+    for i in range(2, s):
+        form_sum(r, h, row_of(r.coefficients, s, i), i, now, r.y[3])
+        evaluate(handle, r, t + c[i] * h, r.y[3], k[i])
+        store_ledger_rates(r, i)
+        damp_in_turn(h, r.y[3], k[i], early if i == 2 else late, handle)
+    for m in range(row_blocks.shape[0] if s > 2 else 0):
+        second_order_correction(row_blocks[m, BEGIN], row_blocks[m, STOP], b, early, k)
+    form_sum(r, h, b, s, now, r.y[new])
+    return 0.0

@@ -1,7 +1,8 @@
 """Event functions, which are zero at an event, and the search for the length of the step that ends at an event."""
 
 from fvsolve.jit import njit
-from fvsolve.steppers.loop_indices import CONTROL, KIND, NEWTON_FAILED, NEWTON_SOLVED, STEP, TOLERANCE, T
+from fvsolve.steppers import loop_records as rec
+from fvsolve.steppers.run_handle import EVENT_FUNCTIONS, STEP, call_attempt, call_events
 
 EVENT_TOLERANCE = 1e-13
 JUMP = 1e-6  # fraction of an event function, and of a given step; smaller changes do not count as a jump
@@ -48,20 +49,16 @@ def event_ratio(g, g_new):
 
 
 @njit
-def locate(
-    attempt, rhs, factor, solve, factor_complex, solve_complex, events, join, handle, coefficients, structure,
-    row_blocks, sums, h, y, now, new, k, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, vectors,
-    factors, complex_factors, g, g_new, e,
-):  # fmt: skip
+def locate(handle, run, r, h, now, new, e):
     """Shorten a step so that it ends just past the first event, by the Illinois rule; returns its length and error.
 
+    handle, run, r : handles of the model and of the run, and the open handle of the run; now, new : rows of y
     h, e : length and error of the full step; y[new] and g_new receive the values at the end of the shortened step
-    g, g_new : float64[events]  values of the event functions at the start and the end of the step
-    attempt, events : step of the method, event functions; other arguments as for `erk.attempt` and `dirk.attempt`
     The error is NEWTON_FAILED if a stage could not be solved, or if an event function jumps over zero in an implicit
     step (Newton) of given length: then the stages of the step have several solutions, those of a shorter step only one.
     """
-    t, low, high, at_low, past = loop_state[T], 0.0, h, 1.0, event_ratio(g, g_new)
+    g, g_new = r.g, r.g_new
+    t, low, high, at_low, past = r.state[0]["t"], 0.0, h, 1.0, event_ratio(g, g_new)
     guess, at_high, side = h, past, 0
     for turn in range(101):
         done = turn == 100 or past >= -EVENT_TOLERANCE or high - low <= 4e-16 * max(abs(t), high)
@@ -73,14 +70,10 @@ def locate(
             guess = 0.5 * (low + high)
         if done:
             guess = high
-        e = attempt(
-            rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure, row_blocks, sums,
-            t, guess, y, now, new, k, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, vectors,
-            factors, complex_factors,
-        )  # fmt: skip
-        if e == NEWTON_FAILED:
+        e = call_attempt(r.calls[STEP], handle, run, t, guess, now, new)
+        if e == rec.NEWTON_FAILED:
             break
-        events(t + guess, y[new], handle, g_new)
+        call_events(r.calls[EVENT_FUNCTIONS], t + guess, r.y[new], handle, g_new)
         if done:
             break
         here = event_ratio(g, g_new)
@@ -90,7 +83,8 @@ def locate(
         else:
             low, at_low = guess, here
             at_high, side = 0.5 * at_high if side < 0 else at_high, -1
-    fixed = controls[KIND] == NEWTON_SOLVED and controls[CONTROL] != TOLERANCE
-    if fixed and past < -JUMP and high > JUMP * loop_state[STEP]:
-        e = NEWTON_FAILED
+    control = r.control[0]
+    fixed = control["kind"] == rec.NEWTON_SOLVED and control["mode"] != rec.TOLERANCE
+    if fixed and past < -JUMP and high > JUMP * r.state[0]["step"]:
+        e = rec.NEWTON_FAILED
     return high, e

@@ -1,91 +1,55 @@
 """Tableaux of explicit Runge-Kutta methods, each as printed in its source."""
 
-from fvsolve.steppers.tableau import declare
+from fvsolve.steppers.tableau import declare, declare_each
 
-declare(
-    "euler",
-    source="Euler 1768",
-    text="""
+declare_each(
+    {
+        "euler": """Euler 1768
     0 |
     --+--
       | 1
-""",
-)
-
-declare(
-    "improved-euler",
-    source="Egeland and Gravdahl 2002 (19)",
-    text="""
+    """,
+        "improved-euler": """Egeland and Gravdahl 2002 (19)
     0 |
     1 | 1
     --+---------
       | 1/2  1/2
-""",
-)
-
-declare(
-    "modified-euler",
-    source="Egeland and Gravdahl 2002 (20), explicit midpoint",
-    text="""
+    """,
+        "modified-euler": """Egeland and Gravdahl 2002 (20), explicit midpoint
     0   |
     1/2 | 1/2
     ----+--------
         | 0    1
-""",
-)
-
-declare(
-    "heun",
-    source="Heun 1900",
-    text="""
+    """,
+        "heun": """Heun 1900
     0   |
     1/3 | 1/3
     2/3 | 0    2/3
     ----+--------------
         | 1/4  0    3/4
-""",
-)
-
-declare(
-    "rk4",
-    source="Kutta 1901",
-    text="""
+    """,
+        "rk4": """Kutta 1901
     0   |
     1/2 | 1/2
     1/2 | 0    1/2
     1   | 0    0    1
     ----+-------------------
         | 1/6  1/3  1/3  1/6
-""",
-)
-
-declare(
-    "ssp-rk2",
-    source="Shu and Osher 1988",
-    text="""
+    """,
+        "ssp-rk2": """Shu and Osher 1988
     0 |
     1 | 1
     --+---------
       | 1/2  1/2
-""",
-)
-
-declare(
-    "ssp-rk3",
-    source="Shu and Osher 1988",
-    text="""
+    """,
+        "ssp-rk3": """Shu and Osher 1988
     0   |
     1   | 1
     1/2 | 1/4  1/4
     ----+--------------
         | 1/6  1/6  2/3
-""",
-)
-
-declare(
-    "bogacki-shampine",
-    source="Bogacki and Shampine 1989",
-    text="""
+    """,
+        "bogacki-shampine": """Bogacki and Shampine 1989
     0   |
     1/2 | 1/2
     3/4 | 0     3/4
@@ -93,7 +57,8 @@ declare(
     ----+---------------------
         | 2/9   1/3  4/9  0
         | 7/24  1/4  1/3  1/8
-""",
+    """,
+    }
 )
 
 declare("dormand-prince", source="Dormand and Prince 1980; dense output Shampine 1986",
@@ -118,46 +83,30 @@ declare("dormand-prince", source="Dormand and Prince 1980; dense output Shampine
     [0, "40617522/29380423", "-110615467/29380423", "69997945/29380423"],
 ])  # fmt: skip
 
-declare(
-    "ralston",
-    source="Ralston 1962, least bound of the local error",
-    text="""
+declare_each(
+    {
+        "ralston": """Ralston 1962, least bound of the local error
     0   |
     2/3 | 2/3
     ----+---------
         | 1/4  3/4
-""",
-)
-
-declare(
-    "kutta-3",
-    source="Kutta 1901",
-    text="""
+    """,
+        "kutta-3": """Kutta 1901
     0   |
     1/2 | 1/2
     1   | -1   2
     ----+--------------
         | 1/6  2/3  1/6
-""",
-)
-
-declare(
-    "three-eighths",
-    source="Kutta 1901",
-    text="""
+    """,
+        "three-eighths": """Kutta 1901
     0   |
     1/3 | 1/3
     2/3 | -1/3  1
     1   | 1     -1   1
     ----+--------------------
         | 1/8   3/8  3/8  1/8
-""",
-)
-
-declare(
-    "ssp-rk10-4",
-    source="Ketcheson 2008, SSPRK(10,4)",
-    text="""
+    """,
+        "ssp-rk10-4": """Ketcheson 2008, SSPRK(10,4)
     0   |
     1/6 | 1/6
     1/3 | 1/6   1/6
@@ -170,7 +119,8 @@ declare(
     1   | 1/15  1/15  1/15  1/15  1/15  1/6   1/6   1/6   1/6
     ----+-----------------------------------------------------------
         | 1/10  1/10  1/10  1/10  1/10  1/10  1/10  1/10  1/10  1/10
-""",
+    """,
+    }
 )
 
 declare(

@@ -1,144 +1,87 @@
 """Tableaux of implicit Runge-Kutta methods, each as printed in its source."""
 
-from fvsolve.steppers.tableau import declare
+from fvsolve.steppers.tableau import declare, declare_each
 
-declare(
-    "implicit-euler",
-    also="radau-iia-1",
-    source="Radau IIA of one stage; Egeland and Gravdahl 2002 (27)",
-    text="""
+declare_each(
+    {
+        "implicit-euler": """Radau IIA of one stage; Egeland and Gravdahl 2002 (27)
     1 | 1
     --+--
       | 1
-""",
-)
-
-declare(
-    "implicit-midpoint",
-    also="gauss-2",
-    source="Gauss of one stage; Hairer and Wanner 1996, IV.5",
-    text="""
+    """,
+        "implicit-midpoint": """Gauss of one stage; Hairer and Wanner 1996, IV.5
     1/2 | 1/2
     ----+----
         | 1
-""",
-)
-
-declare(
-    "gauss-4",
-    source="Hammer and Hollingsworth 1955",
-    text="""
+    """,
+        "gauss-4": """Hammer and Hollingsworth 1955
     1/2-sqrt(3)/6 | 1/4            1/4-sqrt(3)/6
     1/2+sqrt(3)/6 | 1/4+sqrt(3)/6  1/4
     --------------+-----------------------------
                   | 1/2            1/2
-""",
-)
-
-declare(
-    "gauss-6",
-    source="Kuntzmann 1961, Butcher 1964",
-    text="""
+    """,
+        "gauss-6": """Kuntzmann 1961, Butcher 1964
     1/2-sqrt(15)/10 | 5/36              2/9-sqrt(15)/15  5/36-sqrt(15)/30
     1/2             | 5/36+sqrt(15)/24  2/9              5/36-sqrt(15)/24
     1/2+sqrt(15)/10 | 5/36+sqrt(15)/30  2/9+sqrt(15)/15  5/36
     ----------------+----------------------------------------------------
                     | 5/18              4/9              5/18
-""",
-)
-
-declare(
-    "trapezoid",
-    also="lobatto-iiia-2",
-    source="Lobatto IIIA of two stages; Hairer and Wanner 1996, IV.5",
-    text="""
+    """,
+        "trapezoid": """Lobatto IIIA of two stages; Hairer and Wanner 1996, IV.5
     0 | 0    0
     1 | 1/2  1/2
     --+---------
       | 1/2  1/2
-""",
-)
-
-declare(
-    "lobatto-iiia-4",
-    source="Ehle 1969; Hairer and Wanner 1996, IV.5",
-    text="""
+    """,
+        "lobatto-iiia-4": """Ehle 1969; Hairer and Wanner 1996, IV.5
     0   | 0     0    0
     1/2 | 5/24  1/3  -1/24
     1   | 1/6   2/3  1/6
     ----+-----------------
         | 1/6   2/3  1/6
-""",
-)
-
-declare(
-    "lobatto-iiia-6",
-    source="Ehle 1969; Hairer and Wanner 1996, IV.5",
-    text="""
+    """,
+        "lobatto-iiia-6": """Ehle 1969; Hairer and Wanner 1996, IV.5
     0              | 0                 0                    0                    0
     (5-sqrt(5))/10 | (11+sqrt(5))/120  (25-sqrt(5))/120     (25-13sqrt(5))/120   (-1+sqrt(5))/120
     (5+sqrt(5))/10 | (11-sqrt(5))/120  (25+13sqrt(5))/120   (25+sqrt(5))/120     (-1-sqrt(5))/120
     1              | 1/12              5/12                 5/12                 1/12
     ---------------+-----------------------------------------------------------------------------
                    | 1/12              5/12                 5/12                 1/12
-""",
-)
-
-declare(
-    "lobatto-iiic-2",
-    source="Chipman 1971; Hairer and Wanner 1996, IV.5",
-    text="""
+    """,
+        "lobatto-iiic-2": """Chipman 1971; Hairer and Wanner 1996, IV.5
     0 | 1/2  -1/2
     1 | 1/2  1/2
     --+----------
       | 1/2  1/2
-""",
-)
-
-declare(
-    "lobatto-iiic-4",
-    source="Chipman 1971; Hairer and Wanner 1996, IV.5",
-    text="""
+    """,
+        "lobatto-iiic-4": """Chipman 1971; Hairer and Wanner 1996, IV.5
     0   | 1/6  -1/3  1/6
     1/2 | 1/6  5/12  -1/12
     1   | 1/6  2/3   1/6
     ----+-----------------
         | 1/6  2/3   1/6
-""",
-)
-
-declare(
-    "radau-ia-3",
-    source="Ehle 1969; Hairer and Wanner 1996, IV.5",
-    text="""
+    """,
+        "radau-ia-3": """Ehle 1969; Hairer and Wanner 1996, IV.5
     0   | 1/4  -1/4
     2/3 | 1/4  5/12
     ----+----------
         | 1/4  3/4
-""",
-)
-
-declare(
-    "radau-ia-5",
-    source="Ehle 1969; Hairer and Wanner 1996, IV.5",
-    text="""
+    """,
+        "radau-ia-5": """Ehle 1969; Hairer and Wanner 1996, IV.5
     0              | 1/9  (-1-sqrt(6))/18     (-1+sqrt(6))/18
     (6-sqrt(6))/10 | 1/9  (88+7sqrt(6))/360   (88-43sqrt(6))/360
     (6+sqrt(6))/10 | 1/9  (88+43sqrt(6))/360  (88-7sqrt(6))/360
     ---------------+--------------------------------------------
                    | 1/9  (16+sqrt(6))/36     (16-sqrt(6))/36
-""",
-)
-
-declare(
-    "radau-iia-3",
-    source="Ehle 1969; Hairer and Wanner 1996, IV.5",
-    text="""
+    """,
+        "radau-iia-3": """Ehle 1969; Hairer and Wanner 1996, IV.5
     1/3 | 5/12  -1/12
     1   | 3/4   1/4
     ----+------------
         | 3/4   1/4
-""",
+    """,
+    },
+    also={"implicit-euler": "radau-iia-1", "implicit-midpoint": "gauss-2", "trapezoid": "lobatto-iiia-2"},
 )
 
 # The weight of f(t, y) in the embedded solution is the real eigenvalue of A, (6 + 81^(1/3) - 9^(1/3)) / 30.
@@ -232,23 +175,17 @@ declare(
     numbers={"g": ("x^3-3x^2/2+x/2-1/24", 1.0685790213)},
 )
 
-declare(
-    "tr-bdf2",
-    source="Bank et al. 1985; error estimate of Hosea and Shampine 1996",
-    text="""
+declare_each(
+    {
+        "tr-bdf2": """Bank et al. 1985; error estimate of Hosea and Shampine 1996
     0         | 0
     2-sqrt(2) | 1-sqrt(2)/2       1-sqrt(2)/2
     1         | sqrt(2)/4         sqrt(2)/4           1-sqrt(2)/2
     ----------+-----------------------------------------------------
               | sqrt(2)/4         sqrt(2)/4           1-sqrt(2)/2
               | (4-sqrt(2))/12    (4+3sqrt(2))/12     (2-sqrt(2))/6
-""",
-)
-
-declare(
-    "esdirk-3",
-    source="Kennedy and Carpenter 2019, ESDIRK3(2)5L[2]SA",
-    text="""
+    """,
+        "esdirk-3": """Kennedy and Carpenter 2019, ESDIRK3(2)5L[2]SA
     0                | 0
     9/20             | 9/40                                 9/40
     9(2+sqrt(2))/40  | 9(1+sqrt(2))/80                      9(1+sqrt(2))/80                      9/40
@@ -261,13 +198,8 @@ declare(
                        -2374(1+2sqrt(2))/(2835(5+3sqrt(2))) 5827/7560                            9/40
                      | (5547709sqrt(2)-4800247)/16519545    (5547709sqrt(2)-4800247)/16519545 \
                        11095418(1-sqrt(2))/16519545         30698249/44052120                    49563/233080
-""",
-)
-
-declare(
-    "esdirk-4",
-    source="Kennedy and Carpenter 2003, ARK4(3)6L[2]SA-ESDIRK",
-    text="""
+    """,
+        "esdirk-4": """Kennedy and Carpenter 2003, ARK4(3)6L[2]SA-ESDIRK
     0      | 0
     1/2    | 1/4                       1/4
     83/250 | 8611/62500                -1743/31250          1/4
@@ -277,7 +209,8 @@ declare(
     -------+-----------------------------------------------------------------------------------------------------
            | 82889/524892              0                    15625/83664          69875/102672     -2260/8211  1/4
            | 4586570599/29645900160    0  178811875/945068544  814220225/1159782912  -3700637/11593932  61727/225920
-""",
+    """,
+    }
 )
 
 # Kennedy and Carpenter print fractions accurate to 25 digits or more; a_i1 = a_i2.

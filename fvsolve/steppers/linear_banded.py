@@ -8,8 +8,7 @@ bandwidth of U follow.
 import numpy as np
 
 from fvsolve.jit import njit
-from fvsolve.steppers.pivots import LEAST, bad_row, reciprocal, size_of
-from fvsolve.steppers.structure import SIZE, SOLVER_DATA, STARTS
+from fvsolve.steppers.structure import LEAST_PIVOT, SIZE, SOLVER_DATA, STARTS, bad_row, reciprocal, size_of
 
 # Data of this solver in the structure: bandwidths and row length, then the state of each reordered row, then the place
 # of every entry.
@@ -101,7 +100,7 @@ def factor(structure, jacobian, shift, factors):
                 best, pivot = size, d
         if here >= DIAGONAL_PIVOT * best:
             pivot, best = 0, here
-        if not LEAST < best < 1.0 / LEAST:
+        if not LEAST_PIVOT < best < 1.0 / LEAST_PIVOT:
             return order[k] + 1
         pivots[k] = pivot
         if pivot > 0:

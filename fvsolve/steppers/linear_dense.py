@@ -5,8 +5,7 @@ The array `factors` holds the rows of L and U, with 1 / U_ii on the diagonal, th
 
 import numpy as np
 
-from fvsolve.steppers.pivots import LEAST, reciprocal, size_of
-from fvsolve.steppers.structure import ROWS, SIZE, STARTS
+from fvsolve.steppers.structure import LEAST_PIVOT, ROWS, SIZE, STARTS, reciprocal, size_of
 
 
 def prepare(pattern) -> tuple[np.ndarray, int]:
@@ -40,7 +39,7 @@ def factor(structure, jacobian, shift, factors):
             size = size_of(a[i, k])
             if size > best:
                 best, pivot = size, i
-        if not LEAST < best < 1.0 / LEAST:
+        if not LEAST_PIVOT < best < 1.0 / LEAST_PIVOT:
             return k + 1
         pivots[k] = pivot
         if pivot != k:

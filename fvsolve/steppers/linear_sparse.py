@@ -5,12 +5,12 @@ once. The array `factors` holds the blocks of L and U by rows, the inverses of t
 block is four numbers, row by row.
 """
 
+from __future__ import annotations
+
 import numpy as np
 
 from fvsolve.jit import njit
-from fvsolve.steppers.pivots import LEAST, bad_row, size_of
-from fvsolve.steppers.state_pairs import pairs
-from fvsolve.steppers.structure import SOLVER_DATA
+from fvsolve.steppers.structure import LEAST_PIVOT, SOLVER_DATA, bad_row, size_of
 
 # Data of this solver in the structure: number of blocks, then offsets from its start to these lists: the two states of
 # each reordered row; L and U by rows; the entries of J by rows: their places in the work row, and in the Jacobian.
@@ -203,7 +203,7 @@ def factor(structure, jacobian, shift, factors):
         det = diagonal - cross
         remaining = size_of(det)
         if not (
-            LEAST < remaining < 1.0 / LEAST
+            LEAST_PIVOT < remaining < 1.0 / LEAST_PIVOT
             and remaining > LEAST_DETERMINANT * max(first, size_of(diagonal) + size_of(cross))
         ):
             return order[2 * i] + 1
@@ -242,3 +242,26 @@ def solve(structure, factors, x):
         work[2 * i], work[2 * i + 1] = first, second
         x[order[2 * i + 1]] = second  # a single state overwrites its dummy
         x[order[2 * i]] = first
+
+
+def pairs(pattern) -> np.ndarray:
+    """Pairs of states : int64[blocks, 2]; a state without a partner is paired with itself.
+
+    pattern : sparse pattern of the Jacobian. The weight of a coupling of two states is the number of walks of three
+    edges between them. It is greatest between the two waves of a cell, which become a pair. Couplings are taken
+    greedily, strongest first (heavy edge matching; Karypis and Kumar 1998).
+    """
+    from scipy.sparse import coo_array, csr_array
+
+    n = pattern.shape[1]
+    both = csr_array(pattern + pattern.T, dtype=np.float64)
+    walks = coo_array(((both @ both) @ both) * both)
+    upper = walks.row < walks.col
+    i, j, weight = walks.row[upper], walks.col[upper], walks.data[upper]
+    strongest = np.lexsort((j, i, -weight))
+    partner = list(range(n))
+    for a, b in zip(i[strongest].tolist(), j[strongest].tolist(), strict=True):
+        if partner[a] == a and partner[b] == b:
+            partner[a], partner[b] = b, a
+    matches = np.column_stack((np.arange(n), partner))
+    return matches[matches[:, 0] <= matches[:, 1]].astype(np.int64)

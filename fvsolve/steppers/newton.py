@@ -4,9 +4,11 @@ Simplified Newton with the Jacobian at the start of the step is used as long as 
 changes by orders of magnitude within a step, as the slope of a valve does near zero pressure drop, the iterates
 oscillate. Then Newton is damped, with a new Jacobian for every iterate.
 
-Three data are kept between steps and stored for a restart (`Integrator.restart_arrays`): the array `work` with a header
-and the Jacobian, the rate f at the start of the last step, and the stages of the last step. A resumed run factors
-again; Jacobian and shift determine the factors to the bit.
+Four arrays are kept between steps and stored for a restart (`Integrator.restart_arrays`): the record `newton`, the
+Jacobian, the rate f at the start of the last step, and the stages of the last step. A resumed run factors again;
+Jacobian and shift determine the factors to the bit.
+The functions have these arguments: handle : handle of the model; r : open handle of the run; t, h : start and length of
+a step; now, new : rows of y at its start and its end; i : number of a stage.
 """
 
 from __future__ import annotations
@@ -16,36 +18,11 @@ from math import sqrt
 import numpy as np
 
 from fvsolve.jit import inline
-from fvsolve.steppers.differences import differences, multiply
-from fvsolve.steppers.loop_indices import (
-    CALLS,
-    CONTROL,
-    CONVERGENCE_FACTOR,
-    DAMPED_STEP,
-    FACTOR_SIZE,
-    FACTORS,
-    HAS_JACOBIAN,
-    HEADER,
-    INCREMENT_RATIO,
-    JACOBIAN_STEP,
-    JACOBIANS,
-    KNOWN_STEPS,
-    LAST,
-    NEWTON,
-    NEWTON_FAILED,
-    SHIFT,
-    SIZE,
-    STAGES_STEP,
-    STEPS,
-    TOLERANCE,
-    WORST,
-)
+from fvsolve.steppers import loop_records as rec
+from fvsolve.steppers import run_handle
+from fvsolve.steppers.run_handle import evaluate, store_ledger_rates
 from fvsolve.steppers.step_operations import copy, error_scale
-
-# Rows of `vectors` after the s stages of the last step: f at its start, an increment, weights, two rows for
-# differences, base of a stage (Rosenbrock: df/dt), fallback slope; then, for fully implicit methods, transformed
-# increments, f and residuals of all stages.
-FIRST, INCREMENT, WEIGHTS, MOVED, RATE, BASE, FALLBACK, STAGES = range(8)
+from fvsolve.steppers.structure import differences, multiply
 
 MOST = 10  # greatest number of iterations
 # For given steps, relative: target accuracy, error that counts as rounding, and greatest error accepted.
@@ -57,70 +34,95 @@ MOST_DAMPED, LEAST_PART = 40, 1e-4  # greatest number of damped iterations, leas
 LEAST_STAGE_PART = 1 / 64  # least fraction of a step over which `solve_stage_from_start` continues a stage
 
 
-def reset(work: np.ndarray) -> None:
-    """Discard the Jacobian and the earlier stages at a kink."""
-    work[:FACTOR_SIZE] = 0.0
-    work[STAGES_STEP] = work[DAMPED_STEP] = -1.0
-    work[CONVERGENCE_FACTOR] = 1.0
+def reset(newton: np.void) -> None:
+    """Discard the Jacobian and the earlier stages at a kink; newton : record of Newton iterations."""
+    for name in ("has_jacobian", "jacobian_step", "known_steps", "shift", "increment_ratio"):
+        newton[name] = 0.0
+    newton["stages_step"] = newton["damped_step"] = -1.0
+    newton["convergence_factor"] = 1.0
 
 
 @inline
-def begin(k, y, scale, controls, loop_state, work, vectors):
+def begin(r, now):
     """Prepare the first attempt of a step: store the last stages for prediction, discard a slow Jacobian.
 
-    The weights of increments, 1 over the tolerance of each state, are written to `vectors`. Repeated attempts change
-    nothing.
+    The weights of increments, 1 over the tolerance of each state, are stored too. Repeated attempts change nothing.
     A Jacobian is slow if the greatest ratio of successive Newton increments in the last step was above STALE.
-    Arguments as for `dirk.attempt`; y : state at the start of the step.
+    r : open handle of the run; now : row of y at the start of the step
     """
-    s, n = k.shape
-    if work[STAGES_STEP] == loop_state[STEPS]:
+    state, newton, control, k, scale, y = r.state[0], r.newton[0], r.control[0], r.k, r.scale, r.y[now]
+    if newton["stages_step"] == state["steps"]:
         return
-    tolerance = controls[SIZE] if controls[CONTROL] == TOLERANCE else FIXED
-    weights, first, last = vectors[s + WEIGHTS], vectors[s + FIRST], vectors[0]
-    for i in range(n):
+    tolerance = control["size"] if control["mode"] == rec.TOLERANCE else FIXED
+    weights, first, last, rates = r.weights, r.first, r.last_stages[0], k[0]
+    for i in range(rates.size):
         weights[i] = 1.0 / (tolerance * error_scale(scale[i], y[i]))
-        last[i], first[i] = first[i], k[0, i]
-    for j in range(1, s):
-        copy(k[j], vectors[j])
-    follows = work[STAGES_STEP] == loop_state[STEPS] - 1.0 and loop_state[LAST] > 0.0
-    work[KNOWN_STEPS] = min(work[KNOWN_STEPS] + 1.0, 2.0) if follows else 0.0
-    if work[INCREMENT_RATIO] > STALE:
-        work[HAS_JACOBIAN] = 0.0
-    work[STAGES_STEP], work[INCREMENT_RATIO] = loop_state[STEPS], 0.0
+        last[i], first[i] = first[i], rates[i]
+    for j in range(1, k.shape[0]):
+        copy(k[j], r.last_stages[j])
+    follow_stages(state, newton)
+    if newton["increment_ratio"] > STALE:
+        newton["has_jacobian"] = 0.0
+    newton["increment_ratio"] = 0.0
 
 
 @inline
-def renew(rhs, handle, structure, ledger_offset, t, y, f, ledger_rates, scale, out, loop_state, work, moved, rate):
-    """Compute the Jacobian at (t, y) and store it in `work`.
-
-    f, ledger_rates : rates evaluated at (t, y); moved, rate : float64[n]  work arrays for a state and its rates
-    Other arguments as for `dirk.attempt`.
-    """
-    calls = differences(
-        rhs, handle, structure, ledger_offset, t, y, f, ledger_rates, scale, moved, rate, out, work[HEADER:]
-    )
-    loop_state[CALLS] += calls
-    loop_state[JACOBIANS] += 1.0
-    work[HAS_JACOBIAN], work[JACOBIAN_STEP], work[SHIFT], work[INCREMENT_RATIO] = 1.0, loop_state[STEPS], 0.0, 0.0
+def follow_stages(state, newton):
+    """Count the earlier steps whose stages are known, and store the number of the present step."""
+    follows = newton["stages_step"] == state["steps"] - 1.0 and state["last"] > 0.0
+    newton["known_steps"] = min(newton["known_steps"] + 1.0, 2.0) if follows else 0.0
+    newton["stages_step"] = state["steps"]
 
 
 @inline
-def spectral_radius(structure, work, nnz, scale, v):
-    """Approximate largest |eigenvalue| of the Jacobian in `work`, by five iterations of the power method.
+def renew(handle, r, t, y, f, ledger_rates, f_work):
+    """Compute the Jacobian at (t, y) and store it in `jacobian`.
 
-    nnz : number of Jacobian entries; scale : float64[n]  sizes of the states; v : float64[n]  work array
+    f, ledger_rates : rates evaluated at (t, y); f_work : float64[n]  work array for rates
     """
-    n, product, before, now = v.size, work[HEADER + nnz :], 0.0, 0.0
-    for e in range(n):
+    newton, state = r.newton[0], r.state[0]
+    differences(evaluate, handle, r, t, y, f, ledger_rates, f_work)
+    state["jacobians"] += 1.0
+    newton["has_jacobian"], newton["jacobian_step"] = 1.0, state["steps"]
+    newton["shift"] = newton["increment_ratio"] = 0.0
+
+
+@inline
+def renew_at_start(handle, r, t, now):
+    """Compute the Jacobian at the start of the step, from row `now` of y and the first stage."""
+    renew(handle, r, t, r.y[now], r.k[0], r.ledger_rates[0], r.rate)
+
+
+@inline
+def factor_for(r, shift):
+    """Factor the matrix shift I - J for the real shift of a stage, if it is not that of the last factors.
+
+    Returns 0, or 1 + the number of a state without a good pivot. A resumed run factors again without counting it.
+    """
+    newton = r.newton[0]
+    if newton["shift"] == shift:
+        return 0
+    r.state[0]["factorisations"] += 0.0 if newton["shift"] == -shift else 1.0
+    newton["shift"] = 0.0
+    bad = run_handle.call_factor(r.calls[run_handle.REAL_FACTOR], r.structure, r.jacobian, shift, r.factors)
+    if bad == 0:
+        newton["shift"] = shift
+    return bad
+
+
+@inline
+def spectral_radius(r):
+    """Approximate largest |eigenvalue| of the Jacobian, by five iterations of the power method."""
+    v, product, scale, before, now = r.increment, r.product, r.scale, 0.0, 0.0
+    for e in range(v.size):
         v[e] = scale[e] if e % 2 == 0 else -scale[e]
     for _ in range(5):
-        multiply(structure, work[HEADER : HEADER + nnz], v, product)
+        multiply(r.structure, r.jacobian, v, product)
         total = 0.0
-        for e in range(n):
+        for e in range(v.size):
             total += (product[e] / scale[e]) * (product[e] / scale[e])
         before, now = now, sqrt(total)
-        for e in range(n):
+        for e in range(v.size):
             v[e] = product[e] / now if now > 0.0 else 0.0
     return sqrt(before * now)  # for a complex pair the single quotients oscillate
 
@@ -167,252 +169,227 @@ def damping_factor(part, ahead, size):
 
 
 @inline
-def stop_limits(controls):
-    """(size of the increment at which Newton may stop, size that counts as rounding), in units of the tolerance.
-
-    controls : array of the time loop, see `loop_indices`
-    """
-    if controls[CONTROL] == TOLERANCE:
-        enough = max(1e-15 / controls[SIZE], STOP_FRACTION)
+def stop_limits(control):
+    """(size of the increment at which Newton may stop, size that counts as rounding), in units of the tolerance."""
+    if control["mode"] == rec.TOLERANCE:
+        enough = max(1e-15 / control["size"], STOP_FRACTION)
         return enough, enough
     return 1.0, ROUNDED / FIXED
 
 
 @inline
-def damped_limits(controls):
+def damped_limits(control):
     """(increment at which damped Newton stops, increment that counts as rounding, greatest increment accepted).
 
     All are in units of the tolerance. Newton is as accurate as for steps of given length, because f amplifies the
-    Newton residual. controls : array of the time loop, see `loop_indices`
+    Newton residual.
     """
-    unit = controls[SIZE] if controls[CONTROL] == TOLERANCE else FIXED
-    floor = stop_limits(controls)[1] if controls[CONTROL] == TOLERANCE else FLOOR / unit
+    unit = control["size"] if control["mode"] == rec.TOLERANCE else FIXED
+    floor = stop_limits(control)[1] if control["mode"] == rec.TOLERANCE else FLOOR / unit
     return FIXED / unit, min(ROUNDED / unit, floor), floor
 
 
 @inline
-def find_worst(d, f, weights, loop_state):
-    """Store in loop_state[WORST] a state whose rate f is not finite, or the state with the greatest increment d.
-
-    weights : factors that express increments in units of the tolerance
-    """
-    worst = -1.0
+def find_worst(r, d, f):
+    """Store as `worst` a state whose rate f is not finite, or the state with the greatest increment d."""
+    weights, worst, at = r.weights, -1.0, r.state[0]["worst"]
     for i in range(weights.size):
         e = abs(d[i] * weights[i]) if abs(f[i]) < np.inf else np.inf
         if e > worst:  # a rate that is not a number makes other increments NaN as well
-            worst, loop_state[WORST] = e, i
+            worst, at = e, float(i)
+    r.state[0]["worst"] = at
 
 
 @inline
-def convergence(turn, size, before, controls, work):
+def convergence(r, turn, size, before):
     """(True to stop after Newton iteration `turn`, CONVERGED or FAILED).
 
     size, before : norms of this and of the previous increment, in units of the tolerance
-    controls, work : as for `dirk.attempt`; the ratio of increments and its factor are stored in `work`
+    The greatest ratio of increments and the convergence factor are stored.
     """
-    enough, rounded = stop_limits(controls)
+    newton, (enough, rounded) = r.newton[0], stop_limits(r.control[0])
     if not size < np.inf:
         return True, FAILED
     if turn > 0:
         ratio = size / before if before > 0.0 else 0.0
-        work[INCREMENT_RATIO] = max(work[INCREMENT_RATIO], ratio)
+        newton["increment_ratio"] = max(newton["increment_ratio"], ratio)
         if ratio >= 0.3 and size <= rounded:
             return True, CONVERGED
         if ratio >= 0.99:
             return True, FAILED
-        work[CONVERGENCE_FACTOR] = ratio / (1.0 - ratio)
-        if work[CONVERGENCE_FACTOR] * size * ratio ** (MOST - 1 - turn) > rounded:
+        factor = ratio / (1.0 - ratio)
+        newton["convergence_factor"] = factor
+        if factor * size * ratio ** (MOST - 1 - turn) > rounded:
             return True, FAILED
     else:
-        work[CONVERGENCE_FACTOR] = max(work[CONVERGENCE_FACTOR], 1e-4) ** 0.8
-    if work[CONVERGENCE_FACTOR] * size <= enough:
+        factor = max(newton["convergence_factor"], 1e-4) ** 0.8
+        newton["convergence_factor"] = factor
+    if factor * size <= enough:
         return True, CONVERGED
-    return turn == MOST - 1, CONVERGED if turn > 0 and work[CONVERGENCE_FACTOR] * size <= rounded else FAILED
+    return turn == MOST - 1, CONVERGED if turn > 0 and factor * size <= rounded else FAILED
 
 
 @inline
-def book_increment(structure, nnz, d, ledger_rates, i, work):
-    """Correct the ledger rates of stage i by their change J d, with the last increment d of the state of the stage.
-
-    J : Jacobian in `work`; nnz : number of its entries; structure : flat array of `Structure.shape`
-    """
-    n, product = d.size, work[HEADER + nnz :]
-    multiply(structure, work[HEADER : HEADER + nnz], d, product)
+def book_increment(r, d, i):
+    """Correct the ledger rates of stage i by their change J d, with the last increment d of the state of the stage."""
+    product, ledger_rates = r.product, r.ledger_rates
+    multiply(r.structure, r.jacobian, d, product)
     for m in range(ledger_rates.shape[1]):
-        ledger_rates[i, m] += product[n + m]
+        ledger_rates[i, m] += product[d.size + m]
 
 
 @inline
-def evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, loop_state, residual):
-    """Write the rates at the state base + h_gamma ki of a stage with slope ki to f, and f - ki to `residual`.
+def evaluate_stage(handle, r, t, h_gamma, ki, residual):
+    """Write the rates at the state base + h_gamma ki of a stage with slope ki to `rate`, and their excess over ki.
 
-    t : time of the stage; base : state from earlier stages; h_gamma : step times the diagonal coefficient of the method
-    y_stage : float64[n]  receives the state; other arguments as for `dirk.attempt`
+    t : time of the stage; h_gamma : step times the diagonal coefficient of the method; y[3] receives the state
+    residual : float64[n]  receives rate - ki
     """
+    y_stage, base, f = r.y[3], r.base, r.rate
     for j in range(ki.size):
         y_stage[j] = base[j] + h_gamma * ki[j]
-    rhs(t, y_stage, f, out, handle)
-    loop_state[CALLS] += 1.0
-    loop_state[NEWTON] += 1.0
+    evaluate(handle, r, t, y_stage, f)
+    r.state[0]["newton"] += 1.0
     for j in range(ki.size):
         residual[j] = f[j] - ki[j]
 
 
 @inline
-def damped_newton(
-    rhs, factor, solve, handle, structure, t, h_gamma, i, k, y_stage, ledger_rates, ledger_offset, out, scale, controls,
-    loop_state, nnz, work, vectors, factors,
-):  # fmt: skip
+def damped_increment(handle, r, t, h_gamma, i):
+    """Compute the Newton increment of stage i with a new Jacobian; returns its norm in units of the tolerance, or -1.
+
+    The increment is stored in `increment`; `rate` contains the rates of the stage. -1 : the matrix is singular.
+    """
+    d, f, ki, shift, newton = r.increment, r.rate, r.k[i], 1.0 / h_gamma, r.newton[0]
+    store_ledger_rates(r, i)
+    renew(handle, r, t, r.y[3], f, r.ledger_rates[i], d)
+    r.state[0]["factorisations"] += 1.0
+    if run_handle.call_factor(r.calls[run_handle.REAL_FACTOR], r.structure, r.jacobian, shift, r.factors) != 0:
+        return -1.0
+    newton["shift"] = shift
+    for j in range(ki.size):
+        d[j] = f[j] - ki[j]
+    run_handle.call_solve(r.calls[run_handle.REAL_SOLVE], r.structure, r.factors, d)
+    return sqrt(size_of(d, r.weights) / max(ki.size, 1))
+
+
+@inline
+def damped_update(handle, r, t, h_gamma, i, size, rounded):
+    """Add a part of the increment to the slope of stage i: the greatest trial part that is accepted.
+
+    size, rounded : norm of the increment, and norm that counts as rounding
+    Returns (part of the increment, part added so far, squared length of the next increment relative to this one); both
+    parts are equal if the trial is accepted.
+    """
+    d, other, ki, shift = r.increment, r.moved, r.k[i], 1.0 / h_gamma
+    part, tried, length = 1.0, 0.0, 0.0
+    while part != tried and part > LEAST_PART:
+        for j in range(ki.size):
+            ki[j] += shift * (part - tried) * d[j]
+        evaluate_stage(handle, r, t, h_gamma, ki, other)
+        if size <= rounded:  # the direction of the next increment is rounding
+            tried = part
+            break
+        run_handle.call_solve(r.calls[run_handle.REAL_SOLVE], r.structure, r.factors, other)
+        ahead, length = next_increment(d, other, r.weights)
+        tried, part = part, damping_factor(part, ahead, length)
+    return part, tried, length
+
+
+@inline
+def damped_newton(handle, r, t, h_gamma, i):
     """Solve stage i, k[i] = f(t, base + h_gamma k[i]), by damped Newton, with a new Jacobian for every iterate.
 
-    The iteration starts from k[i].
-    t : time of the stage; base : state from earlier stages, in `vectors`
-    h_gamma : step times the diagonal coefficient of the method; nnz : number of Jacobian entries
-    Returns CONVERGED or FAILED. Other arguments as for `dirk.attempt`.
+    The iteration starts from k[i]. Returns CONVERGED or FAILED.
+    t : time of the stage; h_gamma : step times the diagonal coefficient of the method
     """
-    s, n = k.shape
-    base, d, f, weights = vectors[s + BASE], vectors[s + INCREMENT], vectors[s + RATE], vectors[s + WEIGHTS]
-    other, shift, ki = vectors[s + MOVED], 1.0 / h_gamma, k[i]
-    enough, rounded, floor = damped_limits(controls)
+    d, ki, newton, shift = r.increment, r.k[i], r.newton[0], 1.0 / h_gamma
+    enough, rounded, floor = damped_limits(r.control[0])
     before = np.inf
-    evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, loop_state, d)
+    evaluate_stage(handle, r, t, h_gamma, ki, d)
     for turn in range(MOST_DAMPED):
-        for m in range(ledger_rates.shape[1]):
-            ledger_rates[i, m] = out[ledger_offset + m]
-        renew(
-            rhs,
-            handle,
-            structure,
-            ledger_offset,
-            t,
-            y_stage,
-            f,
-            ledger_rates[i],
-            scale,
-            out,
-            loop_state,
-            work,
-            other,
-            d,
-        )
-        loop_state[FACTORS] += 1.0
-        if factor(structure, work[HEADER:], shift, factors) != 0:
+        size = damped_increment(handle, r, t, h_gamma, i)
+        if size == -1.0:
             break
-        work[SHIFT] = shift
-        for j in range(n):
-            d[j] = f[j] - ki[j]
-        solve(structure, factors, d)
-        size = sqrt(size_of(d, weights) / max(n, 1))
         done = size <= enough or size <= rounded and size >= 0.5 * before or size <= floor and turn == MOST_DAMPED - 1
         part, tried, length, before = 1.0, 0.0, 0.0, size
-        while not done and part != tried and part > LEAST_PART:
-            for j in range(n):
-                ki[j] += shift * (part - tried) * d[j]
-            evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, loop_state, other)
-            if size <= rounded:  # the direction of the next increment is rounding
-                tried = part
-                break
-            solve(structure, factors, other)
-            ahead, length = next_increment(d, other, weights)
-            tried, part = part, damping_factor(part, ahead, length)
+        if not done:
+            part, tried, length = damped_update(handle, r, t, h_gamma, i, size, rounded)
         if part != tried and size <= floor and length < np.inf:  # rounding, or a kink between the iterates
             done = True
         if done:
-            for j in range(n):
+            for j in range(ki.size):
                 ki[j] += shift * (1.0 - tried) * d[j]
-            book_increment(structure, nnz, d, ledger_rates, i, work)
-            work[DAMPED_STEP], work[INCREMENT_RATIO], work[CONVERGENCE_FACTOR] = loop_state[STEPS], 1.0, 1.0
+            book_increment(r, d, i)
+            newton["damped_step"], newton["increment_ratio"] = r.state[0]["steps"], 1.0
+            newton["convergence_factor"] = 1.0
             return CONVERGED
         if part != tried or not size < np.inf:
             break
-    find_worst(d, f, weights, loop_state)
-    work[HAS_JACOBIAN] = 0.0
+    find_worst(r, d, r.rate)
+    newton["has_jacobian"] = 0.0
     return FAILED
 
 
 @inline
-def solve_stage_from_start(
-    rhs, factor, solve, handle, structure, t, h_gamma, i, k, y, y_stage, ledger_rates, ledger_offset, out, scale,
-    controls, loop_state, nnz, work, vectors, factors,
-):  # fmt: skip
+def solve_stage_from_start(handle, r, t, h_gamma, i, y):
     """Solve a stage by `damped_newton`, if necessary from other starting values; returns CONVERGED or FAILED.
 
     If the first try fails in a step of given length, the iteration starts again from the state y, and then follows the
     solution from a step of zero length. Under error control a shorter step is cheaper, so there is only one try.
     y : state at the start of the step; other arguments as for `damped_newton`
     """
-    base, reached, ki = vectors[k.shape[0] + BASE], vectors[k.shape[0] + FALLBACK], k[i]
-    done, part, turn, worst = 0.0, 1.0, 0, loop_state[WORST]  # WORST keeps the result of simplified Newton
+    base, reached, ki, state = r.base, r.fallback, r.k[i], r.state[0]
+    done, part, turn, worst = 0.0, 1.0, 0, state["worst"]  # `worst` keeps the result of simplified Newton
     while part >= LEAST_STAGE_PART:
         if turn == 1:
             for j in range(ki.size):
                 ki[j] = (y[j] - base[j]) / h_gamma
         elif turn > 1:
             copy(reached, ki)
-        status = damped_newton(
-            rhs, factor, solve, handle, structure, t, h_gamma * (done + part), i, k, y_stage, ledger_rates,
-            ledger_offset, out, scale, controls, loop_state, nnz, work, vectors, factors,
-        )  # fmt: skip
+        status = damped_newton(handle, r, t, h_gamma * (done + part), i)
         if status == CONVERGED:
             done += part
             if done == 1.0:
                 return CONVERGED
             copy(ki, reached)
-        elif controls[CONTROL] == TOLERANCE:
+        elif r.control[0]["mode"] == rec.TOLERANCE:
             return FAILED
         elif turn == 0:
             for j in range(ki.size):
                 reached[j] = 0.0
         else:
             part *= 0.5
-        loop_state[WORST] = worst
+        state["worst"] = worst
         turn += 1
     return FAILED
 
 
 @inline
-def smoothed_error(
-    rhs, factor, solve, handle, structure, ledger_offset, t, h, y, y_new, k, ledger_rates, error, shift, scale, out,
-    controls, loop_state, work, vectors, factors,
-):  # fmt: skip
+def smoothed_error(handle, r, t, h, now, new, error, shift):
     """Error of a step that damped Newton has solved, in units of the tolerance.
 
     It is the norm of (I - J / shift)^-1 h sum e_j k_j. J is the Jacobian at the start of the step, and `error` contains
     the weights e_j. The matrix reduces the error of stiff components (Hosea and Shampine 1996). If it reverses the
     error, because J jumps, the unfiltered error is used. Returns NEWTON_FAILED if the matrix is singular.
-    y, y_new : states at the start and the end of the step; other arguments as for `dirk.attempt`
+    now, new : rows of y at the start and the end of the step
     """
-    s, n = k.shape
-    d, f, plain, dot, smooth = vectors[s + INCREMENT], vectors[s + RATE], 0.0, 0.0, 0.0
-    renew(
-        rhs,
-        handle,
-        structure,
-        ledger_offset,
-        t,
-        y,
-        k[0],
-        ledger_rates[0],
-        scale,
-        out,
-        loop_state,
-        work,
-        vectors[s + MOVED],
-        f,
-    )
-    loop_state[FACTORS] += 1.0
-    work[INCREMENT_RATIO] = 1.0
-    if factor(structure, work[HEADER:], shift, factors) != 0:
-        return NEWTON_FAILED
-    for i in range(n):
+    k, d, f, y, y_new, scale = r.k, r.increment, r.rate, r.y[now], r.y[new], r.scale
+    size, plain, dot, smooth = r.control[0]["size"], 0.0, 0.0, 0.0
+    renew_at_start(handle, r, t, now)
+    r.state[0]["factorisations"] += 1.0
+    r.newton[0]["increment_ratio"] = 1.0
+    if run_handle.call_factor(r.calls[run_handle.REAL_FACTOR], r.structure, r.jacobian, shift, r.factors) != 0:
+        return rec.NEWTON_FAILED
+    for i in range(y.size):
         f[i] = 0.0
-        for j in range(s):
+        for j in range(k.shape[0]):
             f[i] += h * error[j] * k[j, i]
         d[i] = shift * f[i]
-    solve(structure, factors, d)
-    for i in range(n):
-        w = 1.0 / (controls[SIZE] * (scale[i] + max(abs(y[i]), abs(y_new[i]))))
+    run_handle.call_solve(r.calls[run_handle.REAL_SOLVE], r.structure, r.factors, d)
+    for i in range(y.size):
+        w = 1.0 / (size * (scale[i] + max(abs(y[i]), abs(y_new[i]))))
         plain += (w * f[i]) * (w * f[i])
         dot += (w * f[i]) * (w * d[i])
         smooth += (w * d[i]) * (w * d[i])
-    return sqrt((smooth if dot > 0.0 else plain) / max(n, 1))
+    return sqrt((smooth if dot > 0.0 else plain) / max(y.size, 1))

@@ -14,13 +14,13 @@ from numba import objmode
 
 from fvsolve.errors import FvsolveError
 from fvsolve.jit import COMPILING, DeclaredFunction, code_of, compile_once
-from fvsolve.steppers import automatic, loop_indices
-from fvsolve.steppers.built_in_methods import AUTO
+from fvsolve.kernels.calls import argument_types
+from fvsolve.steppers import automatic, loop_records
 from fvsolve.steppers.integrator import Integrator
-from fvsolve.steppers.signatures import EVENTS, FUSED_STEP, OBSERVE, RHS, argument_types
+from fvsolve.steppers.loop_records import LEAST_STEP, LEAST_TOLERANCE
+from fvsolve.steppers.run_handle import EVENTS, FUSED_STEP, OBSERVE, RHS
 from fvsolve.steppers.structure import Structure
-from fvsolve.steppers.tableau import METHODS, Method, method_named
-from fvsolve.steppers.tolerances import LEAST_STEP, LEAST_TOLERANCE
+from fvsolve.steppers.tableau import AUTO, METHODS, Method, method_named
 
 NO_LIMIT = 1e308
 
@@ -59,10 +59,9 @@ def integrate(
     size = step if step is not None else (1e-6 if rtol is None else rtol)
     scale = np.ones(y0.size) if atol is None or step is not None else _scale(atol, size, y0.size)
     stepper = Integrator(method, y0.size, 0, lambda: _full(y0.size), scale)
-    controls, loop_state = stepper.controls, stepper.loop_state
-    stepper.y[0], loop_state[loop_indices.T] = y0, t[0]
-    controls[loop_indices.CONTROL] = loop_indices.FIXED_STEP if step is not None else loop_indices.TOLERANCE
-    controls[[loop_indices.SIZE, loop_indices.STEP_MAX, loop_indices.STOP_AT]] = size, NO_LIMIT, NO_LIMIT
+    stepper.y[0], stepper.state["t"] = y0, t[0]
+    mode = loop_records.FIXED_STEP if step is not None else loop_records.TOLERANCE
+    stepper.set_control(mode=mode, size=size, step_max=NO_LIMIT, stop_at=NO_LIMIT)
     if automatic_choice:
         automatic.watch(stepper, _full(y0.size))
     key = next(_KEYS)
@@ -82,21 +81,20 @@ def _solve_steps(stepper: Integrator, functions: tuple, key: int, t, y0) -> np.n
     stepper : `Integrator` of the call; y0 : state at t[0]; functions : result of `_functions`
     key : number of the call, with which compiled code finds the Python function
     """
-    controls, loop_state, progress = stepper.controls, stepper.loop_state, stepper.progress
     stepper.times, stepper.rows = np.ascontiguousarray(t[1:]), np.zeros((t.size, y0.size + 1))
     states = np.empty((t.size, y0.size))
     states[0] = y0
-    controls[loop_indices.END] = t[-1]
-    progress[loop_indices.PHASE], progress[loop_indices.HAS_LAST_STEP] = loop_indices.FRESH, 0
-    code = loop_indices.BUDGET_SPENT
-    while code == loop_indices.BUDGET_SPENT:
+    stepper.set_control(end=t[-1])
+    stepper.restart_segment()
+    code = loop_records.BUDGET_SPENT
+    while code == loop_records.BUDGET_SPENT:
         if automatic.is_change_due(stepper):
             automatic.change(stepper)
-        controls[loop_indices.BUDGET] = NO_LIMIT
+        stepper.set_control(budget=NO_LIMIT)
         code = stepper.call(*functions, np.array([key]), WHERE, stepper.no_floats)
-    if code != loop_indices.DONE:
-        raise FvsolveError(_failure(stepper.method, code, loop_state)) from _EXCEPTIONS.get(key)
-    states[1:-1], states[-1] = stepper.rows[: t.size - 2, 1:], stepper.y[progress[loop_indices.NOW]]
+    if code != loop_records.DONE:
+        raise FvsolveError(_failure(stepper.method, code, stepper.state[0])) from _EXCEPTIONS.get(key)
+    states[1:-1], states[-1] = stepper.rows[: t.size - 2, 1:], stepper.y[stepper.progress[0]["now"]]
     return states
 
 
@@ -120,14 +118,10 @@ def _full(n):
     return Structure.full(n)
 
 
-def _failure(method, code, loop_state) -> str:
-    when = f"{method.name} stopped at t = {loop_state[loop_indices.T]:.6g}: "
-    if code == loop_indices.NEWTON_STUCK:
-        return (
-            when
-            + f"Newton did not converge, worst in y[{int(loop_state[loop_indices.WORST])}]; try another rtol, step or "
-            "method"
-        )
+def _failure(method, code, state) -> str:
+    when = f"{method.name} stopped at t = {state['t']:.6g}: "
+    if code == loop_records.NEWTON_STUCK:
+        return when + f"Newton did not converge, worst in y[{int(state['worst'])}]; try another rtol, step or method"
     return when + "the solution is not finite or the step became too small; try a smaller step or a larger rtol"
 
 
@@ -246,7 +240,7 @@ def _functions(f, t0, y0):
 
 
 def _compile(function, letters: str) -> DeclaredFunction:
-    """Compile a numba function for the time loop, with arguments of the types `letters`, see `signatures`."""
+    """Compile a numba function for the time loop, with arguments of the types `letters`, see `run_handle`."""
     kinds = argument_types(letters)
     function.compile(kinds)
     return DeclaredFunction(function, letters, code_of(function.overloads[kinds]))

@@ -1,36 +1,13 @@
 """Output rows and field frames: times at which they are due, and values from dense output or separate steps."""
 
 from fvsolve.jit import njit
-from fvsolve.steppers.loop_indices import (
-    ALWAYS_SEPARATE,
-    CALLS,
-    CONTROL,
-    CONVERGENCE_FACTOR,
-    DAMPED_STEP,
-    DONE,
-    EVERY,
-    FACTOR_SIZE,
-    FIELD,
-    FIELD_COUNT,
-    FIELD_EVERY,
-    HAS_JACOBIAN,
-    KNOWN_STEPS,
-    NEVER_SEPARATE,
-    NEWTON_FAILED,
-    NEXT_FIELD,
-    NEXT_OUTPUT,
-    RADIUS,
-    ROWS,
-    ROWS_FULL,
-    SEPARATE_ROWS,
-    STAGES_STEP,
-    START,
-    STOP_AT,
-    TOLERANCE,
-    WORST,
-    T,
-)
-from fvsolve.steppers.step_operations import BEGIN, HUGE, STOP, copy, interpolate
+from fvsolve.kernels.stage_sums import HUGE
+from fvsolve.steppers import loop_records as rec
+from fvsolve.steppers import run_handle
+from fvsolve.steppers.coefficients import start_slope_of
+from fvsolve.steppers.run_handle import evaluate, open_run, store_ledger_rates
+from fvsolve.steppers.step_control import NEVER
+from fvsolve.steppers.step_operations import BEGIN, STOP, copy, interpolate
 
 BASE, GAIN, LEAST, MOST = range(4)
 AT_END = 1e-9  # in steps: a row closer to the step's end takes the state there
@@ -38,36 +15,39 @@ NEGLIGIBLE = 1e-9  # reference amount below which shares of it are not computed
 
 
 @njit(forceinline=True)
-def output_due(controls, loop_state, count_at, every, limit):
+def output_due(start, count, every, limit):
     """Time [s] of the next output row or field: start of the run + count * every, or 1e308 after the last.
 
-    count_at : index of the count in `loop_state`; limit : greatest count; every : interval [s], 0 for no output
+    count : number of the output; limit : greatest number; every : interval [s], 0 for no output
     """
-    if every <= 0.0 or loop_state[count_at] > limit:
-        return 1e308
-    return controls[START] + loop_state[count_at] * every
+    if every <= 0.0 or count > limit:
+        return NEVER
+    return start + count * every
 
 
 @njit(forceinline=True)
-def row_due(controls, loop_state, times):
-    """Time of the next output row [s], from the array `times` if it is not empty.
+def row_due(r):
+    """Time [s] of the next output row: from the list `times`, or, if it is empty, as in `output_due`.
 
-    controls, loop_state : arrays of the time loop, see `loop_indices`
+    r : open handle of the run
     """
-    if times.size == 0:
-        return output_due(controls, loop_state, NEXT_OUTPUT, controls[EVERY], 1e300)
-    count = int(loop_state[NEXT_OUTPUT])
-    return times[count] if count < times.size else 1e308
+    control, count, times = r.control[0], r.state[0]["next_output"], r.times
+    if times.size > 0:
+        return times[int(count)] if count < times.size else NEVER
+    return output_due(control["start"], count, control["every"], NEVER)
 
 
 @njit(forceinline=True)
-def next_due(controls, loop_state, times):
-    """Time of the next output row or field frame, whichever comes first [s].
+def field_due(r):
+    """Time [s] of the next field frame; 1e308 after the last."""
+    control = r.control[0]
+    return output_due(control["start"], r.state[0]["next_field"], control["field_every"], control["field_count"])
 
-    times : times of the rows, or empty if they are equidistant
-    """
-    row = row_due(controls, loop_state, times)
-    return min(row, output_due(controls, loop_state, NEXT_FIELD, controls[FIELD_EVERY], controls[FIELD_COUNT]))
+
+@njit(forceinline=True)
+def next_due(r):
+    """Time [s] of the next output row or field frame."""
+    return min(row_due(r), field_due(r))
 
 
 @njit(forceinline=True)
@@ -106,98 +86,95 @@ def limit_to_bounds(states, bounds, y_old, y, out):
 
 
 @njit(forceinline=True)
-def needs_separate_step(controls, work):
+def needs_separate_step(r):
     """True if output rows within the last step come from separate steps, see `Integrator.separate_rows`."""
-    if controls[CONTROL] == TOLERANCE or controls[SEPARATE_ROWS] == NEVER_SEPARATE:
+    separate = r.control[0]["separate_rows"]
+    if r.control[0]["mode"] == rec.TOLERANCE or separate == rec.NEVER_SEPARATE:
         return False
-    return controls[SEPARATE_ROWS] == ALWAYS_SEPARATE or work[KNOWN_STEPS] < 2.0
+    return separate == rec.ALWAYS_SEPARATE or r.newton[0]["known_steps"] < 2.0
 
 
 @njit
-def separate_step(
-    attempt, rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure, row_blocks, sums,
-    t, h, y, old, new, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, spare, spare_flat,
-    spare_complex,
-):  # fmt: skip
+def separate_step(handle, r, t, h, old, new):
     """Compute y[new] at t + h by a separate step from y[old] for an output row; returns True if it could be solved.
 
-    The step uses separate arrays and no data of earlier steps, so that neither the steps of a run nor the stages that
-    energy studies read depend on the output rows. Its calls of rhs are counted.
-    ledger_rates : float64[s, ledgers]; spare : float64[s + vectors, n]; spare_flat : float64[work + factors]
-    spare_complex : factors for complex shifts; other arguments as for `erk.attempt` and `dirk.attempt`
+    The step uses the arrays behind the handle `spare` and no data of earlier steps, so that neither the steps of a run
+    nor the stages that energy studies read depend on the output rows. Its calls of rhs are counted.
     """
-    s, worst, radius = ledger_rates.shape[0], loop_state[WORST], loop_state[RADIUS]
-    if work.size > 0:  # no Jacobian and no earlier stages
-        spare_flat[:FACTOR_SIZE] = 0.0
-        spare_flat[HAS_JACOBIAN], spare_flat[STAGES_STEP], spare_flat[DAMPED_STEP], spare_flat[CONVERGENCE_FACTOR] = (
-            0.0,
-            -1.0,
-            -1.0,
-            1.0,
-        )
-        spare_flat[FACTOR_SIZE] = work[FACTOR_SIZE]
-    rhs(t, y[old], spare[0], out, handle)
-    loop_state[CALLS] += 1.0
-    for m in range(ledger_rates.shape[1]):
-        ledger_rates[0, m] = out[ledger_offset + m]
-    e = attempt(
-        rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure, row_blocks, sums, t,
-        h, y, old, new, spare[:s], ledger_rates, ledger_offset, out, scale, controls, loop_state,
-        spare_flat[: work.size], spare[s:], spare_flat[work.size :], spare_complex,
-    )  # fmt: skip
-    loop_state[WORST], loop_state[RADIUS] = worst, radius
-    return e != NEWTON_FAILED
+    own, state = open_run(r.spare), r.state[0]
+    worst, radius, newton = state["worst"], state["radius"], own.newton[0]
+    newton["has_jacobian"] = newton["jacobian_step"] = newton["known_steps"] = 0.0  # no Jacobian, no earlier stages
+    newton["shift"] = newton["increment_ratio"] = 0.0
+    newton["stages_step"] = newton["damped_step"] = -1.0
+    newton["convergence_factor"], newton["factor_size"] = 1.0, r.newton[0]["factor_size"]
+    evaluate(handle, own, t, r.y[old], own.k[0])
+    store_ledger_rates(own, 0)
+    e = run_handle.call_attempt(r.calls[run_handle.STEP], handle, r.spare, t, h, old, new)
+    state["worst"], state["radius"] = worst, radius
+    return e != rec.NEWTON_FAILED
 
 
 @njit
-def emit(
-    attempt, rhs, observe, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure,
-    row_blocks, sums, controls, loop_state, times, progress, t_old, y, now, old, f_old, f, k, ledger_offset, dense,
-    start_slope, scale, out, y_out, rows, bounded_states, bounds, work, spare, spare_ledger_rates, spare_flat,
-    spare_complex,
-):  # fmt: skip
-    """Write the output rows due up to the present time; returns a code of `loop_indices`.
+def interpolate_row(r, t_old, due, separate, now, old):
+    """Write the state at the time `due` within the last step, which began at t_old, to `y_out`.
 
-    DONE : all rows are written; FIELD : a field frame is due, its state is in y_out; ROWS_FULL : `rows` has no space
-    Rows from controls[STOP_AT] on are not written. Where a separate step cannot be solved, its row is interpolated
-    linearly.
-    t_old : time of the last state; now, old : rows of the present and the last state in y
-    f_old, f : rates of the last and the present state; start_slope : result of `start_slope_correction`
-    Other arguments as for `time_loop.run_steps`.
+    separate : True for a linear interpolation, where a separate step could not be solved
     """
-    t, h, separate = loop_state[T], loop_state[T] - t_old, needs_separate_step(controls, work)
-    while True:
-        row = row_due(controls, loop_state, times)
-        field = output_due(controls, loop_state, NEXT_FIELD, controls[FIELD_EVERY], controls[FIELD_COUNT])
-        due = min(row, field)
-        if due > t or (due >= controls[STOP_AT]):
-            return DONE
-        if row <= due and progress[ROWS] == rows.shape[0]:
-            return ROWS_FULL
-        solved, new = False, 3 - now - old
-        if separate and due < t - AT_END * h:
-            solved = separate_step(
-                attempt, rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure,
-                row_blocks, sums, t_old, due - t_old, y, old, new, spare_ledger_rates, ledger_offset, out, scale,
-                controls, loop_state, work, spare, spare_flat, spare_complex,
-            )  # fmt: skip
+    y, y_new, out, h = r.y[old], r.y[now], r.y_out, r.state[0]["t"] - t_old
+    theta, row_blocks, s = (due - t_old) / h, r.row_blocks, r.k.shape[0]
+    start_slope, f = start_slope_of(r.coefficients, s), r.k[s - 1] if r.control[0]["stage_slope"] == 1 else r.k[0]
+    for m in range(row_blocks.shape[0]):
+        begin, end = row_blocks[m, BEGIN], row_blocks[m, STOP]
+        if separate:
+            for i in range(begin, end):
+                out[i] = y[i] + theta * (y_new[i] - y[i])
+        else:
+            interpolate(begin, end, theta, h, y, r.f_old, y_new, f, r.k, r.dense, start_slope, out)
+
+
+@njit
+def compute_row(handle, r, t_old, due, now, old):
+    """Compute the state `y_out` of an output row at the time `due`, and the results `out_row` there.
+
+    t_old : time of the last state; now, old : rows of y with the present and the last state
+    Where a separate step cannot be solved, the row is interpolated linearly.
+    """
+    t, new, y_out, row_blocks = r.state[0]["t"], 3 - now - old, r.y_out, r.row_blocks
+    separate = needs_separate_step(r)
+    within = due < t - AT_END * (t - t_old)
+    if separate and within and separate_step(handle, r, t_old, due - t_old, old, new):
         for m in range(row_blocks.shape[0]):
             begin, end = row_blocks[m, BEGIN], row_blocks[m, STOP]
-            if solved:
-                copy(y[new, begin:end], y_out[begin:end])
-            elif separate:
-                theta = (due - t_old) / h
-                for i in range(begin, end):
-                    y_out[i] = y[old, i] + theta * (y[now, i] - y[old, i])
-            else:
-                interpolate(begin, end, (due - t_old) / h, h, y[old], f_old, y[now], f, k, dense, start_slope, y_out)
-        limit_to_bounds(bounded_states, bounds, y[old], y[now], y_out)
-        rhs(due, y_out, y_out[:0], out, handle)
+            copy(r.y[new, begin:end], y_out[begin:end])
+    else:
+        interpolate_row(r, t_old, due, separate, now, old)
+    limit_to_bounds(r.bounded_states, r.bounds, r.y[old], r.y[now], y_out)
+    run_handle.call_rhs(r.calls[run_handle.RATES], due, y_out, y_out[:0], r.out_row, handle)
+
+
+@njit
+def emit(handle, r):
+    """Write the output rows due up to the present time; returns a code of `loop_records`.
+
+    DONE : all rows are written; FIELD : a field frame is due, its state is in y_out; ROWS_FULL : `rows` has no space
+    Rows from control["stop_at"] on are not written.
+    """
+    state, progress, rows, t = r.state[0], r.progress[0], r.rows, r.state[0]["t"]
+    t_old, stop_at, now, old = t - state["last"], r.control[0]["stop_at"], progress["now"], progress["old"]
+    while True:
+        row, field = row_due(r), field_due(r)
+        due = min(row, field)
+        if due > t or due >= stop_at:
+            return rec.DONE
+        if row <= due and progress["rows"] == rows.shape[0]:
+            return rec.ROWS_FULL
+        compute_row(handle, r, t_old, due, now, old)
         if row <= due:
-            rows[progress[ROWS], 0] = due
-            observe(due, y_out, out, handle, rows[progress[ROWS], 1:])
-            progress[ROWS] += 1
-            loop_state[NEXT_OUTPUT] += 1.0
+            values = rows[progress["rows"], 1:]
+            rows[progress["rows"], 0] = due
+            run_handle.call_observer(r.calls[run_handle.OBSERVER], due, r.y_out, r.out_row, handle, values)
+            progress["rows"] += 1
+            state["next_output"] += 1.0
         if field <= due:
-            loop_state[NEXT_FIELD] += 1.0
-            return FIELD
+            state["next_field"] += 1.0
+            return rec.FIELD

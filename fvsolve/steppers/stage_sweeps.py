@@ -15,9 +15,9 @@ from math import sqrt
 import numpy as np
 
 from fvsolve.jit import inline
+from fvsolve.steppers import loop_records as rec
 from fvsolve.steppers.coefficients import nodes_of, row_of
-from fvsolve.steppers.loop_indices import CONTROL, TOLERANCE
-from fvsolve.steppers.newton import BASE, CONVERGED, FAILED, WEIGHTS, damped_limits, solve_stage_from_start
+from fvsolve.steppers.newton import CONVERGED, FAILED, damped_limits, solve_stage_from_start
 from fvsolve.steppers.step_operations import copy
 
 MOST = 40
@@ -26,78 +26,89 @@ SLOW, GREATEST_EXTRAPOLATION = 0.4, 10.0
 
 
 @inline
-def sweep(
-    rhs, factor, solve, handle, coefficients, low, structure, t, h, y, y_stage, k, ledger_rates, ledger_offset, out,
-    scale, controls, loop_state, nnz, first_row, work, vectors, factors,
-):  # fmt: skip
+def base_of_stage(r, low, h, i, y):
+    """Compute the state `base` of stage i in a sweep, from the slopes of this sweep and of the last one.
+
+    low : as in `sweep`; y : state at the start of the step
+    """
+    s, k, base, row = r.k.shape[0], r.k, r.base, row_of(r.coefficients, r.k.shape[0], i)
+    first = (i - 1) * (s - 1)
+    for e in range(y.size):
+        base[e] = y[e] + h * row[0] * k[0, e]
+    for j in range(1, s):
+        c_ij, slope, last = low[first + j - 1], k[j], r.transformed[j - 1]
+        lead, lag = h * c_ij if j < i else 0.0, h * (row[j] - c_ij)
+        for e in range(y.size):
+            base[e] += lead * slope[e] + lag * last[e]
+
+
+@inline
+def sweep_once(handle, r, low, t, h, now, turn):
+    """Solve all stages in turn; returns the sum of squares of the changes of the slopes, or -1 if a stage fails.
+
+    turn : number of the sweep, from 0; other arguments as for `sweep`
+    """
+    k, y, base, weights, c = r.k, r.y[now], r.base, r.weights, nodes_of(r.coefficients, r.k.shape[0])
+    s, total = k.shape[0], 0.0
+    for i in range(1, s):
+        copy(k[i], r.transformed[i - 1])
+    for i in range(1, s):
+        own, ki, last = h * low[(i - 1) * s], k[i], r.transformed[i - 1]
+        base_of_stage(r, low, h, i, y)
+        if turn == 0:
+            for e in range(y.size):
+                ki[e] = (y[e] - base[e]) / own
+        if solve_stage_from_start(handle, r, t + c[i] * h, own, i, y) == FAILED:
+            return -1.0
+        for e in range(y.size):
+            change = h * (ki[e] - last[e]) * weights[e]
+            total += change * change
+    return total
+
+
+@inline
+def sweep(handle, r, low, t, h, now):
     """Compute the slopes k of the stages and their ledger rates in sweeps; returns CONVERGED or FAILED.
 
-    low : float64[q q]  lower triangular matrix C by rows, with A = C U, see `newton_transform.lower`
-    first_row : first of 3 q rows of `vectors`, for the slopes before a sweep, their changes, and the slopes after it
-    y : state at the start of the step; nnz : number of Jacobian entries; other arguments as for `dirk.attempt`
+    low : float64[q q]  lower triangular matrix C by rows, with A = C U, see `coefficients.lower`
+    The rows of `transformed` receive the slopes before a sweep, their changes, and the slopes after it.
+    handle, r : handle of the model, open handle of the run; t, h, now : as for `irk.attempt`
     """
-    s, n = k.shape
-    q, c, base, weights = s - 1, nodes_of(coefficients, s), vectors[s + BASE], vectors[s + WEIGHTS]
-    enough, rounded, floor = damped_limits(controls)
-    settled = floor if controls[CONTROL] == TOLERANCE else rounded
+    k, s, n = r.k, r.k.shape[0], r.k.shape[1]
+    q = s - 1
+    enough, rounded, floor = damped_limits(r.control[0])
+    settled = floor if r.control[0]["mode"] == rec.TOLERANCE else rounded
     before = 0.0
     for i in range(1, s):
         if low[(i - 1) * s] == 0.0:
             return FAILED
         copy(k[0], k[i])
     for turn in range(MOST):
-        total = 0.0
-        for i in range(1, s):
-            copy(k[i], vectors[first_row + i - 1])
-        for i in range(1, s):
-            row, own, first = row_of(coefficients, s, i), h * low[(i - 1) * s], (i - 1) * q
-            for e in range(n):
-                base[e] = y[e] + h * row[0] * k[0, e]
-            for j in range(1, s):
-                c_ij, last = low[first + j - 1], vectors[first_row + j - 1]
-                lead, lag = h * c_ij if j < i else 0.0, h * (row[j] - c_ij)
-                for e in range(n):
-                    base[e] += lead * k[j, e] + lag * last[e]
-            if turn == 0:
-                for e in range(n):
-                    k[i, e] = (y[e] - base[e]) / own
-            if solve_stage_from_start(
-                rhs, factor, solve, handle, structure, t + c[i] * h, own, i, k, y, y_stage, ledger_rates, ledger_offset,
-                out, scale, controls, loop_state, nnz, work, vectors, factors,
-            ) == FAILED:  # fmt: skip
-                return FAILED
-            last = vectors[first_row + i - 1]
-            for e in range(n):
-                change = h * (k[i, e] - last[e]) * weights[e]
-                total += change * change
+        total = sweep_once(handle, r, low, t, h, now, turn)
+        if total == -1.0:
+            return FAILED
         size = sqrt(total / max(q * n, 1))
-        if (
-            size <= enough
-            or size <= settled
-            and turn >= q
-            and size >= 0.5 * before
-            or size <= floor
-            and turn == MOST - 1
-        ):
+        slow = turn >= q and size >= 0.5 * before
+        if size <= enough or size <= settled and slow or size <= floor and turn == MOST - 1:
             return CONVERGED
-        extrapolate(q, k, first_row, weights, vectors, 1.0 if turn >= q and size > SLOW * before else 0.0)
+        extrapolate(r, 1.0 if turn >= q and size > SLOW * before else 0.0)
         before = size
     return FAILED
 
 
 @inline
-def extrapolate(q, k, first_row, weights, vectors, weight):
+def extrapolate(r, weight):
     """Extrapolate the slopes K after a sweep, and store the change d and the result of this sweep.
 
     The new slopes are K - weight g (K - K_last), g = <d, d - d_before> / |d - d_before|^2, but g is at least
     -GREATEST_EXTRAPOLATION.
     d, d_before : changes in this and in the last sweep; K_last : result of the last sweep before its extrapolation
-    q : number of implicit stages; first_row : as in `sweep`; weights : float64[n]  factors on states in the products
     weight : 1 to extrapolate, 0 to store only
     """
-    dot, square = 0.0, 0.0
+    k, rows, weights, dot, square = r.k, r.transformed, r.weights, 0.0, 0.0
+    q = k.shape[0] - 1
     for i in range(q):
-        ki, last, change = k[i + 1], vectors[first_row + i], vectors[first_row + q + i]
+        ki, last, change = k[i + 1], rows[i], rows[q + i]
         for e in range(weights.size):
             d = (ki[e] - last[e]) * weights[e]
             difference = d - change[e] * weights[e]
@@ -105,12 +116,7 @@ def extrapolate(q, k, first_row, weights, vectors, weight):
             square += difference * difference
     g = weight * max(dot / square, -GREATEST_EXTRAPOLATION) if square > 0.0 and square < np.inf else 0.0
     for i in range(q):
-        ki, last, change, swept = (
-            k[i + 1],
-            vectors[first_row + i],
-            vectors[first_row + q + i],
-            vectors[first_row + 2 * q + i],
-        )
+        ki, last, change, swept = k[i + 1], rows[i], rows[q + i], rows[2 * q + i]
         for e in range(weights.size):
             new = ki[e]
             change[e] = new - last[e]

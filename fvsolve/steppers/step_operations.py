@@ -3,9 +3,11 @@
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.stage_sums import BAD, BASINS, HEAD, HUGE, OTHERS, combine, copy, count_not_finite
+from fvsolve.kernels.stage_sums import BAD, BASINS, HEAD, OTHERS, combine, copy, count_not_finite
+from fvsolve.steppers.coefficients import error_of, weights_of
+from fvsolve.steppers.run_handle import BANDS, call_join
 
-__all__ = ["HUGE", "combine", "copy"]
+__all__ = ["combine", "copy"]
 
 # Columns of `row_blocks`, int64[q, 4], the states of a band: first, one beyond the last, number of the first partial
 # sum, number of partial sums. Errors are summed by rows, and the rows are added in the order of their numbers, so that
@@ -24,8 +26,7 @@ def squares(begin, end, h, error, k, y, y_new, scale, tolerance):
     """Sum of the squared errors of the states from `begin` to `end` - 1, in units of the tolerance.
 
     The error of a state is h sum e_j k_j with the weights e_j in `error`, the rates k_j of the stages and the step h.
-    Its
-    unit is `tolerance` times `error_scale` at the greater of |y| and |y_new|, the sizes at the start and the end.
+    Its unit is `tolerance` times `error_scale` at the greater of |y| and |y_new|, the sizes at the start and the end.
     scale : see `error_scale`
     """
     first, last = 0, error.size
@@ -44,29 +45,34 @@ def squares(begin, end, h, error, k, y, y_new, scale, tolerance):
 
 
 @njit
-def error_norm(h, error, k, y, y_new, scale, tolerance):
-    """Root mean square of the errors of all states in units of the tolerance; arguments as for `squares`."""
-    return sqrt(squares(0, y.size, h, error, k, y, y_new, scale, tolerance) / max(y.size, 1))
+def error_norm(r, h, now, new):
+    """Root mean square of the errors of all states of a step of length h in units of the tolerance.
+
+    r : open handle of the run; now, new : rows of y at the start and the end of the step
+    """
+    y, error = r.y[now], error_of(r.coefficients, r.k.shape[0])
+    return sqrt(squares(0, y.size, h, error, r.k, y, r.y[new], r.scale, r.control[0]["size"]) / max(y.size, 1))
 
 
 @njit
-def error_of_bands(join, handle, row_blocks, sums, h, error, k, y, y_new, scale, tolerance):
-    """Result of `error_norm` over the states of all bands, which exchange the partial sums of their rows in `sums`.
+def error_of_bands(handle, r, h, now, new):
+    """Result of `error_norm` over the states of all bands, which exchange the partial sums of their rows.
 
     A band is a part of the states, which one thread or process steps.
-    join : function that exchanges `sums`; row_blocks : int64[q, 4]  states of this band and their partial sums
-    h, error, k, y, y_new, scale, tolerance : as for `squares`
+    handle : handle of the model; other arguments as for `error_norm`
     """
+    error, k, y, y_new, scale = error_of(r.coefficients, r.k.shape[0]), r.k, r.y[now], r.y[new], r.scale
+    row_blocks, sums, tolerance = r.row_blocks, r.sums, r.control[0]["size"]
     for m in range(row_blocks.shape[0]):
         begin, count = row_blocks[m, BEGIN], row_blocks[m, SUMS]
         length = (row_blocks[m, STOP] - begin) // count
-        for r in range(count):
-            at = begin + r * length
-            sums[row_blocks[m, FIRST] + r] = squares(at, at + length, h, error, k, y, y_new, scale, tolerance)
-    join(sums, row_blocks, handle)
+        for row in range(count):
+            at = begin + row * length
+            sums[row_blocks[m, FIRST] + row] = squares(at, at + length, h, error, k, y, y_new, scale, tolerance)
+    call_join(r.calls[BANDS], sums, row_blocks, handle)
     total = 0.0
-    for r in range(sums.size):
-        total += sums[r]
+    for row in range(sums.size):
+        total += sums[row]
     return sqrt(total / max(y.size, 1))
 
 
@@ -133,57 +139,54 @@ def interpolate(begin, end, theta, h, y, f, y_new, f_new, k, dense, start_slope,
 
 
 @njit
-def all_finite(join, handle, row_blocks, sums, y, stage_sums, checked):
+def all_finite(handle, r, y, checked):
     """True if the states y of all bands are finite and below 1e100.
 
-    A band is a part of the states, which one thread or process steps.
-    sums : partial sums that bands exchange; a single entry means a single band
-    stage_sums : array `sums` of `kernels.stage_sums`
+    A band is a part of the states, which one thread or process steps. A single partial sum means a single band.
+    handle, r : handle of the model, open handle of the run
     checked : True if the rhs has already counted the invalid values of the stages that it formed
     """
-    bad = 0
+    bad, stage_sums, row_blocks = 0, r.structure, r.row_blocks
     if checked:
         bad, first = stage_sums[BAD], HEAD + stage_sums[BASINS]
-        for r in range(stage_sums[OTHERS]):
-            bad += count_not_finite(stage_sums[first + 2 * r], stage_sums[first + 2 * r + 1], y)
-    elif sums.size == 1:
+        for m in range(stage_sums[OTHERS]):
+            bad += count_not_finite(stage_sums[first + 2 * m], stage_sums[first + 2 * m + 1], y)
+    elif r.sums.size == 1:
         bad = count_not_finite(0, y.size, y)
     else:
         for m in range(row_blocks.shape[0]):
             bad += count_not_finite(row_blocks[m, BEGIN], row_blocks[m, STOP], y)
-    return sum_of_bands(bad, join, handle, row_blocks, sums) == 0.0
+    return sum_of_bands(bad, handle, r) == 0.0
 
 
 @njit(forceinline=True)
-def sum_of_bands(own, join, handle, row_blocks, sums):
-    """Sum of the number `own` of this band and the numbers of the other bands; sums : array that bands exchange.
-
-    A band is a part of the states, which one thread or process steps.
-    """
+def sum_of_bands(own, handle, r):
+    """Sum of the number `own` of this band and the numbers of the other bands; arguments as for `all_finite`."""
+    sums, row_blocks = r.sums, r.row_blocks
     if sums.size == 1:
         return float(own)
     for m in range(row_blocks.shape[0]):
-        for r in range(row_blocks[m, FIRST], row_blocks[m, FIRST] + row_blocks[m, SUMS]):
-            sums[r] = 0.0
+        for row in range(row_blocks[m, FIRST], row_blocks[m, FIRST] + row_blocks[m, SUMS]):
+            sums[row] = 0.0
     sums[row_blocks[row_blocks.shape[0] - 1, FIRST]] = own  # of rows of this band, or of states common to all bands
-    join(sums, row_blocks, handle)
+    call_join(r.calls[BANDS], sums, row_blocks, handle)
     total = 0.0
-    for r in range(sums.size):
-        total += sums[r]
+    for row in range(sums.size):
+        total += sums[row]
     return total
 
 
 @njit
-def exceeded(join, handle, row_blocks, sums, y, largest):
+def exceeded(handle, r, y):
     """True if the size of a state of any band exceeds its entry in `largest` or is not a number.
 
-    A band is a part of the states, which one thread or process steps; other arguments as for `sum_of_bands`.
+    Arguments as for `all_finite`.
     """
-    beyond = 0
+    beyond, row_blocks, largest = 0, r.row_blocks, r.largest
     for m in range(row_blocks.shape[0]):
         for i in range(row_blocks[m, BEGIN], row_blocks[m, STOP]):
             beyond += not abs(y[i]) <= largest[i]
-    return sum_of_bands(beyond, join, handle, row_blocks, sums) > 0.0
+    return sum_of_bands(beyond, handle, r) > 0.0
 
 
 @njit(forceinline=True)
@@ -195,28 +198,34 @@ def add_up(total, part, carry):
 
 
 @njit(forceinline=True)
-def add_stored(h, b, k, y, y_new, stored, carry):
+def stored_sum(r, h, b, y, q):
+    """Sum of the state number stored[q] at the start of a step and its change, and new rounding error, by `add_up`.
+
+    h : step; b : weights of the stages; y : state at the start of the step
+    """
+    i, k, total = r.stored[q], r.k, 0.0
+    for j in range(b.size):
+        total += b[j] * k[j, i]
+    return add_up(y[i], h * total, r.carry[q])
+
+
+@njit(forceinline=True)
+def add_stored(r, h, now, new):
     """Recompute the states `stored` (masses) with compensated sums, so that rounding does not accumulate over steps.
 
-    h : step; b, k : weights and rates of the stages; stored : numbers of these states
-    carry : rounding errors of the previous sums. Returns True if this changed a bit of y_new.
+    h : step; now, new : rows of y at its start and its end. Returns True if this changed a bit of the new state.
     """
-    changed = False
+    changed, b, y_new, stored = False, weights_of(r.coefficients, r.k.shape[0]), r.y[new], r.stored
     for q in range(stored.size):
-        i, total = stored[q], 0.0
-        for j in range(b.size):
-            total += b[j] * k[j, i]
-        new = add_up(y[i], h * total, carry[q])[0]
-        changed = changed or new != y_new[i]
-        y_new[i] = new
+        total = stored_sum(r, h, b, r.y[now], q)[0]
+        changed = changed or total != y_new[stored[q]]
+        y_new[stored[q]] = total
     return changed
 
 
 @njit
-def update_carry(h, b, k, y, stored, carry):
-    """Store the rounding errors of `add_stored` in `carry`, for an accepted step."""
-    for q in range(stored.size):
-        i, total = stored[q], 0.0
-        for j in range(b.size):
-            total += b[j] * k[j, i]
-        carry[q] = add_up(y[i], h * total, carry[q])[1]
+def update_carry(r, h, now):
+    """Store the rounding errors of `add_stored` in `carry`, for an accepted step from row `now` of y."""
+    b, carry = weights_of(r.coefficients, r.k.shape[0]), r.carry
+    for q in range(carry.size):
+        carry[q] = stored_sum(r, h, b, r.y[now], q)[1]

@@ -13,12 +13,13 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, nearest
 from fvsolve.steppers.analysis.trees import Conditions, stage_order
-from fvsolve.steppers.collocation import collocation, extrapolated
 from fvsolve.steppers.numbers.algebraic import MIXED_ROOTS, Algebraic
 from fvsolve.steppers.numbers.expression import digits, root, value_of
+from fvsolve.steppers.numbers.polynomial import collocation, extrapolated
 from fvsolve.units import show
 from fvsolve.validation import COUNT, ROW, TABLE, TEXT, validated
 
+AUTO = "auto"  # in place of a method name: `automatic.py` chooses the method
 METHODS: dict[str, Method] = {}  # some methods have two names: `gauss-2` is `implicit-midpoint`
 LARGEST = 10**30  # greatest size of an entry
 BUILT_IN: set[str] = set()  # names of built-in methods, not available for user methods
@@ -266,6 +267,16 @@ def declare(
         METHODS[also] = method
         BUILT_IN.add(also)
     return method
+
+
+def declare_each(texts: dict[str, str], also: Mapping[str, str] | None = None) -> None:
+    """Declare built-in methods by name; the first line of each text is the source, the other lines are the tableau.
+
+    also : second names of some methods, see `declare`
+    """
+    for name, text in texts.items():
+        source, rows = text.split("\n", 1)
+        declare(name, f"\n{rows.rstrip()}\n", source, also=(also or {}).get(name))
 
 
 def method_named(name: str | Method) -> Method:

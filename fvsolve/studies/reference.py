@@ -15,7 +15,7 @@ import numpy as np
 
 from fvsolve import exact as room
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers.built_in_methods import METHODS
+from fvsolve.steppers.tableau import METHODS
 from fvsolve.studies.accuracy.basin_projection import basin_fields, project_to
 from fvsolve.studies.accuracy.case_resolution import (
     basins,

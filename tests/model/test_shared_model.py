@@ -13,7 +13,7 @@ from reference.folders import CASES
 import fvsolve
 from fvsolve.model import Model, RunData
 from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
-from fvsolve.steppers import loop_indices
+from fvsolve.steppers import loop_records
 from fvsolve.studies.outcome import outcome
 
 SCENES = {  # pipes; flags and marks of devices; cells and work arrays of a basin; scalars; Newton's method
@@ -100,7 +100,7 @@ def test_runs_of_one_model_step_by_step_in_turn_are_the_runs_alone(scene):
     for loops in ([begun(model, model.start)], [begun(model, moved)], [begun(model, y) for y in (model.start, moved)]):
         for _ in range(60):
             for loop in loops:
-                assert loop.run(1.0) == loop_indices.BUDGET_SPENT
+                assert loop.run(1.0) == loop_records.BUDGET_SPENT
         states += [loop.now.copy() for loop in loops]
     assert np.array_equal(states[0], states[2]) and np.array_equal(states[1], states[3])
     assert not np.array_equal(states[0], states[1])
@@ -110,7 +110,7 @@ def begun(model: Model, y: np.ndarray) -> RunLoop:
     """Time loop from a state at the start time, before its first step."""
     loop = RunLoop(model)
     loop.now[:] = y
-    loop.loop_state[loop_indices.T] = model.case.numerics.start
+    loop.state["t"] = model.case.numerics.start
     loop.begin(model.case.numerics.end, NO_LIMIT)
     return loop
 

@@ -12,12 +12,14 @@ from reference.scenes import NO_FRICTION, SHARP, lake, pipe, scene
 from scipy.sparse import csc_array
 
 import fvsolve
-from fvsolve.jit import COMPILING, njit
+from fvsolve.jit import njit
+from fvsolve.kernels.calls import compile_as
 from fvsolve.model import RunData
 from fvsolve.model.jacobian_pattern import jacobian_pattern
-from fvsolve.steppers.differences import differences, multiply
-from fvsolve.steppers.signatures import addresses, compiled_as
-from fvsolve.steppers.structure import KINDS, Structure
+from fvsolve.steppers import METHODS
+from fvsolve.steppers.integrator import Integrator
+from fvsolve.steppers.run_handle import RATES, addresses, evaluate, open_run
+from fvsolve.steppers.structure import KINDS, Structure, differences, multiply
 
 CASES = sorted(folders.CASES.glob("*.toml"))
 SCHEMES = ["upwind", "linear-upwind", "fromm", "central", "upwind3", "upwind5", "muscl", "weno5"]
@@ -117,16 +119,12 @@ def test_a_pipe_couples_no_more_than_its_scheme_reads():
 @functools.cache
 def compiled_differences():
     """Function `differences`, compiled as in a stepper for a right-hand side given by its address."""
-    if not COMPILING:
-        return lambda calls, *others: differences(*calls, *others)
-    from fvsolve.steppers.signatures import rhs_at
 
     @njit
-    def differences_at(calls, handle, shape, where, t, y, f, supply, scale, y_work, f_work, out, jacobian):
-        rhs = rhs_at(calls[0])
-        return differences(rhs, handle, shape, where, t, y, f, supply, scale, y_work, f_work, out, jacobian)
+    def differences_of(handle, run, t, y, f, supply, f_work):
+        return differences(evaluate, handle, open_run(run), t, y, f, supply, f_work)
 
-    return compiled_as(differences_at, "hhhitvvvvvvvv")
+    return compile_as(differences_of, "hhtvvvv")
 
 
 def slopes(model, t: float, y: np.ndarray, structure: Structure) -> np.ndarray:
@@ -134,9 +132,12 @@ def slopes(model, t: float, y: np.ndarray, structure: Structure) -> np.ndarray:
     n, m, at = model.y_size, len(model.node_names), int(model.layout["supply"])
     slate = RunData(model)
     f, out = slate.evaluate(t, y, np.inf)
-    supply, jacobian = out[at : at + m].copy(), np.full(structure.nnz, np.nan)
-    given = (addresses((model.functions.rhs,)), slate.handle, structure.shape, at, t, y, f, supply, model.scale.copy())
-    calls = compiled_differences()(*given, np.zeros(n), np.zeros(n), model.new_out(), jacobian)
+    supply = out[at : at + m].copy()
+    stepper = Integrator(METHODS["implicit-euler"], n, structure.m, lambda: structure, model.scale.copy())
+    stepper.calls, stepper.out = addresses((model.functions.rhs,) * (RATES + 1)), model.new_out()
+    stepper.control["ledger_offset"], stepper.jacobian[:] = at, np.nan
+    calls = compiled_differences()(slate.handle, stepper.handle(False), t, y, f, supply, np.zeros(n))
+    jacobian = stepper.jacobian
     assert calls == structure.color_count
     x, product = np.random.default_rng(0).normal(size=n), np.zeros(n + m)
     multiply(structure.shape, jacobian, x, product)

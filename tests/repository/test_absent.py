@@ -16,14 +16,13 @@ from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.rhs_assembly import PHASES
 from fvsolve.model import RunData
 from fvsolve.solve.run_loop import RunLoop
-from fvsolve.steppers import loop_indices
 
 PIPES = {"pipes", "ghost_cells", "reconstruction", "fused_step"}
 MASSES = {"mass_dynamics"}
 BODIES = {"joints", "mass_matrix", "body_layout", "loop_constraints", "bushings"}
 DEVICES = {"check_valve", "regulator", "pump", "accumulator"}
 MEMORY = {"relaxation"}  # of unsteady friction
-IMPLICIT = {"newton", "dirk", "irk", "ros", "differences", "linear_dense", "linear_banded", "linear_sparse"}
+IMPLICIT = {"newton", "dirk", "irk", "ros", "structure", "linear_dense", "linear_banded", "linear_sparse"}
 CAVITIES = {"cavitating_pipes", "cavitating_nodes", "riemann"}
 JOBS = (*PHASES, "observe", "record", "events")
 SCALARS = {"scalar_transport", "node_mixing"}
@@ -91,7 +90,7 @@ def test_other_laws_compile_no_more_for_two_tanks(law, compiling):
 def test_each_room_is_compiled_where_it_is_used(compiling):
     assert files(fvsolve.build(fvsolve.load(line()))) & ALL == PIPES - {"fused_step"}
     found = files(fvsolve.build(fvsolve.load(tanks(method="implicit-euler", step=0.1))))
-    assert found & ALL == {"newton", "dirk", "differences", "linear_dense"}
+    assert found & ALL == {"newton", "dirk", "structure", "linear_dense"}
     dyed = line() | {"scalars": {"dye": {}}}
     assert files(fvsolve.build(fvsolve.load(dyed))) & ALL == PIPES - {"fused_step"} | SCALARS
     log = line() | {"fluid": {"name": "Water", "law": "log"}}
@@ -167,4 +166,4 @@ def test_the_rates_are_called_no_more_often_than_the_steps_ask_for():
     loop = RunLoop(fvsolve.build(fvsolve.load(tanks(method="rk4", step=0.1))))
     loop.begin(10.0, 1e308)
     loop.run(1e308)
-    assert loop.loop_state[loop_indices.STEPS] == 100 and loop.loop_state[loop_indices.CALLS] <= 4 * 100 + 1
+    assert loop.state["steps"] == 100 and loop.state["calls"] <= 4 * 100 + 1

@@ -126,12 +126,16 @@ HARM = {
     "two counts": lambda kept: {"counts": kept["counts"][:2]},
     "text": lambda kept: {"y": np.array(["a"] * kept["y"].size)},
     "no identity": lambda kept: {"identity": np.array("[]")},
-    "memory cut": lambda kept: {"memory": kept["memory"][:-5]},
-    "memory longer": lambda kept: {"memory": np.append(kept["memory"], [0.0, 1.0])},
-    "memory of one number": lambda kept: {"memory": np.zeros(1)},
-    "a segment there is not": lambda kept: {"memory": np.concatenate([[99.0], kept["memory"][1:]])},
-    "changes below zero": lambda kept: {"memory": np.concatenate([kept["memory"][:3], [-4.0], kept["memory"][4:]])},
-    "changes without end": lambda kept: {"memory": np.concatenate([kept["memory"][:3], [1e300], kept["memory"][4:]])},
+    "memory cut": lambda kept: {"memory.extremes": kept["memory.extremes"][:, :-1]},
+    "memory longer": lambda kept: {"memory.run": np.append(kept["memory.run"], [0.0, 1.0])},
+    "memory of one number": lambda kept: {"memory.run": np.zeros(1)},
+    "memory of another type": lambda kept: {"memory.ledger": kept["memory.ledger"].astype(str)},
+    "memory with numbers in place of a record": lambda kept: {"memory.state": np.zeros(1)},
+    "a segment there is not": lambda kept: {"memory.run": np.append(99.0, kept["memory.run"][1:])},
+    "a segment that is no number": lambda kept: {"memory.run": np.append(np.nan, kept["memory.run"][1:])},
+    "one array more": lambda kept: {"memory.more": np.zeros(1)},
+    "changes without end": lambda kept: {"memory.changes": np.zeros(1)},
+    "changes in text": lambda kept: {"memory.changes": np.array([["a"] * 3])},
 }  # fmt: skip
 
 
@@ -140,12 +144,12 @@ def shorter(key: str):
     return lambda kept: {key: np.atleast_1d(kept[key])[:-1]}
 
 
-@pytest.mark.parametrize("key", ["t", "y", "memory", "counts", "identity"])
+@pytest.mark.parametrize("key", ["t", "y", "memory.run", "memory.state", "counts", "identity"])
 def test_the_array_that_is_cut_by_one_or_gone_is_named_with_its_file(key, stopped, tmp_path):
     case, out = copied(stopped, tmp_path)
     with np.load(out / "restart.npz") as file:
         kept = {key: file[key] for key in file.files}
-    name = "states" if key == "y" else key
+    name = "states" if key == "y" else key.partition(".")[0]
     for harmed in ({**kept, **shorter(key)(kept)}, {one: array for one, array in kept.items() if one != key}):
         np.savez(out / "restart.npz", **harmed)
         with pytest.raises(RunError) as error:

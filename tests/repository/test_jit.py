@@ -15,7 +15,7 @@ import pytest
 
 import fvsolve
 from fvsolve import jit, store
-from fvsolve.steppers.signatures import no_algebra
+from fvsolve.steppers.run_handle import no_algebra
 
 LAW = """from fvsolve.jit import njit
 

@@ -11,7 +11,7 @@ from solve.test_threads import liquid
 import fvsolve
 from fvsolve.solve.run_checks import GROWTH_LIMIT
 from fvsolve.solve.run_loop import RunLoop
-from fvsolve.steppers.loop_indices import GROWTH_CHECK_STEPS
+from fvsolve.steppers.loop_records import GROWTH_CHECK_STEPS
 
 
 @pytest.fixture

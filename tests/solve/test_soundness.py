@@ -20,7 +20,6 @@ from fvsolve.solve.run_loop import MOST_EVENTS_IN_SPAN, SPAN, RunLoop
 from fvsolve.step_limits.advection_limit import advection_limit
 from fvsolve.step_limits.grid_limits import plane_limit
 from fvsolve.step_limits.step_notices import step_limits
-from fvsolve.steppers import loop_indices
 from fvsolve.studies import sweep
 
 MAIN = "cases/valve-closure.toml"
@@ -266,7 +265,7 @@ def test_events_that_crowd_within_a_millionth_of_a_run_are_bounded_under_error_c
         loop = RunLoop(model_of(case))
         count = loop.recent_events.maxlen
         for k in range(count):
-            loop.loop_state[loop_indices.T] = 1.0 + apart * SPAN * 3.0 * k / (count - 1)
+            loop.state["t"] = 1.0 + apart * SPAN * 3.0 * k / (count - 1)
             goes_on = loop.handle_events(loop.armed.copy())
             assert goes_on or k == count - 1
         assert goes_on is not crowds

@@ -102,7 +102,8 @@ def told(case, threads: int, state=None):
     loop = run.loop
     cells = [np.asarray(array) for frame in sink.frames for name in ("pool", "sheet") if name in frame
              for array in frame[name].values()]  # fmt: skip
-    kept = [loop.now, *loop.stepper.restart_arrays(), run.run_data.marks, run.run_data.extremes, sink.table(), *cells]
+    kept = [loop.now, *loop.stepper.restart_arrays().values(), run.run_data.marks, run.run_data.extremes, sink.table()]
+    kept += cells
     return [np.array(one).tobytes() for one in kept], summary
 
 
@@ -154,11 +155,11 @@ FORMED = ("muscl, ssp-rk2", "muscl, a limiter of its own, rk4", "upwind5, ssp-rk
 def test_stages_formed_beside_rates_have_the_bits_of_those_formed_after_all(name, cells, monkeypatch):
     """Blocked stages have the bits of whole stages, for several block sizes and numbers of threads."""
     bits, _ = told(SCENES[name], 1)
-    here = importlib.import_module("fvsolve.solve.blocked_stages")
+    here = importlib.import_module("fvsolve.solve.partition")
     monkeypatch.setattr(here, "LEAST_STATES", 0)
     monkeypatch.setattr(here, "BLOCK", cells)
     model = fvsolve.build(fvsolve.load(SCENES[name]))
-    assert RunLoop(model).stepper.shape.size > 0
+    assert RunLoop(model).stepper.structure.size > 0
     assert told(SCENES[name], 1)[0] == bits
     assert told(SCENES[name], 3)[0] == bits
 

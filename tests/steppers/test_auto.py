@@ -14,7 +14,7 @@ from reference.scenes import chamber, lake, pipe, reservoir, scene, tank, valve
 
 import fvsolve
 
-IMPLICIT = ("newton", "ros", "dirk", "irk", "differences", "linear_dense", "linear_banded", "linear_sparse")
+IMPLICIT = ("newton", "ros", "dirk", "irk", "linear_dense", "linear_banded", "linear_sparse")
 PROBE = f"""
 import json, sys, fvsolve
 result = fvsolve.run(json.load(sys.stdin))

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.sparse import csc_array
 
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers.differences import differences, multiply
-from fvsolve.steppers.state_pairs import pairs
-from fvsolve.steppers.structure import Structure
+from fvsolve.steppers.linear_sparse import pairs
+from fvsolve.steppers.structure import Structure, differences, multiply
 
 KINDS = ("dense", "banded", "sparse")
 
@@ -207,17 +208,20 @@ def test_differences_meet_the_slopes(n, m, density):
     _, a = values_on(structure)
     where = 2
 
-    def rhs(t, y, dydt, out, handle):
+    def evaluate(handle, run, t, y, dydt):
         found = np.sin(a @ y + t)
-        dydt[:], out[where : where + m] = found[:n], found[n:]
+        dydt[:], run.out[where : where + m] = found[:n], found[n:]
 
     y = np.random.default_rng(2).normal(size=n)
-    f, f_work, y_work, out = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(where + m)
-    rhs(0.3, y, f, out, None)
-    supply = out[where:].copy()
-    jacobian = np.full(structure.nnz, np.nan)
+    f, f_work, jacobian = np.zeros(n), np.zeros(n), np.full(structure.nnz, np.nan)
+    run = SimpleNamespace(
+        structure=structure.shape, scale=np.ones(n), moved=np.zeros(n), out=np.zeros(where + m), jacobian=jacobian,
+        control=[{"ledger_offset": where}],
+    )  # fmt: skip
+    evaluate(None, run, 0.3, y, f)
+    supply = run.out[where:].copy()
     python = getattr(differences, "py_func", differences)
-    calls = python(rhs, None, structure.shape, where, 0.3, y, f, supply, np.ones(n), y_work, f_work, out, jacobian)
+    calls = python(evaluate, None, run, 0.3, y, f, supply, f_work)
     assert calls == structure.color_count
     slope = np.cos(a @ y + 0.3)[:, None] * a
     pattern = structure.pattern

@@ -10,8 +10,8 @@ from numba import njit
 
 import fvsolve
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers.built_in_methods import METHODS
 from fvsolve.steppers.ode import integrate
+from fvsolve.steppers.tableau import METHODS
 
 
 def test_a_function_that_numba_refuses_gives_the_same_steps():

@@ -10,7 +10,7 @@ from reference.scenes import GRAVITY, area, chamber, reservoir, scene, tank, val
 
 import fvsolve
 from fvsolve.jit import njit
-from fvsolve.steppers import METHODS, loop_indices, ode
+from fvsolve.steppers import METHODS, loop_records, ode
 from fvsolve.steppers.integrator import Integrator
 
 END, EVERY = 10.0, 0.0137  # no step divides the interval [s]
@@ -37,21 +37,19 @@ def stiff(t, y, dydt):
 def tables(f, begin, method, control, size):
     """Tables [t, y] of rows and of ends of steps, computed as in a run, with rows at all times and unchanged steps."""
     stepper = Integrator(METHODS[method], 3, 0, lambda: ode._full(3), np.ones(3))
-    orders, memory, flags = stepper.controls, stepper.loop_state, stepper.progress
+    state, progress = stepper.state[0], stepper.progress[0]
     stepper.y[0] = begin
-    orders[loop_indices.CONTROL] = control
-    orders[[loop_indices.SIZE, loop_indices.STEP_MAX, loop_indices.STOP_AT, loop_indices.END]] = size, 1e308, 1e308, END
-    orders[loop_indices.EVERY] = EVERY
+    stepper.set_control(mode=control, size=size, step_max=1e308, stop_at=1e308, end=END, every=EVERY)
     stepper.rows = np.zeros((round(END / EVERY) + 2, 4))
     functions = ode._prepare(f, 0.0, stepper.y[0])[0]
-    ends, code, memory[loop_indices.NEXT_OUTPUT] = [], loop_indices.BUDGET_SPENT, 1.0
-    while code == loop_indices.BUDGET_SPENT:
-        orders[loop_indices.BUDGET] = 1.0
+    ends, code, state["next_output"] = [], loop_records.BUDGET_SPENT, 1.0
+    while code == loop_records.BUDGET_SPENT:
+        stepper.set_control(budget=1.0)
         code = stepper.call(*functions, np.array([-1]), ode.WHERE, stepper.no_floats)
-        ends.append([memory[loop_indices.T], *stepper.y[flags[loop_indices.NOW]]])
-    assert code == loop_indices.DONE
-    assert flags[loop_indices.ROWS] == int(END / EVERY)
-    return stepper.rows[: flags[loop_indices.ROWS]], np.array(ends)
+        ends.append([state["t"], *stepper.y[progress["now"]]])
+    assert code == loop_records.DONE
+    assert progress["rows"] == int(END / EVERY)
+    return stepper.rows[: progress["rows"]], np.array(ends)
 
 
 def errors(method, control, size):
@@ -67,9 +65,9 @@ def test_rows_are_as_good_as_ends_of_steps(method):
     Without the present interpolation rows of `verner-7` were worse by 1e6, of `gauss-6` by 2e3 and of `esdirk-5` by
     120.
     """
-    settings = [(loop_indices.FIXED_STEP, h) for h in (0.2, 0.05)]
+    settings = [(loop_records.FIXED_STEP, h) for h in (0.2, 0.05)]
     if METHODS[method].adaptive:
-        settings += [(loop_indices.TOLERANCE, rtol) for rtol in (1e-4, 1e-7, 1e-10)]
+        settings += [(loop_records.TOLERANCE, rtol) for rtol in (1e-4, 1e-7, 1e-10)]
     for control, size in settings:
         rows, ends = errors(method, control, size)
         assert rows <= WORSE * ends + ROUNDING, (control, size, rows, ends)
@@ -81,7 +79,7 @@ IMPLICIT = [name for name, method in METHODS.items() if not method.explicit]
 @pytest.mark.parametrize("method", IMPLICIT)
 def test_rows_of_a_stiff_start_do_not_overshoot(method):
     """Rows of steps of 0.2 s over a transient of 1 us do not exceed the ends of steps by more than 1 %."""
-    rows, ends = tables(stiff, np.zeros(3), method, loop_indices.FIXED_STEP, 0.2)
+    rows, ends = tables(stiff, np.zeros(3), method, loop_records.FIXED_STEP, 0.2)
     most = max(1.0, np.abs(ends[:, 1]).max())  # a method that is not L-stable rings at its ends too
     assert np.abs(rows[:, 1]).max() <= 1.01 * most
     assert np.abs(rows[:, 2]).max() <= 1.01 * np.abs(ends[:, 2]).max()

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from hypothesis_profiles import examples
 
 from fvsolve.steppers import METHODS, analyse
-from fvsolve.steppers.numbers.polynomial import Polynomial
-from fvsolve.steppers.numbers.sturm import count_roots, first_sign_change, odd_part, roots_right
+from fvsolve.steppers.numbers.polynomial import Polynomial, count_roots, first_sign_change, odd_part, roots_right
 from fvsolve.steppers.tableau import Method
 
 NAMES = [name for name, method in METHODS.items() if name == method.name]

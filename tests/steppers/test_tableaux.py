@@ -9,8 +9,7 @@ import pytest
 
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers.analysis.trees import Conditions, density, trees
-from fvsolve.steppers.built_in_methods import METHODS
-from fvsolve.steppers.tableau import method_named, tableau
+from fvsolve.steppers.tableau import METHODS, method_named, tableau
 
 # stages, order, order of the embedded solution and stage order of the sources
 PUBLISHED = {

@@ -2,7 +2,7 @@
 
 Rate of the unit flow q [m2/s] in water of depth h: Manning -g n^2 |q| q / h^(7/3), Darcy -(f / 8) |q| q / h^2, both
 -r q with the decay rate r [1/s]. In thin water r is unbounded. SSP methods divide the rates of stages
-(`steppers.semi_implicit`); implicit methods solve for the friction. Other explicit methods, and SSP methods in a basin
+(`steppers.erk`); implicit methods solve for the friction. Other explicit methods, and SSP methods in a basin
 on a body that forces move, cap r smoothly, r -> r / (1 + r / RATE_CAP); thin films are then too fast.
 """
 

@@ -19,8 +19,8 @@ from fvsolve.case.cell_means import means, samples
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.rhs_assembly import RhsTerms
-from fvsolve.steppers.analysis.absolute_monotonicity import in_euler_steps
-from fvsolve.steppers.built_in_methods import AUTO, METHODS
+from fvsolve.steppers.analysis.stability_properties import in_euler_steps
+from fvsolve.steppers.tableau import AUTO, METHODS
 
 PACKAGE = __package__
 WATER_TERMS = RhsTerms(

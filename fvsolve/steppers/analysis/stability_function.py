@@ -6,14 +6,14 @@ import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from math import factorial
 
 import numpy as np
 
-from fvsolve.steppers.analysis.pade import pade
 from fvsolve.steppers.analysis.trees import short
 from fvsolve.steppers.numbers.polynomial import Polynomial
 from fvsolve.steppers.tableau import Method, method_named
-from fvsolve.validation import Kind, is_array, validated
+from fvsolve.validation import COUNT_FROM_ZERO, Kind, is_array, validated
 
 NOTHING = Polynomial([])
 PLANE = Kind(lambda given: is_array(given, "fiuc", 0, 9, finite=False), "complex numbers")
@@ -148,3 +148,22 @@ def _leverrier(a: Sequence[Sequence]) -> tuple[list, list]:
         for i in range(s):
             m[i][i] = m[i][i] + characteristic[-1]
     return characteristic, adjugate
+
+
+@validated(k=COUNT_FROM_ZERO, m=COUNT_FROM_ZERO)
+def pade(k: int, m: int) -> tuple[Polynomial, Polynomial]:
+    """Numerator N(s) and denominator D(s) of the Pade approximation of e^s, with the degrees k and m.
+
+    Its power series agrees with that of e^s in the first k + m + 1 terms.
+    N(s) = sum_j (k+m-j)! k! / ((k+m)! j! (k-j)!) s^j; D is the same sum with m in place of k and -s in place of s
+    (Hairer and Wanner 1996, IV.3).
+    """
+
+    def part(degree: int, sign: int) -> Polynomial:
+        weight = Fraction(factorial(degree), factorial(k + m))
+        return Polynomial(
+            weight * sign**j * Fraction(factorial(k + m - j), factorial(j) * factorial(degree - j))
+            for j in range(degree + 1)
+        )
+
+    return part(k, 1), part(m, -1)

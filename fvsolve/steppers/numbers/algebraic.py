@@ -6,8 +6,7 @@ import functools
 from fractions import Fraction
 from math import isqrt
 
-from fvsolve.steppers.numbers.polynomial import Polynomial, sign
-from fvsolve.steppers.numbers.sturm import count_roots
+from fvsolve.steppers.numbers.polynomial import Polynomial, count_roots, sign
 
 MIXED_ROOTS = (
     "{} are used in one tableau. Expected a single root, or decimals of 20 digits or more in place of all roots"

@@ -1,8 +1,11 @@
-"""Polynomials with exact coefficients (fractions or algebraic numbers), lowest power first."""
+"""Polynomials with exact coefficients (fractions or algebraic numbers), lowest power first.
+
+Sturm chains count their roots; Lagrange polynomials on the nodes of a method give its collocation coefficients.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 
 
@@ -118,3 +121,160 @@ def sign(value) -> int:
 
 def _as(value) -> Polynomial:
     return value if isinstance(value, Polynomial) else Polynomial([value])
+
+
+def lagrange(c: Sequence) -> list[Polynomial]:
+    """Lagrange polynomials l_i on the nodes c, with l_i(c_j) = 1 if i = j, otherwise 0; the nodes must differ."""
+    polynomials = []
+    for i, x in enumerate(c):
+        product = Polynomial([1])
+        for y in (*c[:i], *c[i + 1 :]):
+            product = product * Polynomial([-y, 1]) / (x - y)
+        polynomials.append(product)
+    return polynomials
+
+
+def integrals(c: Sequence) -> list[Polynomial]:
+    """Integrals from 0 to theta of the Lagrange polynomials l_i on the nodes c, as polynomials in theta."""
+    return [
+        Polynomial([0, *(x / (k + 1) for k, x in enumerate(polynomial.coefficients))]) for polynomial in lagrange(c)
+    ]
+
+
+def collocation(a: Sequence, b: Sequence, c: Sequence, rounding: Fraction = Fraction(0)) -> tuple[tuple, ...]:
+    """Coefficients dense_ij of the dense output y(theta) = y + h sum_i k_i sum_j dense_ij theta^(j+1).
+
+    The result is empty if a, b, c is not a collocation method, which has a_ij = int_0^c_i l_j and b_j = int_0^1 l_j
+    with the Lagrange polynomials l_j (Hairer, Norsett and Wanner 1993, II.7).
+    rounding : relative error of a coefficient
+    """
+    if len(set(c)) < len(c) or (len(c) > 1 and not any(x != 0 for i, row in enumerate(a) for x in row[i:])):
+        return ()
+
+    def equal(x, y) -> bool:
+        return abs(x - y) <= 100 * rounding * len(c) if rounding else x == y
+
+    integrated = integrals(c)
+    for x, row in zip((*c, Fraction(1)), (*a, b), strict=True):
+        if not all(equal(value, integral(x)) for value, integral in zip(row, integrated, strict=True)):
+            return ()
+    return tuple(
+        tuple(integral.coefficients[1:]) + (Fraction(0),) * (len(c) - integral.degree) for integral in integrated
+    )
+
+
+def extrapolated(c: Sequence, start) -> tuple:
+    """Weights of the stages in the embedded solution of Radau IIA methods (Hairer and Wanner 1996, IV.8).
+
+    Together with the weight `start` at time 0, they integrate exactly from 0 to 1 all polynomials of a degree below the
+    number of stages. c : times of the stages
+    """
+    return tuple(
+        integral(Fraction(1)) - start * basis(Fraction(0))
+        for integral, basis in zip(integrals(c), lagrange(c), strict=True)
+    )
+
+
+DIGITS = Fraction(1, 1 << 64)  # relative width of the bracket of a root
+
+
+def chain(p: Polynomial) -> list[Polynomial]:
+    """Sturm's chain of p: p, p', then the negative remainders of successive divisions, scaled by positive numbers."""
+    polynomials = [p, p.derivative()]
+    while polynomials[-1].degree > 0:
+        remainder = -(polynomials[-2] % polynomials[-1])
+        if remainder.degree < 0:
+            break
+        top = remainder.coefficients[-1]
+        polynomials.append(remainder / (top if sign(top) > 0 else -top))
+    return polynomials
+
+
+def count_roots(p: Polynomial, low=None, high=None) -> int:
+    """Number of distinct real roots of p in low < x <= high; None stands for infinity. `p` must not be zero."""
+    if p.degree < 1:
+        return 0
+    polynomials = chain(p)
+    return _changes(polynomials, low, -1) - _changes(polynomials, high, 1)
+
+
+def odd_part(p: Polynomial) -> Polynomial:
+    """Polynomial with a single root wherever p changes sign: product of the factors of odd multiplicity (Yun 1976)."""
+    product, k = Polynomial([1]), 1
+    common = p.gcd(p.derivative())
+    w, y = p // common, p.derivative() // common
+    while w.degree > 0:
+        z = y - w.derivative()
+        factor = w.gcd(z) if z.degree >= 0 else w.monic()
+        if k % 2:
+            product = product * factor
+        w, y = w // factor, z // factor
+        k += 1
+    return product
+
+
+def first_sign_change(p: Polynomial) -> float | None:
+    """Least x > 0 at which p changes sign, accurate to about the last bit; None without sign change there."""
+    p = odd_part(p) if p.degree > 0 else p
+    while p.degree > 0 and p.coefficients[0] == 0:
+        p = Polynomial(p.coefficients[1:])
+    if p.degree < 1:
+        return None
+    polynomials, low, high = chain(p), Fraction(0), Fraction(1)
+    at_low, far = _changes(polynomials, low, 1), _changes(polynomials, None, 1)
+    if at_low == far:
+        return None
+    while _changes(polynomials, high, 1) == at_low:
+        low, high = high, 2 * high
+    while at_low - _changes(polynomials, high, 1) > 1:
+        middle = (low + high) / 2
+        if _changes(polynomials, middle, 1) == at_low:
+            low = middle
+        else:
+            high = middle
+    rising = sign(p(high))
+    if rising == 0:
+        return float(high)
+    while high - low > high * DIGITS:
+        middle = (low + high) / 2
+        now = sign(p(middle))
+        if now == 0:
+            return float(middle)
+        if now == rising:
+            high = middle
+        else:
+            low = middle
+    return float(high)
+
+
+def nowhere_negative(p: Polynomial) -> bool:
+    """True if p(x) >= 0 for all x >= 0."""
+    return p.degree < 0 or (sign(p.coefficients[-1]) > 0 and first_sign_change(p) is None)
+
+
+def roots_right(p: Polynomial) -> bool:
+    """True if all roots of p lie in the open right half plane, by Routh's array of p(-x)."""
+    up = [x if k % 2 == 0 else -x for k, x in enumerate(p.coefficients)][::-1]
+    upper, lower = up[0::2], up[1::2]
+    first = sign(upper[0])
+    while lower:
+        if sign(lower[0]) != first:
+            return False
+        ratio = upper[0] / lower[0]
+        rest = [x - ratio * y for x, y in zip(upper[1:], [*lower[1:], Fraction(0)], strict=False)]
+        upper, lower = lower, rest
+    return True
+
+
+def _changes(polynomials: list[Polynomial], x, side: int) -> int:
+    """Number of sign changes along a Sturm chain at x, or at side * infinity if x is None."""
+    signs = [sign(q(x)) if x is not None else _far(q, side) for q in polynomials]
+    signs = [s for s in signs if s != 0]
+    return sum(a != b for a, b in zip(signs, signs[1:], strict=False))
+
+
+def _far(p: Polynomial, side: int) -> int:
+    if p.degree < 0:
+        return 0
+    top = sign(p.coefficients[-1])
+    return top if side > 0 or p.degree % 2 == 0 else -top

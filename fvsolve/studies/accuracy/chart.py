@@ -18,8 +18,7 @@ from fvsolve.case.case import Case
 from fvsolve.case.sections import DEFAULT_CELLS, DEFAULT_RTOL
 from fvsolve.display import Displayable
 from fvsolve.errors import CaseError, FvsolveError, listing
-from fvsolve.steppers.built_in_methods import AUTO, METHODS
-from fvsolve.steppers.tableau import BUILT_IN
+from fvsolve.steppers.tableau import AUTO, BUILT_IN, METHODS
 from fvsolve.studies.accuracy.case_resolution import basins_from_files
 from fvsolve.studies.accuracy.chart_settings import (
     CoarseRun,

@@ -11,7 +11,7 @@ from fvsolve.case.sections import DEFAULT_COURANT, DEFAULT_METHOD, DEFAULT_METHO
 from fvsolve.errors import CaseError, FvsolveError, did_you_mean, listing
 from fvsolve.model.model_facts import rhs_seconds
 from fvsolve.schemes import SCHEMES
-from fvsolve.steppers.built_in_methods import AUTO, METHODS
+from fvsolve.steppers.tableau import AUTO, METHODS
 from fvsolve.studies.accuracy.case_resolution import cell_counts, greatest_wave_rate, pipes, total_cells
 from fvsolve.studies.accuracy.method_setting import (
     MethodSetting,

@@ -8,7 +8,7 @@ from fvsolve.case.case import Case
 from fvsolve.case.defaults import raw_link
 from fvsolve.case.sections import DEFAULT_COURANT, uses_error_control
 from fvsolve.model.delay_line_selection import slowest_pipe
-from fvsolve.steppers.built_in_methods import AUTO, METHODS
+from fvsolve.steppers.tableau import AUTO, METHODS
 from fvsolve.studies.accuracy.case_resolution import basins, cell_counts, cell_keys_of, pipes_with_cells, scaled
 
 IMPLICIT_RTOL = 1e-4  # rtol of implicit methods with cells: their steps follow the solution, not the cell size

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers.built_in_methods import METHODS
+from fvsolve.steppers.tableau import METHODS
 from fvsolve.studies.accuracy.basin_projection import unit_of
 from fvsolve.studies.accuracy.case_resolution import (
     basins,

@@ -9,7 +9,7 @@ import numpy as np
 
 from fvsolve.case.defaults import raw_link
 from fvsolve.errors import FvsolveError, did_you_mean, listing
-from fvsolve.steppers.built_in_methods import AUTO, METHODS
+from fvsolve.steppers.tableau import AUTO, METHODS
 from fvsolve.studies.accuracy.case_resolution import (
     Counts,
     basins,

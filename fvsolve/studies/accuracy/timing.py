@@ -8,7 +8,6 @@ import numpy as np
 
 from fvsolve.errors import CaseError
 from fvsolve.solve.solve import Run
-from fvsolve.steppers import loop_indices
 from fvsolve.studies.outcome import Outcome, outcome, refusal_text, study_model
 
 MAX_RUNS = 5  # greatest number of runs, of which the fastest counts
@@ -31,7 +30,7 @@ class CappedRun(Run):
 
     def check(self) -> None:
         """Raise GivenUp if CPU time or number of steps exceeds its limit."""
-        if self.processor > self.max_seconds or self.loop.loop_state[loop_indices.STEPS] > self.max_steps:
+        if self.processor > self.max_seconds or self.loop.state["steps"] > self.max_steps:
             raise GivenUp
 
     def segments(self) -> str:

@@ -9,7 +9,7 @@ from fvsolve.model.delay_history import jump_times
 from fvsolve.model.energy_accounts import Accounts
 from fvsolve.solve.run_loop import RunLoop
 from fvsolve.solve.solve import Run
-from fvsolve.steppers import automatic, loop_indices
+from fvsolve.steppers import automatic, loop_records
 
 TABLE_ROWS = 1000  # approximate number of rows of the table
 QUADRATURE_TOLERANCE = (
@@ -17,11 +17,11 @@ QUADRATURE_TOLERANCE = (
 )
 LEAST, MOST = 0.1, 8.0  # limits of the factor on the step for that tolerance
 ACCEPTED_CODES = (
-    loop_indices.BUDGET_SPENT,
-    loop_indices.DONE,
-    loop_indices.ROWS_FULL,
-    loop_indices.FIELD,
-    loop_indices.STOPPED,
+    loop_records.BUDGET_SPENT,
+    loop_records.DONE,
+    loop_records.ROWS_FULL,
+    loop_records.FIELD,
+    loop_records.STOPPED,
 )  # status codes of the loop after an accepted step
 
 
@@ -35,9 +35,9 @@ class EnergyLoop(RunLoop):
         self.supplied, self.rates, self.dissipated_lines = (
             accounts.of(kind) for kind in ("supplied", "rate", "dissipated")
         )
-        self.longest = float(self.controls[loop_indices.STEP_MAX])
+        self.longest = float(self.control["step_max"])
         self.dydt, self.out_work = np.zeros(self.model.y_size), self.model.new_out()
-        self.controls[loop_indices.ALLOW_FUSED] = 0.0  # fused steps store no stages
+        self.control["allow_fused"] = 0  # fused steps store no stages
 
     def run(self, budget: float) -> int:
         """Run `RunLoop.run` one step at a time, and add the energy of each accepted step.
@@ -45,12 +45,12 @@ class EnergyLoop(RunLoop):
         budget : greatest number of steps. Returns the status code of the loop.
         """
         code, left, armed = super().run(0.0), budget, self.armed
-        while code == loop_indices.BUDGET_SPENT and left > 0.0 and not automatic.is_change_due(self.stepper):
+        while code == loop_records.BUDGET_SPENT and left > 0.0 and not automatic.is_change_due(self.stepper):
             t, y, rules = self.t, self.now.copy(), armed.copy()
             first_values = self.stepper.k[0].copy(), self.stepper.ledger_rates[0].copy()
-            steps = self.loop_state[loop_indices.STEPS]
+            steps = self.state["steps"]
             code, left = super().run(1.0), left - 1.0
-            if self.loop_state[loop_indices.STEPS] > steps and code in ACCEPTED_CODES:
+            if self.state["steps"] > steps and code in ACCEPTED_CODES:
                 after = armed.copy()
                 armed[:] = rules  # the flags of the right-hand side of this step
                 self.add(self.released_stops(t, y, self.step_energy(t, y, *first_values)) + self.jump_correction(t, y))
@@ -77,7 +77,7 @@ class EnergyLoop(RunLoop):
         first, supply : slope dy/dt and ledger rates, such as the supply of a node [kg/s], of the first stage at (t, y)
         The next step is limited by `limit_next`, except under Rosenbrock methods.
         """
-        stepper, h = self.stepper, float(self.loop_state[loop_indices.LAST])
+        stepper, h = self.stepper, float(self.state["last"])
         (a, b, c), total = self.tableau(), np.zeros_like(self.total)
         k, supplies = np.vstack([first, stepper.k[1:]]), np.vstack([supply, stepper.ledger_rates[1:]])
         if stepper.method.kind == "linear":
@@ -85,9 +85,7 @@ class EnergyLoop(RunLoop):
             return h * total
         s = b.size
         error = stepper.coefficients[s * s + 2 * s : s * s + 3 * s]  # weights of the error estimate
-        error = error * (
-            self.controls[loop_indices.CONTROL] == loop_indices.TOLERANCE and stepper.method.kind != "full"
-        )
+        error = error * (self.control["mode"] == loop_records.TOLERANCE and stepper.method.kind != "full")
         quadrature_error = np.zeros_like(total)
         for i in np.flatnonzero((b != 0.0) | (error != 0.0)):
             power = self.stage(t + c[i] * h, y + h * (a[i] @ k), k[i], supplies[i])
@@ -109,11 +107,9 @@ class EnergyLoop(RunLoop):
         two is exact, but the integral of the power is not.
         """
         grow = (
-            min(MOST, 0.9 * (QUADRATURE_TOLERANCE * lost / off) ** (1.0 / self.controls[loop_indices.ORDER]))
-            if off > 0.0
-            else MOST
+            min(MOST, 0.9 * (QUADRATURE_TOLERANCE * lost / off) ** (1.0 / self.control["order"])) if off > 0.0 else MOST
         )
-        self.controls[loop_indices.STEP_MAX] = min(self.longest, h * max(LEAST, grow))
+        self.control["step_max"] = min(self.longest, h * max(LEAST, grow))
 
     def jump_correction(self, t: float, y: np.ndarray) -> np.ndarray:
         """Correction [J] of the energies of the step from (t, y) for jumps of waves in delay lines within the step.

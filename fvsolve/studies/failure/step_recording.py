@@ -6,7 +6,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fvsolve.steppers import loop_indices
 from fvsolve.studies.accuracy.timing import CappedRun
 from fvsolve.studies.outcome import Outcome, outcome
 
@@ -32,7 +31,7 @@ class RecordedRun(CappedRun):
         """Record the probes, and in a long run skip the steps between two windows. Raises GivenUp at the CPU limit."""
         self.check()
         self.windows[-1].append(self.run_data.observe(self.loop.t, self.loop.now, self.loop.stepper.out))
-        apart = int(self.loop.loop_state[loop_indices.STEPS]) // WINDOW_COUNT
+        apart = int(self.loop.state["steps"]) // WINDOW_COUNT
         self.budget = 1.0
         if apart > WINDOW_STEPS and len(self.windows[-1]) >= WINDOW_STEPS:
             self.windows.append([])

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers.numbers.polynomial import Polynomial, sign
-from fvsolve.steppers.numbers.sturm import odd_part
+from fvsolve.steppers.numbers.polynomial import Polynomial, odd_part, sign
 from fvsolve.studies.ports.rational import (
     Root,
     RootLocations,

@@ -12,8 +12,7 @@ from numbers import Integral, Rational, Real
 import numpy as np
 
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers.numbers.polynomial import Polynomial, sign
-from fvsolve.steppers.numbers.sturm import chain
+from fvsolve.steppers.numbers.polynomial import Polynomial, chain, sign
 
 BITS = 200  # relative precision of a bracketed root in bits, before values are computed from it
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from fvsolve.kernels.delay_lines import wave_history as at
 from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
-from fvsolve.steppers import loop_indices
+from fvsolve.steppers import loop_records
 from fvsolve.studies.stability.bisection import STEP_RATIO, StepLimit, bisect, bisect_limit
 from fvsolve.studies.stability.delay_line_system import BAR_PRESSURE, DelayLineSystem
 from fvsolve.studies.stability.power_growth import checked_powers
@@ -45,7 +45,7 @@ class DelayLineRuns(RealRuns):
         loop = RunLoop(replace(model, case=replace(model.case, numerics=numerics)), lambda: model.structure)
         loop.now[:] = model.start
         loop.now[system.states] += x
-        loop.loop_state[loop_indices.T] = t
+        loop.state["t"] = t
         write_history(loop.run_data.past, model.tables.delays, t, system.h, history)
         loop.begin(t + 2.0 * self.steps * system.h, NO_LIMIT)
         return loop
@@ -79,7 +79,7 @@ class DelayLineRuns(RealRuns):
         for n, budget in zip(self.check_steps, self.strides, strict=True):
             if time.monotonic() > self.latest:
                 raise TimeoutError
-            if any(run.run(budget) != loop_indices.BUDGET_SPENT for run in runs):
+            if any(run.run(budget) != loop_records.BUDGET_SPENT for run in runs):
                 return np.inf, n
             moved, base = ((run.now[system.states], read_history(run.run_data.past, system)) for run in runs)
             growth = float(system.size((moved[0] - base[0])[:, None], (moved[1] - base[1])[..., None])[0]) / small

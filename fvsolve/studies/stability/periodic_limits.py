@@ -18,9 +18,10 @@ import numpy as np
 from fvsolve.assembly.scheme_codes import scheme_settings
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.calls import compile_as
 from fvsolve.kernels.table_handle import make_handle
 from fvsolve.step_limits.symbol import WEIGHTS, symbol, weights_of
-from fvsolve.steppers import loop_indices
+from fvsolve.steppers import loop_records
 from fvsolve.steppers.analysis.method_facts import analyse
 from fvsolve.steppers.integrator import Integrator
 from fvsolve.steppers.ode import observers
@@ -72,15 +73,15 @@ class PeriodicPipe:
     def run(self, start: np.ndarray, courant: float, steps: int) -> np.ndarray | None:
         """Cell values after `steps` steps at a Courant number, from the values `start`; None if not finite."""
         stepper = self.stepper
-        stepper.loop_state[:], stepper.controls[loop_indices.CONTROL] = 0.0, loop_indices.FIXED_STEP
-        stepper.controls[[loop_indices.SIZE, loop_indices.STEP_MAX, loop_indices.STOP_AT]] = courant, FAR_TIME, FAR_TIME
-        stepper.controls[[loop_indices.END, loop_indices.BUDGET]] = 2.0 * courant * (steps + 1), steps
-        stepper.progress[[loop_indices.PHASE, loop_indices.HAS_LAST_STEP]] = loop_indices.FRESH, 0
-        stepper.y[stepper.progress[loop_indices.NOW]] = start
-        code = stepper.call(*self.functions, self.handle, loop_indices.PLACE + 1, stepper.no_floats)
-        if code != loop_indices.BUDGET_SPENT:
+        stepper.state[:] = np.zeros(1, loop_records.STATE)
+        stepper.set_control(mode=loop_records.FIXED_STEP, size=courant, step_max=FAR_TIME, stop_at=FAR_TIME)
+        stepper.set_control(end=2.0 * courant * (steps + 1), budget=steps)
+        stepper.restart_segment()
+        stepper.y[stepper.progress[0]["now"]] = start
+        code = stepper.call(*self.functions, self.handle, loop_records.PLACE + 1, stepper.no_floats)
+        if code != loop_records.BUDGET_SPENT:
             return None
-        return stepper.y[stepper.progress[loop_indices.NOW]].copy()
+        return stepper.y[stepper.progress[0]["now"]].copy()
 
 
 @validated(schemes=NAMES, methods=NAMES, cells=COUNT, steps=COUNT, progress=FUNCTION)
@@ -176,6 +177,6 @@ def _tables(scheme: str, limiter: str, cells: int) -> tuple:
 
 def _rhs():
     from fvsolve.kernels.reconstruction import rhs_periodic
-    from fvsolve.steppers.signatures import RHS, compiled_as
+    from fvsolve.steppers.run_handle import RHS
 
-    return compiled_as(rhs_periodic, RHS)
+    return compile_as(rhs_periodic, RHS)

@@ -10,7 +10,7 @@ import numpy as np
 
 from fvsolve.model.energy_norm import EnergyForm
 from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
-from fvsolve.steppers import loop_indices
+from fvsolve.steppers import loop_records
 from fvsolve.studies.linear.operating_point import OperatingPoint
 from fvsolve.studies.stability.bisection import STEP_RATIO, StepLimit, bisect
 from fvsolve.studies.stability.power_growth import STEPS, THRESHOLD, checked_powers
@@ -94,7 +94,7 @@ class RealRuns:
         numerics = model.case.numerics.model_copy(update=changes)
         loop = RunLoop(replace(model, case=replace(model.case, numerics=numerics)), lambda: self.structure)
         loop.now[:], loop.armed[:] = y, self.at.armed
-        loop.loop_state[loop_indices.T] = self.at.t
+        loop.state["t"] = self.at.t
         loop.begin(self.at.t + 2.0 * self.steps * h, NO_LIMIT)
         return loop
 
@@ -132,7 +132,7 @@ class RealRuns:
         def state(k: int) -> np.ndarray | None:
             while run and len(states) <= k:
                 states.append(
-                    run.now.copy() if run.run(self.strides[len(states)]) == loop_indices.BUDGET_SPENT else None
+                    run.now.copy() if run.run(self.strides[len(states)]) == loop_records.BUDGET_SPENT else None
                 )
             return states[k] if run else self.at.y
 
@@ -150,7 +150,7 @@ class RealRuns:
             if time.monotonic() > self.latest:
                 raise TimeoutError
             base = base_at(k)
-            if base is None or run.run(self.strides[k]) != loop_indices.BUDGET_SPENT:
+            if base is None or run.run(self.strides[k]) != loop_records.BUDGET_SPENT:
                 return (size, after) if self.state_end_time(h) <= n * h else (np.inf, n)
             growth = float(np.linalg.norm(self.form.forward @ (run.now - base))) / first
             if not growth <= self.threshold:
@@ -170,7 +170,7 @@ class RealRuns:
 
     def break_time(self, run: RunLoop, steps: float) -> float:
         """Time [s] from the operating point at which a run stops within a number of steps; inf if it does not stop."""
-        return np.inf if run.run(steps) in (loop_indices.BUDGET_SPENT, loop_indices.DONE) else run.t - self.at.t
+        return np.inf if run.run(steps) in (loop_records.BUDGET_SPENT, loop_records.DONE) else run.t - self.at.t
 
     def fails(self, h: float) -> bool:
         """True if the growth of a deviation with steps of h [s] exceeds the threshold."""

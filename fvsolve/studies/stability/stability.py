@@ -20,7 +20,7 @@ from fvsolve.errors import FvsolveError, RunError
 from fvsolve.model.energy_norm import EnergyForm, energy_form
 from fvsolve.schemes import SCHEMES, branches
 from fvsolve.steppers import automatic, method_named
-from fvsolve.steppers.built_in_methods import AUTO
+from fvsolve.steppers.tableau import AUTO
 from fvsolve.studies.case_pickle import PickledCase
 from fvsolve.studies.delay_line_keys import delay_lines, fixed_choices
 from fvsolve.studies.linear.eigenvalues import Spectrum, find_eigenvalues
