@@ -13,7 +13,7 @@ from measure import agree, parser, peer_module
 
 from fvsolve import build, load, run, vary
 from fvsolve.studies.parallel import run_tasks
-from fvsolve.studies.sweep_row import RowMaker
+from fvsolve.studies.sweep import RowMaker
 
 CASE, KEY, GOAL, SHARE = "valve-closure", "links.valve.area", 500.0, 0.9
 CELLS = {"links.main.cells": 20, "numerics.scheme": "upwind5", "numerics.method": "rk4", "output.fields": 0}

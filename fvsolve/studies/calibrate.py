@@ -15,8 +15,7 @@ from fvsolve.studies.outcome import refusal_text
 from fvsolve.studies.parallel import run_tasks
 from fvsolve.studies.result_table import Column, PlainData, ResultTable
 from fvsolve.studies.sampling import key_ranges, sample_points
-from fvsolve.studies.sweep import VARY
-from fvsolve.studies.sweep_row import RowMaker
+from fvsolve.studies.sweep import VARY, RowMaker
 from fvsolve.validation import COUNT, COUNT_FROM_ZERO, FUNCTION, TABLE, TEXT, validated
 
 SAMPLE_PER_KEY = 16  # sample points per key; the minimisations start at the best of them

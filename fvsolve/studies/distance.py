@@ -13,9 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fvsolve.studies.accuracy.basin_projection import basin_fields, variable_name
-from fvsolve.studies.accuracy.case_resolution import pipes
 from fvsolve.studies.outcome import Outcome
+from fvsolve.studies.resolution import basin_fields, pipes, variable_name
 
 END = {"nodes": "nodes at the end: ", "links": "links at the end: "}  # prefixes of quantities
 NORMS = ("L1", "L2", "max")

@@ -20,7 +20,7 @@ from fvsolve.run import Result, run
 from fvsolve.run.result import HOLDS, OPEN
 from fvsolve.run.verdicts import MAGNITUDES, PLACES_KEY, PlaceMargins, verdict
 from fvsolve.studies.extrema import greatest_error
-from fvsolve.studies.refinement import fixed_basins, refined_keys
+from fvsolve.studies.resolution import basins_from_files, refined_keys
 from fvsolve.studies.unresolved import MAX_NAMES, WIDE_ERROR, Unresolved, has_separation
 
 LEVELS = (0.5, 1.0, 2.0)
@@ -55,7 +55,7 @@ def peak_errors(result: Result, case: Any, progress: Callable[[str], None] | Non
                         for k, rows in enumerate(own.places)]  # fmt: skip
     for k, claim in enumerate(summary["expectations"]):
         claim["error"] = expectation_error(runs, case.expect[claim["text"]], k, summary["peaks"])
-    summary["resolution"] = {"levels": sorted(runs), "kept": fixed_basins(case), "words": description(runs, case),
+    summary["resolution"] = {"levels": sorted(runs), "kept": basins_from_files(case), "words": description(runs, case),
                           "reasons": reason_texts(summary)}  # fmt: skip
     return summary
 
@@ -275,12 +275,11 @@ def description(runs: dict[float, Result], case: Any) -> str:
     """Sentence that describes how the errors of peaks were found, and the restrictions for this case."""
     others = " and ".join(f"{factor:g}" for factor in sorted(runs) if factor != 1.0)
     if not others:
-        return (
-            f"errors are unknown: cells of {listing(fixed_basins(case))} come from files, and there are no other cells"
-        )
+        files = listing(basins_from_files(case))
+        return f"errors are unknown: cells of {files} come from files, and there are no other cells"
     text = f"peaks compared with those at {others} times the resolution"
-    if fixed_basins(case):
-        text += f"; cells of {', '.join(fixed_basins(case))} come from files and did not change"
+    if basins_from_files(case):
+        text += f"; cells of {', '.join(basins_from_files(case))} come from files and did not change"
         text += ": their error is not included"
     if has_separation(runs):
         text += "; column separation, so no order of convergence is assumed"

@@ -16,18 +16,6 @@ import numpy as np
 from fvsolve import exact as room
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers.built_in_methods import METHODS
-from fvsolve.studies.accuracy.basin_projection import basin_fields, project_to
-from fvsolve.studies.accuracy.case_resolution import (
-    basins,
-    cell_counts,
-    cell_keys_of,
-    greatest_wave_rate,
-    pipes_with_cells,
-    scaled,
-    total_cells,
-)
-from fvsolve.studies.accuracy.timing import finished_run, long_capped_run, probe_run
-from fvsolve.studies.delay_line_keys import delay_lines as delayed
 from fvsolve.studies.distance import (
     Distance,
     cell_averages,
@@ -39,8 +27,20 @@ from fvsolve.studies.distance import (
     variable_size,
     wave_sums,
 )
-from fvsolve.studies.outcome import Outcome, outcome, study_model
-from fvsolve.studies.run_queue import RunQueue, RunRequest
+from fvsolve.studies.outcome import Outcome, finished_run, long_capped_run, outcome, probe_run, study_model
+from fvsolve.studies.parallel import RunQueue, RunRequest
+from fvsolve.studies.resolution import (
+    basin_fields,
+    basins,
+    cell_counts,
+    cell_keys_of,
+    greatest_wave_rate,
+    pipes_with_cells,
+    project_to,
+    scaled,
+    total_cells,
+)
+from fvsolve.studies.resolution import delay_lines as delayed
 
 REFINEMENT = 4  # ratio of cells to those of the finest run under study
 CHARACTERISTICS_REFINEMENT = 16  # ratio of cells for characteristics at Courant number 1, whose steps are cheap

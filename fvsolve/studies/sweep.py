@@ -7,25 +7,130 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from fvsolve.case import Case, load
 from fvsolve.case.load import find_source
-from fvsolve.case.raw import read_raw
+from fvsolve.case.raw import read_raw, split_key
 from fvsolve.case.text import inline
 from fvsolve.display import Displayable
-from fvsolve.errors import FvsolveError, RunError, did_you_mean, listing
+from fvsolve.errors import CaseError, FvsolveError, RunError, did_you_mean, listing
 from fvsolve.fluid.property_cache import coolprop_version
 from fvsolve.output.restart import program_versions
-from fvsolve.studies.parallel import run_tasks
+from fvsolve.output.summary_file import plain
+from fvsolve.studies.outcome import has_diverged, refusal_text
+from fvsolve.studies.parallel import PickledCase, run_tasks
 from fvsolve.studies.result_cache import ResultCache, digest_of, write_errors
 from fvsolve.studies.result_table import Column, ResultTable
 from fvsolve.studies.sampling import grid, points_from_file, refuse_unknown, sample_points
-from fvsolve.studies.sweep_row import REFUSED, RowMaker
 from fvsolve.units import show
 from fvsolve.validation import COUNT, COUNT_FROM_ZERO, FUNCTION, PATH, ROW, SERIES, TABLE, TEXT, Kind, validated
+
+REFUSED = "refused: "
+LOST_REASON = "lost: the process of this run was killed repeatedly. Is there enough memory?"
+NO_FIELDS = {"output.fields": 0, "output.lines": {}}  # output that no row needs
+
+
+@dataclass
+class RowMaker:
+    """Callable that runs a case with values of keys and returns the row of results.
+
+    source : case as for `load`; base : overrides of all runs
+    case, model : case and model of the first run, from which the cases and models of later runs are derived
+    """
+
+    source: Any
+    base: dict[str, Any]
+    case: Case | None = field(default=None, compare=False)
+    model: Any = field(default=None, compare=False)
+
+    def __call__(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Row of the run with these values of keys; a refused case gives a row with its reason."""
+        from fvsolve.output.memory_sink import MemorySink
+        from fvsolve.run import model_of
+        from fvsolve.solve import initial_state, solve
+
+        try:
+            model = model_of(self.read(values), like=self.model)
+        except CaseError as error:
+            return {"ok": False, "reason": refusal_text(error)}
+        self.model, sink = self.model or model, MemorySink(model)
+        summary = solve(model, initial_state(model), sink)
+        if summary.reason.startswith("interrupted"):
+            raise KeyboardInterrupt
+        return row_of(model, summary, sink)
+
+    def read(self, values: Mapping[str, Any]) -> Case:
+        """Case with these values; later cases are derived from the first."""
+        if self.case is None:
+            self.case = load(self.source, {**self.base, **values, **NO_FIELDS})
+            return self.case
+        return load(self.case, {**self.base_for(values), **values})
+
+    def base_for(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Overrides of `base` in those tables of the case in which `values` change a key, and in the table [exact].
+
+        They are set again together with `values`, because keys of a table may conflict.
+        """
+        tables = {("exact",), *(split_key(key)[:2] for key in values)}
+        return {key: value for key, value in self.base.items() if {split_key(key)[:1], split_key(key)[:2]} & tables}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """State for pickling; the other process reads the case again."""
+        return {"sent": PickledCase(self.case or self.source), "base": self.base}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.source, self.base, self.case, self.model = state["sent"].source, state["base"], None, None
+
+    def lost_result(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Row of a run that crashed its process."""
+        return {"ok": False, "reason": LOST_REASON}
+
+
+def row_of(model, summary, sink) -> dict[str, Any]:
+    """Row of a run: column -> value as in `summary.json`; see `Sweep` for the columns.
+
+    None replaces values that are not finite, and all values of probes if the run diverged.
+    sink : `MemorySink` with the output of the run
+    """
+    row = {"ok": bool(summary.ok), "reason": summary.reason, "t [s]": plain(float(summary.t))}
+    row["marks"] = min(summary.marks, key=lambda mark: mark.time).text if summary.marks else ""
+    row["warnings"] = [plain(column.plain()) for column in (*model.warnings, *summary.warnings)]
+    row["fluid"] = plain(model.case.properties.plain())
+    blown, last = has_diverged(summary.reason), sink.last  # values of a diverged run are meaningless
+    for k, column in enumerate(sink.columns):
+        least, t_min, greatest, t_max = summary.extremes[column.name]
+        name, unit = column.name, f"[{column.unit}]"
+        entries = {f"min({name}) {unit}": column.from_si(least), f"t_min({name}) [s]": t_min}
+        entries |= {f"max({name}) {unit}": column.from_si(greatest), f"t_max({name}) [s]": t_max}
+        entries[f"final({name}) {unit}"] = last[1 + k]
+        row |= {key: None if blown else plain(float(x)) for key, x in entries.items()}
+    expectations = expectations_of(model, summary, sink)
+    row["expectations"] = all(claim["ok"] for claim in expectations) if expectations else None
+    row["verdicts"] = all(column["ok"] for column in verdicts(model, summary)) if model.case.limits else None
+    return row | {"steps": summary.steps, "seconds": plain(float(summary.seconds))}
+
+
+def expectations_of(model, summary, sink) -> list[dict[str, Any]]:
+    """Expectations of the case with their results, as in the summary of a run; sink : output of the run."""
+    from fvsolve.run import Result
+    from fvsolve.run.case_claims import expectations
+
+    columns = {column.name: column for column in sink.columns}
+    probes = {name: {"dimension": column.dimension, "unit": column.unit} for name, column in columns.items()}
+    summary_data = {"probes": probes, "time_unit": sink.time.unit, "ambient_pressure": model.case.ambient_pressure}
+    result = Result(summary_data, sink.table, sink.envelope)
+    return expectations(model, summary, result)
+
+
+def verdicts(model, summary) -> list[dict[str, Any]]:
+    """Limit verdicts of the case, as in the summary of a run."""
+    from fvsolve.run.verdicts import verdicts
+
+    return verdicts(model, summary)
+
 
 FIRST_COLUMNS = ("ok", "reason", "t [s]", "marks", "warnings", "fluid")
 LAST_COLUMNS = ("expectations", "verdicts", "steps", "seconds")

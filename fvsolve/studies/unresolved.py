@@ -12,8 +12,7 @@ import numpy as np
 from fvsolve.errors import listing
 from fvsolve.model.resolution import LEAST_CELLS, answering_parts
 from fvsolve.parts.schedule import Schedule
-from fvsolve.studies.accuracy.case_resolution import basins_from_files, cell_counts, pipes_with_cells, scaled
-from fvsolve.studies.delay_line_keys import delay_lines
+from fvsolve.studies.resolution import basins_from_files, cell_counts, delay_lines, pipes_with_cells, scaled
 
 Part = tuple[str, str]  # group and name
 MANY_STEPS = 20.0  # accumulated error of steps between jumps of delay lines, in tolerances of a step

@@ -26,8 +26,7 @@ from reference.scenes import step as stepped
 
 import fvsolve
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.energy.energy_balance import energy
-from fvsolve.studies.energy.energy_of_pairs import measure_pairs
+from fvsolve.studies.energy.energy_balance import energy, measure_pairs
 from fvsolve.studies.energy.passivity import closed_pipe, courant_limit, method_claim, passivity, scheme_claim
 from fvsolve.studies.outcome import outcome, study_model
 

@@ -9,144 +9,48 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
 
 from fvsolve.case import load
 from fvsolve.case.case import Case
-from fvsolve.case.sections import DEFAULT_CELLS, DEFAULT_RTOL
-from fvsolve.display import Displayable
 from fvsolve.errors import CaseError, FvsolveError, listing
 from fvsolve.steppers.built_in_methods import AUTO, METHODS
 from fvsolve.steppers.tableau import BUILT_IN
-from fvsolve.studies.accuracy.case_resolution import basins_from_files
 from fvsolve.studies.accuracy.chart_settings import (
     CoarseRun,
+    MethodSetting,
+    cell_keys,
     chart_settings,
     check_names,
     default_curve,
+    is_adaptive,
+    main_part_name,
     run_coarse,
     unsupported_schemes,
 )
-from fvsolve.studies.accuracy.method_setting import MethodSetting, cell_keys, is_adaptive, main_part_name
-from fvsolve.studies.accuracy.pareto import target_powers
-from fvsolve.studies.accuracy.timing import GIVEN_UP, best_run_of, compile_seconds
 from fvsolve.studies.accuracy.work_precision import (
-    FrontRow,
+    Chart,
     Point,
+    TargetSetting,
     cheapest_curve,
     coarser_setting,
     curves_by_name,
     front_row,
     good_errors,
     interpolated_setting,
+    target_powers,
 )
-from fvsolve.studies.delay_line_keys import as_cells, cells_for_lines, delay_lines, fixed_choices
 from fvsolve.studies.distance import Distance, distance, moving_probes
-from fvsolve.studies.outcome import Progress, name_list, study_model
+from fvsolve.studies.outcome import GIVEN_UP, Progress, best_run_of, compile_seconds, name_list, study_model
+from fvsolve.studies.parallel import RunQueue, RunRequest
 from fvsolve.studies.reference import Reference, find_reference
+from fvsolve.studies.resolution import as_cells, basins_from_files, cells_for_lines, delay_lines, fixed_choices
 from fvsolve.studies.result_cache import ResultCache
-from fvsolve.studies.result_table import Column, ResultTable
-from fvsolve.studies.run_queue import RunQueue, RunRequest
 from fvsolve.validation import COUNT, FUNCTION, NAMES, NUMBER, NUMBERS, PATH, TABLE, TEXT, validated
 
-TABLE_COLUMNS = (
-    "scheme", "method", "cells", "size", "trajectory", "greatest", "end", "overshoot", "worst", "seconds", "updates",
-    "steps", "ok", "reason",
-)  # fmt: skip
 WRONG_ERROR = 1.0  # errors above the range of the component are wrong results
-
-
-@dataclass(frozen=True)
-class TargetSetting:
-    """Setting (scheme, method and resolution) whose run has at most the target error.
-
-    target : target error, relative to the range of the worst probe [-]; point : the setting and the results of its run
-    numerics : overrides under `[numerics]`, key without "numerics." -> value; others : other overrides, dotted key ->
-    value
-    """
-
-    target: float
-    point: Point
-    numerics: dict
-    others: dict
-
-    def toml_lines(self) -> list[str]:
-        """Lines of TOML: keys of `[numerics]`, then the tables of parts whose cells change."""
-        toml_lines = [f"{key} = {toml_value(value)}" for key, value in self.numerics.items()]
-        for key, value in self.others.items():
-            table, _, name = key.rpartition(".")
-            toml_lines += ["", f"[{table}]", f"{name} = {toml_value(value)}"]
-        return toml_lines
-
-
-@dataclass(frozen=True, repr=False)
-class Chart(Displayable):
-    """Errors of a case against their cost, for several schemes, methods and resolutions.
-
-    points : settings with the results of their runs; front : cheapest setting for each target error
-    reference, second : descriptions of the two references
-    floor : uncertainty of the reference, at least its difference from the second, with the keys of `Distance`; smaller
-    errors are not reliable. It also has the descriptions `reference`, `second` and `told`.
-    default : names of the default scheme and method, such as "weno5 rk4"; compile_seconds : time of compilation [s]
-    reused : number of points from earlier studies; told : reasons of failed references
-    left_out : default schemes that do not support the fluid; aim : setting for a target error, None without a target
-    """
-
-    case: str
-    points: list[Point]
-    reference: str
-    second: str
-    floor: dict
-    default: str
-    compile_seconds: float
-    front: list[FrontRow]
-    reused: int = 0
-    aim: TargetSetting | None = None
-    told: tuple[str, ...] = field(default=())
-    left_out: tuple[str, ...] = field(default=())
-
-    picture = "fvsolve.studies.accuracy.chart_files:chart_picture"
-
-    def summary_line(self) -> str:
-        return f"of {self.case!r}: {len(self.points)} points, {len(self.failed)} failed; default {self.default}"
-
-    def table_columns(self) -> dict[str, list]:
-        """Columns of a table of all points, for a data frame : name in TABLE_COLUMNS -> list of values."""
-        return ResultTable([Column(key) for key in TABLE_COLUMNS], self.rows).table_columns()
-
-    @property
-    def rows(self) -> list[dict]:
-        """All points as dicts, each with the fields of the setting and the results of its run."""
-        return [vars(point.setting) | vars(point) for point in self.points]
-
-    def curves(self) -> dict[str, list[Point]]:
-        """Points of each scheme and method, from coarse to fine : name, such as "weno5 rk4" -> points."""
-        return curves_by_name(self.points)
-
-    @property
-    def stands(self) -> Point | None:
-        """Point of the default scheme and method with 100 cells or a tolerance of 1e-6; None without such a point."""
-        curve = self.curves().get(self.default, [])
-        return next(
-            (point for point in curve if DEFAULT_CELLS == point.setting.cells or point.setting.size == DEFAULT_RTOL),
-            None,
-        )
-
-    @property
-    def failed(self) -> list[Point]:
-        """Points without a usable result."""
-        return [point for point in self.points if not point.ok]
-
-    def plain(self) -> dict:
-        """Return the chart as plain data, SI; `paste` is the setting for a target error, in TOML for the case file."""
-        stands = None if self.stands is None else asdict(self.stands)
-        return (
-            asdict(self)
-            | {"stands": stands}
-            | ({} if self.aim is None else {"paste": "\n".join(self.aim.toml_lines())})
-        )
 
 
 @validated(
@@ -192,11 +96,6 @@ def chart(
     base_case = load(base_case, fixed_choices(base_case)) if fixed_choices(base_case) else base_case
     with ResultCache(out) as points, RunQueue(base_case, jobs, dask) as queue:
         return _ChartStudy(base_case, points, report, queue).run(schemes, methods, cells, rtol, step, target)
-
-
-def toml_value(value) -> str:
-    """Text or number in the format of TOML."""
-    return f'"{value}"' if isinstance(value, str) else repr(value)
 
 
 class _ChartStudy:

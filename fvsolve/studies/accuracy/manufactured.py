@@ -11,13 +11,13 @@ import numpy as np
 from fvsolve.errors import FvsolveError
 from fvsolve.exact.solution import Solution, averages
 from fvsolve.model import RunData
-from fvsolve.studies.accuracy.case_resolution import pipes
-from fvsolve.studies.accuracy.order_result import Order
+from fvsolve.studies.accuracy.order import Order
 from fvsolve.studies.accuracy.order_study import OrderStudy
 from fvsolve.studies.distance import recording_keys
 from fvsolve.studies.outcome import Outcome, outcome, study_model
+from fvsolve.studies.parallel import RunQueue
 from fvsolve.studies.reference import Reference, reference_of_solution
-from fvsolve.studies.run_queue import RunQueue
+from fvsolve.studies.resolution import pipes
 
 
 class ManufacturedStudy(OrderStudy):

@@ -20,9 +20,8 @@ from fvsolve.fluid import LAWS
 from fvsolve.kernels.schedule_pieces import value_with_limit
 from fvsolve.model.model_facts import velocities
 from fvsolve.studies.accuracy.model_levels import NotApplicable, finer_levels, level_keys, level_names, sloshing_basins
-from fvsolve.studies.accuracy.timing import GIVEN_UP, CappedRun
 from fvsolve.studies.distance import Deviation, moving_probes
-from fvsolve.studies.outcome import Outcome, outcome, refuse_basins
+from fvsolve.studies.outcome import GIVEN_UP, CappedRun, Outcome, outcome, refuse_basins
 from fvsolve.studies.reference import reference_of_run
 from fvsolve.validation import FUNCTION, NUMBER, TABLE, validated
 

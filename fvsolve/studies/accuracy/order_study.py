@@ -10,26 +10,28 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers.built_in_methods import METHODS
-from fvsolve.studies.accuracy.basin_projection import unit_of
-from fvsolve.studies.accuracy.case_resolution import (
+from fvsolve.studies.accuracy.fit import FAILED, FLOOR, LEAST_ROWS, NO_ERROR, Fit, fit
+from fvsolve.studies.accuracy.order import Order, OrderRow, error_scale
+from fvsolve.studies.accuracy.refine import Level, Plan
+from fvsolve.studies.distance import NORMS, error_norms, recording_keys, variable_size
+from fvsolve.studies.outcome import Outcome, Progress, long_capped_run, outcome, study_model
+from fvsolve.studies.parallel import RunQueue, RunRequest
+from fvsolve.studies.reference import ROUNDING, Reference, find_reference, reference_of_run
+from fvsolve.studies.resolution import (
+    EXACT_NOTE,
+    EXPECTED_ORDER,
+    READING_ORDER,
     basins,
     cell_counts,
+    cells_for_lines,
+    delay_lines,
     greatest_wave_rate,
     has_initial_jump,
     order_varies,
     scheme_order,
+    unit_of,
 )
-from fvsolve.studies.accuracy.fit import FAILED, FLOOR, LEAST_ROWS, NO_ERROR, Fit, fit
-from fvsolve.studies.accuracy.order_picture import error_scale
-from fvsolve.studies.accuracy.order_result import Order, OrderRow
-from fvsolve.studies.accuracy.refine import Level, Plan
-from fvsolve.studies.accuracy.timing import long_capped_run
-from fvsolve.studies.delay_line_keys import EXACT_NOTE, EXPECTED_ORDER, READING_ORDER, cells_for_lines, delay_lines
-from fvsolve.studies.distance import NORMS, error_norms, recording_keys, variable_size
-from fvsolve.studies.outcome import Outcome, Progress, outcome, study_model
-from fvsolve.studies.reference import ROUNDING, Reference, find_reference, reference_of_run
 from fvsolve.studies.result_cache import ResultCache
-from fvsolve.studies.run_queue import RunQueue, RunRequest
 
 BEST_OF, BRIEF_RUN = 2, 1.0  # timed runs of a row; time of the first run above which it is not repeated [s]
 EXCESS_ORDER = 1.5  # greatest excess of a fitted order over that of scheme and method; it occurs at single points

@@ -12,16 +12,21 @@ import numpy as np
 from fvsolve.case import load
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.schemes import LIMITED
-from fvsolve.studies.delay_line_keys import delay_lines, fixed_choices
-from fvsolve.studies.failure.delay_line_limit import WaveGrowthLimit
-from fvsolve.studies.failure.eigenvalue_limit import eigenvalues_of, greatest_step
-from fvsolve.studies.failure.map_columns import Columns, cells_for_delay_lines, default_schemes, map_columns
-from fvsolve.studies.failure.run_verdict import NOT_RUN, Measures, measure_run, verdict
-from fvsolve.studies.failure.step_recording import run_recorded
+from fvsolve.studies.failure.map_columns import (
+    Columns,
+    WaveGrowthLimit,
+    cells_for_delay_lines,
+    default_schemes,
+    eigenvalues_of,
+    greatest_step,
+    map_columns,
+)
+from fvsolve.studies.failure.run_verdict import NOT_RUN, Measures, measure_run, run_recorded, verdict
 from fvsolve.studies.outcome import Progress, name_list, refuse_basins
+from fvsolve.studies.parallel import RunQueue, RunRequest
 from fvsolve.studies.reference import Reference, find_reference
+from fvsolve.studies.resolution import delay_lines, fixed_choices
 from fvsolve.studies.result_cache import OUT, ResultCache, cache_in
-from fvsolve.studies.run_queue import RunQueue, RunRequest
 from fvsolve.validation import COUNT, FUNCTION, NAMES, NUMBER, NUMBERS, ROW, TABLE, TEXT, Kind, is_row, validated
 
 METHODS = ("euler", "ssp-rk3", "rk4", "implicit-euler", "trapezoid", "gauss-4", "radau-iia-5")

@@ -1,16 +1,16 @@
-"""Verdict on a run, in a word: stable, ringing, coarse, wrong, blown up, refused or not run."""
+"""Verdict on a run, in a word, and runs that record their probes after every step."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from fvsolve.studies.accuracy.timing import GIVEN_UP
+from fvsolve.steppers import loop_indices
 from fvsolve.studies.distance import Deviation, column_ranges, time_weights
-from fvsolve.studies.outcome import has_diverged
+from fvsolve.studies.outcome import GIVEN_UP, CappedRun, Outcome, has_diverged, outcome
 
 STABLE, RINGING, COARSE, WRONG, BLOWN_UP, REFUSED, NOT_RUN = (
     "stable", "ringing", "coarse", "wrong", "blown up", "refused", "not run",
@@ -174,3 +174,45 @@ def measure_run(outcome, windows: Sequence[np.ndarray], reference) -> Measures:
             outcome.counts["steps"],
             outcome.seconds,
         )
+
+
+WINDOW_STEPS = 9  # least number of successive steps in a window
+CPU_LIMIT = 10.0  # CPU time after which a run is given up [s]
+WINDOW_COUNT = 30  # in long runs the distance of windows is this fraction of the steps taken: 1 / 30
+
+
+class RecordedRun(CappedRun):
+    """Run that records its probes after every step; in a long run only in windows of nine or more successive steps.
+
+    The steps are those of a run without recording.
+    windows : for each window a list of float64[probes], the values of the probes after successive steps, in SI units
+    """
+
+    def __init__(self, *arguments) -> None:
+        super().__init__(*arguments)
+        self.windows: list[list[np.ndarray]] = [[]]
+        self.budget = self.left = 1.0
+        self.max_seconds = CPU_LIMIT
+
+    def pause(self) -> None:
+        """Record the probes, and in a long run skip the steps between two windows. Raises GivenUp at the CPU limit."""
+        self.check()
+        self.windows[-1].append(self.run_data.observe(self.loop.t, self.loop.now, self.loop.stepper.out))
+        apart = int(self.loop.loop_state[loop_indices.STEPS]) // WINDOW_COUNT
+        self.budget = 1.0
+        if apart > WINDOW_STEPS and len(self.windows[-1]) >= WINDOW_STEPS:
+            self.windows.append([])
+            self.budget = float(apart)
+
+
+def run_recorded(case, set: Mapping | None = None) -> tuple[Outcome, list[np.ndarray]]:
+    """(outcome of a run with the changed keys `set`, recorded windows : list of float64[steps, probes] in SI units)."""
+    runs: list[RecordedRun] = []
+
+    def run(*arguments) -> RecordedRun:
+        runs.append(RecordedRun(*arguments))
+        return runs[-1]
+
+    result = outcome(case, set, run=run)
+    windows = runs[-1].windows if runs else []
+    return result, [np.array(window) for window in windows if len(window) > 1]

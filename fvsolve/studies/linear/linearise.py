@@ -12,15 +12,17 @@ from fvsolve.kernels.schedule_pieces import value_with_limit
 from fvsolve.model.inputs import PRESSURE, Input, inputs_of
 from fvsolve.schemes import SCHEMES
 from fvsolve.solve.advance import hold
-from fvsolve.studies.linear.finite_differences import (
+from fvsolve.studies.linear.operating_point import OperatingPoint, has_limiter, operating_point
+from fvsolve.studies.linear.state_matrices import (
     COARSE_STEPS,
     SLOPE_TOLERANCE,
     longest_step_slopes,
+    output_matrix,
+    responses,
     single_sided_differences,
+    state_matrix,
     two_sided_differences,
 )
-from fvsolve.studies.linear.operating_point import OperatingPoint, has_limiter, operating_point
-from fvsolve.studies.linear.state_matrices import output_matrix, responses, state_matrix
 from fvsolve.units import DIMENSIONS
 from fvsolve.validation import FLAG, NAMES, NUMBER, TABLE, TEXT, validated
 

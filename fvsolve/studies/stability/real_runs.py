@@ -12,8 +12,7 @@ from fvsolve.model.energy_norm import EnergyForm
 from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
 from fvsolve.steppers import loop_indices
 from fvsolve.studies.linear.operating_point import OperatingPoint
-from fvsolve.studies.stability.bisection import STEP_RATIO, StepLimit, bisect
-from fvsolve.studies.stability.power_growth import STEPS, THRESHOLD, checked_powers
+from fvsolve.studies.stability.growth import STEP_RATIO, STEPS, THRESHOLD, StepLimit, bisect, checked_powers
 
 SMALL_DEVIATIONS = 10.0 ** -np.arange(
     6.0, 16.0

@@ -21,22 +21,33 @@ from fvsolve.model.energy_norm import EnergyForm, energy_form
 from fvsolve.schemes import SCHEMES, branches
 from fvsolve.steppers import automatic, method_named
 from fvsolve.steppers.built_in_methods import AUTO
-from fvsolve.studies.case_pickle import PickledCase
-from fvsolve.studies.delay_line_keys import delay_lines, fixed_choices
 from fvsolve.studies.linear.eigenvalues import Spectrum, find_eigenvalues
 from fvsolve.studies.linear.linearise import Linear, linearise_at
 from fvsolve.studies.linear.operating_point import OperatingPoint, has_limiter, operating_point, with_weights
 from fvsolve.studies.outcome import Progress, name_list
-from fvsolve.studies.parallel import TaskPool
+from fvsolve.studies.parallel import PickledCase, TaskPool
+from fvsolve.studies.resolution import delay_lines, fixed_choices
 from fvsolve.studies.result_cache import ResultCache, case_key
-from fvsolve.studies.stability.bound_notes import bound_notes
-from fvsolve.studies.stability.delay_line_row import delayed_row
-from fvsolve.studies.stability.growth_method import growth_method, predicted_limit
-from fvsolve.studies.stability.power_growth import DENSE, STEPS, THRESHOLD
+from fvsolve.studies.stability.delay_line_limits import delayed_row
+from fvsolve.studies.stability.growth import (
+    DENSE,
+    STEPS,
+    THRESHOLD,
+    TIME_LIMIT,
+    VECTORS,
+    TooLarge,
+    growth_method,
+    predicted_limit,
+)
 from fvsolve.studies.stability.real_runs import RealRuns, measure_limit
-from fvsolve.studies.stability.region_bounds import MAX_STATES, field_of_values, region_limit
-from fvsolve.studies.stability.stability_row import StabilityRow, row_from_json
-from fvsolve.studies.stability.vector_growth import TIME_LIMIT, VECTORS, TooLarge
+from fvsolve.studies.stability.stability_row import (
+    MAX_STATES,
+    StabilityRow,
+    bound_notes,
+    field_of_values,
+    region_limit,
+    row_from_json,
+)
 from fvsolve.validation import COUNT, FLAG, FUNCTION, NAMES, NUMBER, PATH, TABLE, TEXT, validated
 
 AUTO_NOTE = (
