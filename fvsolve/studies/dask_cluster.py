@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import pickle
-import queue
 import threading
 import uuid
+from concurrent.futures import Future
 from typing import Any
 
 from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.output.restart import program_versions
 from fvsolve.run.process_pool import compute
 
-TIMEOUT = 10.0  # timeout for a scheduler, and for its first worker; interval of checks of the connection [s]
+TIMEOUT = 10.0  # timeout for a scheduler, and for its first worker [s]
 CHUNKS_PER_THREAD = 2  # chunks per thread: one in work, one that waits on the worker
 MATCHING_PACKAGES = ("python", "distributed", "msgpack", "cloudpickle", "numpy")  # versions must be equal on both sides
 
@@ -33,58 +33,37 @@ class Cluster:
             self.client.close()
             raise
         self.capacity = CHUNKS_PER_THREAD * sum(self.client.nthreads().values())
-        self.given: dict[Any, int] = {}  # future -> chunk
-        self.finished: queue.SimpleQueue = queue.SimpleQueue()
+        self.executor = self.client.get_executor(pure=False)
 
-    def submit(self, chunk: int, tasks: list) -> None:
-        """Send a chunk of tasks to a worker; chunk : number of the chunk, which `next_result` returns."""
-        future = self.client.submit(run_on_worker, self.name, self.work, tasks, pure=False)
-        self.given[future] = chunk
-        future.add_done_callback(self.finished.put)
+    @property
+    def lost(self) -> type[Exception]:
+        """Exception of a future whose worker was killed."""
+        from distributed import KilledWorker
 
-    def next_result(self) -> tuple[int, list | None, float]:
-        """Wait for the next finished chunk; returns (number of the chunk, answers of its tasks, computing time [s]).
+        return KilledWorker
 
-        The answers are None if the worker was killed. Raises the exception that a worker raised, and RunError if the
-        scheduler is lost.
-        """
-        future = self._next()
-        chunk, status = self.given.pop(future), future.status
-        if status == "finished":
-            answers, seconds = future.result()
-            if isinstance(answers, BaseException):
-                raise answers
-            return chunk, answers, seconds
-        if status == "error" and type(future.exception()).__name__ == "KilledWorker":
-            return chunk, None, 0.0
-        if status == "error":
-            raise future.exception()
-        raise RunError(self._lost_text())
+    def submit(self, tasks: list) -> Future:
+        """Compute a list of tasks on a worker : future of the result of `compute`."""
+        return self.executor.submit(run_on_worker, self.name, self.work, tasks)
 
-    def _next(self) -> Any:
-        while True:
-            try:
-                return self.finished.get(timeout=TIMEOUT)
-            except queue.Empty:
-                if self.client.status != "running":
-                    raise RunError(self._lost_text()) from None
-
-    def _lost_text(self) -> str:
-        return f"lost the Dask scheduler at {self.address}. Finished runs are kept; the same command resumes from there"
+    def check(self) -> None:
+        """Raise RunError if the scheduler is lost."""
+        if self.client.status != "running":
+            text = "Finished runs are kept; the same command resumes from there"
+            raise RunError(f"lost the Dask scheduler at {self.address}. {text}")
 
     def close(self) -> None:
         """Cancel unfinished chunks and close the connection."""
-        self.client.cancel([*self.given], force=True) if self.client.status == "running" else None
+        if self.client.status == "running":
+            self.executor.shutdown(wait=False)
         self.client.close()
 
 
-WORKER_CACHE = (
-    threading.local()
-)  # per worker thread: name of the last work, and the work with the data that it has read
+WORKER_CACHE = threading.local()  # for each thread: name of the last work, and the work with the data that it has read
 
 
 def run_on_worker(name: str, work: bytes, tasks: list) -> tuple[Any, float]:
-    """Compute a chunk of tasks on a worker; returns (answers or the exception raised, computing time [s]).
+    """Compute a chunk of tasks on a worker; returns the result of `compute`.
 
     work : pickled callable; name : its identity, by which a worker reuses the unpickled callable for later chunks
     """
@@ -140,15 +119,13 @@ def check_versions(client: Any, address: str) -> None:
 
 
 def program_differences(reported: Any) -> list[str]:
-    """Texts on programs, except the target processor, whose version on a worker differs from that in this process.
+    """Texts on programs whose version on a worker differs from that in this process; the processor may differ.
 
     reported : program -> version on the worker, or the exception of the worker if fvsolve is missing there
     """
     if not isinstance(reported, dict):
         return [f"no fvsolve ({reported})"]
-    own = {
-        name: version for name, version in program_versions().items() if name != "target"
-    }  # processors of workers may differ
+    own = {name: version for name, version in program_versions().items() if name != "target"}
     return differing_versions(own, reported)
 
 

@@ -7,18 +7,21 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from dataclasses import replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, Self
 
 from fvsolve.case import Case, load
 from fvsolve.case.load import find_source
 from fvsolve.case.raw import Raw, read_raw
 from fvsolve.errors import FvsolveError, RunError
+from fvsolve.run.process_pool import ProcessPool
 from fvsolve.steppers.tableau import BUILT_IN, METHODS
 from fvsolve.studies.outcome import Outcome, study_model
 
 CHUNK_TIME = 1.0  # intended time of a chunk [s]
 MAX_GROWTH = 8  # greatest ratio of sizes of successive chunks
+CHECK_TIME = 10.0  # interval of checks that workers can be reached [s]
 MAX_CRASHES = 2  # number of processes that a task may crash before it counts as lost
 
 
@@ -29,22 +32,6 @@ class Work(Protocol):
 
     def lost_result(self, task: Any) -> Any:
         """Answer for a task that crashed its process repeatedly and so has no result; an exception may be raised."""
-
-
-class Workers(Protocol):
-    """Processes that compute chunks of tasks; capacity : greatest number of chunks submitted and not yet returned."""
-
-    capacity: int
-
-    def submit(self, chunk: int, tasks: list) -> None: ...
-
-    def next_result(self) -> tuple[int, list | None, float]:
-        """Wait for the next finished chunk; returns (number of the chunk, answers of its tasks, computing time [s]).
-
-        The answers are None if the process crashed. Raises the exception that a task raised.
-        """
-
-    def close(self) -> None: ...
 
 
 def run_tasks(work: Work, tasks: Sequence, jobs: int = 1, dask: str | None = None) -> Iterator[tuple[int, Any]]:
@@ -74,10 +61,18 @@ class TaskPool:
             self.has_started = True
             yield number, self.work(tasks[number])
         if local < len(tasks):
-            self.workers = self.workers or open_pool(self.work, self.jobs, self.dask)
+            self.workers = self.workers or self._open()
             yield from distribute(self.work, tasks, self.workers, local)
 
-    def __enter__(self) -> TaskPool:
+    def _open(self) -> Any:
+        """`ProcessPool` of local processes, or `Cluster` of a Dask scheduler."""
+        if self.dask is None:
+            return ProcessPool(self.work, self.jobs)
+        from fvsolve.studies.dask_cluster import Cluster
+
+        return Cluster(self.work, self.dask)
+
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: Any) -> None:
@@ -85,46 +80,48 @@ class TaskPool:
             self.workers.close()
 
 
-def open_pool(work: Work, jobs: int, dask: str | None) -> Workers:
-    """Start local processes, or connect to a Dask scheduler; arguments as for `TaskPool`."""
-    if dask is not None:
-        from fvsolve.studies.dask_cluster import Cluster
-
-        return Cluster(work, dask)
-    from fvsolve.run.process_pool import ProcessPool
-
-    return ProcessPool(work, jobs)
-
-
-def distribute(work: Work, tasks: Sequence, workers: Workers, first: int) -> Iterator[tuple[int, Any]]:
+def distribute(work: Work, tasks: Sequence, workers: Any, first: int) -> Iterator[tuple[int, Any]]:
     """Distribute the tasks from index `first` on to workers; yields (index, answer) of each finished task.
 
     If a process crashes, its chunk is divided into two halves and repeated, so that only tasks that crash are lost (see
     `Work.lost_result`).
+    workers : `ProcessPool` or `Cluster`. It has a `capacity`, the greatest number of chunks in work; submit(tasks) ->
+    future of (answers, or the exception of a task; computing time [s]); the type `lost` of the exception of a future
+    whose process crashed; and check(), which raises RunError if the workers cannot be reached
     """
     waiting, retry = deque(range(first, len(tasks))), deque()
-    in_work: dict[int, list[int]] = {}
+    in_work: dict[Future, list[int]] = {}
     crashes: dict[int, int] = {}
-    size, next_chunk = 1, 0  # start with single tasks: computing times of tasks may differ by orders of magnitude
+    size = 1  # start with single tasks: computing times of tasks may differ by orders of magnitude
     while waiting or retry or in_work:
         while (waiting or retry) and len(in_work) < workers.capacity:
             fair_share = -(-len(waiting) // workers.capacity)  # limits chunks near the end, so that no worker is idle
             numbers_given = retry.popleft() if retry else [waiting.popleft() for _ in range(min(size, fair_share))]
-            in_work[next_chunk] = numbers_given
-            workers.submit(next_chunk, [tasks[k] for k in numbers_given])
-            next_chunk += 1
-        chunk, answers, seconds = workers.next_result()
-        numbers = in_work.pop(chunk)
-        if answers is not None:
-            size = next_chunk_size(len(numbers), seconds, size)
-            yield from zip(numbers, answers, strict=True)
-        elif len(numbers) > 1:
-            retry += [numbers[: len(numbers) // 2], numbers[len(numbers) // 2 :]]
-        elif crashes.setdefault(numbers[0], 1) < MAX_CRASHES:
-            crashes[numbers[0]] += 1
-            retry.append(numbers)
-        else:
-            yield numbers[0], work.lost_result(tasks[numbers[0]])
+            in_work[workers.submit([tasks[k] for k in numbers_given])] = numbers_given
+        done = wait(in_work, CHECK_TIME, FIRST_COMPLETED).done
+        if not done:
+            workers.check()
+            continue
+        future = done.pop()
+        numbers = in_work.pop(future)
+        try:
+            answers, seconds = future.result()
+        except CancelledError:
+            workers.check()
+            raise
+        except workers.lost:
+            if len(numbers) > 1:
+                retry += [numbers[: len(numbers) // 2], numbers[len(numbers) // 2 :]]
+            elif crashes.setdefault(numbers[0], 1) < MAX_CRASHES:
+                crashes[numbers[0]] += 1
+                retry.append(numbers)
+            else:
+                yield numbers[0], work.lost_result(tasks[numbers[0]])
+            continue
+        if isinstance(answers, BaseException):
+            raise answers
+        size = next_chunk_size(len(numbers), seconds, size)
+        yield from zip(numbers, answers, strict=True)
 
 
 def next_chunk_size(done: int, seconds: float, size: int) -> int:
