@@ -52,7 +52,7 @@ class TaskPool:
             raise FvsolveError(f"jobs = {jobs} is out of range. Expected 1 or more")
         self.work, self.jobs, self.dask = work, jobs, dask
         self.in_process, self.has_started = dask is None and jobs == 1, False
-        self.workers: Workers | None = None
+        self.workers: Any = None
 
     def run(self, tasks: Sequence) -> Iterator[tuple[int, Any]]:
         """Compute tasks; yields (index, answer) of each task when it is finished."""
