@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import time
-from dataclasses import replace
-
 import numpy as np
 
 from fvsolve.errors import CaseError, FvsolveError
@@ -16,44 +13,38 @@ from fvsolve.steppers import loop_indices
 from fvsolve.studies.linear.operating_point import with_held_schedules
 from fvsolve.studies.outcome import study_model
 from fvsolve.studies.stability.delay_line_system import BAR_PRESSURE, DelayLineSystem
-from fvsolve.studies.stability.growth import STEP_RATIO, StepLimit, bisect, bisect_limit, checked_powers
-from fvsolve.studies.stability.real_runs import SAFE_PARTS, TIME_LIMIT, RealRuns, too_long
+from fvsolve.studies.stability.growth import STEP_RATIO, StepLimit, bisect, bisect_limit
+from fvsolve.studies.stability.real_runs import SAFE_PARTS, RealRuns, fixed_step_loop, measure_limit
 from fvsolve.studies.stability.stability_row import StabilityRow
 
-NEAR_PREDICTION, STEP_RATIO_UP = (
-    0.99,
-    2.0,
-)  # lower end of the bracket over the prediction; ratio of steps if all are predicted safe
+NEAR_PREDICTION = 0.99  # lower end of the bracket over the prediction
+STEP_RATIO_UP = 2.0  # ratio of consecutive steps if all are predicted safe
 SMALL_WAVE = 1e-5  # deviation at the start, in units of a wave of 1 bar over one step
 
 
 class DelayLineRuns(RealRuns):
     """Real runs at fixed steps, each from the deviation with the greatest growth in the linear system of the step.
 
-    limits : a `delay_line_row.DelayLineLimits`; steps : number of steps of a run; threshold : growth at which it fails
+    limits : a `DelayLineLimits`; steps : number of steps of a run; threshold : growth at which it fails
     end : a step that is predicted to fail [s]; inf if no step is, nan if there is no prediction
     """
 
-    def __init__(self, limits, steps: int, threshold: float, end: float) -> None:
-        self.failing_step, self.first, self.far = end, limits.first, limits.far
-        self.system, self.states, self.longest_tried = limits.system, limits.base_model.y_size, 0.0
-        self.steps, self.threshold = steps, threshold
-        self.check_steps = checked_powers(self.steps)
-        self.strides = np.diff([0, *self.check_steps]).astype(float)
-        self.latest = time.monotonic() + TIME_LIMIT
+    def __init__(self, limits: DelayLineLimits, steps: int, threshold: float, end: float) -> None:
+        self.failing_step, self.first, self.far, self.system = end, limits.first, limits.far, limits.system
+        self.prepare(limits.base_model.y_size, steps, threshold)
 
     def start_run(self, system: DelayLineSystem, x: np.ndarray, history: np.ndarray) -> RunLoop:
         """Run from the initial state plus the deviation x, with the past waves `history` in its delay lines."""
         model, t = system.model, float(system.model.case.numerics.start)
-        changes = {"method": system.method.name, "step": system.h, "courant": None, "rtol": None}
-        numerics = model.case.numerics.model_copy(update=changes)
-        loop = RunLoop(replace(model, case=replace(model.case, numerics=numerics)), lambda: model.structure)
+        loop = fixed_step_loop(model, lambda: model.structure, system.method.name, system.h, t)
         loop.now[:] = model.start
         loop.now[system.states] += x
-        loop.loop_state[loop_indices.T] = t
         write_history(loop.run_data.past, model.tables.delays, t, system.h, history)
         loop.begin(t + 2.0 * self.steps * system.h, NO_LIMIT)
         return loop
+
+    def columns(self, guess: float, size: float) -> dict[str, float]:
+        return self.limit_columns(guess)
 
     def limit(self, guess: float) -> StepLimit:
         """Limit of real runs, searched close to the predicted limit `guess` [s].
@@ -65,11 +56,8 @@ class DelayLineRuns(RealRuns):
             return bisect_limit(self.fails, self.first, self.far, STEP_RATIO if np.isnan(guess) else STEP_RATIO_UP)
         if any(self.fails(part * guess) for part in SAFE_PARTS) or not self.fails(self.failing_step):
             return super().limit(guess)
-        return bisect(
-            self.fails,
-            NEAR_PREDICTION * guess if self.safe(NEAR_PREDICTION * guess) else SAFE_PARTS[-1] * guess,
-            self.failing_step,
-        )
+        low = (SAFE_PARTS[-1] if self.fails(NEAR_PREDICTION * guess) else NEAR_PREDICTION) * guess
+        return bisect(self.fails, low, self.failing_step)
 
     def growth(self, h: float) -> tuple[float, int]:
         """(greatest growth of a deviation with steps of h [s], number of steps after which it is reached).
@@ -77,28 +65,18 @@ class DelayLineRuns(RealRuns):
         The growth is infinite if a run stops. Raises TimeoutError at the time limit.
         """
         system = self.system(h)
-        predicted = system.growth(self.steps, self.threshold)
-        small = SMALL_WAVE * float(system.weight.max()) * greatest_wave(system)
+        predicted, tables = system.growth(self.steps, self.threshold), system.model.tables
+        greatest_wave = BAR_PRESSURE * float(tables.pipes["admittance"][tables.delays["pipe"]].max())  # [kg/s]
+        small = SMALL_WAVE * float(system.weight.max()) * greatest_wave
         runs = [self.start_run(system, width * predicted.x, width * predicted.history) for width in (small, 0.0)]
-        size, after = 1.0, 0
-        for n, budget in zip(self.check_steps, self.strides, strict=True):
-            if time.monotonic() > self.latest:
-                raise TimeoutError
-            if any(run.run(budget) != loop_indices.BUDGET_SPENT for run in runs):
-                return np.inf, n
+
+        def growth(k: int) -> float:
+            if any(run.run(self.strides[k]) != loop_indices.BUDGET_SPENT for run in runs):
+                return np.inf
             moved, base = ((run.now[system.states], read_history(run.run_data.past, system)) for run in runs)
-            growth = float(system.size((moved[0] - base[0])[:, None], (moved[1] - base[1])[..., None])[0]) / small
-            if not growth <= self.threshold:
-                return growth if growth > self.threshold else np.inf, n
-            if growth > size:
-                size, after = growth, n
-        return size, after
+            return float(system.size((moved[0] - base[0])[:, None], (moved[1] - base[1])[..., None])[0]) / small
 
-
-def greatest_wave(system: DelayLineSystem) -> float:
-    """Mass flow [kg/s] of a wave of 1 bar in the delay line with the greatest admittance."""
-    tables = system.model.tables
-    return BAR_PRESSURE * float(tables.pipes["admittance"][tables.delays["pipe"]].max())
+        return self.greatest(growth)
 
 
 def write_history(past: np.ndarray, delays: np.ndarray, t: float, h: float, history: np.ndarray) -> None:
@@ -142,10 +120,8 @@ def ring_offsets(places, delays: np.ndarray, numbers: np.ndarray):
                 yield ring + 2 * (numbers & mask) + wave, int(row["stretch"]) + q, wave
 
 
-TRAVEL_PARTS, TRAVEL_FACTOR = (
-    32.0,
-    2.0,
-)  # first step: at most the longest travel time over this; last step: that time times this
+TRAVEL_PARTS = 32.0  # first step: at most the longest travel time over this
+TRAVEL_FACTOR = 2.0  # last step: the longest travel time times this
 RATE_MARGIN = 0.1  # greatest product of the first step and the rates of other states
 LINE_COUNT = 4  # greatest number of lines at stores for which integer parts of the delay are checked
 RISE, FINE = 1.6, 1e-3  # ratio of consecutive steps of the search, relative width of the final bracket
@@ -211,10 +187,8 @@ class DelayLineLimits:
         if self.method.kind == "linear":
             return StepLimit(np.nan, np.nan)
         rough = bisect_limit(self.fails, self.first, self.far, RISE, FINE)
-        least = min(
-            [rough, *(self.limit_at_parts(d, rough.fails) for d in self.delays_at_stores(rough))], key=lambda b: b.fails
-        )
-        return least
+        limits = [rough, *(self.limit_at_parts(d, rough.fails) for d in self.delays_at_stores(rough))]
+        return min(limits, key=lambda limit: limit.fails)
 
     def delays_at_stores(self, rough: StepLimit) -> list[float]:
         """Delays of the lines at storing nodes [s], longest first and four at most; empty if `rough` is 0 or infinite.
@@ -272,21 +246,5 @@ def delayed_row(case, scheme: str, method, steps: int, threshold: float) -> Stab
         h = min(limits.refused)
         notes.append(f"steps of {h:.4g} s or more are refused: {limits.refused[h]}")
     if not limits.refused or predicted.fails not in limits.refused:
-        row |= measured_entries(DelayLineRuns(limits, steps, threshold, predicted.fails), predicted.step, left_out)
+        row |= measure_limit(DelayLineRuns(limits, steps, threshold, predicted.fails), predicted.step, 0.0, left_out)
     return StabilityRow(**row, left_out=left_out, notes=tuple(notes))
-
-
-def measured_entries(runs: DelayLineRuns, guess: float, left_out: dict[str, str]) -> dict:
-    """Columns of a row with the limit of real runs near the predicted limit `guess` [s].
-
-    If the limit is not found in time, the dict is empty and `left_out` receives the reason.
-    """
-    try:
-        measured = runs.limit(guess)
-    except TimeoutError:
-        left_out["measured"] = too_long(runs)
-        return {}
-    return {
-        "measured": measured.step,
-        "measured_up_to": measured.fails if np.isfinite(measured.fails) else runs.longest_tried,
-    }

@@ -227,10 +227,8 @@ class DenseGrowth:
     def failing_after(self, h: float) -> int:
         """First number of steps of h [s] in `matrix_powers` after which growth exceeds the threshold; 0 for none."""
         with np.errstate(over="ignore", invalid="ignore"):
-            failing = (
-                n for n, power in matrix_powers(self.matrix(h), self.steps) if norm_exceeds(power, self.threshold)
-            )
-            return next(failing, 0)
+            powers = matrix_powers(self.matrix(h), self.steps)
+            return next((n for n, power in powers if norm_exceeds(power, self.threshold)), 0)
 
     def growth(self, h: float) -> Growth:
         """Greatest growth with steps of h [s], and the deviation with this growth.
@@ -248,8 +246,7 @@ class DenseGrowth:
 
 TIME_LIMIT = 30.0  # time limit of a prediction [s]
 VECTORS, PASSES = 4, 4  # vectors in a block; passes forward and back
-# Greatest ratio of the norm of a power to the norm of a random block, over the root of the number of states.
-NORM_MARGIN = 2.0
+NORM_MARGIN = 2.0  # greatest norm of a power over that of a random block, and over the root of the number of states
 
 
 class VectorGrowth:
@@ -323,7 +320,12 @@ class VectorGrowth:
         with np.errstate(over="ignore", invalid="ignore"):
             for n in checked_powers(self.steps):
                 if time.monotonic() > self.latest:
-                    raise TooLarge(too_large(self.e.shape[0], self.steps))
+                    raise TooLarge(
+                        f"{self.e.shape[0]} states and {self.steps} steps take longer than {TIME_LIMIT:g} s to predict"
+                        ": give pipes or basins fewer cells, --set links.NAME.cells=100 or nodes.NAME.cells=[20,20] "
+                        "(or, for pipes that state no cells, a greater numerics.cell_time; the limit as a Courant number "
+                        "changes little), or use fewer --steps"
+                    )
                 for _ in range(n - done):
                     v = step(v)
                 done = n
@@ -339,15 +341,6 @@ class VectorGrowth:
 
 class TooLarge(FvsolveError):
     """Error: the prediction has taken longer than its time limit."""
-
-
-def too_large(states: int, steps: int) -> str:
-    """Text of the error `TooLarge`: number of states and steps, and remedies."""
-    return (
-        f"{states} states and {steps} steps take longer than {TIME_LIMIT:g} s to predict: give pipes or basins fewer "
-        "cells, --set links.NAME.cells=100 or nodes.NAME.cells=[20,20] (or, for pipes that state no cells, a "
-        "greater numerics.cell_time; the limit as a Courant number changes little), or use fewer --steps"
-    )
 
 
 def step_function(method: Method, h: float, e: Any) -> Callable[[np.ndarray], np.ndarray]:
@@ -399,6 +392,4 @@ def predicted_limit(growth: Any) -> StepLimit:
     growth : result of `growth_method`. The search goes from 0.1 / ||J||, or less if that fails, to 1e4 / ||J||, with
     the norm of the Jacobian J. The limit is inf if no step fails, and for J = 0.
     """
-    if growth.size == 0.0:
-        return StepLimit(np.inf, np.inf)
-    return growth.limit()
+    return growth.limit() if growth.size else StepLimit(np.inf, np.inf)

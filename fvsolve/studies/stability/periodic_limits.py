@@ -36,15 +36,13 @@ from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import METHODS, method_named
 from fvsolve.studies.outcome import Progress, name_list
 from fvsolve.studies.result_table import PlainData
+from fvsolve.studies.stability.growth import bisect
 from fvsolve.validation import COUNT, FUNCTION, NAMES, validated
 
 THRESHOLD = 1e3
 CELLS, STEPS = 100, 1000
-SMALLEST_COURANT, LARGEST_COURANT, COURANT_RATIO = (
-    0.05,
-    20.0,
-    1.1,
-)  # first and last Courant number of the search, ratio of consecutive numbers
+SMALLEST_COURANT, LARGEST_COURANT = 0.05, 20.0  # first and last Courant number of the search
+COURANT_RATIO = 1.1  # ratio of consecutive Courant numbers
 LIMIT_TOLERANCE = 1e-8  # relative width of the bracket of a limit
 FAR_TIME = 1e300
 WENO_NOISE = 1e-18  # small number of WENO, for values of size 1
@@ -156,13 +154,7 @@ def first_failure(
         low, high = high, high * ratio
         if high > LARGEST_COURANT:
             return None
-    while high - low > width * high:
-        middle = (low + high) / 2
-        if growth(middle) <= math.log10(THRESHOLD):
-            low = middle
-        else:
-            high = middle
-    return high
+    return bisect(lambda courant: not growth(courant) <= math.log10(THRESHOLD), low, high, width).fails
 
 
 def check_size(cells: int, steps: int) -> None:
@@ -257,10 +249,8 @@ def limited_limits(
     """
     check_size(cells, steps)
     report = progress or (lambda *_: None)
-    schemes, chosen = (
-        name_list(schemes) or tuple(LIMITED),
-        [method_named(name) for name in name_list(methods) or LIMITED_METHODS],
-    )
+    schemes = name_list(schemes) or tuple(LIMITED)
+    chosen = [method_named(name) for name in name_list(methods) or LIMITED_METHODS]
     implicit = [tableau.name for tableau in chosen if not tableau.explicit]
     if implicit:
         raise FvsolveError(f"{implicit[0]} is implicit. Expected explicit methods for runs with limited schemes")

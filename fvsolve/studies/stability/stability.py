@@ -246,8 +246,7 @@ class SchemeRows:
             return
         for name, weights in branches(self.scheme, at.model.case.numerics.limiter).items():
             if name not in self.systems:
-                cells = sum(weight != 0 for weight in weights)
-                # degree of the polynomials at pipe ends
+                cells = sum(weight != 0 for weight in weights)  # which set the degree of the polynomials at pipe ends
                 degree = min(cells - 1, 4) if self.scheme == "weno5" else int(name != "upwind")
                 point = replace(self.at("upwind5"), y=at.y)
                 self.systems[name] = LinearSystem(with_weights(point, tuple(map(float, weights)), degree))
@@ -278,6 +277,11 @@ class SchemeRows:
                          f"step matrix applied to {VECTORS} start vectors")  # fmt: skip
         return StabilityRow(**row | {"notes": tuple(notes)})
 
+    def first_columns(self, at: OperatingPoint, method) -> dict:
+        """Columns that name the pair and the operating point."""
+        return {"scheme": self.scheme, "method": method.name, "when": at.when, "states": at.model.y_size,
+                "steps": self.steps, "threshold": self.threshold}  # fmt: skip
+
     def bound_columns(self, side: LinearSystem, method) -> dict:
         """Columns of a row that do not need powers of the step matrix: names, sizes, bounds of the step.
 
@@ -285,16 +289,14 @@ class SchemeRows:
         """
         model, left_out = side.at.model, {}
         values = side.spectrum
-        row = {
-            "scheme": self.scheme, "method": method.name, "when": side.at.when,
-            "states": model.y_size, "steps": self.steps, "threshold": self.threshold, "rate": side.rate,
+        row = self.first_columns(side.at, method) | {
+            "rate": side.rate,
             "eigenvalues": region_limit(method, values.values),
             "greatest_real": float(values.values.real.max(initial=0.0)),
-        }  # fmt: skip
+        }
         if not values.complete:
-            left_out["eigenvalues"] = (
-                f"the limit may be lower; it is computed from some eigenvalues, {values.description}"
-            )
+            some = f"it is computed from some eigenvalues, {values.description}"
+            left_out["eigenvalues"] = f"the limit may be lower; {some}"
         if model.y_size <= MAX_STATES:
             row["field_of_values"] = region_limit(method, side.field)
         else:
@@ -319,30 +321,19 @@ class SchemeRows:
                     starts[limit.step] = growth.growth(limit.fails).start
         except TooLarge as error:
             left_out["frozen weights"] = str(error)
-        guess = (
-            sorted(starts)[len(starts) // 2] if starts else np.inf
-        )  # the middle value, between those of small and large slopes
+        # the middle value, between those of small and large slopes
+        guess = sorted(starts)[len(starts) // 2] if starts else np.inf
         if left_out and not starts:
             guess = von_neumann_limit(SCHEMES[self.scheme].smooth.name, method) / side.rate or np.inf
-        runs = RealRuns(at, method.name, side.form, starts.get(guess), self.steps, self.threshold, LIMITED_DEVIATION)
-        row = {
-            "scheme": self.scheme, "method": method.name, "when": at.when, "states": at.model.y_size,
-            "steps": self.steps, "threshold": self.threshold, "rate": side.rate, "frozen": limits, "left_out": left_out,
-        }  # fmt: skip
-        row |= measure_limit(runs, guess, growth.size, row["left_out"])
+
+        def runs(steps: int) -> RealRuns:
+            return RealRuns(at, method.name, side.form, starts.get(guess), steps, self.threshold, LIMITED_DEVIATION)
+
+        row = self.first_columns(at, method) | {"rate": side.rate, "frozen": limits, "left_out": left_out}
+        row |= measure_limit(runs(self.steps), guess, growth.size, left_out)
         if method.stages == 1 and method.explicit and np.isfinite(row.get("measured", np.nan)):
-            longer = RealRuns(
-                at,
-                method.name,
-                side.form,
-                starts.get(guess),
-                LONGER_FACTOR * self.steps,
-                self.threshold,
-                LIMITED_DEVIATION,
-            )
-            row["longer"] = measure_limit(longer, row["measured"], 0.0, row["left_out"], "longer").get(
-                "measured", np.nan
-            )
+            longer = measure_limit(runs(LONGER_FACTOR * self.steps), row["measured"], 0.0, left_out, "longer")
+            row["longer"] = longer.get("measured", np.nan)
         return StabilityRow(**row | {"notes": tuple(bound_notes(StabilityRow(**row), side, None))})
 
 

@@ -1,4 +1,8 @@
-"""Row of a stability study: columns, bounds of the step, and notes on bounds that differ from the actual limit."""
+"""Row of a stability study: columns, bounds of the step, and notes on bounds that differ from the actual limit.
+
+Arguments of functions that make notes : row, the `StabilityRow`; side, the `LinearSystem` of its scheme; system, the
+result of `growth_method`, which computes the growth of deviations
+"""
 
 from __future__ import annotations
 
@@ -159,20 +163,17 @@ GROWTH_FLOOR = 1e-9  # of the greatest wave rate or eigenvalue: real parts below
 
 
 def bound_notes(row, side, system) -> list[str]:
-    """Notes on a row of a stability study, as texts.
-
-    row : `StabilityRow`; side : `LinearSystem` of its scheme
-    system : result of `growth_method`, which computes the growth of deviations; None for a limited scheme
-    """
-    texts = [*case_notes(row, side)]
+    """Notes on a row of a stability study, as texts; `system` is None for a limited scheme."""
+    texts = case_notes(row, side)
     if row.limited:
         return texts + limiter_notes(row, side.at.model)
     if not np.isfinite(row.predicted):
-        return [
-            *texts,
-            "in linearised form no step up to 1e4 / ||J|| fails (J: Jacobian)",
-            *nonlinear_failure_notes(row),
-        ]
+        texts.append("in linearised form no step up to 1e4 / ||J|| fails (J: Jacobian)")
+        if np.isfinite(row.measured):
+            texts.append(f"only the linear system never fails; real runs fail from h = {row.measured:.5g} s on: in "
+                         f"{row.steps} such steps the solution leaves the linearised state, and nonlinear laws "
+                         "determine the growth")  # fmt: skip
+        return texts
     if "eigenvalues" not in row.left_out:
         texts += eigenvalue_notes(row, system)
     texts += field_of_values_notes(row, side)
@@ -181,39 +182,21 @@ def bound_notes(row, side, system) -> list[str]:
         texts.append(f"no real run fails, up to h = {row.measured_up_to:.3g} s: the state moves away from the "
                      "linearised state, or nonlinear laws stop the growth")  # fmt: skip
     if np.isfinite(row.difference) and abs(row.difference) > 0.01:
-        texts.append(
-            f"prediction and measurement differ by {100 * row.difference:+.1f} %: {difference_reason(row, side)}"
-        )
+        reason = "the deviation does not stay linear"
+        if state_moves(side):
+            reason = (f"{row.steps} steps of the predicted limit take {row.steps * row.predicted:.3g} s, and meanwhile "
+                      "the state leaves the linearised state; the prediction is for that state only")  # fmt: skip
+        texts.append(f"prediction and measurement differ by {100 * row.difference:+.1f} %: {reason}")
     return texts
 
 
-def difference_reason(row, side) -> str:
-    """Reason why the limits of real runs and of the linear system differ; row, side : as in `bound_notes`."""
-    if not state_moves(side):
-        return "the deviation does not stay linear"
-    return (f"{row.steps} steps of the predicted limit take {row.steps * row.predicted:.3g} s, and meanwhile the state "
-            "leaves the linearised state; the prediction is for that state only")  # fmt: skip
-
-
-def nonlinear_failure_notes(row) -> list[str]:
-    """Note on real runs that fail although the linear system never fails, as a list; empty if they do not fail.
-
-    row : `StabilityRow`
-    """
-    if not np.isfinite(row.measured):
-        return []
-    return [f"only the linear system never fails; real runs fail from h = {row.measured:.5g} s on: in {row.steps} such "
-            "steps the solution leaves the linearised state, and nonlinear laws determine the growth"]  # fmt: skip
-
-
 def case_notes(row, side) -> list[str]:
-    """Notes on the operating point and the case, which do not depend on the method; row, side : as in `bound_notes`."""
+    """Notes on the operating point and the case, which do not depend on the method."""
     texts = []
     growing = row.greatest_real > 0.0
     if growing and row.greatest_real > GROWTH_FLOOR * max(row.rate, np.abs(side.spectrum.values).max(initial=0.0)):
-        texts.append(
-            f"the case itself is unstable, with a growth rate of {row.greatest_real:.3g} 1/s, not because of long steps"
-        )
+        rate = f"{row.greatest_real:.3g} 1/s"
+        texts.append(f"the case itself is unstable, with a growth rate of {rate}, not because of long steps")
     if side.full_form is not side.form:
         texts.append(f"{listing(side.idle)}: free motion stores no energy, but states with energy depend on it; "
                      "the norm includes this motion, with the least weight of all states")  # fmt: skip
@@ -234,7 +217,7 @@ def state_moves(side) -> bool:
 
 
 def eigenvalue_notes(row, system) -> list[str]:
-    """Notes on the bound by eigenvalues, compared with the predicted limit; row, system : as in `bound_notes`."""
+    """Notes on the bound by eigenvalues, compared with the predicted limit."""
     if np.isinf(row.eigenvalues) or row.eigenvalues > (1.0 + AGREEMENT) * row.predicted:
         if np.isinf(row.eigenvalues):
             return ["eigenvalues allow every step, but deviations grow at some steps: the Jacobian J is not normal"]
@@ -253,10 +236,7 @@ def eigenvalue_notes(row, system) -> list[str]:
 
 
 def field_of_values_notes(row, side) -> list[str]:
-    """Notes on the bound by the field of values, which is too strict with pipe ends of high order.
-
-    row, side : as in `bound_notes`
-    """
+    """Notes on the bound by the field of values, which is too strict with pipe ends of high order."""
     if np.isnan(row.field_of_values) or row.field_of_values > (1.0 - AGREEMENT) * row.predicted:
         return []
     if row.field_of_values == 0.0:
