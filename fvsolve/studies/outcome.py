@@ -12,6 +12,7 @@ from fvsolve.errors import CaseError, FvsolveError, listing
 from fvsolve.run import model_of
 from fvsolve.solve.solve import Run
 from fvsolve.steppers import loop_indices
+from fvsolve.validation import COUNT, FUNCTION, TABLE, TEXT
 
 POINTS = 5  # points of a cell of a line at which waves are evaluated
 WEIGHTS = np.array([275.0, 100.0, 402.0, 100.0, 275.0]) / 1152.0  # at the middles of fifths; exact to degree 5
@@ -161,6 +162,7 @@ def line_averages(run_data, t: float, out: np.ndarray) -> dict[str, tuple[np.nda
     return sums
 
 
+STUDY_ARGUMENTS = {"set": TABLE, "jobs": COUNT, "dask": TEXT, "progress": FUNCTION}  # kinds, for `validated`
 Progress = Callable[[int, int, str], None]  # (finished points, all points, text of the next point)
 
 
@@ -213,37 +215,15 @@ class GivenUp(Exception):
     """Raised to end a run that costs too much."""
 
 
-def capped_run(model, state, sink, progress) -> Run:
-    """Run of a model that is stopped after CPU_LIMIT seconds of CPU time; arguments as for `solve.Run`."""
-    run = CappedRun(model, state, sink, progress)
-    run.max_seconds = CPU_LIMIT
-    return run
+def capped(seconds: float = np.inf, steps: float = np.inf) -> Callable:
+    """Function that makes a `CappedRun`, for `outcome`, with limits of CPU time [s] and of the number of steps."""
 
+    def make(*arguments) -> CappedRun:
+        run = CappedRun(*arguments)
+        run.max_seconds, run.max_steps = seconds, steps
+        return run
 
-def long_capped_run(model, state, sink, progress) -> Run:
-    """Run of a model that is stopped after REFERENCE_CPU_LIMIT seconds of CPU time; arguments as for `solve.Run`."""
-    run = CappedRun(model, state, sink, progress)
-    run.max_seconds = REFERENCE_CPU_LIMIT
-    return run
-
-
-def probe_run(model, state, sink, progress) -> Run:
-    """New `Run` of a model, not yet started, that stops after about PROBE_STEPS steps; arguments as for `solve.Run`."""
-    run = CappedRun(model, state, sink, progress)
-    run.max_steps = PROBE_STEPS
-    return run
-
-
-def finished_run(model, run=None) -> Outcome:
-    """Outcome of one run of a model. Raises KeyboardInterrupt if the user interrupted the run.
-
-    run : function(model, state, sink, progress) that returns the `Run`, such as `capped_run` (default `solve.Run`
-    itself)
-    """
-    result = outcome(model, run=run)
-    if result.reason.startswith("interrupted"):
-        raise KeyboardInterrupt
-    return result
+    return make
 
 
 def best_run(model, most: int = MAX_RUNS, budget: float = REPEAT_TIME) -> Outcome:
@@ -252,11 +232,11 @@ def best_run(model, most: int = MAX_RUNS, budget: float = REPEAT_TIME) -> Outcom
     A run that stops early, or exceeds its limit, is not repeated.
     budget : wall time of all runs together, including the first [s]; a run that would probably exceed it is not begun
     """
-    began, fastest = perf_counter(), finished_run(model, capped_run)
+    began, fastest = perf_counter(), outcome(model, run=capped(CPU_LIMIT))
     for _ in range(most - 1 if fastest.ok else 0):
         if perf_counter() - began + fastest.seconds > budget:
             break
-        fastest = min(fastest, finished_run(model, capped_run), key=lambda run: run.processor)
+        fastest = min(fastest, outcome(model, run=capped(CPU_LIMIT)), key=lambda run: run.processor)
     return fastest
 
 
@@ -276,6 +256,6 @@ def compile_seconds(model) -> float:
     times = []
     for _ in range(2):
         began = perf_counter()
-        finished_run(model, probe_run)
+        outcome(model, run=capped(steps=PROBE_STEPS))
         times.append(perf_counter() - began)
     return max(0.0, times[0] - times[1])

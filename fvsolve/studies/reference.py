@@ -27,7 +27,7 @@ from fvsolve.studies.distance import (
     variable_size,
     wave_sums,
 )
-from fvsolve.studies.outcome import Outcome, finished_run, long_capped_run, outcome, probe_run, study_model
+from fvsolve.studies.outcome import PROBE_STEPS, REFERENCE_CPU_LIMIT, Outcome, capped, outcome, study_model
 from fvsolve.studies.parallel import RunQueue, RunRequest
 from fvsolve.studies.resolution import (
     basin_fields,
@@ -100,7 +100,7 @@ class Reference:
 
 def capped_outcome(case, keys: Mapping) -> Outcome:
     """Outcome of a case with changed keys; its run is stopped after REFERENCE_CPU_LIMIT seconds of CPU time."""
-    return outcome(case, keys, run=long_capped_run)
+    return outcome(case, keys, run=capped(REFERENCE_CPU_LIMIT))
 
 
 def find_reference(
@@ -335,7 +335,7 @@ def run_text(case, scheme: str, cells, method: str, control: str, size: float) -
 def _is_characteristic(case, keys: dict) -> bool:
     """True if waves cross exactly one cell in nearly every step (Courant number 1), without numerical diffusion.
 
-    The number of steps is that of a run (see `probe_run`). keys : overrides of the case
+    The number of steps is that of a run of at most about `PROBE_STEPS` steps. keys : overrides of the case
     """
     model = study_model(case, keys)
     if model.basins:
@@ -343,7 +343,10 @@ def _is_characteristic(case, keys: dict) -> bool:
     rates, span = model.wave_rates, case.numerics.end - case.numerics.start
     if np.ptp(rates) > 1e-9 * rates.max():
         return False
-    return finished_run(model, probe_run).counts["steps"] <= 1.01 * span * rates.max() + 2 * len(model.breaks) + 2
+    return (
+        outcome(model, run=capped(steps=PROBE_STEPS)).counts["steps"]
+        <= 1.01 * span * rates.max() + 2 * len(model.breaks) + 2
+    )
 
 
 def reference_of_refinements(words: str, runs: Sequence[Outcome]) -> Reference:

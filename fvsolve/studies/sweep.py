@@ -20,13 +20,13 @@ from fvsolve.errors import CaseError, FvsolveError, RunError, did_you_mean, list
 from fvsolve.fluid.property_cache import coolprop_version
 from fvsolve.output.restart import program_versions
 from fvsolve.output.summary_file import plain
-from fvsolve.studies.outcome import has_diverged, refusal_text
+from fvsolve.studies.outcome import STUDY_ARGUMENTS, has_diverged, refusal_text
 from fvsolve.studies.parallel import PickledCase, run_tasks
 from fvsolve.studies.result_cache import ResultCache, digest_of, write_errors
 from fvsolve.studies.result_table import Column, ResultTable
 from fvsolve.studies.sampling import grid, points_from_file, refuse_unknown, sample_points
 from fvsolve.units import show
-from fvsolve.validation import COUNT, COUNT_FROM_ZERO, FUNCTION, PATH, ROW, SERIES, TABLE, TEXT, Kind, validated
+from fvsolve.validation import COUNT_FROM_ZERO, PATH, ROW, SERIES, TABLE, TEXT, Kind, validated
 
 REFUSED = "refused: "
 LOST_REASON = "lost: the process of this run was killed repeatedly. Is there enough memory?"
@@ -235,17 +235,7 @@ POINTS = Kind(
 )
 
 
-@validated(
-    vary=VARY,
-    set=TABLE,
-    jobs=COUNT,
-    out=PATH,
-    progress=FUNCTION,
-    points=POINTS,
-    sample=TEXT,
-    seed=COUNT_FROM_ZERO,
-    dask=TEXT,
-)
+@validated(vary=VARY, out=PATH, points=POINTS, sample=TEXT, seed=COUNT_FROM_ZERO, **STUDY_ARGUMENTS)
 def sweep(
     case,
     vary: Mapping[str, Sequence[Any]] | None = None,

@@ -43,28 +43,26 @@ from fvsolve.studies.accuracy.work_precision import (
     target_powers,
 )
 from fvsolve.studies.distance import Distance, distance, moving_probes
-from fvsolve.studies.outcome import GIVEN_UP, Progress, best_run_of, compile_seconds, name_list, study_model
+from fvsolve.studies.outcome import (
+    GIVEN_UP,
+    STUDY_ARGUMENTS,
+    Progress,
+    best_run_of,
+    compile_seconds,
+    name_list,
+    study_model,
+)
 from fvsolve.studies.parallel import RunQueue, RunRequest
 from fvsolve.studies.reference import Reference, find_reference
 from fvsolve.studies.resolution import as_cells, basins_from_files, cells_for_lines, delay_lines, fixed_choices
 from fvsolve.studies.result_cache import ResultCache
-from fvsolve.validation import COUNT, FUNCTION, NAMES, NUMBER, NUMBERS, PATH, TABLE, TEXT, validated
+from fvsolve.validation import NAMES, NUMBER, NUMBERS, PATH, validated
 
 WRONG_ERROR = 1.0  # errors above the range of the component are wrong results
 
 
 @validated(
-    set=TABLE,
-    schemes=NAMES,
-    methods=NAMES,
-    cells=NUMBERS,
-    rtol=NUMBERS,
-    step=NUMBERS,
-    target=NUMBER,
-    out=PATH,
-    progress=FUNCTION,
-    jobs=COUNT,
-    dask=TEXT,
+    schemes=NAMES, methods=NAMES, cells=NUMBERS, rtol=NUMBERS, step=NUMBERS, target=NUMBER, out=PATH, **STUDY_ARGUMENTS
 )
 def chart(
     case,

@@ -20,7 +20,7 @@ from fvsolve.model.delay_line_selection import slowest_pipe
 from fvsolve.model.model_facts import rhs_seconds
 from fvsolve.schemes import SCHEMES
 from fvsolve.steppers.built_in_methods import AUTO, METHODS
-from fvsolve.studies.outcome import capped_run, compile_seconds, finished_run, study_model
+from fvsolve.studies.outcome import best_run, compile_seconds, study_model
 from fvsolve.studies.resolution import (
     basins,
     cell_counts,
@@ -200,7 +200,7 @@ def run_coarse(case: Case) -> CoarseRun:
     model = study_model(case, cells_setting(case, default_scheme(case), DEFAULT_METHOD, cells).keys)
     span = case.numerics.end - case.numerics.start
     waves, compile_time = span * float(model.wave_rate) / DEFAULT_COURANT, compile_seconds(model)
-    result = finished_run(model, capped_run)
+    result = best_run(model, most=1)
     fraction = (result.t - case.numerics.start) / span  # less than 1 if the run was stopped
     finer_model = study_model(case, cells_setting(case, default_scheme(case), DEFAULT_METHOD, 2 * cells).keys)
     cell_time = (rhs_seconds(finer_model) - rhs_seconds(model)) / max(

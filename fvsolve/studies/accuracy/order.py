@@ -11,11 +11,11 @@ from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.studies.accuracy.fit import Fit
 from fvsolve.studies.accuracy.refine import Level, Plan, affordable_plan
-from fvsolve.studies.outcome import Progress, name_list, refuse_basins
+from fvsolve.studies.outcome import STUDY_ARGUMENTS, Progress, name_list, refuse_basins
 from fvsolve.studies.parallel import RunQueue
 from fvsolve.studies.resolution import delay_lines, fixed_choices
 from fvsolve.studies.result_cache import OUT, ResultCache, cache_in
-from fvsolve.validation import COUNT, FUNCTION, NAMES, TABLE, TEXT, validated
+from fvsolve.validation import COUNT, FUNCTION, NAMES, TEXT, validated
 
 SHOWN_VARIABLES = 3  # variables with a table on the terminal; order.csv contains all
 NORMS = ("L1", "L2", "max")
@@ -161,7 +161,6 @@ REFERENCE_KINDS = ("auto", "exact", "finer", "richardson")
 
 
 @validated(
-    set=TABLE,
     refine=TEXT,
     key=TEXT,
     levels=COUNT,
@@ -173,9 +172,7 @@ REFERENCE_KINDS = ("auto", "exact", "finer", "richardson")
     source=FUNCTION,
     exact=FUNCTION,
     out=OUT,
-    progress=FUNCTION,
-    jobs=COUNT,
-    dask=TEXT,
+    **STUDY_ARGUMENTS,
 )
 def order(
     case, set: Mapping | None = None, *, refine: str | None = None, key: str | None = None, levels: int | None = None,

@@ -14,7 +14,7 @@ from fvsolve.studies.accuracy.fit import FAILED, FLOOR, LEAST_ROWS, NO_ERROR, Fi
 from fvsolve.studies.accuracy.order import Order, OrderRow, error_scale
 from fvsolve.studies.accuracy.refine import Level, Plan
 from fvsolve.studies.distance import NORMS, error_norms, recording_keys, variable_size
-from fvsolve.studies.outcome import Outcome, Progress, long_capped_run, outcome, study_model
+from fvsolve.studies.outcome import REFERENCE_CPU_LIMIT, Outcome, Progress, capped, outcome, study_model
 from fvsolve.studies.parallel import RunQueue, RunRequest
 from fvsolve.studies.reference import ROUNDING, Reference, find_reference, reference_of_run
 from fvsolve.studies.resolution import (
@@ -45,7 +45,7 @@ ORDER_TOLERANCE = 0.06, 0.04  # a, b: greatest distance a + b order of an order 
 
 def timed_run(case, keys: Mapping) -> Outcome:
     """Outcome of a case with changed keys: of the faster of two runs, or of a single run if it takes long."""
-    return outcome(case, keys, best_of=BEST_OF, run=long_capped_run, budget=BRIEF_RUN)
+    return outcome(case, keys, best_of=BEST_OF, run=capped(REFERENCE_CPU_LIMIT), budget=BRIEF_RUN)
 
 
 class OrderStudy:

@@ -22,12 +22,12 @@ from fvsolve.studies.failure.map_columns import (
     map_columns,
 )
 from fvsolve.studies.failure.run_verdict import NOT_RUN, Measures, measure_run, run_recorded, verdict
-from fvsolve.studies.outcome import Progress, name_list, refuse_basins
+from fvsolve.studies.outcome import STUDY_ARGUMENTS, Progress, name_list, refuse_basins
 from fvsolve.studies.parallel import RunQueue, RunRequest
 from fvsolve.studies.reference import Reference, find_reference
 from fvsolve.studies.resolution import delay_lines, fixed_choices
 from fvsolve.studies.result_cache import OUT, ResultCache, cache_in
-from fvsolve.validation import COUNT, FUNCTION, NAMES, NUMBER, NUMBERS, ROW, TABLE, TEXT, Kind, is_row, validated
+from fvsolve.validation import NAMES, NUMBER, NUMBERS, ROW, TEXT, Kind, is_row, validated
 
 METHODS = ("euler", "ssp-rk3", "rk4", "implicit-euler", "trapezoid", "gauss-4", "radau-iia-5")
 TOLERANCE = 0.02  # greatest mean error, over the range of a probe
@@ -108,10 +108,7 @@ KEY_VALUES = Kind(
     key=KEY_VALUES,
     tolerance=NUMBER,
     out=OUT,
-    progress=FUNCTION,
-    set=TABLE,
-    jobs=COUNT,
-    dask=TEXT,
+    **STUDY_ARGUMENTS,
 )
 def failure_map(
     case, schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None,

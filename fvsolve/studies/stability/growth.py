@@ -323,8 +323,8 @@ class VectorGrowth:
                     raise TooLarge(
                         f"{self.e.shape[0]} states and {self.steps} steps take longer than {TIME_LIMIT:g} s to predict"
                         ": give pipes or basins fewer cells, --set links.NAME.cells=100 or nodes.NAME.cells=[20,20] "
-                        "(or, for pipes that state no cells, a greater numerics.cell_time; the limit as a Courant number "
-                        "changes little), or use fewer --steps"
+                        "(or, for pipes that state no cells, a greater numerics.cell_time; the limit as a Courant "
+                        "number changes little), or use fewer --steps"
                     )
                 for _ in range(n - done):
                     v = step(v)

@@ -24,7 +24,7 @@ from fvsolve.steppers.built_in_methods import AUTO
 from fvsolve.studies.linear.eigenvalues import Spectrum, find_eigenvalues
 from fvsolve.studies.linear.linearise import Linear, linearise_at
 from fvsolve.studies.linear.operating_point import OperatingPoint, has_limiter, operating_point, with_weights
-from fvsolve.studies.outcome import Progress, name_list
+from fvsolve.studies.outcome import STUDY_ARGUMENTS, Progress, name_list
 from fvsolve.studies.parallel import PickledCase, TaskPool
 from fvsolve.studies.resolution import delay_lines, fixed_choices
 from fvsolve.studies.result_cache import ResultCache, case_key
@@ -48,7 +48,7 @@ from fvsolve.studies.stability.stability_row import (
     region_limit,
     row_from_json,
 )
-from fvsolve.validation import COUNT, FLAG, FUNCTION, NAMES, NUMBER, PATH, TABLE, TEXT, validated
+from fvsolve.validation import COUNT, FLAG, NAMES, NUMBER, PATH, validated
 
 AUTO_NOTE = (
     f"auto starts with {automatic.EXPLICIT}, and its row is that of {automatic.EXPLICIT}; a run continues with "
@@ -115,17 +115,7 @@ class LinearSystem:
 
 
 @validated(
-    schemes=NAMES,
-    methods=NAMES,
-    at=NUMBER,
-    before=FLAG,
-    steps=COUNT,
-    threshold=NUMBER,
-    set=TABLE,
-    out=PATH,
-    progress=FUNCTION,
-    jobs=COUNT,
-    dask=TEXT,
+    schemes=NAMES, methods=NAMES, at=NUMBER, before=FLAG, steps=COUNT, threshold=NUMBER, out=PATH, **STUDY_ARGUMENTS
 )
 def stability(
     case, schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None, at: float | None = None,
