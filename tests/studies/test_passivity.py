@@ -137,7 +137,7 @@ def worst_state(scheme: str, method: str, courant: float) -> np.ndarray:
 
     a, s = closed_pipe(scheme)
     b = courant * study.pipe_operator(scheme)
-    r = stability_function(study.method_of(method))
+    r = stability_function(method_named(method))
     up, down = (study.matrix_polynomial([float(x) for x in p.coefficients], b) for p in (r.numerator, r.denominator))
     assert a.shape == s.shape
     return np.linalg.solve(s, np.linalg.svd(np.linalg.solve(down, up))[2][0])

@@ -24,6 +24,7 @@ from fvsolve.output.summary_file import plain
 from fvsolve.schemes import SCHEMES
 from fvsolve.steppers.automatic import AUTO, EXPLICIT, IMPLICIT, TIGHT_BELOW, TIGHT_IMPLICIT
 from fvsolve.studies.outcome import name_list
+from fvsolve.studies.stability.growth import bisect
 from fvsolve.validation import FUNCTION, NAMES, validated
 
 CELLS = 20  # cells of the closed pipe
@@ -259,17 +260,17 @@ def courant_limit(scheme: str, method: str) -> float | None:
     facts = analyse(method)
     if facts.a_stable:  # von Neumann: R(hA) is a contraction wherever A is dissipative
         return math.inf
+
+    def gains(courant: float) -> bool:
+        return not step_gain(scheme, method, courant) <= 1.0 + NORM_TOLERANCE
+
     samples = np.geomspace(LEAST, MOST, 120)
-    failed = next((k for k, x in enumerate(samples) if not step_gain(scheme, method, x) <= 1.0 + NORM_TOLERANCE), None)
+    failed = next((k for k, x in enumerate(samples) if gains(x)), None)
     if failed is None:
         return math.inf
     if failed == 0:
         return 0.0
-    low, high = samples[failed - 1], samples[failed]
-    while high - low > 1e-9 * high:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if step_gain(scheme, method, middle) <= 1.0 + NORM_TOLERANCE else (low, middle)
-    return float(low)
+    return float(bisect(gains, samples[failed - 1], samples[failed], 1e-9).step)
 
 
 def step_gain(scheme: str, method: str, courant: float) -> float:
@@ -285,17 +286,10 @@ def step_gain(scheme: str, method: str, courant: float) -> float:
 @functools.cache
 def polynomials(method: str) -> tuple[list[float], list[float]]:
     """Coefficients (of the numerator, of the denominator) of the stability function, lowest power first."""
-    from fvsolve.steppers import stability_function
+    from fvsolve.steppers import method_named, stability_function
 
-    r = stability_function(method_of(method))
+    r = stability_function(method_named(method))
     return [float(x) for x in r.numerator.coefficients], [float(x) for x in r.denominator.coefficients]
-
-
-def method_of(name: str):
-    """Runge-Kutta method with this name."""
-    from fvsolve.steppers import method_named
-
-    return method_named(name)
 
 
 def matrix_polynomial(coefficients: list[float], b: np.ndarray) -> np.ndarray:

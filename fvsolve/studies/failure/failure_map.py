@@ -12,6 +12,7 @@ import numpy as np
 from fvsolve.case import load
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.schemes import LIMITED
+from fvsolve.steppers.built_in_methods import METHODS as KNOWN_METHODS
 from fvsolve.studies.failure.map_columns import (
     Columns,
     WaveGrowthLimit,
@@ -135,9 +136,8 @@ def failure_map(
         raise FvsolveError(f"--tolerance {tolerance} is out of range. Expected a positive number, for example 0.02")
     base = {"output.every": (case.numerics.end - case.numerics.start) / OUTPUT_ROWS}
     column_set = map_columns(case, base, courants, steps, key)
-    schemes, methods = _check_names(
-        name_list(schemes) or default_schemes(case, column_set), name_list(methods) or METHODS
-    )
+    own_schemes = name_list(schemes) or default_schemes(case, column_set)
+    schemes, methods = _check_names(own_schemes, name_list(methods) or METHODS)
     places = [(scheme, method, k) for scheme in schemes for method in methods for k in range(len(column_set.sets))]
     squares, report = [], progress or (lambda *_: None)
     with cache_in(out) as points, RunQueue(case, jobs, dask) as queue:
@@ -192,10 +192,10 @@ class MapRuns:
             uncertainty = reference.uncertainty.trajectory
             if uncertainty > self.tolerance / 2:
                 raise FvsolveError(
-                    "the reference is not accurate enough: its error may be "
-                    f"{uncertainty:.2g} of the range of {reference.uncertainty.worst or 'a probe'}, but the tolerance "
-                    f"is {self.tolerance:g}. Try --tolerance {4 * uncertainty:.1g}, or more cells if the case has "
-                    "cells; if this probe shows only rounding, remove this probe from output.probes"
+                    f"the reference is not accurate enough: its error may be {uncertainty:.2g} of the range of "
+                    f"{reference.uncertainty.worst or 'a probe'}, but the tolerance is {self.tolerance:g}. Try "
+                    f"--tolerance {4 * uncertainty:.1g}, or more cells if the case has cells; if this probe shows only "
+                    "rounding, remove this probe from output.probes"
                 )
             self._references[at] = reference
         return self._references[at]
@@ -207,15 +207,12 @@ class MapRuns:
         """
         at = scheme, k if self.columns.keys(k) else 0
         if at not in self._spectra:
-            self._spectra[at] = eigenvalues_of(
-                self.case, {**self.base, **self.columns.keys(k), "numerics.scheme": scheme}
-            )
+            keys = {**self.base, **self.columns.keys(k), "numerics.scheme": scheme}
+            self._spectra[at] = eigenvalues_of(self.case, keys)
         eigenvalues = self._spectra[at]
         if (method, *at) not in self._limits:
-            both = (
-                None if eigenvalues is None else greatest_step(method, eigenvalues, self.span),
-                self.lines_limit(method, *at),
-            )
+            of_modes = None if eigenvalues is None else greatest_step(method, eigenvalues, self.span)
+            both = of_modes, self.lines_limit(method, *at)
             self._limits[method, *at] = None if None in both else min(both)
         return self._limits[method, *at]
 
@@ -247,7 +244,8 @@ class MapRuns:
             errors.append(measures.error)
             return measures
 
-        if step and self.span / step > MAX_IMPLICIT_STEPS and not _is_explicit(method):
+        explicit = method not in KNOWN_METHODS or KNOWN_METHODS[method].explicit
+        if step and self.span / step > MAX_IMPLICIT_STEPS and not explicit:
             run, word = Measures(f"{self.span / step:.0f} implicit steps", False), NOT_RUN
         else:
             run = self.measure(trial, k)
@@ -314,20 +312,13 @@ def _shorter_steps(case, trial: dict, ratio: int) -> dict:
 
     trial : keys and values of the run with the original step
     """
-    numerics = case.numerics
-    for name, factor in (("step", ratio), ("courant", ratio), ("rtol", ratio**2)):
-        if f"numerics.{name}" in trial:
-            return {f"numerics.{name}": trial[f"numerics.{name}"] / factor}
-    for name, factor in (("step", ratio), ("courant", ratio), ("rtol", ratio**2)):
-        if getattr(numerics, name) is not None:
-            return {f"numerics.{name}": getattr(numerics, name) / factor}
+    factors = {"numerics.step": ratio, "numerics.courant": ratio, "numerics.rtol": ratio**2}
+    own = {key: getattr(case.numerics, key.removeprefix("numerics.")) for key in factors}
+    for values in (trial, own):
+        for key, factor in factors.items():
+            if values.get(key) is not None:
+                return {key: values[key] / factor}
     return {}
-
-
-def _is_explicit(method: str) -> bool:
-    from fvsolve.steppers import METHODS as KNOWN
-
-    return method not in KNOWN or KNOWN[method].explicit
 
 
 def _check_names(*given: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:

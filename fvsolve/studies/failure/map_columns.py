@@ -6,7 +6,9 @@ The columns are steps around the predicted limits, or values of a key. The limit
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,17 +67,23 @@ def greatest_step(method: str, eigenvalues: np.ndarray, span: float) -> float:
 
     def grows(h: float) -> bool:
         with np.errstate(all="ignore"):
-            return span / h * math.log(max(np.abs(r(h * eigenvalues)).max(), 1e-300)) - exact_growth > math.log(
-                VISIBLE_GROWTH
-            )
+            growth = span / h * math.log(max(np.abs(r(h * eigenvalues)).max(), 1e-300))
+        return growth - exact_growth > math.log(VISIBLE_GROWTH)
 
-    steps = np.geomspace(1e-2, 1e3, 1201) / fastest
+    return last_step(grows, np.geomspace(1e-2, 1e3, 1201) / fastest, 50, lambda low, high: 0.5 * (low + high))
+
+
+def last_step(grows: Callable[[float], bool], steps: Sequence[float], halvings: int, mean: Callable) -> float:
+    """Greatest step h up to which grows(h) is false: inf if it is false at all `steps`, 0 if it is true at the first.
+
+    Between two steps it is refined by a number of bisections; mean : mean(low, high), the next step to try
+    """
     first = next((k for k, h in enumerate(steps) if grows(h)), None)
     if first is None or first == 0:
         return math.inf if first is None else 0.0
     low, high = steps[first - 1], steps[first]
-    for _ in range(50):
-        middle = 0.5 * (low + high)
+    for _ in range(halvings):
+        middle = mean(low, high)
         low, high = (low, middle) if grows(middle) else (middle, high)
     return float(low)
 
@@ -117,18 +125,8 @@ class WaveGrowthLimit:
         """
         if method_named(method).kind == "linear" and any(storing_nodes(self.model(self.steps[0]), 1.0)):
             return None
-        last = 0.0
-        for h in self.steps:
-            if self.grows(method, h):
-                break
-            last = h
-        else:
-            return math.inf
-        high = h
-        for _ in range(HALVINGS if last > 0.0 else 0):
-            middle = math.sqrt(last * high)
-            last, high = (last, middle) if self.grows(method, middle) else (middle, high)
-        return last
+        grows = functools.partial(self.grows, method)
+        return last_step(grows, self.steps, HALVINGS, lambda low, high: math.sqrt(low * high))
 
 
 COURANTS = (0.25, 0.5, 0.75, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0, 3.0)
@@ -181,7 +179,8 @@ def map_columns(case, base: dict, courants, steps, key) -> Columns:
     span = case.numerics.end - case.numerics.start
     if key is not None:
         name, values = key
-        control = _step_control(courants, steps)
+        control = {"numerics.courant": courants[0]} if courants is not None else {}
+        control |= {"numerics.step": steps[0]} if steps is not None else {}
         sets = [{name: value, **control} for value in values]
         rates = [_fastest_and_wave_rate(case, {**base, name: value}) for value in values]
         return Columns(name, list(values), sets, rates, span, _wave_rate(case, {**base, name: values[0]}))
@@ -191,13 +190,6 @@ def map_columns(case, base: dict, courants, steps, key) -> Columns:
     chosen = [c / waves for c in courants] if courants is not None else steps
     chosen = list(chosen if chosen is not None else _default_steps(case, rates, waves))
     return Columns("step", chosen, [{"numerics.step": h} for h in chosen], [rates], span, waves)
-
-
-def _step_control(courants, steps) -> dict:
-    """Key and value that set the step in all columns of a varied key; empty without given numbers."""
-    if courants is not None:
-        return {"numerics.courant": courants[0]}
-    return {} if steps is None else {"numerics.step": steps[0]}
 
 
 def _fastest_and_wave_rate(case, set: dict) -> tuple[float, float | None]:
@@ -275,9 +267,8 @@ def _check_options(courants, steps, key) -> None:
         if values is not None and len(values) == 0:
             raise FvsolveError(f"{option} is empty. Expected at least one number")
     if key is not None and len(courants or steps or [0]) > 1:
-        raise FvsolveError(
-            "with --key, the values of the key are the columns. Expected at most one number in --step or --courant"
-        )
+        text = "with --key, the values of the key are the columns"
+        raise FvsolveError(f"{text}. Expected at most one number in --step or --courant")
     if key is not None and not key[1]:
         raise FvsolveError("--key has no values. Expected KEY=a,b,c with at least one value")
     if key is not None and key[0] in MAP_KEYS:

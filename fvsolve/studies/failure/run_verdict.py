@@ -26,10 +26,7 @@ VERDICT_TEXTS = {
 }
 BLOWN_RANGES = 3.0  # a run farther outside the values of the reference, in ranges of a probe, has blown up
 MIN_SWINGS = 8  # successive changes of alternating sign that count as ringing
-SWING_RANGE, REFERENCE_SWING = (
-    0.02,
-    1e-3,
-)  # least swings that count [range]: of a run, and of the reference, which may decay
+SWING_RANGE, REFERENCE_SWING = 0.02, 1e-3  # least swings that count [range]: of a run, of the reference, may decay
 PACE_RATIO = 0.5  # swings count if they follow in less than this fraction of the time of those of the reference
 EXCESS_VARIATION = 0.25  # greatest excess of the variation of a probe, as a fraction of that of the reference
 ERROR_RATIO = 0.75  # a shorter step helps if at most this fraction of the error remains
@@ -113,10 +110,8 @@ def excess_variation(rows: np.ndarray, reference: np.ndarray, ranges: np.ndarray
     rows, reference : float64[k, probes]  values of the run and the reference; ranges : float64[probes]
     """
     smooth, smooth_reference = (_medians(values) / ranges for values in (rows, reference))
-    variation, reference_variation = (
-        np.abs(np.diff(values, axis=0)).sum(axis=0) for values in (smooth, smooth_reference)
-    )
-    excesses = (variation - reference_variation) / np.maximum(reference_variation, 1.0)
+    variation, expected = (np.abs(np.diff(values, axis=0)).sum(axis=0) for values in (smooth, smooth_reference))
+    excesses = (variation - expected) / np.maximum(expected, 1.0)
     quick = [
         turn_interval(a, SWING_RANGE) < PACE_RATIO * turn_interval(b, REFERENCE_SWING)
         for a, b in zip(smooth.T, smooth_reference.T, strict=True)
@@ -158,22 +153,14 @@ def measure_run(outcome, windows: Sequence[np.ndarray], reference) -> Measures:
     expected = np.column_stack([np.interp(t, reference.run.rows[:, 0], column) for column in reference_rows.T])
     widths, steps = probe_ranges(reference_rows), np.concatenate([rows[-1:], *windows])
     with np.errstate(over="ignore", invalid="ignore"):
-        error = [
-            Deviation(off, time_weights(t), width).ranges()["L1"]
-            for off, width in zip((rows - expected).T, widths, strict=True)
-        ]
+        error = [Deviation(off, time_weights(t), width).ranges()["L1"]
+                 for off, width in zip((rows - expected).T, widths, strict=True)]  # fmt: skip
         outside = np.maximum(steps - reference_rows.max(axis=0), reference_rows.min(axis=0) - steps) / widths
         return Measures(
-            outcome.reason,
-            True,
-            False,
-            float(np.max(error)),
-            max(0.0, float(outside.max())),
-            ringing_amplitude(windows, widths),
-            excess_variation(rows, expected, widths),
-            outcome.counts["steps"],
+            outcome.reason, True, False, float(np.max(error)), max(0.0, float(outside.max())),
+            ringing_amplitude(windows, widths), excess_variation(rows, expected, widths), outcome.counts["steps"],
             outcome.seconds,
-        )
+        )  # fmt: skip
 
 
 WINDOW_STEPS = 9  # least number of successive steps in a window

@@ -26,25 +26,14 @@ from fvsolve.studies.linear.state_matrices import (
 from fvsolve.units import DIMENSIONS
 from fvsolve.validation import FLAG, NAMES, NUMBER, TABLE, TEXT, validated
 
-EULER_PARAMETERS = ("eps_x", "eps_y", "eps_z")
 STATE_UNITS = {
-    "mass": "kg",
-    "excess": "kg",
-    "air": "kg",
-    "forward": "kg/s",
-    "backward": "kg/s",
-    "memory": "kg/s",
-    "flow": "kg/s",
-    "creep": "kg/s",
-    "position": "m",
-    "velocity": "m/s",
-    "speed": "-",
-    "opening": "-",
+    **dict.fromkeys(("mass", "excess", "air"), "kg"),
+    **dict.fromkeys(("forward", "backward", "memory", "flow", "creep"), "kg/s"),
+    **dict.fromkeys(("position", "travel"), "m"),
+    **dict.fromkeys(("velocity", "travel_rate"), "m/s"),
+    **dict.fromkeys(("speed", "opening", "eta", "eps_x", "eps_y", "eps_z"), "-"),
     "angle": "rad",
     "rate": "rad/s",
-    "travel": "m",
-    "travel_rate": "m/s",
-    **dict.fromkeys(("eta", *EULER_PARAMETERS), "-"),
     **{f"spin_{axis}": "rad/s" for axis in "xyz"},
     **{f"centre_{axis}": "m" for axis in "xyz"},
     **{f"centre_v{axis}": "m/s" for axis in "xyz"},

@@ -1,4 +1,11 @@
-"""Matrices A and C of a linearised case at an operating point, by finite differences that are checked."""
+"""Matrices A and C of a linearised case at an operating point, by finite differences that are checked.
+
+Arguments of several functions : at, operating point; outputs, number of outputs; f, function of a vector x;
+base : float64[m]  f(x); direction, change of x, for the states the small deviations `width` : float64[n]
+steps, factors on `direction`, largest first; sides : float64[steps, p]  forward minus backward quotients of the matrix
+entries, column after column; starts : int64[columns]  first entry of each column; size : float64[p]  size of the row of
+each entry
+"""
 
 from __future__ import annotations
 
@@ -13,21 +20,18 @@ from fvsolve.kernels import dtypes as rec
 from fvsolve.studies.linear.operating_point import OperatingPoint
 
 STEPS = 2.0 ** -np.arange(8.0, 25.0, 4.0)  # in units of the small deviation: 1/256 to 6e-8
-FINER_STEPS = 2.0 ** -np.arange(
-    8.0, 37.0, 4.0
-)  # if those give no slope: down to 1.5e-11, for the laminar range of a valve
-COARSE_STEPS = 2.0 ** -np.arange(
-    2.0, 8.0, 2.0
-)  # before STEPS, for an input with a range: laminar ranges of laws end below
+# if those give no slope: down to 1.5e-11, for the laminar range of a valve
+FINER_STEPS = 2.0 ** -np.arange(8.0, 37.0, 4.0)
+COARSE_STEPS = 2.0 ** -np.arange(2.0, 8.0, 2.0)  # before STEPS, for an input with a range: laminar ranges end below
 SLOPE_TOLERANCE = 1e-3  # relative difference of steps or sides above which there is no derivative
 ROUNDING_SHARE = 1e-12  # of the size of a row, over the step: round-off of its slopes, with a safety factor of 1000
 HIDDEN_KINK = 1e-4  # of a row: least constant difference of both sides that is a kink; friction factors have 3e-6
-CONSTANT_SHARE = (
-    0.25  # relative change of a constant difference of both sides from step to step; a smooth one loses 15/16
-)
-BEND_FACTOR = (
-    4.0  # kink: sides differ by more than this times their change with the step; smooth ones by less than once
-)
+CONSTANT_SHARE = 0.25  # change of a constant difference of both sides with the step; a smooth one loses 15/16
+BEND_FACTOR = 4.0  # kink: sides differ by more than this times their change with the step; smooth ones by less
+DENSE = 1000  # greatest number of states for which A is a full array
+C_TIME, MAX_ENTRIES = 20.0, 10_000_000  # time limit of C [s], greatest number of its entries
+RATE_FLOOR = 1e-10  # of the greatest rate per deviation: smaller rows are round-off of sums
+TRIAL_DIRECTIONS = 3  # random directions along which A is checked
 
 Function = Callable[[np.ndarray], np.ndarray]
 
@@ -35,10 +39,7 @@ Function = Callable[[np.ndarray], np.ndarray]
 def two_sided_differences(
     f: Function, x: np.ndarray, direction: np.ndarray, base: np.ndarray, steps: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Forward and backward difference quotients of f at x along `direction` : float64[steps, m] each.
-
-    base : float64[m]  f(x); steps : factors on the vector `direction`, largest first
-    """
+    """Forward and backward difference quotients of f at x along `direction` : float64[steps, m] each."""
     forward = [(f(x + h * direction) - base) / h for h in steps]
     return np.array(forward), np.array([(base - f(x - h * direction)) / h for h in steps])
 
@@ -46,10 +47,7 @@ def two_sided_differences(
 def central_differences(
     f: Function, x: np.ndarray, direction: np.ndarray, base: np.ndarray, steps: np.ndarray = STEPS
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Central difference quotient of f at x along `direction`, and forward minus backward quotient.
-
-    Both are float64[steps, m]; base, steps : as for `two_sided_differences`
-    """
+    """Central difference quotient of f at x, and forward minus backward quotient : float64[steps, m] each."""
     forward, backward = two_sided_differences(f, x, direction, base, steps)
     return 0.5 * (forward + backward), forward - backward
 
@@ -60,7 +58,6 @@ def single_sided_differences(
     """One-sided difference quotient of f at x along `direction`, returned twice: as forward and as backward quotient.
 
     It is (-3 f(x) + 4 f(x + h) - f(x + 2 h)) / 2 h, second order in the step h : float64[steps, m].
-    base, steps : as for `two_sided_differences`
     """
     slopes = [(4.0 * (f(x + h * direction) - base) - (f(x + 2.0 * h * direction) - base)) / (2.0 * h) for h in steps]
     return np.array(slopes), np.array(slopes)
@@ -71,7 +68,6 @@ def longest_step_slopes(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Derivative, error and kink of each entry of f : float64[m] each, from the longest steps with a clear result.
 
-    forward, backward, steps : difference quotients and steps of `two_sided_differences`
     size : float64[m]  size of each entry of f, from which the round-off of its quotients is estimated
     The derivative is taken at the longest steps at which forward and backward quotients agree and change little with
     the step. The error is the change with the step, relative to the quotient. If there are no such steps, the error is
@@ -81,11 +77,8 @@ def longest_step_slopes(
     """
     slopes, magnitude = 0.5 * (forward + backward), np.maximum(np.abs(forward), np.abs(backward))
     clear = magnitude[1:] > ROUNDING_SHARE * size / steps[1:, None]
-    change, sides, peak = (
-        np.abs(np.diff(slopes, axis=0)),
-        np.abs(forward - backward)[1:],
-        above_zero(magnitude.max(axis=0)),
-    )
+    change, sides = np.abs(np.diff(slopes, axis=0)), np.abs(forward - backward)[1:]
+    peak = above_zero(magnitude.max(axis=0))
     good = clear & (np.maximum(change, sides) <= SLOPE_TOLERANCE * magnitude[1:])
     started = np.maximum.accumulate(good, axis=0)
     stretch = good & ~np.maximum.accumulate(started & ~good, axis=0)
@@ -108,7 +101,6 @@ def best_slopes(slopes: np.ndarray, size: np.ndarray, starts: np.ndarray) -> tup
 
     They come from the two consecutive steps that agree best for the column.
     slopes : float64[steps, p]  difference quotients of the entries, column after column
-    size : float64[p]  size of the row of each entry; starts : int64[columns]  first entry of each column
     """
     if slopes.shape[1] == 0:
         return slopes[0], np.zeros(0)
@@ -124,7 +116,6 @@ def side_differences(sides: np.ndarray, size: np.ndarray, starts: np.ndarray) ->
     """Difference of forward and backward quotients of each column, relative to `size` : float64[columns].
 
     It is the greatest difference over the entries of a column, at the step where this is least.
-    sides : float64[steps, p]  forward minus backward quotients; size, starts : as in `best_slopes`
     """
     if sides.shape[1] == 0:
         return np.zeros(0)
@@ -138,23 +129,14 @@ def hidden_kinks(
 
     A column has a kink if the difference of forward and backward quotients of an entry is constant over three steps and
     above 1e-4 of the size of its row. The difference of a smooth function falls with the step.
-    sides : float64[steps, p]  forward minus backward quotients; starts : int64[columns]  first entry of each column
-    size : float64[p]  size of the row of each entry over the longest step, which does not resolve the steep laminar
-    range of a valve at zero pressure drop
-    rounding : float64[p]  size of the row of each entry, from which its round-off is estimated
-    steps : float64[steps]  steps as fractions of the small deviations
+    size : float64[p]  size of the row over the longest step, which does not resolve the steep laminar range of a valve
+    at zero pressure drop; rounding : float64[p]  size of the row, from which the round-off of the entry is estimated
     """
     if sides.shape[1] == 0:
         return np.zeros(0, dtype=bool)
     constant = np.abs(np.diff(sides, axis=0)) <= CONSTANT_SHARE * np.abs(sides[1:])
     clear = np.abs(sides[2:]) > np.maximum(HIDDEN_KINK * size, ROUNDING_SHARE * rounding / steps[2:, None])
     return np.logical_or.reduceat(np.any(constant[:-1] & constant[1:] & clear, axis=0), starts)
-
-
-DENSE = 1000  # greatest number of states for which A is a full array
-C_TIME, MAX_ENTRIES = 20.0, 10_000_000  # time limit of C [s], greatest number of its entries
-RATE_FLOOR = 1e-10  # of the greatest rate per deviation: smaller rows are round-off of sums
-TRIAL_DIRECTIONS = 3  # random directions along which A is checked
 
 
 def responses(at: OperatingPoint, y: np.ndarray, outputs: int) -> np.ndarray:
@@ -220,8 +202,7 @@ def matrix_entries(at: OperatingPoint, width, rows, columns, steps) -> tuple[np.
     """Central difference quotients of matrix entries, and forward minus backward ones : float64[steps, entries] each.
 
     They are changes of a rate per small deviation of a state.
-    width : float64[n]  small deviations; rows, columns : int64[entries]  rows and columns of the entries in A
-    steps : factors on the small deviations
+    rows, columns : int64[entries]  rows and columns of the entries in A
     """
     structure, slopes, sides = at.model.structure, [], []
     base = responses(at, at.y, 0)
@@ -251,13 +232,10 @@ def refuse_state(model, j: int, cause: str) -> None:
     """
     basin = next((part for part in model.basins if model.state_names[j].startswith(f"{part.name}.")), None)
     if basin is not None:
-        text = (
-            "fluxes of this basin have a kink near its state (equal wave speeds from both sides, or cells that run dry)"
-        )
-        raise FvsolveError(
-            f"the state cannot be linearised along {model.state_names[j]}: {text}; choose another time with --at"
-        )
+        cause = "basin"
     reason = {
+        "basin": "fluxes of this basin have a kink near its state (equal wave speeds from both sides, or cells that "
+                 "run dry); choose another time with --at",
         "slope": "the slopes there do not converge, as for a valve with a pressure drop of zero: give the valve the "
                  "key `laminar_reynolds`, or linearise at a time with flow (--at)",
         "kink": "the slopes for a rise and a fall of this state differ (a tank dry or full, an end stop or seat just "
@@ -269,8 +247,7 @@ def refuse_state(model, j: int, cause: str) -> None:
 def check_directions(at: OperatingPoint, a, width: np.ndarray, size: np.ndarray, steps: np.ndarray) -> None:
     """Check A along random directions of all states; raises FvsolveError if rates are not linear along them.
 
-    a : A; width : float64[n]  small deviations; size : float64[n]  sizes of the rows of A
-    steps : factors on the small deviations
+    a : A; size : float64[n]  sizes of the rows of A
     """
     model, rng = at.model, np.random.default_rng(1)
     base = responses(at, at.y, 0)
@@ -288,7 +265,6 @@ def check_directions(at: OperatingPoint, a, width: np.ndarray, size: np.ndarray,
 def output_matrix(at: OperatingPoint, outputs: int, steps: np.ndarray) -> tuple[np.ndarray, float]:
     """Matrix C : float64[outputs, n], and its error, by differences along each state on which an output depends.
 
-    outputs : number of outputs; steps : factors on the small deviations of states
     Raises FvsolveError for an output without a derivative, and if C is too large or takes too long.
     """
     n, width = at.model.y_size, small_deviations(at)
@@ -331,7 +307,7 @@ def too_large(n: int, outputs: int) -> FvsolveError:
 def visible_states(at: OperatingPoint, outputs: int, base: np.ndarray, width: np.ndarray) -> Iterator[int]:
     """Yield the numbers of the states that change an output, found by bisection of the range of states.
 
-    outputs : number of outputs; base : float64[outputs]  outputs at the state; width : float64[n]  small deviations
+    base : float64[outputs]  outputs at the state
     """
     rng, n = np.random.default_rng(2), width.size
     direction = rng.uniform(0.5, 1.0, n) * rng.choice([-1.0, 1.0], n) * width * STEPS[0]
