@@ -13,13 +13,10 @@ from fvsolve.case.text import path
 from fvsolve.errors import CaseError, Fault, FvsolveError, collect_faults, did_you_mean, listing
 from fvsolve.parts.schedule import Schedule
 from fvsolve.run import run
+from fvsolve.studies.result_table import PlainData
 from fvsolve.units import show
 
-START_SHAPES = (
-    0.0,
-    1.0,
-    -1.0,
-)  # half the log ratio of the first slope to the last, of the schedules that searches start from
+START_SHAPES = 0.0, 1.0, -1.0  # half the log ratio of the first slope to the last, of schedules at the start
 MAX_KNOTS = 12
 SIMPLEX_SIZE = 1.0  # edge length of the first simplex
 
@@ -38,7 +35,7 @@ class ValveSchedule:
 
 
 @dataclass(frozen=True)
-class Optimum:
+class Optimum(PlainData):
     """Result of an optimisation of a schedule.
 
     key : key of the schedule; minimise : quantity whose peak is minimised, such as "max(gate.pressure)"
@@ -53,11 +50,6 @@ class Optimum:
     best: ValveSchedule
     runs: int
     laws: list[ValveSchedule] = field(default_factory=list)
-
-    def plain(self) -> dict[str, Any]:
-        """Plain values for JSON."""
-        return {"key": self.key, "minimise": self.minimise, "unit": self.unit, "linear": vars(self.linear),
-                "best": vars(self.best), "runs": self.runs, "laws": [vars(law) for law in self.laws]}  # fmt: skip
 
     @property
     def schedule(self) -> str:
@@ -141,9 +133,8 @@ def optimise(
         minimize(search, z, method="Nelder-Mead",
                  options={"maxfev": evaluations, "initial_simplex": simplex, "xatol": 1e-2, "fatol": 0.0})  # fmt: skip
     if all(law.peak is None for law in search.laws):
-        raise FvsolveError(
-            f"no schedule gives {minimise} a finite value: {search.failure_reason or 'it is not a number'}"
-        )
+        reason = search.failure_reason or "it is not a number"
+        raise FvsolveError(f"no schedule gives {minimise} a finite value: {reason}")
     linear = search.laws[0]
     best = min(search.laws, key=lambda law: np.inf if law.peak is None else law.peak)
     return Optimum(key, minimise, search.unit, linear, best, len(search.laws), search.laws)

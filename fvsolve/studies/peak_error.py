@@ -4,6 +4,9 @@ Each error is bounded from the local extrema of a signal (`extrema.py`). The err
 bounded from the signals at some places of each part to which the limit applies. With column separation no order of
 convergence is assumed, because peaks after cavity collapse converge slowly (docs/cavitation.md). Without cells, a peak
 between two rows of output is higher than the rows by up to an eighth of their second difference.
+
+Arguments of several functions : runs, results at all resolutions, as from `refined_runs`; triple, values at half, one
+and twice the resolution
 """
 
 from __future__ import annotations
@@ -30,10 +33,8 @@ SIGNS = {"minimum": -1.0, "maximum": 1.0}
 SIDES = tuple(SIGNS)
 NO_FIELDS = {"output.fields": 0, "output.lines": {}}
 MIN_ROWS, MAX_ROWS = 500, 4000  # limits of the number of rows of signals, at the resolution of the run itself
-PLACES_PER_PART, MAX_PLACES = (
-    12,
-    400,
-)  # greatest number of places with signals: of a part under a bound, and of all limits
+PLACES_PER_PART = 12  # greatest number of places of a part with signals, under a bound
+MAX_PLACES = 400  # greatest number of places with signals, of all limits
 
 
 def peak_errors(result: Result, case: Any, progress: Callable[[str], None] | None = None) -> dict[str, Any]:
@@ -116,11 +117,8 @@ def selected_places(neighbours: PlaceMargins, rows: int) -> list[int]:
     padded = np.pad(margins, 1, constant_values=np.inf)
     least = np.flatnonzero((margins <= padded[:-2]) & (margins <= padded[2:]))
     least = least[np.argsort(margins[least], kind="stable")][: max(min(PLACES_PER_PART, most) // 2, 1)]
-    spaced = (
-        np.linspace(0, len(margins) - 1, min(PLACES_PER_PART, most) - len(least)).astype(int)
-        if most > len(least)
-        else []
-    )
+    count = max(min(PLACES_PER_PART, most) - len(least), 0)
+    spaced = np.linspace(0, len(margins) - 1, count).astype(int)
     return list(dict.fromkeys([int(np.argmin(margins)), *least.tolist(), *list(spaced)]))
 
 
@@ -136,14 +134,13 @@ def accepts_probes(case: Any, texts: list[str]) -> bool:
 def peak_rows(result: Result, runs: dict[float, Result], unresolved: Unresolved) -> dict[str, Any]:
     """Entry `peaks` of a summary, as in `peak_errors`: unit, least and greatest value of each probe, with their errors.
 
-    result : result of the case; runs : results at all resolutions, as from `refined_runs`
+    result : result of the case
     """
     summary, largest, rows = result.summary, {"rad": 1.0}, {}
     parts = {probe.text: (probe.part, probe.name) for probe in unresolved.case.probes}
     for extreme in summary["extremes"].values():
-        largest[extreme["unit"]] = max(
-            [largest.get(extreme["unit"], 0.0), *(abs(extreme[side] or 0.0) for side in SIDES)]
-        )
+        values = [abs(extreme[side] or 0.0) for side in SIDES]
+        largest[extreme["unit"]] = max(largest.get(extreme["unit"], 0.0), *values)
     for name, extreme in summary["extremes"].items():
         rows[name] = {"unit": extreme["unit"]}
         for side, sign in SIGNS.items():
@@ -168,8 +165,7 @@ def peak_rows(result: Result, runs: dict[float, Result], unresolved: Unresolved)
 def error_bound(runs: dict[float, Result], triple: Sequence[float | None], places: Sequence = ()) -> float | None:
     """Error bound of the second of three values at increasing resolutions; None if it is not known.
 
-    triple : greatest values at half, one and twice the resolution; places : for each place, its signals at these
-    resolutions, with a sign such that the peak is a maximum
+    places : for each place, its signals at these resolutions, with a sign such that the peak is a maximum
     """
     c, *finer = triple
     if not all(value is not None and math.isfinite(value) for value in finer):
@@ -199,7 +195,7 @@ def signals(runs: dict[float, Result], probe: str, rising: Callable[[np.ndarray]
 def limit_row(runs: dict[float, Result], limit: int, k: int, row: dict[str, Any], unresolved: Unresolved) -> dict:
     """Row of a limit with its error. A limit that holds becomes open if the error is unknown or above the margin.
 
-    runs : results at all resolutions, as from `refined_runs`; limit, k : indices of the limit and of the row in these
+    limit, k : indices of the limit and of the row in these
     results; row : row of `run.verdicts.places`
     """
     sign, magnitude = SIGNS[row["bound"]], row["quantity"] in MAGNITUDES
@@ -211,14 +207,12 @@ def limit_row(runs: dict[float, Result], limit: int, k: int, row: dict[str, Any]
     part = (row[PLACES_KEY].probes[0].split(".")[0], row["place"])
     error = None if part in unresolved.unknown else error_bound(runs, triple, places)
     span = max((float(np.ptp(run[-2][1])) for run in places if usable(run)), default=math.inf)
+    size = abs(row["value"] or 0.0)
     if error is not None:
-        error += RELATIVE_FLOOR * abs(row["value"] or 0.0) + unresolved.tolerance * (
-            span if math.isfinite(span) else 0.0
-        )
+        error += RELATIVE_FLOOR * size + unresolved.tolerance * (span if math.isfinite(span) else 0.0)
     doubtful = row["state"] == HOLDS and (error is None or not row["margin"] >= error)
-    reason = unresolved.reason(
-        part, triple, error, span + 2.0 * RELATIVE_FLOOR / WIDE_ERROR * abs(row["value"] or 0.0), row["unit"]
-    )
+    span_and_floor = span + 2.0 * RELATIVE_FLOOR / WIDE_ERROR * size
+    reason = unresolved.reason(part, triple, error, span_and_floor, row["unit"])
     return row | {"error": error, "reason": reason, "state": OPEN if doubtful else row["state"]}
 
 

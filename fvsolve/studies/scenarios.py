@@ -22,14 +22,7 @@ from fvsolve.studies.parallel import PickledCase, run_tasks
 from fvsolve.units import show
 
 KEYS = ("case", "title", "estimate_error", "events", "protections")
-NAMED_TABLES = (
-    "nodes",
-    "links",
-    "limits",
-    "routes",
-    "scalars",
-    "defaults",
-)  # tables of named parts: keys are set one by one
+NAMED_TABLES = "nodes", "links", "limits", "routes", "scalars", "defaults"  # of parts: keys are set one by one
 AddFault = Callable[[tuple, str], None]
 
 
@@ -68,11 +61,8 @@ def read_scenarios(path: str | Path) -> Scenarios:
         faults.setdefault((place, message), Fault(place, message, line))
 
     if {"nodes", "fluid"} & data.keys():
-        text = (
-            f'is a case, not a study. A study refers to it by case = "{path.name}" '
-            "and has [events.NAME], [protections.NAME]"
-        )
-        raise CaseError([Fault("", text)], path.name)
+        text = f'A study refers to it by case = "{path.name}" and has [events.NAME], [protections.NAME]'
+        raise CaseError([Fault("", f"is a case, not a study. {text}")], path.name)
     for key in data:
         if key not in KEYS:
             fault((key,), f"unknown key{did_you_mean(key, KEYS) or '. Expected ' + ', '.join(KEYS)}")
@@ -191,10 +181,8 @@ def all_conflicts(events: dict, protections: dict) -> Iterator[tuple[str, str, s
     """
     for event, of_event in events.items():
         for protection, of_protection in protections.items():
-            yield from (
-                (event, protection, event_key, protection_key)
-                for event_key, protection_key in conflicting_keys(of_event, of_protection)
-            )
+            for keys in conflicting_keys(of_event, of_protection):
+                yield event, protection, *keys
 
 
 def conflicting_keys(first: dict[str, Any], second: dict[str, Any]) -> Iterator[tuple[str, str]]:
@@ -286,11 +274,8 @@ class ScenarioResults:
         by_protection: dict[str, list[dict[str, Any]]] = {}
         for row in self.rows:
             by_protection.setdefault(row["protection"] or "", []).append(row)
-        return [
-            name
-            for name, rows in by_protection.items()
-            if all(map(run_passes, rows)) and any(row["verdicts"] for row in rows)
-        ]
+        return [name for name, rows in by_protection.items()
+                if all(map(run_passes, rows)) and any(row["verdicts"] for row in rows)]  # fmt: skip
 
     @property
     def limited(self) -> bool:
@@ -389,11 +374,8 @@ def write_study(results: ScenarioResults) -> None:
     temporary.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
     os.replace(temporary, results.folder / STUDY)
     limits = list(dict.fromkeys(verdict["name"] for row in results.rows for verdict in row["verdicts"]))
-    columns = [
-        f"{name} {quantity}"
-        for name in limits
-        for quantity in ("value", "margin", "unit", "state", "place", "time [s]")
-    ]
+    quantities = ("value", "margin", "unit", "state", "place", "time [s]")
+    columns = [f"{name} {quantity}" for name in limits for quantity in quantities]
     with open(results.folder / "study.csv", "w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(["event", "protection", "ok", "reason", *columns])

@@ -100,9 +100,8 @@ def parse_range(low: Any, high: Any) -> tuple[float, float, str]:
     if unit_a != unit_b:
         first, second = UNITS.get(unit_a), UNITS.get(unit_b)
         if first is None or second is None or first.dimension != second.dimension or first.gauge != second.gauge:
-            raise FvsolveError(
-                f"{show(low)} and {show(high)} have different kinds of units. Use the same unit for both"
-            )
+            text = f"{show(low)} and {show(high)} have different kinds of units"
+            raise FvsolveError(f"{text}. Use the same unit for both")
         a = float(second.number(first.si(a)))
     if not a < b:
         raise FvsolveError(f"{show(low)} is not below {show(high)}. Expected LOW,HIGH")
@@ -209,25 +208,13 @@ class SizeSearch:
 
 def size_run(value: float, result: Any) -> SizeRun:
     """`SizeRun` from the limit verdicts in the result of a run with this value of the key."""
-    margins = [
-        (relative_margin(row, verdict.quantity), verdict.name) for verdict in result.verdicts for row in verdict.worst
-    ]
-    margin, name = min(margins)
-    ok, failed = (
-        all(verdict.ok for verdict in result.verdicts),
-        any(verdict.state == FAILS for verdict in result.verdicts),
-    )
-    doubts = [verdict.text for verdict in result.marks] + [
-        verdict.text for verdict in result.warnings if verdict.kind == "end"
-    ]
-    doubts += [
-        f"{verdict.name}: its margin is smaller than its error" for verdict in result.verdicts if verdict.doubtful
-    ]
-    doubts += [
-        f"{verdict.name}: its {'value' if verdict.margin is None else 'error'} is not known"
-        for verdict in result.verdicts
-        if verdict.state == OPEN and not verdict.doubtful
-    ]
+    limits = result.verdicts
+    margin, name = min((relative_margin(row, limit.quantity), limit.name) for limit in limits for row in limit.worst)
+    ok, failed = all(limit.ok for limit in limits), any(limit.state == FAILS for limit in limits)
+    doubts = [mark.text for mark in result.marks] + [text.text for text in result.warnings if text.kind == "end"]
+    doubts += [f"{limit.name}: its margin is smaller than its error" for limit in limits if limit.doubtful]
+    doubts += [f"{limit.name}: its {'value' if limit.margin is None else 'error'} is not known"
+               for limit in limits if limit.state == OPEN and not limit.doubtful]  # fmt: skip
     reason = "" if ok or failed or not result.ok else next(iter(doubts), "")
     is_known = result.ok and (ok or margin < 0.0) and math.isfinite(margin)
     return SizeRun(value, result.ok and ok, margin if is_known else None, name, result.reason, reason)

@@ -133,7 +133,7 @@ def pipe_model(scheme: str, method: str, courant: float, steps: int = 1):
 
 def worst_state(scheme: str, method: str, courant: float) -> np.ndarray:
     """State whose energy a step increases most."""
-    from fvsolve.steppers import stability_function
+    from fvsolve.steppers import method_named, stability_function
 
     a, s = closed_pipe(scheme)
     b = courant * study.pipe_operator(scheme)
