@@ -25,9 +25,7 @@ CORRELATED = 0.999  # correlation of errors above which two keys cannot be disti
 AT_BOUND = 1e-3  # distance from an end of the range, as a fraction of it, below which a value counts as at the end
 MAX_ROUNDS = 6  # greatest number of rounds of weights
 WEIGHT_TOLERANCE = 0.01  # relative change of weights below which the rounds end
-LEAST_SCATTER = (
-    1e-6  # least scatter as a fraction of the range of a series, from the digits of files and from time steps
-)
+LEAST_SCATTER = 1e-6  # least scatter as a fraction of the range of a series, from digits of files and time steps
 FAILED_RESIDUAL = 1e6  # residual of a run that failed
 
 
@@ -136,9 +134,7 @@ class LeastSquaresFit:
     bounds : key -> (low, high) [SI]; points : values of the keys in the runs of the sample
     """
 
-    def __init__(
-        self, case: Case, bounds: dict[str, tuple[float, float]], points: list[dict], progress: Callable
-    ) -> None:
+    def __init__(self, case: Case, bounds: dict, points: list[dict], progress: Callable) -> None:
         self.case, self.bounds, self.points, self.progress = case, bounds, points, progress
         self.low, high = (np.array(side) for side in zip(*bounds.values(), strict=True))
         self.width = high - self.low
@@ -178,9 +174,8 @@ class LeastSquaresFit:
         degrees = np.array([len(part) - np.einsum("ij,jk,ik->", part, inverse, part) for part in parts])
         squares = np.array([float(series @ series) for series in differences])
         pooled = squares.sum() / max(1.0, sum(series.size for series in differences) - answer.x.size)
-        return np.sqrt(
-            np.maximum(np.where(degrees > 1.0, squares / np.maximum(degrees, 1.0), pooled), LEAST_SCATTER**2)
-        )
+        variances = np.where(degrees > 1.0, squares / np.maximum(degrees, 1.0), pooled)
+        return np.sqrt(np.maximum(variances, LEAST_SCATTER**2))
 
     def weighted(self, differences: list[np.ndarray]) -> np.ndarray:
         """Differences of all series, multiplied by the weight of their series and joined to one array."""
@@ -232,9 +227,9 @@ class LeastSquaresFit:
             near = np.clip(np.where(np.arange(x.size) == k, at, x), 0.0, 1.0)
             if len(results) < 2 and (differences := self.differences(near)):
                 results.append((near[k], self.weighted(differences)))
-        return (
-            (results[1][1] - results[0][1]) / (results[1][0] - results[0][0]) if len(results) == 2 else np.zeros(size)
-        )
+        if len(results) < 2:
+            return np.zeros(size)
+        return (results[1][1] - results[0][1]) / (results[1][0] - results[0][0])
 
     def differences(self, x: np.ndarray) -> list[np.ndarray]:
         """Run the case at x; returns the differences of every series as `Residuals`, or [] if the run fails."""
@@ -283,8 +278,6 @@ def identifiability(slopes: np.ndarray, keys: list[str]) -> tuple[np.ndarray, li
         for k, other_key in enumerate(keys[:j]):
             correlation = float(inverse[j, k] / (root[j] * root[k]))
             if abs(correlation) > CORRELATED and last not in without_effect and other_key not in without_effect:
-                doubts.append(
-                    f"{other_key} and {last} cannot be distinguished: "
-                    f"the correlation of their errors is {correlation:.5f}"
-                )
+                reason = f"the correlation of their errors is {correlation:.5f}"
+                doubts.append(f"{other_key} and {last} cannot be distinguished: {reason}")
     return inverse, doubts

@@ -141,6 +141,5 @@ def differing_versions(here: dict[str, str], there: dict[str, str]) -> list[str]
 
     here, there : package -> version
     """
-    return [
-        f"{name} {there.get(name)} (here {version})" for name, version in here.items() if there.get(name) != version
-    ]
+    texts = {name: f"{name} {there.get(name)} (here {version})" for name, version in here.items()}
+    return [text for name, text in texts.items() if there.get(name) != here[name]]

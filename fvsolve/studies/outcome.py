@@ -171,11 +171,8 @@ def refuse_basins(case, study: str, allow_sloshing: bool = False) -> None:
 
     study : name of the study in the message; allow_sloshing : True to accept basins with a free surface on bodies
     """
-    names = [
-        name
-        for name in case.meshes
-        if not (allow_sloshing and case.nodes[name].on and case.nodes[name].physics_type.has_modes)
-    ]
+    sloshing = [name for name in case.meshes if case.nodes[name].on and case.nodes[name].physics_type.has_modes]
+    names = [name for name in case.meshes if not (allow_sloshing and name in sloshing)]
     if names:
         raise FvsolveError(f"{study} does not support basins yet; the case has {listing(names)}")
 

@@ -36,11 +36,6 @@ def delay_lines(case) -> list[str]:
     return [name for name, pipe in line_methods(case).items() if pipe.pipe_model == "delay-line"]
 
 
-def slowest_line(case) -> str:
-    """Name of the delay line with the longest travel time; its key `cells` limits the step if the case states none."""
-    return slowest_pipe(case, delay_lines(case))
-
-
 def fixed_choices(case) -> dict[str, str]:
     """Overrides that replace `pipe_model = "auto"` by its present choice for each pipe.
 
@@ -49,16 +44,14 @@ def fixed_choices(case) -> dict[str, str]:
     """
     from fvsolve.run import model_of
 
-    undecided = [
-        name for name in delay_lines(case) if (case.links[name].pipe_model or case.numerics.pipe_model) == "auto"
-    ]
+    own = case.numerics.pipe_model
+    undecided = [name for name in delay_lines(case) if (case.links[name].pipe_model or own) == "auto"]
     if not undecided:
         return {}
     model = model_of(case)
     pairs = zip(model.pipes, model.tables.pipes["delay"] >= 0, strict=True)
-    return pipe_model_keys(
-        {pipe.name: "delay-line" if delayed else "finite-volume" for pipe, delayed in pairs if pipe.name in undecided}
-    )
+    models = {pipe.name: "delay-line" if delayed else "finite-volume" for pipe, delayed in pairs}
+    return pipe_model_keys({name: models[name] for name in models if name in undecided})
 
 
 def as_cells(names: Iterable[str]) -> dict[str, str]:
@@ -197,12 +190,8 @@ def greatest_wave_rate(case, cells_by_key: Mapping[str, tuple[int, ...]]) -> flo
 def scheme_order(case) -> int:
     """Order of the scheme in smooth flow, the least of all parts with cells."""
     scheme = SCHEMES[case.numerics.scheme]
-    return min(
-        [
-            scheme.order,
-            *(scheme.for_basin(bool(basin.cells) and not basin.holes).order for basin in basins(case).values()),
-        ]
-    )
+    of_basins = [scheme.for_basin(bool(basin.cells) and not basin.holes) for basin in basins(case).values()]
+    return min(entry.order for entry in (scheme, *of_basins))
 
 
 def order_varies(case) -> bool:
@@ -241,12 +230,8 @@ def refinable_counts(case) -> Counts:
     """Numbers of cells that can be doubled, as from `cell_counts`. Raises FvsolveError without such cells."""
     cells_by_key = cell_counts(case)
     if not cells_by_key:
-        files = basins_from_files(case)
-        reason = (
-            f"meshes from files cannot be refined ({listing(files)})"
-            if files
-            else "this case has no pipe or basin, and so no cells"
-        )
+        files, reason = basins_from_files(case), "this case has no pipe or basin, and so no cells"
+        reason = f"meshes from files cannot be refined ({listing(files)})" if files else reason
         raise FvsolveError(f'{reason}: refine = "both" or "space" is impossible. Expected "time"')
     return cells_by_key
 
@@ -275,14 +260,14 @@ def refined_keys(case, times: float) -> dict[str, Any]:
 def refined_step_keys(case, times: float) -> dict[str, Any]:
     """Overrides with which a case with delay lines takes `times` as many steps; empty if the case states the step.
 
-    If the case states a Courant number and has no cells, this number changes. Otherwise the key `cells` of the slowest
-    line changes, which then sets the step.
+    If the case states a Courant number and has no cells, this number changes. Otherwise the key `cells` of the delay
+    line with the longest travel time changes, which then sets the step.
     """
     if case.numerics.step is not None:
         return {}
     if case.numerics.courant is not None and not cell_counts(case):
         return {"numerics.courant": case.numerics.courant / times}
-    name = slowest_line(case)
+    name = slowest_pipe(case, delay_lines(case))
     return {f"links.{name}.cells": max(1, round(case.links[name].cells * times))}
 
 
@@ -324,14 +309,12 @@ def project_to(fine, values, coarse) -> np.ndarray:
     fine_grid, coarse_grid = fine.mesh.grid, coarse.mesh.grid
     degree = SPLINE_DEGREE if fine.is_grid else 1  # higher splines would smooth across holes
     averages = []
+    fine_area, coarse_area = (np.outer(np.diff(grid.y), np.diff(grid.x)) for grid in (fine_grid, coarse_grid))
     for value in values:
-        contents = np.where(fine_grid.index >= 0, value[fine_grid.index], 0.0) * np.outer(
-            np.diff(fine_grid.y), np.diff(fine_grid.x)
-        )
-        contents = coarse_contents(
-            coarse_contents(contents, fine_grid.x, coarse_grid.x, degree, 1), fine_grid.y, coarse_grid.y, degree, 0
-        )
-        averages.append((contents / np.outer(np.diff(coarse_grid.y), np.diff(coarse_grid.x)))[coarse_grid.index >= 0])
+        contents = np.where(fine_grid.index >= 0, value[fine_grid.index], 0.0) * fine_area
+        contents = coarse_contents(contents, fine_grid.x, coarse_grid.x, degree, 1)
+        contents = coarse_contents(contents, fine_grid.y, coarse_grid.y, degree, 0)
+        averages.append((contents / coarse_area)[coarse_grid.index >= 0])
     return np.array(averages)
 
 

@@ -95,6 +95,8 @@ def row_of(model, summary, sink) -> dict[str, Any]:
     None replaces values that are not finite, and all values of probes if the run diverged.
     sink : `MemorySink` with the output of the run
     """
+    from fvsolve.run.verdicts import verdicts
+
     row = {"ok": bool(summary.ok), "reason": summary.reason, "t [s]": plain(float(summary.t))}
     row["marks"] = min(summary.marks, key=lambda mark: mark.time).text if summary.marks else ""
     row["warnings"] = [plain(column.plain()) for column in (*model.warnings, *summary.warnings)]
@@ -123,13 +125,6 @@ def expectations_of(model, summary, sink) -> list[dict[str, Any]]:
     summary_data = {"probes": probes, "time_unit": sink.time.unit, "ambient_pressure": model.case.ambient_pressure}
     result = Result(summary_data, sink.table, sink.envelope)
     return expectations(model, summary, result)
-
-
-def verdicts(model, summary) -> list[dict[str, Any]]:
-    """Limit verdicts of the case, as in the summary of a run."""
-    from fvsolve.run.verdicts import verdicts
-
-    return verdicts(model, summary)
 
 
 FIRST_COLUMNS = ("ok", "reason", "t [s]", "marks", "warnings", "fluid")
@@ -282,9 +277,8 @@ def planned_values(
     if points is not None:
         if vary or sample:
             raise FvsolveError("`points` has all values of every run. Expected no `vary` and no `sample` in addition")
-        runs = (
-            points_from_file(Path(points), source, raw) if PATH.accepts(points) else [dict(point) for point in points]
-        )
+        in_file = PATH.accepts(points)
+        runs = points_from_file(Path(points), source, raw) if in_file else [dict(point) for point in points]
         if not runs or not runs[0] or any(point.keys() != runs[0].keys() for point in runs):
             raise FvsolveError("`points` is empty or has different keys. Expected one or more keys, equal in every run")
         return runs
@@ -313,9 +307,8 @@ class SweepRun:
         self.digests: dict[str, str] = {}  # name of a file -> hash of its content
         relevant = {key: value for key, value in raw.items() if key not in TEXT_KEYS}
         versions_used = program_versions() | {"numba": "", "coolprop": coolprop_version()}
-        self.identity = digest_of(
-            {**versions_used, "case": relevant, "base": base, "files": [*self.files((relevant, base))]}
-        )
+        files = [*self.files((relevant, base))]
+        self.identity = digest_of({**versions_used, "case": relevant, "base": base, "files": files})
 
     def run(self, folder: Path | None, jobs: int, dask: str | None) -> Sweep:
         """Compute all rows; files are written if there is a folder, also after an interruption."""
@@ -330,17 +323,15 @@ class SweepRun:
 
     def fill(self, jobs: int, dask: str | None) -> None:
         """Read the rows of earlier sweeps, then run the remaining ones."""
-        keys = [
-            digest_of({"who": self.identity, "set": values, "files": [*self.files(values)]}) for values in self.runs
-        ]
+        identities = [{"who": self.identity, "set": values, "files": [*self.files(values)]} for values in self.runs]
+        keys = [digest_of(identity) for identity in identities]
         for index, key in enumerate(keys):
             if (earlier := self.cache.lookup(key)) is not None:
                 self.rows[index] = self.runs[index] | earlier
         waiting = [index for index in range(len(keys)) if index not in self.rows]
         self.report_progress(waiting[:1])
-        for number, row in run_tasks(
-            RowMaker(self.source, self.base), [self.runs[index] for index in waiting], jobs, dask
-        ):
+        tasks = [self.runs[index] for index in waiting]
+        for number, row in run_tasks(RowMaker(self.source, self.base), tasks, jobs, dask):
             index = waiting[number]
             self.rows[index] = self.runs[index] | self.cache.store(keys[index], ROW_VERSION, row)
             self.report_progress([index + 1] if index + 1 < len(keys) else [])
@@ -364,15 +355,14 @@ class SweepRun:
         own, remaining = len(self.rows) - self.cache.reused, len(self.runs) - len(self.rows)
         spent = time.perf_counter() - self.began
         text = f"{duration_text(spent / own * remaining)} left, " if own and remaining else ""
-        self.progress(
-            len(self.rows), len(self.runs), text + "".join(_values_text(self.runs[index]) for index in coming)
-        )
+        for index in coming:
+            text += ", ".join(f"{key} = {as_option_text(value)}" for key, value in self.runs[index].items())
+        self.progress(len(self.rows), len(self.runs), text)
 
     def files(self, values: Any) -> Iterator[str]:
         """Hashes of the contents of all files whose names occur in nested dicts and lists of values."""
-        for value in (
-            values.values() if isinstance(values, Mapping) else values if isinstance(values, (list, tuple)) else ()
-        ):
+        inner = values.values() if isinstance(values, Mapping) else values
+        for value in inner if isinstance(values, (Mapping, list, tuple)) else ():
             if isinstance(value, str):
                 yield from self.digest(value)
             else:
@@ -406,10 +396,6 @@ def duration_text(seconds: float) -> str:
     if seconds < 100.0:
         return f"{seconds:.0f} s"
     return f"{seconds / 60.0:.0f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.1f} h"
-
-
-def _values_text(values: Mapping[str, Any]) -> str:
-    return ", ".join(f"{key} = {as_option_text(value)}" for key, value in values.items())
 
 
 def as_option_text(value: Any) -> str:

@@ -166,10 +166,8 @@ class _ChartStudy:
         """
         if not delay_lines(self.case):
             return None if self.finest is None else cell_keys(self.case, self.finest)
-        main, cells = (
-            main_part_name(self.case) or main_part_name(self.case_in_cells),
-            self.finest or max(self.coarse.levels),
-        )
+        main = main_part_name(self.case) or main_part_name(self.case_in_cells)
+        cells = self.finest or max(self.coarse.levels)
         keys = cell_keys(self.case, cells) if self.finest else {}
         return keys | cells_for_lines(self.case, self.case.links[main].length / self.case.wave_speed(main) / cells)
 

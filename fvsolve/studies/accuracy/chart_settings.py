@@ -203,9 +203,8 @@ def run_coarse(case: Case) -> CoarseRun:
     result = best_run(model, most=1)
     fraction = (result.t - case.numerics.start) / span  # less than 1 if the run was stopped
     finer_model = study_model(case, cells_setting(case, default_scheme(case), DEFAULT_METHOD, 2 * cells).keys)
-    cell_time = (rhs_seconds(finer_model) - rhs_seconds(model)) / max(
-        1, finer_model.all_cells - model.all_cells
-    )  # nodes also cost time
+    more_cells = max(1, finer_model.all_cells - model.all_cells)
+    cell_time = (rhs_seconds(finer_model) - rhs_seconds(model)) / more_cells  # a difference: nodes also cost time
     dearness = max(1.0, cell_time / CELL_TIME)
     sizes = None if basin_cells(case) is None else basin_sizes(case)
     works = [] if sizes else [run_work(case, MAX_CELLS >> k) for k in range(MAX_CELLS.bit_length() - LEVEL_COUNT)]
@@ -232,11 +231,8 @@ def run_work(case: Case, cells: int) -> float:
     """Cells times steps of a run at Courant number 1, with `cells` cells in the main part (see `main_part_name`)."""
     changed = load(case, cell_keys(case, cells))
     cells_by_key = cell_counts(changed)
-    return (
-        total_cells(changed, cells_by_key)
-        * (case.numerics.end - case.numerics.start)
-        * greatest_wave_rate(changed, cells_by_key)
-    )
+    span = case.numerics.end - case.numerics.start
+    return total_cells(changed, cells_by_key) * span * greatest_wave_rate(changed, cells_by_key)
 
 
 def default_scheme(case: Case) -> str:
@@ -273,10 +269,8 @@ def chart_settings(
         raise FvsolveError(
             f"{case.name} has cells, so its resolution is the number of cells. Use --cells instead of --rtol and --step"
         )
-    pairs, levels = (
-        scheme_method_pairs(case, schemes, methods, coarse_run.stiff),
-        sorted({*(cells or coarse_run.levels)}),
-    )
+    pairs = scheme_method_pairs(case, schemes, methods, coarse_run.stiff)
+    levels = sorted({*(cells or coarse_run.levels)})
     return [cells_setting(case, *pair, level) for pair in pairs for level in levels]
 
 
@@ -308,11 +302,8 @@ def _delay_line_settings(case: Case, schemes, methods, cells, rtol, step) -> lis
         )
     travel = max(pipe.length / case.wave_speed(name) for name, pipe in pipes(case).items())
     steps = sorted(step or [float(f"{travel / n:.2g}") for n in TRAVEL_PARTS], reverse=True)
-    return [
-        lumped_setting(method, size, "step")
-        for method in dict.fromkeys([*(methods or DELAY_LINE_METHODS), DEFAULT_METHOD])
-        for size in steps
-    ]
+    chosen = dict.fromkeys([*(methods or DELAY_LINE_METHODS), DEFAULT_METHOD])
+    return [lumped_setting(method, size, "step") for method in chosen for size in steps]
 
 
 def scheme_method_pairs(

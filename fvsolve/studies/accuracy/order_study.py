@@ -304,24 +304,18 @@ class OrderStudy:
         rows = []
         for level, run, after in zip(self.plan.levels, runs, [*runs[1:], None], strict=True):
             both = run.ok and after is not None and after.ok
-            rows.append(
-                row_of_run(level, run, error_norms(run, reference_of_run(after), self.probe_names) if both else {})
-            )
+            errors = error_norms(run, reference_of_run(after), self.probe_names) if both else {}
+            rows.append(row_of_run(level, run, errors))
         names = next((row.errors for row in rows if row.errors), {})
         good = next((run for run in runs if run.ok), None)
         if good is None:
             raise FvsolveError(f"no row could be run: {runs[0].reason}")
         sizes = {name: variable_size(good, name) for name in names}
         result, theory = self.fitted_order(rows, "richardson", RICHARDSON, {}, sizes), self.theory()
-        fits = {
-            name: {
-                norm: mark_finest(check_three_differences(fitted, theory[norm]), rows) for norm, fitted in norms.items()
-            }
-            for name, norms in result.fits.items()
-        }
-        return replace(
-            result, rows=extrapolate(rows, fits), fits=fits, notes=(*result.notes, *difference_notes(rows, fits))
-        )
+        fits = {name: {norm: mark_finest(check_three_differences(fitted, theory[norm]), rows)
+                       for norm, fitted in norms.items()} for name, norms in result.fits.items()}  # fmt: skip
+        notes = *result.notes, *difference_notes(rows, fits)
+        return replace(result, rows=extrapolate(rows, fits), fits=fits, notes=notes)
 
 
 def check_order(fitted: Fit, smooth_order: float) -> Fit:

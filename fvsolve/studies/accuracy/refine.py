@@ -155,9 +155,9 @@ def delay_line_plan(case, way: str, levels: int) -> Plan:
         first = 1.0 / greatest_wave_rate(case, cell_counts(case)) if by_error else step
         refined = [Level(row if by_error else row | {"numerics.step": step / 2**k}, first / 2**k, count, step / 2**k)
                    for k, row in enumerate(rows)]  # fmt: skip
-        return Plan(
-            way, "longest step [s]" if by_error else "step [s]", tuple(refined), STRETCH_AND_STEP_WORDS[by_error]
-        )
+        what = "longest step" if by_error else "step"
+        words = f"{STRETCH_WORDS}, and {'the longest step' if by_error else 'steps'} halved"
+        return Plan(way, f"{what} [s]", tuple(refined), words)
     tables = [study_model(case, row).tables.delays for row in rows]
     line = int(np.argmax(tables[-1]["stretches"]))
     if tables[0]["stretches"][line] == tables[-1]["stretches"][line]:
@@ -169,10 +169,6 @@ def delay_line_plan(case, way: str, levels: int) -> Plan:
 
 
 STRETCH_WORDS = "tolerance of delay lines halved, so that they have twice as many stretches"
-STRETCH_AND_STEP_WORDS = {
-    False: f"{STRETCH_WORDS}, and steps halved",
-    True: f"{STRETCH_WORDS}, and the longest step halved",
-}
 
 
 def stretch_keys(case, way: str, k: int) -> dict:
@@ -342,22 +338,16 @@ def affordable_plan(
     refinement = refinement_plan(case, refine, key, levels, cells)
     if cells is not None or key is not None or refinement.way == "time" or not cell_counts(case):
         return refinement
-    settings = {
-        "study": "order",
-        "what": "first cells",
-        "way": refinement.way,
-        "levels": len(refinement.levels),
-        "against": against,
-    }
+    settings = {"study": "order", "what": "first cells", "way": refinement.way, "levels": len(refinement.levels),
+                "against": against}  # fmt: skip
     stored = None if points is None else points.find(case, settings)
     first = stored["cells"] if stored else first_cells(case, refinement, refine, levels, against)
     if first == most_cells(cell_counts(case)):
         return refinement
     if points is not None and stored is None:
         points.get(case, settings, lambda: {"cells": first})
-    remark = (
-        f"starts with {first} of {most_cells(cell_counts(case))} cells, to end within minutes (change with --cells)"
-    )
+    of_case = most_cells(cell_counts(case))
+    remark = f"starts with {first} of {of_case} cells, to end within minutes (change with --cells)"
     refinement = refinement_plan(case, refine, key, levels, first)
     return replace(refinement, words=f"{refinement.words}; {remark}")
 

@@ -312,11 +312,8 @@ class Chart(Displayable):
     def plain(self) -> dict:
         """Return the chart as plain data, SI; `paste` is the setting for a target error, in TOML for the case file."""
         stands = None if self.stands is None else asdict(self.stands)
-        return (
-            asdict(self)
-            | {"stands": stands}
-            | ({} if self.aim is None else {"paste": "\n".join(self.aim.toml_lines())})
-        )
+        paste = {} if self.aim is None else {"paste": "\n".join(self.aim.toml_lines())}
+        return asdict(self) | {"stands": stands} | paste
 
 
 def toml_value(value) -> str:
@@ -368,18 +365,12 @@ def chart_picture(chart: Chart, title: str = ""):
     curves = []
     for name, points in chart.curves().items():
         setting = points[0].setting
-        curves.append(
-            Curve(
-                setting.scheme or setting.method,
-                setting.method,
-                [np.array([getattr(point, key) for point in points]) for key in ("trajectory", "end")],
-                [np.array([getattr(point, key) for point in points], float) for key in ("seconds", "updates")],
-                np.array([not point.ok for point in points]),
-                name == chart.default,
-            )
-        )
+        errors = [np.array([getattr(point, key) for point in points]) for key in ("trajectory", "end")]
+        costs = [np.array([getattr(point, key) for point in points], float) for key in ("seconds", "updates")]
+        failed = np.array([not point.ok for point in points])
+        first = setting.scheme or setting.method
+        curves.append(Curve(first, setting.method, errors, costs, failed, name == chart.default))
     work = "cell updates" if any(point.setting.cells for point in chart.points) else "rates evaluated x states"
     floors = [chart.floor[key] or 0.0 for key in ("trajectory", "end")]
-    return chart_figure(
-        curves, ERROR_LABELS, ("CPU time [s]", work), floors, title or f"{chart.case}: error against cost"
-    )
+    title = title or f"{chart.case}: error against cost"
+    return chart_figure(curves, ERROR_LABELS, ("CPU time [s]", work), floors, title)

@@ -180,9 +180,8 @@ def energy(case, set=None, port: str | None = None, progress=None) -> Energy:
 def ledger(run: EnergyRun, summary, port: str | None) -> Energy:
     """Energy balance of a finished run, from its recorded energies; summary : its `Summary`; port : as in `energy`."""
     accounts, totals, holdings = run.accounts, np.array(run.totals), np.array(run.holdings)
-    lines = {
-        kind: lines_by_name(accounts.accounts, kind, totals) for kind in ("supplied", "dissipated", "scheme", "law")
-    }
+    kinds = ("supplied", "dissipated", "scheme", "law")
+    lines = {kind: lines_by_name(accounts.accounts, kind, totals) for kind in kinds}
     stored = lines_by_name(accounts.stored_accounts, "stored", holdings)
     impact_losses = np.array(run.losses)
     for name, column in zip(run.model.column_names, impact_losses.T, strict=True):
@@ -252,16 +251,14 @@ def port_verdict(run: EnergyRun, port: str) -> Port:
 
 def port_text(port: Port, case) -> str:
     """Verdict on the passivity at a port as a sentence, in the units of `[output]` of the case."""
-    work, least, own_bound, others, margin = (
-        case.amount(energy_value, "energy", 6)
-        for energy_value in (port.work, 0.0 - port.at_start, -(port.at_start + port.others), port.others, port.margin)
-    )
+    energies = port.work, 0.0 - port.at_start, -(port.at_start + port.others), port.others, port.margin
+    work, least, own_bound, others, margin = (case.amount(value, "energy", 6) for value in energies)
     if port.others:
         bound = f"-(E0 + others) = {own_bound} (E0: energy stored at the start; others: {others} from other ports)"
     else:
         bound = f"-E0 = {least} (E0: energy stored at the start)"
     verdict = "passive over this run" if port.passive else "NOT passive: the network supplied more energy than it had"
-    time, margin_time = (case.amount(energy_value, "time", 6) for energy_value in (port.time, port.t_margin))
+    time, margin_time = (case.amount(value, "time", 6) for value in (port.time, port.t_margin))
     return (f"port {port.node}: integral of p q falls to {work} at {time}, its bound is {bound}; "
             f"least margin {margin} at {margin_time}: {verdict}")  # fmt: skip
 
@@ -327,9 +324,7 @@ def measure_pairs(
 
 def pair_result(case, scheme: str, method: str, port: str | None, watch=None) -> dict:
     """Row of a pair: energy remainders of a run of the case with this scheme and method, see `measure_pairs`."""
-    missing = dict.fromkeys(
-        ("remainder", "scheme_loss", "step_loss", "newton_loss", "least", "relative", "creates", "margin")
-    )
+    missing = {column.key: None for column in PAIR_COLUMNS if column.key not in ("scheme", "method", "reason")}
     try:
         result = energy(case, {"numerics.scheme": scheme, "numerics.method": method}, port, watch)
     except CaseError as error:

@@ -115,10 +115,8 @@ class EnergyLoop(RunLoop):
             b = self.power_weights()
         begin, end = t + min(0.0, float(c.min())) * h, t + max(1.0, float(c.max())) * h
         for jump_time in jump_times(past, self.model.tables.delays, begin, end):
-            before, after = (
-                self.power(time, y + (time - t) / h * (self.now - y))
-                for time in (jump_time - 2.0 * separation, jump_time + 2.0 * separation)
-            )
+            sides = jump_time - 2.0 * separation, jump_time + 2.0 * separation
+            before, after = (self.power(time, y + (time - t) / h * (self.now - y)) for time in sides)
             booked = h * float(b[t + c * h >= jump_time - separation].sum())
             total[:-1] += (after - before) * (min(h, max(0.0, self.t - jump_time)) - booked)
         return total

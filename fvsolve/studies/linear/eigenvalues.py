@@ -66,11 +66,8 @@ def poles_of(a: Any, form: EnergyForm) -> Spectrum:
         return moving
     idle = np.linalg.eigvals(form.idle_rows @ (a @ form.idle))
     values = sort_eigenvalues(np.concatenate([moving.values, idle]))
-    text = (
-        f"all {values.size}"
-        if moving.complete
-        else f"{moving.description}; and {idle.size} of motions that store no energy"
-    )
+    some = f"{moving.description}; and {idle.size} of motions that store no energy"
+    text = f"all {values.size}" if moving.complete else some
     return Spectrum(values, moving.complete, text)
 
 

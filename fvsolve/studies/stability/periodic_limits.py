@@ -271,21 +271,12 @@ def limited_limit(
     scheme: str, limiter: str | None, method: str, cells: int = LIMITED_CELLS, steps: int = LIMITED_STEPS
 ) -> LimitedLimit:
     """Courant limits of a limited scheme (and the limiter of muscl) with a method, on a grid of `cells` cells."""
-    name = limiter or scheme
-    counts = tuple(n * steps for n in STEP_FACTORS)
-    return LimitedLimit(
-        scheme,
-        limiter,
-        method_named(method).name,
-        {branch: limit_of(weights, branch, method) for branch, weights in branches(scheme, limiter).items()},
-        monotone_limit(name, method),
-        cells,
-        counts,
-        {
-            start: tuple(measured_courant(scheme, limiter, method, u, n) for n in counts)
-            for start, u in start_fields(cells).items()
-        },
-    )
+    counts, name = tuple(n * steps for n in STEP_FACTORS), method_named(method).name
+    frozen = {branch: limit_of(weights, branch, method) for branch, weights in branches(scheme, limiter).items()}
+    measured = {start: tuple(measured_courant(scheme, limiter, method, u, n) for n in counts)
+                for start, u in start_fields(cells).items()}  # fmt: skip
+    monotone = monotone_limit(limiter or scheme, method)
+    return LimitedLimit(scheme, limiter, name, frozen, monotone, cells, counts, measured)
 
 
 def monotone_limit(limiter: str, method: str) -> float | None:
