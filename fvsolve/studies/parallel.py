@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from dataclasses import replace
-from typing import Any, NamedTuple, Protocol, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 from fvsolve.case import Case, load
 from fvsolve.case.load import find_source
@@ -25,13 +25,24 @@ CHECK_TIME = 10.0  # interval of checks that workers can be reached [s]
 MAX_CRASHES = 2  # number of processes that a task may crash before it counts as lost
 
 
-class Work(Protocol):
-    """Callable that computes a task. It is sent to processes once or with each chunk, so it must be picklable."""
+class Work:
+    """Base class of callables that compute a task. They are sent to processes once or with each chunk, by pickle.
 
-    def __call__(self, task: Any) -> Any: ...
+    unsent : names of fields, dicts of data that each process computes again
+    """
+
+    unsent: ClassVar[tuple[str, ...]] = ()
+
+    def process_text(self, task: Any) -> str:
+        """Words that follow "the process" in the message on a task that crashed it."""
+        return f"of task {task}"
 
     def lost_result(self, task: Any) -> Any:
-        """Answer for a task that crashed its process repeatedly and so has no result; an exception may be raised."""
+        """Answer for a task that crashed its process repeatedly and so has no result; here raises RunError."""
+        raise RunError(f"the process {self.process_text(task)} was killed repeatedly. Is there enough memory?")
+
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {name: {} for name in self.unsent}
 
 
 def run_tasks(work: Work, tasks: Sequence, jobs: int = 1, dask: str | None = None) -> Iterator[tuple[int, Any]]:
@@ -145,22 +156,15 @@ class RunRequest(NamedTuple):
     stages: tuple[dict[str, Any], ...] = ()
 
 
-class RunQueue:
+class RunQueue(TaskPool):
     """Runs of a study. A result computed ahead is returned once; other runs are computed when requested.
 
-    source : case of the study, as for `load`
-    jobs : number of local processes; dask : address of a scheduler, used instead of local processes.
-    Context manager: workers are closed on exit.
+    source : case of the study, as for `load`; jobs, dask : as for `TaskPool`
     """
 
     def __init__(self, source: Any, jobs: int = 1, dask: str | None = None) -> None:
-        self.pool = TaskPool(RequestRunner(source), jobs, dask)
+        super().__init__(RequestRunner(source), jobs, dask)
         self.results: dict[str, Any] = {}
-
-    @property
-    def in_process(self) -> bool:
-        """True if all runs are computed in this process, one after another."""
-        return self.pool.in_process
 
     def run_ahead(self, requests: Sequence[RunRequest]) -> Iterator[int]:
         """Compute runs before their results are requested; yields the index of each finished run.
@@ -172,7 +176,7 @@ class RunQueue:
         if self.in_process or not requests:
             return
         order = [0, *range(len(requests) - 1, 0, -1)]
-        for position, answer in self.pool.run([requests[k] for k in order]):
+        for position, answer in self.run([requests[k] for k in order]):
             self.results[repr(requests[order[position]])] = answer
             yield order[position]
 
@@ -185,18 +189,14 @@ class RunQueue:
             return replace(answer, model=study_model(case, request.keys))
         return answer
 
-    def __enter__(self) -> RunQueue:
-        return self
 
-    def __exit__(self, *_: Any) -> None:
-        self.pool.__exit__()
-
-
-class RequestRunner:
+class RequestRunner(Work):
     """Callable that makes the run of a `RunRequest`, in this or another process.
 
     The case after each sequence of stages (see `RunRequest`) is stored and used again for later runs.
     """
+
+    unsent = ("staged",)
 
     def __init__(self, source: Any) -> None:
         self.sent = PickledCase(source)
@@ -212,13 +212,9 @@ class RequestRunner:
             self.staged[name] = case
         return request.function(self.staged[name], request.keys)
 
-    def lost_result(self, request: RunRequest) -> Any:
-        """Raise RunError, because a study cannot continue without the run of a request that crashed its process."""
+    def process_text(self, request: RunRequest) -> str:
         keys = ", ".join(f"{key} = {value}" for key, value in request.keys.items()) or "the keys of the case"
-        raise RunError(f"the process that made the run with {keys} was killed repeatedly. Is there enough memory?")
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {"sent": self.sent, "staged": {}}
+        return f"that made the run with {keys}"
 
 
 class PickledCase:

@@ -14,11 +14,11 @@ from typing import Any
 from fvsolve.case import Case, load, shipped
 from fvsolve.case.raw import split_key, syntax_fault
 from fvsolve.case.toml_lines import key_lines
-from fvsolve.errors import CaseError, Fault, FvsolveError, RunError, did_you_mean
+from fvsolve.errors import CaseError, Fault, FvsolveError, did_you_mean
 from fvsolve.output.directory import clear_reports
 from fvsolve.output.summary_file import plain, write_summary
 from fvsolve.run import run
-from fvsolve.studies.parallel import PickledCase, run_tasks
+from fvsolve.studies.parallel import PickledCase, Work, run_tasks
 from fvsolve.units import show
 
 KEYS = ("case", "title", "estimate_error", "events", "protections")
@@ -328,7 +328,7 @@ def study(source, out: str | Path | None = None, jobs: int = 1, dask: str | None
     return results
 
 
-class ScenarioRun:
+class ScenarioRun(Work):
     """Callable that makes one run of a scenario study, in this or another process; returns its row of results."""
 
     def __init__(self, source: Any, error: bool, force: bool) -> None:
@@ -351,9 +351,8 @@ class ScenarioRun:
             key: plain(summary[key]) for key in keys_shown if key in summary
         }
 
-    def lost_result(self, task: dict[str, Any]) -> Any:
-        """Raise RunError, because a run that crashed its process has no results."""
-        raise RunError(f"the process that ran {task['directory']} was killed repeatedly. Is there enough memory?")
+    def process_text(self, task: dict[str, Any]) -> str:
+        return f"that ran {task['directory']}"
 
 
 def row_name(row: dict[str, Any]) -> str:

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from fvsolve.case import load
-from fvsolve.errors import FvsolveError, RunError
+from fvsolve.errors import FvsolveError
 from fvsolve.model.energy_norm import EnergyForm, energy_form
 from fvsolve.schemes import SCHEMES, branches
 from fvsolve.steppers import automatic, method_named
@@ -25,7 +25,7 @@ from fvsolve.studies.linear.eigenvalues import Spectrum, find_eigenvalues
 from fvsolve.studies.linear.linearise import Linear, linearise_at
 from fvsolve.studies.linear.operating_point import OperatingPoint, has_limiter, operating_point, with_weights
 from fvsolve.studies.outcome import STUDY_ARGUMENTS, Progress, name_list
-from fvsolve.studies.parallel import PickledCase, TaskPool
+from fvsolve.studies.parallel import PickledCase, TaskPool, Work
 from fvsolve.studies.resolution import delay_lines, fixed_choices
 from fvsolve.studies.result_cache import ResultCache, case_key
 from fvsolve.studies.stability.delay_line_limits import delayed_row
@@ -177,8 +177,10 @@ def cached_rows(points: ResultCache, case, options: dict, pairs: list, pool: Tas
     return rows
 
 
-class RowTask:
+class RowTask(Work):
     """Task that computes rows of a stability study of a case, in this or another process."""
+
+    unsent = ("makers",)
 
     def __init__(self, case, **options) -> None:
         self.pickled_case, self.options = PickledCase(case), options
@@ -194,13 +196,8 @@ class RowTask:
             self.makers[scheme] = SchemeRows(load(self.pickled_case.source), scheme, **self.options)
         return self.makers[scheme]
 
-    def lost_result(self, pair: tuple[str, str]) -> dict:
-        """Raise RunError for a row whose process has ended."""
-        raise RunError(f"the process for the row of {' with '.join(pair)} was killed repeatedly. Is there enough "
-                       "memory?")  # fmt: skip
-
-    def __getstate__(self) -> dict:
-        return {"pickled_case": self.pickled_case, "options": self.options, "makers": {}}
+    def process_text(self, pair: tuple[str, str]) -> str:
+        return f"for the row of {' with '.join(pair)}"
 
 
 class SchemeRows:
