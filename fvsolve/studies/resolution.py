@@ -1,7 +1,8 @@
 """Resolution of a case in studies: cells of pipes and basins, delay lines, and keys that change them.
 
 Quantities in the cells of basins are averaged over coarser meshes. A variable of a basin has the name "BASIN at the
-end: QUANTITY". Its values are those of `basin_fields`.
+end: QUANTITY". Its values are those of `basin_fields`. The argument `cells_by_key` of several functions has numbers of
+cells as from `cell_counts`.
 """
 
 from __future__ import annotations
@@ -122,10 +123,7 @@ def scaled(cells_by_key: Counts, factor: float) -> Counts:
 
 
 def total_cells(case, cells_by_key: Counts) -> int:
-    """Total number of cells of a case with these numbers of cells, including basins whose mesh comes from a file.
-
-    cells_by_key : as from `cell_counts`
-    """
+    """Total number of cells of a case with these numbers of cells, including basins whose mesh comes from a file."""
     fixed = sum(case.meshes[name].area.size for name in basins_from_files(case))
     return fixed + sum(part_cells(case, key, numbers) for key, numbers in cells_by_key.items())
 
@@ -175,7 +173,6 @@ def greatest_wave_rate(case, cells_by_key: Mapping[str, tuple[int, ...]]) -> flo
     With basins the result is at least the step-limiting rate of all parts at the start (`Model.wave_rate`), times the
     greatest factor by which a basin is refined. With delay lines it is at least the number of cells of the slowest
     line divided by the travel time of a wave along it.
-    cells_by_key : as from `cell_counts`
     """
     rates = [case.wave_speed(name) * cells_by_key[f"links.{name}.cells"][0] / pipe.length
              for name, pipe in pipes_with_cells(case).items()]  # fmt: skip

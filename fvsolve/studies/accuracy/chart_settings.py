@@ -1,4 +1,8 @@
-"""Settings of a work-precision study: schemes, methods and resolutions. A curve has one scheme and method."""
+"""Settings of a work-precision study: schemes, methods and resolutions. A curve has one scheme and method.
+
+Arguments of several functions : schemes, methods, cells, rtol, step as for `chart`; a single number `cells` is that of
+the main part, see `main_part_name`
+"""
 
 from __future__ import annotations
 
@@ -82,13 +86,13 @@ def main_part_name(case: Case) -> str | None:
 
 
 def basin_cells(case: Case) -> int | None:
-    """Greatest number of cells along a side of the main part (see `main_part_name`); None if it is not a basin."""
+    """Greatest number of cells along a side of the main part; None if it is not a basin."""
     basin = basins(case).get(main_part_name(case) or "")
     return None if basin is None else max(basin.cells)
 
 
 def cell_keys(case: Case, cells: int) -> dict:
-    """Overrides that set the number of cells of the main part (see `main_part_name`), and scale those of other parts.
+    """Overrides that set the number of cells of the main part, and scale those of other parts.
 
     They set `cells` of the pipes that state it in the case; for other pipes they set `numerics.cell_time`. With basins
     they set `cells` of all parts.
@@ -112,7 +116,7 @@ def cell_keys(case: Case, cells: int) -> dict:
 def cells_setting(case: Case, scheme: str, method: str, cells: int) -> MethodSetting:
     """Setting of a case with cells: Courant number 0.9, or 1 for upwind with Euler.
 
-    Methods with error control have a tolerance instead. cells : number of cells of the main part (see `main_part_name`)
+    Methods with error control have a tolerance instead.
     """
     by_error = uses_error_control(method)
     control = "rtol" if by_error else "courant"
@@ -182,9 +186,8 @@ class CoarseRun:
         If possible, the work of the finest run, times `dearness`, is at most `MAX_WORK`.
         """
         if self.sizes is not None:
-            return [n for n, work in self.sizes if self.dearness * work <= MAX_WORK][-LEVEL_COUNT:] or [
-                self.sizes[0][0]
-            ]
+            within = [n for n, work in self.sizes if self.dearness * work <= MAX_WORK]
+            return within[-LEVEL_COUNT:] or [self.sizes[0][0]]
         finest = MAX_CELLS
         for work in self.works:
             stiff = self.steps * self.cells * 16 * finest / MAX_CELLS if self.stiff else 0.0
@@ -228,7 +231,7 @@ def basin_sizes(case: Case) -> list[tuple[int, float]]:
 
 
 def run_work(case: Case, cells: int) -> float:
-    """Cells times steps of a run at Courant number 1, with `cells` cells in the main part (see `main_part_name`)."""
+    """Cells times steps of a run at Courant number 1, with `cells` cells in the main part."""
     changed = load(case, cell_keys(case, cells))
     cells_by_key = cell_counts(changed)
     span = case.numerics.end - case.numerics.start
@@ -258,7 +261,7 @@ def chart_settings(
     """Settings of a study: for each scheme and method its resolutions, from coarse to fine.
 
     The default scheme and method are always included.
-    coarse_run : results of a coarse run, None for a case without pipes and basins; other arguments as for `chart`
+    coarse_run : results of a coarse run, None for a case without pipes and basins
     Raises FvsolveError for options that the case does not support.
     """
     if not main_part_name(case) and delay_lines(case):
@@ -266,9 +269,8 @@ def chart_settings(
     if coarse_run is None:
         return _lumped_settings(case, schemes, methods, cells, rtol, step)
     if rtol or step:
-        raise FvsolveError(
-            f"{case.name} has cells, so its resolution is the number of cells. Use --cells instead of --rtol and --step"
-        )
+        text = f"{case.name} has cells, so its resolution is the number of cells"
+        raise FvsolveError(f"{text}. Use --cells instead of --rtol and --step")
     pairs = scheme_method_pairs(case, schemes, methods, coarse_run.stiff)
     levels = sorted({*(cells or coarse_run.levels)})
     return [cells_setting(case, *pair, level) for pair in pairs for level in levels]
@@ -277,9 +279,8 @@ def chart_settings(
 def _lumped_settings(case: Case, schemes, methods, cells, rtol, step) -> list[MethodSetting]:
     if schemes or cells:
         option = "scheme" if schemes else "cells"
-        raise FvsolveError(
-            f"{case.name} has no pipe, so the option {option} does not apply. Use rtol or step for its resolution"
-        )
+        text = f"{case.name} has no pipe, so the option {option} does not apply"
+        raise FvsolveError(f"{text}. Use rtol or step for its resolution")
     span = case.numerics.end - case.numerics.start
     steps = sorted(step or [span / n for n in STEP_COUNTS], reverse=True)
     settings_of_methods = []
@@ -292,14 +293,13 @@ def _lumped_settings(case: Case, schemes, methods, cells, rtol, step) -> list[Me
 def _delay_line_settings(case: Case, schemes, methods, cells, rtol, step) -> list[MethodSetting]:
     """Settings of a case in which all pipes are delay lines, so that the resolution is the step.
 
-    Arguments as for `chart`. A tolerance is not used: the error estimate of a step does not include the interpolation
+    A tolerance is not used: the error estimate of a step does not include the interpolation
     between steps.
     """
     if schemes or cells or rtol:
         option = "scheme" if schemes else "cells" if cells else "rtol"
-        raise FvsolveError(
-            f"{case.name} has only delay lines, so the option {option} does not apply. Use step for their resolution"
-        )
+        text = f"{case.name} has only delay lines, so the option {option} does not apply"
+        raise FvsolveError(f"{text}. Use step for their resolution")
     travel = max(pipe.length / case.wave_speed(name) for name, pipe in pipes(case).items())
     steps = sorted(step or [float(f"{travel / n:.2g}") for n in TRAVEL_PARTS], reverse=True)
     chosen = dict.fromkeys([*(methods or DELAY_LINE_METHODS), DEFAULT_METHOD])

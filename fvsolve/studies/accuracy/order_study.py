@@ -1,4 +1,8 @@
-"""Order study of one scheme and method: runs of all rows, errors against a reference, and fitted orders."""
+"""Order study of one scheme and method: runs of all rows, errors against a reference, and fitted orders.
+
+Arguments of several functions : rows, each an `OrderRow`; fits, variable -> norm -> `Fit`; points, result cache;
+progress, called as progress(done, total, next)
+"""
 
 from __future__ import annotations
 
@@ -90,7 +94,7 @@ class OrderStudy:
             return replace(result, notes=(f"no other reference can be used: {error}", *result.notes))
 
     def against_reference(self, points: ResultCache | None, progress: Progress) -> Order:
-        """Study against an exact solution or a finer run; points, progress : as for `study`."""
+        """Study against an exact solution or a finer run."""
         rows, levels = [], self.plan.levels
         total = len(levels) + 1
 
@@ -174,7 +178,7 @@ class OrderStudy:
     def fitted_order(self, rows, kind: str, words: str, own: dict, sizes: dict) -> Order:
         """Fit an order for every variable and norm, and add notes. Raises the FvsolveError of `refuse_reference`.
 
-        rows : each an `OrderRow`; kind, words : kind and description of the reference
+        kind, words : kind and description of the reference
         own : variable -> norm -> error of the reference [SI]; sizes : variable -> greatest absolute value [SI]
         """
         fits, doubtful, smooth_order = {}, [], self.smooth_order()
@@ -204,10 +208,7 @@ class OrderStudy:
                      tuple(notes), units, scales)  # fmt: skip
 
     def refuse_reference(self, rows, fits, words: str) -> None:
-        """Raise FvsolveError if all errors of all variables are too close to the error of the reference.
-
-        fits : variable -> norm -> `Fit`; words : description of the reference
-        """
+        """Raise FvsolveError if all errors of all variables are too close to that of the reference, named `words`."""
         uncertain = [
             mark == UNCERTAIN
             for name, norms in fits.items() for norm, fitted in norms.items()
@@ -274,7 +275,7 @@ class OrderStudy:
     def step_error_note(self, fits) -> list[str]:
         """Remark with a smaller step, tolerance or Courant number, if the time error may hide the order in space.
 
-        The result is a list with one text, or empty. fits : variable -> norm -> `Fit`
+        The result is a list with one text, or empty.
         """
         with_errors = [norms["L1"] for norms in fits.values() if norms["L1"].reason != NO_ERROR]
         hidden = any(FLOOR in fitted.marks or fitted.reason for fitted in with_errors)
@@ -360,7 +361,7 @@ def extrapolate(rows, fits) -> tuple[OrderRow, ...]:
     """Rows with errors instead of differences to the next row, where the fitted order p is certain (see `is_certain`).
 
     The error of a row is its difference d plus the error of the next row. After the last difference, the error of the
-    next row is d / (ratio^p - 1), with the ratio of the sizes of both rows. fits : variable -> norm -> `Fit`
+    next row is d / (ratio^p - 1), with the ratio of the sizes of both rows.
     """
     results: list[OrderRow] = []
     for k in range(len(rows) - 1, -1, -1):
@@ -379,7 +380,7 @@ def difference_notes(rows, fits) -> list[str]:
     """List with one note, or empty: variables and norms for which the table shows differences instead of errors.
 
     The differences are those to the next row. The order of these variables and norms is not certain (see `is_certain`).
-    At most three variables are named. fits : variable -> norm -> `Fit`
+    At most three variables are named.
     """
     ratio = rows[0].level.size / rows[1].level.size
     names = [f"{name} ({', '.join(uncertain)})" for name, norms in fits.items()

@@ -1,4 +1,8 @@
-"""Plan of a refinement: levels from coarse to fine, as keys of a case, and a first row that the study can afford."""
+"""Plan of a refinement: levels from coarse to fine, as keys of a case, and a first row that the study can afford.
+
+Arguments of several functions : refine or way, key, levels, cells as for `refinement_plan`; against, kind of the
+reference as in `order`; courant, Courant number of the finest row; k, number of a row, from 0
+"""
 
 from __future__ import annotations
 
@@ -146,7 +150,7 @@ def delay_line_plan(case, way: str, levels: int) -> Plan:
 
     With way = "both" steps are halved too, and the size of a row is its step (with error control its longest step) [s].
     With "space" it is the travel time of a stretch [s], in the line with most stretches in the last row.
-    levels : number of rows. Raises FvsolveError if with "space" the stretches do not change.
+    Raises FvsolveError if with "space" the stretches do not change.
     """
     count, step = total_cells(case, cell_counts(case)), first_step(case) if case.numerics.rtol is None else math.nan
     rows = [stretch_keys(case, way, k) for k in range(levels)]
@@ -174,7 +178,7 @@ STRETCH_WORDS = "tolerance of delay lines halved, so that they have twice as man
 def stretch_keys(case, way: str, k: int) -> dict:
     """Overrides of row k: tolerance of delay lines divided by 2^k, and their cells times 2^k if cells set the step.
 
-    way : "both" (space and time) or "space"; with "space" the cells of delay lines stay
+    With way = "space" the cells of delay lines stay.
     """
     keys = {"numerics.delay_tolerance": case.numerics.delay_tolerance / 2**k} if delay_lines(case) else {}
     if way == "both" and (case.numerics.rtol is not None or (cell_counts(case) and case.numerics.courant is not None)):
@@ -188,7 +192,6 @@ def stretch_keys(case, way: str, k: int) -> dict:
 def space_plan(case, way: str, key: str | None, levels: int, cells: int | None) -> Plan:
     """Plan in which the cells of all pipes and basins, or of the part that `key` names, are doubled from row to row.
 
-    way : "both" (space and time) or "space"; other arguments as for `refinement_plan`
     Raises FvsolveError for more than `MAX_CELLS` cells in the finest row.
     """
     first = coarsest_counts(case, key, cells)
@@ -219,7 +222,7 @@ def space_plan(case, way: str, key: str | None, levels: int, cells: int | None) 
 
 
 def coarsest_counts(case, key: str | None, cells: int | None) -> Counts:
-    """Numbers of cells of the first row, as from `cell_counts`; key, cells : as for `refinement_plan`."""
+    """Numbers of cells of the first row, as from `cell_counts`."""
     own_counts = cell_counts(case)
     if cells is None:
         return own_counts
@@ -235,7 +238,7 @@ def space_courant(case, levels: int) -> float | None:
 
     With Courant number C, cell size dx and orders p in space and q in time, the time error is C^q dx^q and the space
     error dx^p. If p > q, their ratio grows by 2^(p - q) from row to row. The result is at least `LEAST_COURANT`, but at
-    most the Courant number of the case, and None if the case states none. levels : number of rows
+    most the Courant number of the case, and None if the case states none.
     """
     numerics = case.numerics
     if numerics.courant is None:
@@ -265,7 +268,7 @@ def step_keys(case, cells: Counts, step_cells: Counts, k: int, courant: float | 
 
 
 def stepping_words(case, way: str, courant: float | None) -> str:
-    """Text on the time steps of a refinement; way : "both" or "space"; courant : Courant number of the finest row."""
+    """Text on the time steps of a refinement with way = "both" or "space"."""
     numerics = case.numerics
     if numerics.rtol is not None:
         return f"steps by error, rtol = {numerics.rtol:g} in all rows"
@@ -283,7 +286,7 @@ def stepping_words(case, way: str, courant: float | None) -> str:
 def time_plan(case, key: str | None, levels: int) -> Plan:
     """Plan in which the step is halved from row to row, or the tolerance divided by ten, with constant cells.
 
-    key, levels : as for `refinement_plan`. Raises FvsolveError if the method does not permit it.
+    Raises FvsolveError if the method does not permit it.
     """
     numerics, count = case.numerics, total_cells(case, cell_counts(case))
     by_error = key == "numerics.rtol" or (key is None and numerics.rtol is not None)
@@ -332,7 +335,6 @@ def affordable_plan(
     """Plan of a refinement; if neither `cells` nor `key` is given, the study is planned to end within minutes.
 
     For this the number of cells of the first row is reduced if necessary, unless only steps are refined.
-    refine, key, levels, cells : as in `refinement_plan`; against : kind of the reference as in `order`
     points : result cache, which also stores the chosen number of cells
     """
     refinement = refinement_plan(case, refine, key, levels, cells)
@@ -356,7 +358,7 @@ def first_cells(case, rows: Plan, refine: str | None, levels: int | None, agains
     """Number of cells of the first row: that of the case, halved until the study takes at most `CPU_BUDGET`.
 
     It is not halved below `LEAST_CELLS`, nor if patches or holes of a basin would then not end between cells.
-    rows : plan with the cells of the case; other arguments as in `affordable_plan`
+    rows : plan with the cells of the case
     """
     own_counts, exact = cell_counts(case), case.exact is not None or against != "auto" or bool(basins(case))
     cells, seconds = most_cells(own_counts), rhs_seconds(study_model(case)) / total_cells(case, own_counts)

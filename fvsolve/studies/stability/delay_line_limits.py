@@ -1,4 +1,8 @@
-"""Stability of a case with delay lines: greatest step by the linear system of steps, and by real runs."""
+"""Stability of a case with delay lines: greatest step by the linear system of steps, and by real runs.
+
+Arguments of several functions : steps, number of steps over which growth counts; threshold, growth above which a step
+fails
+"""
 
 from __future__ import annotations
 
@@ -25,7 +29,7 @@ SMALL_WAVE = 1e-5  # deviation at the start, in units of a wave of 1 bar over on
 class DelayLineRuns(RealRuns):
     """Real runs at fixed steps, each from the deviation with the greatest growth in the linear system of the step.
 
-    limits : a `DelayLineLimits`; steps : number of steps of a run; threshold : growth at which it fails
+    limits : a `DelayLineLimits`
     end : a step that is predicted to fail [s]; inf if no step is, nan if there is no prediction
     """
 
@@ -133,8 +137,7 @@ NO_LIMIT_NOTE = "no step up to twice the slowest line's travel time fails"
 class DelayLineLimits:
     """Step limit of a case with delay lines for one scheme and method, predicted by a linear system for each step.
 
-    The delay lines are divided into stretches for each step. steps : number of steps over which growth counts
-    threshold : growth above which a step fails
+    The delay lines are divided into stretches for each step.
     """
 
     def __init__(self, case, scheme: str, method, steps: int, threshold: float) -> None:
@@ -223,7 +226,6 @@ def delayed_row(case, scheme: str, method, steps: int, threshold: float) -> Stab
     """Row of a stability study for a case with delay lines, with a scheme and a method, at the start of the case.
 
     It contains the limit from the linear system of a step and the limit of real runs.
-    steps : number of steps over which growth counts; threshold : growth above which a step fails
     """
     limits, left_out, notes = DelayLineLimits(case, scheme, method, steps, threshold), {}, []
     predicted, model = limits.predicted(), limits.base_model

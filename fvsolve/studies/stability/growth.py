@@ -2,6 +2,10 @@
 
 The growth is the greatest norm of R(h J)^n over n <= N steps, in the energy norm, with the step h, the Jacobian J and
 the stability function R of the method. A step fails if the growth exceeds 1000.
+
+Arguments of several functions : e, Jacobian in coordinates of the energy norm [1/s]; steps, number of steps over which
+growth counts; threshold, growth above which a step fails; latest, time of the monotonic clock [s] from which
+`VectorGrowth` raises TooLarge; default: in 30 s
 """
 
 from __future__ import annotations
@@ -193,7 +197,7 @@ def power_growth(m: np.ndarray, steps: int = STEPS) -> Growth:
 class DenseGrowth:
     """Growth over the steps of one method on a small system, from powers of the step matrix.
 
-    e : float64[n, n]  Jacobian in coordinates of the energy norm [1/s]; size : its 2-norm
+    e : float64[n, n]  Jacobian; size : its 2-norm
     """
 
     def __init__(self, method: Method, e: np.ndarray, steps: int, threshold: float = THRESHOLD) -> None:
@@ -254,8 +258,7 @@ class VectorGrowth:
 
     The matrix and its transpose are used in turn, as in a power iteration for the 2-norm. Start vectors are random with
     a fixed seed. The result is a lower bound of the greatest growth, close to it after four passes.
-    e : sparse Jacobian in coordinates of the energy norm [1/s]; size : its 2-norm
-    latest : time of the monotonic clock [s] from which computations raise TooLarge; default: 30 s after the start
+    e : sparse Jacobian; size : its 2-norm
     """
 
     def __init__(
@@ -373,12 +376,7 @@ def step_function(method: Method, h: float, e: Any) -> Callable[[np.ndarray], np
 def growth_method(
     method: Method, e: Any, steps: int = STEPS, threshold: float = THRESHOLD, latest: float | None = None
 ) -> Any:
-    """Object that computes the growth of deviations: `DenseGrowth` for up to 500 states, `VectorGrowth` for more.
-
-    e : Jacobian in coordinates of the energy norm [1/s]; steps : number of steps over which growth counts
-    threshold : growth above which a step fails
-    latest : time of the monotonic clock [s] after which `VectorGrowth` raises TooLarge; default: in 30 s
-    """
+    """Object that computes the growth of deviations: `DenseGrowth` for up to 500 states, `VectorGrowth` for more."""
     if e.shape[0] <= DENSE:
         return DenseGrowth(method, e if isinstance(e, np.ndarray) else e.toarray(), steps, threshold)
     from scipy.sparse import csr_array
