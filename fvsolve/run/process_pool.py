@@ -1,7 +1,5 @@
 """Pool of worker processes on this machine, with the interface of concurrent.futures; a lost process is replaced."""
 
-from __future__ import annotations
-
 import os
 import signal
 import threading

@@ -1,7 +1,5 @@
 """Calibration of values in a case against measured series by least squares, with standard deviations."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any

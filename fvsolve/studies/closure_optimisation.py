@@ -1,7 +1,5 @@
 """Optimisation of a piecewise-linear schedule, such as a valve closure, for the least peak."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any

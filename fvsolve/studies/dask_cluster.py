@@ -1,7 +1,5 @@
 """Workers of a Dask scheduler that compute chunks of tasks."""
 
-from __future__ import annotations
-
 import pickle
 import threading
 import uuid

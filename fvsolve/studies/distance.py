@@ -5,8 +5,6 @@ a quantity in the cells of a pipe or basin. A relative error of 0.01 is a hundre
 argument `truth` is a `Reference`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -16,8 +16,6 @@ least 1.6 / 2.15 of its remainder with the ratio of whole signals. The constants
 random mains (benchmarks/peak_bands.py --random) and its median is least.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

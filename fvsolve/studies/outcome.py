@@ -1,7 +1,5 @@
 """Run of a case with changed keys, its outcome, and its CPU time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from time import perf_counter

@@ -3,8 +3,6 @@
 The result of a task must not depend on the process, the order or the other tasks of its chunk.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait

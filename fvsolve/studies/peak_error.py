@@ -9,8 +9,6 @@ Arguments of several functions : runs, results at all resolutions, as from `refi
 and twice the resolution
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from typing import Any

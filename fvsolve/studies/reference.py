@@ -4,8 +4,6 @@
 `Reference` gives averages over any cells at the end, values of probes at the rows of a run, and its own error.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence

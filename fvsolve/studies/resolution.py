@@ -5,8 +5,6 @@ end: QUANTITY". Its values are those of `basin_fields`. The argument `cells_by_k
 cells as from `cell_counts`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from typing import Any

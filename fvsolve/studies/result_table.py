@@ -3,8 +3,6 @@
 A row is a mapping. A missing value is None: an empty field in CSV, null in JSON, "-" on a terminal.
 """
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields

@@ -1,7 +1,5 @@
 """Scenario study: a file with named sets of overrides of a case, runs of all combinations, and limit verdicts."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

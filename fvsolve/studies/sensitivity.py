@@ -1,7 +1,5 @@
 """Global sensitivity analysis: Sobol indices and Morris effects of keys of a case on an outcome, by SALib."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Sizing: search by bracketing for the least or greatest value of a key at which all limits hold."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Sweeps: runs of a case with many sets of values; a row of results for each run."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import time

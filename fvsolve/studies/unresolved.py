@@ -1,7 +1,5 @@
 """Reasons why errors of peaks, from runs at several resolutions, are unknown or wide, with remedies."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Sequence

@@ -5,8 +5,6 @@ the points of one scheme and method, from coarse to fine. A target error is a tr
 of the worst probe, relative to its range.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict

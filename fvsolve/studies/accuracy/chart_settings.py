@@ -4,8 +4,6 @@ Arguments of several functions : schemes, methods, cells, rtol, step as for `cha
 the main part, see `main_part_name`
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

@@ -8,8 +8,6 @@ floor. Rows off the line are errors at the floor before larger errors, a single 
 last row that leaves the line. If other rows remain, there is no order, and no number is given.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Order study with the start, a source or the exact solution as functions of x and t (manufactured solutions)."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from functools import cached_property

@@ -4,8 +4,6 @@ A level of the hierarchy is a model of the case with a density law. The level `r
 It has the most cells and the most complete density law that runs.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field

@@ -4,8 +4,6 @@ Levels of pipes are rigid columns, lumped volumes, delay lines, and few or many 
 are frozen water (a rigid mass), sloshing modes and cells.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Study of the order of convergence of a case, and its results: rows, fitted orders, notes, table and picture."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace

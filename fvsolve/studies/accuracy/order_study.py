@@ -4,8 +4,6 @@ Arguments of several functions : rows, each an `OrderRow`; fits, variable -> nor
 progress, called as progress(done, total, next)
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property

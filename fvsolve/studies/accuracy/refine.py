@@ -4,8 +4,6 @@ Arguments of several functions : refine or way, key, levels, cells as for `refin
 reference as in `order`; courant, Courant number of the finest row; k, number of a row, from 0
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

@@ -4,8 +4,6 @@ A curve has the points (settings with results) of one scheme and method, from co
 infinite errors.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field

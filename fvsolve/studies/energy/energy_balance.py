@@ -1,7 +1,5 @@
 """Energy balance of a run: supplied, stored and dissipated energy, and energy changed by the numerical method."""
 
-from __future__ import annotations
-
 import functools
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -11,8 +11,6 @@ energy must not grow: |R(-x)| <= 1 for a leaking chamber, |R(i y)| <= 1 for a co
 R(h J) <= 1 for a closed pipe, if the scheme creates no energy.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from dataclasses import dataclass

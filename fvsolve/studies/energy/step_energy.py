@@ -1,7 +1,5 @@
 """Energy of each accepted time step: sum of the powers at its stages with the weights of the method."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from fvsolve.kernels.delay_lines.wave_history import JUMPS_TRAVELLING, time_tolerance

@@ -4,8 +4,6 @@ The columns are steps around the predicted limits, or values of a key. The limit
 (equation (13) of docs/course.md) and of waves between a node with storage (tank, chamber) and a delay line.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Verdict on a run, in a word, and runs that record their probes after every step."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Eigenvalues (poles) of a linearised case, computed in the energy norm."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass
 from typing import Any

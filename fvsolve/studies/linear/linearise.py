@@ -1,7 +1,5 @@
 """State-space form of a case about a state: matrices A, B, C, D with names and SI units."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

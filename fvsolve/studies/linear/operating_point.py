@@ -1,7 +1,5 @@
 """Operating points for linearisation: a state of a case with schedules held at their values."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -7,8 +7,6 @@ entries, column after column; starts : int64[columns]  first entry of each colum
 each entry
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from typing import Any

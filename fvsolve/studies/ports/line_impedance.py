@@ -1,7 +1,5 @@
 """Impedance of a lossless line, and a sweep test for positive realness of any function, with an error bound."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

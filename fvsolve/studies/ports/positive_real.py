@@ -1,7 +1,5 @@
 """Exact test of a rational transfer function for positive realness, from its coefficients."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from fractions import Fraction

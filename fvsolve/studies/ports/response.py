@@ -1,7 +1,5 @@
 """Transfer function between pressure and flow at a port of a linearised case, and its positive realness."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Test of a state-space system for positive realness, in floating point up to a tolerance."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

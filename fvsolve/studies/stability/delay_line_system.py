@@ -6,8 +6,6 @@ earlier and is interpolated between steps by the polynomials of the lines; frict
 line reflects a part of it. A step computes x by the tableau of the method, with w at its stages, and stores s.
 """
 
-from __future__ import annotations
-
 from functools import cached_property
 from typing import NamedTuple
 

@@ -8,8 +8,6 @@ growth counts; threshold, growth above which a step fails; latest, time of the m
 `VectorGrowth` raises TooLarge; default: in 30 s
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple

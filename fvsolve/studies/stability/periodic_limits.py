@@ -13,8 +13,6 @@ difference of neighbours (1 for minmod, 2 for other limiters) and the SSP radius
 runs from three initial states (`start_fields`) give measured limits for increasing numbers of steps.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

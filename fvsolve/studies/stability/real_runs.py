@@ -1,7 +1,5 @@
 """Growth of small deviations in real runs of the compiled program, and the measured limit of the step."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import replace

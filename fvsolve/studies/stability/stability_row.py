@@ -4,8 +4,6 @@ Arguments of functions that make notes : row, the `StabilityRow`; side, the `Lin
 result of `growth_method`, which computes the growth of deviations
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass, field
 
 import numpy as np
