@@ -9,7 +9,7 @@ import numpy as np
 from fvsolve.case import Case, load
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.run.comparison import interpolated
-from fvsolve.studies.outcome import refusal_text
+from fvsolve.studies.outcome import end_if_interrupted, refusal_text
 from fvsolve.studies.parallel import run_tasks
 from fvsolve.studies.result_table import Column, PlainData, ResultTable
 from fvsolve.studies.sampling import key_ranges, sample_points
@@ -71,8 +71,7 @@ class Residuals(RowMaker):
             result = run(case)
         except CaseError as error:
             return refusal_text(error)
-        if result.reason.startswith("interrupted"):
-            raise KeyboardInterrupt
+        end_if_interrupted(result.reason)
         if result.reason != "finished":
             return result.reason
         differences = []

@@ -8,9 +8,10 @@ import numpy as np
 
 from fvsolve.case import Case, load
 from fvsolve.case.text import path
-from fvsolve.errors import CaseError, Fault, FvsolveError, collect_faults, did_you_mean, listing
+from fvsolve.errors import Fault, FvsolveError, collect_faults, did_you_mean, listing
 from fvsolve.parts.schedule import Schedule
 from fvsolve.run import run
+from fvsolve.studies.outcome import NO_FIELDS, checked_case, end_if_interrupted
 from fvsolve.studies.result_table import PlainData
 from fvsolve.units import show
 
@@ -84,10 +85,9 @@ class ClosureSearch:
         The result is infinite if the run failed or the peak is not known.
         """
         time, value = self.law(z)
-        quiet = {"output.fields": 0, "output.lines": {}, "expect": peak_expectation(self.minimise)}
-        result = run(load(self.case, {self.key: {"time": time, "value": value}, **quiet}))
-        if result.reason.startswith("interrupted"):
-            raise KeyboardInterrupt
+        keys = {self.key: {"time": time, "value": value}, "expect": peak_expectation(self.minimise)}
+        result = run(load(self.case, keys | NO_FIELDS))
+        end_if_interrupted(result.reason)
         expectation = result.expectations[0]
         self.unit = expectation.unit
         peak = expectation.found if result.ok else None
@@ -115,13 +115,7 @@ def optimise(
     """
     from scipy.optimize import minimize
 
-    faults: list[Fault] = []
-    loaded = None
-    with collect_faults(faults):
-        loaded = load(case, dict(set or {}))
-    faults += find_faults(loaded, key, minimise, knots, runs)
-    if faults:
-        raise CaseError(faults, "case" if loaded is None else loaded.name)
+    loaded = checked_case(case, set, lambda known: find_faults(known, key, minimise, knots, runs))
     search = ClosureSearch(loaded, key, minimise, span_of(loaded, key), knots, progress)
     search(np.zeros(knots))
     for k, start in enumerate(START_SHAPES):
@@ -145,9 +139,8 @@ def find_faults(case: Case | None, key: str, minimise: str, knots: int, runs: in
     if not 1 <= knots <= MAX_KNOTS:
         faults.append(Fault("knots", f"{knots} is out of range. Expected 1 to {MAX_KNOTS}"))
     if runs < fewest:
-        faults.append(
-            Fault("runs", f"{runs} is too few. Expected {fewest} or more for knots = {fewest // len(START_SHAPES) - 2}")
-        )
+        least = f"Expected {fewest} or more for knots = {fewest // len(START_SHAPES) - 2}"
+        faults.append(Fault("runs", f"{runs} is too few. {least}"))
     if case is not None:
         with collect_faults(faults, f"--schedule {key}"):
             span_of(case, key)

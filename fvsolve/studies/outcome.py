@@ -6,12 +6,13 @@ from time import perf_counter
 
 import numpy as np
 
-from fvsolve.errors import CaseError, FvsolveError, listing
+from fvsolve.errors import CaseError, FvsolveError, collect_faults, listing
 from fvsolve.run import model_of
 from fvsolve.solve.solve import Run
 from fvsolve.steppers import loop_indices
 from fvsolve.validation import COUNT, FUNCTION, TABLE, TEXT
 
+NO_FIELDS = {"output.fields": 0, "output.lines": {}}  # overrides: no output of cell values, which no study needs
 POINTS = 5  # points of a cell of a line at which waves are evaluated
 WEIGHTS = np.array([275.0, 100.0, 402.0, 100.0, 275.0]) / 1152.0  # at the middles of fifths; exact to degree 5
 
@@ -94,7 +95,7 @@ def study_model(case, set: Mapping | None = None):
     """Build the model of a case with changed keys, without output of cell values, for `outcome`. Raises CaseError."""
     from fvsolve.case import load
 
-    return model_of(load(case, {**(set or {}), "output.fields": 0, "output.lines": {}}))
+    return model_of(load(case, {**(set or {}), **NO_FIELDS}))
 
 
 def outcome(
@@ -104,7 +105,6 @@ def outcome(
     """Run a case with changed keys, or a model as it is. A refused case gives an outcome with its reason.
 
     set : changed keys of a case, ignored for a model
-
     y : float64[n]  initial state (default `solve.initial_state`, zero except for a basin with a start of its own)
     best_of : number of runs, of which the fastest counts. Runs after the first contain no compilation; they are omitted
     if the first took more than `budget` [s].
@@ -118,6 +118,28 @@ def outcome(
     outcomes = [_single_run(model, y, run)]
     outcomes += [_single_run(model, y, run) for _ in range(best_of - 1) if outcomes[0].seconds <= budget]
     return min(outcomes, key=lambda entry: entry.seconds)
+
+
+def end_if_interrupted(reason: str) -> None:
+    """Raise KeyboardInterrupt if a run was interrupted: it ends cleanly at Ctrl-C, but the study must end too."""
+    if reason.startswith("interrupted"):
+        raise KeyboardInterrupt
+
+
+def checked_case(case, set: Mapping | None, find_faults: Callable):
+    """Case with changed keys. Raises CaseError with the faults of the case and those of arguments of a study.
+
+    find_faults : find_faults(case) -> faults of the arguments; its case is None if the case itself has faults
+    """
+    from fvsolve.case import load
+
+    faults, loaded = [], None
+    with collect_faults(faults):
+        loaded = load(case, dict(set or {}))
+    faults += find_faults(loaded)
+    if faults:
+        raise CaseError(faults, "case" if loaded is None else loaded.name)
+    return loaded
 
 
 def refusal_text(error: CaseError) -> str:
@@ -135,8 +157,7 @@ def _single_run(model, y, run) -> Outcome:
         state.y[:] = y
     solver = (run or Run)(model, state, sink, None)
     summary = solver.go()
-    if summary.reason.startswith("interrupted"):  # a run ends cleanly at Ctrl-C; the study must end too
-        raise KeyboardInterrupt
+    end_if_interrupted(summary.reason)
     rows = np.concatenate([np.empty((0, 1 + len(model.probes))), *sink.blocks])
     names = tuple(probe.text for probe in model.case.probes)
     return Outcome(

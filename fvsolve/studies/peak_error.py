@@ -21,6 +21,7 @@ from fvsolve.run import Result, run
 from fvsolve.run.result import HOLDS, OPEN
 from fvsolve.run.verdicts import MAGNITUDES, PLACES_KEY, PlaceMargins, verdict
 from fvsolve.studies.extrema import greatest_error
+from fvsolve.studies.outcome import NO_FIELDS
 from fvsolve.studies.resolution import basins_from_files, refined_keys
 from fvsolve.studies.unresolved import MAX_NAMES, WIDE_ERROR, Unresolved, has_separation
 
@@ -29,7 +30,6 @@ RELATIVE_FLOOR = 5e-6  # least relative error, from iterations, interpolated row
 ROUNDING = 1e-12  # rounding error relative to the greatest value in that unit (for angles at least 1 rad)
 SIGNS = {"minimum": -1.0, "maximum": 1.0}
 SIDES = tuple(SIGNS)
-NO_FIELDS = {"output.fields": 0, "output.lines": {}}
 MIN_ROWS, MAX_ROWS = 500, 4000  # limits of the number of rows of signals, at the resolution of the run itself
 PLACES_PER_PART = 12  # greatest number of places of a part with signals, under a bound
 MAX_PLACES = 400  # greatest number of places with signals, of all limits

@@ -14,6 +14,7 @@ from fvsolve.parts.arithmetic import Arithmetic
 from fvsolve.run import run
 from fvsolve.run.result import FAILS, OPEN
 from fvsolve.run.verdicts import SIZES
+from fvsolve.studies.outcome import NO_FIELDS, checked_case, end_if_interrupted
 from fvsolve.studies.peak_error import peak_errors
 from fvsolve.studies.sampling import is_known, key_quantity, si_unit_of
 from fvsolve.units import UNITS, show
@@ -142,15 +143,14 @@ class SizeSearch:
         if self.progress is not None:
             self.progress(len(self.runs), f"{self.key} = {value:.6g} {self.unit}".rstrip())
         try:
-            case = load(self.case, {**self.keys(value), "output.fields": 0, "output.lines": {}})
+            case = load(self.case, {**self.keys(value), **NO_FIELDS})
             result = run(case)
         except CaseError as error:
             if not self.runs:
                 raise
             self.runs.append(SizeRun(value, False, None, "", f"refused: {error.faults[0].message}"))
             return self.runs[-1]
-        if result.reason.startswith("interrupted"):
-            raise KeyboardInterrupt
+        end_if_interrupted(result.reason)
         if self.error and result.ok:
             peak_errors(result, case)
         self.runs.append(size_run(value, result))
@@ -246,13 +246,7 @@ def size(
     If limits fail at both ends, values near the one with the greatest margin are tried. Raises CaseError for an invalid
     case, a case without limits, and wrong arguments.
     """
-    faults: list[Fault] = []
-    loaded = None
-    with collect_faults(faults):
-        loaded = load(case, dict(set or {}))
-    faults += find_faults(loaded, key, (low, high), goal, ties or {}, rtol)
-    if faults:
-        raise CaseError(faults, "case" if loaded is None else loaded.name)
+    loaded = checked_case(case, set, lambda known: find_faults(known, key, (low, high), goal, ties or {}, rtol))
     first, last, unit = parse_range(low, high)
     search = SizeSearch(loaded, key, unit, ties or {}, progress, error)
     value, bracket = search.search(first, last, goal, rtol)

@@ -18,7 +18,7 @@ from fvsolve.errors import CaseError, FvsolveError, RunError, did_you_mean, list
 from fvsolve.fluid.property_cache import coolprop_version
 from fvsolve.output.restart import program_versions
 from fvsolve.output.summary_file import plain
-from fvsolve.studies.outcome import STUDY_ARGUMENTS, has_diverged, refusal_text
+from fvsolve.studies.outcome import NO_FIELDS, STUDY_ARGUMENTS, end_if_interrupted, has_diverged, refusal_text
 from fvsolve.studies.parallel import PickledCase, run_tasks
 from fvsolve.studies.result_cache import ResultCache, digest_of, write_errors
 from fvsolve.studies.result_table import Column, ResultTable
@@ -28,7 +28,6 @@ from fvsolve.validation import COUNT_FROM_ZERO, PATH, ROW, SERIES, TABLE, TEXT, 
 
 REFUSED = "refused: "
 LOST_REASON = "lost: the process of this run was killed repeatedly. Is there enough memory?"
-NO_FIELDS = {"output.fields": 0, "output.lines": {}}  # output that no row needs
 
 
 @dataclass
@@ -56,8 +55,7 @@ class RowMaker:
             return {"ok": False, "reason": refusal_text(error)}
         self.model, sink = self.model or model, MemorySink(model)
         summary = solve(model, initial_state(model), sink)
-        if summary.reason.startswith("interrupted"):
-            raise KeyboardInterrupt
+        end_if_interrupted(summary.reason)
         return row_of(model, summary, sink)
 
     def read(self, values: Mapping[str, Any]) -> Case:

@@ -13,7 +13,7 @@ from fvsolve.schemes import SCHEMES
 from fvsolve.solve import initial_state
 from fvsolve.studies.energy.passivity import AUTO, check_names, method_names
 from fvsolve.studies.energy.step_energy import EnergyRun
-from fvsolve.studies.outcome import RowSink, refusal_text, study_model
+from fvsolve.studies.outcome import RowSink, end_if_interrupted, refusal_text, study_model
 from fvsolve.studies.result_cache import ResultCache
 from fvsolve.studies.result_table import Column
 from fvsolve.validation import FUNCTION, TABLE, TEXT, validated
@@ -327,8 +327,7 @@ def pair_result(case, scheme: str, method: str, port: str | None, watch=None) ->
         result = energy(case, {"numerics.scheme": scheme, "numerics.method": method}, port, watch)
     except CaseError as error:
         return missing | {"reason": refusal_text(error)}
-    if result.reason == "interrupted":  # a run ends cleanly at Ctrl-C; the study must end too
-        raise KeyboardInterrupt
+    end_if_interrupted(result.reason)
     losses = [float(values[-1]) for values in result.scheme.values()]
     sound = result.ok and bool(np.all(np.isfinite(result.remainder)))
     least = float(np.min(result.numerical_remainder))
