@@ -254,7 +254,8 @@ def sweep(
     """
     if jobs < 1:
         raise FvsolveError(f"jobs = {jobs} is out of range. Expected 1 or more")
-    raw, base = raw_of(case), dict(set or {})
+    base = dict(set or {})
+    raw = case.raw if isinstance(case, Case) else read_raw(find_source(case)).table
     runs = planned_values(case, raw, base, vary or {}, points, sample, seed)
     refuse_unknown(case, {**base, **runs[0]}, raw)
     folder = None if out is None else Path(out)
@@ -372,11 +373,6 @@ class SweepRun:
             except (OSError, ValueError):
                 self.digests[name] = ""
         return [self.digests[name]] if self.digests[name] else []
-
-
-def raw_of(source) -> dict[str, Any]:
-    """Nested dicts of a case, as read from its file; source : as for `load`."""
-    return source.raw if isinstance(source, Case) else read_raw(find_source(source)).table
 
 
 def folder_of(source) -> Path:

@@ -118,7 +118,12 @@ class _ChartStudy:
         schemes, methods = name_list(schemes), name_list(methods)
         check_names(schemes, methods)
         if main_part_name(self.case_in_cells):
-            self.coarse = CoarseRun(**self.points.get(self.case, {"study": "chart", "coarse": True}, self.coarse_data))
+            coarse_case = self.case if main_part_name(self.case) else self.case_in_cells
+            # cached, so that a repeated study has the same numbers of cells
+            data = self.points.get(
+                self.case, {"study": "chart", "coarse": True}, lambda: asdict(run_coarse(coarse_case))
+            )
+            self.coarse = CoarseRun(**data)
             self.compiling += self.coarse.compile_seconds
         self.all = chart_settings(self.case, self.coarse, schemes, methods, cells, rtol, step)
         self.finest = max((entry.cells for entry in self.all if entry.cells), default=None)
@@ -168,13 +173,6 @@ class _ChartStudy:
         cells = self.finest or max(self.coarse.levels)
         keys = cell_keys(self.case, cells) if self.finest else {}
         return keys | cells_for_lines(self.case, self.case.links[main].length / self.case.wave_speed(main) / cells)
-
-    def coarse_data(self) -> dict:
-        """Results of a coarse run, the fields of `CoarseRun`, as plain data.
-
-        They are cached, so that a repeated study has the same numbers of cells.
-        """
-        return asdict(run_coarse(self.case if main_part_name(self.case) else self.case_in_cells))
 
     def floor(self) -> dict:
         """Uncertainty of the reference (see `Reference`), as plain data with the keys of `Distance`.

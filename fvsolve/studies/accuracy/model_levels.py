@@ -76,7 +76,8 @@ def level_keys(case, level: str) -> dict[str, Any]:
         count, greatest = int(level.split()[0]), max(pipe.cells for pipe in pipes.values())
         return {f"links.{name}.cells": max(1, round(pipe.cells * count / greatest)) for name, pipe in pipes.items()}
     keys = {"expect": {}, "compare": {}, "routes": {}, "limits": {}, **LUMPED_NUMERICS}
-    keys["output.probes"] = [probe.text for probe in case.output.probes if _survives(probe, pipes)]
+    keys["output.probes"] = [probe.text for probe in case.output.probes if probe.part != "links"
+                             or probe.name not in pipes or probe.text == f"{probe.name}.flow"]  # fmt: skip
     if level != "lumped volume":
         keys |= {f"links.{name}": rigid_column(case, name) for name in pipes}
     else:
@@ -117,10 +118,6 @@ def delay_line_keys_of(case, pipes: dict[str, Any]) -> dict[str, Any]:
         if reason := reason_for_cells(case, name, pipe):
             raise NotApplicable(f"{name} cannot be a delay line: {reason}")
     return {f"links.{name}.pipe_model": "delay-line" for name in pipes}
-
-
-def _survives(probe, pipes: dict) -> bool:
-    return probe.part != "links" or probe.name not in pipes or probe.text == f"{probe.name}.flow"
 
 
 def rigid_column(case, name: str) -> dict[str, Any]:

@@ -186,12 +186,6 @@ def input_value(at: OperatingPoint, name: str, input_: Input) -> float:
     return float(value / input_.scale)
 
 
-def input_width(at: OperatingPoint, input_: Input, value: float) -> float:
-    """Small change of an input for difference quotients, in SI units; value : its value at the operating point."""
-    usual = input_.sort.small / (input_.scale or 1e4) if input_.node >= 0 else input_.sort.small
-    return usual if input_.sort.bounded or input_.sort is PRESSURE else max(usual, abs(value))
-
-
 def input_column(at, name, input_, value, size, outputs, steps) -> tuple[np.ndarray, float]:
     """Column of B, followed by the column of D, of an input : float64[n + outputs], and its error.
 
@@ -201,7 +195,8 @@ def input_column(at, name, input_, value, size, outputs, steps) -> tuple[np.ndar
     the input has no derivative.
     """
     model = at.model
-    width = np.array([input_width(at, input_, value)])
+    usual = input_.sort.small / (input_.scale or 1e4) if input_.node >= 0 else input_.sort.small
+    width = np.array([usual if input_.sort.bounded or input_.sort is PRESSURE else max(usual, abs(value))])
     low, high = input_.sort.least, input_.sort.greatest
     differences = two_sided_differences
     if input_.sort.bounded:

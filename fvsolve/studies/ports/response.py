@@ -131,7 +131,9 @@ def _linear_system(case, port: str, at, before, scheme):
     system = linear([], [pressure])
     row = system.at.model.tables.nodes[system.at.model.node_names.index(port)]
     b = np.zeros(len(system.states))
-    b[row["y"]] = _density(system, row)
+    b[row["y"]] = float(
+        system.at.model.case.law.density(system.output_values[0])
+    )  # at the pressure of the port [kg/m3]
     return (_dense(system.a), b, system.c[0], 0.0), system
 
 
@@ -149,11 +151,6 @@ def port_flows(case, port: str) -> dict[str, float]:
             else:
                 signs[f"links.{name}.flow"] = 1.0 if end == "from" else -1.0
     return signs
-
-
-def _density(system, row) -> float:
-    """Density of the fluid at the storing node of the port, at its pressure [kg/m3]."""
-    return float(system.at.model.case.law.density(system.output_values[0]))
 
 
 def _dense(a) -> np.ndarray:
