@@ -16,6 +16,7 @@ from fvsolve.run.result import FAILS, OPEN
 from fvsolve.run.verdicts import SIZES
 from fvsolve.studies.outcome import NO_FIELDS, checked_case, end_if_interrupted
 from fvsolve.studies.peak_error import peak_errors
+from fvsolve.studies.result_table import PlainData
 from fvsolve.studies.sampling import is_known, key_quantity, si_unit_of
 from fvsolve.units import UNITS, show
 
@@ -47,7 +48,7 @@ class SizeRun:
 
 
 @dataclass(frozen=True)
-class Size:
+class Size(PlainData):
     """Result of a sizing.
 
     key : key whose value is searched; unit : unit of its values, for bare numbers the SI unit of the key, "" if it has
@@ -65,6 +66,8 @@ class Size:
     runs: list[SizeRun] = field(default_factory=list)
     ties: tuple[str, ...] = ()
 
+    json = "key unit goal value bracket ties runs"
+
     @property
     def nearest(self) -> SizeRun:
         """Run with the greatest margin."""
@@ -72,9 +75,7 @@ class Size:
 
     def plain(self) -> dict[str, Any]:
         """Plain values for JSON; if no value was found, also the run with the greatest margin as `nearest`."""
-        data = {"key": self.key, "unit": self.unit, "goal": self.goal, "value": self.value, "bracket": self.bracket,
-                "ties": list(self.ties), "runs": [vars(run) for run in self.runs]}  # fmt: skip
-        return data if self.value is not None else data | {"nearest": vars(self.nearest)}
+        return super().plain() | ({} if self.value is not None else {"nearest": vars(self.nearest)})
 
 
 def number_and_unit(given: Any) -> tuple[float, str]:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.errors import FvsolveError
+from fvsolve.studies.result_table import PlainData
 from fvsolve.validation import NUMBER, SERIES, Kind, is_array, validated
 
 LEAST_ROWS = 3
@@ -30,7 +31,7 @@ PRE_ASYMPTOTIC, FLOOR, OFF_LINE, FAILED = "pre-asymptotic", "floor", "off the li
 
 
 @dataclass(frozen=True)
-class Fit:
+class Fit(PlainData):
     """Fitted order of convergence with its spread, or the reason why no order is found.
 
     pairwise : order between each row and the next, NaN if an error is zero or unknown
@@ -48,12 +49,7 @@ class Fit:
     reason: str = ""
     note: str = ""
 
-    def plain(self) -> dict:
-        """Return the fit as plain data."""
-        return {
-            "order": self.order, "spread": self.spread, "constant": self.constant, "pairwise": list(self.pairwise),
-            "marks": list(self.marks), "reason": self.reason, "note": self.note,
-        }  # fmt: skip
+    json = "order spread constant pairwise marks reason note"
 
 
 ERRORS = Kind(lambda value: is_array(value, "fiu", 1, 1, finite=False), "a row of numbers")

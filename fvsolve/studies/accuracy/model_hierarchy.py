@@ -21,6 +21,7 @@ from fvsolve.studies.accuracy.model_levels import NotApplicable, finer_levels, l
 from fvsolve.studies.distance import Deviation, moving_probes
 from fvsolve.studies.outcome import GIVEN_UP, Outcome, capped, outcome, refuse_basins
 from fvsolve.studies.reference import reference_of_run
+from fvsolve.studies.result_table import PlainData
 from fvsolve.validation import FUNCTION, NUMBER, TABLE, validated
 
 DEFAULT_TARGET = 1e-2
@@ -81,7 +82,7 @@ class LawDifference:
 
 
 @dataclass(frozen=True)
-class Hierarchy:
+class Hierarchy(PlainData):
     """Levels of the model hierarchy of a case, with rules of thumb for the choice of a model.
 
     rungs : all levels, simplest first; target : acceptable error [-]; cheapest : fastest level with an error within
@@ -109,6 +110,8 @@ class Hierarchy:
     own_error: float | None
     shallow_water: tuple[str, ...] = ()
     case: Any = field(default=None, repr=False)
+
+    json = "target own_error travel_time change_time strain apart=law_difference thumb=rules rungs richest cheapest"
 
     @property
     def own_error_note(self) -> str:
@@ -157,13 +160,6 @@ class Hierarchy:
         dynamic = self.case.amount(apart.swift, "pressure", 3, span=True)
         reason += f"; linear neglects the dynamic pressure, {dynamic} at the start" if apart.swift > 0.0 else ""
         return f"{text}, more than dp/K = {self.strain:.2g} (greatest pressure change / bulk modulus): {reason}"
-
-    def plain(self) -> dict[str, Any]:
-        """Return the hierarchy as plain data, SI."""
-        own = {name: getattr(self, name) for name in ("target", "own_error", "travel_time", "change_time", "strain")}
-        laws = {"apart": self.law_difference and vars(self.law_difference), "thumb": self.rules}
-        levels = {"rungs": [vars(level) for level in self.rungs]}
-        return own | laws | levels | {"richest": vars(self.richest), "cheapest": vars(self.cheapest)}
 
 
 @validated(set=TABLE, target=NUMBER, progress=FUNCTION)

@@ -18,10 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.errors import FvsolveError, did_you_mean
-from fvsolve.output.summary_file import plain
 from fvsolve.schemes import SCHEMES
 from fvsolve.steppers.automatic import AUTO, EXPLICIT, IMPLICIT, TIGHT_BELOW, TIGHT_IMPLICIT
 from fvsolve.studies.outcome import name_list
+from fvsolve.studies.result_table import PlainData
 from fvsolve.studies.stability.growth import bisect
 from fvsolve.validation import FUNCTION, NAMES, validated
 
@@ -67,7 +67,7 @@ class SchemeClaim:
 
 
 @dataclass(frozen=True)
-class Pair:
+class Pair(PlainData):
     """Scheme and method, with the Courant number up to which no state of a closed pipe gains energy in a step.
 
     courant : inf if there is no limit, 0 if any step can create energy, None for a scheme with a limiter
@@ -77,24 +77,29 @@ class Pair:
     method: str
     courant: float | None
 
+    also = ("any_step",)
+
+    @property
+    def any_step(self) -> bool:
+        """True if there is no limit."""
+        return self.courant == math.inf
+
 
 @dataclass(frozen=True)
-class Passivity:
+class Passivity(PlainData):
     """Results of `passivity`: one entry for each method, for each scheme, and for each pair of the two."""
 
     methods: list[MethodClaim]
     schemes: list[SchemeClaim]
     pairs: list[Pair]
 
+    json = "cells methods schemes pairs"
+    cells = CELLS
+
     @property
     def breaking(self) -> list[tuple[str, str]]:
         """Pairs (scheme, method) that can create energy in a step of any length."""
         return [(pair.scheme, pair.method) for pair in self.pairs if pair.courant == 0.0]
-
-    def plain(self) -> dict:
-        """Plain values for JSON: infinite limits are None; `any_step` is True if a pair has no limit."""
-        pairs = [vars(pair) | {"any_step": pair.courant == math.inf} for pair in self.pairs]
-        return plain({"cells": CELLS, "methods": self.methods, "schemes": self.schemes, "pairs": pairs})
 
 
 @validated(schemes=NAMES, methods=NAMES, progress=FUNCTION)

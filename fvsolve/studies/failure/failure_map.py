@@ -28,6 +28,7 @@ from fvsolve.studies.parallel import RunQueue, RunRequest
 from fvsolve.studies.reference import Reference, find_reference
 from fvsolve.studies.resolution import delay_lines, fixed_choices
 from fvsolve.studies.result_cache import OUT, ResultCache, cache_in
+from fvsolve.studies.result_table import PlainData
 from fvsolve.validation import NAMES, NUMBER, NUMBERS, ROW, TEXT, Kind, is_row, validated
 
 METHODS = ("euler", "ssp-rk3", "rk4", "implicit-euler", "trapezoid", "gauss-4", "radau-iia-5")
@@ -37,7 +38,7 @@ OUTPUT_ROWS = 1000  # rows of the history of each run
 
 
 @dataclass(frozen=True)
-class Square:
+class Square(PlainData):
     """Run of a failure map, with its verdict.
 
     column : number of its column; step : given step [s], None unless the column has one
@@ -56,9 +57,13 @@ class Square:
     halved_error: float | None
     limit: float | None
 
+    json = "scheme method column step courant verdict halved_error limit " + " ".join(
+        f"{entry.name}=measures.{entry.name}" for entry in fields(Measures)
+    )
+
 
 @dataclass(frozen=True)
-class FailureMap:
+class FailureMap(PlainData):
     """Verdicts on runs of a case over schemes, methods and columns.
 
     key : "step" [s] or the key of the case that changes along the columns; values : its values
@@ -86,11 +91,6 @@ class FailureMap:
     def row(self, scheme: str, method: str) -> list[Square]:
         """Runs of a scheme and a method in the order of the columns."""
         return [square for square in self.squares if (square.scheme, square.method) == (scheme, method)]
-
-    def plain(self) -> dict:
-        """Return the map as plain data in SI units; None for unknown or infinite limits."""
-        data = {entry.name: getattr(self, entry.name) for entry in fields(self) if entry.name != "squares"}
-        return data | {"squares": [_square_data(entry) for entry in self.squares]}
 
 
 KEY_VALUES = Kind(
@@ -331,12 +331,3 @@ def _check_names(*given: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...
             if name not in known:
                 raise FvsolveError(f'no {kind} named "{name}"{did_you_mean(name, known)}')
     return tuple(dict.fromkeys(given[0])), tuple(dict.fromkeys(given[1]))
-
-
-def _square_data(square: Square) -> dict:
-    """Run of a failure map as plain data, with its measures; None for an infinite limit."""
-    data = asdict(square)
-    data |= data.pop("measures")
-    limit = square.limit
-    data["limit"] = None if limit is None or math.isinf(limit) else limit
-    return data

@@ -28,6 +28,7 @@ from fvsolve.studies.outcome import STUDY_ARGUMENTS, Progress, name_list
 from fvsolve.studies.parallel import PickledCase, TaskPool, Work
 from fvsolve.studies.resolution import delay_lines, fixed_choices
 from fvsolve.studies.result_cache import ResultCache, case_key
+from fvsolve.studies.result_table import PlainData
 from fvsolve.studies.stability.delay_line_limits import delayed_row
 from fvsolve.studies.stability.growth import (
     DENSE,
@@ -59,7 +60,7 @@ LONGER_FACTOR = 10  # factor of the number of steps in longer runs of Euler with
 
 
 @dataclass(frozen=True)
-class Stability:
+class Stability(PlainData):
     """Result of a stability study: a row for each scheme and method, and notes.
 
     systems : {scheme: function of the scheme that returns its `LinearSystem`, computed on first use}
@@ -70,13 +71,11 @@ class Stability:
     notes: tuple[str, ...]
     systems: dict[str, Callable[[str], LinearSystem]] = field(repr=False)
 
+    json = "case rows said=notes"
+
     def system(self, scheme: str) -> LinearSystem:
         """Linear system with one of the requested schemes; raises FvsolveError for a limited scheme."""
         return self.systems[scheme](scheme)
-
-    def plain(self) -> dict:
-        """Data for JSON."""
-        return {"case": self.case, "rows": [row.plain() for row in self.rows], "said": self.notes}
 
 
 class LinearSystem:
