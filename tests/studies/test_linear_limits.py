@@ -12,8 +12,7 @@ from fvsolve.cli import main
 from fvsolve.errors import FvsolveError
 from fvsolve.model.energy_norm import energy_form
 from fvsolve.studies.linear import state_matrices
-from fvsolve.studies.linear.eigenvalues import eigenvalues_near, poles_of
-from fvsolve.studies.linear.linearise import linearise
+from fvsolve.studies.linear.linearise import eigenvalues_near, linearise, poles_of
 from fvsolve.studies.ports.response import response
 from fvsolve.studies.stability import growth, real_runs
 from fvsolve.studies.stability.stability import stability

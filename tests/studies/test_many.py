@@ -113,7 +113,8 @@ def test_a_worker_of_dask_that_is_killed_costs_its_chunk(cluster, tmp_path):
 
 
 def test_a_scheduler_that_is_not_there_is_named(monkeypatch):
-    cluster_room = pytest.importorskip("fvsolve.studies.dask_cluster")
+    from fvsolve.studies import parallel as cluster_room
+
     pytest.importorskip("distributed", reason="Dask is an extra")
     monkeypatch.setattr(cluster_room, "TIMEOUT", 0.5)
     with socket.socket() as free:
@@ -127,7 +128,7 @@ def test_a_scheduler_that_is_not_there_is_named(monkeypatch):
 
 def test_a_scheduler_without_workers_is_named(monkeypatch):
     distributed = pytest.importorskip("distributed", reason="Dask is an extra")
-    from fvsolve.studies import dask_cluster as room
+    from fvsolve.studies import parallel as room
 
     monkeypatch.setattr(room, "TIMEOUT", 0.5)
     with distributed.LocalCluster(n_workers=0, dashboard_address=":0") as empty:
@@ -136,7 +137,7 @@ def test_a_scheduler_without_workers_is_named(monkeypatch):
 
 
 def test_another_version_is_named_with_both_numbers(cluster, monkeypatch):
-    from fvsolve.studies import dask_cluster as room
+    from fvsolve.studies import parallel as room
 
     own = room.program_versions()
     assert room.program_differences(own) == [] and room.program_differences({**own, "sources": "other"}) == [
@@ -162,7 +163,7 @@ def test_another_version_is_named_with_both_numbers(cluster, monkeypatch):
 
 def test_a_scheduler_that_goes_away_is_told_and_nobody_waits_for_ever(monkeypatch):
     distributed = pytest.importorskip("distributed", reason="Dask is an extra")
-    from fvsolve.studies import dask_cluster as room
+    from fvsolve.studies import parallel as room
 
     monkeypatch.setattr(room, "TIMEOUT", 3.0)
     made = distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0", processes=False)

@@ -21,8 +21,7 @@ from fvsolve.model.energy_norm import EnergyForm, energy_form
 from fvsolve.schemes import SCHEMES, branches
 from fvsolve.steppers import automatic, method_named
 from fvsolve.steppers.built_in_methods import AUTO
-from fvsolve.studies.linear.eigenvalues import Spectrum, find_eigenvalues
-from fvsolve.studies.linear.linearise import Linear, linearise_at
+from fvsolve.studies.linear.linearise import Linear, Spectrum, find_eigenvalues, linearise_at
 from fvsolve.studies.linear.operating_point import OperatingPoint, has_limiter, operating_point, with_weights
 from fvsolve.studies.outcome import STUDY_ARGUMENTS, Progress, name_list
 from fvsolve.studies.parallel import PickledCase, TaskPool, Work
