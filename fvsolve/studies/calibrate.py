@@ -10,7 +10,7 @@ from fvsolve.case import Case, load
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.run.comparison import interpolated
 from fvsolve.studies.outcome import end_if_interrupted, refusal_text
-from fvsolve.studies.parallel import run_tasks
+from fvsolve.studies.parallel import TaskPool
 from fvsolve.studies.result_table import Column, PlainData, ResultTable
 from fvsolve.studies.sampling import key_ranges, sample_points
 from fvsolve.studies.sweep import VARY, RowMaker
@@ -185,13 +185,14 @@ class LeastSquaresFit:
         Raises FvsolveError if no run of the sample finishes.
         """
         costs, reason = np.full(len(self.points), np.inf), ""
-        for k, answer in run_tasks(self.work, self.points, jobs, dask):
-            self.runs += 1
-            self.progress(self.runs, len(self.points), "sample; minimisations follow")
-            if isinstance(answer, str):
-                reason = reason or answer
-            else:
-                costs[k] = sum(float(series @ series) for series in answer)
+        with TaskPool(self.work, jobs, dask) as pool:
+            for k, answer in pool.run(self.points):
+                self.runs += 1
+                self.progress(self.runs, len(self.points), "sample; minimisations follow")
+                if isinstance(answer, str):
+                    reason = reason or answer
+                else:
+                    costs[k] = sum(float(series @ series) for series in answer)
         if not np.isfinite(costs).any():
             raise FvsolveError(f"no run of the sample finished: {reason}")
         best = [k for k in np.argsort(costs, kind="stable")[:DESCENTS] if np.isfinite(costs[k])]

@@ -242,15 +242,15 @@ def capped(seconds: float = np.inf, steps: float = np.inf) -> Callable:
     return make
 
 
-def best_run(model, most: int = MAX_RUNS, budget: float = REPEAT_TIME) -> Outcome:
+def best_run(model, most: int = MAX_RUNS) -> Outcome:
     """Outcome with the least CPU time among up to `most` runs of a model.
 
-    A run that stops early, or exceeds its limit, is not repeated.
-    budget : wall time of all runs together, including the first [s]; a run that would probably exceed it is not begun
+    A run that stops early, or exceeds its limit, is not repeated. A run is not begun if the wall time of all runs
+    together would probably exceed `REPEAT_TIME`.
     """
     began, fastest = perf_counter(), outcome(model, run=capped(CPU_LIMIT))
     for _ in range(most - 1 if fastest.ok else 0):
-        if perf_counter() - began + fastest.seconds > budget:
+        if perf_counter() - began + fastest.seconds > REPEAT_TIME:
             break
         fastest = min(fastest, outcome(model, run=capped(CPU_LIMIT)), key=lambda run: run.processor)
     return fastest

@@ -49,12 +49,6 @@ class Work:
         return vars(self) | {name: {} for name in self.unsent}
 
 
-def run_tasks(work: Work, tasks: Sequence, jobs: int = 1, dask: str | None = None) -> Iterator[tuple[int, Any]]:
-    """Compute tasks with a `TaskPool`; yields (index, answer) of each task when it is finished."""
-    with TaskPool(work, jobs, dask) as pool:
-        yield from pool.run(tasks)
-
-
 class TaskPool:
     """Pool for tasks of one kind. The first task is computed in this process, which compiles the functions for all.
 

@@ -16,7 +16,7 @@ from fvsolve.errors import CaseError, Fault, FvsolveError, did_you_mean
 from fvsolve.output.directory import clear_reports
 from fvsolve.output.summary_file import plain, write_summary
 from fvsolve.run import run
-from fvsolve.studies.parallel import PickledCase, Work, run_tasks
+from fvsolve.studies.parallel import PickledCase, TaskPool, Work
 from fvsolve.units import show
 
 KEYS = ("case", "title", "estimate_error", "events", "protections")
@@ -317,10 +317,11 @@ def study(source, out: str | Path | None = None, jobs: int = 1, dask: str | None
         tasks.append({"event": event, "protection": protection, "keys": keys, "directory": str(place)})
     folder.mkdir(parents=True, exist_ok=True)
     rows: list[dict[str, Any] | None] = [None] * len(tasks)
-    for done, (at, row) in enumerate(run_tasks(ScenarioRun(design.case, design.error, force), tasks, jobs, dask), 1):
-        rows[at] = row
-        if progress is not None:
-            progress(done, len(tasks), row_name(row))
+    with TaskPool(ScenarioRun(design.case, design.error, force), jobs, dask) as pool:
+        for done, (at, row) in enumerate(pool.run(tasks), 1):
+            rows[at] = row
+            if progress is not None:
+                progress(done, len(tasks), row_name(row))
     results = ScenarioResults(design, folder, rows)
     write_study(results)
     return results

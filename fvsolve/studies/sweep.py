@@ -19,7 +19,7 @@ from fvsolve.fluid.property_cache import coolprop_version
 from fvsolve.output.restart import program_versions
 from fvsolve.output.summary_file import plain
 from fvsolve.studies.outcome import NO_FIELDS, STUDY_ARGUMENTS, end_if_interrupted, has_diverged, refusal_text
-from fvsolve.studies.parallel import PickledCase, run_tasks
+from fvsolve.studies.parallel import PickledCase, TaskPool
 from fvsolve.studies.result_cache import ResultCache, digest_of, write_errors
 from fvsolve.studies.result_table import Column, ResultTable
 from fvsolve.studies.sampling import grid, points_from_file, refuse_unknown, sample_points
@@ -328,10 +328,11 @@ class SweepRun:
         waiting = [index for index in range(len(keys)) if index not in self.rows]
         self.report_progress(waiting[:1])
         tasks = [self.runs[index] for index in waiting]
-        for number, row in run_tasks(RowMaker(self.source, self.base), tasks, jobs, dask):
-            index = waiting[number]
-            self.rows[index] = self.runs[index] | self.cache.store(keys[index], ROW_VERSION, row)
-            self.report_progress([index + 1] if index + 1 < len(keys) else [])
+        with TaskPool(RowMaker(self.source, self.base), jobs, dask) as pool:
+            for number, row in pool.run(tasks):
+                index = waiting[number]
+                self.rows[index] = self.runs[index] | self.cache.store(keys[index], ROW_VERSION, row)
+                self.report_progress([index + 1] if index + 1 < len(keys) else [])
 
     def write(self, folder: Path | None) -> Sweep:
         """Collect the rows so far in a `Sweep`, and write them to the folder if there is one.

@@ -13,7 +13,7 @@ import pytest
 
 from fvsolve.errors import FvsolveError, RunError
 from fvsolve.studies import parallel as engine
-from fvsolve.studies.parallel import next_chunk_size, run_tasks
+from fvsolve.studies.parallel import TaskPool, next_chunk_size
 
 
 class Work:
@@ -33,6 +33,11 @@ class Work:
 
     def lost_result(self, task):
         return "lost", task
+
+
+def run_tasks(work, tasks, jobs=1, dask=None):
+    with TaskPool(work, jobs, dask) as pool:
+        yield from pool.run(tasks)
 
 
 def squares(found) -> dict:
@@ -64,10 +69,10 @@ def test_processes_end_with_the_one_that_started_them(tmp_path):
     """Processes end with a killed parent; otherwise their tasks would continue for hours."""
     script = """if True:
         import os, signal, sys, time
-        from fvsolve.studies.parallel import run_tasks
+        from fvsolve.studies.parallel import TaskPool
         def said(task):
             if task: open(f"{sys.argv[1]}/{os.getpid()}", "w").close(); time.sleep(60.0)
-        if __name__ == "__main__": [*run_tasks(said, [0, 1, 2], jobs=2)]"""
+        if __name__ == "__main__": [*TaskPool(said, jobs=2).run([0, 1, 2])]"""
     (tmp_path / "script.py").write_text(textwrap.dedent(script))
     (tmp_path / "there").mkdir()
     running = subprocess.Popen([sys.executable, tmp_path / "script.py", tmp_path / "there"])
