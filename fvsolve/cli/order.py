@@ -12,7 +12,7 @@ from fvsolve.cli import terminal
 from fvsolve.cli.app import Json, Set, SingleCase, app, load_case, print_json
 from fvsolve.cli.study_options import Dask, Jobs, Out, clear_files, comma_list, folder_of, method_names, progress_line
 from fvsolve.output.summary_file import plain
-from fvsolve.studies.accuracy.order import NORMS, SHOWN_VARIABLES, study_title, variable_unit
+from fvsolve.studies.accuracy.order_picture import NORMS, SHOWN_VARIABLES, study_title, variable_unit
 from fvsolve.studies.result_table import Column, ResultTable, columns
 
 FILE = columns(
