@@ -182,6 +182,5 @@ def schedules(case: Case) -> Iterator[tuple[str, Schedule]]:
     for group in ("nodes", "links"):
         for name, part in getattr(case, group).items():
             values = {info.alias or field: getattr(part, field) for field, info in type(part).model_fields.items()}
-            yield from (
-                (path((group, name, key)), value) for key, value in values.items() if isinstance(value, Schedule)
-            )
+            laws = {key: value for key, value in values.items() if isinstance(value, Schedule)}
+            yield from ((path((group, name, key)), law) for key, law in laws.items())

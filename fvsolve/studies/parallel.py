@@ -325,11 +325,9 @@ def check_versions(client: Any, address: str) -> None:
     faults = [
         f"{end} has {item}" for end, text in ends.items() for item in differing_versions(here, version_numbers(text))
     ]
-    faults = faults or [
-        f"worker {name} has {item}"
-        for name, text in client.run(program_versions, on_error="return").items()
-        for item in program_differences(text)
-    ]
+    if not faults:
+        programs = client.run(program_versions, on_error="return")
+        faults = [f"worker {name} has {item}" for name, text in programs.items() for item in program_differences(text)]
     if faults:
         raise FvsolveError(f"the Dask cluster at {address} has other versions, so its results could differ: "
                            f"{listing(faults)}. Install the same versions there and here")  # fmt: skip

@@ -346,9 +346,8 @@ class ScenarioRun(Work):
         summary = result.summary
         keys_shown = ("ok", "reason", "t", "invalid_from", "verdicts", "extremes", "peaks", "resolution", "marks",
                       "events", "expectations", "time_unit", "envelope_units", "warnings")  # fmt: skip
-        return {key: task[key] for key in ("event", "protection", "directory")} | {
-            key: plain(summary[key]) for key in keys_shown if key in summary
-        }
+        row = {key: task[key] for key in ("event", "protection", "directory")}
+        return row | {key: plain(summary[key]) for key in keys_shown if key in summary}
 
     def process_text(self, task: dict[str, Any]) -> str:
         return f"that ran {task['directory']}"

@@ -120,10 +120,8 @@ class _ChartStudy:
         if main_part_name(self.case_in_cells):
             coarse_case = self.case if main_part_name(self.case) else self.case_in_cells
             # cached, so that a repeated study has the same numbers of cells
-            data = self.points.get(
-                self.case, {"study": "chart", "coarse": True}, lambda: asdict(run_coarse(coarse_case))
-            )
-            self.coarse = CoarseRun(**data)
+            key = {"study": "chart", "coarse": True}
+            self.coarse = CoarseRun(**self.points.get(self.case, key, lambda: asdict(run_coarse(coarse_case))))
             self.compiling += self.coarse.compile_seconds
         self.all = chart_settings(self.case, self.coarse, schemes, methods, cells, rtol, step)
         self.finest = max((entry.cells for entry in self.all if entry.cells), default=None)
@@ -280,17 +278,14 @@ class _ChartStudy:
             )
         best = cheapest_curve(points, target, floor["trajectory"], "seconds")
         if best is None:
-            finer = "more cells" if self.finest else "shorter steps" if self.coarse else "a smaller rtol"
-            raise FvsolveError(
-                f"no setting reaches an error of {target:g}; the least error is {min(good_errors(points)):.2g}. "
-                f"Try {finer}"
-            )
+            remedy = "more cells" if self.finest else "shorter steps" if self.coarse else "a smaller rtol"
+            least = f"{min(good_errors(points)):.2g}"
+            raise FvsolveError(f"no setting reaches an error of {target:g}; the least error is {least}. Try {remedy}")
         name, crossing = best
         curve = curves_by_name(points)[name]
         for share in (crossing.share, 0.5 * (1.0 + crossing.share)) if crossing.within else ():
-            point = self.point(
-                interpolated_setting(self.case, curve[crossing.coarser].setting, curve[crossing.finer].setting, share)
-            )
+            coarser, finer = curve[crossing.coarser].setting, curve[crossing.finer].setting
+            point = self.point(interpolated_setting(self.case, coarser, finer, share))
             if point.ok and point.trajectory <= target:
                 return _target_setting(target, point, self.case)
         return _target_setting(target, curve[crossing.finer], self.case)
@@ -318,9 +313,8 @@ def _target_setting(target: float, point: Point, case: Case) -> TargetSetting:
     if "numerics.method" in keys:
         keys = keys | {"numerics.method": _method_in_file(keys["numerics.method"], case)}
     numerics = {key.removeprefix("numerics."): value for key, value in keys.items() if key.startswith("numerics.")}
-    return TargetSetting(
-        target, point, numerics, {key: value for key, value in keys.items() if not key.startswith("numerics.")}
-    )
+    others = {key: value for key, value in keys.items() if not key.startswith("numerics.")}
+    return TargetSetting(target, point, numerics, others)
 
 
 def _method_in_file(method: str, case: Case) -> str:
@@ -342,10 +336,10 @@ def _useless_text(case: Case, points: list[Point], floor: dict) -> str:
     """
     least = min(good_errors(points), default=math.nan)
     errors = f"all errors (least {least:.2g})" if math.isfinite(least) else "any useful error, and no run succeeded"
-    larger_step = "a larger --step (if delay lines are exact, any step is accurate)"
-    remedy = larger_step if delay_lines(case) else "a larger --rtol"
-    remedy = (
-        "fewer --cells (references have four times the cells of the finest run)" if main_part_name(case) else remedy
-    )
+    remedy = "a larger --rtol"
+    if main_part_name(case):
+        remedy = "fewer --cells (references have four times the cells of the finest run)"
+    elif delay_lines(case):
+        remedy = "a larger --step (if delay lines are exact, any step is accurate)"
     return (f"{case.name}: the two references ({floor['reference']}; {floor['second']}) disagree by "
             f"{floor['trajectory']:.2g}, more than {errors}. Try {remedy}, or an earlier end of the run")  # fmt: skip

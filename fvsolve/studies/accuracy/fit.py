@@ -132,9 +132,8 @@ class FitRows:
         """
         marks = list(self.marks)
         for k, i in enumerate(rows):
-            marks[i] = (
-                PRE_ASYMPTOTIC if k < first else FLOOR if k >= stop and not note else OFF_LINE if k >= stop else ""
-            )
+            after = OFF_LINE if note else FLOOR
+            marks[i] = PRE_ASYMPTOTIC if k < first else after if k >= stop else ""
         if outlier is not None:
             marks[outlier] = OFF_LINE
             note = note or "one error lies far below the line of the other errors, as if the error changed sign there"
@@ -265,9 +264,8 @@ def may_be_floor(h, e, first: int, stop: int) -> bool:
     """
     slope, _ = line_of(h[first:stop], e[first:stop])
     before = np.max(pair_orders(h[: first + 1], e[: first + 1]), initial=0.0)
-    return bool(before > STEEP_RATIO * slope + 0.3) and not (
-        stop - first > LEAST_ROWS and is_clear_line(h, e, first, stop)
-    )
+    clear = stop - first > LEAST_ROWS and is_clear_line(h, e, first, stop)
+    return bool(before > STEEP_RATIO * slope + 0.3) and not clear
 
 
 def is_clear_line(h, e, first: int, stop: int) -> bool:
@@ -323,7 +321,6 @@ def classify_tail(h, e, first: int, stop: int) -> str | None:
     if rest.size == 1 and stop - first > LEAST_ROWS:
         if 0.0 < excess[0] and rest[0] < ALLOWED_RISE * last and abs(rest[0] / last - 1.0) < 0.1 * slope:
             return ""  # the error no longer falls
-        return (
-            "the error of the last row leaves the line of the other rows: an error floor or another order begins there"
-        )
+        leaves = "the error of the last row leaves the line of the other rows"
+        return f"{leaves}: an error floor or another order begins there"
     return None

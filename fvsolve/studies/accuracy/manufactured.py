@@ -58,9 +58,9 @@ class ManufacturedStudy(OrderStudy):
         """Reference: the exact function, or a finer run from the same start and with the same source."""
         time_only = self.plan.way == "time" and self.against == "auto"  # the space error would hide the time error
         use_exact = self.exact is not None and self.against != "finer" and not time_only
-        return (
-            self.reference_of_function() if use_exact else self.find_reference(self.plan.way, False, run=self.outcome)
-        )
+        if use_exact:
+            return self.reference_of_function()
+        return self.find_reference(self.plan.way, False, run=self.outcome)
 
     def reference_of_function(self) -> Reference:
         """Reference from the exact function; the pressure of a node is that at the pipe end that joins the node."""
@@ -130,9 +130,8 @@ class UserFunction:
 
         The error is also stored, because compiled steps that call the function cannot pass it on.
         """
-        self.fault = FvsolveError(
-            f'{self.name}(pipe, x{", t" if self.name != "initial" else ""}) on "{pipe}" {problem}'
-        )
+        arguments = "pipe, x" if self.name == "initial" else "pipe, x, t"
+        self.fault = FvsolveError(f'{self.name}({arguments}) on "{pipe}" {problem}')
         return self.fault
 
 

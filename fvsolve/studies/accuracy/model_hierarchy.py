@@ -239,9 +239,8 @@ def refine_richest(
         run = _run_level(case, name, law)
         if not run.ok:
             break
-        differences.append(
-            max((_rms_error(gap) for gap in moving_probes(runs[-1][1], reference_of_run(run)).values()), default=0.0)
-        )
+        gaps = moving_probes(runs[-1][1], reference_of_run(run)).values()
+        differences.append(max((_rms_error(gap) for gap in gaps), default=0.0))
         if len(differences) > 1 and differences[-2] > 0.0:
             ratio = min(max(differences[-1] / differences[-2], 0.1), 0.9)
         if differences[-1] <= target * (1.0 - ratio):
@@ -277,13 +276,8 @@ def _run_level(case, name: str, law: str) -> Outcome:
     name : name of the level as from `level_names`; law : density law
     """
     try:
-        return outcome(
-            case,
-            {**level_keys(case, name), "fluid.law": law},
-            best_of=BEST_OF,
-            run=capped(LEVEL_CPU_LIMIT),
-            budget=BRIEF_RUN,
-        )
+        keys = {**level_keys(case, name), "fluid.law": law}
+        return outcome(case, keys, best_of=BEST_OF, run=capped(LEVEL_CPU_LIMIT), budget=BRIEF_RUN)
     except (CaseError, NotApplicable) as error:
         return Outcome(f"skipped: {error}", refused=True)
 

@@ -40,11 +40,8 @@ def level_names(case) -> list[str]:
 
 def sloshing_basins(case) -> dict[str, Any]:
     """Basins with a free surface that are mounted on bodies: name -> node."""
-    return {
-        name: node
-        for name, node in case.nodes.items()
-        if node.kind == "basin" and node.on and node.physics_type.has_modes
-    }
+    basins = {name: node for name, node in case.nodes.items() if node.kind == "basin"}
+    return {name: node for name, node in basins.items() if node.on and node.physics_type.has_modes}
 
 
 def finer_levels(case, doublings: int) -> list[str]:
@@ -97,9 +94,8 @@ def sloshing_keys(case, level: str) -> dict[str, Any]:
     basins, keys = sloshing_basins(case), {"expect": {}, "compare": {}, "routes": {}, "limits": {}}
     if level in ("frozen", "modes"):
         quantities = {"frozen": (), "modes": ("depth",)}[level]
-        keys["output.probes"] = [
-            entry.text for entry in case.output.probes if entry.name not in basins or entry.quantity in quantities
-        ]
+        probes = [entry for entry in case.output.probes if entry.name not in basins or entry.quantity in quantities]
+        keys["output.probes"] = [entry.text for entry in probes]
         return keys | {f"nodes.{name}.sloshing": level for name in basins} | LUMPED_NUMERICS
     keys |= {f"nodes.{name}.sloshing": "cells" for name in basins}
     if any(basin.lumped for basin in basins.values()):

@@ -146,9 +146,8 @@ def order(
         for scheme, method in pairs:
             pair_settings = {"numerics.scheme": scheme, "numerics.method": method}
             settings = {**(set or {}), **{name: value for name, value in pair_settings.items() if value is not None}}
-            studies.append(
-                _order_of_pair(case, settings, (refine, key, levels, cells), against, given, points, report, queue)
-            )
+            rows = refine, key, levels, cells
+            studies.append(_order_of_pair(case, settings, rows, against, given, points, report, queue))
     return studies[0] if len(studies) == 1 else studies
 
 

@@ -342,9 +342,8 @@ def check_three_differences(fitted: Fit, theory: float) -> Fit:
 def mark_finest(fitted: Fit, rows) -> Fit:
     """Return a fit in which rows that ran but have no finer row have the mark "finest" instead of "failed"."""
     pairs = zip(fitted.marks, rows, strict=True)
-    return replace(
-        fitted, marks=tuple(FINEST_ROW if mark == FAILED and not row.reason else mark for mark, row in pairs)
-    )
+    marks = tuple(FINEST_ROW if mark == FAILED and not row.reason else mark for mark, row in pairs)
+    return replace(fitted, marks=marks)
 
 
 def is_certain(fitted: Fit, ratio: float) -> bool:

@@ -120,17 +120,14 @@ def refinement_plan(
     if refine != "time" and not delay_lines(case):
         refinable_counts(case)
     if key is not None and (known[key] == "time") != (refine == "time"):
-        raise FvsolveError(
-            f'{key} refines {"time" if known[key] == "time" else "space"}, so refine = "{refine}" is impossible. '
-            "Leave `refine` out"
-        )
+        way = "time" if known[key] == "time" else "space"
+        raise FvsolveError(f'{key} refines {way}, so refine = "{refine}" is impossible. Leave `refine` out')
     levels = DEFAULT_LEVELS[refine] if levels is None else levels
     if levels < 2:
         raise FvsolveError(f"levels = {levels} is too few. Expected at least 2, and at least 3 for a fitted order")
     if refine == "time" and cells is not None:
-        raise FvsolveError(
-            f"cells = {cells}: only steps are refined here. Leave `cells` out, or set the cells of the case"
-        )
+        text = "only steps are refined here. Leave `cells` out, or set the cells of the case"
+        raise FvsolveError(f"cells = {cells}: {text}")
     if refine == "time":
         return time_plan(case, key, levels)
     if delay_lines(case) and (key == "numerics.delay_tolerance" or not cell_counts(case)):
@@ -212,9 +209,8 @@ def space_plan(case, way: str, key: str | None, levels: int, cells: int | None) 
         rows.append(Level(cell_keys_of(row_counts) | stepping | stretched, length, total_cells(case, row_counts), step))
     names = ", ".join(name.split(".")[1] for name in refined)
     kinds = " and ".join(kind for kind, parts in (("pipes", pipes_with_cells(case)), ("basins", basins(case))) if parts)
-    text = (
-        f"cells of all {kinds}" if len(refined) == len(first) and not basins_from_files(case) else f"cells of {names}"
-    )
+    all_refined = len(refined) == len(first) and not basins_from_files(case)
+    text = f"cells of all {kinds}" if all_refined else f"cells of {names}"
     text += " and stretches of delay lines" if delay_lines(case) and key is None else ""
     return Plan(way, "cell size [m]", tuple(rows), f"{text} doubled, {stepping_words(case, way, courant)}")
 

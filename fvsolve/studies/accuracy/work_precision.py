@@ -148,9 +148,8 @@ def front_row(points: Sequence[Point], target: float, floor: float, default: str
     """
     by_time, by_work = (cheapest_curve(points, target, floor, cost) for cost in ("seconds", "updates"))
     name, best = by_time or (None, None)
-    default_time, default_work = (
-        target_crossings(points, target, floor, cost).get(default) for cost in ("seconds", "updates")
-    )
+    by_cost = (target_crossings(points, target, floor, cost) for cost in ("seconds", "updates"))
+    default_time, default_work = (crossings.get(default) for crossings in by_cost)
     return FrontRow(
         target, name, fineness_text(points, name, best), best and best.cost, by_work and by_work[0],
         by_work and by_work[1].cost, fineness_text(points, default, default_time), default_time and default_time.cost,
@@ -188,9 +187,8 @@ def cheapest_curve(points: Sequence[Point], target: float, floor: float, cost: s
 def interpolated_setting(case: Case, coarse: MethodSetting, fine: MethodSetting, share: float) -> MethodSetting:
     """Setting between two settings of a curve; share : its position in logarithms, 0 at `coarse` and 1 at `fine`."""
     if coarse.cells is not None:
-        return cells_setting(
-            case, coarse.scheme, coarse.method, math.ceil(interpolate_log(coarse.cells, fine.cells, share))
-        )
+        cells = math.ceil(interpolate_log(coarse.cells, fine.cells, share))
+        return cells_setting(case, coarse.scheme, coarse.method, cells)
     return lumped_setting(coarse.method, float(f"{interpolate_log(coarse.size, fine.size, share):.2g}"), coarse.control)
 
 
@@ -297,10 +295,10 @@ class Chart(Displayable):
     def stands(self) -> Point | None:
         """Point of the default scheme and method with 100 cells or a tolerance of 1e-6; None without such a point."""
         curve = self.curves().get(self.default, [])
-        return next(
-            (point for point in curve if DEFAULT_CELLS == point.setting.cells or point.setting.size == DEFAULT_RTOL),
-            None,
-        )
+        for point in curve:
+            if DEFAULT_CELLS == point.setting.cells or point.setting.size == DEFAULT_RTOL:
+                return point
+        return None
 
     @property
     def failed(self) -> list[Point]:

@@ -205,9 +205,8 @@ def energy_matrix(settings, n: int) -> np.ndarray:
     points = np.zeros((3 * n, n))
     for i in range(n):
         start = min(max(i - width // 2, 0), n - width)
-        points[3 * i : 3 * i + 3, start : start + width] = (
-            np.sqrt(GAUSS_WEIGHTS)[:, None] * POINTS[width, i - start, :, :width]
-        )
+        weighted = np.sqrt(GAUSS_WEIGHTS)[:, None] * POINTS[width, i - start, :, :width]
+        points[3 * i : 3 * i + 3, start : start + width] = weighted
     return np.linalg.cholesky(points.T @ points).T
 
 

@@ -110,10 +110,8 @@ def excess_variation(rows: np.ndarray, reference: np.ndarray, ranges: np.ndarray
     smooth, smooth_reference = (_medians(values) / ranges for values in (rows, reference))
     variation, expected = (np.abs(np.diff(values, axis=0)).sum(axis=0) for values in (smooth, smooth_reference))
     excesses = (variation - expected) / np.maximum(expected, 1.0)
-    quick = [
-        turn_interval(a, SWING_RANGE) < PACE_RATIO * turn_interval(b, REFERENCE_SWING)
-        for a, b in zip(smooth.T, smooth_reference.T, strict=True)
-    ]
+    quick = [turn_interval(a, SWING_RANGE) < PACE_RATIO * turn_interval(b, REFERENCE_SWING)
+             for a, b in zip(smooth.T, smooth_reference.T, strict=True)]  # fmt: skip
     return float(np.max(excesses[quick], initial=0.0))
 
 

@@ -120,9 +120,8 @@ class RealRuns:
 
         def state(k: int) -> np.ndarray | None:
             while run and len(states) <= k:
-                states.append(
-                    run.now.copy() if run.run(self.strides[len(states)]) == loop_indices.BUDGET_SPENT else None
-                )
+                continues = run.run(self.strides[len(states)]) == loop_indices.BUDGET_SPENT
+                states.append(run.now.copy() if continues else None)
             return states[k] if run else self.at.y
 
         return state

@@ -132,9 +132,8 @@ def stability(
     prediction that takes too long, and for too few steps or too small a threshold.
     """
     if steps < 10 or not threshold > 1.0:
-        raise FvsolveError(
-            f"steps = {steps}, threshold = {threshold:g}: expected at least 10 steps and a threshold above 1"
-        )
+        given = f"steps = {steps}, threshold = {threshold:g}"
+        raise FvsolveError(f"{given}: expected at least 10 steps and a threshold above 1")
     case = load(case, dict(set or {}))
     case = load(case, fixed_choices(case))
     if delay_lines(case) and at is not None:
@@ -148,9 +147,8 @@ def stability(
     work, pairs = RowTask(case, **requested), [*itertools.product(schemes, methods)]
     with ResultCache(out) as points, TaskPool(work, jobs, dask) as pool:
         rows = cached_rows(points, case, requested, pairs, pool, progress or (lambda *_: None))
-    return Stability(
-        case.name, tuple(map(row_from_json, rows)), texts, {scheme: work.maker(scheme).system for scheme in schemes}
-    )
+    systems = {scheme: work.maker(scheme).system for scheme in schemes}
+    return Stability(case.name, tuple(map(row_from_json, rows)), texts, systems)
 
 
 def cached_rows(points: ResultCache, case, options: dict, pairs: list, pool: TaskPool, report: Progress) -> list[dict]:

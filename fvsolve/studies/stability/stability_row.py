@@ -243,9 +243,8 @@ def field_of_values_notes(row, side) -> list[str]:
             return [f"the field of values allows no step: it reaches {reach:.3g} 1/s into the right half plane; energy "
                     "can grow at first (pipe ends with a scheme above first order, or a gain in the case). This is not "
                     "a failure"]  # fmt: skip
-        return [
-            "the field of values allows no step: it touches the imaginary axis at points outside the stability region"
-        ]
+        touches = "it touches the imaginary axis at points outside the stability region"
+        return [f"the field of values allows no step: {touches}"]
     return ["the bound by the field of values is below the predicted limit here"]
 
 
