@@ -56,8 +56,8 @@ class ProcessPool(ThreadPoolExecutor):
         self.idle.append(worker)
         return result
 
-    def check(self) -> None:
-        """Do nothing: the pool itself cannot be lost."""
+    def check(self, cancelled: bool = False) -> None:
+        """Do nothing: processes of this machine can always be reached."""
 
     def close(self) -> None:
         """End all processes; unfinished chunks are dropped."""

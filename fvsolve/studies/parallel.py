@@ -94,7 +94,7 @@ def distribute(work: Work, tasks: Sequence, workers: Any, first: int) -> Iterato
     `Work.lost_result`).
     workers : `ProcessPool` or `Cluster`. It has a `capacity`, the greatest number of chunks in work; submit(tasks) ->
     future of (answers, or the exception of a task; computing time [s]); the type `lost` of the exception of a future
-    whose process crashed; and check(), which raises RunError if the workers cannot be reached
+    whose process crashed; and check(cancelled), which raises RunError if the workers cannot be reached
     """
     waiting, retry = deque(range(first, len(tasks))), deque()
     in_work: dict[Future, list[int]] = {}
@@ -114,7 +114,7 @@ def distribute(work: Work, tasks: Sequence, workers: Any, first: int) -> Iterato
         try:
             answers, seconds = future.result()
         except CancelledError:
-            workers.check()
+            workers.check(cancelled=True)
             raise
         except workers.lost:
             if len(numbers) > 1:
@@ -263,9 +263,9 @@ class Cluster:
         """Compute a list of tasks on a worker : future of the result of `compute`."""
         return self.executor.submit(run_on_worker, self.name, self.work, tasks)
 
-    def check(self) -> None:
-        """Raise RunError if the scheduler is lost."""
-        if self.client.status != "running":
+    def check(self, cancelled: bool = False) -> None:
+        """Raise RunError if the scheduler is lost; cancelled : True if it has cancelled a chunk, which shows this."""
+        if cancelled or self.client.status != "running":
             text = "Finished runs are kept; the same command resumes from there"
             raise RunError(f"lost the Dask scheduler at {self.address}. {text}")
 
