@@ -196,6 +196,8 @@ def refuse_basins(case, study: str, allow_sloshing: bool = False) -> None:
         raise FvsolveError(f"{study} does not support basins yet; the case has {listing(names)}")
 
 
+# limits of CPU time -----------------------------------------------------------------------------------------------
+
 MAX_RUNS = 5  # greatest number of runs, of which the fastest counts
 REPEAT_TIME = 0.4  # wall time of all runs together, including the first, above which no run is repeated [s]
 CPU_LIMIT = 30.0  # CPU time after which a run is stopped [s]

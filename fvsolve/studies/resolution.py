@@ -75,6 +75,8 @@ def pipe_model_keys(chosen: dict[str, str]) -> dict[str, str]:
     return {f"links.{name}.pipe_model": line for name, line in chosen.items()}
 
 
+# cells ------------------------------------------------------------------------------------------------------------
+
 Counts = dict[str, tuple[int, ...]]  # dotted key -> numbers of cells: one of a pipe, two of a basin
 BASIN_ORDER = 2  # order of `muscl`, which replaces all schemes that a basin does not have
 JUMP_SHARE = 0.75  # a jump keeps at least this fraction of its greatest difference between neighbours on finer cells
@@ -265,6 +267,8 @@ def refined_step_keys(case, times: float) -> dict[str, Any]:
     name = slowest_pipe(case, delay_lines(case))
     return {f"links.{name}.cells": max(1, round(case.links[name].cells * times))}
 
+
+# quantities of basins ---------------------------------------------------------------------------------------------
 
 EDGE_TOLERANCE = 1e-9  # fraction of the length: edges of coarse and fine cells that lie nearer are equal
 SPLINE_DEGREE = 5  # degree of the spline through cumulative contents, for edges that are not equal

@@ -248,6 +248,8 @@ def within(place: str, key: str) -> bool:
     return place == key or place.startswith((f"{key}.", f"{key}["))
 
 
+# runs and results -------------------------------------------------------------------------------------------------
+
 STUDY = "study.json"
 
 

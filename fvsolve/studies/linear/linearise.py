@@ -223,6 +223,8 @@ def input_column(at, name, input_, value, size, outputs, steps) -> tuple[np.ndar
     return slope / width[0], float(np.max(error))
 
 
+# eigenvalues ------------------------------------------------------------------------------------------------------
+
 MAX_DENSE = 1500  # greatest number of states for which all eigenvalues are computed; above, some by ARPACK
 ARPACK_COUNT = 20  # eigenvalues that ARPACK computes at each place
 RIM_PLACES = 5  # places on the spectral circle, from i to -1: the lower half plane mirrors the upper one

@@ -70,6 +70,8 @@ def bisect(fails: Callable[[float], bool], low: float, high: float, fine: float 
     return StepLimit(low, high)
 
 
+# powers of the step matrix ----------------------------------------------------------------------------------------
+
 THRESHOLD = 1e3
 STEPS = 1000
 DENSE = 500  # greatest number of states for which powers are matrices; above, vectors are propagated
@@ -245,6 +247,8 @@ class DenseGrowth:
         with np.errstate(over="ignore", invalid="ignore"):
             return step_matrix(self.method, h * self.e)
 
+
+# vectors ----------------------------------------------------------------------------------------------------------
 
 TIME_LIMIT = 30.0  # time limit of a prediction [s]
 VECTORS, PASSES = 4, 4  # vectors in a block; passes forward and back

@@ -179,6 +179,8 @@ def _rhs():
     return compiled_as(rhs_periodic, RHS)
 
 
+# limited schemes --------------------------------------------------------------------------------------------------
+
 LIMITED_CELLS, LIMITED_STEPS, STEP_FACTORS = 50, 500, (1, 10, 100)
 LIMITED_TOLERANCE = 1e-3  # relative width of a measured limit; growth is not a smooth function of the Courant number
 SMALLEST = 0.3  # least Courant number that is run, unless a bound excludes failure up to a greater one

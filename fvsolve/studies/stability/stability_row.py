@@ -101,6 +101,8 @@ def row_from_json(data: dict) -> StabilityRow:
     return StabilityRow(**fields | {"notes": tuple(fields["notes"])})
 
 
+# bounds -----------------------------------------------------------------------------------------------------------
+
 MODULUS_MARGIN = 1e-9  # |R| may exceed 1 by this: round-off of eigenvalues
 POINTS_PER_SIDE = 8  # points along each side of the polygon inscribed in a field of values
 TANGENTS = 49  # tangents to a field of values in the upper half plane
@@ -155,6 +157,8 @@ def field_of_values(e: np.ndarray) -> np.ndarray:
     share = np.arange(POINTS_PER_SIDE) / POINTS_PER_SIDE
     return np.concatenate([a + (b - a) * share for a, b in zip(corners, np.roll(corners, -1), strict=True)])
 
+
+# notes ------------------------------------------------------------------------------------------------------------
 
 AGREEMENT = 0.02  # relative difference of a bound and the prediction below which no note is needed
 GROWTH_FLOOR = 1e-9  # of the greatest wave rate or eigenvalue: real parts below are round-off
