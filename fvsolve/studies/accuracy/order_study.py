@@ -13,8 +13,8 @@ import numpy as np
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers.built_in_methods import METHODS
 from fvsolve.studies.accuracy.fit import FAILED, FLOOR, LEAST_ROWS, NO_ERROR, Fit, fit
-from fvsolve.studies.accuracy.order import Order, OrderRow
 from fvsolve.studies.accuracy.order_picture import error_scale
+from fvsolve.studies.accuracy.order_result import Order, OrderRow
 from fvsolve.studies.accuracy.refine import Level, Plan
 from fvsolve.studies.distance import NORMS, error_norms, recording_keys, variable_size
 from fvsolve.studies.outcome import REFERENCE_CPU_LIMIT, Outcome, Progress, capped, outcome, study_model
