@@ -16,9 +16,8 @@ from time import perf_counter
 from measure import agree, parser
 
 from fvsolve.case import shipped
-from fvsolve.studies.accuracy.chart import Chart, chart
-from fvsolve.studies.accuracy.chart_files import write_chart
-from fvsolve.studies.accuracy.pareto import find_crossing
+from fvsolve.studies.accuracy.chart import chart
+from fvsolve.studies.accuracy.work_precision import Chart, find_crossing, write_chart
 
 ROOT = Path(__file__).resolve().parents[1]
 PICTURES, POINTS = ROOT / "docs" / "charts", ROOT / "build" / "charts"

@@ -17,7 +17,7 @@ from measure import agree, parser
 
 from fvsolve.run import model_of, run
 from fvsolve.studies.peak_error import SIDES, peak_errors
-from fvsolve.studies.refinement import refined_keys
+from fvsolve.studies.resolution import refined_keys
 
 WATER = {"name": "user", "density": 1000, "bulk_modulus": 2.2e9, "viscosity": 1e-3, "vapor_pressure": 2000}
 FRICTIONS = (

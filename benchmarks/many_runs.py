@@ -12,8 +12,8 @@ import numpy as np
 from measure import agree, parser, peer_module
 
 from fvsolve import build, load, run, vary
-from fvsolve.studies.parallel import run_tasks
-from fvsolve.studies.sweep_row import RowMaker
+from fvsolve.studies.parallel import TaskPool
+from fvsolve.studies.sweep import RowMaker
 
 CASE, KEY, GOAL, SHARE = "valve-closure", "links.valve.area", 500.0, 0.9
 CELLS = {"links.main.cells": 20, "numerics.scheme": "upwind5", "numerics.method": "rk4", "output.fields": 0}
@@ -74,16 +74,18 @@ def dask() -> None:
     rows, points = RowMaker(CASE, CELLS), [area(k) for k in range(RUNS)]
     rows(points[0])
     began = time.process_time()
-    for _ in run_tasks(rows, points):
+    for _ in TaskPool(rows).run(points):
         pass
     here = (time.process_time() - began) / RUNS
     made = distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0")
     with made as cluster, distributed.Client(cluster) as client:
-        for _ in run_tasks(RowMaker(CASE, CELLS), points[:50], dask=cluster.scheduler_address):
-            pass  # compiles on the worker
+        with TaskPool(RowMaker(CASE, CELLS), dask=cluster.scheduler_address) as pool:
+            for _ in pool.run(points[:50]):
+                pass  # compiles on the worker
         before, began = sum(client.run(time.process_time).values()), time.process_time()
-        for _ in run_tasks(RowMaker(CASE, CELLS), points, dask=cluster.scheduler_address):
-            pass
+        with TaskPool(RowMaker(CASE, CELLS), dask=cluster.scheduler_address) as pool:
+            for _ in pool.run(points):
+                pass
         there = (sum(client.run(time.process_time).values()) - before) / RUNS
         beside = (time.process_time() - began) / RUNS
     told(f"{RUNS} rows in this process", here)

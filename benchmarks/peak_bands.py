@@ -23,7 +23,7 @@ from fvsolve.case import load, shipped
 from fvsolve.errors import FvsolveError
 from fvsolve.run import run
 from fvsolve.studies.peak_error import RELATIVE_FLOOR, SIDES, peak_errors
-from fvsolve.studies.refinement import refined_keys
+from fvsolve.studies.resolution import refined_keys
 
 QUIET = {"output.fields": 0, "output.lines": {}}
 

@@ -11,8 +11,7 @@ from price import front, price
 from fvsolve.case import load
 from fvsolve.solve.solve import Run
 from fvsolve.steppers.tableau import METHODS
-from fvsolve.studies.accuracy.timing import CappedRun
-from fvsolve.studies.outcome import Outcome, outcome, study_model
+from fvsolve.studies.outcome import CappedRun, Outcome, outcome, study_model
 
 HERE = Path(__file__).resolve().parent
 SCENES = ("cylinder-servo", "hydraulic-drive", "chamber-chain", "pipe-tiny-chamber", "temperature-front", "servo-arm")

@@ -1,7 +1,5 @@
 """Display of results at a prompt and in a notebook: a line, a table, a plot."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from html import escape
 from importlib import import_module

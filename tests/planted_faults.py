@@ -108,7 +108,7 @@ FAULTS = [
         "np.log(e[:-1] / e[1:]) / np.log(h[:-1] / h[1:])",
         "np.log(e[:-1] / e[1:]) / np.log(1.01 * h[:-1] / h[1:])",
     ),
-    Fault("studies/stability/vector_growth.py", "scaled @ result + x * v", "scaled @ result - x * v"),
+    Fault("studies/stability/growth.py", "scaled @ result + x * v", "scaled @ result - x * v"),
     Fault(
         "studies/linear/linearise.py",
         "float(value / input_.scale)",

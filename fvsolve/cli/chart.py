@@ -65,7 +65,7 @@ def chart(
 ) -> None:
     """Chart error against CPU time and work for schemes, methods and resolutions; list the cheapest for each error."""
     from fvsolve.studies.accuracy.chart import chart as study
-    from fvsolve.studies.accuracy.chart_files import write_chart
+    from fvsolve.studies.accuracy.work_precision import write_chart
 
     loaded = load_case(case, set, scheme, method)
     if target is not None and not 0.0 < target < 1.0:

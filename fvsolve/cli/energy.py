@@ -200,7 +200,7 @@ def compare_pairs(case, schemes, methods, port, out, as_json: bool) -> None:
     """
     from fvsolve.cli.progress import interruptible
     from fvsolve.cli.terminal import console, line, print_sheet
-    from fvsolve.studies.energy.energy_of_pairs import PAIR_COLUMNS, measure_pairs
+    from fvsolve.studies.energy.energy_balance import PAIR_COLUMNS, measure_pairs
     from fvsolve.studies.result_cache import ResultCache
 
     folder = folder_of(case, "energy", out)

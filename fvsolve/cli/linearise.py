@@ -65,7 +65,7 @@ def linearise(
 ) -> None:
     """Linearise a case about a state: matrices A, B, C, D and poles."""
     from fvsolve.model.energy_norm import energy_form
-    from fvsolve.studies.linear.eigenvalues import POLES, poles_of
+    from fvsolve.studies.linear.linearise import POLES, poles_of
     from fvsolve.studies.linear.linearise import linearise as ask
 
     system = ask(
@@ -130,7 +130,7 @@ def print_system(system, values, poles: list[dict], folder: Path) -> None:
     folder : folder of the files, whose names are printed
     """
     from fvsolve.cli import terminal
-    from fvsolve.studies.linear.eigenvalues import POLES
+    from fvsolve.studies.linear.linearise import POLES
 
     output = terminal.console()
     moving = np.abs(system.at.rate) / system.at.model.scale

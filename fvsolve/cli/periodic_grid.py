@@ -11,8 +11,14 @@ from fvsolve.cli.study_options import comma_list, method_names, progress_line, w
 from fvsolve.step_limits.advection_limit import AdvectionLimit, advection_limits
 from fvsolve.step_limits.symbol import WEIGHTS
 from fvsolve.studies.result_table import Column, ResultTable, cell_text
-from fvsolve.studies.stability.limited_schemes import LIMITED, LimitedLimit, limited_limits
-from fvsolve.studies.stability.periodic_limits import THRESHOLD, MeasuredLimit, measured_limits
+from fvsolve.studies.stability.periodic_limits import (
+    LIMITED,
+    THRESHOLD,
+    LimitedLimit,
+    MeasuredLimit,
+    limited_limits,
+    measured_limits,
+)
 
 RUNS = (Column("scheme"), Column("method"), Column("predicted", words=".7g"), Column("measured", words=".7g"),
         Column("ratio", words=".7f"))  # fmt: skip

@@ -89,7 +89,7 @@ def stability(
 
         without_case(scheme, method, cells, steps, as_json, out, courant)
         return
-    from fvsolve.studies.stability.power_growth import STEPS
+    from fvsolve.studies.stability.growth import STEPS
     from fvsolve.studies.stability.stability import stability as ask
 
     loaded = load_case(case, set, scheme, method)

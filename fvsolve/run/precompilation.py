@@ -8,13 +8,14 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import as_completed
 from dataclasses import dataclass
 from pathlib import Path
 
 from fvsolve import jit, store
 from fvsolve.draw.plot_process import processor_count
 from fvsolve.errors import FvsolveError, RunError
-from fvsolve.run.process_pool import ProcessPool
+from fvsolve.run.process_pool import ProcessPool, WorkerLost
 
 LINEAR = ("dense", "banded", "sparse")  # kinds of `steppers.structure`
 STEPS = ("explicit", "damped", "diagonal", "full", "linear")  # kinds of methods
@@ -90,18 +91,20 @@ def _all(tasks: list[tuple[str, str]], jobs: int, progress: Callable[[int, str],
 
     Raises the exception of a task, and RunError if a process is killed.
     """
-    pool, started = ProcessPool(run_task, min(jobs, len(tasks))), 0
+    pool = ProcessPool(run_task, min(jobs, len(tasks)))
     progress(0, "compiling")
     try:
-        for count in range(len(tasks)):
-            while started < len(tasks) and started - count < pool.capacity:
-                pool.submit(started, [tasks[started]])
-                started += 1
-            at, answers, _ = pool.next_result()
-            kind, name = tasks[at]
-            if answers is None:
-                raise RunError(f"the process that compiled {kind} {name} has ended; possibly memory was too small")
-            progress(count + 1, Path(name).stem if kind == "case" else f"{kind} {name}".strip())
+        futures = {pool.submit([task]): task for task in tasks}
+        for count, future in enumerate(as_completed(futures), 1):
+            kind, name = futures[future]
+            try:
+                answers, _ = future.result()
+            except WorkerLost:
+                text = f"the process that compiled {kind} {name} has ended; possibly memory was too small"
+                raise RunError(text) from None
+            if isinstance(answers, BaseException):
+                raise answers
+            progress(count, Path(name).stem if kind == "case" else f"{kind} {name}".strip())
     finally:
         pool.close()
 

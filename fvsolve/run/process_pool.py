@@ -1,15 +1,14 @@
-"""Pool of worker processes on this machine; a process that ends is replaced."""
-
-from __future__ import annotations
+"""Pool of worker processes on this machine, with the interface of concurrent.futures; a lost process is replaced."""
 
 import os
 import signal
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import get_context, parent_process
-from multiprocessing.connection import Connection, wait
+from multiprocessing.connection import Connection
 from typing import Any
 
 from fvsolve.errors import RunError
@@ -19,52 +18,57 @@ THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")  # thre
 NOT_STARTED = 'a worker process could not be started; a script that uses jobs needs if __name__ == "__main__"'
 
 
-class ProcessPool:
-    """Pool of up to `size` processes, which are started when needed.
+class WorkerLost(Exception):
+    """Exception of a future whose process has ended before it returned a result."""
+
+
+class ProcessPool(ThreadPoolExecutor):
+    """Pool of up to `size` processes, which are started when needed. A thread for each process waits for its results.
 
     work : function that each process applies to every task of a chunk. If a process is killed, only its chunk is lost.
-    The caller keeps the number of unfinished chunks at most `capacity`.
     """
 
+    lost = WorkerLost
+
     def __init__(self, work: Any, size: int) -> None:
-        self.work, self.capacity = work, size
-        self.context = get_context("spawn")
+        super().__init__(size)
+        self.work, self.capacity, self.closed = work, size, False
+        self.context, self.lock = get_context("spawn"), threading.Lock()
         self.idle: list[Worker] = []
-        self.busy: list[Worker] = []
+        self.workers: list[Worker] = []
 
-    def submit(self, chunk: int, tasks: list) -> None:
-        """Send a list of tasks, with the number `chunk`, to a free or new process."""
-        worker = self.idle.pop() if self.idle else Worker(self.context, self.work)
-        self.busy.append(worker)
-        worker.submit(chunk, tasks)
+    def submit(self, tasks: list) -> Future:
+        """Compute a list of tasks in a free or new process : future of the result of `compute`.
 
-    def next_result(self) -> tuple[int, list | None, float]:
-        """Wait for a finished chunk; returns its number, the answers (None if the process ended) and its time [s].
-
-        Raises the exception that a task raised, and RunError if a process could not be started.
+        The future has the exception WorkerLost if the process ended, and RunError if it could not be started.
         """
-        while True:
-            ready = wait([worker.pipe for worker in self.busy])
-            worker = next(candidate for candidate in self.busy if candidate.pipe in ready)
-            message = worker.receive()
-            if message == READY:
-                continue
-            self.busy.remove(worker)
-            if message is None:
-                worker.end()
-                if not worker.started:
-                    raise RunError(NOT_STARTED)
-                return worker.chunk, None, 0.0
-            self.idle.append(worker)
-            answers, seconds = message
-            if isinstance(answers, BaseException):
-                raise answers
-            return worker.chunk, answers, seconds
+        return super().submit(self._compute, tasks)
+
+    def _compute(self, tasks: list) -> Any:
+        with self.lock:
+            if self.closed:
+                raise WorkerLost
+            worker = self.idle.pop() if self.idle else Worker(self.context, self.work)
+            self.workers += [] if worker in self.workers else [worker]
+        result = worker.compute(tasks)
+        if result is None:
+            raise WorkerLost if worker.started else RunError(NOT_STARTED)
+        self.idle.append(worker)
+        return result
+
+    def check(self, cancelled: bool = False) -> None:
+        """Do nothing: processes of this machine can always be reached."""
 
     def close(self) -> None:
         """End all processes; unfinished chunks are dropped."""
-        for worker in (*self.idle, *self.busy):
-            worker.end()
+        with self.lock:
+            self.closed = True
+        for worker in self.workers:
+            worker.process.terminate()
+            worker.process.join()
+        self.shutdown(cancel_futures=True)
+        for worker in self.workers:
+            worker.pipe.close()
 
 
 class Worker:
@@ -73,31 +77,20 @@ class Worker:
     def __init__(self, context, work: Any) -> None:
         self.pipe, far_end = context.Pipe()
         self.process = context.Process(target=serve, args=(far_end, work), daemon=True)
-        self.started, self.chunk = False, -1
+        self.started = False
         with _no_interrupts(), _single_thread():
             self.process.start()
         far_end.close()  # so that the pipe ends with the process
 
-    def submit(self, chunk: int, tasks: list) -> None:
-        self.chunk = chunk
+    def compute(self, tasks: list) -> Any:
+        """Result of `compute` for a list of tasks in the process; None if the process has ended."""
         try:
             self.pipe.send(tasks)
-        except OSError:  # the process has just ended; `receive` will detect it
-            pass
-
-    def receive(self) -> Any:
-        """Next message of the process; None if it has ended."""
-        try:
-            message = self.pipe.recv()
+            while (message := self.pipe.recv()) == READY:
+                self.started = True
+            return message
         except (EOFError, OSError):
             return None
-        self.started = True
-        return message
-
-    def end(self) -> None:
-        self.process.terminate()
-        self.process.join()
-        self.pipe.close()
 
 
 def serve(pipe: Connection, work: Any) -> None:

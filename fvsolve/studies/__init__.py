@@ -16,7 +16,7 @@ _HOMES = {  # public name -> module of this package
     "fit": "accuracy.fit",
     "ladder": "accuracy.model_hierarchy",
     "limit_of": ".step_limits.advection_limit",
-    "limited_limits": "stability.limited_schemes",
+    "limited_limits": "stability.periodic_limits",
     "line_positive_real": "ports.line_impedance",
     "linearise": "linear.linearise",
     "measured_limits": "stability.periodic_limits",

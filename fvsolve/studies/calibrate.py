@@ -1,7 +1,5 @@
 """Calibration of values in a case against measured series by least squares, with standard deviations."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,12 +9,11 @@ import numpy as np
 from fvsolve.case import Case, load
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.run.comparison import interpolated
-from fvsolve.studies.outcome import refusal_text
-from fvsolve.studies.parallel import run_tasks
+from fvsolve.studies.outcome import end_if_interrupted, refusal_text
+from fvsolve.studies.parallel import TaskPool
 from fvsolve.studies.result_table import Column, PlainData, ResultTable
 from fvsolve.studies.sampling import key_ranges, sample_points
-from fvsolve.studies.sweep import VARY
-from fvsolve.studies.sweep_row import RowMaker
+from fvsolve.studies.sweep import VARY, RowMaker
 from fvsolve.validation import COUNT, COUNT_FROM_ZERO, FUNCTION, TABLE, TEXT, validated
 
 SAMPLE_PER_KEY = 16  # sample points per key; the minimisations start at the best of them
@@ -26,9 +23,7 @@ CORRELATED = 0.999  # correlation of errors above which two keys cannot be disti
 AT_BOUND = 1e-3  # distance from an end of the range, as a fraction of it, below which a value counts as at the end
 MAX_ROUNDS = 6  # greatest number of rounds of weights
 WEIGHT_TOLERANCE = 0.01  # relative change of weights below which the rounds end
-LEAST_SCATTER = (
-    1e-6  # least scatter as a fraction of the range of a series, from the digits of files and from time steps
-)
+LEAST_SCATTER = 1e-6  # least scatter as a fraction of the range of a series, from digits of files and time steps
 FAILED_RESIDUAL = 1e6  # residual of a run that failed
 
 
@@ -76,8 +71,7 @@ class Residuals(RowMaker):
             result = run(case)
         except CaseError as error:
             return refusal_text(error)
-        if result.reason.startswith("interrupted"):
-            raise KeyboardInterrupt
+        end_if_interrupted(result.reason)
         if result.reason != "finished":
             return result.reason
         differences = []
@@ -137,9 +131,7 @@ class LeastSquaresFit:
     bounds : key -> (low, high) [SI]; points : values of the keys in the runs of the sample
     """
 
-    def __init__(
-        self, case: Case, bounds: dict[str, tuple[float, float]], points: list[dict], progress: Callable
-    ) -> None:
+    def __init__(self, case: Case, bounds: dict, points: list[dict], progress: Callable) -> None:
         self.case, self.bounds, self.points, self.progress = case, bounds, points, progress
         self.low, high = (np.array(side) for side in zip(*bounds.values(), strict=True))
         self.width = high - self.low
@@ -179,9 +171,8 @@ class LeastSquaresFit:
         degrees = np.array([len(part) - np.einsum("ij,jk,ik->", part, inverse, part) for part in parts])
         squares = np.array([float(series @ series) for series in differences])
         pooled = squares.sum() / max(1.0, sum(series.size for series in differences) - answer.x.size)
-        return np.sqrt(
-            np.maximum(np.where(degrees > 1.0, squares / np.maximum(degrees, 1.0), pooled), LEAST_SCATTER**2)
-        )
+        variances = np.where(degrees > 1.0, squares / np.maximum(degrees, 1.0), pooled)
+        return np.sqrt(np.maximum(variances, LEAST_SCATTER**2))
 
     def weighted(self, differences: list[np.ndarray]) -> np.ndarray:
         """Differences of all series, multiplied by the weight of their series and joined to one array."""
@@ -194,13 +185,14 @@ class LeastSquaresFit:
         Raises FvsolveError if no run of the sample finishes.
         """
         costs, reason = np.full(len(self.points), np.inf), ""
-        for k, answer in run_tasks(self.work, self.points, jobs, dask):
-            self.runs += 1
-            self.progress(self.runs, len(self.points), "sample; minimisations follow")
-            if isinstance(answer, str):
-                reason = reason or answer
-            else:
-                costs[k] = sum(float(series @ series) for series in answer)
+        with TaskPool(self.work, jobs, dask) as pool:
+            for k, answer in pool.run(self.points):
+                self.runs += 1
+                self.progress(self.runs, len(self.points), "sample; minimisations follow")
+                if isinstance(answer, str):
+                    reason = reason or answer
+                else:
+                    costs[k] = sum(float(series @ series) for series in answer)
         if not np.isfinite(costs).any():
             raise FvsolveError(f"no run of the sample finished: {reason}")
         best = [k for k in np.argsort(costs, kind="stable")[:DESCENTS] if np.isfinite(costs[k])]
@@ -233,9 +225,9 @@ class LeastSquaresFit:
             near = np.clip(np.where(np.arange(x.size) == k, at, x), 0.0, 1.0)
             if len(results) < 2 and (differences := self.differences(near)):
                 results.append((near[k], self.weighted(differences)))
-        return (
-            (results[1][1] - results[0][1]) / (results[1][0] - results[0][0]) if len(results) == 2 else np.zeros(size)
-        )
+        if len(results) < 2:
+            return np.zeros(size)
+        return (results[1][1] - results[0][1]) / (results[1][0] - results[0][0])
 
     def differences(self, x: np.ndarray) -> list[np.ndarray]:
         """Run the case at x; returns the differences of every series as `Residuals`, or [] if the run fails."""
@@ -284,8 +276,6 @@ def identifiability(slopes: np.ndarray, keys: list[str]) -> tuple[np.ndarray, li
         for k, other_key in enumerate(keys[:j]):
             correlation = float(inverse[j, k] / (root[j] * root[k]))
             if abs(correlation) > CORRELATED and last not in without_effect and other_key not in without_effect:
-                doubts.append(
-                    f"{other_key} and {last} cannot be distinguished: "
-                    f"the correlation of their errors is {correlation:.5f}"
-                )
+                reason = f"the correlation of their errors is {correlation:.5f}"
+                doubts.append(f"{other_key} and {last} cannot be distinguished: {reason}")
     return inverse, doubts

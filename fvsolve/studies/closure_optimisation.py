@@ -1,7 +1,5 @@
 """Optimisation of a piecewise-linear schedule, such as a valve closure, for the least peak."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -10,16 +8,14 @@ import numpy as np
 
 from fvsolve.case import Case, load
 from fvsolve.case.text import path
-from fvsolve.errors import CaseError, Fault, FvsolveError, collect_faults, did_you_mean, listing
+from fvsolve.errors import Fault, FvsolveError, collect_faults, did_you_mean, listing
 from fvsolve.parts.schedule import Schedule
 from fvsolve.run import run
+from fvsolve.studies.outcome import NO_FIELDS, checked_case, end_if_interrupted
+from fvsolve.studies.result_table import PlainData
 from fvsolve.units import show
 
-START_SHAPES = (
-    0.0,
-    1.0,
-    -1.0,
-)  # half the log ratio of the first slope to the last, of the schedules that searches start from
+START_SHAPES = 0.0, 1.0, -1.0  # half the log ratio of the first slope to the last, of schedules at the start
 MAX_KNOTS = 12
 SIMPLEX_SIZE = 1.0  # edge length of the first simplex
 
@@ -38,7 +34,7 @@ class ValveSchedule:
 
 
 @dataclass(frozen=True)
-class Optimum:
+class Optimum(PlainData):
     """Result of an optimisation of a schedule.
 
     key : key of the schedule; minimise : quantity whose peak is minimised, such as "max(gate.pressure)"
@@ -53,11 +49,6 @@ class Optimum:
     best: ValveSchedule
     runs: int
     laws: list[ValveSchedule] = field(default_factory=list)
-
-    def plain(self) -> dict[str, Any]:
-        """Plain values for JSON."""
-        return {"key": self.key, "minimise": self.minimise, "unit": self.unit, "linear": vars(self.linear),
-                "best": vars(self.best), "runs": self.runs, "laws": [vars(law) for law in self.laws]}  # fmt: skip
 
     @property
     def schedule(self) -> str:
@@ -94,10 +85,9 @@ class ClosureSearch:
         The result is infinite if the run failed or the peak is not known.
         """
         time, value = self.law(z)
-        quiet = {"output.fields": 0, "output.lines": {}, "expect": peak_expectation(self.minimise)}
-        result = run(load(self.case, {self.key: {"time": time, "value": value}, **quiet}))
-        if result.reason.startswith("interrupted"):
-            raise KeyboardInterrupt
+        keys = {self.key: {"time": time, "value": value}, "expect": peak_expectation(self.minimise)}
+        result = run(load(self.case, keys | NO_FIELDS))
+        end_if_interrupted(result.reason)
         expectation = result.expectations[0]
         self.unit = expectation.unit
         peak = expectation.found if result.ok else None
@@ -125,13 +115,7 @@ def optimise(
     """
     from scipy.optimize import minimize
 
-    faults: list[Fault] = []
-    loaded = None
-    with collect_faults(faults):
-        loaded = load(case, dict(set or {}))
-    faults += find_faults(loaded, key, minimise, knots, runs)
-    if faults:
-        raise CaseError(faults, "case" if loaded is None else loaded.name)
+    loaded = checked_case(case, set, lambda known: find_faults(known, key, minimise, knots, runs))
     search = ClosureSearch(loaded, key, minimise, span_of(loaded, key), knots, progress)
     search(np.zeros(knots))
     for k, start in enumerate(START_SHAPES):
@@ -141,9 +125,8 @@ def optimise(
         minimize(search, z, method="Nelder-Mead",
                  options={"maxfev": evaluations, "initial_simplex": simplex, "xatol": 1e-2, "fatol": 0.0})  # fmt: skip
     if all(law.peak is None for law in search.laws):
-        raise FvsolveError(
-            f"no schedule gives {minimise} a finite value: {search.failure_reason or 'it is not a number'}"
-        )
+        reason = search.failure_reason or "it is not a number"
+        raise FvsolveError(f"no schedule gives {minimise} a finite value: {reason}")
     linear = search.laws[0]
     best = min(search.laws, key=lambda law: np.inf if law.peak is None else law.peak)
     return Optimum(key, minimise, search.unit, linear, best, len(search.laws), search.laws)
@@ -156,9 +139,8 @@ def find_faults(case: Case | None, key: str, minimise: str, knots: int, runs: in
     if not 1 <= knots <= MAX_KNOTS:
         faults.append(Fault("knots", f"{knots} is out of range. Expected 1 to {MAX_KNOTS}"))
     if runs < fewest:
-        faults.append(
-            Fault("runs", f"{runs} is too few. Expected {fewest} or more for knots = {fewest // len(START_SHAPES) - 2}")
-        )
+        least = f"Expected {fewest} or more for knots = {fewest // len(START_SHAPES) - 2}"
+        faults.append(Fault("runs", f"{runs} is too few. {least}"))
     if case is not None:
         with collect_faults(faults, f"--schedule {key}"):
             span_of(case, key)
@@ -200,6 +182,5 @@ def schedules(case: Case) -> Iterator[tuple[str, Schedule]]:
     for group in ("nodes", "links"):
         for name, part in getattr(case, group).items():
             values = {info.alias or field: getattr(part, field) for field, info in type(part).model_fields.items()}
-            yield from (
-                (path((group, name, key)), value) for key, value in values.items() if isinstance(value, Schedule)
-            )
+            laws = {key: value for key, value in values.items() if isinstance(value, Schedule)}
+            yield from ((path((group, name, key)), law) for key, law in laws.items())

@@ -5,17 +5,14 @@ a quantity in the cells of a pipe or basin. A relative error of 0.01 is a hundre
 argument `truth` is a `Reference`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from fvsolve.studies.accuracy.basin_projection import basin_fields, variable_name
-from fvsolve.studies.accuracy.case_resolution import pipes
 from fvsolve.studies.outcome import Outcome
+from fvsolve.studies.resolution import basin_fields, pipes, variable_name
 
 END = {"nodes": "nodes at the end: ", "links": "links at the end: "}  # prefixes of quantities
 NORMS = ("L1", "L2", "max")
@@ -100,9 +97,8 @@ def error_norms(run: Outcome, truth, own: tuple[str, ...] | None = None) -> dict
     deviations, by_component = {}, field_deviations(run, truth)
     for quantity in ("pressure", "flow") if run.model.pipes else ():
         gaps = [by_component[pipe.name, quantity] for pipe in run.model.pipes]
-        deviations[quantity] = Deviation(
-            *(np.concatenate([getattr(deviation, key) for deviation in gaps]) for key in ("error", "weights"))
-        )
+        errors, weights = [gap.error for gap in gaps], [gap.weights for gap in gaps]
+        deviations[quantity] = Deviation(np.concatenate(errors), np.concatenate(weights))
     for basin in run.model.basins:
         by_content = {content: by_component.get((basin, content)) for content in basin_fields(basin, run.y)}
         deviations |= {variable_name(basin, content): gap for content, gap in by_content.items() if gap is not None}
@@ -185,14 +181,9 @@ def field_deviations(run: Outcome, truth) -> dict[tuple, Deviation]:
     for k, pipe in enumerate(model.pipes):
         lengths, span = np.full(pipe.cells, pipe.length / pipe.cells), truth.spans.get(pipe.name, math.nan)
         flow_per_pressure = float(model.tables.pipes[k]["admittance"]) / model.case.properties.density
-        for quantity, values, reference_values, width in zip(
-            ("pressure", "flow"),
-            own_fields[pipe.name],
-            reference_fields[pipe.name],
-            (span, span * flow_per_pressure),
-            strict=True,
-        ):
-            deviations[pipe.name, quantity] = Deviation(values - reference_values, lengths, width)
+        widths = {"pressure": span, "flow": span * flow_per_pressure}
+        for quantity, values, expected in zip(widths, own_fields[pipe.name], reference_fields[pipe.name], strict=True):
+            deviations[pipe.name, quantity] = Deviation(values - expected, lengths, widths[quantity])
     for basin in model.basins:
         reference_basin = reference_fields.get(("basin", basin.name))
         if reference_basin is None:
@@ -203,9 +194,8 @@ def field_deviations(run: Outcome, truth) -> dict[tuple, Deviation]:
         for (content, values), reference_values, span in zip(
             basin_fields(basin, run.y).items(), reference_basin, spans, strict=True
         ):
-            deviations[basin, content] = Deviation(
-                values - reference_values, basin.mesh.area, float(span) if span > CONSTANT else math.nan
-            )
+            span = float(span) if span > CONSTANT else math.nan
+            deviations[basin, content] = Deviation(values - reference_values, basin.mesh.area, span)
     return deviations
 
 

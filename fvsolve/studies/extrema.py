@@ -16,8 +16,6 @@ least 1.6 / 2.15 of its remainder with the ratio of whole signals. The constants
 random mains (benchmarks/peak_bands.py --random) and its median is least.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -47,18 +45,16 @@ def greatest_error(places: Sequence[Sequence[Signal]], triple: Sequence[float], 
         return error_of_maxima(own_maxima, remainders(own_maxima, believed))
     k = int(np.argmax([np.max(signals[-2][1]) for signals in places]))
     rows = [own_maxima, *(values[np.isfinite(values).all(axis=1)] for _, values in maxima)]
-    bounds = [
-        remainders(values, believed) * (1.0 if j in (0, k + 1) else OTHER_PLACES) for j, values in enumerate(rows)
-    ]
+    factors = [1.0 if j in (0, k + 1) else OTHER_PLACES for j in range(len(rows))]
+    bounds = [remainders(values, believed) * factor for values, factor in zip(rows, factors, strict=True)]
     error = error_of_maxima(np.vstack(rows), np.concatenate(bounds))
     (cuts, _), (middle, fine), most = maxima[k], places[k][-2:], float(np.max(np.abs(np.diff(own_maxima))))
     moved = difference_at_peaks(middle, fine) if greatest_segment(cuts, middle) == greatest_segment(cuts, fine) else 0.0
     mean = MEAN_FRACTION * float(np.mean(np.max(np.abs(np.diff(rows[k + 1], axis=1)), axis=1, initial=0.0)))
     ratio = convergence_ratio(places[k])
     error *= float(np.interp(ratio, CONVERGED, TRUSTED))
-    return max(
-        error, min(max(moved, mean), MAX_MOVED * most), MINIMUM_SAFETY * remainder_by_ratio(ratio, own_maxima[0])
-    )
+    least = MINIMUM_SAFETY * remainder_by_ratio(ratio, own_maxima[0])
+    return max(error, min(max(moved, mean), MAX_MOVED * most), least)
 
 
 def three_values(maxima: np.ndarray) -> np.ndarray:

@@ -1,15 +1,19 @@
-"""Run of a case with changed keys, and its outcome."""
-
-from __future__ import annotations
+"""Run of a case with changed keys, its outcome, and its CPU time."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from time import perf_counter
 
 import numpy as np
 
-from fvsolve.errors import CaseError, FvsolveError, listing
+from fvsolve.errors import CaseError, FvsolveError, collect_faults, listing
 from fvsolve.run import model_of
-from fvsolve.studies.delay_line_keys import line_averages
+from fvsolve.solve.solve import Run
+from fvsolve.validation import COUNT, FUNCTION, TABLE, TEXT
+
+NO_FIELDS = {"output.fields": 0, "output.lines": {}}  # overrides: no output of cell values, which no study needs
+POINTS = 5  # points of a cell of a line at which waves are evaluated
+WEIGHTS = np.array([275.0, 100.0, 402.0, 100.0, 275.0]) / 1152.0  # at the middles of fifths; exact to degree 5
 
 
 def name_list(given: str | Sequence[str] | None) -> list[str] | None:
@@ -32,7 +36,7 @@ class Outcome:
     envelope : pipe -> {"min_pressure", "max_pressure" [Pa], ...: float64[cells]}, extremes over the run
     counts : numbers of `steps`, `rejections`, evaluations of the rates `rhs`, ...
     seconds : wall time of the steps alone [s]; processor : their CPU time [s]; run_data : `RunData` of the run
-    lines : waves in delay lines at the end, see `delay_line_keys.line_averages`
+    lines : waves in delay lines at the end, see `line_averages`
     """
 
     reason: str
@@ -90,7 +94,7 @@ def study_model(case, set: Mapping | None = None):
     """Build the model of a case with changed keys, without output of cell values, for `outcome`. Raises CaseError."""
     from fvsolve.case import load
 
-    return model_of(load(case, {**(set or {}), "output.fields": 0, "output.lines": {}}))
+    return model_of(load(case, {**(set or {}), **NO_FIELDS}))
 
 
 def outcome(
@@ -100,7 +104,6 @@ def outcome(
     """Run a case with changed keys, or a model as it is. A refused case gives an outcome with its reason.
 
     set : changed keys of a case, ignored for a model
-
     y : float64[n]  initial state (default `solve.initial_state`, zero except for a basin with a start of its own)
     best_of : number of runs, of which the fastest counts. Runs after the first contain no compilation; they are omitted
     if the first took more than `budget` [s].
@@ -114,6 +117,28 @@ def outcome(
     outcomes = [_single_run(model, y, run)]
     outcomes += [_single_run(model, y, run) for _ in range(best_of - 1) if outcomes[0].seconds <= budget]
     return min(outcomes, key=lambda entry: entry.seconds)
+
+
+def end_if_interrupted(reason: str) -> None:
+    """Raise KeyboardInterrupt if a run was interrupted: it ends cleanly at Ctrl-C, but the study must end too."""
+    if reason.startswith("interrupted"):
+        raise KeyboardInterrupt
+
+
+def checked_case(case, set: Mapping | None, find_faults: Callable):
+    """Case with changed keys. Raises CaseError with the faults of the case and those of arguments of a study.
+
+    find_faults : find_faults(case) -> faults of the arguments; its case is None if the case itself has faults
+    """
+    from fvsolve.case import load
+
+    faults, loaded = [], None
+    with collect_faults(faults):
+        loaded = load(case, dict(set or {}))
+    faults += find_faults(loaded)
+    if faults:
+        raise CaseError(faults, "case" if loaded is None else loaded.name)
+    return loaded
 
 
 def refusal_text(error: CaseError) -> str:
@@ -131,8 +156,7 @@ def _single_run(model, y, run) -> Outcome:
         state.y[:] = y
     solver = (run or Run)(model, state, sink, None)
     summary = solver.go()
-    if summary.reason.startswith("interrupted"):  # a run ends cleanly at Ctrl-C; the study must end too
-        raise KeyboardInterrupt
+    end_if_interrupted(summary.reason)
     rows = np.concatenate([np.empty((0, 1 + len(model.probes))), *sink.blocks])
     names = tuple(probe.text for probe in model.case.probes)
     return Outcome(
@@ -142,6 +166,21 @@ def _single_run(model, y, run) -> Outcome:
     )  # fmt: skip
 
 
+def line_averages(run_data, t: float, out: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Averages of the waves in delay lines over the cells of their output, at the time t [s].
+
+    out : output array of the right-hand side at t, as from `RunData.evaluate`
+    Returns {name of the delay line: (r + l, r - l)}, float64[cells] each [kg/s], with the forward wave r and the
+    backward wave l.
+    """
+    sums = {}
+    for k, (r, l) in run_data.along(t, out, POINTS).items():  # noqa: E741
+        r, l = r.reshape(-1, POINTS) @ WEIGHTS, l.reshape(-1, POINTS) @ WEIGHTS  # noqa: E741
+        sums[run_data.model.pipes[k].name] = r + l, r - l
+    return sums
+
+
+STUDY_ARGUMENTS = {"set": TABLE, "jobs": COUNT, "dask": TEXT, "progress": FUNCTION}  # kinds, for `validated`
 Progress = Callable[[int, int, str], None]  # (finished points, all points, text of the next point)
 
 
@@ -150,10 +189,90 @@ def refuse_basins(case, study: str, allow_sloshing: bool = False) -> None:
 
     study : name of the study in the message; allow_sloshing : True to accept basins with a free surface on bodies
     """
-    names = [
-        name
-        for name in case.meshes
-        if not (allow_sloshing and case.nodes[name].on and case.nodes[name].physics_type.has_modes)
-    ]
+    sloshing = [name for name in case.meshes if case.nodes[name].on and case.nodes[name].physics_type.has_modes]
+    names = [name for name in case.meshes if not (allow_sloshing and name in sloshing)]
     if names:
         raise FvsolveError(f"{study} does not support basins yet; the case has {listing(names)}")
+
+
+# limits of CPU time -----------------------------------------------------------------------------------------------
+
+MAX_RUNS = 5  # greatest number of runs, of which the fastest counts
+REPEAT_TIME = 0.4  # wall time of all runs together, including the first, above which no run is repeated [s]
+CPU_LIMIT = 30.0  # CPU time after which a run is stopped [s]
+REFERENCE_CPU_LIMIT = 120.0  # CPU time after which a reference run, or a row of an order study, is stopped [s]
+PROBE_STEPS = 20_000  # steps after which a run that only compiles is stopped
+GIVEN_UP = "given up after"
+
+
+class CappedRun(Run):
+    """Run that stops between two chunks of steps as soon as its cost exceeds a limit."""
+
+    max_seconds, max_steps = np.inf, np.inf
+
+    def pause(self) -> None:
+        """Do what a run does between two chunks of steps, then check the cost."""
+        super().pause()
+        self.check()
+
+    def check(self) -> None:
+        """Raise GivenUp if CPU time or number of steps exceeds its limit."""
+        if self.processor > self.max_seconds or self.loop.state["steps"] > self.max_steps:
+            raise GivenUp
+
+    def segments(self) -> str:
+        """Run to the end; returns the reason for the end, such as "finished", or "given up after ..." at the limit."""
+        try:
+            return super().segments()
+        except GivenUp:
+            return f"{GIVEN_UP} {self.processor:.3g} s, at t = {self.loop.t:.3g} s of {self.end:.3g} s"
+
+
+class GivenUp(Exception):
+    """Raised to end a run that costs too much."""
+
+
+def capped(seconds: float = np.inf, steps: float = np.inf) -> Callable:
+    """Function that makes a `CappedRun`, for `outcome`, with limits of CPU time [s] and of the number of steps."""
+
+    def make(*arguments) -> CappedRun:
+        run = CappedRun(*arguments)
+        run.max_seconds, run.max_steps = seconds, steps
+        return run
+
+    return make
+
+
+def best_run(model, most: int = MAX_RUNS) -> Outcome:
+    """Outcome with the least CPU time among up to `most` runs of a model.
+
+    A run that stops early, or exceeds its limit, is not repeated. A run is not begun if the wall time of all runs
+    together would probably exceed `REPEAT_TIME`.
+    """
+    began, fastest = perf_counter(), outcome(model, run=capped(CPU_LIMIT))
+    for _ in range(most - 1 if fastest.ok else 0):
+        if perf_counter() - began + fastest.seconds > REPEAT_TIME:
+            break
+        fastest = min(fastest, outcome(model, run=capped(CPU_LIMIT)), key=lambda run: run.processor)
+    return fastest
+
+
+def best_run_of(case, keys) -> Outcome:
+    """Outcome of `best_run` for a case with changed keys; a refused case gives an outcome with its reason."""
+    try:
+        return best_run(study_model(case, keys))
+    except CaseError as error:
+        return Outcome(refusal_text(error), refused=True)
+
+
+def compile_seconds(model) -> float:
+    """Wall time of a first run minus that of a second run [s].
+
+    The difference is the time of compilation, or of loading compiled code.
+    """
+    times = []
+    for _ in range(2):
+        began = perf_counter()
+        outcome(model, run=capped(steps=PROBE_STEPS))
+        times.append(perf_counter() - began)
+    return max(0.0, times[0] - times[1])

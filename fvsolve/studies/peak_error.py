@@ -4,9 +4,10 @@ Each error is bounded from the local extrema of a signal (`extrema.py`). The err
 bounded from the signals at some places of each part to which the limit applies. With column separation no order of
 convergence is assumed, because peaks after cavity collapse converge slowly (docs/cavitation.md). Without cells, a peak
 between two rows of output is higher than the rows by up to an eighth of their second difference.
-"""
 
-from __future__ import annotations
+Arguments of several functions : runs, results at all resolutions, as from `refined_runs`; triple, values at half, one
+and twice the resolution
+"""
 
 import math
 from collections.abc import Callable, Sequence
@@ -20,7 +21,8 @@ from fvsolve.run import Result, run
 from fvsolve.run.result import HOLDS, OPEN
 from fvsolve.run.verdicts import MAGNITUDES, PLACES_KEY, PlaceMargins, verdict
 from fvsolve.studies.extrema import greatest_error
-from fvsolve.studies.refinement import fixed_basins, refined_keys
+from fvsolve.studies.outcome import NO_FIELDS
+from fvsolve.studies.resolution import basins_from_files, refined_keys
 from fvsolve.studies.unresolved import MAX_NAMES, WIDE_ERROR, Unresolved, has_separation
 
 LEVELS = (0.5, 1.0, 2.0)
@@ -28,12 +30,9 @@ RELATIVE_FLOOR = 5e-6  # least relative error, from iterations, interpolated row
 ROUNDING = 1e-12  # rounding error relative to the greatest value in that unit (for angles at least 1 rad)
 SIGNS = {"minimum": -1.0, "maximum": 1.0}
 SIDES = tuple(SIGNS)
-NO_FIELDS = {"output.fields": 0, "output.lines": {}}
 MIN_ROWS, MAX_ROWS = 500, 4000  # limits of the number of rows of signals, at the resolution of the run itself
-PLACES_PER_PART, MAX_PLACES = (
-    12,
-    400,
-)  # greatest number of places with signals: of a part under a bound, and of all limits
+PLACES_PER_PART = 12  # greatest number of places of a part with signals, under a bound
+MAX_PLACES = 400  # greatest number of places with signals, of all limits
 
 
 def peak_errors(result: Result, case: Any, progress: Callable[[str], None] | None = None) -> dict[str, Any]:
@@ -55,7 +54,7 @@ def peak_errors(result: Result, case: Any, progress: Callable[[str], None] | Non
                         for k, rows in enumerate(own.places)]  # fmt: skip
     for k, claim in enumerate(summary["expectations"]):
         claim["error"] = expectation_error(runs, case.expect[claim["text"]], k, summary["peaks"])
-    summary["resolution"] = {"levels": sorted(runs), "kept": fixed_basins(case), "words": description(runs, case),
+    summary["resolution"] = {"levels": sorted(runs), "kept": basins_from_files(case), "words": description(runs, case),
                           "reasons": reason_texts(summary)}  # fmt: skip
     return summary
 
@@ -116,11 +115,8 @@ def selected_places(neighbours: PlaceMargins, rows: int) -> list[int]:
     padded = np.pad(margins, 1, constant_values=np.inf)
     least = np.flatnonzero((margins <= padded[:-2]) & (margins <= padded[2:]))
     least = least[np.argsort(margins[least], kind="stable")][: max(min(PLACES_PER_PART, most) // 2, 1)]
-    spaced = (
-        np.linspace(0, len(margins) - 1, min(PLACES_PER_PART, most) - len(least)).astype(int)
-        if most > len(least)
-        else []
-    )
+    count = max(min(PLACES_PER_PART, most) - len(least), 0)
+    spaced = np.linspace(0, len(margins) - 1, count).astype(int)
     return list(dict.fromkeys([int(np.argmin(margins)), *least.tolist(), *list(spaced)]))
 
 
@@ -136,14 +132,13 @@ def accepts_probes(case: Any, texts: list[str]) -> bool:
 def peak_rows(result: Result, runs: dict[float, Result], unresolved: Unresolved) -> dict[str, Any]:
     """Entry `peaks` of a summary, as in `peak_errors`: unit, least and greatest value of each probe, with their errors.
 
-    result : result of the case; runs : results at all resolutions, as from `refined_runs`
+    result : result of the case
     """
     summary, largest, rows = result.summary, {"rad": 1.0}, {}
     parts = {probe.text: (probe.part, probe.name) for probe in unresolved.case.probes}
     for extreme in summary["extremes"].values():
-        largest[extreme["unit"]] = max(
-            [largest.get(extreme["unit"], 0.0), *(abs(extreme[side] or 0.0) for side in SIDES)]
-        )
+        values = [abs(extreme[side] or 0.0) for side in SIDES]
+        largest[extreme["unit"]] = max(largest.get(extreme["unit"], 0.0), *values)
     for name, extreme in summary["extremes"].items():
         rows[name] = {"unit": extreme["unit"]}
         for side, sign in SIGNS.items():
@@ -168,8 +163,7 @@ def peak_rows(result: Result, runs: dict[float, Result], unresolved: Unresolved)
 def error_bound(runs: dict[float, Result], triple: Sequence[float | None], places: Sequence = ()) -> float | None:
     """Error bound of the second of three values at increasing resolutions; None if it is not known.
 
-    triple : greatest values at half, one and twice the resolution; places : for each place, its signals at these
-    resolutions, with a sign such that the peak is a maximum
+    places : for each place, its signals at these resolutions, with a sign such that the peak is a maximum
     """
     c, *finer = triple
     if not all(value is not None and math.isfinite(value) for value in finer):
@@ -199,7 +193,7 @@ def signals(runs: dict[float, Result], probe: str, rising: Callable[[np.ndarray]
 def limit_row(runs: dict[float, Result], limit: int, k: int, row: dict[str, Any], unresolved: Unresolved) -> dict:
     """Row of a limit with its error. A limit that holds becomes open if the error is unknown or above the margin.
 
-    runs : results at all resolutions, as from `refined_runs`; limit, k : indices of the limit and of the row in these
+    limit, k : indices of the limit and of the row in these
     results; row : row of `run.verdicts.places`
     """
     sign, magnitude = SIGNS[row["bound"]], row["quantity"] in MAGNITUDES
@@ -211,14 +205,12 @@ def limit_row(runs: dict[float, Result], limit: int, k: int, row: dict[str, Any]
     part = (row[PLACES_KEY].probes[0].split(".")[0], row["place"])
     error = None if part in unresolved.unknown else error_bound(runs, triple, places)
     span = max((float(np.ptp(run[-2][1])) for run in places if usable(run)), default=math.inf)
+    size = abs(row["value"] or 0.0)
     if error is not None:
-        error += RELATIVE_FLOOR * abs(row["value"] or 0.0) + unresolved.tolerance * (
-            span if math.isfinite(span) else 0.0
-        )
+        error += RELATIVE_FLOOR * size + unresolved.tolerance * (span if math.isfinite(span) else 0.0)
     doubtful = row["state"] == HOLDS and (error is None or not row["margin"] >= error)
-    reason = unresolved.reason(
-        part, triple, error, span + 2.0 * RELATIVE_FLOOR / WIDE_ERROR * abs(row["value"] or 0.0), row["unit"]
-    )
+    span_and_floor = span + 2.0 * RELATIVE_FLOOR / WIDE_ERROR * size
+    reason = unresolved.reason(part, triple, error, span_and_floor, row["unit"])
     return row | {"error": error, "reason": reason, "state": OPEN if doubtful else row["state"]}
 
 
@@ -275,12 +267,11 @@ def description(runs: dict[float, Result], case: Any) -> str:
     """Sentence that describes how the errors of peaks were found, and the restrictions for this case."""
     others = " and ".join(f"{factor:g}" for factor in sorted(runs) if factor != 1.0)
     if not others:
-        return (
-            f"errors are unknown: cells of {listing(fixed_basins(case))} come from files, and there are no other cells"
-        )
+        files = listing(basins_from_files(case))
+        return f"errors are unknown: cells of {files} come from files, and there are no other cells"
     text = f"peaks compared with those at {others} times the resolution"
-    if fixed_basins(case):
-        text += f"; cells of {', '.join(fixed_basins(case))} come from files and did not change"
+    if basins_from_files(case):
+        text += f"; cells of {', '.join(basins_from_files(case))} come from files and did not change"
         text += ": their error is not included"
     if has_separation(runs):
         text += "; column separation, so no order of convergence is assumed"

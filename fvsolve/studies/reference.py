@@ -4,8 +4,6 @@
 `Reference` gives averages over any cells at the end, values of probes at the rows of a run, and its own error.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -16,18 +14,6 @@ import numpy as np
 from fvsolve import exact as room
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers.tableau import METHODS
-from fvsolve.studies.accuracy.basin_projection import basin_fields, project_to
-from fvsolve.studies.accuracy.case_resolution import (
-    basins,
-    cell_counts,
-    cell_keys_of,
-    greatest_wave_rate,
-    pipes_with_cells,
-    scaled,
-    total_cells,
-)
-from fvsolve.studies.accuracy.timing import finished_run, long_capped_run, probe_run
-from fvsolve.studies.delay_line_keys import delay_lines as delayed
 from fvsolve.studies.distance import (
     Distance,
     cell_averages,
@@ -39,8 +25,20 @@ from fvsolve.studies.distance import (
     variable_size,
     wave_sums,
 )
-from fvsolve.studies.outcome import Outcome, outcome, study_model
-from fvsolve.studies.run_queue import RunQueue, RunRequest
+from fvsolve.studies.outcome import PROBE_STEPS, REFERENCE_CPU_LIMIT, Outcome, capped, outcome, study_model
+from fvsolve.studies.parallel import RunQueue, RunRequest
+from fvsolve.studies.resolution import (
+    basin_fields,
+    basins,
+    cell_counts,
+    cell_keys_of,
+    greatest_wave_rate,
+    pipes_with_cells,
+    project_to,
+    scaled,
+    total_cells,
+)
+from fvsolve.studies.resolution import delay_lines as delayed
 
 REFINEMENT = 4  # ratio of cells to those of the finest run under study
 CHARACTERISTICS_REFINEMENT = 16  # ratio of cells for characteristics at Courant number 1, whose steps are cheap
@@ -56,10 +54,8 @@ SEPARATION = (  # only one scheme is above first order with cavities, so the ref
 )
 STIFF = (("upwind5", "rodas-5p", "rtol", 1e-8, REFINEMENT), ("weno5", "radau-iia-5", "rtol", 1e-8, REFINEMENT))
 LUMPED = ((None, "radau-iia-9", "rtol", 1e-12, 1), (None, "rodas-5p", "rtol", 1e-11, 1))
-ALTERNATIVES = {
-    True: ("dormand-prince", "tsitouras"),
-    False: ("radau-iia-5", "esdirk-5"),
-}  # explicit -> methods of high order
+# explicit -> methods of high order
+ALTERNATIVES = {True: ("dormand-prince", "tsitouras"), False: ("radau-iia-5", "esdirk-5")}
 TOLERANCE_FRACTION = 0.01  # greatest ratio of the tolerance of a reference to that under study
 LEAST_RTOL = 1e-13
 TOLERANCE_RATIO = 10.0**1.5  # ratio of tolerances of successive refinements, equal to halving steps at order 5
@@ -100,7 +96,7 @@ class Reference:
 
 def capped_outcome(case, keys: Mapping) -> Outcome:
     """Outcome of a case with changed keys; its run is stopped after REFERENCE_CPU_LIMIT seconds of CPU time."""
-    return outcome(case, keys, run=long_capped_run)
+    return outcome(case, keys, run=capped(REFERENCE_CPU_LIMIT))
 
 
 def find_reference(
@@ -125,11 +121,8 @@ def find_reference(
     from fvsolve.case import load
 
     case = load(case, finest or {})
-    exact_result = (
-        exact_reference(case)
-        if exact and case.exact is not None and not (way == "time" and pipes_with_cells(case))
-        else None
-    )
+    use_exact = exact and case.exact is not None and not (way == "time" and pipes_with_cells(case))
+    exact_result = exact_reference(case) if use_exact else None
     if exact_result is not None and opinions == 1:
         return exact_result
     kinds, references, failures = candidates(case, exclude_own, way, stiff, lines), [], []
@@ -179,19 +172,13 @@ def best_reference(references: Sequence[Reference], failures: tuple[str, ...] = 
     if not later:
         return replace(first, failures=failures)
     second_reference, doubt = later[0], asdict(first.uncertainty)
-    difference = asdict(distance(second_reference.run, first)) | {
-        "overshoot": extremes_distance(second_reference.run, first)
-    }
+    difference = asdict(distance(second_reference.run, first))
+    difference["overshoot"] = extremes_distance(second_reference.run, first)
     doubt |= {key: float(np.nanmax([0.0, difference[key], doubt[key]])) for key in MEASURES}
     own = {name: {norm: max(error, first.own_error.get(name, {}).get(norm, 0.0)) for norm, error in norms.items()}
            for name, norms in error_norms(second_reference.run, first).items()}  # fmt: skip
-    return replace(
-        first,
-        own_error=own,
-        uncertainty=Distance(**doubt | {"worst": difference["worst"]}),
-        second=second_reference.words,
-        failures=failures,
-    )
+    uncertainty = Distance(**doubt | {"worst": difference["worst"]})
+    return replace(first, own_error=own, uncertainty=uncertainty, second=second_reference.words, failures=failures)
 
 
 def _uncertainty(reference: Reference) -> float:
@@ -272,11 +259,8 @@ def candidates(case, judged: bool, way: str, stiff: bool, lines: bool = False) -
     table = LUMPED if not cells else SEPARATION if not has_all else STIFF if stiff else WAVES
     if judged:  # prefer other schemes or methods; without characteristics, which may equal the scheme under study
         is_own = [numerics.scheme == entry[0] if cells else numerics.method == entry[1] for entry in table]
-        table = [
-            entry
-            for _, entry in sorted(zip(is_own, table, strict=True), key=lambda pair: pair[0])
-            if entry[4] != CHARACTERISTICS_REFINEMENT
-        ]
+        ordered = sorted(zip(is_own, table, strict=True), key=lambda pair: pair[0])
+        table = [entry for _, entry in ordered if entry[4] != CHARACTERISTICS_REFINEMENT]
     # in cells, only characteristics carry jumps without error
     if lines and has_all and any(jump for _, jump in study_model(case).breaks):
         table = sorted(WAVES, key=lambda entry: entry[4] != CHARACTERISTICS_REFINEMENT)
@@ -290,10 +274,8 @@ def candidates(case, judged: bool, way: str, stiff: bool, lines: bool = False) -
         trials = [fixed | {f"numerics.{control}": size if cells else size * TOLERANCE_RATIO**k}
                   | cell_keys_of(scaled(cells, factor / 2**k)) for k in (2, 1, 0)]  # fmt: skip
         if factor != CHARACTERISTICS_REFINEMENT or _is_characteristic(case, trials[0]):
-            yield (
-                run_text(case, " ".join([scheme or "", *limiters]), scaled(cells, factor), method, control, size),
-                trials,
-            )
+            names = " ".join([scheme or "", *limiters])
+            yield run_text(case, names, scaled(cells, factor), method, control, size), trials
 
 
 def smaller_steps(case) -> tuple[str, list[dict]]:
@@ -306,10 +288,8 @@ def smaller_steps(case) -> tuple[str, list[dict]]:
     judged = METHODS.get(numerics.method)
     method = alternative_method(judged is not None and judged.explicit, numerics.method)
     if numerics.rtol is not None:
-        control, sizes = (
-            "rtol",
-            [max(LEAST_RTOL, TOLERANCE_FRACTION * numerics.rtol * TOLERANCE_RATIO ** (k - 2)) for k in (2, 1, 0)],
-        )
+        control, finest = "rtol", TOLERANCE_FRACTION * numerics.rtol
+        sizes = [max(LEAST_RTOL, finest * TOLERANCE_RATIO ** (k - 2)) for k in (2, 1, 0)]
     else:
         rate = greatest_wave_rate(case, cells)
         step = min(numerics.step or numerics.courant / rate, 1.0 / rate)
@@ -335,7 +315,7 @@ def run_text(case, scheme: str, cells, method: str, control: str, size: float) -
 def _is_characteristic(case, keys: dict) -> bool:
     """True if waves cross exactly one cell in nearly every step (Courant number 1), without numerical diffusion.
 
-    The number of steps is that of a run (see `probe_run`). keys : overrides of the case
+    The number of steps is that of a run of at most about `PROBE_STEPS` steps. keys : overrides of the case
     """
     model = study_model(case, keys)
     if model.basins:
@@ -343,7 +323,8 @@ def _is_characteristic(case, keys: dict) -> bool:
     rates, span = model.wave_rates, case.numerics.end - case.numerics.start
     if np.ptp(rates) > 1e-9 * rates.max():
         return False
-    return finished_run(model, probe_run).counts["steps"] <= 1.01 * span * rates.max() + 2 * len(model.breaks) + 2
+    steps = outcome(model, run=capped(steps=PROBE_STEPS)).counts["steps"]
+    return steps <= 1.01 * span * rates.max() + 2 * len(model.breaks) + 2
 
 
 def reference_of_refinements(words: str, runs: Sequence[Outcome]) -> Reference:
@@ -357,15 +338,9 @@ def reference_of_refinements(words: str, runs: Sequence[Outcome]) -> Reference:
     own = {name: {norm: SAFETY * extrapolated_error(coarse_errors[name][norm], d, ROUNDING * variable_size(fine, name))
                   for norm, d in norms.items()} for name, norms in fine_errors.items()}  # fmt: skip
     coarse_errors, fine_errors = asdict(distance(coarse, middle_reference)), asdict(distance(middle, fine_reference))
-    doubt = {
-        key: SAFETY * extrapolated_error(coarse_errors[key], fine_errors[key])
-        for key in ("trajectory", "greatest", "end")
-    }
-    return replace(
-        fine_reference,
-        own_error=own,
-        uncertainty=Distance(**doubt, overshoot=SAFETY * extremes_distance(middle, fine_reference)),
-    )
+    doubt = {key: SAFETY * extrapolated_error(coarse_errors[key], fine_errors[key]) for key in MEASURES[:3]}
+    uncertainty = Distance(**doubt, overshoot=SAFETY * extremes_distance(middle, fine_reference))
+    return replace(fine_reference, own_error=own, uncertainty=uncertainty)
 
 
 def reference_of_run(run: Outcome, words: str = "") -> Reference:
@@ -377,9 +352,8 @@ def reference_of_run(run: Outcome, words: str = "") -> Reference:
     def fields_of(model) -> dict:
         sums = wave_sums(run)
         cells = {pipe.name: pipe.cells for pipe in model.pipes}
-        by_pipe = fields(
-            model, {name: tuple(cell_averages(entry, cells[name]) for entry in pair) for name, pair in sums.items()}
-        )
+        averages = {name: tuple(cell_averages(entry, cells[name]) for entry in pair) for name, pair in sums.items()}
+        by_pipe = fields(model, averages)
         pairs = zip(run.model.basins, model.basins, strict=True)
         return by_pipe | {("basin", other.name): project_to(entry, [*basin_fields(entry, run.y).values()], other)
                         for entry, other in pairs}  # fmt: skip

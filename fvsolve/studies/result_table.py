@@ -3,11 +3,10 @@
 A row is a mapping. A missing value is None: an empty field in CSV, null in JSON, "-" on a terminal.
 """
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -15,13 +14,20 @@ from fvsolve.output.summary_file import plain
 
 
 class PlainData:
-    """Base class of dataclasses with plain values for JSON: all fields, and the properties named in `also`."""
+    """Base class of dataclasses with plain values for JSON.
 
-    also: ClassVar[tuple[str, ...]] = ()  # names of properties
+    json : names of JSON in order, each a field or property, or "NAME=FIELD.ATTRIBUTE"; default: all fields
+    also : names of further properties
+    """
+
+    json: ClassVar[str] = ""
+    also: ClassVar[tuple[str, ...]] = ()
 
     def plain(self) -> dict:
         """Plain values for JSON: complex numbers as [re, im], None for values that are not finite."""
-        return {name: plain(getattr(self, name)) for name in (*(field.name for field in fields(self)), *self.also)}
+        names = self.json.split() or [field.name for field in fields(self)]
+        paths = (name.partition("=") for name in (*names, *self.also))
+        return {name: plain(attrgetter(path or name)(self)) for name, _, path in paths}
 
 
 @dataclass(frozen=True)

@@ -146,10 +146,8 @@ def points_from_file(path: Path, source: Any, raw: dict[str, Any]) -> list[dict[
         raise FvsolveError(f"{error}. Expected a header of keys and a row for each run") from None
     faults = [f"two columns have the key {name}" for name in dict.fromkeys(table.names) if table.names.count(name) > 1]
     keys = [Heading.of(header, raw, faults) for header in table.header]
-    rows = [
-        {key.name: key.read(cell, f"line {line}, {key.name}", faults) for key, cell in zip(keys, row, strict=True)}
-        for line, row in zip(table.lines, table.cells, strict=True)
-    ]
+    rows = [{key.name: key.read(cell, f"line {line}, {key.name}", faults) for key, cell in zip(keys, row, strict=True)}
+            for line, row in zip(table.lines, table.cells, strict=True)]  # fmt: skip
     try:
         refuse_unknown(source, rows[0], raw)
     except CaseError as error:

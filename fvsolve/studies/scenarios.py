@@ -1,22 +1,254 @@
-"""Scenario study: runs of a case with every combination of events and protections, with limit verdicts."""
-
-from __future__ import annotations
+"""Scenario study: a file with named sets of overrides of a case, runs of all combinations, and limit verdicts."""
 
 import csv
 import json
 import os
+import tomllib
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fvsolve.case import Case, load
-from fvsolve.errors import FvsolveError, RunError
+from fvsolve.case import Case, load, shipped
+from fvsolve.case.raw import split_key, syntax_fault
+from fvsolve.case.toml_lines import key_lines
+from fvsolve.errors import CaseError, Fault, FvsolveError, did_you_mean
 from fvsolve.output.directory import clear_reports
 from fvsolve.output.summary_file import plain, write_summary
 from fvsolve.run import run
-from fvsolve.studies.case_pickle import PickledCase
-from fvsolve.studies.parallel import run_tasks
-from fvsolve.studies.scenario_file import Scenarios, read_scenarios
+from fvsolve.studies.parallel import PickledCase, TaskPool, Work
+from fvsolve.units import show
+
+KEYS = ("case", "title", "estimate_error", "events", "protections")
+NAMED_TABLES = "nodes", "links", "limits", "routes", "scalars", "defaults"  # of parts: keys are set one by one
+AddFault = Callable[[tuple, str], None]
+
+
+@dataclass(frozen=True)
+class Scenarios:
+    """Content of a study file.
+
+    name, path : name and path of the file; case : path of the case file; error : True if errors of peaks are estimated
+    events, protections : name -> overrides (dotted key -> value)
+    """
+
+    name: str
+    path: Path
+    title: str
+    case: Path
+    error: bool
+    events: dict[str, dict[str, Any]]
+    protections: dict[str, dict[str, Any]]
+
+    def runs(self) -> Iterator[tuple[str | None, str | None, dict[str, Any]]]:
+        """Yield (event, protection, overrides) of every run; event or protection is None if the file has none."""
+        for event, of_event in (self.events or {None: {}}).items():
+            for protection, of_protection in (self.protections or {None: {}}).items():
+                yield event, protection, {**of_protection, **of_event}
+
+
+def read_scenarios(path: str | Path) -> Scenarios:
+    """Read a study from a TOML file. Raises CaseError with all faults of the file and its runs, with line numbers."""
+    path = Path(path)
+    data, lines = read_text(path)
+    faults: dict[tuple, Fault] = {}
+
+    def fault(keys: tuple, message: str) -> None:
+        place = ".".join(keys)
+        line = next((lines[spelling] for spelling in possible_paths(keys) if spelling in lines), None)
+        faults.setdefault((place, message), Fault(place, message, line))
+
+    if {"nodes", "fluid"} & data.keys():
+        text = f'A study refers to it by case = "{path.name}" and has [events.NAME], [protections.NAME]'
+        raise CaseError([Fault("", f"is a case, not a study. {text}")], path.name)
+    for key in data:
+        if key not in KEYS:
+            fault((key,), f"unknown key{did_you_mean(key, KEYS) or '. Expected ' + ', '.join(KEYS)}")
+    for key, kind, kind_text in (("title", str, "text"), ("estimate_error", bool, "true or false")):
+        if not isinstance(data.get(key, kind()), kind):
+            fault((key,), f"{show(data[key])} is not {kind_text}")
+    sets = {group: read_overrides(data.get(group, {}), group, fault) for group in ("events", "protections")}
+    if not faults and not any(sets.values()):
+        fault((), "the study has no runs. Expected [events.NAME], [protections.NAME] or both")
+    for event, protection, key, other in all_conflicts(**sets):
+        text = f"{key} is set here, and {other} in protections.{protection}; the two are in conflict"
+        fault(("events", event, key), text)
+    place = case_path(data.get("case"), path.parent, fault)
+    design = Scenarios(path.stem, path, data.get("title", ""), place, data.get("estimate_error", False), **sets)
+    if place is not None:
+        run_faults(design, fault)
+    if faults:
+        raise CaseError(list(faults.values()), path.name)
+    return design
+
+
+def possible_paths(keys: tuple) -> Iterator[tuple]:
+    """Yield paths in the TOML file under which an override may be written, to find its line; most specific first.
+
+    keys : (group, name of the event or protection, dotted key), or its first entries alone. The dotted key may be
+    written as nested tables or as one quoted key. The paths of the tables that contain it follow.
+    """
+    below = split_key(keys[2]) if len(keys) > 2 else ()
+    for n in range(len(below), 0, -1):
+        yield (*keys[:2], *below[:n])
+        yield (*keys[:2], ".".join(below[:n]))
+    yield from (keys[:n] for n in range(min(len(keys), 2), 0, -1))
+
+
+def read_text(path: Path) -> tuple[dict[str, Any], dict[tuple, int]]:
+    """Read a TOML file: (data, path of each key -> line). Raises CaseError if it is missing, unreadable or invalid."""
+    text = ""
+    try:
+        text = path.read_text(encoding="utf-8-sig").replace("\r\n", "\n")
+        return tomllib.loads(text), key_lines(text)
+    except FileNotFoundError:
+        near = [other.name for other in path.parent.glob("*.toml")] if path.parent.is_dir() else []
+        raise CaseError([Fault("", f"there is no such file{did_you_mean(path.name, near)}")], str(path)) from None
+    except OSError as error:
+        raise CaseError([Fault("", f"cannot be read: {error.strerror or error}")], path.name) from None
+    except ValueError as error:
+        raise CaseError([syntax_fault(error, text)], path.name) from None
+
+
+def case_path(case: Any, folder: Path, fault: AddFault) -> Path | None:
+    """Path of the case file of a study, or of a shipped case; adds a fault and returns None if there is no such file.
+
+    case : value of the key `case`, which must be a text; folder : folder of the study
+    fault : fault(keys, message) records a fault
+    """
+    if not isinstance(case, str):
+        missing = "case is missing. Expected the name of the case file of the study"
+        text = missing if case is None else f"{show(case)} is not a text"
+        fault(() if case is None else ("case",), text)
+        return None
+    place = folder / case
+    if not place.is_file() and case in shipped.names():
+        return shipped.find(case)
+    if not place.is_file():
+        suggestion = [file.name for file in place.parent.glob("*.toml")] if place.parent.is_dir() else []
+        suggestion = did_you_mean(place.name, [*suggestion, *shipped.names()])
+        fault(("case",), f"{show(case)}: there is no such file{suggestion}; a path is relative to the study")
+        return None
+    return place
+
+
+def read_overrides(table: Any, group: str, fault) -> dict[str, dict[str, Any]]:
+    """Overrides of the events or protections in a table of the file : name -> {dotted key: value}; adds faults.
+
+    group : "events" or "protections"; fault : fault(keys, message) records a fault
+    """
+    if not isinstance(table, dict):
+        fault((group,), f"{show(table)} is not a table. Expected named tables, [{group}.NAME]")
+        return {}
+    sets = {}
+    for name, overrides in table.items():
+        if not isinstance(overrides, dict):
+            fault((group, name), f'{show(overrides)} is not a table. Expected keys such as links.pump.trip = "2 s"')
+        elif not name.replace("-", "").replace("_", "").isalnum():
+            fault((group, name), f"{show(name)} is not a valid name. Expected letters, digits, _ and -")
+        else:
+            sets[name] = dict(dotted_keys(overrides))
+    return sets
+
+
+def dotted_keys(table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Flatten tables of overrides; yields pairs (dotted key, value).
+
+    A named part, such as links.main, gives a pair for each of its keys; deeper tables remain values.
+    """
+    for first, inner in table.items():
+        if "." in first or not isinstance(inner, dict):
+            yield first, inner
+            continue
+        for second, below in inner.items():
+            if first in NAMED_TABLES and isinstance(below, dict):
+                yield from ((dotted_path(first, second, third), value) for third, value in below.items())
+            else:
+                yield dotted_path(first, second), below
+
+
+def dotted_path(*keys: str) -> str:
+    """Join keys to a dotted TOML key, with quotes where necessary."""
+    return ".".join(key if key.replace("-", "").replace("_", "").isalnum() else json.dumps(key) for key in keys)
+
+
+def all_conflicts(events: dict, protections: dict) -> Iterator[tuple[str, str, str, str]]:
+    """Yield (event, protection, key of the event, key of the protection) for each pair of overrides in conflict.
+
+    They are in conflict as in `conflicting_keys`.
+    """
+    for event, of_event in events.items():
+        for protection, of_protection in protections.items():
+            for keys in conflicting_keys(of_event, of_protection):
+                yield event, protection, *keys
+
+
+def conflicting_keys(first: dict[str, Any], second: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """Yield (key of `first`, key of `second`) for keys that are equal, or one of which contains the other.
+
+    Equal keys with equal values are left out.
+    """
+    for key in first:
+        for other_key in second:
+            a, b = split_key(key), split_key(other_key)
+            if a[: len(b)] == b[: len(a)] and not (a == b and first[key] == second[other_key]):
+                yield key, other_key
+
+
+def run_faults(design: Scenarios, fault: AddFault) -> None:
+    """Add the faults of all runs whose case is invalid, each at the override that causes it.
+
+    If only some runs with an event (or protection) have a fault, the message names their protections (or events). Runs
+    with conflicting overrides are omitted. Faults of the case itself are added at the key `case`.
+    fault : fault(keys, message) records a fault
+    """
+    try:
+        base = load(design.case)
+    except CaseError as error:
+        for case_fault in error.faults:
+            fault(("case",), f"{error.file}: {case_fault}")
+        return
+    clash = {(event, protection) for event, protection, *_ in all_conflicts(design.events, design.protections)}
+    runs = [(pair, keys) for *pair, keys in design.runs() if tuple(pair) not in clash]
+    groups: dict[tuple[str, str], list] = {}  # (place, message) -> pairs of event and protection
+    for pair, keys in runs:
+        try:
+            load(base, keys)
+        except CaseError as error:
+            for case_fault in error.faults:
+                groups.setdefault((case_fault.place, case_fault.message), []).append(pair)
+    for (place, message), pairs in groups.items():
+        of_keys = list(responsible_sets(design, place, pairs))
+        for keys in of_keys or responsible_sets(design, None, pairs):
+            position = 0 if keys[0] == "events" else 1
+            partners = [pair[1 - position] for pair in pairs if pair[position] == keys[1]]
+            in_all = len(partners) == sum(pair[position] == keys[1] for pair, _ in runs)
+            text = message if of_keys or not place else f"{place}: {message}"
+            fault(keys, text if in_all else f"{text} (with {', '.join(partners)})")
+
+
+def responsible_sets(design: Scenarios, place: str | None, pairs: list) -> Iterator[tuple]:
+    """Yield (group, name, place) of events and protections that set `place`, a part of it, or a table that contains it.
+
+    place : key with a fault. If it is None, (group, name) of each event is yielded, or of each protection if there are
+    no events. pairs : (event, protection) of the runs with the fault
+    """
+    for position, group in enumerate(("events", "protections")):
+        for name in dict.fromkeys(pair[position] for pair in pairs if pair[position] is not None):
+            if place is None:
+                yield group, name
+            elif any(within(place, key) or within(key, place) for key in getattr(design, group)[name]):
+                yield group, name, place
+        if place is None and pairs[0][position] is not None:
+            return
+
+
+def within(place: str, key: str) -> bool:
+    """True if the dotted path `place` is equal to `key` or lies below it."""
+    return place == key or place.startswith((f"{key}.", f"{key}["))
+
+
+# runs and results -------------------------------------------------------------------------------------------------
 
 STUDY = "study.json"
 
@@ -42,11 +274,8 @@ class ScenarioResults:
         by_protection: dict[str, list[dict[str, Any]]] = {}
         for row in self.rows:
             by_protection.setdefault(row["protection"] or "", []).append(row)
-        return [
-            name
-            for name, rows in by_protection.items()
-            if all(map(run_passes, rows)) and any(row["verdicts"] for row in rows)
-        ]
+        return [name for name, rows in by_protection.items()
+                if all(map(run_passes, rows)) and any(row["verdicts"] for row in rows)]  # fmt: skip
 
     @property
     def limited(self) -> bool:
@@ -90,16 +319,17 @@ def study(source, out: str | Path | None = None, jobs: int = 1, dask: str | None
         tasks.append({"event": event, "protection": protection, "keys": keys, "directory": str(place)})
     folder.mkdir(parents=True, exist_ok=True)
     rows: list[dict[str, Any] | None] = [None] * len(tasks)
-    for done, (at, row) in enumerate(run_tasks(ScenarioRun(design.case, design.error, force), tasks, jobs, dask), 1):
-        rows[at] = row
-        if progress is not None:
-            progress(done, len(tasks), row_name(row))
+    with TaskPool(ScenarioRun(design.case, design.error, force), jobs, dask) as pool:
+        for done, (at, row) in enumerate(pool.run(tasks), 1):
+            rows[at] = row
+            if progress is not None:
+                progress(done, len(tasks), row_name(row))
     results = ScenarioResults(design, folder, rows)
     write_study(results)
     return results
 
 
-class ScenarioRun:
+class ScenarioRun(Work):
     """Callable that makes one run of a scenario study, in this or another process; returns its row of results."""
 
     def __init__(self, source: Any, error: bool, force: bool) -> None:
@@ -118,13 +348,11 @@ class ScenarioRun:
         summary = result.summary
         keys_shown = ("ok", "reason", "t", "invalid_from", "verdicts", "extremes", "peaks", "resolution", "marks",
                       "events", "expectations", "time_unit", "envelope_units", "warnings")  # fmt: skip
-        return {key: task[key] for key in ("event", "protection", "directory")} | {
-            key: plain(summary[key]) for key in keys_shown if key in summary
-        }
+        row = {key: task[key] for key in ("event", "protection", "directory")}
+        return row | {key: plain(summary[key]) for key in keys_shown if key in summary}
 
-    def lost_result(self, task: dict[str, Any]) -> Any:
-        """Raise RunError, because a run that crashed its process has no results."""
-        raise RunError(f"the process that ran {task['directory']} was killed repeatedly. Is there enough memory?")
+    def process_text(self, task: dict[str, Any]) -> str:
+        return f"that ran {task['directory']}"
 
 
 def row_name(row: dict[str, Any]) -> str:
@@ -145,11 +373,8 @@ def write_study(results: ScenarioResults) -> None:
     temporary.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
     os.replace(temporary, results.folder / STUDY)
     limits = list(dict.fromkeys(verdict["name"] for row in results.rows for verdict in row["verdicts"]))
-    columns = [
-        f"{name} {quantity}"
-        for name in limits
-        for quantity in ("value", "margin", "unit", "state", "place", "time [s]")
-    ]
+    quantities = ("value", "margin", "unit", "state", "place", "time [s]")
+    columns = [f"{name} {quantity}" for name in limits for quantity in quantities]
     with open(results.folder / "study.csv", "w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(["event", "protection", "ok", "reason", *columns])

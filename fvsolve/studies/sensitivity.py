@@ -1,7 +1,5 @@
 """Global sensitivity analysis: Sobol indices and Morris effects of keys of a case on an outcome, by SALib."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,11 +11,12 @@ import numpy as np
 from fvsolve.case import load
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError
+from fvsolve.studies.outcome import STUDY_ARGUMENTS
 from fvsolve.studies.result_table import Column, PlainData, ResultTable
 from fvsolve.studies.sampling import key_ranges
 from fvsolve.studies.sweep import VARY, sweep
 from fvsolve.units import show
-from fvsolve.validation import COUNT, COUNT_FROM_ZERO, FUNCTION, PATH, TABLE, TEXT, validated
+from fvsolve.validation import COUNT, COUNT_FROM_ZERO, PATH, TEXT, validated
 
 COLUMNS = ("S1", "S1_conf", "ST", "ST_conf", "mu_star", "mu_star_conf", "mu", "sigma")
 LEVELS = 4  # levels of the Morris grid
@@ -65,17 +64,7 @@ class Sensitivity(Displayable, PlainData):
         return self.sheet.table_columns()
 
 
-@validated(
-    vary=VARY,
-    outcome=TEXT,
-    samples=COUNT,
-    seed=COUNT_FROM_ZERO,
-    set=TABLE,
-    jobs=COUNT,
-    dask=TEXT,
-    out=PATH,
-    progress=FUNCTION,
-)
+@validated(vary=VARY, outcome=TEXT, samples=COUNT, seed=COUNT_FROM_ZERO, out=PATH, **STUDY_ARGUMENTS)
 def sensitivity(
     case,
     vary: Mapping[str, Sequence[Any]],

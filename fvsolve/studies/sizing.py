@@ -1,7 +1,5 @@
 """Sizing: search by bracketing for the least or greatest value of a key at which all limits hold."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -16,7 +14,9 @@ from fvsolve.parts.arithmetic import Arithmetic
 from fvsolve.run import run
 from fvsolve.run.result import FAILS, OPEN
 from fvsolve.run.verdicts import SIZES
+from fvsolve.studies.outcome import NO_FIELDS, checked_case, end_if_interrupted
 from fvsolve.studies.peak_error import peak_errors
+from fvsolve.studies.result_table import PlainData
 from fvsolve.studies.sampling import is_known, key_quantity, si_unit_of
 from fvsolve.units import UNITS, show
 
@@ -48,7 +48,7 @@ class SizeRun:
 
 
 @dataclass(frozen=True)
-class Size:
+class Size(PlainData):
     """Result of a sizing.
 
     key : key whose value is searched; unit : unit of its values, for bare numbers the SI unit of the key, "" if it has
@@ -66,6 +66,8 @@ class Size:
     runs: list[SizeRun] = field(default_factory=list)
     ties: tuple[str, ...] = ()
 
+    json = "key unit goal value bracket ties runs"
+
     @property
     def nearest(self) -> SizeRun:
         """Run with the greatest margin."""
@@ -73,9 +75,7 @@ class Size:
 
     def plain(self) -> dict[str, Any]:
         """Plain values for JSON; if no value was found, also the run with the greatest margin as `nearest`."""
-        data = {"key": self.key, "unit": self.unit, "goal": self.goal, "value": self.value, "bracket": self.bracket,
-                "ties": list(self.ties), "runs": [vars(run) for run in self.runs]}  # fmt: skip
-        return data if self.value is not None else data | {"nearest": vars(self.nearest)}
+        return super().plain() | ({} if self.value is not None else {"nearest": vars(self.nearest)})
 
 
 def number_and_unit(given: Any) -> tuple[float, str]:
@@ -100,9 +100,8 @@ def parse_range(low: Any, high: Any) -> tuple[float, float, str]:
     if unit_a != unit_b:
         first, second = UNITS.get(unit_a), UNITS.get(unit_b)
         if first is None or second is None or first.dimension != second.dimension or first.gauge != second.gauge:
-            raise FvsolveError(
-                f"{show(low)} and {show(high)} have different kinds of units. Use the same unit for both"
-            )
+            text = f"{show(low)} and {show(high)} have different kinds of units"
+            raise FvsolveError(f"{text}. Use the same unit for both")
         a = float(second.number(first.si(a)))
     if not a < b:
         raise FvsolveError(f"{show(low)} is not below {show(high)}. Expected LOW,HIGH")
@@ -145,15 +144,14 @@ class SizeSearch:
         if self.progress is not None:
             self.progress(len(self.runs), f"{self.key} = {value:.6g} {self.unit}".rstrip())
         try:
-            case = load(self.case, {**self.keys(value), "output.fields": 0, "output.lines": {}})
+            case = load(self.case, {**self.keys(value), **NO_FIELDS})
             result = run(case)
         except CaseError as error:
             if not self.runs:
                 raise
             self.runs.append(SizeRun(value, False, None, "", f"refused: {error.faults[0].message}"))
             return self.runs[-1]
-        if result.reason.startswith("interrupted"):
-            raise KeyboardInterrupt
+        end_if_interrupted(result.reason)
         if self.error and result.ok:
             peak_errors(result, case)
         self.runs.append(size_run(value, result))
@@ -209,25 +207,13 @@ class SizeSearch:
 
 def size_run(value: float, result: Any) -> SizeRun:
     """`SizeRun` from the limit verdicts in the result of a run with this value of the key."""
-    margins = [
-        (relative_margin(row, verdict.quantity), verdict.name) for verdict in result.verdicts for row in verdict.worst
-    ]
-    margin, name = min(margins)
-    ok, failed = (
-        all(verdict.ok for verdict in result.verdicts),
-        any(verdict.state == FAILS for verdict in result.verdicts),
-    )
-    doubts = [verdict.text for verdict in result.marks] + [
-        verdict.text for verdict in result.warnings if verdict.kind == "end"
-    ]
-    doubts += [
-        f"{verdict.name}: its margin is smaller than its error" for verdict in result.verdicts if verdict.doubtful
-    ]
-    doubts += [
-        f"{verdict.name}: its {'value' if verdict.margin is None else 'error'} is not known"
-        for verdict in result.verdicts
-        if verdict.state == OPEN and not verdict.doubtful
-    ]
+    limits = result.verdicts
+    margin, name = min((relative_margin(row, limit.quantity), limit.name) for limit in limits for row in limit.worst)
+    ok, failed = all(limit.ok for limit in limits), any(limit.state == FAILS for limit in limits)
+    doubts = [mark.text for mark in result.marks] + [text.text for text in result.warnings if text.kind == "end"]
+    doubts += [f"{limit.name}: its margin is smaller than its error" for limit in limits if limit.doubtful]
+    doubts += [f"{limit.name}: its {'value' if limit.margin is None else 'error'} is not known"
+               for limit in limits if limit.state == OPEN and not limit.doubtful]  # fmt: skip
     reason = "" if ok or failed or not result.ok else next(iter(doubts), "")
     is_known = result.ok and (ok or margin < 0.0) and math.isfinite(margin)
     return SizeRun(value, result.ok and ok, margin if is_known else None, name, result.reason, reason)
@@ -261,13 +247,7 @@ def size(
     If limits fail at both ends, values near the one with the greatest margin are tried. Raises CaseError for an invalid
     case, a case without limits, and wrong arguments.
     """
-    faults: list[Fault] = []
-    loaded = None
-    with collect_faults(faults):
-        loaded = load(case, dict(set or {}))
-    faults += find_faults(loaded, key, (low, high), goal, ties or {}, rtol)
-    if faults:
-        raise CaseError(faults, "case" if loaded is None else loaded.name)
+    loaded = checked_case(case, set, lambda known: find_faults(known, key, (low, high), goal, ties or {}, rtol))
     first, last, unit = parse_range(low, high)
     search = SizeSearch(loaded, key, unit, ties or {}, progress, error)
     value, bracket = search.search(first, last, goal, rtol)

@@ -1,31 +1,127 @@
 """Sweeps: runs of a case with many sets of values; a row of results for each run."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from fvsolve.case import Case, load
 from fvsolve.case.load import find_source
-from fvsolve.case.raw import read_raw
+from fvsolve.case.raw import read_raw, split_key
 from fvsolve.case.text import inline
 from fvsolve.display import Displayable
-from fvsolve.errors import FvsolveError, RunError, did_you_mean, listing
+from fvsolve.errors import CaseError, FvsolveError, RunError, did_you_mean, listing
 from fvsolve.fluid.property_cache import coolprop_version
 from fvsolve.output.restart import program_versions
-from fvsolve.studies.parallel import run_tasks
+from fvsolve.output.summary_file import plain
+from fvsolve.studies.outcome import NO_FIELDS, STUDY_ARGUMENTS, end_if_interrupted, has_diverged, refusal_text
+from fvsolve.studies.parallel import PickledCase, TaskPool
 from fvsolve.studies.result_cache import ResultCache, digest_of, write_errors
 from fvsolve.studies.result_table import Column, ResultTable
 from fvsolve.studies.sampling import grid, points_from_file, refuse_unknown, sample_points
-from fvsolve.studies.sweep_row import REFUSED, RowMaker
 from fvsolve.units import show
-from fvsolve.validation import COUNT, COUNT_FROM_ZERO, FUNCTION, PATH, ROW, SERIES, TABLE, TEXT, Kind, validated
+from fvsolve.validation import COUNT_FROM_ZERO, PATH, ROW, SERIES, TABLE, TEXT, Kind, validated
+
+REFUSED = "refused: "
+LOST_REASON = "lost: the process of this run was killed repeatedly. Is there enough memory?"
+
+
+@dataclass
+class RowMaker:
+    """Callable that runs a case with values of keys and returns the row of results.
+
+    source : case as for `load`; base : overrides of all runs
+    case, model : case and model of the first run, from which the cases and models of later runs are derived
+    """
+
+    source: Any
+    base: dict[str, Any]
+    case: Case | None = field(default=None, compare=False)
+    model: Any = field(default=None, compare=False)
+
+    def __call__(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Row of the run with these values of keys; a refused case gives a row with its reason."""
+        from fvsolve.output.memory_sink import MemorySink
+        from fvsolve.run import model_of
+        from fvsolve.solve import initial_state, solve
+
+        try:
+            model = model_of(self.read(values), like=self.model)
+        except CaseError as error:
+            return {"ok": False, "reason": refusal_text(error)}
+        self.model, sink = self.model or model, MemorySink(model)
+        summary = solve(model, initial_state(model), sink)
+        end_if_interrupted(summary.reason)
+        return row_of(model, summary, sink)
+
+    def read(self, values: Mapping[str, Any]) -> Case:
+        """Case with these values; later cases are derived from the first."""
+        if self.case is None:
+            self.case = load(self.source, {**self.base, **values, **NO_FIELDS})
+            return self.case
+        return load(self.case, {**self.base_for(values), **values})
+
+    def base_for(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Overrides of `base` in those tables of the case in which `values` change a key, and in the table [exact].
+
+        They are set again together with `values`, because keys of a table may conflict.
+        """
+        tables = {("exact",), *(split_key(key)[:2] for key in values)}
+        return {key: value for key, value in self.base.items() if {split_key(key)[:1], split_key(key)[:2]} & tables}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """State for pickling; the other process reads the case again."""
+        return {"sent": PickledCase(self.case or self.source), "base": self.base}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.source, self.base, self.case, self.model = state["sent"].source, state["base"], None, None
+
+    def lost_result(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Row of a run that crashed its process."""
+        return {"ok": False, "reason": LOST_REASON}
+
+
+def row_of(model, summary, sink) -> dict[str, Any]:
+    """Row of a run: column -> value as in `summary.json`; see `Sweep` for the columns.
+
+    None replaces values that are not finite, and all values of probes if the run diverged.
+    sink : `MemorySink` with the output of the run
+    """
+    from fvsolve.run.verdicts import verdicts
+
+    row = {"ok": bool(summary.ok), "reason": summary.reason, "t [s]": plain(float(summary.t))}
+    row["marks"] = min(summary.marks, key=lambda mark: mark.time).text if summary.marks else ""
+    row["warnings"] = [plain(column.plain()) for column in (*model.warnings, *summary.warnings)]
+    row["fluid"] = plain(model.case.properties.plain())
+    blown, last = has_diverged(summary.reason), sink.last  # values of a diverged run are meaningless
+    for k, column in enumerate(sink.columns):
+        least, t_min, greatest, t_max = summary.extremes[column.name]
+        name, unit = column.name, f"[{column.unit}]"
+        entries = {f"min({name}) {unit}": column.from_si(least), f"t_min({name}) [s]": t_min}
+        entries |= {f"max({name}) {unit}": column.from_si(greatest), f"t_max({name}) [s]": t_max}
+        entries[f"final({name}) {unit}"] = last[1 + k]
+        row |= {key: None if blown else plain(float(x)) for key, x in entries.items()}
+    expectations = expectations_of(model, summary, sink)
+    row["expectations"] = all(claim["ok"] for claim in expectations) if expectations else None
+    row["verdicts"] = all(column["ok"] for column in verdicts(model, summary)) if model.case.limits else None
+    return row | {"steps": summary.steps, "seconds": plain(float(summary.seconds))}
+
+
+def expectations_of(model, summary, sink) -> list[dict[str, Any]]:
+    """Expectations of the case with their results, as in the summary of a run; sink : output of the run."""
+    from fvsolve.run import Result
+    from fvsolve.run.case_claims import expectations
+
+    columns = {column.name: column for column in sink.columns}
+    probes = {name: {"dimension": column.dimension, "unit": column.unit} for name, column in columns.items()}
+    summary_data = {"probes": probes, "time_unit": sink.time.unit, "ambient_pressure": model.case.ambient_pressure}
+    result = Result(summary_data, sink.table, sink.envelope)
+    return expectations(model, summary, result)
+
 
 FIRST_COLUMNS = ("ok", "reason", "t [s]", "marks", "warnings", "fluid")
 LAST_COLUMNS = ("expectations", "verdicts", "steps", "seconds")
@@ -130,17 +226,7 @@ POINTS = Kind(
 )
 
 
-@validated(
-    vary=VARY,
-    set=TABLE,
-    jobs=COUNT,
-    out=PATH,
-    progress=FUNCTION,
-    points=POINTS,
-    sample=TEXT,
-    seed=COUNT_FROM_ZERO,
-    dask=TEXT,
-)
+@validated(vary=VARY, out=PATH, points=POINTS, sample=TEXT, seed=COUNT_FROM_ZERO, **STUDY_ARGUMENTS)
 def sweep(
     case,
     vary: Mapping[str, Sequence[Any]] | None = None,
@@ -168,7 +254,8 @@ def sweep(
     """
     if jobs < 1:
         raise FvsolveError(f"jobs = {jobs} is out of range. Expected 1 or more")
-    raw, base = raw_of(case), dict(set or {})
+    base = dict(set or {})
+    raw = case.raw if isinstance(case, Case) else read_raw(find_source(case)).table
     runs = planned_values(case, raw, base, vary or {}, points, sample, seed)
     refuse_unknown(case, {**base, **runs[0]}, raw)
     folder = None if out is None else Path(out)
@@ -187,9 +274,8 @@ def planned_values(
     if points is not None:
         if vary or sample:
             raise FvsolveError("`points` has all values of every run. Expected no `vary` and no `sample` in addition")
-        runs = (
-            points_from_file(Path(points), source, raw) if PATH.accepts(points) else [dict(point) for point in points]
-        )
+        in_file = PATH.accepts(points)
+        runs = points_from_file(Path(points), source, raw) if in_file else [dict(point) for point in points]
         if not runs or not runs[0] or any(point.keys() != runs[0].keys() for point in runs):
             raise FvsolveError("`points` is empty or has different keys. Expected one or more keys, equal in every run")
         return runs
@@ -218,9 +304,8 @@ class SweepRun:
         self.digests: dict[str, str] = {}  # name of a file -> hash of its content
         relevant = {key: value for key, value in raw.items() if key not in TEXT_KEYS}
         versions_used = program_versions() | {"numba": "", "coolprop": coolprop_version()}
-        self.identity = digest_of(
-            {**versions_used, "case": relevant, "base": base, "files": [*self.files((relevant, base))]}
-        )
+        files = [*self.files((relevant, base))]
+        self.identity = digest_of({**versions_used, "case": relevant, "base": base, "files": files})
 
     def run(self, folder: Path | None, jobs: int, dask: str | None) -> Sweep:
         """Compute all rows; files are written if there is a folder, also after an interruption."""
@@ -235,20 +320,19 @@ class SweepRun:
 
     def fill(self, jobs: int, dask: str | None) -> None:
         """Read the rows of earlier sweeps, then run the remaining ones."""
-        keys = [
-            digest_of({"who": self.identity, "set": values, "files": [*self.files(values)]}) for values in self.runs
-        ]
+        identities = [{"who": self.identity, "set": values, "files": [*self.files(values)]} for values in self.runs]
+        keys = [digest_of(identity) for identity in identities]
         for index, key in enumerate(keys):
             if (earlier := self.cache.lookup(key)) is not None:
                 self.rows[index] = self.runs[index] | earlier
         waiting = [index for index in range(len(keys)) if index not in self.rows]
         self.report_progress(waiting[:1])
-        for number, row in run_tasks(
-            RowMaker(self.source, self.base), [self.runs[index] for index in waiting], jobs, dask
-        ):
-            index = waiting[number]
-            self.rows[index] = self.runs[index] | self.cache.store(keys[index], ROW_VERSION, row)
-            self.report_progress([index + 1] if index + 1 < len(keys) else [])
+        tasks = [self.runs[index] for index in waiting]
+        with TaskPool(RowMaker(self.source, self.base), jobs, dask) as pool:
+            for number, row in pool.run(tasks):
+                index = waiting[number]
+                self.rows[index] = self.runs[index] | self.cache.store(keys[index], ROW_VERSION, row)
+                self.report_progress([index + 1] if index + 1 < len(keys) else [])
 
     def write(self, folder: Path | None) -> Sweep:
         """Collect the rows so far in a `Sweep`, and write them to the folder if there is one.
@@ -269,15 +353,14 @@ class SweepRun:
         own, remaining = len(self.rows) - self.cache.reused, len(self.runs) - len(self.rows)
         spent = time.perf_counter() - self.began
         text = f"{duration_text(spent / own * remaining)} left, " if own and remaining else ""
-        self.progress(
-            len(self.rows), len(self.runs), text + "".join(_values_text(self.runs[index]) for index in coming)
-        )
+        for index in coming:
+            text += ", ".join(f"{key} = {as_option_text(value)}" for key, value in self.runs[index].items())
+        self.progress(len(self.rows), len(self.runs), text)
 
     def files(self, values: Any) -> Iterator[str]:
         """Hashes of the contents of all files whose names occur in nested dicts and lists of values."""
-        for value in (
-            values.values() if isinstance(values, Mapping) else values if isinstance(values, (list, tuple)) else ()
-        ):
+        inner = values.values() if isinstance(values, Mapping) else values
+        for value in inner if isinstance(values, (Mapping, list, tuple)) else ():
             if isinstance(value, str):
                 yield from self.digest(value)
             else:
@@ -293,11 +376,6 @@ class SweepRun:
         return [self.digests[name]] if self.digests[name] else []
 
 
-def raw_of(source) -> dict[str, Any]:
-    """Nested dicts of a case, as read from its file; source : as for `load`."""
-    return source.raw if isinstance(source, Case) else read_raw(find_source(source)).table
-
-
 def folder_of(source) -> Path:
     """Folder to which the paths of files in a case are relative; source : as for `load`."""
     if isinstance(source, Case):
@@ -311,10 +389,6 @@ def duration_text(seconds: float) -> str:
     if seconds < 100.0:
         return f"{seconds:.0f} s"
     return f"{seconds / 60.0:.0f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.1f} h"
-
-
-def _values_text(values: Mapping[str, Any]) -> str:
-    return ", ".join(f"{key} = {as_option_text(value)}" for key, value in values.items())
 
 
 def as_option_text(value: Any) -> str:

@@ -1,7 +1,5 @@
 """Reasons why errors of peaks, from runs at several resolutions, are unknown or wide, with remedies."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Sequence
@@ -12,25 +10,15 @@ import numpy as np
 from fvsolve.errors import listing
 from fvsolve.model.start_notices import LEAST_CELLS, answering_parts
 from fvsolve.parts.schedule import Schedule
-from fvsolve.studies.accuracy.case_resolution import basins_from_files, cell_counts, pipes_with_cells, scaled
-from fvsolve.studies.delay_line_keys import delay_lines
+from fvsolve.studies.resolution import basins_from_files, cell_counts, delay_lines, pipes_with_cells, scaled
 
 Part = tuple[str, str]  # group and name
 MANY_STEPS = 20.0  # accumulated error of steps between jumps of delay lines, in tolerances of a step
-SMOOTHED = (
-    0.05  # effect of jumps below a quarter of numerics.delay_tolerance, smoothed over a step, relative to that key
-)
+SMOOTHED = 0.05  # effect of jumps below a quarter of numerics.delay_tolerance, smoothed over a step, over that key
 MIN_CELLS = 4  # cells recommended for a pipe, and for the travel time of a short pipe in its neighbour
 MAX_NAMES = 3  # greatest number of names in a text
 WIDE_ERROR = 0.05  # error relative to the span of a signal above which a reason is given
 SMALL_DIFFERENCE = 0.1  # differences below this fraction of an error are not its cause
-
-
-def single_cell_pipes(case: Any) -> list[str]:
-    """Names of pipes with a single cell, whose number of cells is the same at half the resolution."""
-    cells = cell_counts(case)
-    half = scaled(cells, 0.5)
-    return [name for name in pipes_with_cells(case) if half[f"links.{name}.cells"] == cells[f"links.{name}.cells"]]
 
 
 def short_pipes(case: Any) -> dict[str, tuple[str, int]]:
@@ -106,7 +94,7 @@ def unknown_parts(case: Any) -> dict[Part, str]:
     """Parts with unknown errors of their peaks : (group, name) of a part -> reason.
 
     With a short pulse in a schedule (`brief_pulses`) these are all parts. Otherwise they are the pipes of `short_pipes`
-    and `single_cell_pipes`, and their end nodes.
+    and those with a single cell, and their end nodes.
     """
     reasons: dict[Part, str] = {}
     if pulses := brief_pulses(case):
@@ -117,9 +105,10 @@ def unknown_parts(case: Any) -> dict[Part, str]:
         reasons = {(group, name): text for group in ("nodes", "links") for name in getattr(case, group)}
     texts = {name: f"a wave crosses {name} faster than a cell of {neighbour}; set links.{neighbour}.cells = {cells}"
              for name, (neighbour, cells) in short_pipes(case).items()}  # fmt: skip
-    texts |= {
-        name: f"{name} has a single cell; set links.{name}.cells = {MIN_CELLS}" for name in single_cell_pipes(case)
-    }
+    half = scaled(cell_counts(case), 0.5)
+    for name, pipe in pipes_with_cells(case).items():
+        if half[f"links.{name}.cells"] == (pipe.cells,):  # no coarser cells
+            texts[name] = f"{name} has a single cell; set links.{name}.cells = {MIN_CELLS}"
     for name, text in texts.items():
         link = case.links[name]
         for part in (("links", name), ("nodes", link.from_), ("nodes", link.to)):
@@ -131,10 +120,9 @@ def stopped_runs_text(case: Any, runs: dict[float, Any]) -> str:
     """Reason why runs at other resolutions give no value of a peak; runs : factor of resolution -> result."""
     ended = [f"{times:g} times the resolution: {run.reason}" for times, run in runs.items() if run.reason != "finished"]
     if len(runs) == 1:
-        ended = [
-            f"the cells of {listing(basins_from_files(case), MAX_NAMES)} come from a file, so there is no run at "
-            "another resolution; run the case with a file of finer cells, and compare both runs with fvsolve compare"
-        ]
+        files = listing(basins_from_files(case), MAX_NAMES)
+        return (f"the cells of {files} come from a file, so there is no run at another resolution; run the case with a "
+                "file of finer cells, and compare both runs with fvsolve compare")  # fmt: skip
     return "; ".join(ended) or "at another resolution the peak is not a number; use more cells or shorter steps"
 
 

@@ -18,14 +18,13 @@ from fvsolve.errors import FvsolveError
 from fvsolve.model import RunData
 from fvsolve.model.energy_accounts import Accounts
 from fvsolve.model.jacobian_pattern import jacobian_pattern
-from fvsolve.studies.accuracy.basin_projection import project_to
-from fvsolve.studies.accuracy.case_resolution import cell_counts, cell_keys_of, scaled
 from fvsolve.studies.accuracy.chart import chart
 from fvsolve.studies.accuracy.order import order
 from fvsolve.studies.accuracy.refine import refinement_plan, resolutions
 from fvsolve.studies.energy.energy_balance import energy
 from fvsolve.studies.linear.linearise import linearise
 from fvsolve.studies.peak_error import description
+from fvsolve.studies.resolution import cell_counts, cell_keys_of, project_to, scaled
 from fvsolve.studies.stability.stability import stability
 
 PLANE = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.9}

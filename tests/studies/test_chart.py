@@ -31,10 +31,9 @@ from reference.scenes import (
 import fvsolve
 from fvsolve.case.text import write
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.accuracy import timing
+from fvsolve.studies import outcome as timing
 from fvsolve.studies.accuracy.chart import chart
-from fvsolve.studies.accuracy.chart_files import chart_picture, write_chart_csv
-from fvsolve.studies.accuracy.work_precision import curves_by_name
+from fvsolve.studies.accuracy.work_precision import chart_picture, curves_by_name, write_chart_csv
 from fvsolve.studies.distance import Distance, cell_averages, distance
 from fvsolve.studies.outcome import Outcome, outcome, study_model
 from fvsolve.studies.reference import best_reference, reference_of_refinements, reference_of_run

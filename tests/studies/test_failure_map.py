@@ -31,14 +31,15 @@ from fvsolve.errors import FvsolveError
 from fvsolve.studies.failure.failure_map import failure_map
 from fvsolve.studies.failure.run_verdict import (
     BLOWN_RANGES,
+    WINDOW_STEPS,
     Measures,
     excess_variation,
     probe_ranges,
     ringing_amplitude,
+    run_recorded,
     turn_interval,
     verdict,
 )
-from fvsolve.studies.failure.step_recording import WINDOW_STEPS, run_recorded
 from fvsolve.studies.result_cache import ResultCache, package_hash
 
 TOLERANCE = 0.02

@@ -12,10 +12,9 @@ from fvsolve.cli import main
 from fvsolve.errors import FvsolveError
 from fvsolve.model.energy_norm import energy_form
 from fvsolve.studies.linear import state_matrices
-from fvsolve.studies.linear.eigenvalues import eigenvalues_near, poles_of
-from fvsolve.studies.linear.linearise import linearise
+from fvsolve.studies.linear.linearise import eigenvalues_near, linearise, poles_of
 from fvsolve.studies.ports.response import response
-from fvsolve.studies.stability import real_runs, vector_growth
+from fvsolve.studies.stability import growth, real_runs
 from fvsolve.studies.stability.stability import stability
 
 
@@ -66,7 +65,7 @@ def test_an_eigenvalue_that_is_too_late_is_left_out_and_said():
 
 
 def test_what_takes_too_long_to_predict_is_refused_with_the_way_out(monkeypatch):
-    monkeypatch.setattr(vector_growth, "TIME_LIMIT", -1.0)
+    monkeypatch.setattr(growth, "TIME_LIMIT", -1.0)
     with pytest.raises(FvsolveError, match="600 states and 100 steps take longer.*--set links.NAME.cells=100.*--steps"):
         stability(line(300), steps=100)
 

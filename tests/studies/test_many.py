@@ -13,7 +13,7 @@ import pytest
 
 from fvsolve.errors import FvsolveError, RunError
 from fvsolve.studies import parallel as engine
-from fvsolve.studies.parallel import next_chunk_size, run_tasks
+from fvsolve.studies.parallel import TaskPool, next_chunk_size
 
 
 class Work:
@@ -33,6 +33,11 @@ class Work:
 
     def lost_result(self, task):
         return "lost", task
+
+
+def run_tasks(work, tasks, jobs=1, dask=None):
+    with TaskPool(work, jobs, dask) as pool:
+        yield from pool.run(tasks)
 
 
 def squares(found) -> dict:
@@ -64,10 +69,10 @@ def test_processes_end_with_the_one_that_started_them(tmp_path):
     """Processes end with a killed parent; otherwise their tasks would continue for hours."""
     script = """if True:
         import os, signal, sys, time
-        from fvsolve.studies.parallel import run_tasks
+        from fvsolve.studies.parallel import TaskPool
         def said(task):
             if task: open(f"{sys.argv[1]}/{os.getpid()}", "w").close(); time.sleep(60.0)
-        if __name__ == "__main__": [*run_tasks(said, [0, 1, 2], jobs=2)]"""
+        if __name__ == "__main__": [*TaskPool(said, jobs=2).run([0, 1, 2])]"""
     (tmp_path / "script.py").write_text(textwrap.dedent(script))
     (tmp_path / "there").mkdir()
     running = subprocess.Popen([sys.executable, tmp_path / "script.py", tmp_path / "there"])
@@ -113,7 +118,8 @@ def test_a_worker_of_dask_that_is_killed_costs_its_chunk(cluster, tmp_path):
 
 
 def test_a_scheduler_that_is_not_there_is_named(monkeypatch):
-    cluster_room = pytest.importorskip("fvsolve.studies.dask_cluster")
+    from fvsolve.studies import parallel as cluster_room
+
     pytest.importorskip("distributed", reason="Dask is an extra")
     monkeypatch.setattr(cluster_room, "TIMEOUT", 0.5)
     with socket.socket() as free:
@@ -127,7 +133,7 @@ def test_a_scheduler_that_is_not_there_is_named(monkeypatch):
 
 def test_a_scheduler_without_workers_is_named(monkeypatch):
     distributed = pytest.importorskip("distributed", reason="Dask is an extra")
-    from fvsolve.studies import dask_cluster as room
+    from fvsolve.studies import parallel as room
 
     monkeypatch.setattr(room, "TIMEOUT", 0.5)
     with distributed.LocalCluster(n_workers=0, dashboard_address=":0") as empty:
@@ -136,7 +142,7 @@ def test_a_scheduler_without_workers_is_named(monkeypatch):
 
 
 def test_another_version_is_named_with_both_numbers(cluster, monkeypatch):
-    from fvsolve.studies import dask_cluster as room
+    from fvsolve.studies import parallel as room
 
     own = room.program_versions()
     assert room.program_differences(own) == [] and room.program_differences({**own, "sources": "other"}) == [
@@ -162,7 +168,7 @@ def test_another_version_is_named_with_both_numbers(cluster, monkeypatch):
 
 def test_a_scheduler_that_goes_away_is_told_and_nobody_waits_for_ever(monkeypatch):
     distributed = pytest.importorskip("distributed", reason="Dask is an extra")
-    from fvsolve.studies import dask_cluster as room
+    from fvsolve.studies import parallel as room
 
     monkeypatch.setattr(room, "TIMEOUT", 3.0)
     made = distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0", processes=False)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fvsolve.studies.accuracy.pareto import find_crossing, pareto_front, target_powers
+from fvsolve.studies.accuracy.work_precision import find_crossing, pareto_front, target_powers
 
 COSTS = [1.0, 4.0, 16.0, 64.0]
 sizes = st.floats(1e-12, 1e3)

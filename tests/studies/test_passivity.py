@@ -26,8 +26,7 @@ from reference.scenes import step as stepped
 
 import fvsolve
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.energy.energy_balance import energy
-from fvsolve.studies.energy.energy_of_pairs import measure_pairs
+from fvsolve.studies.energy.energy_balance import energy, measure_pairs
 from fvsolve.studies.energy.passivity import closed_pipe, courant_limit, method_claim, passivity, scheme_claim
 from fvsolve.studies.outcome import outcome, study_model
 
@@ -134,11 +133,11 @@ def pipe_model(scheme: str, method: str, courant: float, steps: int = 1):
 
 def worst_state(scheme: str, method: str, courant: float) -> np.ndarray:
     """State whose energy a step increases most."""
-    from fvsolve.steppers import stability_function
+    from fvsolve.steppers import method_named, stability_function
 
     a, s = closed_pipe(scheme)
     b = courant * study.pipe_operator(scheme)
-    r = stability_function(study.method_of(method))
+    r = stability_function(method_named(method))
     up, down = (study.matrix_polynomial([float(x) for x in p.coefficients], b) for p in (r.numerator, r.denominator))
     assert a.shape == s.shape
     return np.linalg.solve(s, np.linalg.svd(np.linalg.solve(down, up))[2][0])

@@ -11,7 +11,7 @@ from reference.scenes import area, junction, lake, pipe, ramp, reservoir, scene,
 
 import fvsolve
 from fvsolve.studies.peak_error import between_rows, peak_errors
-from fvsolve.studies.refinement import refined_keys
+from fvsolve.studies.resolution import refined_keys
 from fvsolve.studies.unresolved import differing_events
 
 

@@ -13,8 +13,15 @@ from fvsolve.schemes import LIMITERS, branches
 from fvsolve.step_limits.advection_limit import advection_limit
 from fvsolve.step_limits.symbol import WEIGHTS, weights_of
 from fvsolve.steppers import METHODS
-from fvsolve.studies.stability.limited_schemes import limited_limit, measured_courant, monotone_limit, start_fields
-from fvsolve.studies.stability.periodic_limits import PeriodicPipe, measured_limit, measured_limits
+from fvsolve.studies.stability.periodic_limits import (
+    PeriodicPipe,
+    limited_limit,
+    measured_courant,
+    measured_limit,
+    measured_limits,
+    monotone_limit,
+    start_fields,
+)
 
 EXPLICIT = [name for name, one in METHODS.items() if name == one.name and one.explicit]
 

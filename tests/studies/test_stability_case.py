@@ -18,12 +18,18 @@ from fvsolve.model.energy_norm import energy_form
 from fvsolve.steppers import METHODS, method_named, stability_function
 from fvsolve.studies.linear.linearise import linearise, linearise_at
 from fvsolve.studies.linear.operating_point import operating_point
-from fvsolve.studies.stability.growth_method import predicted_limit
-from fvsolve.studies.stability.power_growth import DenseGrowth, matrix_powers, power_growth, step_matrix
+from fvsolve.studies.stability.growth import (
+    DenseGrowth,
+    VectorGrowth,
+    matrix_powers,
+    power_growth,
+    predicted_limit,
+    step_function,
+    step_matrix,
+)
 from fvsolve.studies.stability.real_runs import RealRuns
-from fvsolve.studies.stability.region_bounds import field_of_values, region_limit
 from fvsolve.studies.stability.stability import stability
-from fvsolve.studies.stability.vector_growth import VectorGrowth, step_function
+from fvsolve.studies.stability.stability_row import field_of_values, region_limit
 
 NUMERICS = {"method": "rk4", "step": 1e-3}
 IMPLICIT = ["implicit-euler", "trapezoid", "gauss-4", "radau-iia-5", "lobatto-iiic-4", "tr-bdf2", "rodas-5p"]

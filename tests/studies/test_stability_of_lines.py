@@ -12,8 +12,7 @@ from fvsolve import studies
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers.tableau import method_named
 from fvsolve.studies.linear.operating_point import with_held_schedules
-from fvsolve.studies.stability.delay_line_row import DelayLineLimits
-from fvsolve.studies.stability.delay_line_runs import DelayLineRuns, read_history
+from fvsolve.studies.stability.delay_line_limits import DelayLineLimits, DelayLineRuns, read_history
 from fvsolve.studies.stability.delay_line_system import DelayLineSystem
 
 

@@ -10,7 +10,7 @@ from reference.folders import CASES
 import fvsolve
 from fvsolve.cli.order import variable_unit
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.accuracy import model_hierarchy, time_budget
+from fvsolve.studies.accuracy import model_hierarchy, refine
 from fvsolve.studies.accuracy.chart_settings import (
     CoarseRun,
     chart_settings,
@@ -22,18 +22,17 @@ from fvsolve.studies.accuracy.fit import fit
 from fvsolve.studies.accuracy.model_hierarchy import change_time
 from fvsolve.studies.accuracy.model_levels import NotApplicable, level_keys
 from fvsolve.studies.accuracy.order_study import check_order
-from fvsolve.studies.accuracy.time_budget import affordable_plan
-from fvsolve.studies.accuracy.timing import GIVEN_UP
-from fvsolve.studies.failure import step_recording as watched_runs
-from fvsolve.studies.failure.eigenvalue_limit import eigenvalues_of
+from fvsolve.studies.accuracy.refine import affordable_plan
+from fvsolve.studies.failure import run_verdict as watched_runs
+from fvsolve.studies.failure.map_columns import eigenvalues_of
 from fvsolve.studies.failure.run_verdict import NOT_RUN, Measures, verdict
 from fvsolve.studies.linear.linearise import linearise
-from fvsolve.studies.outcome import outcome
+from fvsolve.studies.outcome import GIVEN_UP, outcome
 from fvsolve.studies.reference import candidates, find_reference
 from fvsolve.studies.result_cache import ResultCache
 from fvsolve.studies.stability import stability as room
+from fvsolve.studies.stability.growth import TooLarge
 from fvsolve.studies.stability.stability import stability
-from fvsolve.studies.stability.vector_growth import TooLarge
 
 
 def case(name, **numerics):
@@ -116,7 +115,7 @@ def test_an_order_that_would_take_long_begins_on_fewer_cells_and_says_so(monkeyp
     few = case("relief-on-closed-main", links__main__cells=64)
     whole = affordable_plan(few, None, None, 3, None, "auto", None)
     assert [level.cells for level in whole.levels] == [64, 128, 256] and "begun" not in whole.words
-    monkeypatch.setattr(time_budget, "CPU_BUDGET", 1e-6)
+    monkeypatch.setattr(refine, "CPU_BUDGET", 1e-6)
     made = affordable_plan(few, None, None, 3, None, "auto", ResultCache(tmp_path))
     assert [level.cells for level in made.levels] == [8, 16, 32] and "starts with 8 of 64 cells" in made.words
     assert affordable_plan(few, None, None, 3, 50, "auto", None).levels[0].cells == 50

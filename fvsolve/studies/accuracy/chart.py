@@ -5,161 +5,61 @@ the points of one scheme and method, from coarse to fine. A target error is a tr
 of the worst probe, relative to its range.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
 
 from fvsolve.case import load
 from fvsolve.case.case import Case
-from fvsolve.case.sections import DEFAULT_CELLS, DEFAULT_RTOL
-from fvsolve.display import Displayable
 from fvsolve.errors import CaseError, FvsolveError, listing
 from fvsolve.steppers.tableau import AUTO, BUILT_IN, METHODS
-from fvsolve.studies.accuracy.case_resolution import basins_from_files
 from fvsolve.studies.accuracy.chart_settings import (
     CoarseRun,
+    MethodSetting,
+    cell_keys,
     chart_settings,
     check_names,
     default_curve,
+    is_adaptive,
+    main_part_name,
     run_coarse,
     unsupported_schemes,
 )
-from fvsolve.studies.accuracy.method_setting import MethodSetting, cell_keys, is_adaptive, main_part_name
-from fvsolve.studies.accuracy.pareto import target_powers
-from fvsolve.studies.accuracy.timing import GIVEN_UP, best_run_of, compile_seconds
 from fvsolve.studies.accuracy.work_precision import (
-    FrontRow,
+    Chart,
     Point,
+    TargetSetting,
     cheapest_curve,
     coarser_setting,
     curves_by_name,
     front_row,
     good_errors,
     interpolated_setting,
+    target_powers,
 )
-from fvsolve.studies.delay_line_keys import as_cells, cells_for_lines, delay_lines, fixed_choices
 from fvsolve.studies.distance import Distance, distance, moving_probes
-from fvsolve.studies.outcome import Progress, name_list, study_model
+from fvsolve.studies.outcome import (
+    GIVEN_UP,
+    STUDY_ARGUMENTS,
+    Progress,
+    best_run_of,
+    compile_seconds,
+    name_list,
+    study_model,
+)
+from fvsolve.studies.parallel import RunQueue, RunRequest
 from fvsolve.studies.reference import Reference, find_reference
+from fvsolve.studies.resolution import as_cells, basins_from_files, cells_for_lines, delay_lines, fixed_choices
 from fvsolve.studies.result_cache import ResultCache
-from fvsolve.studies.result_table import Column, ResultTable
-from fvsolve.studies.run_queue import RunQueue, RunRequest
-from fvsolve.validation import COUNT, FUNCTION, NAMES, NUMBER, NUMBERS, PATH, TABLE, TEXT, validated
+from fvsolve.validation import NAMES, NUMBER, NUMBERS, PATH, validated
 
-TABLE_COLUMNS = (
-    "scheme", "method", "cells", "size", "trajectory", "greatest", "end", "overshoot", "worst", "seconds", "updates",
-    "steps", "ok", "reason",
-)  # fmt: skip
 WRONG_ERROR = 1.0  # errors above the range of the component are wrong results
 
 
-@dataclass(frozen=True)
-class TargetSetting:
-    """Setting (scheme, method and resolution) whose run has at most the target error.
-
-    target : target error, relative to the range of the worst probe [-]; point : the setting and the results of its run
-    numerics : overrides under `[numerics]`, key without "numerics." -> value; others : other overrides, dotted key ->
-    value
-    """
-
-    target: float
-    point: Point
-    numerics: dict
-    others: dict
-
-    def toml_lines(self) -> list[str]:
-        """Lines of TOML: keys of `[numerics]`, then the tables of parts whose cells change."""
-        toml_lines = [f"{key} = {toml_value(value)}" for key, value in self.numerics.items()]
-        for key, value in self.others.items():
-            table, _, name = key.rpartition(".")
-            toml_lines += ["", f"[{table}]", f"{name} = {toml_value(value)}"]
-        return toml_lines
-
-
-@dataclass(frozen=True, repr=False)
-class Chart(Displayable):
-    """Errors of a case against their cost, for several schemes, methods and resolutions.
-
-    points : settings with the results of their runs; front : cheapest setting for each target error
-    reference, second : descriptions of the two references
-    floor : uncertainty of the reference, at least its difference from the second, with the keys of `Distance`; smaller
-    errors are not reliable. It also has the descriptions `reference`, `second` and `told`.
-    default : names of the default scheme and method, such as "weno5 rk4"; compile_seconds : time of compilation [s]
-    reused : number of points from earlier studies; told : reasons of failed references
-    left_out : default schemes that do not support the fluid; aim : setting for a target error, None without a target
-    """
-
-    case: str
-    points: list[Point]
-    reference: str
-    second: str
-    floor: dict
-    default: str
-    compile_seconds: float
-    front: list[FrontRow]
-    reused: int = 0
-    aim: TargetSetting | None = None
-    told: tuple[str, ...] = field(default=())
-    left_out: tuple[str, ...] = field(default=())
-
-    picture = "fvsolve.studies.accuracy.chart_files:chart_picture"
-
-    def summary_line(self) -> str:
-        return f"of {self.case!r}: {len(self.points)} points, {len(self.failed)} failed; default {self.default}"
-
-    def table_columns(self) -> dict[str, list]:
-        """Columns of a table of all points, for a data frame : name in TABLE_COLUMNS -> list of values."""
-        return ResultTable([Column(key) for key in TABLE_COLUMNS], self.rows).table_columns()
-
-    @property
-    def rows(self) -> list[dict]:
-        """All points as dicts, each with the fields of the setting and the results of its run."""
-        return [vars(point.setting) | vars(point) for point in self.points]
-
-    def curves(self) -> dict[str, list[Point]]:
-        """Points of each scheme and method, from coarse to fine : name, such as "weno5 rk4" -> points."""
-        return curves_by_name(self.points)
-
-    @property
-    def stands(self) -> Point | None:
-        """Point of the default scheme and method with 100 cells or a tolerance of 1e-6; None without such a point."""
-        curve = self.curves().get(self.default, [])
-        return next(
-            (point for point in curve if DEFAULT_CELLS == point.setting.cells or point.setting.size == DEFAULT_RTOL),
-            None,
-        )
-
-    @property
-    def failed(self) -> list[Point]:
-        """Points without a usable result."""
-        return [point for point in self.points if not point.ok]
-
-    def plain(self) -> dict:
-        """Return the chart as plain data, SI; `paste` is the setting for a target error, in TOML for the case file."""
-        stands = None if self.stands is None else asdict(self.stands)
-        return (
-            asdict(self)
-            | {"stands": stands}
-            | ({} if self.aim is None else {"paste": "\n".join(self.aim.toml_lines())})
-        )
-
-
 @validated(
-    set=TABLE,
-    schemes=NAMES,
-    methods=NAMES,
-    cells=NUMBERS,
-    rtol=NUMBERS,
-    step=NUMBERS,
-    target=NUMBER,
-    out=PATH,
-    progress=FUNCTION,
-    jobs=COUNT,
-    dask=TEXT,
+    schemes=NAMES, methods=NAMES, cells=NUMBERS, rtol=NUMBERS, step=NUMBERS, target=NUMBER, out=PATH, **STUDY_ARGUMENTS
 )
 def chart(
     case,
@@ -193,11 +93,6 @@ def chart(
         return _ChartStudy(base_case, points, report, queue).run(schemes, methods, cells, rtol, step, target)
 
 
-def toml_value(value) -> str:
-    """Text or number in the format of TOML."""
-    return f'"{value}"' if isinstance(value, str) else repr(value)
-
-
 class _ChartStudy:
     """Work-precision study of a case: makes the runs, the reference and the chart.
 
@@ -222,7 +117,10 @@ class _ChartStudy:
         schemes, methods = name_list(schemes), name_list(methods)
         check_names(schemes, methods)
         if main_part_name(self.case_in_cells):
-            self.coarse = CoarseRun(**self.points.get(self.case, {"study": "chart", "coarse": True}, self.coarse_data))
+            coarse_case = self.case if main_part_name(self.case) else self.case_in_cells
+            # cached, so that a repeated study has the same numbers of cells
+            key = {"study": "chart", "coarse": True}
+            self.coarse = CoarseRun(**self.points.get(self.case, key, lambda: asdict(run_coarse(coarse_case))))
             self.compiling += self.coarse.compile_seconds
         self.all = chart_settings(self.case, self.coarse, schemes, methods, cells, rtol, step)
         self.finest = max((entry.cells for entry in self.all if entry.cells), default=None)
@@ -268,19 +166,10 @@ class _ChartStudy:
         """
         if not delay_lines(self.case):
             return None if self.finest is None else cell_keys(self.case, self.finest)
-        main, cells = (
-            main_part_name(self.case) or main_part_name(self.case_in_cells),
-            self.finest or max(self.coarse.levels),
-        )
+        main = main_part_name(self.case) or main_part_name(self.case_in_cells)
+        cells = self.finest or max(self.coarse.levels)
         keys = cell_keys(self.case, cells) if self.finest else {}
         return keys | cells_for_lines(self.case, self.case.links[main].length / self.case.wave_speed(main) / cells)
-
-    def coarse_data(self) -> dict:
-        """Results of a coarse run, the fields of `CoarseRun`, as plain data.
-
-        They are cached, so that a repeated study has the same numbers of cells.
-        """
-        return asdict(run_coarse(self.case if main_part_name(self.case) else self.case_in_cells))
 
     def floor(self) -> dict:
         """Uncertainty of the reference (see `Reference`), as plain data with the keys of `Distance`.
@@ -388,17 +277,14 @@ class _ChartStudy:
             )
         best = cheapest_curve(points, target, floor["trajectory"], "seconds")
         if best is None:
-            finer = "more cells" if self.finest else "shorter steps" if self.coarse else "a smaller rtol"
-            raise FvsolveError(
-                f"no setting reaches an error of {target:g}; the least error is {min(good_errors(points)):.2g}. "
-                f"Try {finer}"
-            )
+            remedy = "more cells" if self.finest else "shorter steps" if self.coarse else "a smaller rtol"
+            least = f"{min(good_errors(points)):.2g}"
+            raise FvsolveError(f"no setting reaches an error of {target:g}; the least error is {least}. Try {remedy}")
         name, crossing = best
         curve = curves_by_name(points)[name]
         for share in (crossing.share, 0.5 * (1.0 + crossing.share)) if crossing.within else ():
-            point = self.point(
-                interpolated_setting(self.case, curve[crossing.coarser].setting, curve[crossing.finer].setting, share)
-            )
+            coarser, finer = curve[crossing.coarser].setting, curve[crossing.finer].setting
+            point = self.point(interpolated_setting(self.case, coarser, finer, share))
             if point.ok and point.trajectory <= target:
                 return _target_setting(target, point, self.case)
         return _target_setting(target, curve[crossing.finer], self.case)
@@ -426,9 +312,8 @@ def _target_setting(target: float, point: Point, case: Case) -> TargetSetting:
     if "numerics.method" in keys:
         keys = keys | {"numerics.method": _method_in_file(keys["numerics.method"], case)}
     numerics = {key.removeprefix("numerics."): value for key, value in keys.items() if key.startswith("numerics.")}
-    return TargetSetting(
-        target, point, numerics, {key: value for key, value in keys.items() if not key.startswith("numerics.")}
-    )
+    others = {key: value for key, value in keys.items() if not key.startswith("numerics.")}
+    return TargetSetting(target, point, numerics, others)
 
 
 def _method_in_file(method: str, case: Case) -> str:
@@ -450,10 +335,10 @@ def _useless_text(case: Case, points: list[Point], floor: dict) -> str:
     """
     least = min(good_errors(points), default=math.nan)
     errors = f"all errors (least {least:.2g})" if math.isfinite(least) else "any useful error, and no run succeeded"
-    larger_step = "a larger --step (if delay lines are exact, any step is accurate)"
-    remedy = larger_step if delay_lines(case) else "a larger --rtol"
-    remedy = (
-        "fewer --cells (references have four times the cells of the finest run)" if main_part_name(case) else remedy
-    )
+    remedy = "a larger --rtol"
+    if main_part_name(case):
+        remedy = "fewer --cells (references have four times the cells of the finest run)"
+    elif delay_lines(case):
+        remedy = "a larger --step (if delay lines are exact, any step is accurate)"
     return (f"{case.name}: the two references ({floor['reference']}; {floor['second']}) disagree by "
             f"{floor['trajectory']:.2g}, more than {errors}. Try {remedy}, or an earlier end of the run")  # fmt: skip

@@ -1,30 +1,142 @@
-"""Settings of a work-precision study: schemes, methods and resolutions. A curve has one scheme and method."""
+"""Settings of a work-precision study: schemes, methods and resolutions. A curve has one scheme and method.
 
-from __future__ import annotations
+Arguments of several functions : schemes, methods, cells, rtol, step as for `chart`; a single number `cells` is that of
+the main part, see `main_part_name`
+"""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from fvsolve.case import load
 from fvsolve.case.case import Case
-from fvsolve.case.sections import DEFAULT_COURANT, DEFAULT_METHOD, DEFAULT_METHOD_RTOL, DEFAULT_SCHEME
+from fvsolve.case.defaults import raw_link
+from fvsolve.case.sections import (
+    DEFAULT_COURANT,
+    DEFAULT_METHOD,
+    DEFAULT_METHOD_RTOL,
+    DEFAULT_SCHEME,
+    uses_error_control,
+)
 from fvsolve.errors import CaseError, FvsolveError, did_you_mean, listing
+from fvsolve.model.delay_line_selection import slowest_pipe
 from fvsolve.model.model_facts import rhs_seconds
 from fvsolve.schemes import SCHEMES
 from fvsolve.steppers.tableau import AUTO, METHODS
-from fvsolve.studies.accuracy.case_resolution import cell_counts, greatest_wave_rate, pipes, total_cells
-from fvsolve.studies.accuracy.method_setting import (
-    MethodSetting,
-    basin_cells,
-    cell_keys,
-    cells_setting,
-    is_adaptive,
-    lumped_setting,
-    main_part_name,
+from fvsolve.studies.outcome import best_run, compile_seconds, study_model
+from fvsolve.studies.resolution import (
+    basins,
+    cell_counts,
+    cell_keys_of,
+    delay_lines,
+    greatest_wave_rate,
+    pipes,
+    pipes_with_cells,
+    scaled,
+    total_cells,
 )
-from fvsolve.studies.accuracy.timing import capped_run, compile_seconds, finished_run
-from fvsolve.studies.delay_line_keys import delay_lines
-from fvsolve.studies.outcome import study_model
+
+IMPLICIT_RTOL = 1e-4  # rtol of implicit methods with cells: their steps follow the solution, not the cell size
+
+
+@dataclass(frozen=True)
+class MethodSetting:
+    """Scheme, method and resolution of a run.
+
+    scheme : None without cells; control : key "courant", "rtol" or "step" that sets the steps; size : its value, the
+    step in s
+    cells : number of cells of the main part (see `main_part_name`), None without cells; keys : overrides, dotted key ->
+    value
+    """
+
+    scheme: str | None
+    method: str
+    control: str
+    size: float
+    cells: int | None = None
+    keys: dict = field(default_factory=dict, compare=False)
+
+    @property
+    def curve(self) -> tuple:
+        """(scheme, method, step control), which all settings of a curve in a work-precision chart have in common."""
+        return self.scheme, self.method, "courant" if self.control == "courant" else self.control
+
+    @property
+    def name(self) -> str:
+        """Name of scheme and method, such as `upwind5 rk4`."""
+        return f"{self.scheme} {self.method}" if self.scheme else self.method
+
+    @property
+    def fineness(self) -> str:
+        """Resolution in words, such as `200 cells` or `rtol 1e-06`."""
+        return f"{self.cells} cells" if self.cells is not None else f"{self.control} {self.size:.3g}"
+
+
+def main_part_name(case: Case) -> str | None:
+    """Name of the main part, whose number of cells is the resolution; None if the case has no cells that can change.
+
+    The main part is the basin with most cells along a side, else the pipe with the longest travel time of a wave.
+    """
+    sizes = {name: max(basin.cells) for name, basin in basins(case).items() if basin.cells}
+    if sizes:
+        return max(sizes, key=sizes.get)
+    pipes = pipes_with_cells(case)
+    return slowest_pipe(case, pipes) if pipes else None
+
+
+def basin_cells(case: Case) -> int | None:
+    """Greatest number of cells along a side of the main part; None if it is not a basin."""
+    basin = basins(case).get(main_part_name(case) or "")
+    return None if basin is None else max(basin.cells)
+
+
+def cell_keys(case: Case, cells: int) -> dict:
+    """Overrides that set the number of cells of the main part, and scale those of other parts.
+
+    They set `cells` of the pipes that state it in the case; for other pipes they set `numerics.cell_time`. With basins
+    they set `cells` of all parts.
+    """
+    main_part, main_cells = main_part_name(case), basin_cells(case)
+    if main_cells is not None:
+        return cell_keys_of(scaled(cell_counts(case), cells / main_cells))
+    pipes = pipes_with_cells(case)
+    stated = {name for name in pipes if raw_link(case.raw, name).get("cells") is not None}
+    factor = cells / pipes[main_part].cells
+    changed = {f"links.{name}.cells": max(1, round(pipes[name].cells * factor)) for name in stated}
+    if main_part not in stated:
+        changed["numerics.cell_time"] = pipes[main_part].length / case.wave_speed(main_part) / cells
+    elif len(stated) < len(pipes):
+        unstated = [pipe for name, pipe in pipes.items() if name not in stated]
+        travel = max(pipe.length / case.wave_speed(name) for name, pipe in pipes.items() if name not in stated)
+        changed["numerics.cell_time"] = travel / (max(pipe.cells for pipe in unstated) * factor)
+    return changed
+
+
+def cells_setting(case: Case, scheme: str, method: str, cells: int) -> MethodSetting:
+    """Setting of a case with cells: Courant number 0.9, or 1 for upwind with Euler.
+
+    Methods with error control have a tolerance instead.
+    """
+    by_error = uses_error_control(method)
+    control = "rtol" if by_error else "courant"
+    size = IMPLICIT_RTOL if by_error else 1.0 if (scheme, method) == ("upwind", "euler") else DEFAULT_COURANT
+    settings = {"numerics.scheme": scheme, "numerics.method": method, f"numerics.{control}": size}
+    return MethodSetting(scheme, method, control, size, cells, settings | cell_keys(case, cells))
+
+
+def lumped_setting(method: str, size: float, control: str | None = None) -> MethodSetting:
+    """Setting of a case without cells, which consists of ordinary differential equations or delay lines.
+
+    size : tolerance [-] or step [s]
+    control : "rtol" or "step"; if None a tolerance, or a step for methods without an error estimate
+    """
+    control = control or ("rtol" if is_adaptive(method) else "step")
+    return MethodSetting(None, method, control, size, None, {"numerics.method": method, f"numerics.{control}": size})
+
+
+def is_adaptive(method: str) -> bool:
+    """True if a method can keep the error of its steps within a tolerance."""
+    return method == AUTO or METHODS[method].adaptive
+
 
 DEFAULT_SCHEMES = ("upwind", "muscl", "upwind5", "weno5")
 EXPLICIT_METHODS, IMPLICIT_METHOD, IMPLICIT_SCHEME = ("ssp-rk3", "rk4", "dormand-prince"), "rodas-5p", "upwind5"
@@ -72,9 +184,8 @@ class CoarseRun:
         If possible, the work of the finest run, times `dearness`, is at most `MAX_WORK`.
         """
         if self.sizes is not None:
-            return [n for n, work in self.sizes if self.dearness * work <= MAX_WORK][-LEVEL_COUNT:] or [
-                self.sizes[0][0]
-            ]
+            within = [n for n, work in self.sizes if self.dearness * work <= MAX_WORK]
+            return within[-LEVEL_COUNT:] or [self.sizes[0][0]]
         finest = MAX_CELLS
         for work in self.works:
             stiff = self.steps * self.cells * 16 * finest / MAX_CELLS if self.stiff else 0.0
@@ -90,12 +201,11 @@ def run_coarse(case: Case) -> CoarseRun:
     model = study_model(case, cells_setting(case, default_scheme(case), DEFAULT_METHOD, cells).keys)
     span = case.numerics.end - case.numerics.start
     waves, compile_time = span * float(model.wave_rate) / DEFAULT_COURANT, compile_seconds(model)
-    result = finished_run(model, capped_run)
+    result = best_run(model, most=1)
     fraction = (result.t - case.numerics.start) / span  # less than 1 if the run was stopped
     finer_model = study_model(case, cells_setting(case, default_scheme(case), DEFAULT_METHOD, 2 * cells).keys)
-    cell_time = (rhs_seconds(finer_model) - rhs_seconds(model)) / max(
-        1, finer_model.all_cells - model.all_cells
-    )  # nodes also cost time
+    more_cells = max(1, finer_model.all_cells - model.all_cells)
+    cell_time = (rhs_seconds(finer_model) - rhs_seconds(model)) / more_cells  # a difference: nodes also cost time
     dearness = max(1.0, cell_time / CELL_TIME)
     sizes = None if basin_cells(case) is None else basin_sizes(case)
     works = [] if sizes else [run_work(case, MAX_CELLS >> k) for k in range(MAX_CELLS.bit_length() - LEVEL_COUNT)]
@@ -119,14 +229,11 @@ def basin_sizes(case: Case) -> list[tuple[int, float]]:
 
 
 def run_work(case: Case, cells: int) -> float:
-    """Cells times steps of a run at Courant number 1, with `cells` cells in the main part (see `main_part_name`)."""
+    """Cells times steps of a run at Courant number 1, with `cells` cells in the main part."""
     changed = load(case, cell_keys(case, cells))
     cells_by_key = cell_counts(changed)
-    return (
-        total_cells(changed, cells_by_key)
-        * (case.numerics.end - case.numerics.start)
-        * greatest_wave_rate(changed, cells_by_key)
-    )
+    span = case.numerics.end - case.numerics.start
+    return total_cells(changed, cells_by_key) * span * greatest_wave_rate(changed, cells_by_key)
 
 
 def default_scheme(case: Case) -> str:
@@ -152,7 +259,7 @@ def chart_settings(
     """Settings of a study: for each scheme and method its resolutions, from coarse to fine.
 
     The default scheme and method are always included.
-    coarse_run : results of a coarse run, None for a case without pipes and basins; other arguments as for `chart`
+    coarse_run : results of a coarse run, None for a case without pipes and basins
     Raises FvsolveError for options that the case does not support.
     """
     if not main_part_name(case) and delay_lines(case):
@@ -160,22 +267,18 @@ def chart_settings(
     if coarse_run is None:
         return _lumped_settings(case, schemes, methods, cells, rtol, step)
     if rtol or step:
-        raise FvsolveError(
-            f"{case.name} has cells, so its resolution is the number of cells. Use --cells instead of --rtol and --step"
-        )
-    pairs, levels = (
-        scheme_method_pairs(case, schemes, methods, coarse_run.stiff),
-        sorted({*(cells or coarse_run.levels)}),
-    )
+        text = f"{case.name} has cells, so its resolution is the number of cells"
+        raise FvsolveError(f"{text}. Use --cells instead of --rtol and --step")
+    pairs = scheme_method_pairs(case, schemes, methods, coarse_run.stiff)
+    levels = sorted({*(cells or coarse_run.levels)})
     return [cells_setting(case, *pair, level) for pair in pairs for level in levels]
 
 
 def _lumped_settings(case: Case, schemes, methods, cells, rtol, step) -> list[MethodSetting]:
     if schemes or cells:
         option = "scheme" if schemes else "cells"
-        raise FvsolveError(
-            f"{case.name} has no pipe, so the option {option} does not apply. Use rtol or step for its resolution"
-        )
+        text = f"{case.name} has no pipe, so the option {option} does not apply"
+        raise FvsolveError(f"{text}. Use rtol or step for its resolution")
     span = case.numerics.end - case.numerics.start
     steps = sorted(step or [span / n for n in STEP_COUNTS], reverse=True)
     settings_of_methods = []
@@ -188,21 +291,17 @@ def _lumped_settings(case: Case, schemes, methods, cells, rtol, step) -> list[Me
 def _delay_line_settings(case: Case, schemes, methods, cells, rtol, step) -> list[MethodSetting]:
     """Settings of a case in which all pipes are delay lines, so that the resolution is the step.
 
-    Arguments as for `chart`. A tolerance is not used: the error estimate of a step does not include the interpolation
+    A tolerance is not used: the error estimate of a step does not include the interpolation
     between steps.
     """
     if schemes or cells or rtol:
         option = "scheme" if schemes else "cells" if cells else "rtol"
-        raise FvsolveError(
-            f"{case.name} has only delay lines, so the option {option} does not apply. Use step for their resolution"
-        )
+        text = f"{case.name} has only delay lines, so the option {option} does not apply"
+        raise FvsolveError(f"{text}. Use step for their resolution")
     travel = max(pipe.length / case.wave_speed(name) for name, pipe in pipes(case).items())
     steps = sorted(step or [float(f"{travel / n:.2g}") for n in TRAVEL_PARTS], reverse=True)
-    return [
-        lumped_setting(method, size, "step")
-        for method in dict.fromkeys([*(methods or DELAY_LINE_METHODS), DEFAULT_METHOD])
-        for size in steps
-    ]
+    chosen = dict.fromkeys([*(methods or DELAY_LINE_METHODS), DEFAULT_METHOD])
+    return [lumped_setting(method, size, "step") for method in chosen for size in steps]
 
 
 def scheme_method_pairs(

@@ -8,14 +8,13 @@ floor. Rows off the line are errors at the floor before larger errors, a single 
 last row that leaves the line. If other rows remain, there is no order, and no number is given.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from fvsolve.errors import FvsolveError
+from fvsolve.studies.result_table import PlainData
 from fvsolve.validation import NUMBER, SERIES, Kind, is_array, validated
 
 LEAST_ROWS = 3
@@ -32,7 +31,7 @@ PRE_ASYMPTOTIC, FLOOR, OFF_LINE, FAILED = "pre-asymptotic", "floor", "off the li
 
 
 @dataclass(frozen=True)
-class Fit:
+class Fit(PlainData):
     """Fitted order of convergence with its spread, or the reason why no order is found.
 
     pairwise : order between each row and the next, NaN if an error is zero or unknown
@@ -50,12 +49,7 @@ class Fit:
     reason: str = ""
     note: str = ""
 
-    def plain(self) -> dict:
-        """Return the fit as plain data."""
-        return {
-            "order": self.order, "spread": self.spread, "constant": self.constant, "pairwise": list(self.pairwise),
-            "marks": list(self.marks), "reason": self.reason, "note": self.note,
-        }  # fmt: skip
+    json = "order spread constant pairwise marks reason note"
 
 
 ERRORS = Kind(lambda value: is_array(value, "fiu", 1, 1, finite=False), "a row of numbers")
@@ -138,9 +132,8 @@ class FitRows:
         """
         marks = list(self.marks)
         for k, i in enumerate(rows):
-            marks[i] = (
-                PRE_ASYMPTOTIC if k < first else FLOOR if k >= stop and not note else OFF_LINE if k >= stop else ""
-            )
+            after = OFF_LINE if note else FLOOR
+            marks[i] = PRE_ASYMPTOTIC if k < first else after if k >= stop else ""
         if outlier is not None:
             marks[outlier] = OFF_LINE
             note = note or "one error lies far below the line of the other errors, as if the error changed sign there"
@@ -271,9 +264,8 @@ def may_be_floor(h, e, first: int, stop: int) -> bool:
     """
     slope, _ = line_of(h[first:stop], e[first:stop])
     before = np.max(pair_orders(h[: first + 1], e[: first + 1]), initial=0.0)
-    return bool(before > STEEP_RATIO * slope + 0.3) and not (
-        stop - first > LEAST_ROWS and is_clear_line(h, e, first, stop)
-    )
+    clear = stop - first > LEAST_ROWS and is_clear_line(h, e, first, stop)
+    return bool(before > STEEP_RATIO * slope + 0.3) and not clear
 
 
 def is_clear_line(h, e, first: int, stop: int) -> bool:
@@ -329,7 +321,6 @@ def classify_tail(h, e, first: int, stop: int) -> str | None:
     if rest.size == 1 and stop - first > LEAST_ROWS:
         if 0.0 < excess[0] and rest[0] < ALLOWED_RISE * last and abs(rest[0] / last - 1.0) < 0.1 * slope:
             return ""  # the error no longer falls
-        return (
-            "the error of the last row leaves the line of the other rows: an error floor or another order begins there"
-        )
+        leaves = "the error of the last row leaves the line of the other rows"
+        return f"{leaves}: an error floor or another order begins there"
     return None

@@ -4,8 +4,6 @@ A level of the hierarchy is a model of the case with a density law. The level `r
 It has the most cells and the most complete density law that runs.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -20,10 +18,10 @@ from fvsolve.fluid import LAWS
 from fvsolve.kernels.schedule_pieces import value_with_limit
 from fvsolve.model.model_facts import velocities
 from fvsolve.studies.accuracy.model_levels import NotApplicable, finer_levels, level_keys, level_names, sloshing_basins
-from fvsolve.studies.accuracy.timing import GIVEN_UP, CappedRun
 from fvsolve.studies.distance import Deviation, moving_probes
-from fvsolve.studies.outcome import Outcome, outcome, refuse_basins
+from fvsolve.studies.outcome import GIVEN_UP, Outcome, capped, outcome, refuse_basins
 from fvsolve.studies.reference import reference_of_run
+from fvsolve.studies.result_table import PlainData
 from fvsolve.validation import FUNCTION, NUMBER, TABLE, validated
 
 DEFAULT_TARGET = 1e-2
@@ -84,7 +82,7 @@ class LawDifference:
 
 
 @dataclass(frozen=True)
-class Hierarchy:
+class Hierarchy(PlainData):
     """Levels of the model hierarchy of a case, with rules of thumb for the choice of a model.
 
     rungs : all levels, simplest first; target : acceptable error [-]; cheapest : fastest level with an error within
@@ -113,6 +111,8 @@ class Hierarchy:
     shallow_water: tuple[str, ...] = ()
     case: Any = field(default=None, repr=False)
 
+    json = "target own_error travel_time change_time strain apart=law_difference thumb=rules rungs richest cheapest"
+
     @property
     def own_error_note(self) -> str:
         """Note on the error of the level `richest` itself because of its cells; empty if this level is "as it is"."""
@@ -123,27 +123,21 @@ class Hierarchy:
         text = f"{self.richest.name} itself has an error of about {self.own_error:.2g} from its cells"
         if self.own_error <= self.target:
             return text
-        return (
-            f"{text}, more than the target, so all errors of the table have at least this uncertainty. "
-            "Try `fvsolve order` to see how this error falls with more cells"
-        )
+        return (f"{text}, more than the target, so all errors of the table have at least this uncertainty. "
+                "Try `fvsolve order` to see how this error falls with more cells")  # fmt: skip
 
     @property
     def rules(self) -> list[str]:
         """Rules of thumb for the choice of a model, in words."""
-        rules = list(self.shallow_water) + (
-            [] if self.law_difference is None else [self._law_rule(self.law_difference)]
-        )
+        rules = [*self.shallow_water]
+        if self.law_difference is not None:
+            rules.append(self._law_rule(self.law_difference))
         if self.travel_time > 0.0 and math.isfinite(self.change_time):
             ratio = self.change_time / self.travel_time
             kind = "waves matter" if ratio < 2.0 else "waves fade" if ratio < 20.0 else "waves hardly matter"
-            crossing, change = (
-                self.case.amount(seconds, "time", 3) for seconds in (self.travel_time, self.change_time)
-            )
-            rules.append(
-                f"a wave travels along a pipe for up to {crossing}; the fastest input changes in "
-                f"{change}, {ratio:.3g} times as long: {kind}"
-            )
+            crossing, change = (self.case.amount(time, "time", 3) for time in (self.travel_time, self.change_time))
+            rules.append(f"a wave travels along a pipe for up to {crossing}; the fastest input changes in {change}, "
+                         f"{ratio:.3g} times as long: {kind}")  # fmt: skip
         return [*rules, self.own_error_note] if self.own_error_note else rules
 
     def _law_rule(self, apart: LawDifference) -> str:
@@ -156,39 +150,16 @@ class Hierarchy:
         text = f"linear differs from {self.richest.law} by {apart.error:.3g} of the range of {apart.probe}"
         text += f", {side} the target"
         if apart.error <= STRAIN_FACTOR * self.strain:
-            return (
-                f"dp/K = {self.strain:.2g} (greatest pressure change / bulk modulus): the laws differ by about this "
-                f"fraction of a pressure change; here {text}"
-            )
+            return (f"dp/K = {self.strain:.2g} (greatest pressure change / bulk modulus): the laws differ by about "
+                    f"this fraction of a pressure change; here {text}")  # fmt: skip
         reason = f"the difference is {apart.start:.3g} at the start and grows"
         if apart.start >= 0.5 * apart.error:
-            reason = (
-                f"the difference is already {apart.start:.3g} at the start, because at pressures of "
-                f"{apart.level:.2g} times the bulk modulus the laws differ by "
-            )
-            reason += f"this fraction, and the range of {apart.probe} is only {apart.moves:.2g} of its value"
+            reason = (f"the difference is already {apart.start:.3g} at the start, because at pressures of "
+                      f"{apart.level:.2g} times the bulk modulus the laws differ by this fraction, and the range of "
+                      f"{apart.probe} is only {apart.moves:.2g} of its value")  # fmt: skip
         dynamic = self.case.amount(apart.swift, "pressure", 3, span=True)
         reason += f"; linear neglects the dynamic pressure, {dynamic} at the start" if apart.swift > 0.0 else ""
         return f"{text}, more than dp/K = {self.strain:.2g} (greatest pressure change / bulk modulus): {reason}"
-
-    def plain(self) -> dict[str, Any]:
-        """Return the hierarchy as plain data, SI."""
-        own = {
-            "target": self.target,
-            "own_error": self.own_error,
-            "travel_time": self.travel_time,
-            "change_time": self.change_time,
-        }
-        laws = {"strain": self.strain, "apart": self.law_difference and vars(self.law_difference), "thumb": self.rules}
-        levels = {"rungs": [vars(level) for level in self.rungs]}
-        return own | laws | levels | {"richest": vars(self.richest), "cheapest": vars(self.cheapest)}
-
-
-def with_whole_pipes(case):
-    """Return the case; each pipe that placed parts or bends divide is replaced by its pieces."""
-    from fvsolve.case import load
-
-    return load(case.table()) if placed(add_bends(case.raw)) else case
 
 
 @validated(set=TABLE, target=NUMBER, progress=FUNCTION)
@@ -211,7 +182,9 @@ def ladder(
     """
     from fvsolve.case import load
 
-    case, report = with_whole_pipes(load(case, dict(set or {}))), progress or (lambda *_: None)
+    case, report = load(case, dict(set or {})), progress or (lambda *_: None)
+    if placed(add_bends(case.raw)):
+        case = load(case.table())  # each pipe that placed parts or bends divide becomes its pieces
     refuse_basins(case, "chart --models", allow_sloshing=True)
     models = [(name, law) for name in level_names(case) for law in possible_laws(case)]
     runs, given_up = [], {}  # given_up: law -> level with cells that was given up under it
@@ -233,24 +206,16 @@ def ladder(
     levels = [_level_of(*names, entry, richest) for names, entry in zip(models, runs, strict=True)]
     accurate = [entry for entry in levels if entry.error is not None and entry.error <= target]
     if not accurate:
-        raise FvsolveError(
-            "no probe changes, so models have no errors. Try a probe that changes, or an input that does"
-        )
+        reason = "no probe changes, so models have no errors"
+        raise FvsolveError(f"{reason}. Try a probe that changes, or an input that does")
     cheapest = min(accurate, key=lambda level: level.seconds)
     travel, change = travel_time(richest.model), change_time(richest.model)
-    linear = next(
-        (entry for entry, pair in zip(runs, models, strict=True) if pair == (models[at][0], "linear")), own_run
-    )
-    top = levels[-1] if finer_runs else levels[at]
-    rules = (
-        travel,
-        change,
-        greatest_strain(richest),
-        law_difference(linear, own_run),
-        own,
-        tuple(shallow_water_notes(case, target)),
-    )
-    return Hierarchy(levels, top, target, cheapest, *rules, case)
+    of_law = {pair[1]: entry for entry, pair in zip(runs, models, strict=True) if pair[0] == models[at][0]}
+    difference = law_difference(of_law.get("linear", own_run), own_run)
+    strain = max((float(np.max(np.abs(p - p[0]))) for p in probe_pressures(richest)), default=0.0)
+    strain /= least_stiffness(richest)
+    top, notes = levels[-1] if finer_runs else levels[at], tuple(shallow_water_notes(case, target))
+    return Hierarchy(levels, top, target, cheapest, travel, change, strain, difference, own, notes, case)
 
 
 def refine_richest(
@@ -274,9 +239,8 @@ def refine_richest(
         run = _run_level(case, name, law)
         if not run.ok:
             break
-        differences.append(
-            max((_rms_error(gap) for gap in moving_probes(runs[-1][1], reference_of_run(run)).values()), default=0.0)
-        )
+        gaps = moving_probes(runs[-1][1], reference_of_run(run)).values()
+        differences.append(max((_rms_error(gap) for gap in gaps), default=0.0))
         if len(differences) > 1 and differences[-2] > 0.0:
             ratio = min(max(differences[-1] / differences[-2], 0.1), 0.9)
         if differences[-1] <= target * (1.0 - ratio):
@@ -312,18 +276,10 @@ def _run_level(case, name: str, law: str) -> Outcome:
     name : name of the level as from `level_names`; law : density law
     """
     try:
-        return outcome(
-            case, {**level_keys(case, name), "fluid.law": law}, best_of=BEST_OF, run=long_capped_level, budget=BRIEF_RUN
-        )
+        keys = {**level_keys(case, name), "fluid.law": law}
+        return outcome(case, keys, best_of=BEST_OF, run=capped(LEVEL_CPU_LIMIT), budget=BRIEF_RUN)
     except (CaseError, NotApplicable) as error:
         return Outcome(f"skipped: {error}", refused=True)
-
-
-def long_capped_level(model, state, sink, progress) -> CappedRun:
-    """Run of a model that is stopped after LEVEL_CPU_LIMIT seconds of CPU time; arguments as for `solve.Run`."""
-    run = CappedRun(model, state, sink, progress)
-    run.max_seconds = LEVEL_CPU_LIMIT
-    return run
 
 
 # errors of a level, and rules of thumb ------------------------------------------------------------------------
@@ -361,12 +317,9 @@ def law_difference(linear: Outcome, richest: Outcome) -> LawDifference | None:
     level = max((float(abs(change[0])) for change in probe_pressures(richest)), default=0.0) / least_stiffness(richest)
     moves = float(np.ptp(values) / np.max(np.abs(values)))
     start = float(abs(gaps[probe].error[0]) / gaps[probe].span)
-    return LawDifference(probe, _rms_error(gaps[probe]), start, moves, level, velocity_head(richest.model))
-
-
-def velocity_head(model) -> float:
-    """Greatest velocity head rho v^2 / 2 of a pipe at the start [Pa] (density rho, velocity v); 0 without pipes."""
-    return 0.5 * model.case.properties.density * float(velocities(model).max(initial=0.0)) ** 2
+    model = richest.model
+    swift = 0.5 * model.case.properties.density * float(velocities(model).max(initial=0.0)) ** 2
+    return LawDifference(probe, _rms_error(gaps[probe]), start, moves, level, swift)
 
 
 def shallow_water_notes(case, target: float) -> Iterator[str]:
@@ -378,15 +331,10 @@ def shallow_water_notes(case, target: float) -> Iterator[str]:
     for name, basin in sloshing_basins(case).items():
         mesh = {**case.meshes, **case.lumped}[name]
         if (mode := slowest(basin, mesh)) is not None:
-            text = (
-                f"{name}: its slowest wave, with k h = {mode.kh:.2g} (wave number times depth), is {mode.excess:.2g} % "
-                "too fast in shallow-water theory"
-            )
-            yield (
-                f"{text}, more than the target: modes are more accurate for small waves"
-                if mode.excess > share
-                else text
-            )
+            text = (f"{name}: its slowest wave, with k h = {mode.kh:.2g} (wave number times depth), is "
+                    f"{mode.excess:.2g} % too fast in shallow-water theory")  # fmt: skip
+            more = ", more than the target: modes are more accurate for small waves"
+            yield text + more if mode.excess > share else text
 
 
 def travel_time(model) -> float:
@@ -406,7 +354,7 @@ def change_time(model) -> float:
     trips = {name: link.trip for name, link in model.case.links.items() if getattr(link, "trip", None) is not None}
     quickest = min((run_down_time(model, name, t) for name, t in trips.items()), default=math.inf)
     for index in range(len(model.tables.schedules)):
-        if any(np.ptp(schedule_values(model, index, [time_before(t), t])) for t in trips.values()):
+        if any(np.ptp(schedule_values(model, index, [math.nextafter(t, -math.inf), t])) for t in trips.values()):
             continue  # a jump at the trip of a pump, whose run-down time counts instead
         values = schedule_values(model, index, times)
         steepest = float(np.max(np.abs(np.diff(values) / np.diff(times))))
@@ -420,23 +368,10 @@ def schedule_values(model, index: int, times) -> np.ndarray:
     return np.array([value_with_limit(model.tables.schedules, model.tables.pieces, index, t, np.inf) for t in times])
 
 
-def time_before(t: float) -> float:
-    """Greatest float below a time [s]."""
-    return math.nextafter(t, -math.inf)
-
-
 def run_down_time(model, name: str, t: float) -> float:
     """Time in which the pump `name`, tripped at the time t, would stop under constant torque [s]."""
     rate = model.rhs(t, np.zeros(model.y_size))[model.state_names.index(f"{name}.speed")]
     return float(model.case.links[name].speed.value[0]) / abs(rate) if rate != 0.0 else math.inf
-
-
-def greatest_strain(run: Outcome) -> float:
-    """Greatest change of a pressure or head probe from the start, over the least effective bulk modulus of a pipe [-].
-
-    Without pipes the divisor is the bulk modulus of the fluid.
-    """
-    return max((float(np.max(np.abs(p - p[0]))) for p in probe_pressures(run)), default=0.0) / least_stiffness(run)
 
 
 def probe_pressures(run: Outcome) -> list[np.ndarray]:

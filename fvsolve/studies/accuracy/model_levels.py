@@ -4,8 +4,6 @@ Levels of pipes are rigid columns, lumped volumes, delay lines, and few or many 
 are frozen water (a rigid mass), sloshing modes and cells.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -42,11 +40,8 @@ def level_names(case) -> list[str]:
 
 def sloshing_basins(case) -> dict[str, Any]:
     """Basins with a free surface that are mounted on bodies: name -> node."""
-    return {
-        name: node
-        for name, node in case.nodes.items()
-        if node.kind == "basin" and node.on and node.physics_type.has_modes
-    }
+    basins = {name: node for name, node in case.nodes.items() if node.kind == "basin"}
+    return {name: node for name, node in basins.items() if node.on and node.physics_type.has_modes}
 
 
 def finer_levels(case, doublings: int) -> list[str]:
@@ -78,7 +73,8 @@ def level_keys(case, level: str) -> dict[str, Any]:
         count, greatest = int(level.split()[0]), max(pipe.cells for pipe in pipes.values())
         return {f"links.{name}.cells": max(1, round(pipe.cells * count / greatest)) for name, pipe in pipes.items()}
     keys = {"expect": {}, "compare": {}, "routes": {}, "limits": {}, **LUMPED_NUMERICS}
-    keys["output.probes"] = [probe.text for probe in case.output.probes if _survives(probe, pipes)]
+    keys["output.probes"] = [probe.text for probe in case.output.probes if probe.part != "links"
+                             or probe.name not in pipes or probe.text == f"{probe.name}.flow"]  # fmt: skip
     if level != "lumped volume":
         keys |= {f"links.{name}": rigid_column(case, name) for name in pipes}
     else:
@@ -98,9 +94,8 @@ def sloshing_keys(case, level: str) -> dict[str, Any]:
     basins, keys = sloshing_basins(case), {"expect": {}, "compare": {}, "routes": {}, "limits": {}}
     if level in ("frozen", "modes"):
         quantities = {"frozen": (), "modes": ("depth",)}[level]
-        keys["output.probes"] = [
-            entry.text for entry in case.output.probes if entry.name not in basins or entry.quantity in quantities
-        ]
+        probes = [entry for entry in case.output.probes if entry.name not in basins or entry.quantity in quantities]
+        keys["output.probes"] = [entry.text for entry in probes]
         return keys | {f"nodes.{name}.sloshing": level for name in basins} | LUMPED_NUMERICS
     keys |= {f"nodes.{name}.sloshing": "cells" for name in basins}
     if any(basin.lumped for basin in basins.values()):
@@ -119,10 +114,6 @@ def delay_line_keys_of(case, pipes: dict[str, Any]) -> dict[str, Any]:
         if reason := reason_for_cells(case, name, pipe):
             raise NotApplicable(f"{name} cannot be a delay line: {reason}")
     return {f"links.{name}.pipe_model": "delay-line" for name in pipes}
-
-
-def _survives(probe, pipes: dict) -> bool:
-    return probe.part != "links" or probe.name not in pipes or probe.text == f"{probe.name}.flow"
 
 
 def rigid_column(case, name: str) -> dict[str, Any]:

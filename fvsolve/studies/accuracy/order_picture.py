@@ -1,7 +1,5 @@
 """Picture of an order study, and names and units of its variables."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,17 +1,17 @@
 """Results of an order study: rows, fitted orders and notes."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 
 from fvsolve.display import Displayable
 from fvsolve.studies.accuracy.fit import Fit
+from fvsolve.studies.accuracy.order_picture import variable_unit
 from fvsolve.studies.accuracy.refine import Level, Plan
+from fvsolve.studies.result_table import PlainData
 
 
 @dataclass(frozen=True)
-class OrderRow:
+class OrderRow(PlainData):
     """Row of an order study: a refinement level with its errors and cost.
 
     errors : variable -> {"L1" | "L2" | "max": error [SI]}; seconds : time of the run [s]
@@ -26,15 +26,12 @@ class OrderRow:
     steps: int
     reason: str = ""
 
-    def plain(self) -> dict:
-        """Return the row as plain data."""
-        level = {"cells": self.level.cells, "size": self.level.size, "step": self.level.step, "set": self.level.set}
-        cost = {"seconds": self.seconds, "rhs": self.rhs, "cell_updates": self.cell_updates, "steps": self.steps}
-        return {**level, **cost, "reason": self.reason, "errors": self.errors}
+    json = """cells=level.cells size=level.size step=level.step set=level.set
+              seconds rhs cell_updates steps reason errors"""
 
 
 @dataclass(frozen=True, repr=False)
-class Order(Displayable):
+class Order(Displayable, PlainData):
     """Order study of one scheme and method.
 
     rows : refinement levels with errors, from coarse to fine; fits : variable -> {"L1" | "L2" | "max": Fit}
@@ -59,6 +56,7 @@ class Order(Displayable):
     shown: dict[str, tuple[float, str]] = field(default_factory=dict)
 
     picture = "fvsolve.studies.accuracy.order_picture:order_picture"
+    json = "case scheme method refine=plan.way measure=plan.measure how=plan.words reference rows fits notes"
 
     def summary_line(self) -> str:
         return f"of {self.case!r}: {self.scheme}, {self.method}, {len(self.rows)} rows against {self.kind}"
@@ -75,8 +73,6 @@ class Order(Displayable):
 
     def error_unit(self, variable: str) -> tuple[float, str]:
         """(factor from SI, unit) of the printed errors of a variable."""
-        from fvsolve.studies.accuracy.order_picture import variable_unit
-
         return self.shown.get(variable) or (1.0, variable_unit(variable, self.units))
 
     @property
@@ -84,12 +80,7 @@ class Order(Displayable):
         """Names of the compared variables."""
         return tuple(self.fits)
 
-    def plain(self) -> dict:
-        """Return the study as plain data, SI."""
-        return {
-            "case": self.case, "scheme": self.scheme, "method": self.method, "refine": self.plan.way,
-            "measure": self.plan.measure, "how": self.plan.words, "reference": {"kind": self.kind, "words": self.words,
-            "own_error": self.own_error}, "rows": [row.plain() for row in self.rows],
-            "fits": {name: {norm: fit.plain() for norm, fit in fits.items()} for name, fits in self.fits.items()},
-            "notes": list(self.notes),
-        }  # fmt: skip
+    @property
+    def reference(self) -> dict:
+        """Kind, description and error of the reference."""
+        return {"kind": self.kind, "words": self.words, "own_error": self.own_error}

@@ -1,6 +1,8 @@
-"""Order study of one scheme and method: runs of all rows, errors against a reference, and fitted orders."""
+"""Order study of one scheme and method: runs of all rows, errors against a reference, and fitted orders.
 
-from __future__ import annotations
+Arguments of several functions : rows, each an `OrderRow`; fits, variable -> norm -> `Fit`; points, result cache;
+progress, called as progress(done, total, next)
+"""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -10,26 +12,29 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers.tableau import METHODS
-from fvsolve.studies.accuracy.basin_projection import unit_of
-from fvsolve.studies.accuracy.case_resolution import (
-    basins,
-    cell_counts,
-    greatest_wave_rate,
-    has_initial_jump,
-    order_varies,
-    scheme_order,
-)
 from fvsolve.studies.accuracy.fit import FAILED, FLOOR, LEAST_ROWS, NO_ERROR, Fit, fit
 from fvsolve.studies.accuracy.order_picture import error_scale
 from fvsolve.studies.accuracy.order_result import Order, OrderRow
 from fvsolve.studies.accuracy.refine import Level, Plan
-from fvsolve.studies.accuracy.timing import long_capped_run
-from fvsolve.studies.delay_line_keys import EXACT_NOTE, EXPECTED_ORDER, READING_ORDER, cells_for_lines, delay_lines
 from fvsolve.studies.distance import NORMS, error_norms, recording_keys, variable_size
-from fvsolve.studies.outcome import Outcome, Progress, outcome, study_model
+from fvsolve.studies.outcome import REFERENCE_CPU_LIMIT, Outcome, Progress, capped, outcome, study_model
+from fvsolve.studies.parallel import RunQueue, RunRequest
 from fvsolve.studies.reference import ROUNDING, Reference, find_reference, reference_of_run
+from fvsolve.studies.resolution import (
+    EXACT_NOTE,
+    EXPECTED_ORDER,
+    READING_ORDER,
+    basins,
+    cell_counts,
+    cells_for_lines,
+    delay_lines,
+    greatest_wave_rate,
+    has_initial_jump,
+    order_varies,
+    scheme_order,
+    unit_of,
+)
 from fvsolve.studies.result_cache import ResultCache
-from fvsolve.studies.run_queue import RunQueue, RunRequest
 
 BEST_OF, BRIEF_RUN = 2, 1.0  # timed runs of a row; time of the first run above which it is not repeated [s]
 EXCESS_ORDER = 1.5  # greatest excess of a fitted order over that of scheme and method; it occurs at single points
@@ -43,7 +48,7 @@ ORDER_TOLERANCE = 0.06, 0.04  # a, b: greatest distance a + b order of an order 
 
 def timed_run(case, keys: Mapping) -> Outcome:
     """Outcome of a case with changed keys: of the faster of two runs, or of a single run if it takes long."""
-    return outcome(case, keys, best_of=BEST_OF, run=long_capped_run, budget=BRIEF_RUN)
+    return outcome(case, keys, best_of=BEST_OF, run=capped(REFERENCE_CPU_LIMIT), budget=BRIEF_RUN)
 
 
 class OrderStudy:
@@ -88,7 +93,7 @@ class OrderStudy:
             return replace(result, notes=(f"no other reference can be used: {error}", *result.notes))
 
     def against_reference(self, points: ResultCache | None, progress: Progress) -> Order:
-        """Study against an exact solution or a finer run; points, progress : as for `study`."""
+        """Study against an exact solution or a finer run."""
         rows, levels = [], self.plan.levels
         total = len(levels) + 1
 
@@ -172,7 +177,7 @@ class OrderStudy:
     def fitted_order(self, rows, kind: str, words: str, own: dict, sizes: dict) -> Order:
         """Fit an order for every variable and norm, and add notes. Raises the FvsolveError of `refuse_reference`.
 
-        rows : each an `OrderRow`; kind, words : kind and description of the reference
+        kind, words : kind and description of the reference
         own : variable -> norm -> error of the reference [SI]; sizes : variable -> greatest absolute value [SI]
         """
         fits, doubtful, smooth_order = {}, [], self.smooth_order()
@@ -202,10 +207,7 @@ class OrderStudy:
                      tuple(notes), units, scales)  # fmt: skip
 
     def refuse_reference(self, rows, fits, words: str) -> None:
-        """Raise FvsolveError if all errors of all variables are too close to the error of the reference.
-
-        fits : variable -> norm -> `Fit`; words : description of the reference
-        """
+        """Raise FvsolveError if all errors of all variables are too close to that of the reference, named `words`."""
         uncertain = [
             mark == UNCERTAIN
             for name, norms in fits.items() for norm, fitted in norms.items()
@@ -272,7 +274,7 @@ class OrderStudy:
     def step_error_note(self, fits) -> list[str]:
         """Remark with a smaller step, tolerance or Courant number, if the time error may hide the order in space.
 
-        The result is a list with one text, or empty. fits : variable -> norm -> `Fit`
+        The result is a list with one text, or empty.
         """
         with_errors = [norms["L1"] for norms in fits.values() if norms["L1"].reason != NO_ERROR]
         hidden = any(FLOOR in fitted.marks or fitted.reason for fitted in with_errors)
@@ -302,24 +304,18 @@ class OrderStudy:
         rows = []
         for level, run, after in zip(self.plan.levels, runs, [*runs[1:], None], strict=True):
             both = run.ok and after is not None and after.ok
-            rows.append(
-                row_of_run(level, run, error_norms(run, reference_of_run(after), self.probe_names) if both else {})
-            )
+            errors = error_norms(run, reference_of_run(after), self.probe_names) if both else {}
+            rows.append(row_of_run(level, run, errors))
         names = next((row.errors for row in rows if row.errors), {})
         good = next((run for run in runs if run.ok), None)
         if good is None:
             raise FvsolveError(f"no row could be run: {runs[0].reason}")
         sizes = {name: variable_size(good, name) for name in names}
         result, theory = self.fitted_order(rows, "richardson", RICHARDSON, {}, sizes), self.theory()
-        fits = {
-            name: {
-                norm: mark_finest(check_three_differences(fitted, theory[norm]), rows) for norm, fitted in norms.items()
-            }
-            for name, norms in result.fits.items()
-        }
-        return replace(
-            result, rows=extrapolate(rows, fits), fits=fits, notes=(*result.notes, *difference_notes(rows, fits))
-        )
+        fits = {name: {norm: mark_finest(check_three_differences(fitted, theory[norm]), rows)
+                       for norm, fitted in norms.items()} for name, norms in result.fits.items()}  # fmt: skip
+        notes = *result.notes, *difference_notes(rows, fits)
+        return replace(result, rows=extrapolate(rows, fits), fits=fits, notes=notes)
 
 
 def check_order(fitted: Fit, smooth_order: float) -> Fit:
@@ -346,9 +342,8 @@ def check_three_differences(fitted: Fit, theory: float) -> Fit:
 def mark_finest(fitted: Fit, rows) -> Fit:
     """Return a fit in which rows that ran but have no finer row have the mark "finest" instead of "failed"."""
     pairs = zip(fitted.marks, rows, strict=True)
-    return replace(
-        fitted, marks=tuple(FINEST_ROW if mark == FAILED and not row.reason else mark for mark, row in pairs)
-    )
+    marks = tuple(FINEST_ROW if mark == FAILED and not row.reason else mark for mark, row in pairs)
+    return replace(fitted, marks=marks)
 
 
 def is_certain(fitted: Fit, ratio: float) -> bool:
@@ -364,7 +359,7 @@ def extrapolate(rows, fits) -> tuple[OrderRow, ...]:
     """Rows with errors instead of differences to the next row, where the fitted order p is certain (see `is_certain`).
 
     The error of a row is its difference d plus the error of the next row. After the last difference, the error of the
-    next row is d / (ratio^p - 1), with the ratio of the sizes of both rows. fits : variable -> norm -> `Fit`
+    next row is d / (ratio^p - 1), with the ratio of the sizes of both rows.
     """
     results: list[OrderRow] = []
     for k in range(len(rows) - 1, -1, -1):
@@ -383,7 +378,7 @@ def difference_notes(rows, fits) -> list[str]:
     """List with one note, or empty: variables and norms for which the table shows differences instead of errors.
 
     The differences are those to the next row. The order of these variables and norms is not certain (see `is_certain`).
-    At most three variables are named. fits : variable -> norm -> `Fit`
+    At most three variables are named.
     """
     ratio = rows[0].level.size / rows[1].level.size
     names = [f"{name} ({', '.join(uncertain)})" for name, norms in fits.items()

@@ -1,23 +1,30 @@
-"""Plan of a refinement: levels from coarse to fine, as keys of a case."""
+"""Plan of a refinement: levels from coarse to fine, as keys of a case, and a first row that the study can afford.
 
-from __future__ import annotations
+Arguments of several functions : refine or way, key, levels, cells as for `refinement_plan`; against, kind of the
+reference as in `order`; courant, Courant number of the finest row; k, number of a row, from 0
+"""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fvsolve.case.defaults import raw_link
 from fvsolve.errors import FvsolveError, did_you_mean, listing
-from fvsolve.steppers.tableau import AUTO, METHODS
-from fvsolve.studies.accuracy.case_resolution import (
+from fvsolve.model.model_facts import rhs_seconds
+from fvsolve.steppers import automatic
+from fvsolve.steppers.tableau import AUTO, METHODS, method_named
+from fvsolve.studies.outcome import study_model
+from fvsolve.studies.resolution import (
     Counts,
     basins,
     basins_from_files,
     cell_counts,
     cell_keys_of,
     cell_size,
+    delay_lines,
     greatest_wave_rate,
+    is_valid,
     most_cells,
     pipes,
     pipes_with_cells,
@@ -26,8 +33,7 @@ from fvsolve.studies.accuracy.case_resolution import (
     scheme_order,
     total_cells,
 )
-from fvsolve.studies.delay_line_keys import delay_lines
-from fvsolve.studies.outcome import study_model
+from fvsolve.studies.result_cache import ResultCache
 
 WAYS = ("both", "space", "time")
 TIME_KEYS = ("numerics.step", "numerics.courant", "numerics.rtol")
@@ -113,17 +119,14 @@ def refinement_plan(
     if refine != "time" and not delay_lines(case):
         refinable_counts(case)
     if key is not None and (known[key] == "time") != (refine == "time"):
-        raise FvsolveError(
-            f'{key} refines {"time" if known[key] == "time" else "space"}, so refine = "{refine}" is impossible. '
-            "Leave `refine` out"
-        )
+        way = "time" if known[key] == "time" else "space"
+        raise FvsolveError(f'{key} refines {way}, so refine = "{refine}" is impossible. Leave `refine` out')
     levels = DEFAULT_LEVELS[refine] if levels is None else levels
     if levels < 2:
         raise FvsolveError(f"levels = {levels} is too few. Expected at least 2, and at least 3 for a fitted order")
     if refine == "time" and cells is not None:
-        raise FvsolveError(
-            f"cells = {cells}: only steps are refined here. Leave `cells` out, or set the cells of the case"
-        )
+        text = "only steps are refined here. Leave `cells` out, or set the cells of the case"
+        raise FvsolveError(f"cells = {cells}: {text}")
     if refine == "time":
         return time_plan(case, key, levels)
     if delay_lines(case) and (key == "numerics.delay_tolerance" or not cell_counts(case)):
@@ -141,7 +144,7 @@ def delay_line_plan(case, way: str, levels: int) -> Plan:
 
     With way = "both" steps are halved too, and the size of a row is its step (with error control its longest step) [s].
     With "space" it is the travel time of a stretch [s], in the line with most stretches in the last row.
-    levels : number of rows. Raises FvsolveError if with "space" the stretches do not change.
+    Raises FvsolveError if with "space" the stretches do not change.
     """
     count, step = total_cells(case, cell_counts(case)), first_step(case) if case.numerics.rtol is None else math.nan
     rows = [stretch_keys(case, way, k) for k in range(levels)]
@@ -150,9 +153,9 @@ def delay_line_plan(case, way: str, levels: int) -> Plan:
         first = 1.0 / greatest_wave_rate(case, cell_counts(case)) if by_error else step
         refined = [Level(row if by_error else row | {"numerics.step": step / 2**k}, first / 2**k, count, step / 2**k)
                    for k, row in enumerate(rows)]  # fmt: skip
-        return Plan(
-            way, "longest step [s]" if by_error else "step [s]", tuple(refined), STRETCH_AND_STEP_WORDS[by_error]
-        )
+        what = "longest step" if by_error else "step"
+        words = f"{STRETCH_WORDS}, and {'the longest step' if by_error else 'steps'} halved"
+        return Plan(way, f"{what} [s]", tuple(refined), words)
     tables = [study_model(case, row).tables.delays for row in rows]
     line = int(np.argmax(tables[-1]["stretches"]))
     if tables[0]["stretches"][line] == tables[-1]["stretches"][line]:
@@ -164,16 +167,12 @@ def delay_line_plan(case, way: str, levels: int) -> Plan:
 
 
 STRETCH_WORDS = "tolerance of delay lines halved, so that they have twice as many stretches"
-STRETCH_AND_STEP_WORDS = {
-    False: f"{STRETCH_WORDS}, and steps halved",
-    True: f"{STRETCH_WORDS}, and the longest step halved",
-}
 
 
 def stretch_keys(case, way: str, k: int) -> dict:
     """Overrides of row k: tolerance of delay lines divided by 2^k, and their cells times 2^k if cells set the step.
 
-    way : "both" (space and time) or "space"; with "space" the cells of delay lines stay
+    With way = "space" the cells of delay lines stay.
     """
     keys = {"numerics.delay_tolerance": case.numerics.delay_tolerance / 2**k} if delay_lines(case) else {}
     if way == "both" and (case.numerics.rtol is not None or (cell_counts(case) and case.numerics.courant is not None)):
@@ -187,7 +186,6 @@ def stretch_keys(case, way: str, k: int) -> dict:
 def space_plan(case, way: str, key: str | None, levels: int, cells: int | None) -> Plan:
     """Plan in which the cells of all pipes and basins, or of the part that `key` names, are doubled from row to row.
 
-    way : "both" (space and time) or "space"; other arguments as for `refinement_plan`
     Raises FvsolveError for more than `MAX_CELLS` cells in the finest row.
     """
     first = coarsest_counts(case, key, cells)
@@ -210,15 +208,14 @@ def space_plan(case, way: str, key: str | None, levels: int, cells: int | None) 
         rows.append(Level(cell_keys_of(row_counts) | stepping | stretched, length, total_cells(case, row_counts), step))
     names = ", ".join(name.split(".")[1] for name in refined)
     kinds = " and ".join(kind for kind, parts in (("pipes", pipes_with_cells(case)), ("basins", basins(case))) if parts)
-    text = (
-        f"cells of all {kinds}" if len(refined) == len(first) and not basins_from_files(case) else f"cells of {names}"
-    )
+    all_refined = len(refined) == len(first) and not basins_from_files(case)
+    text = f"cells of all {kinds}" if all_refined else f"cells of {names}"
     text += " and stretches of delay lines" if delay_lines(case) and key is None else ""
     return Plan(way, "cell size [m]", tuple(rows), f"{text} doubled, {stepping_words(case, way, courant)}")
 
 
 def coarsest_counts(case, key: str | None, cells: int | None) -> Counts:
-    """Numbers of cells of the first row, as from `cell_counts`; key, cells : as for `refinement_plan`."""
+    """Numbers of cells of the first row, as from `cell_counts`."""
     own_counts = cell_counts(case)
     if cells is None:
         return own_counts
@@ -234,7 +231,7 @@ def space_courant(case, levels: int) -> float | None:
 
     With Courant number C, cell size dx and orders p in space and q in time, the time error is C^q dx^q and the space
     error dx^p. If p > q, their ratio grows by 2^(p - q) from row to row. The result is at least `LEAST_COURANT`, but at
-    most the Courant number of the case, and None if the case states none. levels : number of rows
+    most the Courant number of the case, and None if the case states none.
     """
     numerics = case.numerics
     if numerics.courant is None:
@@ -264,7 +261,7 @@ def step_keys(case, cells: Counts, step_cells: Counts, k: int, courant: float | 
 
 
 def stepping_words(case, way: str, courant: float | None) -> str:
-    """Text on the time steps of a refinement; way : "both" or "space"; courant : Courant number of the finest row."""
+    """Text on the time steps of a refinement with way = "both" or "space"."""
     numerics = case.numerics
     if numerics.rtol is not None:
         return f"steps by error, rtol = {numerics.rtol:g} in all rows"
@@ -282,7 +279,7 @@ def stepping_words(case, way: str, courant: float | None) -> str:
 def time_plan(case, key: str | None, levels: int) -> Plan:
     """Plan in which the step is halved from row to row, or the tolerance divided by ten, with constant cells.
 
-    key, levels : as for `refinement_plan`. Raises FvsolveError if the method does not permit it.
+    Raises FvsolveError if the method does not permit it.
     """
     numerics, count = case.numerics, total_cells(case, cell_counts(case))
     by_error = key == "numerics.rtol" or (key is None and numerics.rtol is not None)
@@ -316,3 +313,65 @@ def first_step(case) -> float:
         return every
     step = (numerics.courant or 0.9) / greatest_wave_rate(case, cell_counts(case))
     return every / math.ceil(every / step) if every > step else step
+
+
+CPU_BUDGET = 40.0  # approximate CPU time of all rows and their reference [s]
+LEAST_CELLS = 8  # least number of cells of the first row, along the pipe or side with most cells
+# Calls of a reference per call and stage of the finest row: 4, 2 and 1 times as fine (16 + 4 + 1), 7 stages.
+REFERENCE_COST = 21.0 * 7.0
+
+
+def affordable_plan(
+    case, refine: str | None, key: str | None, levels: int | None, cells: int | None, against: str,
+    points: ResultCache | None,
+) -> Plan:  # fmt: skip
+    """Plan of a refinement; if neither `cells` nor `key` is given, the study is planned to end within minutes.
+
+    For this the number of cells of the first row is reduced if necessary, unless only steps are refined.
+    points : result cache, which also stores the chosen number of cells
+    """
+    refinement = refinement_plan(case, refine, key, levels, cells)
+    if cells is not None or key is not None or refinement.way == "time" or not cell_counts(case):
+        return refinement
+    settings = {"study": "order", "what": "first cells", "way": refinement.way, "levels": len(refinement.levels),
+                "against": against}  # fmt: skip
+    stored = None if points is None else points.find(case, settings)
+    first = stored["cells"] if stored else first_cells(case, refinement, refine, levels, against)
+    if first == most_cells(cell_counts(case)):
+        return refinement
+    if points is not None and stored is None:
+        points.get(case, settings, lambda: {"cells": first})
+    of_case = most_cells(cell_counts(case))
+    remark = f"starts with {first} of {of_case} cells, to end within minutes (change with --cells)"
+    refinement = refinement_plan(case, refine, key, levels, first)
+    return replace(refinement, words=f"{refinement.words}; {remark}")
+
+
+def first_cells(case, rows: Plan, refine: str | None, levels: int | None, against: str) -> int:
+    """Number of cells of the first row: that of the case, halved until the study takes at most `CPU_BUDGET`.
+
+    It is not halved below `LEAST_CELLS`, nor if patches or holes of a basin would then not end between cells.
+    rows : plan with the cells of the case
+    """
+    own_counts, exact = cell_counts(case), case.exact is not None or against != "auto" or bool(basins(case))
+    cells, seconds = most_cells(own_counts), rhs_seconds(study_model(case)) / total_cells(case, own_counts)
+    while cells >= 2 * LEAST_CELLS and cpu_time(case, rows, seconds, exact) > CPU_BUDGET:
+        if not is_valid(case, scaled(own_counts, (cells // 2) / most_cells(own_counts))):
+            break
+        cells //= 2
+        rows = refinement_plan(case, refine, None, levels, cells)
+    return cells
+
+
+def cpu_time(case, rows: Plan, seconds: float, exact: bool) -> float:
+    """Estimated CPU time of all rows [s], and of a finer reference unless `exact`; 0 if steps follow a tolerance.
+
+    rows : plan of the refinement; exact : True if the study needs no finer run as reference
+    seconds : time of one call of the rates, divided by the number of cells [s]
+    """
+    numerics = case.numerics
+    stages = method_named(automatic.first_method(numerics.method)).stages
+    row_times = [level.cells * (numerics.end - numerics.start) / level.step * seconds for level in rows.levels]
+    if any(math.isnan(seconds_of_row) for seconds_of_row in row_times):
+        return 0.0
+    return stages * sum(row_times) + (0.0 if exact else REFERENCE_COST * row_times[-1])

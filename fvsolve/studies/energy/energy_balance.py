@@ -1,17 +1,20 @@
 """Energy balance of a run: supplied, stored and dissipated energy, and energy changed by the numerical method."""
 
-from __future__ import annotations
-
+import functools
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from fvsolve.errors import FvsolveError, did_you_mean
+from fvsolve.errors import CaseError, FvsolveError, did_you_mean
 from fvsolve.model.energy_accounts import Account, available_energy, datum_of
+from fvsolve.schemes import SCHEMES
 from fvsolve.solve import initial_state
+from fvsolve.studies.energy.passivity import AUTO, check_names, method_names
 from fvsolve.studies.energy.step_energy import EnergyRun
-from fvsolve.studies.outcome import RowSink, study_model
+from fvsolve.studies.outcome import RowSink, end_if_interrupted, refusal_text, study_model
+from fvsolve.studies.result_cache import ResultCache
+from fvsolve.studies.result_table import Column
 from fvsolve.validation import FUNCTION, TABLE, TEXT, validated
 
 ROUNDING = 1e-12  # fraction of the energy throughput below which a remainder is rounding
@@ -174,9 +177,8 @@ def energy(case, set=None, port: str | None = None, progress=None) -> Energy:
 def ledger(run: EnergyRun, summary, port: str | None) -> Energy:
     """Energy balance of a finished run, from its recorded energies; summary : its `Summary`; port : as in `energy`."""
     accounts, totals, holdings = run.accounts, np.array(run.totals), np.array(run.holdings)
-    lines = {
-        kind: lines_by_name(accounts.accounts, kind, totals) for kind in ("supplied", "dissipated", "scheme", "law")
-    }
+    kinds = ("supplied", "dissipated", "scheme", "law")
+    lines = {kind: lines_by_name(accounts.accounts, kind, totals) for kind in kinds}
     stored = lines_by_name(accounts.stored_accounts, "stored", holdings)
     impact_losses = np.array(run.losses)
     for name, column in zip(run.model.column_names, impact_losses.T, strict=True):
@@ -246,16 +248,14 @@ def port_verdict(run: EnergyRun, port: str) -> Port:
 
 def port_text(port: Port, case) -> str:
     """Verdict on the passivity at a port as a sentence, in the units of `[output]` of the case."""
-    work, least, own_bound, others, margin = (
-        case.amount(energy_value, "energy", 6)
-        for energy_value in (port.work, 0.0 - port.at_start, -(port.at_start + port.others), port.others, port.margin)
-    )
+    energies = port.work, 0.0 - port.at_start, -(port.at_start + port.others), port.others, port.margin
+    work, least, own_bound, others, margin = (case.amount(value, "energy", 6) for value in energies)
     if port.others:
         bound = f"-(E0 + others) = {own_bound} (E0: energy stored at the start; others: {others} from other ports)"
     else:
         bound = f"-E0 = {least} (E0: energy stored at the start)"
     verdict = "passive over this run" if port.passive else "NOT passive: the network supplied more energy than it had"
-    time, margin_time = (case.amount(energy_value, "time", 6) for energy_value in (port.time, port.t_margin))
+    time, margin_time = (case.amount(value, "time", 6) for value in (port.time, port.t_margin))
     return (f"port {port.node}: integral of p q falls to {work} at {time}, its bound is {bound}; "
             f"least margin {margin} at {margin_time}: {verdict}")  # fmt: skip
 
@@ -271,3 +271,68 @@ def write_table(result: Energy, path: Path) -> None:
     text = [",".join(columns)]
     text += [",".join(repr(float(x)) for x in row) for row in np.column_stack(list(columns.values()))]
     path.write_text("\n".join(text) + "\n", encoding="utf-8")
+
+
+PAIR_COLUMNS = (  # columns of a row
+    Column("scheme"),
+    Column("method"),
+    Column("remainder", words=".4g", head="remainder [J]"),
+    Column("scheme_loss", words=".4g", head="by the scheme [J]"),
+    Column("step_loss", words=".4g", head="by the step [J]"),
+    Column("newton_loss", words=".4g", head="by Newton residuals [J]"),
+    Column("least", words=".4g", head="least remainder [J]"),
+    Column("relative", words=".4g", head="over throughput"),
+    Column("creates", head="creates energy"),
+    Column("margin", words=".4g", head="margin at the port [J]"),
+    Column("reason", words=lambda row: row["reason"].partition(":")[0], head="run"),
+)
+
+
+def measure_pairs(
+    case, schemes=None, methods=None, port: str | None = None, progress=None, points=None, watch=None
+) -> list[dict]:
+    """Run a case with every pair of scheme and method; returns a row (dict) with the energy remainders of each pair.
+
+    Entries of a row are those of `PAIR_COLUMNS`. remainder, scheme_loss, step_loss, newton_loss : energies at the end
+    [J], see `Energy`; least : least value over time of the remainder without Newton residuals [J]
+    creates : True if `least` is below zero by more than rounding, or if the run failed; None if it was refused
+    margin : least margin of the passivity at the port [J], see `Port`; None without a port
+    If the pair was refused, all entries except scheme, method and reason are None.
+
+    schemes, methods : names (default those of the case); progress : called as progress(done, total, next)
+    points : `ResultCache` of earlier rows; watch : called as watch(t, seconds, steps) during every run
+    A pair that is refused or diverges gives a row with its reason. Raises FvsolveError for unknown names and for a case
+    whose energy is not computed (see `Accounts`), and KeyboardInterrupt if a run is interrupted.
+    """
+    check_port(case, port)
+    points = points or ResultCache()
+    schemes = check_names(schemes or [case.numerics.scheme], list(SCHEMES), "scheme")
+    methods = check_names(methods or [case.numerics.method], [*method_names(), AUTO], "method")
+    rows, total = [], len(schemes) * len(methods)
+    for scheme in schemes:
+        for method in methods:
+            if progress is not None:
+                progress(len(rows), total, f"{scheme} with {method}")
+            pair = {"scheme": scheme, "method": method}
+            make = functools.partial(pair_result, case, scheme, method, port, watch)
+            rows.append(pair | points.get(case, pair | {"study": "energy", "port": port}, make))
+    return rows
+
+
+def pair_result(case, scheme: str, method: str, port: str | None, watch=None) -> dict:
+    """Row of a pair: energy remainders of a run of the case with this scheme and method, see `measure_pairs`."""
+    missing = {column.key: None for column in PAIR_COLUMNS if column.key not in ("scheme", "method", "reason")}
+    try:
+        result = energy(case, {"numerics.scheme": scheme, "numerics.method": method}, port, watch)
+    except CaseError as error:
+        return missing | {"reason": refusal_text(error)}
+    end_if_interrupted(result.reason)
+    losses = [float(values[-1]) for values in result.scheme.values()]
+    sound = result.ok and bool(np.all(np.isfinite(result.remainder)))
+    least = float(np.min(result.numerical_remainder))
+    return missing | {
+        "remainder": float(result.remainder[-1]), "scheme_loss": sum(losses), "step_loss": float(result.step[-1]),
+        "newton_loss": float(result.newton[-1]),
+        "least": least, "relative": result.relative, "creates": not sound or least < -ROUNDING * result.throughput,
+        "margin": None if result.port is None else result.port.margin, "reason": result.reason,
+    }  # fmt: skip

@@ -11,8 +11,6 @@ energy must not grow: |R(-x)| <= 1 for a leaking chamber, |R(i y)| <= 1 for a co
 R(h J) <= 1 for a closed pipe, if the scheme creates no energy.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from dataclasses import dataclass
@@ -20,10 +18,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.errors import FvsolveError, did_you_mean
-from fvsolve.output.summary_file import plain
 from fvsolve.schemes import SCHEMES
 from fvsolve.steppers.automatic import AUTO, EXPLICIT, IMPLICIT, TIGHT_BELOW, TIGHT_IMPLICIT
 from fvsolve.studies.outcome import name_list
+from fvsolve.studies.result_table import PlainData
+from fvsolve.studies.stability.growth import bisect
 from fvsolve.validation import FUNCTION, NAMES, validated
 
 CELLS = 20  # cells of the closed pipe
@@ -68,7 +67,7 @@ class SchemeClaim:
 
 
 @dataclass(frozen=True)
-class Pair:
+class Pair(PlainData):
     """Scheme and method, with the Courant number up to which no state of a closed pipe gains energy in a step.
 
     courant : inf if there is no limit, 0 if any step can create energy, None for a scheme with a limiter
@@ -78,24 +77,29 @@ class Pair:
     method: str
     courant: float | None
 
+    also = ("any_step",)
+
+    @property
+    def any_step(self) -> bool:
+        """True if there is no limit."""
+        return self.courant == math.inf
+
 
 @dataclass(frozen=True)
-class Passivity:
+class Passivity(PlainData):
     """Results of `passivity`: one entry for each method, for each scheme, and for each pair of the two."""
 
     methods: list[MethodClaim]
     schemes: list[SchemeClaim]
     pairs: list[Pair]
 
+    json = "cells methods schemes pairs"
+    cells = CELLS
+
     @property
     def breaking(self) -> list[tuple[str, str]]:
         """Pairs (scheme, method) that can create energy in a step of any length."""
         return [(pair.scheme, pair.method) for pair in self.pairs if pair.courant == 0.0]
-
-    def plain(self) -> dict:
-        """Plain values for JSON: infinite limits are None; `any_step` is True if a pair has no limit."""
-        pairs = [vars(pair) | {"any_step": pair.courant == math.inf} for pair in self.pairs]
-        return plain({"cells": CELLS, "methods": self.methods, "schemes": self.schemes, "pairs": pairs})
 
 
 @validated(schemes=NAMES, methods=NAMES, progress=FUNCTION)
@@ -201,9 +205,8 @@ def energy_matrix(settings, n: int) -> np.ndarray:
     points = np.zeros((3 * n, n))
     for i in range(n):
         start = min(max(i - width // 2, 0), n - width)
-        points[3 * i : 3 * i + 3, start : start + width] = (
-            np.sqrt(GAUSS_WEIGHTS)[:, None] * POINTS[width, i - start, :, :width]
-        )
+        weighted = np.sqrt(GAUSS_WEIGHTS)[:, None] * POINTS[width, i - start, :, :width]
+        points[3 * i : 3 * i + 3, start : start + width] = weighted
     return np.linalg.cholesky(points.T @ points).T
 
 
@@ -259,17 +262,17 @@ def courant_limit(scheme: str, method: str) -> float | None:
     facts = analyse(method)
     if facts.a_stable:  # von Neumann: R(hA) is a contraction wherever A is dissipative
         return math.inf
+
+    def gains(courant: float) -> bool:
+        return not step_gain(scheme, method, courant) <= 1.0 + NORM_TOLERANCE
+
     samples = np.geomspace(LEAST, MOST, 120)
-    failed = next((k for k, x in enumerate(samples) if not step_gain(scheme, method, x) <= 1.0 + NORM_TOLERANCE), None)
+    failed = next((k for k, x in enumerate(samples) if gains(x)), None)
     if failed is None:
         return math.inf
     if failed == 0:
         return 0.0
-    low, high = samples[failed - 1], samples[failed]
-    while high - low > 1e-9 * high:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if step_gain(scheme, method, middle) <= 1.0 + NORM_TOLERANCE else (low, middle)
-    return float(low)
+    return float(bisect(gains, samples[failed - 1], samples[failed], 1e-9).step)
 
 
 def step_gain(scheme: str, method: str, courant: float) -> float:
@@ -285,17 +288,10 @@ def step_gain(scheme: str, method: str, courant: float) -> float:
 @functools.cache
 def polynomials(method: str) -> tuple[list[float], list[float]]:
     """Coefficients (of the numerator, of the denominator) of the stability function, lowest power first."""
-    from fvsolve.steppers import stability_function
+    from fvsolve.steppers import method_named, stability_function
 
-    r = stability_function(method_of(method))
+    r = stability_function(method_named(method))
     return [float(x) for x in r.numerator.coefficients], [float(x) for x in r.denominator.coefficients]
-
-
-def method_of(name: str):
-    """Runge-Kutta method with this name."""
-    from fvsolve.steppers import method_named
-
-    return method_named(name)
 
 
 def matrix_polynomial(coefficients: list[float], b: np.ndarray) -> np.ndarray:

@@ -1,7 +1,5 @@
 """Energy of each accepted time step: sum of the powers at its stages with the weights of the method."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from fvsolve.kernels.delay_lines.wave_history import JUMPS_TRAVELLING, time_tolerance
@@ -12,17 +10,11 @@ from fvsolve.solve.solve import Run
 from fvsolve.steppers import automatic, loop_records
 
 TABLE_ROWS = 1000  # approximate number of rows of the table
-QUADRATURE_TOLERANCE = (
-    1e-3  # allowed quadrature error of the dissipated energy in a step with error control, relative to its total
-)
+QUADRATURE_TOLERANCE = 1e-3  # allowed quadrature error of the dissipated energy in a step, relative to its total
 LEAST, MOST = 0.1, 8.0  # limits of the factor on the step for that tolerance
-ACCEPTED_CODES = (
-    loop_records.BUDGET_SPENT,
-    loop_records.DONE,
-    loop_records.ROWS_FULL,
-    loop_records.FIELD,
-    loop_records.STOPPED,
-)  # status codes of the loop after an accepted step
+ACCEPTED_CODES = (  # status codes of the loop after an accepted step
+    loop_records.BUDGET_SPENT, loop_records.DONE, loop_records.ROWS_FULL, loop_records.FIELD, loop_records.STOPPED,
+)  # fmt: skip
 
 
 class EnergyLoop(RunLoop):
@@ -32,9 +24,8 @@ class EnergyLoop(RunLoop):
         """Start to add up the energies of `accounts`; on_step() is called after every accepted step."""
         self.accounts, self.on_step = accounts, on_step
         self.total, self.carry = np.zeros((2, len(accounts.accounts) + 1))  # ledger lines, then the Newton residual
-        self.supplied, self.rates, self.dissipated_lines = (
-            accounts.of(kind) for kind in ("supplied", "rate", "dissipated")
-        )
+        self.supplied, self.rates = accounts.of("supplied"), accounts.of("rate")
+        self.dissipated_lines = accounts.of("dissipated")
         self.longest = float(self.control["step_max"])
         self.dydt, self.out_work = np.zeros(self.model.y_size), self.model.new_out()
         self.control["allow_fused"] = 0  # fused steps store no stages
@@ -84,18 +75,15 @@ class EnergyLoop(RunLoop):
             total[:-1] = b @ self.linearly_implicit(t, y, h, a, c, k)
             return h * total
         s = b.size
-        error = stepper.coefficients[s * s + 2 * s : s * s + 3 * s]  # weights of the error estimate
-        error = error * (self.control["mode"] == loop_records.TOLERANCE and stepper.method.kind != "full")
+        by_error = self.control["mode"] == loop_records.TOLERANCE and stepper.method.kind != "full"
+        error = stepper.coefficients[s * s + 2 * s : s * s + 3 * s] * by_error  # weights of the error estimate
         quadrature_error = np.zeros_like(total)
         for i in np.flatnonzero((b != 0.0) | (error != 0.0)):
             power = self.stage(t + c[i] * h, y + h * (a[i] @ k), k[i], supplies[i])
             total += b[i] * power
             quadrature_error += error[i] * power
-        self.limit_next(
-            h,
-            h * np.abs(quadrature_error[self.dissipated_lines]).sum(),
-            np.abs((self.total + h * total)[self.dissipated_lines]).sum(),
-        )
+        lost = np.abs((self.total + h * total)[self.dissipated_lines]).sum()
+        self.limit_next(h, h * np.abs(quadrature_error[self.dissipated_lines]).sum(), lost)
         return h * total
 
     def limit_next(self, h: float, off: float, lost: float) -> None:
@@ -106,9 +94,9 @@ class EnergyLoop(RunLoop):
         The error control of states does not cover this error: for states that are parabolas in time, a method of order
         two is exact, but the integral of the power is not.
         """
-        grow = (
-            min(MOST, 0.9 * (QUADRATURE_TOLERANCE * lost / off) ** (1.0 / self.control["order"])) if off > 0.0 else MOST
-        )
+        grow = MOST
+        if off > 0.0:
+            grow = min(MOST, 0.9 * (QUADRATURE_TOLERANCE * lost / off) ** (1.0 / self.control["order"]))
         self.control["step_max"] = min(self.longest, h * max(LEAST, grow))
 
     def jump_correction(self, t: float, y: np.ndarray) -> np.ndarray:
@@ -125,10 +113,8 @@ class EnergyLoop(RunLoop):
             b = self.power_weights()
         begin, end = t + min(0.0, float(c.min())) * h, t + max(1.0, float(c.max())) * h
         for jump_time in jump_times(past, self.model.tables.delays, begin, end):
-            before, after = (
-                self.power(time, y + (time - t) / h * (self.now - y))
-                for time in (jump_time - 2.0 * separation, jump_time + 2.0 * separation)
-            )
+            sides = jump_time - 2.0 * separation, jump_time + 2.0 * separation
+            before, after = (self.power(time, y + (time - t) / h * (self.now - y)) for time in sides)
             booked = h * float(b[t + c * h >= jump_time - separation].sum())
             total[:-1] += (after - before) * (min(h, max(0.0, self.t - jump_time)) - booked)
         return total

@@ -12,17 +12,24 @@ import numpy as np
 from fvsolve.case import load
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.schemes import LIMITED
-from fvsolve.studies.delay_line_keys import delay_lines, fixed_choices
-from fvsolve.studies.failure.delay_line_limit import WaveGrowthLimit
-from fvsolve.studies.failure.eigenvalue_limit import eigenvalues_of, greatest_step
-from fvsolve.studies.failure.map_columns import Columns, cells_for_delay_lines, default_schemes, map_columns
-from fvsolve.studies.failure.run_verdict import NOT_RUN, Measures, measure_run, verdict
-from fvsolve.studies.failure.step_recording import run_recorded
-from fvsolve.studies.outcome import Progress, name_list, refuse_basins
+from fvsolve.steppers.tableau import METHODS as KNOWN_METHODS
+from fvsolve.studies.failure.map_columns import (
+    Columns,
+    WaveGrowthLimit,
+    cells_for_delay_lines,
+    default_schemes,
+    eigenvalues_of,
+    greatest_step,
+    map_columns,
+)
+from fvsolve.studies.failure.run_verdict import NOT_RUN, Measures, measure_run, run_recorded, verdict
+from fvsolve.studies.outcome import STUDY_ARGUMENTS, Progress, name_list, refuse_basins
+from fvsolve.studies.parallel import RunQueue, RunRequest
 from fvsolve.studies.reference import Reference, find_reference
+from fvsolve.studies.resolution import delay_lines, fixed_choices
 from fvsolve.studies.result_cache import OUT, ResultCache, cache_in
-from fvsolve.studies.run_queue import RunQueue, RunRequest
-from fvsolve.validation import COUNT, FUNCTION, NAMES, NUMBER, NUMBERS, ROW, TABLE, TEXT, Kind, is_row, validated
+from fvsolve.studies.result_table import PlainData
+from fvsolve.validation import NAMES, NUMBER, NUMBERS, ROW, TEXT, Kind, is_row, validated
 
 METHODS = ("euler", "ssp-rk3", "rk4", "implicit-euler", "trapezoid", "gauss-4", "radau-iia-5")
 TOLERANCE = 0.02  # greatest mean error, over the range of a probe
@@ -31,7 +38,7 @@ OUTPUT_ROWS = 1000  # rows of the history of each run
 
 
 @dataclass(frozen=True)
-class Square:
+class Square(PlainData):
     """Run of a failure map, with its verdict.
 
     column : number of its column; step : given step [s], None unless the column has one
@@ -50,9 +57,13 @@ class Square:
     halved_error: float | None
     limit: float | None
 
+    json = "scheme method column step courant verdict halved_error limit " + " ".join(
+        f"{entry.name}=measures.{entry.name}" for entry in fields(Measures)
+    )
+
 
 @dataclass(frozen=True)
-class FailureMap:
+class FailureMap(PlainData):
     """Verdicts on runs of a case over schemes, methods and columns.
 
     key : "step" [s] or the key of the case that changes along the columns; values : its values
@@ -81,11 +92,6 @@ class FailureMap:
         """Runs of a scheme and a method in the order of the columns."""
         return [square for square in self.squares if (square.scheme, square.method) == (scheme, method)]
 
-    def plain(self) -> dict:
-        """Return the map as plain data in SI units; None for unknown or infinite limits."""
-        data = {entry.name: getattr(self, entry.name) for entry in fields(self) if entry.name != "squares"}
-        return data | {"squares": [_square_data(entry) for entry in self.squares]}
-
 
 KEY_VALUES = Kind(
     lambda value: (
@@ -103,10 +109,7 @@ KEY_VALUES = Kind(
     key=KEY_VALUES,
     tolerance=NUMBER,
     out=OUT,
-    progress=FUNCTION,
-    set=TABLE,
-    jobs=COUNT,
-    dask=TEXT,
+    **STUDY_ARGUMENTS,
 )
 def failure_map(
     case, schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None,
@@ -133,9 +136,8 @@ def failure_map(
         raise FvsolveError(f"--tolerance {tolerance} is out of range. Expected a positive number, for example 0.02")
     base = {"output.every": (case.numerics.end - case.numerics.start) / OUTPUT_ROWS}
     column_set = map_columns(case, base, courants, steps, key)
-    schemes, methods = _check_names(
-        name_list(schemes) or default_schemes(case, column_set), name_list(methods) or METHODS
-    )
+    own_schemes = name_list(schemes) or default_schemes(case, column_set)
+    schemes, methods = _check_names(own_schemes, name_list(methods) or METHODS)
     places = [(scheme, method, k) for scheme in schemes for method in methods for k in range(len(column_set.sets))]
     squares, report = [], progress or (lambda *_: None)
     with cache_in(out) as points, RunQueue(case, jobs, dask) as queue:
@@ -190,10 +192,10 @@ class MapRuns:
             uncertainty = reference.uncertainty.trajectory
             if uncertainty > self.tolerance / 2:
                 raise FvsolveError(
-                    "the reference is not accurate enough: its error may be "
-                    f"{uncertainty:.2g} of the range of {reference.uncertainty.worst or 'a probe'}, but the tolerance "
-                    f"is {self.tolerance:g}. Try --tolerance {4 * uncertainty:.1g}, or more cells if the case has "
-                    "cells; if this probe shows only rounding, remove this probe from output.probes"
+                    f"the reference is not accurate enough: its error may be {uncertainty:.2g} of the range of "
+                    f"{reference.uncertainty.worst or 'a probe'}, but the tolerance is {self.tolerance:g}. Try "
+                    f"--tolerance {4 * uncertainty:.1g}, or more cells if the case has cells; if this probe shows only "
+                    "rounding, remove this probe from output.probes"
                 )
             self._references[at] = reference
         return self._references[at]
@@ -205,15 +207,12 @@ class MapRuns:
         """
         at = scheme, k if self.columns.keys(k) else 0
         if at not in self._spectra:
-            self._spectra[at] = eigenvalues_of(
-                self.case, {**self.base, **self.columns.keys(k), "numerics.scheme": scheme}
-            )
+            keys = {**self.base, **self.columns.keys(k), "numerics.scheme": scheme}
+            self._spectra[at] = eigenvalues_of(self.case, keys)
         eigenvalues = self._spectra[at]
         if (method, *at) not in self._limits:
-            both = (
-                None if eigenvalues is None else greatest_step(method, eigenvalues, self.span),
-                self.lines_limit(method, *at),
-            )
+            of_modes = None if eigenvalues is None else greatest_step(method, eigenvalues, self.span)
+            both = of_modes, self.lines_limit(method, *at)
             self._limits[method, *at] = None if None in both else min(both)
         return self._limits[method, *at]
 
@@ -245,7 +244,8 @@ class MapRuns:
             errors.append(measures.error)
             return measures
 
-        if step and self.span / step > MAX_IMPLICIT_STEPS and not _is_explicit(method):
+        explicit = method not in KNOWN_METHODS or KNOWN_METHODS[method].explicit
+        if step and self.span / step > MAX_IMPLICIT_STEPS and not explicit:
             run, word = Measures(f"{self.span / step:.0f} implicit steps", False), NOT_RUN
         else:
             run = self.measure(trial, k)
@@ -312,20 +312,13 @@ def _shorter_steps(case, trial: dict, ratio: int) -> dict:
 
     trial : keys and values of the run with the original step
     """
-    numerics = case.numerics
-    for name, factor in (("step", ratio), ("courant", ratio), ("rtol", ratio**2)):
-        if f"numerics.{name}" in trial:
-            return {f"numerics.{name}": trial[f"numerics.{name}"] / factor}
-    for name, factor in (("step", ratio), ("courant", ratio), ("rtol", ratio**2)):
-        if getattr(numerics, name) is not None:
-            return {f"numerics.{name}": getattr(numerics, name) / factor}
+    factors = {"numerics.step": ratio, "numerics.courant": ratio, "numerics.rtol": ratio**2}
+    own = {key: getattr(case.numerics, key.removeprefix("numerics.")) for key in factors}
+    for values in (trial, own):
+        for key, factor in factors.items():
+            if values.get(key) is not None:
+                return {key: values[key] / factor}
     return {}
-
-
-def _is_explicit(method: str) -> bool:
-    from fvsolve.steppers import METHODS as KNOWN
-
-    return method not in KNOWN or KNOWN[method].explicit
 
 
 def _check_names(*given: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -338,12 +331,3 @@ def _check_names(*given: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...
             if name not in known:
                 raise FvsolveError(f'no {kind} named "{name}"{did_you_mean(name, known)}')
     return tuple(dict.fromkeys(given[0])), tuple(dict.fromkeys(given[1]))
-
-
-def _square_data(square: Square) -> dict:
-    """Run of a failure map as plain data, with its measures; None for an infinite limit."""
-    data = asdict(square)
-    data |= data.pop("measures")
-    limit = square.limit
-    data["limit"] = None if limit is None or math.isinf(limit) else limit
-    return data

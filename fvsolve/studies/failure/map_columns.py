@@ -1,8 +1,12 @@
-"""Columns of a failure map: steps around the predicted limits, or values of a key."""
+"""Columns of a failure map, and predicted limits of the step for its methods.
 
-from __future__ import annotations
+The columns are steps around the predicted limits, or values of a key. The limits are those of eigenvalue modes
+(equation (13) of docs/course.md) and of waves between a node with storage (tank, chamber) and a delay line.
+"""
 
+import functools
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,9 +14,118 @@ import numpy as np
 from fvsolve.case import load
 from fvsolve.case.sections import DEFAULT_CELLS
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.delay_line_keys import cells_for_lines, delay_lines
-from fvsolve.studies.failure.eigenvalue_limit import eigenvalues_of
+from fvsolve.schemes import LIMITED, SCHEMES
+from fvsolve.step_limits.delay_line_growth import storing_nodes, wave_growth
+from fvsolve.steppers.tableau import method_named
 from fvsolve.studies.outcome import study_model
+from fvsolve.studies.resolution import cells_for_lines, delay_lines
+
+VISIBLE_GROWTH = 1e3  # factor within the run; less growth is not visible
+MAX_STATES = 1200  # greatest number for a dense spectrum
+
+
+def eigenvalues_of(case, set: dict) -> np.ndarray | None:
+    """Eigenvalues of the linearised rates about the initial steady state, in one array [1/s].
+
+    They are computed twice, with the schedules at their values at the start and at the end of the run. A limited scheme
+    has its weights in smooth flow (or is replaced by upwind, see `linear_scheme_for`), and waves that arrive from delay
+    lines are constant. Returns None for more than 1200 states. set : changed keys of the case
+    """
+    from fvsolve.studies.outcome import study_model
+
+    model = study_model(case, set)
+    if (scheme := model.case.numerics.scheme) in LIMITED:
+        model = study_model(case, {**set, "numerics.scheme": linear_scheme_for(model.case, scheme)})
+    if model.y_size > MAX_STATES:
+        return None
+    rest = np.zeros(model.y_size)
+    times = (model.case.numerics.start, model.case.numerics.end)
+    return np.concatenate([np.linalg.eigvals(model.jacobian_without_delays(t, rest)) for t in times])
+
+
+def linear_scheme_for(case, scheme: str) -> str:
+    """Linear scheme in place of a limited one: the one equal in smooth flow or, if the case excludes that, `upwind`."""
+    return SCHEMES[scheme].twin if SCHEMES[scheme].twin in case.schemes else "upwind"
+
+
+def greatest_step(method: str, eigenvalues: np.ndarray, span: float) -> float:
+    """Greatest step [s] up to which no mode grows 1000 times more than the exact solution in a run of `span` [s].
+
+    eigenvalues : complex128[n]  eigenvalues of the modes [1/s]
+    Steps h are searched for which h times the greatest modulus of an eigenvalue is between 0.01 and 1000. Returns inf
+    if no mode grows at these steps, and 0 if a mode grows at the shortest of them.
+    """
+    from fvsolve.steppers import method_named, stability_function
+
+    r = stability_function(method_named(method))
+    fastest = float(np.abs(eigenvalues).max(initial=0.0))
+    if fastest == 0.0:
+        return math.inf
+    exact_growth = span * max(0.0, float(eigenvalues.real.max()))
+
+    def grows(h: float) -> bool:
+        with np.errstate(all="ignore"):
+            growth = span / h * math.log(max(np.abs(r(h * eigenvalues)).max(), 1e-300))
+        return growth - exact_growth > math.log(VISIBLE_GROWTH)
+
+    return last_step(grows, np.geomspace(1e-2, 1e3, 1201) / fastest, 50, lambda low, high: 0.5 * (low + high))
+
+
+def last_step(grows: Callable[[float], bool], steps: Sequence[float], halvings: int, mean: Callable) -> float:
+    """Greatest step h up to which grows(h) is false: inf if it is false at all `steps`, 0 if it is true at the first.
+
+    Between two steps it is refined by a number of bisections; mean : mean(low, high), the next step to try
+    """
+    first = next((k for k, h in enumerate(steps) if grows(h)), None)
+    if first is None or first == 0:
+        return math.inf if first is None else 0.0
+    low, high = steps[first - 1], steps[first]
+    for _ in range(halvings):
+        middle = mean(low, high)
+        low, high = (low, middle) if grows(middle) else (middle, high)
+    return float(low)
+
+
+STEP_COUNT, HALVINGS = 33, 12  # number of steps tried, and of bisections between two of them
+STEP_MARGIN = 4.0  # ratio of the limits of these steps to those of the map, up and down
+
+
+class WaveGrowthLimit:
+    """Callable that returns, for a method, the greatest step at which waves in delay lines do not grow visibly.
+
+    The waves are those between a storing node and the far end of a delay line, see `wave_growth`. Growth is visible if
+    it is 1000 times or more in the run.
+    case, set : the case and its changed keys; steps : steps of the failure map [s], around which limits are searched
+    The model depends on the step but not on the method, so that all methods use the stored model of a step.
+    """
+
+    def __init__(self, case, set: dict, steps: list[float]) -> None:
+        self.case, self.set = case, set
+        self.steps = [float(h) for h in np.geomspace(min(steps) / STEP_MARGIN, STEP_MARGIN * max(steps), STEP_COUNT)]
+        self.models: dict[float, object] = {}
+
+    def model(self, h: float):
+        """Model with delay lines divided into stretches for steps of h [s]."""
+        if h not in self.models:
+            self.models[h] = study_model(self.case, {**self.set, "numerics.step": h, "numerics.method": "euler"})
+        return self.models[h]
+
+    def grows(self, method: str, h: float) -> bool:
+        """True if waves between a storing node and a delay line grow 1000 times or more in a run of steps h [s]."""
+        numerics = self.case.numerics
+        return wave_growth(self.model(h), method_named(method), h, numerics.end - numerics.start)[0] >= VISIBLE_GROWTH
+
+    def __call__(self, method: str) -> float | None:
+        """Greatest step [s] up to which waves grow less than 1000 times in the run with a method.
+
+        It is inf if they do so at all steps tried, and 0 if they grow more at the shortest of these steps. The result
+        is None for Rosenbrock methods if delay lines end at storing nodes, as their growth is not known.
+        """
+        if method_named(method).kind == "linear" and any(storing_nodes(self.model(self.steps[0]), 1.0)):
+            return None
+        grows = functools.partial(self.grows, method)
+        return last_step(grows, self.steps, HALVINGS, lambda low, high: math.sqrt(low * high))
+
 
 COURANTS = (0.25, 0.5, 0.75, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0, 3.0)
 COLUMN_COUNT = 10  # default number of steps, if waves are not the fastest
@@ -64,7 +177,8 @@ def map_columns(case, base: dict, courants, steps, key) -> Columns:
     span = case.numerics.end - case.numerics.start
     if key is not None:
         name, values = key
-        control = _step_control(courants, steps)
+        control = {"numerics.courant": courants[0]} if courants is not None else {}
+        control |= {"numerics.step": steps[0]} if steps is not None else {}
         sets = [{name: value, **control} for value in values]
         rates = [_fastest_and_wave_rate(case, {**base, name: value}) for value in values]
         return Columns(name, list(values), sets, rates, span, _wave_rate(case, {**base, name: values[0]}))
@@ -74,13 +188,6 @@ def map_columns(case, base: dict, courants, steps, key) -> Columns:
     chosen = [c / waves for c in courants] if courants is not None else steps
     chosen = list(chosen if chosen is not None else _default_steps(case, rates, waves))
     return Columns("step", chosen, [{"numerics.step": h} for h in chosen], [rates], span, waves)
-
-
-def _step_control(courants, steps) -> dict:
-    """Key and value that set the step in all columns of a varied key; empty without given numbers."""
-    if courants is not None:
-        return {"numerics.courant": courants[0]}
-    return {} if steps is None else {"numerics.step": steps[0]}
 
 
 def _fastest_and_wave_rate(case, set: dict) -> tuple[float, float | None]:
@@ -158,9 +265,8 @@ def _check_options(courants, steps, key) -> None:
         if values is not None and len(values) == 0:
             raise FvsolveError(f"{option} is empty. Expected at least one number")
     if key is not None and len(courants or steps or [0]) > 1:
-        raise FvsolveError(
-            "with --key, the values of the key are the columns. Expected at most one number in --step or --courant"
-        )
+        text = "with --key, the values of the key are the columns"
+        raise FvsolveError(f"{text}. Expected at most one number in --step or --courant")
     if key is not None and not key[1]:
         raise FvsolveError("--key has no values. Expected KEY=a,b,c with at least one value")
     if key is not None and key[0] in MAP_KEYS:

@@ -1,16 +1,13 @@
-"""Verdict on a run, in a word: stable, ringing, coarse, wrong, blown up, refused or not run."""
-
-from __future__ import annotations
+"""Verdict on a run, in a word, and runs that record their probes after every step."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from fvsolve.studies.accuracy.timing import GIVEN_UP
 from fvsolve.studies.distance import Deviation, column_ranges, time_weights
-from fvsolve.studies.outcome import has_diverged
+from fvsolve.studies.outcome import GIVEN_UP, CappedRun, Outcome, has_diverged, outcome
 
 STABLE, RINGING, COARSE, WRONG, BLOWN_UP, REFUSED, NOT_RUN = (
     "stable", "ringing", "coarse", "wrong", "blown up", "refused", "not run",
@@ -26,10 +23,7 @@ VERDICT_TEXTS = {
 }
 BLOWN_RANGES = 3.0  # a run farther outside the values of the reference, in ranges of a probe, has blown up
 MIN_SWINGS = 8  # successive changes of alternating sign that count as ringing
-SWING_RANGE, REFERENCE_SWING = (
-    0.02,
-    1e-3,
-)  # least swings that count [range]: of a run, and of the reference, which may decay
+SWING_RANGE, REFERENCE_SWING = 0.02, 1e-3  # least swings that count [range]: of a run, of the reference, may decay
 PACE_RATIO = 0.5  # swings count if they follow in less than this fraction of the time of those of the reference
 EXCESS_VARIATION = 0.25  # greatest excess of the variation of a probe, as a fraction of that of the reference
 ERROR_RATIO = 0.75  # a shorter step helps if at most this fraction of the error remains
@@ -113,14 +107,10 @@ def excess_variation(rows: np.ndarray, reference: np.ndarray, ranges: np.ndarray
     rows, reference : float64[k, probes]  values of the run and the reference; ranges : float64[probes]
     """
     smooth, smooth_reference = (_medians(values) / ranges for values in (rows, reference))
-    variation, reference_variation = (
-        np.abs(np.diff(values, axis=0)).sum(axis=0) for values in (smooth, smooth_reference)
-    )
-    excesses = (variation - reference_variation) / np.maximum(reference_variation, 1.0)
-    quick = [
-        turn_interval(a, SWING_RANGE) < PACE_RATIO * turn_interval(b, REFERENCE_SWING)
-        for a, b in zip(smooth.T, smooth_reference.T, strict=True)
-    ]
+    variation, expected = (np.abs(np.diff(values, axis=0)).sum(axis=0) for values in (smooth, smooth_reference))
+    excesses = (variation - expected) / np.maximum(expected, 1.0)
+    quick = [turn_interval(a, SWING_RANGE) < PACE_RATIO * turn_interval(b, REFERENCE_SWING)
+             for a, b in zip(smooth.T, smooth_reference.T, strict=True)]  # fmt: skip
     return float(np.max(excesses[quick], initial=0.0))
 
 
@@ -158,19 +148,53 @@ def measure_run(outcome, windows: Sequence[np.ndarray], reference) -> Measures:
     expected = np.column_stack([np.interp(t, reference.run.rows[:, 0], column) for column in reference_rows.T])
     widths, steps = probe_ranges(reference_rows), np.concatenate([rows[-1:], *windows])
     with np.errstate(over="ignore", invalid="ignore"):
-        error = [
-            Deviation(off, time_weights(t), width).ranges()["L1"]
-            for off, width in zip((rows - expected).T, widths, strict=True)
-        ]
+        error = [Deviation(off, time_weights(t), width).ranges()["L1"]
+                 for off, width in zip((rows - expected).T, widths, strict=True)]  # fmt: skip
         outside = np.maximum(steps - reference_rows.max(axis=0), reference_rows.min(axis=0) - steps) / widths
         return Measures(
-            outcome.reason,
-            True,
-            False,
-            float(np.max(error)),
-            max(0.0, float(outside.max())),
-            ringing_amplitude(windows, widths),
-            excess_variation(rows, expected, widths),
-            outcome.counts["steps"],
+            outcome.reason, True, False, float(np.max(error)), max(0.0, float(outside.max())),
+            ringing_amplitude(windows, widths), excess_variation(rows, expected, widths), outcome.counts["steps"],
             outcome.seconds,
-        )
+        )  # fmt: skip
+
+
+WINDOW_STEPS = 9  # least number of successive steps in a window
+CPU_LIMIT = 10.0  # CPU time after which a run is given up [s]
+WINDOW_COUNT = 30  # in long runs the distance of windows is this fraction of the steps taken: 1 / 30
+
+
+class RecordedRun(CappedRun):
+    """Run that records its probes after every step; in a long run only in windows of nine or more successive steps.
+
+    The steps are those of a run without recording.
+    windows : for each window a list of float64[probes], the values of the probes after successive steps, in SI units
+    """
+
+    def __init__(self, *arguments) -> None:
+        super().__init__(*arguments)
+        self.windows: list[list[np.ndarray]] = [[]]
+        self.budget = self.left = 1.0
+        self.max_seconds = CPU_LIMIT
+
+    def pause(self) -> None:
+        """Record the probes, and in a long run skip the steps between two windows. Raises GivenUp at the CPU limit."""
+        self.check()
+        self.windows[-1].append(self.run_data.observe(self.loop.t, self.loop.now, self.loop.stepper.out))
+        apart = int(self.loop.state["steps"]) // WINDOW_COUNT
+        self.budget = 1.0
+        if apart > WINDOW_STEPS and len(self.windows[-1]) >= WINDOW_STEPS:
+            self.windows.append([])
+            self.budget = float(apart)
+
+
+def run_recorded(case, set: Mapping | None = None) -> tuple[Outcome, list[np.ndarray]]:
+    """(outcome of a run with the changed keys `set`, recorded windows : list of float64[steps, probes] in SI units)."""
+    runs: list[RecordedRun] = []
+
+    def run(*arguments) -> RecordedRun:
+        runs.append(RecordedRun(*arguments))
+        return runs[-1]
+
+    result = outcome(case, set, run=run)
+    windows = runs[-1].windows if runs else []
+    return result, [np.array(window) for window in windows if len(window) > 1]

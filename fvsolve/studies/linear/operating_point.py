@@ -1,7 +1,5 @@
 """Operating points for linearisation: a state of a case with schedules held at their values."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,10 +8,10 @@ from fvsolve.errors import FvsolveError
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.ghost_cells import difference_rows
 from fvsolve.kernels.schedule_pieces import POLYNOMIAL, piece_at, piece_slopes, value_with_limit
-from fvsolve.model.delay_line_selection import line_methods
 from fvsolve.schemes import LIMITED, SCHEMES
 from fvsolve.step_limits.symbol import symbol
 from fvsolve.studies.outcome import outcome, study_model
+from fvsolve.studies.resolution import as_cells, delay_lines
 
 DELAY_ERROR = 0.01  # relative error of a wave in cells that replace a delay line, for the frequency in the note
 
@@ -53,13 +51,9 @@ def operating_point(case, set=None, at: float | None = None, before: bool = Fals
     from fvsolve.case import load
 
     case = load(case, dict(set or {}))
-    delay_lines = [name for name, choice in line_methods(case).items() if choice.pipe_model == "delay-line"]
-    if delay_lines:
-        case = load(
-            case,
-            {"numerics.pipe_model": "finite-volume"}
-            | {f"links.{name}.pipe_model": "finite-volume" for name in delay_lines},
-        )
+    delayed = delay_lines(case)
+    if delayed:
+        case = load(case, as_cells(delayed))
     if "scheme" not in case.raw["numerics"] and case.numerics.scheme in LIMITED:
         linear = "upwind" if case.meshes else SCHEMES[case.numerics.scheme].twin
         case = load(case, {"numerics.scheme": linear})
@@ -73,7 +67,7 @@ def operating_point(case, set=None, at: float | None = None, before: bool = Fals
     side = "before" if before else "after"
     when = "the start" if at is None else f"t = {case.amount(t, 'time', 6)}"
     when += f", just {side} a {'jump' if sides[t] else 'kink'} of a schedule" if t in sides else ""
-    when += frequency_limit_note(model, delay_lines) if delay_lines else ""
+    when += frequency_limit_note(model, delayed) if delayed else ""
     return OperatingPoint(with_held_schedules(model, t, before), t, y, when, armed)
 
 

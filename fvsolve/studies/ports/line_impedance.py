@@ -1,7 +1,5 @@
 """Impedance of a lossless line, and a sweep test for positive realness of any function, with an error bound."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -35,9 +33,8 @@ class LineImpedance:
     def __post_init__(self) -> None:
         for name, kind in (("z0", POSITIVE), ("time", POSITIVE), ("reflection", NUMBER)):
             if not kind.accepts(getattr(self, name)):
-                raise FvsolveError(
-                    f"LineImpedance {name} = {show(getattr(self, name))} is not valid. Expected {kind.expected}"
-                )
+                text = f"LineImpedance {name} = {show(getattr(self, name))} is not valid"
+                raise FvsolveError(f"{text}. Expected {kind.expected}")
 
     @validated(s=COMPLEX)
     def __call__(self, s):
@@ -135,9 +132,8 @@ def sweep_positive_real(
     k = int(np.argmin(real))
     least, worst, floor = float(real[k]), float(w[k]), float(min(bound.min(), real.min()))
     holds = False if violated.any() else True if proven.all() else None
-    return SweepVerdict(
-        holds, _verdict_text(holds, least, worst, floor, shift, high), least, worst, floor, shift, high, len(w)
-    )
+    text = _verdict_text(holds, least, worst, floor, shift, high)
+    return SweepVerdict(holds, text, least, worst, floor, shift, high, len(w))
 
 
 def _value_per_point(name: str, given, shape: tuple, kind: type) -> np.ndarray:

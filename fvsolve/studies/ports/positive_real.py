@@ -1,7 +1,5 @@
 """Exact test of a rational transfer function for positive realness, from its coefficients."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from fractions import Fraction
@@ -131,11 +129,7 @@ def positive_real(numerator, denominator) -> Verdict:
     bands, zeros = _bands(even, below), _zeros(even, below)
     hidden = _root_places(common, locate_roots(common))
     poles = _root_places(d, where)
-    faults = [
-        *_unstable_text(poles),
-        *(pole.fault for pole in axis if pole.fault),
-        *(_band_text(band) for band in bands),
-    ]
+    faults = _unstable_text(poles) + [pole.fault for pole in axis if pole.fault] + [_band_text(band) for band in bands]
     holds = not faults
     lossless = holds and even.degree < 0 and n.degree >= 0
     reasons = faults or _proof_text(axis, zeros, lossless, n)
@@ -171,9 +165,8 @@ def _origin(n: Polynomial, d: Polynomial, locations: RootLocations) -> list[Axis
     if not locations.zero:
         return []
     if locations.zero > 1:
-        return [
-            AxisPole(0.0, locations.zero, None, f"the pole at s = 0 has order {locations.zero}; expected a simple pole")
-        ]
+        fault = f"the pole at s = 0 has order {locations.zero}; expected a simple pole"
+        return [AxisPole(0.0, locations.zero, None, fault)]
     residue = n.coefficients[0] / d.coefficients[1]
     fault = f"the pole at s = 0 has the negative residue {_float(residue):.6g}" if residue < 0 else None
     return [AxisPole(0.0, 1, complex(_float(residue)), fault)]
@@ -194,15 +187,13 @@ def _pair(n: Polynomial, d: Polynomial, x: Root, order: int) -> AxisPole:
     slope, x_value = c.derivative(), x.refine()
     below = -2 * slope(x_value) * (re(x_value) ** 2 + x_value * ro(x_value) ** 2)
     real = x.sign_of(turned) == 0
-    residue = complex(
-        _float(straight(x_value) / below), 0.0 if real else -_float(turned(x_value) / below) / float_root(x_value)
-    )
+    imaginary = 0.0 if real else -_float(turned(x_value) / below) / float_root(x_value)
+    residue = complex(_float(straight(x_value) / below), imaginary)
     if not real:
         return AxisPole(x.frequency, 1, residue, f"{name} has the residue {residue:.6g}, which is not real")
     negative = x.sign_of(straight) * x.sign_of(slope) > 0
-    return AxisPole(
-        x.frequency, 1, residue, f"{name} has the negative residue {residue.real:.6g}" if negative else None
-    )
+    fault = f"{name} has the negative residue {residue.real:.6g}" if negative else None
+    return AxisPole(x.frequency, 1, residue, fault)
 
 
 # the real part on the axis --------------------------------------------------------------------------------------

@@ -119,9 +119,8 @@ def cauchy_index(top: Polynomial, below: Polynomial) -> int:
     remainders = [below, top] if top.degree >= 0 else [below]
     while len(remainders) > 1 and (remainder := -(remainders[-2] % remainders[-1])).degree >= 0:
         remainders.append(remainder / abs(remainder.coefficients[-1]))
-    return _sign_changes(_sign_at_infinity(q, -1) for q in remainders) - _sign_changes(
-        _sign_at_infinity(q, 1) for q in remainders
-    )
+    left, right = (_sign_changes(_sign_at_infinity(q, side) for q in remainders) for side in (-1, 1))
+    return left - right
 
 
 class Root:

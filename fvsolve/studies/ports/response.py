@@ -1,7 +1,5 @@
 """Transfer function between pressure and flow at a port of a linearised case, and its positive realness."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -60,9 +58,8 @@ class Response:
 
     def plain(self) -> dict:
         """Values for JSON, arrays as numpy arrays: poles and residues as [re, im], H as `real` and `imaginary`."""
-        poles = sorted(
-            zip(self.transfer.poles, self.transfer.residues, strict=True), key=lambda p: (abs(p[0]), p[0].imag)
-        )
+        pairs = zip(self.transfer.poles, self.transfer.residues, strict=True)
+        poles = sorted(pairs, key=lambda pair: (abs(pair[0]), pair[0].imag))
         return {
             "case": self.case, "when": self.when, "port": self.port, "kind": self.kind, "scheme": self.scheme,
             "input_unit": self.units[0], "output_unit": self.units[1], "states": self.states,
@@ -133,7 +130,7 @@ def _linear_system(case, port: str, at, before, scheme):
     system = linear([], [pressure])
     row = system.at.model.tables.nodes[system.at.model.node_names.index(port)]
     b = np.zeros(len(system.states))
-    b[row["y"]] = _density(system, row)
+    b[row["y"]] = float(system.at.model.case.law.density(system.output_values[0]))  # at the pressure of the port
     return (_dense(system.a), b, system.c[0], 0.0), system
 
 
@@ -151,11 +148,6 @@ def port_flows(case, port: str) -> dict[str, float]:
             else:
                 signs[f"links.{name}.flow"] = 1.0 if end == "from" else -1.0
     return signs
-
-
-def _density(system, row) -> float:
-    """Density of the fluid at the storing node of the port, at its pressure [kg/m3]."""
-    return float(system.at.model.case.law.density(system.output_values[0]))
 
 
 def _dense(a) -> np.ndarray:

@@ -1,7 +1,5 @@
 """Test of a state-space system for positive realness, in floating point up to a tolerance."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -174,20 +172,11 @@ def state_positive_real(h: Transfer, tolerance: float = TOLERANCE) -> StateVerdi
     dips = _dips(h, shift, w, _certain_part(raw, doubt), tolerance)
     margin, worst = (0.0, 0.0) if zero else _margin(h, near, shift, w, raw, doubt, (low <= w) & (w <= high))
     holds = False if len(unstable) or dips else True if margin > tolerance or zero else None
+    reasons = tuple(_reason_texts(holds, unstable, dips, hidden, margin, worst, tolerance, shift))
     return StateVerdict(
-        holds,
-        tuple(_reason_texts(holds, unstable, dips, hidden, margin, worst, tolerance, shift)),
-        margin,
-        worst,
-        tolerance,
-        shift,
-        low,
-        high,
-        tuple(dips),
-        _listed(unstable),
-        _listed(h.poles[near]),
-        _listed(hidden),
-    )
+        holds, reasons, margin, worst, tolerance, shift, low, high, tuple(dips), _listed(unstable),
+        _listed(h.poles[near]), _listed(hidden),
+    )  # fmt: skip
 
 
 def _margin(h, near, shift, w, raw, doubt, within) -> tuple[float, float]:

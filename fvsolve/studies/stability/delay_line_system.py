@@ -6,8 +6,6 @@ earlier and is interpolated between steps by the polynomials of the lines; frict
 line reflects a part of it. A step computes x by the tableau of the method, with w at its stages, and stores s.
 """
 
-from __future__ import annotations
-
 from functools import cached_property
 from typing import NamedTuple
 
@@ -19,13 +17,9 @@ from fvsolve.model.energy_norm import energy_form
 from fvsolve.steppers.tableau import Method
 
 STENCIL_MARGIN = 4  # entries before the oldest reading, for its interpolation
-DERIVATIVE_STEP, BAR_PRESSURE = (
-    1e-6,
-    1e5,
-)  # step of differences in units of the small deviation; pressure of a wave of unit size [Pa]
+DERIVATIVE_STEP = 1e-6  # step of differences in units of the small deviation
+BAR_PRESSURE = 1e5  # pressure of a wave of unit size [Pa]
 GROWTH_ROUNDS = 2  # of all steps: first with random starts, then with their ends as starts
-
-
 VANISHED = 1e-100  # size of a deviation that has left the model
 
 
@@ -73,10 +67,9 @@ class DelayLineSystem:
         self.parts, self.energy_rows = (), np.zeros((0, self.states.size))
         if self.states.size:
             form = energy_form(model, model.start)
-            self.parts, self.energy_rows = form.parts, form.rows[:, self.states]
-            self.energy_rows = (
-                self.energy_rows if isinstance(self.energy_rows, np.ndarray) else self.energy_rows.toarray()
-            )
+            rows_of_states = form.rows[:, self.states]
+            self.parts = form.parts
+            self.energy_rows = rows_of_states if isinstance(rows_of_states, np.ndarray) else rows_of_states.toarray()
         factor = 1.0 / (pipes["admittance"][rows["pipe"]] * model.case.properties.density)
         ages = np.arange(self.history_steps, 0, -1)
         self.weight = np.sqrt(h * factor[line_of]) * (ages[:, None] <= np.maximum(1.0, np.round(self.delays)))
@@ -247,9 +240,8 @@ def local_matrices(model, states: np.ndarray) -> tuple[np.ndarray, np.ndarray, n
 
     with model.run_data() as data:
         past, arrivals = data.past, at.offsets_of(data.past)[0]
-        inputs = (
-            arrivals + at.ARRIVALS_SIZE * np.stack([first, first + rows["stretches"] - 1], axis=1) + np.array([0, 1])
-        )
+        ends_of_lines = np.stack([first, first + rows["stretches"] - 1], axis=1)
+        inputs = arrivals + at.ARRIVALS_SIZE * ends_of_lines + np.array([0, 1])
 
         def evaluate(y: np.ndarray, w: np.ndarray) -> np.ndarray:
             past[inputs.ravel()] = w

@@ -1,13 +1,17 @@
-"""Courant limits of linear schemes on a periodic pipe: predicted for each wave, and measured by real runs.
+"""Courant limits on a periodic pipe, predicted for each wave and measured by real runs.
 
 A Courant number nu fails if the L2 norm of some initial state grows more than 1000 times within n steps. On a periodic
-grid the matrix of a step is normal, so the greatest growth over all initial states is exactly the greatest |R(nu
-z(theta_k))|^n over the waves k, with the phases theta_k = 2 pi k / cells, the stability function R of the method and
-the symbol z of the scheme. A run measures this growth from one impulse, all of whose waves have equal size, as the
-greatest |u_k(n)| / |u_k(0)| of the Fourier coefficients u_k.
-"""
+grid the matrix of a step of a linear scheme is normal, so the greatest growth over all initial states is exactly the
+greatest |R(nu z(theta_k))|^n over the waves k, with the phases theta_k = 2 pi k / cells, the stability function R of
+the method and the symbol z of the scheme. A run measures this growth from one impulse, all of whose waves have equal
+size, as the greatest |u_k(n)| / |u_k(0)| of the Fourier coefficients u_k.
 
-from __future__ import annotations
+A limited scheme has no derivative at a constant state, since its weights depend on the solution, and no exact limit.
+Three kinds of limits are computed. The linear schemes that result from constant weights have exact limits. For slope
+limiters total variation cannot grow up to the Courant number r / (1 + phi / 2), with the greatest slope phi over the
+difference of neighbours (1 for minmod, 2 for other limiters) and the SSP radius r of the method (Harten 1983). Real
+runs from three initial states (`start_fields`) give measured limits for increasing numbers of steps.
+"""
 
 import math
 from collections.abc import Callable, Sequence
@@ -16,10 +20,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.assembly.scheme_codes import scheme_settings
-from fvsolve.errors import FvsolveError
+from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.kernels import dtypes as rec
-from fvsolve.kernels.calls import compile_as
 from fvsolve.kernels.table_handle import make_handle
+from fvsolve.schemes import LIMITED, LIMITERS, branches
+from fvsolve.step_limits.advection_limit import AdvectionLimit, limit_of
 from fvsolve.step_limits.symbol import WEIGHTS, symbol, weights_of
 from fvsolve.steppers import loop_records
 from fvsolve.steppers.analysis.method_facts import analyse
@@ -29,15 +34,13 @@ from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import METHODS, method_named
 from fvsolve.studies.outcome import Progress, name_list
 from fvsolve.studies.result_table import PlainData
+from fvsolve.studies.stability.growth import bisect
 from fvsolve.validation import COUNT, FUNCTION, NAMES, validated
 
 THRESHOLD = 1e3
 CELLS, STEPS = 100, 1000
-SMALLEST_COURANT, LARGEST_COURANT, COURANT_RATIO = (
-    0.05,
-    20.0,
-    1.1,
-)  # first and last Courant number of the search, ratio of consecutive numbers
+SMALLEST_COURANT, LARGEST_COURANT = 0.05, 20.0  # first and last Courant number of the search
+COURANT_RATIO = 1.1  # ratio of consecutive Courant numbers
 LIMIT_TOLERANCE = 1e-8  # relative width of the bracket of a limit
 FAR_TIME = 1e300
 WENO_NOISE = 1e-18  # small number of WENO, for values of size 1
@@ -149,13 +152,7 @@ def first_failure(
         low, high = high, high * ratio
         if high > LARGEST_COURANT:
             return None
-    while high - low > width * high:
-        middle = (low + high) / 2
-        if growth(middle) <= math.log10(THRESHOLD):
-            low = middle
-        else:
-            high = middle
-    return high
+    return bisect(lambda courant: not growth(courant) <= math.log10(THRESHOLD), low, high, width).fails
 
 
 def check_size(cells: int, steps: int) -> None:
@@ -176,7 +173,149 @@ def _tables(scheme: str, limiter: str, cells: int) -> tuple:
 
 
 def _rhs():
+    from fvsolve.kernels.calls import compile_as
     from fvsolve.kernels.reconstruction import rhs_periodic
     from fvsolve.steppers.run_handle import RHS
 
     return compile_as(rhs_periodic, RHS)
+
+
+# limited schemes --------------------------------------------------------------------------------------------------
+
+LIMITED_CELLS, LIMITED_STEPS, STEP_FACTORS = 50, 500, (1, 10, 100)
+LIMITED_TOLERANCE = 1e-3  # relative width of a measured limit; growth is not a smooth function of the Courant number
+SMALLEST = 0.3  # least Courant number that is run, unless a bound excludes failure up to a greater one
+RATIO = 1.02  # of consecutive Courant numbers; above a failure, a greater one may be stable again
+LIMITED_METHODS = ("euler", "ssp-rk2", "ssp-rk3", "rk4")  # by default
+NORM_CHECKS = 25  # number of checks of the norm during a run
+SHARPNESS = 0.05  # relative fall of the limit from the fewest to the most steps above which it is not sharp
+SEED = 1
+
+
+@dataclass(frozen=True)
+class LimitedLimit(PlainData):
+    """Courant limits of a limited scheme with a method.
+
+    frozen : exact limits with constant weights, by name of the resulting linear scheme
+    monotone : Courant number up to which total variation cannot grow; None if unknown
+    steps : numbers of steps of the runs
+    measured : name of the initial values (see `start_fields`) -> for each number of steps, the least Courant number
+    found to fail within these steps; None if none fails up to 20
+    least : least measured limit over the initial values, for each number of steps
+    sharp : False if `least` falls by more than 5 % from the fewest to the most steps (exponential growth alone would
+    change it less), None unless runs of both the fewest and the most steps fail
+    """
+
+    scheme: str
+    limiter: str | None
+    method: str
+    frozen: dict[str, AdvectionLimit]
+    monotone: float | None
+    cells: int
+    steps: tuple[int, ...]
+    measured: dict[str, tuple[float | None, ...]]
+
+    also = ("least", "sharp")
+
+    @property
+    def least(self) -> tuple[float | None, ...]:
+        """Least measured limit over the initial values, for each number of steps; None if no run failed."""
+        columns = zip(*self.measured.values(), strict=True)
+        return tuple(min((x for x in column if x is not None), default=None) for column in columns)
+
+    @property
+    def sharp(self) -> bool | None:
+        first, last = self.least[0], self.least[-1]
+        return None if first is None or last is None else last >= (1 - SHARPNESS) * first
+
+    def flat(self) -> dict:
+        """Values as a single row of a table, without the exact limits: name of the column -> value."""
+        cells = {"scheme": self.scheme, "limiter": self.limiter, "method": self.method, "monotone": self.monotone}
+        cells |= {"cells": self.cells, "sharp": self.sharp}
+        for start, row in self.measured.items():
+            cells |= {f"{start}, {n} steps": x for n, x in zip(self.steps, row, strict=True)}
+        return cells
+
+
+@validated(schemes=NAMES, methods=NAMES, cells=COUNT, steps=COUNT, progress=FUNCTION)
+def limited_limits(
+    schemes: Sequence[str] = tuple(LIMITED), methods: Sequence[str] | None = None, cells: int = LIMITED_CELLS,
+    steps: int = LIMITED_STEPS, progress: Progress | None = None,
+) -> list[LimitedLimit]:  # fmt: skip
+    """Courant limits of limited schemes (muscl with each limiter) with explicit methods on a periodic grid.
+
+    cells : cells of the grid; steps : real runs have 1, 10 and 100 times this number of steps
+    progress : function of (limits done, limits in total, next pair)
+    Raises FvsolveError for unknown names, implicit methods, and for too few cells or steps.
+    """
+    check_size(cells, steps)
+    report = progress or (lambda *_: None)
+    schemes = name_list(schemes) or tuple(LIMITED)
+    chosen = [method_named(name) for name in name_list(methods) or LIMITED_METHODS]
+    implicit = [tableau.name for tableau in chosen if not tableau.explicit]
+    if implicit:
+        raise FvsolveError(f"{implicit[0]} is implicit. Expected explicit methods for runs with limited schemes")
+    for name in schemes:
+        if name not in LIMITED:
+            hint = did_you_mean(name, LIMITED) or f"; limited schemes are {', '.join(LIMITED)}"
+            raise FvsolveError(f'no limited scheme named "{name}"{hint}')
+    kinds = [(name, limiter) for name in schemes for limiter in (LIMITERS if name == "muscl" else (None,))]
+    pairs = [(*kind, tableau.name) for tableau in dict.fromkeys(chosen) for kind in kinds]
+    limits = []
+    for scheme, limiter, method in pairs:
+        report(len(limits), len(pairs), f"{scheme} {limiter or ''} with {method}")
+        limits.append(limited_limit(scheme, limiter, method, cells, steps))
+    return limits
+
+
+def limited_limit(
+    scheme: str, limiter: str | None, method: str, cells: int = LIMITED_CELLS, steps: int = LIMITED_STEPS
+) -> LimitedLimit:
+    """Courant limits of a limited scheme (and the limiter of muscl) with a method, on a grid of `cells` cells."""
+    counts, name = tuple(n * steps for n in STEP_FACTORS), method_named(method).name
+    frozen = {branch: limit_of(weights, branch, method) for branch, weights in branches(scheme, limiter).items()}
+    measured = {start: tuple(measured_courant(scheme, limiter, method, u, n) for n in counts)
+                for start, u in start_fields(cells).items()}  # fmt: skip
+    monotone = monotone_limit(limiter or scheme, method)
+    return LimitedLimit(scheme, limiter, name, frozen, monotone, cells, counts, measured)
+
+
+def monotone_limit(limiter: str, method: str) -> float | None:
+    """Courant number up to which total variation cannot grow with a slope limiter and a method; None if unknown."""
+    radius = analyse(method).ssp_radius
+    return radius / (1 + LIMITERS[limiter].steepest / 2) if limiter in LIMITERS and radius > 0 else None
+
+
+def start_fields(cells: int) -> dict[str, np.ndarray]:
+    """Initial cell values with mean zero, by name: a sine wave, a square wave ("front") and random noise."""
+    j = np.arange(cells)
+    noise = np.random.default_rng(SEED).standard_normal(cells)
+    fields = {"wave": np.sin(2 * np.pi * j / cells), "front": np.where(j < cells // 2, 1.0, -1.0), "noise": noise}
+    return {name: u - u.mean() for name, u in fields.items()}
+
+
+def measured_courant(scheme: str, limiter: str | None, method: str, start: np.ndarray, steps: int) -> float | None:
+    """Least Courant number found at which the L2 norm of a real run grows 1000 times within `steps` steps.
+
+    start : initial cell values. The result is None if no Courant number up to 20 is found to fail.
+    """
+    circle = PeriodicPipe(scheme, method, start.size, limiter or "minmod")
+    smallest = monotone_limit(limiter or scheme, method) or SMALLEST
+    return first_failure(lambda courant: _growth(circle, start, courant, steps), LIMITED_TOLERANCE, smallest, RATIO)
+
+
+def _growth(circle: PeriodicPipe, start: np.ndarray, courant: float, steps: int) -> float:
+    """log10 of the growth in a run, the greatest norm over the norm at the start.
+
+    The result is inf for a growth above 1000, and if values are not finite.
+    """
+    u, greatest, done = start, 0.0, 0
+    for k in range(1, NORM_CHECKS + 1):
+        count, done = steps * k // NORM_CHECKS - done, steps * k // NORM_CHECKS
+        u = circle.run(u, courant, count) if count else u
+        if u is None:
+            return math.inf
+        greatest = max(greatest, float(np.linalg.norm(u) / np.linalg.norm(start)))
+        if greatest > THRESHOLD:
+            return math.inf
+    return math.log10(greatest) if greatest > 0 else -math.inf

@@ -1,7 +1,5 @@
 """Growth of small deviations in real runs of the compiled program, and the measured limit of the step."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,27 +10,19 @@ from fvsolve.model.energy_norm import EnergyForm
 from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
 from fvsolve.steppers import loop_records
 from fvsolve.studies.linear.operating_point import OperatingPoint
-from fvsolve.studies.stability.bisection import STEP_RATIO, StepLimit, bisect
-from fvsolve.studies.stability.power_growth import STEPS, THRESHOLD, checked_powers
+from fvsolve.studies.stability.growth import STEP_RATIO, STEPS, THRESHOLD, StepLimit, bisect, checked_powers
 
-SMALL_DEVIATIONS = 10.0 ** -np.arange(
-    6.0, 16.0
-)  # greatest deviation at the start, in units of the small deviation of states
+SMALL_DEVIATIONS = 10.0 ** -np.arange(6.0, 16.0)  # greatest at the start, in units of the small deviation of states
 CLEAR_DEVIATION = 1e-6  # a deviation of this size at the start is above round-off and Newton residuals
-DEVIATION_RATIO, GROWTH_AGREEMENT = (
-    10.0,
-    0.02,
-)  # ratio of a larger start; relative difference of growth up to which both starts agree
+DEVIATION_RATIO = 10.0  # ratio of a larger start to a smaller one
+GROWTH_AGREEMENT = 0.02  # relative difference of growth up to which both starts agree
 END_TOLERANCE = 2.0  # greatest number of steps between the ends of two runs that stop for the same reason
 STAGE_REACH = 10.0  # greatest deviation of stages of a step over that of states
 RANDOM_STARTS = 2  # random starts, besides the start with the greatest predicted growth
 SAFE_PARTS = (0.3, 0.6, 0.85)  # of the predicted limit: steps that are checked to be safe
 TIME_LIMIT = 20.0  # time limit of a measured limit [s]
 UNLIMITED_STEPS = (10.0, 100.0)  # steps over 1 / ||J|| that are run if no step is predicted to fail
-MAX_WIDENINGS, MAX_REDUCTIONS = (
-    12,
-    40,
-)  # greatest number of factors 1.3 upwards and downwards in the search for a bracket
+MAX_WIDENINGS, MAX_REDUCTIONS = 12, 40  # greatest number of factors 1.3 up and down in the search for a bracket
 
 
 class RealRuns:
@@ -47,17 +37,20 @@ class RealRuns:
 
     def __init__(self, at: OperatingPoint, method: str, form: EnergyForm, worst=None, steps: int = STEPS,
                  threshold: float = THRESHOLD, small: float | None = None, a=None) -> None:  # fmt: skip
-        self.at, self.method, self.form, self.longest_tried = at, method, form, 0.0
-        self.states = at.model.y_size
-        self.steps, self.threshold = steps, threshold
+        self.at, self.method, self.form = at, method, form
+        self.prepare(at.model.y_size, steps, threshold)
         rng = np.random.default_rng(7)
         starts = [*([] if worst is None else [worst]), *rng.standard_normal((RANDOM_STARTS, form.size))]
         deviations = [self.as_deviation(start) for start in starts]
         self.starts = [(y, small or self.linear_width(y, a)) for y in deviations]
-        self.check_steps = checked_powers(self.steps)
-        self.strides = np.diff([0, *self.check_steps]).astype(float)
         self.at_rest = not np.any(at.rate)
         self.structure = at.model.structure
+
+    def prepare(self, states: int, steps: int, threshold: float) -> None:
+        """Set the fields that all kinds of runs have; states : number of states, for messages."""
+        self.states, self.steps, self.threshold, self.longest_tried = states, steps, threshold, 0.0
+        self.check_steps = checked_powers(steps)
+        self.strides = np.diff([0, *self.check_steps]).astype(float)
         self.latest = time.monotonic() + TIME_LIMIT
 
     def as_deviation(self, start: np.ndarray) -> np.ndarray:
@@ -89,12 +82,8 @@ class RealRuns:
 
     def loop(self, y: np.ndarray, h: float) -> RunLoop:
         """Run loop that starts from the state y with fixed steps of h [s]."""
-        model = self.at.model
-        changes = {"method": self.method, "step": h, "courant": None, "rtol": None}
-        numerics = model.case.numerics.model_copy(update=changes)
-        loop = RunLoop(replace(model, case=replace(model.case, numerics=numerics)), lambda: self.structure)
+        loop = fixed_step_loop(self.at.model, lambda: self.structure, self.method, h, self.at.t)
         loop.now[:], loop.armed[:] = y, self.at.armed
-        loop.state["t"] = self.at.t
         loop.begin(self.at.t + 2.0 * self.steps * h, NO_LIMIT)
         return loop
 
@@ -131,9 +120,8 @@ class RealRuns:
 
         def state(k: int) -> np.ndarray | None:
             while run and len(states) <= k:
-                states.append(
-                    run.now.copy() if run.run(self.strides[len(states)]) == loop_records.BUDGET_SPENT else None
-                )
+                continues = run.run(self.strides[len(states)]) == loop_records.BUDGET_SPENT
+                states.append(run.now.copy() if continues else None)
             return states[k] if run else self.at.y
 
         return state
@@ -144,19 +132,34 @@ class RealRuns:
         The run ends when the growth exceeds the threshold. The growth is infinite if a run stops because of the step.
         base_at : result of `base_states`. Raises TimeoutError at the time limit.
         """
-        size, after, run = 1.0, 0, self.loop(self.at.y + start, h)
-        first = np.linalg.norm(self.form.forward @ start)
+        run, first = self.loop(self.at.y + start, h), np.linalg.norm(self.form.forward @ start)
+
+        def growth(k: int) -> float:
+            base = base_at(k)
+            if base is None or run.run(self.strides[k]) != loop_records.BUDGET_SPENT:
+                return -1.0 if self.state_end_time(h) <= self.check_steps[k] * h else np.inf
+            return float(np.linalg.norm(self.form.forward @ (run.now - base))) / first
+
+        return self.greatest(growth)
+
+    def greatest(self, growth: Callable[[int], float]) -> tuple[float, int]:
+        """(greatest growth at all checks, number of steps after which it is reached).
+
+        growth : growth at check number k; inf if a run stops because of the step, -1 if the model ends there
+        The checks end when the growth exceeds the threshold, or is not a number, which counts as infinite, and at the
+        end of the model. Raises TimeoutError at the time limit.
+        """
+        size, after = 1.0, 0
         for k, n in enumerate(self.check_steps):
             if time.monotonic() > self.latest:
                 raise TimeoutError
-            base = base_at(k)
-            if base is None or run.run(self.strides[k]) != loop_records.BUDGET_SPENT:
-                return (size, after) if self.state_end_time(h) <= n * h else (np.inf, n)
-            growth = float(np.linalg.norm(self.form.forward @ (run.now - base))) / first
-            if not growth <= self.threshold:
-                return growth if growth > self.threshold else np.inf, n
-            if growth > size:
-                size, after = growth, n
+            now = growth(k)
+            if not now <= self.threshold:
+                return now if now > self.threshold else np.inf, n
+            if now < 0.0:
+                break
+            if now > size:
+                size, after = now, n
         return size, after
 
     def state_end_time(self, h: float) -> float:
@@ -165,12 +168,12 @@ class RealRuns:
         If runs with the steps h and h / 2 stop at the same time, the model ends there (such as a piston at the end of
         its cylinder), and the step h has not failed.
         """
-        ends = [self.break_time(self.loop(self.at.y, step), self.steps * h / step) for step in (h, 0.5 * h)]
+        ends = []
+        for step in (h, 0.5 * h):
+            run = self.loop(self.at.y, step)
+            reached = run.run(self.steps * h / step) in (loop_records.BUDGET_SPENT, loop_records.DONE)
+            ends.append(np.inf if reached else run.t - self.at.t)
         return min(ends) if abs(ends[0] - ends[1]) <= END_TOLERANCE * h else np.inf
-
-    def break_time(self, run: RunLoop, steps: float) -> float:
-        """Time [s] from the operating point at which a run stops within a number of steps; inf if it does not stop."""
-        return np.inf if run.run(steps) in (loop_records.BUDGET_SPENT, loop_records.DONE) else run.t - self.at.t
 
     def fails(self, h: float) -> bool:
         """True if the growth of a deviation with steps of h [s] exceeds the threshold."""
@@ -188,69 +191,70 @@ class RealRuns:
         high = guess
         for _ in range(MAX_WIDENINGS):
             if self.fails(high * 1.03):
-                return bisect(
-                    self.fails,
-                    high / STEP_RATIO if self.safe(high / STEP_RATIO) else SAFE_PARTS[-1] * guess,
-                    high * 1.03,
-                )
+                low = SAFE_PARTS[-1] * guess if self.fails(high / STEP_RATIO) else high / STEP_RATIO
+                return bisect(self.fails, low, high * 1.03)
             high *= STEP_RATIO
         return StepLimit(np.inf, np.inf)
-
-    def safe(self, h: float) -> bool:
-        """True if the growth of deviations with steps of h [s] does not exceed the threshold."""
-        return not self.fails(h)
 
     def limit_below(self, high: float) -> StepLimit:
         """Limit of the step below a step `high` [s] that fails; nan if no safe step is found."""
         for _ in range(MAX_REDUCTIONS):
-            if self.safe(high / STEP_RATIO):
+            if not self.fails(high / STEP_RATIO):
                 return bisect(self.fails, high / STEP_RATIO, high)
             high /= STEP_RATIO
         return StepLimit(np.nan, high)
+
+    def columns(self, guess: float, size: float) -> dict[str, float]:
+        """Columns of a stability row: limit of real runs, `measured` [s], and a step above it, `measured_up_to` [s].
+
+        `measured_up_to` is a step with which runs fail, or the longest tested step if none fails.
+        guess : predicted limit [s]; if it is infinite, runs with two long steps are made
+        size : norm of the Jacobian [1/s]. The result is empty if `guess` is 0, or if `guess` is infinite and `size` is
+        0. Raises TimeoutError at the time limit.
+        """
+        if np.isfinite(guess) and guess > 0.0:
+            return self.limit_columns(guess)
+        if guess == 0.0 or size == 0.0:
+            return {}
+        passed = 0.0
+        try:
+            for factor in UNLIMITED_STEPS:
+                if self.fails(factor / size):
+                    return {"measured": self.limit_below(factor / size).step, "measured_up_to": factor / size}
+                passed = factor / size
+        except TimeoutError:
+            if passed == 0.0:
+                raise
+        return {"measured": np.inf, "measured_up_to": passed}
+
+    def limit_columns(self, guess: float) -> dict[str, float]:
+        """Columns of `columns` with the limit that is found around a step `guess` [s]."""
+        limit = self.limit(guess)
+        fails = limit.fails if np.isfinite(limit.fails) else self.longest_tried
+        return {"measured": limit.step, "measured_up_to": fails}
 
 
 def measure_limit(
     runs: RealRuns, guess: float, size: float, left_out: dict[str, str], quantity: str = "measured"
 ) -> dict:
-    """Columns of a stability row with the limit of real runs, see `measured_limit_of`; empty if not found in time.
+    """Columns of a stability row with the limit of real runs, see `RealRuns.columns`; empty if not found in time.
 
     quantity : name under which `left_out` then receives the reason
     """
     try:
-        return measured_limit_of(runs, guess, size)
+        return runs.columns(guess, size)
     except TimeoutError:
-        left_out[quantity] = too_long(runs)
+        left_out[quantity] = f"real runs of {runs.states} states take longer than {TIME_LIMIT:g} s"
         return {}
 
 
-def too_long(runs: RealRuns) -> str:
-    """Reason for a missing measured limit: real runs take too long."""
-    return f"real runs of {runs.states} states take longer than {TIME_LIMIT:g} s"
+def fixed_step_loop(model, structure: Callable, method: str, h: float, t: float) -> RunLoop:
+    """Run loop of a model with a method and fixed steps of h [s], at the time t [s].
 
-
-def measured_limit_of(runs: RealRuns, guess: float, size: float) -> dict:
-    """Dict with the limit of real runs, `measured` [s], and a step above it, `measured_up_to` [s].
-
-    `measured_up_to` is a step with which runs fail, or the longest tested step if none fails.
-    guess : predicted limit [s]; if it is infinite, runs with two long steps are made
-    size : norm of the Jacobian [1/s]. The dict is empty if `guess` is 0, or if `guess` is infinite and `size` is 0.
-    Raises TimeoutError at the time limit.
+    structure : function that returns the `Structure` of the model
     """
-    if np.isfinite(guess) and guess > 0.0:
-        limit = runs.limit(guess)
-        return {
-            "measured": limit.step,
-            "measured_up_to": limit.fails if np.isfinite(limit.fails) else runs.longest_tried,
-        }
-    if guess == 0.0 or size == 0.0:
-        return {}
-    passed = 0.0
-    try:
-        for factor in UNLIMITED_STEPS:
-            if runs.fails(factor / size):
-                return {"measured": runs.limit_below(factor / size).step, "measured_up_to": factor / size}
-            passed = factor / size
-    except TimeoutError:
-        if passed == 0.0:
-            raise
-    return {"measured": np.inf, "measured_up_to": passed}
+    changes = {"method": method, "step": h, "courant": None, "rtol": None}
+    numerics = model.case.numerics.model_copy(update=changes)
+    loop = RunLoop(replace(model, case=replace(model.case, numerics=numerics)), structure)
+    loop.state["t"] = t
+    return loop

@@ -16,28 +16,39 @@ from pathlib import Path
 import numpy as np
 
 from fvsolve.case import load
-from fvsolve.errors import FvsolveError, RunError
+from fvsolve.errors import FvsolveError
 from fvsolve.model.energy_norm import EnergyForm, energy_form
 from fvsolve.schemes import SCHEMES, branches
 from fvsolve.steppers import automatic, method_named
 from fvsolve.steppers.tableau import AUTO
-from fvsolve.studies.case_pickle import PickledCase
-from fvsolve.studies.delay_line_keys import delay_lines, fixed_choices
-from fvsolve.studies.linear.eigenvalues import Spectrum, find_eigenvalues
-from fvsolve.studies.linear.linearise import Linear, linearise_at
+from fvsolve.studies.linear.linearise import Linear, Spectrum, find_eigenvalues, linearise_at
 from fvsolve.studies.linear.operating_point import OperatingPoint, has_limiter, operating_point, with_weights
-from fvsolve.studies.outcome import Progress, name_list
-from fvsolve.studies.parallel import TaskPool
+from fvsolve.studies.outcome import STUDY_ARGUMENTS, Progress, name_list
+from fvsolve.studies.parallel import PickledCase, TaskPool, Work
+from fvsolve.studies.resolution import delay_lines, fixed_choices
 from fvsolve.studies.result_cache import ResultCache, case_key
-from fvsolve.studies.stability.bound_notes import bound_notes
-from fvsolve.studies.stability.delay_line_row import delayed_row
-from fvsolve.studies.stability.growth_method import growth_method, predicted_limit
-from fvsolve.studies.stability.power_growth import DENSE, STEPS, THRESHOLD
+from fvsolve.studies.result_table import PlainData
+from fvsolve.studies.stability.delay_line_limits import delayed_row
+from fvsolve.studies.stability.growth import (
+    DENSE,
+    STEPS,
+    THRESHOLD,
+    TIME_LIMIT,
+    VECTORS,
+    TooLarge,
+    growth_method,
+    predicted_limit,
+)
 from fvsolve.studies.stability.real_runs import RealRuns, measure_limit
-from fvsolve.studies.stability.region_bounds import MAX_STATES, field_of_values, region_limit
-from fvsolve.studies.stability.stability_row import StabilityRow, row_from_json
-from fvsolve.studies.stability.vector_growth import TIME_LIMIT, VECTORS, TooLarge
-from fvsolve.validation import COUNT, FLAG, FUNCTION, NAMES, NUMBER, PATH, TABLE, TEXT, validated
+from fvsolve.studies.stability.stability_row import (
+    MAX_STATES,
+    StabilityRow,
+    bound_notes,
+    field_of_values,
+    region_limit,
+    row_from_json,
+)
+from fvsolve.validation import COUNT, FLAG, NAMES, NUMBER, PATH, validated
 
 AUTO_NOTE = (
     f"auto starts with {automatic.EXPLICIT}, and its row is that of {automatic.EXPLICIT}; a run continues with "
@@ -48,7 +59,7 @@ LONGER_FACTOR = 10  # factor of the number of steps in longer runs of Euler with
 
 
 @dataclass(frozen=True)
-class Stability:
+class Stability(PlainData):
     """Result of a stability study: a row for each scheme and method, and notes.
 
     systems : {scheme: function of the scheme that returns its `LinearSystem`, computed on first use}
@@ -59,13 +70,11 @@ class Stability:
     notes: tuple[str, ...]
     systems: dict[str, Callable[[str], LinearSystem]] = field(repr=False)
 
+    json = "case rows said=notes"
+
     def system(self, scheme: str) -> LinearSystem:
         """Linear system with one of the requested schemes; raises FvsolveError for a limited scheme."""
         return self.systems[scheme](scheme)
-
-    def plain(self) -> dict:
-        """Data for JSON."""
-        return {"case": self.case, "rows": [row.plain() for row in self.rows], "said": self.notes}
 
 
 class LinearSystem:
@@ -104,17 +113,7 @@ class LinearSystem:
 
 
 @validated(
-    schemes=NAMES,
-    methods=NAMES,
-    at=NUMBER,
-    before=FLAG,
-    steps=COUNT,
-    threshold=NUMBER,
-    set=TABLE,
-    out=PATH,
-    progress=FUNCTION,
-    jobs=COUNT,
-    dask=TEXT,
+    schemes=NAMES, methods=NAMES, at=NUMBER, before=FLAG, steps=COUNT, threshold=NUMBER, out=PATH, **STUDY_ARGUMENTS
 )
 def stability(
     case, schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None, at: float | None = None,
@@ -133,9 +132,8 @@ def stability(
     prediction that takes too long, and for too few steps or too small a threshold.
     """
     if steps < 10 or not threshold > 1.0:
-        raise FvsolveError(
-            f"steps = {steps}, threshold = {threshold:g}: expected at least 10 steps and a threshold above 1"
-        )
+        given = f"steps = {steps}, threshold = {threshold:g}"
+        raise FvsolveError(f"{given}: expected at least 10 steps and a threshold above 1")
     case = load(case, dict(set or {}))
     case = load(case, fixed_choices(case))
     if delay_lines(case) and at is not None:
@@ -149,9 +147,8 @@ def stability(
     work, pairs = RowTask(case, **requested), [*itertools.product(schemes, methods)]
     with ResultCache(out) as points, TaskPool(work, jobs, dask) as pool:
         rows = cached_rows(points, case, requested, pairs, pool, progress or (lambda *_: None))
-    return Stability(
-        case.name, tuple(map(row_from_json, rows)), texts, {scheme: work.maker(scheme).system for scheme in schemes}
-    )
+    systems = {scheme: work.maker(scheme).system for scheme in schemes}
+    return Stability(case.name, tuple(map(row_from_json, rows)), texts, systems)
 
 
 def cached_rows(points: ResultCache, case, options: dict, pairs: list, pool: TaskPool, report: Progress) -> list[dict]:
@@ -176,8 +173,10 @@ def cached_rows(points: ResultCache, case, options: dict, pairs: list, pool: Tas
     return rows
 
 
-class RowTask:
+class RowTask(Work):
     """Task that computes rows of a stability study of a case, in this or another process."""
+
+    unsent = ("makers",)
 
     def __init__(self, case, **options) -> None:
         self.pickled_case, self.options = PickledCase(case), options
@@ -193,13 +192,8 @@ class RowTask:
             self.makers[scheme] = SchemeRows(load(self.pickled_case.source), scheme, **self.options)
         return self.makers[scheme]
 
-    def lost_result(self, pair: tuple[str, str]) -> dict:
-        """Raise RunError for a row whose process has ended."""
-        raise RunError(f"the process for the row of {' with '.join(pair)} was killed repeatedly. Is there enough "
-                       "memory?")  # fmt: skip
-
-    def __getstate__(self) -> dict:
-        return {"pickled_case": self.pickled_case, "options": self.options, "makers": {}}
+    def process_text(self, pair: tuple[str, str]) -> str:
+        return f"for the row of {' with '.join(pair)}"
 
 
 class SchemeRows:
@@ -235,8 +229,7 @@ class SchemeRows:
             return
         for name, weights in branches(self.scheme, at.model.case.numerics.limiter).items():
             if name not in self.systems:
-                cells = sum(weight != 0 for weight in weights)
-                # degree of the polynomials at pipe ends
+                cells = sum(weight != 0 for weight in weights)  # which set the degree of the polynomials at pipe ends
                 degree = min(cells - 1, 4) if self.scheme == "weno5" else int(name != "upwind")
                 point = replace(self.at("upwind5"), y=at.y)
                 self.systems[name] = LinearSystem(with_weights(point, tuple(map(float, weights)), degree))
@@ -267,6 +260,11 @@ class SchemeRows:
                          f"step matrix applied to {VECTORS} start vectors")  # fmt: skip
         return StabilityRow(**row | {"notes": tuple(notes)})
 
+    def first_columns(self, at: OperatingPoint, method) -> dict:
+        """Columns that name the pair and the operating point."""
+        return {"scheme": self.scheme, "method": method.name, "when": at.when, "states": at.model.y_size,
+                "steps": self.steps, "threshold": self.threshold}  # fmt: skip
+
     def bound_columns(self, side: LinearSystem, method) -> dict:
         """Columns of a row that do not need powers of the step matrix: names, sizes, bounds of the step.
 
@@ -274,16 +272,14 @@ class SchemeRows:
         """
         model, left_out = side.at.model, {}
         values = side.spectrum
-        row = {
-            "scheme": self.scheme, "method": method.name, "when": side.at.when,
-            "states": model.y_size, "steps": self.steps, "threshold": self.threshold, "rate": side.rate,
+        row = self.first_columns(side.at, method) | {
+            "rate": side.rate,
             "eigenvalues": region_limit(method, values.values),
             "greatest_real": float(values.values.real.max(initial=0.0)),
-        }  # fmt: skip
+        }
         if not values.complete:
-            left_out["eigenvalues"] = (
-                f"the limit may be lower; it is computed from some eigenvalues, {values.description}"
-            )
+            some = f"it is computed from some eigenvalues, {values.description}"
+            left_out["eigenvalues"] = f"the limit may be lower; {some}"
         if model.y_size <= MAX_STATES:
             row["field_of_values"] = region_limit(method, side.field)
         else:
@@ -308,30 +304,19 @@ class SchemeRows:
                     starts[limit.step] = growth.growth(limit.fails).start
         except TooLarge as error:
             left_out["frozen weights"] = str(error)
-        guess = (
-            sorted(starts)[len(starts) // 2] if starts else np.inf
-        )  # the middle value, between those of small and large slopes
+        # the middle value, between those of small and large slopes
+        guess = sorted(starts)[len(starts) // 2] if starts else np.inf
         if left_out and not starts:
             guess = von_neumann_limit(SCHEMES[self.scheme].smooth.name, method) / side.rate or np.inf
-        runs = RealRuns(at, method.name, side.form, starts.get(guess), self.steps, self.threshold, LIMITED_DEVIATION)
-        row = {
-            "scheme": self.scheme, "method": method.name, "when": at.when, "states": at.model.y_size,
-            "steps": self.steps, "threshold": self.threshold, "rate": side.rate, "frozen": limits, "left_out": left_out,
-        }  # fmt: skip
-        row |= measure_limit(runs, guess, growth.size, row["left_out"])
+
+        def runs(steps: int) -> RealRuns:
+            return RealRuns(at, method.name, side.form, starts.get(guess), steps, self.threshold, LIMITED_DEVIATION)
+
+        row = self.first_columns(at, method) | {"rate": side.rate, "frozen": limits, "left_out": left_out}
+        row |= measure_limit(runs(self.steps), guess, growth.size, left_out)
         if method.stages == 1 and method.explicit and np.isfinite(row.get("measured", np.nan)):
-            longer = RealRuns(
-                at,
-                method.name,
-                side.form,
-                starts.get(guess),
-                LONGER_FACTOR * self.steps,
-                self.threshold,
-                LIMITED_DEVIATION,
-            )
-            row["longer"] = measure_limit(longer, row["measured"], 0.0, row["left_out"], "longer").get(
-                "measured", np.nan
-            )
+            longer = measure_limit(runs(LONGER_FACTOR * self.steps), row["measured"], 0.0, left_out, "longer")
+            row["longer"] = longer.get("measured", np.nan)
         return StabilityRow(**row | {"notes": tuple(bound_notes(StabilityRow(**row), side, None))})
 
 

@@ -1,10 +1,19 @@
-"""Row of a stability study, with conversion to and from JSON."""
+"""Row of a stability study: columns, bounds of the step, and notes on bounds that differ from the actual limit.
 
-from __future__ import annotations
+Arguments of functions that make notes : row, the `StabilityRow`; side, the `LinearSystem` of its scheme; system, the
+result of `growth_method`, which computes the growth of deviations
+"""
 
 from dataclasses import asdict, dataclass, field
 
 import numpy as np
+
+from fvsolve.errors import listing
+from fvsolve.steppers import analyse
+from fvsolve.steppers.tableau import Method
+from fvsolve.studies.linear.linearise import ZERO_TOLERANCE
+from fvsolve.studies.linear.operating_point import has_limiter
+from fvsolve.studies.stability.growth import TooLarge, bisect_limit
 
 
 @dataclass(frozen=True)
@@ -90,3 +99,181 @@ def row_from_json(data: dict) -> StabilityRow:
             fields[name] = values[value]
     fields["frozen"] = {name: values.get(step, step) for name, step in fields["frozen"].items()}
     return StabilityRow(**fields | {"notes": tuple(fields["notes"])})
+
+
+# bounds -----------------------------------------------------------------------------------------------------------
+
+MODULUS_MARGIN = 1e-9  # |R| may exceed 1 by this: round-off of eigenvalues
+POINTS_PER_SIDE = 8  # points along each side of the polygon inscribed in a field of values
+TANGENTS = 49  # tangents to a field of values in the upper half plane
+MAX_STATES = 400  # greatest number of states for which a field of values is computed
+MAX_HS = 1e5  # greatest h |s| of the search
+
+
+def region_limit(method: Method, points: np.ndarray) -> float:
+    """Greatest step h [s] for which all points s [1/s] times any shorter step are in the stability region.
+
+    The result is 0 if there is no such step, inf if all steps are possible. Points within 1e-10 of the imaginary axis
+    (round-off, relative to the greatest |s|) are moved onto it, and points within 1e-10 of 0 are left out. Points to
+    the right of the axis allow no step.
+    """
+    size = np.max(np.abs(points), initial=0.0)
+    points = points[np.abs(points) > ZERO_TOLERANCE * size]
+    if size == 0.0 or not points.size:
+        return np.inf
+    on_axis = np.abs(points.real) <= ZERO_TOLERANCE * size
+    facts = analyse(method)
+    if np.any(points.real[~on_axis] > 0.0) or (np.any(on_axis) and facts.imaginary_interval == 0.0):
+        return 0.0
+    if facts.a_stable:
+        return np.inf
+    points = np.where(on_axis, 1j * points.imag, points)
+    r = facts.stability_function
+
+    def outside(h: float) -> bool:
+        with np.errstate(all="ignore"):
+            return not bool(np.all(np.abs(r(h * points)) <= 1.0 + MODULUS_MARGIN))
+
+    return bisect_limit(outside, 0.05 / size, MAX_HS / size, rise=1.02, fine=1e-7).step
+
+
+def field_of_values(e: np.ndarray) -> np.ndarray:
+    """Points on a polygon inscribed in the field of values of the real matrix E : complex[m].
+
+    The field of values is the set of all x* E x with |x| = 1. Its tangent at an angle touches it at x* E x, where x is
+    the eigenvector of the greatest eigenvalue of the Hermitian part of exp(-i angle) E (Johnson 1978). The lower half
+    mirrors the upper half.
+    """
+    from scipy.linalg import eigh
+
+    n = e.shape[0]
+    points = []
+    for angle in np.linspace(0.0, np.pi, TANGENTS):
+        rotated = np.exp(-1j * angle) * e
+        x = eigh(0.5 * (rotated + rotated.conj().T), subset_by_index=[n - 1, n - 1], check_finite=False)[1][:, 0]
+        points.append(np.vdot(x, e @ x))
+    upper = np.array(points)
+    corners = np.concatenate([upper, upper[::-1].conj()])
+    share = np.arange(POINTS_PER_SIDE) / POINTS_PER_SIDE
+    return np.concatenate([a + (b - a) * share for a, b in zip(corners, np.roll(corners, -1), strict=True)])
+
+
+# notes ------------------------------------------------------------------------------------------------------------
+
+AGREEMENT = 0.02  # relative difference of a bound and the prediction below which no note is needed
+GROWTH_FLOOR = 1e-9  # of the greatest wave rate or eigenvalue: real parts below are round-off
+
+
+def bound_notes(row, side, system) -> list[str]:
+    """Notes on a row of a stability study, as texts; `system` is None for a limited scheme."""
+    texts = case_notes(row, side)
+    if row.limited:
+        return texts + limiter_notes(row, side.at.model)
+    if not np.isfinite(row.predicted):
+        texts.append("in linearised form no step up to 1e4 / ||J|| fails (J: Jacobian)")
+        if np.isfinite(row.measured):
+            texts.append(f"only the linear system never fails; real runs fail from h = {row.measured:.5g} s on: in "
+                         f"{row.steps} such steps the solution leaves the linearised state, and nonlinear laws "
+                         "determine the growth")  # fmt: skip
+        return texts
+    if "eigenvalues" not in row.left_out:
+        texts += eigenvalue_notes(row, system)
+    texts += field_of_values_notes(row, side)
+    texts += von_neumann_notes(row)
+    if np.isinf(row.measured):
+        texts.append(f"no real run fails, up to h = {row.measured_up_to:.3g} s: the state moves away from the "
+                     "linearised state, or nonlinear laws stop the growth")  # fmt: skip
+    if np.isfinite(row.difference) and abs(row.difference) > 0.01:
+        reason = "the deviation does not stay linear"
+        if state_moves(side):
+            reason = (f"{row.steps} steps of the predicted limit take {row.steps * row.predicted:.3g} s, and meanwhile "
+                      "the state leaves the linearised state; the prediction is for that state only")  # fmt: skip
+        texts.append(f"prediction and measurement differ by {100 * row.difference:+.1f} %: {reason}")
+    return texts
+
+
+def case_notes(row, side) -> list[str]:
+    """Notes on the operating point and the case, which do not depend on the method."""
+    texts = []
+    growing = row.greatest_real > 0.0
+    if growing and row.greatest_real > GROWTH_FLOOR * max(row.rate, np.abs(side.spectrum.values).max(initial=0.0)):
+        rate = f"{row.greatest_real:.3g} 1/s"
+        texts.append(f"the case itself is unstable, with a growth rate of {rate}, not because of long steps")
+    if side.full_form is not side.form:
+        texts.append(f"{listing(side.idle)}: free motion stores no energy, but states with energy depend on it; "
+                     "the norm includes this motion, with the least weight of all states")  # fmt: skip
+    elif side.idle:
+        texts.append(f"{listing(side.idle)}: free motion stores no energy and is left out")
+    model = side.at.model
+    if model.cells and model.case.scalars and model.case.numerics.scheme != "upwind" and not has_limiter(model):
+        texts.append("scalars in pipes are computed without slopes in cells, because their limiter has no derivative")
+    if state_moves(side):
+        texts.append("the state is not steady: deviations are measured from a run that starts at this state, with "
+                     "schedules held constant")  # fmt: skip
+    return texts
+
+
+def state_moves(side) -> bool:
+    """True if the operating point of the `LinearSystem` `side` is not steady."""
+    return bool(np.max(np.abs(side.at.rate) / side.at.model.scale) > 1e-9)
+
+
+def eigenvalue_notes(row, system) -> list[str]:
+    """Notes on the bound by eigenvalues, compared with the predicted limit."""
+    if np.isinf(row.eigenvalues) or row.eigenvalues > (1.0 + AGREEMENT) * row.predicted:
+        if np.isinf(row.eigenvalues):
+            return ["eigenvalues allow every step, but deviations grow at some steps: the Jacobian J is not normal"]
+        try:
+            after = system.failing_after(0.99 * row.eigenvalues)
+        except TooLarge:
+            after = 0
+        if after:
+            return [f"eigenvalues are misleading: the Jacobian J is not normal; 1 % below their limit growth exceeds "
+                    f"{row.threshold:g} after {after} steps"]  # fmt: skip
+        return ["eigenvalues allow longer steps than the growth of deviations does: the Jacobian J is not normal"]
+    if row.eigenvalues < (1.0 - AGREEMENT) * row.predicted:
+        return [f"above the limit of the eigenvalues a mode grows, but by less than a factor of {row.threshold:g} in "
+                f"{row.steps} steps: longer runs fail at smaller steps"]  # fmt: skip
+    return []
+
+
+def field_of_values_notes(row, side) -> list[str]:
+    """Notes on the bound by the field of values, which is too strict with pipe ends of high order."""
+    if np.isnan(row.field_of_values) or row.field_of_values > (1.0 - AGREEMENT) * row.predicted:
+        return []
+    if row.field_of_values == 0.0:
+        reach = float(side.field.real.max())
+        if reach > GROWTH_FLOOR * np.abs(side.field).max():
+            return [f"the field of values allows no step: it reaches {reach:.3g} 1/s into the right half plane; energy "
+                    "can grow at first (pipe ends with a scheme above first order, or a gain in the case). This is not "
+                    "a failure"]  # fmt: skip
+        touches = "it touches the imaginary axis at points outside the stability region"
+        return [f"the field of values allows no step: {touches}"]
+    return ["the bound by the field of values is below the predicted limit here"]
+
+
+def von_neumann_notes(row) -> list[str]:
+    """Notes on von Neumann's limit (interior of a uniform pipe), compared with the limit of the case."""
+    if np.isnan(row.von_neumann):
+        return []
+    if row.von_neumann > (1.0 + AGREEMENT) * row.predicted:
+        return ["von Neumann's limit is misleading: pipe ends, nodes or other parts limit the step, not the interior"]
+    if row.von_neumann < (1.0 - AGREEMENT) * row.predicted:
+        return ["von Neumann's limit holds for any number of steps and any wavelength; in this case growth remains "
+                f"below the threshold of {row.threshold:g} in {row.steps} steps"]  # fmt: skip
+    return []
+
+
+def limiter_notes(row, model) -> list[str]:
+    """Notes on a limited scheme, whose weights are held constant in predictions."""
+    frozen = "these weights give the limits in this row"
+    if model.cavitates:
+        frozen = "in pipes with cavities only the weights of upwind are used"
+    elif model.basins:
+        frozen = "in basins only the weights of upwind are used"
+    texts = [f"{row.scheme} has no derivative at a constant state, so its limit is measured; in predictions its "
+             f"weights are held constant: {frozen}"]  # fmt: skip
+    if np.isfinite(row.longer):
+        texts.append(f"Euler with a limiter has no sharp limit: Courant number {row.courant(row.measured):.3g} in "
+                     f"{row.steps} steps, {row.courant(row.longer):.3g} in {10 * row.steps} steps")  # fmt: skip
+    return texts

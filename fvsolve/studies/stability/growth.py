@@ -1,0 +1,395 @@
+"""Growth of small deviations over many steps of a linear system, and the least step that fails.
+
+The growth is the greatest norm of R(h J)^n over n <= N steps, in the energy norm, with the step h, the Jacobian J and
+the stability function R of the method. A step fails if the growth exceeds 1000.
+
+Arguments of several functions : e, Jacobian in coordinates of the energy norm [1/s]; steps, number of steps over which
+growth counts; threshold, growth above which a step fails; latest, time of the monotonic clock [s] from which
+`VectorGrowth` raises TooLarge; default: in 30 s
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fvsolve.errors import FvsolveError
+from fvsolve.steppers import stability_function
+from fvsolve.steppers.tableau import Method
+
+BRACKET_WIDTH = 1e-4  # relative width of the final bracket
+STEP_RATIO = 1.3  # ratio of consecutive steps of the search upwards
+
+
+class StepLimit(NamedTuple):
+    """Result of a search: greatest step found safe, `step` [s], and least step found to fail, `fails` [s].
+
+    Both are inf if no failure was found, and nan if nothing was computed; `step` is 0 or nan if no safe step was found.
+    """
+
+    step: float
+    fails: float
+
+
+def bisect_limit(
+    fails: Callable[[float], bool], first: float, far: float, rise: float = STEP_RATIO, fine: float = BRACKET_WIDTH
+) -> StepLimit:
+    """Find the least step h [s] at which fails(h) is true, by a search upwards and bisection.
+
+    The search starts at `first` and multiplies the step by `rise`. Bisection ends at the relative width `fine`. If
+    `first` fails, it is halved down to 1e-9 of its value; if all these steps fail, the limit `StepLimit.step` is 0. If
+    no step up to `far` fails, the limit is inf.
+    """
+    low, high = 0.0, first
+    if fails(high):
+        while high > 1e-9 * first:
+            low, high = 0.5 * high, high
+            if not fails(low):
+                break
+            high = low
+        else:
+            return StepLimit(0.0, high)
+    else:
+        while not fails(rise * high):
+            high *= rise
+            if high > far:
+                return StepLimit(np.inf, np.inf)
+        low, high = high, rise * high
+    return bisect(fails, low, high, fine)
+
+
+def bisect(fails: Callable[[float], bool], low: float, high: float, fine: float = BRACKET_WIDTH) -> StepLimit:
+    """Bisect between a safe step `low` [s] and a failing step `high` [s], to the relative width `fine`."""
+    while high - low > fine * high:
+        middle = 0.5 * (low + high)
+        if fails(middle):
+            high = middle
+        else:
+            low = middle
+    return StepLimit(low, high)
+
+
+# powers of the step matrix ----------------------------------------------------------------------------------------
+
+THRESHOLD = 1e3
+STEPS = 1000
+DENSE = 500  # greatest number of states for which powers are matrices; above, vectors are propagated
+MAX_HJ = 1e4  # greatest h ||J|| of the search
+CHECKED_STEPS = 11  # steps whose powers are all checked if a few powers show no failure
+
+
+class Growth(NamedTuple):
+    """Greatest growth found, `size` (inf: not finite), after `steps` steps.
+
+    start, end : float64[n]  deviation with this growth at its start and at its end, scaled to norm 1
+    """
+
+    size: float
+    steps: int
+    start: np.ndarray
+    end: np.ndarray
+
+
+def step_matrix(method: Method, e: np.ndarray) -> np.ndarray:
+    """Matrix of a step of a linear system : float64[n, n], R(E) with the stability function R and E = h J.
+
+    e : float64[n, n]  step times Jacobian. It is computed by Horner's rule for explicit methods, and from the linear
+    system of the stages for implicit methods.
+    """
+    n = e.shape[0]
+    if method.explicit:
+        coefficients = [float(x) for x in stability_function(method).numerator.coefficients]
+        result = coefficients[-1] * np.eye(n)
+        for x in coefficients[-2::-1]:
+            result = e @ result
+            result[np.diag_indices(n)] += x
+        return result
+    a, b, s = method.a, method.b, method.stages
+    if not np.any(np.triu(a, 1)):
+        stages: list[np.ndarray] = []
+        for i in range(s):
+            right = e + e @ sum((a[i, j] * stages[j] for j in range(i) if a[i, j] != 0.0), np.zeros((n, n)))
+            stages.append(np.linalg.solve(np.eye(n) - a[i, i] * e, right) if a[i, i] != 0.0 else right)
+    else:
+        solved = np.linalg.solve(np.eye(s * n) - np.kron(a, e), np.tile(e, (s, 1)))
+        stages = [solved[i * n : (i + 1) * n] for i in range(s)]
+    return np.eye(n) + sum(b[i] * stages[i] for i in range(s))
+
+
+def norm_exceeds(m: np.ndarray, threshold: float) -> bool:
+    """True if the 2-norm of the matrix m exceeds the threshold or is not finite; cheap bounds are checked first."""
+    if not np.all(np.isfinite(m)):
+        return True
+    squares = np.einsum("ij,ij->j", m, m)
+    if np.sum(squares) <= threshold**2:
+        return False
+    return bool(np.max(squares) > threshold**2) or float(np.linalg.norm(m, 2)) > threshold
+
+
+CONSECUTIVE_POWERS = 64  # number of first and of last powers that are all checked; between, sixteen for each doubling
+ALL_POWERS_STATES = 64  # greatest number of states for which every power is checked
+
+
+def checked_powers(steps: int, few: bool = False) -> list[int]:
+    """Increasing numbers n of steps, up to `steps`, at which growth is checked.
+
+    They are 1 to 64, 16 to 31 times powers of two, powers of two, and the last 64 numbers.
+    few : True for powers of two and `steps` only
+    """
+    numbers = {1 << k for k in range(64)} | {steps}
+    if not few:
+        numbers |= {*range(2, CONSECUTIVE_POWERS + 1), *range(steps - CONSECUTIVE_POWERS + 1, steps)}
+        numbers |= {j << k for k in range(2, 59) for j in range(16, 32)}
+    return sorted(n for n in numbers if 1 <= n <= steps)
+
+
+def matrix_powers(m: np.ndarray, steps: int, few: bool = False) -> Iterator[tuple[int, np.ndarray]]:
+    """Yield pairs (n, m^n) of powers of a matrix m, for increasing n.
+
+    n takes the values of `checked_powers`; for a matrix of up to 64 states, unless `few` is True, it takes all values
+    up to `steps`. A power is the product of m and the power before, or of two lower powers. The first power that is not
+    finite is the last pair.
+    """
+    known, last, power = {1: m}, 1, m
+    yield 1, m
+    all_powers = m.shape[0] <= ALL_POWERS_STATES and not few
+    for n in range(2, steps + 1) if all_powers else checked_powers(steps, few)[1:]:
+        high = 1 << (n.bit_length() - 1)
+        high = n // 2 if high == n else high
+        if all_powers or n == last + 1:
+            power = power @ m
+        else:
+            rest = n - high
+            power = known[high] @ (known[rest] if rest in known else assembled_power(known, rest))
+        last = n
+        if n <= CONSECUTIVE_POWERS or n & (n - 1) == 0:
+            known[n] = power
+        yield n, power
+        if not np.all(np.isfinite(power)):
+            return
+
+
+def assembled_power(known: dict[int, np.ndarray], n: int) -> np.ndarray:
+    """Power m^n of a matrix as a product of the powers m^(2^k) in `known`."""
+    product = None
+    for k in range(n.bit_length()):
+        if n >> k & 1:
+            product = known[1 << k] if product is None else product @ known[1 << k]
+    return product
+
+
+def power_growth(m: np.ndarray, steps: int = STEPS) -> Growth:
+    """Greatest 2-norm of the powers m^n over the n <= steps of `matrix_powers`, with its deviation (see `Growth`)."""
+    size, after, greatest = 1.0, 0, np.eye(m.shape[0])
+    for n, power in matrix_powers(m, steps):
+        if not np.all(np.isfinite(power)):
+            size, after = np.inf, n
+            break
+        if np.linalg.norm(power) > size:
+            norm = float(np.linalg.norm(power, 2))
+            if norm > size:
+                size, after, greatest = norm, n, power
+    ends, _, starts = np.linalg.svd(greatest)
+    return Growth(size, after, starts[0], ends[:, 0])
+
+
+class DenseGrowth:
+    """Growth over the steps of one method on a small system, from powers of the step matrix.
+
+    e : float64[n, n]  Jacobian; size : its 2-norm
+    """
+
+    def __init__(self, method: Method, e: np.ndarray, steps: int, threshold: float = THRESHOLD) -> None:
+        self.method, self.e, self.steps, self.threshold = method, e, steps, threshold
+        self.size = float(np.linalg.norm(e, 2))
+
+    def fails(self, h: float, few: bool = False) -> bool:
+        """True if the norm of a power of the matrix of a step of h [s] exceeds the threshold within `steps` powers.
+
+        few : True to check only powers of two and the last power
+        """
+        m = self.matrix(h)
+        with np.errstate(over="ignore", invalid="ignore"):
+            return any(norm_exceeds(power, self.threshold) for _, power in matrix_powers(m, self.steps, few))
+
+    def limit(self) -> StepLimit:
+        """Limit of the step: first from few powers, which give an upper bound, then from all checked powers."""
+        rough = bisect_limit(lambda h: self.fails(h, few=True), 0.1 / self.size, MAX_HJ / self.size)
+        if rough.step == 0.0:
+            return rough
+        if np.isinf(rough.step):
+            fails_somewhere = any(self.fails(h) for h in np.geomspace(0.1, MAX_HJ, CHECKED_STEPS) / self.size)
+            return bisect_limit(self.fails, 0.1 / self.size, MAX_HJ / self.size) if fails_somewhere else rough
+        if not self.fails(rough.step):
+            return rough
+        low, high = 0.97 * rough.step, rough.step
+        while self.fails(low):
+            low, high = 0.9 * low, low
+        return bisect(self.fails, low, high)
+
+    def failing_after(self, h: float) -> int:
+        """First number of steps of h [s] in `matrix_powers` after which growth exceeds the threshold; 0 for none."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            powers = matrix_powers(self.matrix(h), self.steps)
+            return next((n for n, power in powers if norm_exceeds(power, self.threshold)), 0)
+
+    def growth(self, h: float) -> Growth:
+        """Greatest growth with steps of h [s], and the deviation with this growth.
+
+        Growth far above the threshold is inaccurate, because repeated squaring amplifies round-off.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            return power_growth(self.matrix(h), self.steps)
+
+    def matrix(self, h: float) -> np.ndarray:
+        """Matrix of a step of h [s] : float64[n, n]."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return step_matrix(self.method, h * self.e)
+
+
+# vectors ----------------------------------------------------------------------------------------------------------
+
+TIME_LIMIT = 30.0  # time limit of a prediction [s]
+VECTORS, PASSES = 4, 4  # vectors in a block; passes forward and back
+NORM_MARGIN = 2.0  # greatest norm of a power over that of a random block, and over the root of the number of states
+
+
+class VectorGrowth:
+    """Growth over many steps on a large system: a block of vectors is multiplied by the step matrix again and again.
+
+    The matrix and its transpose are used in turn, as in a power iteration for the 2-norm. Start vectors are random with
+    a fixed seed. The result is a lower bound of the greatest growth, close to it after four passes.
+    e : sparse Jacobian; size : its 2-norm
+    """
+
+    def __init__(
+        self, method: Method, e: Any, steps: int, threshold: float = THRESHOLD, latest: float | None = None
+    ) -> None:
+        self.method, self.e, self.steps, self.threshold = method, e.tocsr(), steps, threshold
+        self.latest = time.monotonic() + TIME_LIMIT if latest is None else latest
+        self.transpose = e.T.tocsr()
+        self.size = self.two_norm()
+        self.start_block = np.random.default_rng(1).standard_normal((e.shape[0], VECTORS))
+
+    def two_norm(self) -> float:
+        """Estimate of the 2-norm of the Jacobian [1/s], by power iteration."""
+        v = np.random.default_rng(2).standard_normal(self.e.shape[0])
+        for _ in range(50):
+            v = self.transpose @ (self.e @ (v / np.linalg.norm(v)))
+        return float(np.sqrt(np.linalg.norm(v)))
+
+    def limit(self) -> StepLimit:
+        """Limit of the step [s], below which no step is found to fail."""
+        return bisect_limit(self.fails, 0.1 / self.size, MAX_HJ / self.size)
+
+    def fails(self, h: float) -> bool:
+        """True if growth above the threshold is found with steps of h [s]."""
+        return self.failing_after(h) > 0
+
+    def failing_after(self, h: float) -> int:
+        """Number of steps of h [s] after which growth is found to exceed the threshold; 0 if it does not."""
+        growth = self.growth(h, self.threshold)
+        return growth.steps if growth.size > self.threshold else 0
+
+    def growth(self, h: float, enough: float = np.inf) -> Growth:
+        """Greatest growth found with steps of h [s], and the deviation with this growth.
+
+        The search ends when the growth exceeds a finite `enough`, or is so far below it after a pass that the norm of
+        no power can reach it. Raises TooLarge at the time limit.
+        """
+        forth, back = step_function(self.method, h, self.e), step_function(self.method, h, self.transpose)
+        v, unit = self.start_block, self.start_block[:, 0] / np.linalg.norm(self.start_block[:, 0])
+        best = Growth(1.0, 0, unit, unit)
+        for _ in range(PASSES):
+            start = np.linalg.qr(v)[0]
+            size, steps, block = self.propagate(forth, start, enough)
+            if steps == 0 or not np.isfinite(size):
+                return best if steps == 0 else best._replace(size=size, steps=steps)
+            if size > best.size:
+                ends, _, mixing = np.linalg.svd(block, full_matrices=False)
+                best = Growth(size, steps, start @ mixing[0], ends[:, 0])
+            if size > enough or size * NORM_MARGIN * np.sqrt(v.shape[0]) < enough < np.inf:
+                return best
+            v = block
+            for _ in range(steps):
+                v = back(v)
+        return best
+
+    def propagate(self, step: Callable, v: np.ndarray, enough: float) -> tuple[float, int, np.ndarray]:
+        """(greatest norm of a block v of vectors over the steps, number of steps when it is reached, block then).
+
+        step : function that multiplies a block by the step matrix; enough : norm above which the steps end
+        """
+        size, steps, block, done = 1.0, 0, v, 0
+        with np.errstate(over="ignore", invalid="ignore"):
+            for n in checked_powers(self.steps):
+                if time.monotonic() > self.latest:
+                    raise TooLarge(
+                        f"{self.e.shape[0]} states and {self.steps} steps take longer than {TIME_LIMIT:g} s to predict"
+                        ": give pipes or basins fewer cells, --set links.NAME.cells=100 or nodes.NAME.cells=[20,20] "
+                        "(or, for pipes that state no cells, a greater numerics.cell_time; the limit as a Courant "
+                        "number changes little), or use fewer --steps"
+                    )
+                for _ in range(n - done):
+                    v = step(v)
+                done = n
+                if not np.all(np.isfinite(v)):
+                    return np.inf, n, block
+                norm = float(np.linalg.norm(v, 2))
+                if norm > size:
+                    size, steps, block = norm, n, v
+                if norm > enough:
+                    break
+        return size, steps, block
+
+
+class TooLarge(FvsolveError):
+    """Error: the prediction has taken longer than its time limit."""
+
+
+def step_function(method: Method, h: float, e: Any) -> Callable[[np.ndarray], np.ndarray]:
+    """Function that multiplies a block of vectors : float64[n, k] by the matrix of a step of h [s]; e : Jacobian."""
+    if method.explicit:
+        coefficients = [float(x) for x in stability_function(method).numerator.coefficients]
+        scaled = h * e
+
+        def explicit(v: np.ndarray) -> np.ndarray:
+            result = coefficients[-1] * v
+            for x in coefficients[-2::-1]:
+                result = scaled @ result + x * v
+            return result
+
+        return explicit
+    from scipy.sparse import eye_array, kron
+    from scipy.sparse.linalg import splu
+
+    n, s = e.shape[0], method.stages
+    scaled = (h * e).tocsc()
+    factors = splu((eye_array(s * n) - kron(method.a, scaled)).tocsc())
+
+    def implicit(v: np.ndarray) -> np.ndarray:
+        stages = factors.solve(np.tile(scaled @ v, (s, 1)))
+        return v + sum(method.b[i] * stages[i * n : (i + 1) * n] for i in range(s))
+
+    return implicit
+
+
+def growth_method(
+    method: Method, e: Any, steps: int = STEPS, threshold: float = THRESHOLD, latest: float | None = None
+) -> Any:
+    """Object that computes the growth of deviations: `DenseGrowth` for up to 500 states, `VectorGrowth` for more."""
+    if e.shape[0] <= DENSE:
+        return DenseGrowth(method, e if isinstance(e, np.ndarray) else e.toarray(), steps, threshold)
+    from scipy.sparse import csr_array
+
+    return VectorGrowth(method, csr_array(e), steps, threshold, latest)
+
+
+def predicted_limit(growth: Any) -> StepLimit:
+    """Limit of the step of a linear system, below which no step is found to fail.
+
+    growth : result of `growth_method`. The search goes from 0.1 / ||J||, or less if that fails, to 1e4 / ||J||, with
+    the norm of the Jacobian J. The limit is inf if no step fails, and for J = 0.
+    """
+    return growth.limit() if growth.size else StepLimit(np.inf, np.inf)
