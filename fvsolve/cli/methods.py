@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
 
-from fvsolve.cli import terminal
-from fvsolve.cli.study_options import method_name
+from fvsolve.cli.app import method_name
+from fvsolve.cli.terminal import Table
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers import METHODS, Facts, Method, analyse, method_named
 from fvsolve.steppers.numbers.polynomial import Polynomial, sign
@@ -20,26 +19,18 @@ SHORT_DIGITS = 14  # digits printed of a longer entry
 MAX_COEFFICIENT = 40  # greatest length of a coefficient of R that is printed exactly, in characters
 
 
-@dataclass(frozen=True)
-class MethodOutput:
-    """Output of `fvsolve methods` in two forms.
-
-    plain : values for JSON; show : function that prints text
-    """
-
-    plain: dict
-    show: Callable[[], None]
-
-
-def table_output() -> MethodOutput:
-    """Table of all methods, explicit methods first."""
+def all_methods() -> tuple[dict, Iterator]:
+    """Table of all methods, explicit methods first : (values for JSON, text)."""
     all_facts = {name: analyse(method) for name, method in METHODS.items()}
-    return MethodOutput({name: facts.plain() for name, facts in all_facts.items()}, lambda: _table(all_facts))
+    return {name: facts.plain() for name, facts in all_facts.items()}, _table_text(all_facts)
 
 
-def method_output(name: str, out: Path | None) -> MethodOutput:
-    """Tableau, stability function R(s) and properties of a method; writes a picture of its stability region."""
-    from fvsolve.draw.region_picture import region_figure
+def single_method(name: str, out: Path | None) -> tuple[dict, Iterator]:
+    """Tableau, stability function R(s) and properties of a method : (values for JSON, text).
+
+    It writes a picture of the stability region to the file `out`, by default NAME.png.
+    """
+    from fvsolve.draw.stability_pictures import region_figure
 
     name = method_name(name)
     method = method_named(name)
@@ -50,11 +41,10 @@ def method_output(name: str, out: Path | None) -> MethodOutput:
     path.parent.mkdir(parents=True, exist_ok=True)
     region_figure(facts.stability_function, f"{method.name}: |R(hλ)| ≤ 1").savefig(path)
     array = {"a": method.a, "b": method.b, "c": method.c, "error": method.error, "start_error": method.start_error}
-    return MethodOutput(facts.plain() | array | {"picture": str(path)}, lambda: _show(method, facts, path))
+    return facts.plain() | array | {"picture": str(path)}, _method_text(method, facts, path)
 
 
-def _table(all_facts: dict[str, Facts]) -> None:
-    console = terminal.console()
+def _table_text(all_facts: dict[str, Facts]) -> Iterator:
     first = {name: facts for name, facts in all_facts.items() if name == facts.name}
     heads = ["method", "order", "error", "stage", "stages", "kind", "A", "L", "real", "imaginary", "SSP", "Padé"]
     rows = [
@@ -65,33 +55,26 @@ def _table(all_facts: dict[str, Facts]) -> None:
         ]
         for name, facts in first.items()
     ]  # fmt: skip
-    terminal.table(heads, rows, console)
-    terminal.line(console, "")
+    yield Table(heads, rows)
+    yield ""
     for name, facts in all_facts.items():
         if name != facts.name:
-            terminal.line(console, f"{name} is {facts.name}")
-    terminal.line(
-        console,
-        "error: order of the embedded solution; stage: stage order; A, L: A-stable, L-stable; real, imaginary:",
-    )
-    terminal.line(
-        console,
+            yield f"{name} is {facts.name}"
+    yield "error: order of the embedded solution; stage: stage order; A, L: A-stable, L-stable; real, imaginary:"
+    yield (
         "greatest stable |h lambda| on the axis; SSP: SSP radius, in Euler steps; "
-        "Padé: degrees of numerator and denominator of R",
+        "Padé: degrees of numerator and denominator of R"
     )
 
 
-def _show(method: Method, facts: Facts, path: Path) -> None:
-    console = terminal.console()
-    terminal.line(console, f"{method.name} ({method.source})", "bold")
-    terminal.line(console, "")
-    for text in [*_tableau_lines(method), *_entry_notes(method)]:
-        terminal.line(console, text)
-    terminal.line(console, "")
-    terminal.line(console, f"R(s) = {_quotient(facts)}")
-    for text in _sentences(facts):
-        terminal.line(console, text)
-    terminal.line(console, f"stability region: {path}")
+def _method_text(method: Method, facts: Facts, path: Path) -> Iterator:
+    yield f"{method.name} ({method.source})", "bold"
+    yield ""
+    yield from [*_tableau_lines(method), *_entry_notes(method)]
+    yield ""
+    yield f"R(s) = {_quotient(facts)}"
+    yield from _sentences(facts)
+    yield f"stability region: {path}"
 
 
 def _sentences(facts: Facts) -> list[str]:

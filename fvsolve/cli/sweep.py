@@ -1,21 +1,36 @@
-"""`fvsolve sweep`: one run for every combination of values of keys."""
+"""`fvsolve sweep`, `sensitivity` and `calibrate`: runs over combinations, samples and ranges of keys."""
 
 from __future__ import annotations
 
 import re
-import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Option
 
-from fvsolve.cli.app import Json, SingleCase, app, load_case, print_json, value_of
-from fvsolve.cli.study_options import Dask, Jobs, Out, Seed, clear_files, folder_of, progress_line, writable_folder
+from fvsolve.cli.app import (
+    Dask,
+    Jobs,
+    Json,
+    Out,
+    Seed,
+    Set,
+    SingleCase,
+    app,
+    clear_files,
+    folder_of,
+    load_case,
+    value_of,
+    writable_folder,
+)
+from fvsolve.cli.progress import progress_line
+from fvsolve.cli.terminal import Table, present
 from fvsolve.errors import FvsolveError
 
 Values = Annotated[
     list[str],
-    typer.Option(
+    Option(
         "--set",
         metavar="KEY=a,b,c",
         help="values of a key, one run for each, or a single value for all runs; repeat the option for more keys",
@@ -23,7 +38,7 @@ Values = Annotated[
 ]
 Ranges = Annotated[
     list[str],
-    typer.Option(
+    Option(
         "--vary",
         metavar="KEY=LOW,HIGH",
         help="key to vary with --sample and its range, in SI or with units; repeat the option for more keys",
@@ -31,7 +46,7 @@ Ranges = Annotated[
 ]
 Outcomes = Annotated[
     list[str],
-    typer.Option(
+    Option(
         "--quantity",
         metavar="max(PROBE)",
         help="quantity to chart over the keys: max, min or final of a probe; repeat the option for more quantities "
@@ -50,14 +65,14 @@ def sweep(
     set: Values = [],  # noqa: B006
     points: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             metavar="FILE.csv",
             help="CSV file of the values of keys in all runs: a row for each run, a column for each key",
         ),
     ] = None,
     sample: Annotated[
         str | None,
-        typer.Option(
+        Option(
             metavar="sobol:N",
             help="sample of N runs in the ranges of --vary: sobol:N (Sobol) or lhs:N (Latin hypercube)",
         ),
@@ -85,11 +100,8 @@ def sweep(
         result = studies.sweep(loaded, varied, fixed, jobs, folder, progress, points, sample, seed, dask)
     heads = {key: key_with_unit(loaded.raw, key, [row[key] for row in result.rows]) for key in result.keys}
     charts = write_charts(result, outcome, folder, heads)
-    if as_json:
-        print_json(result.plain() | {"directory": str(folder), "charts": [str(path) for path in charts]})
-    else:
-        _show(result, folder, heads)
-    sys.exit(0 if all(row["ok"] for row in result.rows) else 1)
+    facts = result.plain() | {"directory": str(folder), "charts": [str(path) for path in charts]}
+    present(as_json, facts, sweep_text(result, folder, heads), code=0 if all(row["ok"] for row in result.rows) else 1)
 
 
 def ranges(texts: list[str], option: str) -> dict[str, list]:
@@ -109,7 +121,7 @@ def write_charts(result, outcomes: list[str], folder: Path, heads: dict[str, str
 
     Pictures of earlier sweeps in this folder are deleted. heads : key -> heading of the key with its unit
     """
-    from fvsolve.draw.sweep_picture import outcome_figure
+    from fvsolve.draw.object_pictures import outcome_figure
 
     available = result.outcomes
     names = [result.outcome(name) for name in outcomes] or [
@@ -152,11 +164,9 @@ def split_list(text: str) -> list[str]:
     return [part.strip() for part in parts if part.strip()]
 
 
-def _show(result, folder: Path, heads: dict[str, str]) -> None:
-    from fvsolve.cli import terminal
+def sweep_text(result, folder: Path, heads: dict[str, str]) -> Iterator:
     from fvsolve.studies.sweep import as_option_text
 
-    console = terminal.console()
     columns = [*result.keys, "ok", *(name for name in result.columns if name.startswith(("min(", "max(")))]
     shown = columns[len(result.keys) : len(result.keys) + 1 + MAX_COLUMNS]
     first_rows = result.rows[:MAX_ROWS]
@@ -164,17 +174,111 @@ def _show(result, folder: Path, heads: dict[str, str]) -> None:
         [*(as_option_text(row[key]) for key in result.keys), *(_text(row.get(name)) for name in shown)]
         for row in first_rows
     ]
-    terminal.table([*heads.values(), *shown], rows, console)
+    yield Table([*heads.values(), *shown], rows)
     for row in first_rows:
         values = ", ".join(f"{key} = {as_option_text(row[key])}" for key in result.keys)
         if not row["ok"]:
-            terminal.line(console, f"{values}: {row['reason']}", "bold red")
+            yield f"{values}: {row['reason']}", "bold red"
         if row.get("marks"):
-            terminal.line(console, f"{values}: {row['marks']}", "yellow")
+            yield f"{values}: {row['marks']}", "yellow"
     reused = f", {result.reused} of them reused from an earlier sweep" if result.reused else ""
     reused += f", the first {MAX_ROWS} are printed here" if len(result.rows) > MAX_ROWS else ""
-    terminal.line(console, f"{folder / 'sweep.csv'}: {len(result.rows)} rows{reused}")
+    yield f"{folder / 'sweep.csv'}: {len(result.rows)} rows{reused}"
 
 
 def _text(value) -> str:
     return "-" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+@app.command()
+def sensitivity(
+    case: SingleCase,
+    vary: Annotated[
+        list[str],
+        Option(
+            "--vary",
+            metavar="KEY=LOW,HIGH",
+            help="key to vary and its range, in SI or with units; repeat the option for more keys",
+        ),
+    ],
+    outcome: Annotated[str, Option(metavar="max(PROBE)", help="outcome to analyse: min, max or final of a probe")],
+    samples: Annotated[
+        int,
+        Option(
+            metavar="N",
+            help="base sample size, a power of two; for k keys the study makes about 1.25 N (k + 2) runs",
+        ),
+    ] = 64,
+    seed: Seed = 0,
+    jobs: Jobs = 1,
+    dask: Dask = None,
+    set: Set = [],  # noqa: B006
+    out: Out = None,
+    as_json: Json = False,
+) -> None:
+    """Compute the sensitivity of an outcome to keys: Sobol indices and Morris effects over ranges."""
+    from fvsolve import studies
+
+    loaded = load_case(case, set)
+    folder = folder_of(loaded, "sensitivity", out)
+    with progress_line() as progress:
+        result = studies.sensitivity(
+            loaded, ranges(vary, "--vary"), outcome, samples, seed, None, jobs, dask, folder, progress
+        )
+    paths = [
+        result.sheet.write(clear_files(folder, "sensitivity.csv", "sensitivity.png") / "sensitivity.csv"),
+        folder / "sensitivity.png",
+    ]
+    result.plot(paths[1])
+    below = f"{paths[0]}: {result.outcome}, {result.runs} runs"
+    present(as_json, result.plain() | {"directory": str(folder)}, [_key_table(result), below])
+
+
+@app.command()
+def calibrate(
+    case: SingleCase,
+    parameter: Annotated[
+        list[str],
+        Option(
+            metavar="KEY=LOW,HIGH",
+            help="key to calibrate and its range, in SI or with units; repeat the option for more keys",
+        ),
+    ],
+    seed: Seed = 0,
+    jobs: Jobs = 1,
+    dask: Dask = None,
+    set: Set = [],  # noqa: B006
+    as_json: Json = False,
+) -> None:
+    """Calibrate keys of a case against the measured series in its [compare]."""
+    from fvsolve import studies
+
+    loaded = load_case(case, set)
+    with progress_line(resumable=False) as progress:
+        result = studies.calibrate(loaded, ranges(parameter, "--parameter"), None, seed, jobs, dask, progress)
+    present(as_json, result.plain(), calibration_text(loaded, result))
+
+
+def calibration_text(case, result) -> Iterator:
+    """Calibrated values of the keys, differences from the measured series, and doubts."""
+    from fvsolve.output.unit_columns import column
+    from fvsolve.studies.sampling import si_unit_of
+
+    texts, probes = (
+        [],
+        {series.probe.text: series.probe for series in case.compare.values() if series.probe is not None},
+    )
+    for name, rms in result.rms.items():
+        probe = probes[name]
+        unit_column = column(probe.text, probe.dimension, case, probe.unit)
+        texts.append(f"rms of {name} {unit_column.span_from_si(rms):.6g} {unit_column.span_unit}")
+    units = {key: f"{key} [{unit}]" if (unit := si_unit_of(case.raw, key)) else key for key in result.values}
+    yield _key_table(result, units)
+    yield ", ".join([*texts, f"{result.runs} runs"])
+    yield from ((doubt, "yellow") for doubt in result.doubts)
+
+
+def _key_table(result, units: dict[str, str] = {}) -> Table:  # noqa: B006
+    """Table of the keys of a sensitivity study or a calibration; units : key -> its heading with unit, if it has one"""
+    heads, rows = result.sheet.words()
+    return Table(heads, [[units.get(key, key), *row] for key, *row in rows])

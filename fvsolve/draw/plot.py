@@ -1,20 +1,142 @@
-"""Figures of history.png (probes over time) and envelope.png (extreme heads along pipes)."""
+"""Figures of runs: history.png, envelope.png, long sections and phase planes.
+
+Constant and duplicate curves are left out of history.png.
+"""
 
 from __future__ import annotations
 
 import textwrap
+from dataclasses import dataclass
 
 import numpy as np
 
 from fvsolve.draw import style
-from fvsolve.draw.curve_selection import select_curves
 
+CONSTANT_TOLERANCE = 1e-9  # greatest range of a constant curve, as a fraction of its size
+SAME_TOLERANCE = 1e-3  # greatest difference of coinciding curves, as a fraction of the range of their panel
+ALIKE_TOLERANCE = (
+    1e-6  # greatest residual of a curve after scaling and shifting another to it, as a fraction of its range
+)
+OF_PRESSURE = ("pressure", "gauge_pressure", "head", "level")  # equivalent quantities at a fixed place
 MAX_PANELS = 6  # greatest number of panels
 MAX_LINES = 8  # greatest number of curves in a panel
 MAX_CONSTANTS = 4  # greatest number of constant probes with names
 LEGEND_WIDTH = 26  # letters of a line of a legend
 MAX_PIPES = 6  # greatest number of pipes drawn; the longest are chosen
 MAX_POINTS = 4000  # greatest number of rows drawn; of longer tables the extremes of bins are drawn
+LINE_LOOKS = {"vapour line": {"color": style.COLOURS[3], "linewidth": 1.2, "linestyle": ":"},
+         "class line": {"color": style.COLOURS[6], "linewidth": 1.4, "linestyle": "-."}}  # fmt: skip
+LIMIT_LOOKS = {"maximum": {"color": style.COLOURS[6], "linewidth": 1.1, "linestyle": (0, (9, 3))},
+          "minimum": {"color": style.COLOURS[6], "linewidth": 1.1,
+                      "linestyle": (0, (6, 2, 1.5, 2, 1.5, 2))}}  # fmt: skip
+MAX_NAME_LENGTH = 22  # greatest number of letters of a name over a chainage
+
+
+@dataclass
+class DrawnLine:
+    """Curve of a column of history.csv.
+
+    column : index of the column; names : places (part, and position on it) whose values the curve shows
+    alike : other quantities at the same place with an equivalent curve, which are not drawn
+    """
+
+    column: int
+    names: list[str]
+    alike: list[str]
+
+    @property
+    def label(self) -> str:
+        return ", ".join(self.names) + (f" ({', '.join(self.alike)} alike)" if self.alike else "")
+
+
+@dataclass
+class DrawnPanel:
+    """Curves of a panel, which have the same quantity and unit."""
+
+    quantity: str
+    unit: str
+    lines: list[DrawnLine]
+
+
+def select_curves(values: np.ndarray, probes, measured=()) -> tuple[list[DrawnPanel], list[tuple[str, str, float]]]:
+    """Panels with the curves to draw, and constant probes : (list of `DrawnPanel`, list of (probe, unit, value)).
+
+    values : float64[k, n]; probes : (name, unit) of each column
+    measured : names of probes with measurements, which are always drawn
+    """
+    swings = [_range_of(values[:, k]) for k in range(len(probes))]
+    still = [k for k, (name, _) in enumerate(probes) if swings[k] is None and name not in measured]
+    if len(still) == len(probes):
+        still = []  # if all probes are constant, all are drawn
+    panels: dict[tuple[str, str], DrawnPanel] = {}
+    leaders: dict[str, list[tuple[int, DrawnLine]]] = {}
+    for k, (name, unit) in enumerate(probes):
+        if k in still:
+            continue
+        place, quantity = _place_and_quantity(name)
+        line = DrawnLine(k, [place], [])
+        if name not in measured and quantity in OF_PRESSURE:
+            first = next(
+                (leader for j, leader in leaders.get(place, []) if _is_scaled(values[:, j], values[:, k])), None
+            )
+            if first is not None:
+                first.alike.append(quantity.replace("_", " "))
+                continue
+            leaders.setdefault(place, []).append((k, line))
+        panels.setdefault((quantity, unit), DrawnPanel(quantity, unit, [])).lines.append(line)
+    for panel in panels.values():
+        panel.lines = _without_doubles(panel.lines, values, probes, measured)
+    return list(panels.values()), [(*probes[k], float(values[0, k])) for k in still if len(values)]
+
+
+def _without_doubles(lines: list[DrawnLine], values: np.ndarray, probes, measured) -> list[DrawnLine]:
+    """Curves of a panel without duplicates: coinciding curves become one curve, which has the places of all in `names`.
+
+    A curve with measurements, or with quantities in `alike`, does not become part of another curve.
+    values, probes, measured : as for `select_curves`
+    """
+    seen = np.concatenate([values[:, line.column] for line in lines])
+    tolerance = SAME_TOLERANCE * np.ptp(seen[np.isfinite(seen)]) if np.isfinite(seen).any() else 0.0
+    result: list[DrawnLine] = []
+    for line in lines:
+        under = None
+        if probes[line.column][0] not in measured and not line.alike:
+            under = next(
+                (other for other in result if _coincide(values[:, other.column], values[:, line.column], tolerance)),
+                None,
+            )
+        if under is None:
+            result.append(line)
+        else:
+            under.names += line.names
+    return result
+
+
+def _place_and_quantity(probe: str) -> tuple[str, str]:
+    """Place and quantity of a probe: (`main at 0.5`, `pressure`) for `main.pressure@0.5`."""
+    path, _, spot = probe.partition("@")
+    place, _, quantity = path.rpartition(".")
+    return place + (f" at {spot}" if spot else ""), quantity
+
+
+def _range_of(values: np.ndarray) -> float | None:
+    """Range of a curve; None if it is constant."""
+    finite = values[np.isfinite(values)]
+    swing = float(np.ptp(finite)) if finite.size else 0.0
+    return swing if swing > CONSTANT_TOLERANCE * float(np.abs(finite).max(initial=0.0)) else None
+
+
+def _coincide(a: np.ndarray, b: np.ndarray, tolerance: float) -> bool:
+    return bool(np.array_equal(np.isnan(a), np.isnan(b)) and not (np.abs(a - b) > tolerance).any())
+
+
+def _is_scaled(a: np.ndarray, b: np.ndarray) -> bool:
+    """True if curve b is curve a times a positive factor plus a constant; False if either is constant or not finite."""
+    low, high = int(a.argmin()), int(a.argmax())
+    if not (np.isfinite(a).all() and np.isfinite(b).all() and a[low] < a[high]):
+        return False
+    scale = (b[high] - b[low]) / (a[high] - a[low])
+    return bool(scale > 0.0 and np.abs(b - b[low] - scale * (a - a[low])).max() <= ALIKE_TOLERANCE * np.ptp(b))
 
 
 @style.without_markup
@@ -155,3 +277,89 @@ def _profile(axes, arrays, hilly: bool) -> None:
     if hilly:  # if all elevations are zero, they would only compress the heads
         axes.plot(x, ground, color=style.MUTED, linewidth=1.8, label="pipe")
     axes.set_xlim(0.0, x[-1] + x[0])
+
+
+@style.without_markup
+def section_figure(chainage, along, units, lines, seen, parted=(), beyond=(), posts=(), labels=(), title=""):
+    """Figure of heads along a route, with pipe, vapour line, pressure class and limits; shaded where cavities formed.
+
+    chainage : float64[n]; along : quantity of envelope.csv -> float64[n]; lines : name of a line -> float64[n]
+    units : quantity -> unit; seen : `HeadWindow`, ends of the head axis and texts of the limits above and below it
+    parted : spans of chainage with cavities; beyond : (chainage, head, name) of points where a limit is violated
+    posts : chainages of vertical lines
+    labels : (chainage, names, True for a device, False for only a junction) of each label above the axes
+    """
+    figure = style.figure(9.2)
+    axes = figure.subplots()
+    style.style_axes(axes)
+    for a, b in parted:
+        axes.axvspan(a, b, color=style.COLOURS[3], alpha=0.15, linewidth=0)
+    high, low = along["max_head"], along["min_head"]
+    axes.fill_between(chainage, low, high, color=style.COLOURS[0], alpha=0.08, linewidth=0)
+    axes.plot(chainage, high, color=style.COLOURS[0], linewidth=1.4, label="maximum head")
+    axes.plot(chainage, low, color=style.COLOURS[1], linewidth=1.4, label="minimum head")
+    axes.plot(chainage, along["initial_head"], color=style.INK, linewidth=0.9, linestyle=(0, (5, 3)),
+              label="initial head")  # fmt: skip
+    axes.plot(chainage, along["elevation"], color=style.MUTED, linewidth=2.4, label="pipe")
+    for name, line in lines.items():
+        axes.plot(chainage, line, label=name, **(LINE_LOOKS.get(name) or LIMIT_LOOKS[name.rpartition(", ")[2]]))
+    if parted:
+        axes.fill_between([], [], color=style.COLOURS[3], alpha=0.3, label="vapour pressure reached")
+    if beyond:
+        at, heads, _ = zip(*beyond, strict=True)
+        axes.plot(at, heads, "x", color=style.DOUBT, markersize=7, markeredgewidth=2.0, clip_on=False, zorder=5,
+                  label="limit passed")  # fmt: skip
+    axes.set_xlim(min([chainage[0], *posts]), max([chainage[-1], *posts]))
+    axes.set_ylim(seen.low, seen.high)
+    red = style.COLOURS[6]
+    for limits, edge in ((seen.above, 1), (seen.below, 0)):
+        if limits:
+            axes.annotate("\n".join(limits), (0.97, edge), xycoords="axes fraction", xytext=(0, -22 if edge else 22),
+                          textcoords="offset points", ha="right", va="top" if edge else "bottom", fontsize=8,
+                          color=red, arrowprops={"arrowstyle": "->", "color": red, "relpos": (1, edge)})  # fmt: skip
+    _places(axes, posts, labels)
+    axes.set_xlabel(f"chainage [{units['distance']}]", fontsize=8.5, color=style.INK)
+    axes.set_ylabel(f"head [{units['max_head']}]", fontsize=8.5, color=style.INK)
+    figure.legend(loc="outside lower center", ncols=4, handlelength=3, frameon=False, fontsize=8, labelcolor=style.INK)
+    style.title(figure, title)
+    return figure
+
+
+@style.without_markup
+def phase_figure(pairs, title=""):
+    """Figure with a phase plane for each pair of probes; a dot marks the start.
+
+    pairs : list of (probe of x, probe of y), each probe as (name, unit, values : float64[k])
+    """
+    across = min(len(pairs), 2)
+    down = -(-len(pairs) // across)
+    figure = style.figure(0.6 + (4.4 if across == 1 else 3.6) * down, width=5.6 if across == 1 else style.WIDTH)
+    grid = figure.subplots(down, across, squeeze=False)
+    for axes, (x, y) in zip(grid.flat, pairs, strict=False):
+        style.style_axes(axes)
+        axes.margins(0.05)
+        axes.plot(*_thin_path(x[2], y[2]), color=style.COLOURS[0], linewidth=1.0)
+        axes.plot(x[2][:1], y[2][:1], "o", color=style.COLOURS[1], markersize=5)
+        axes.set_xlabel(f"{x[0]} [{x[1]}]", fontsize=8.5, color=style.INK)
+        axes.set_ylabel(f"{y[0]} [{y[1]}]", fontsize=8.5, color=style.INK)
+    for axes in list(grid.flat)[len(pairs) :]:
+        axes.set_visible(False)
+    style.title(figure, title)
+    return figure
+
+
+def _places(axes, posts, labels) -> None:
+    """Draw a vertical line at each chainage of `posts`, and the names in `labels`; see `section_figure`."""
+    for x in posts:
+        axes.axvline(x, color=style.HAIR, linewidth=0.8, zorder=0)
+    for x, names, stands in labels:
+        text = names if len(names) <= MAX_NAME_LENGTH else f"{names[: MAX_NAME_LENGTH - 1]}\u2026"
+        axes.annotate(text, (x, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 4), rotation=40, fontsize=7.5,
+                      textcoords="offset points", color=style.INK if stands else style.MUTED)  # fmt: skip
+
+
+def _thin_path(x, y) -> tuple:
+    """Reduce a long path (x, y) to the extremes of both coordinates in bins of consecutive points : (x, y)."""
+    rows = np.arange(len(x), dtype=float)
+    indices = np.union1d(thin_series(rows, x)[0], thin_series(rows, y)[0]).astype(int)
+    return x[indices], y[indices]

@@ -1,4 +1,4 @@
-"""Run directory: the object that writes all files of a run, and functions that read and clear the directory."""
+"""Run directory: the object that writes all files of a run, and functions that lock, read and clear the directory."""
 
 from __future__ import annotations
 
@@ -7,25 +7,63 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
+from filelock import FileLock, Timeout
+
 from fvsolve.case.resource_checks import LEAST_TEXT, byte_text, disk_size
 from fvsolve.errors import RunError
-from fvsolve.output.envelope import envelope_in_units, read_envelope, with_initial_heads, write_envelope
+from fvsolve.output.csv_files import (
+    HistoryFile,
+    LineSeries,
+    clear_lines,
+    envelope_in_units,
+    read_envelope,
+    read_table,
+    with_initial_heads,
+    write_envelope,
+    write_routes,
+)
 from fvsolve.output.fields import FieldSeries
-from fvsolve.output.history_file import HistoryFile, read_table
-from fvsolve.output.line_files import LineSeries, clear_lines
-from fvsolve.output.lock import lock_folder, release
 from fvsolve.output.parallel_vtk import ParallelBasinWriter
 from fvsolve.output.restart import Restart, identity, read_restart, write_restart
-from fvsolve.output.route_table import write_routes
 from fvsolve.output.summary_file import read_summary
 from fvsolve.output.unit_columns import probe_columns, time_column
 
+LOCK_FILE = ".lock"
 RUN_FILES = ("restart.npz", "history.csv", "envelope.csv", "routes.csv", "fields.pvd", "case.toml")
 SUMMARY_FILE = "summary.json"
 PICTURE_FILES = ("history.png", "envelope.png")
 # Files of `fvsolve report` and `plot`; those of an earlier run are deleted, since they show other numbers.
 REPORT_FILES = ("report.html", "report.xlsx", "section.png", "probes.png", "phase.png")
 PICTURE_PATTERNS = ("section-*.png", "view-*.png", "view-*.gif")  # the last two of `fvsolve view`
+
+
+def lock_folder(folder: Path, writer: str) -> FileLock:
+    """Create a folder if needed and lock it; return the lock.
+
+    writer : name of another user of the folder in the message, for example "a run"
+    Raises RunError if another process has locked the folder, or it cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = FileLock(folder / LOCK_FILE, blocking=False, thread_local=False, fallback_to_soft=False)
+        lock.acquire()
+    except Timeout:
+        raise RunError(f"{folder} is in use: {writer} still writes there. Wait until it ends, stop it, or choose "
+                       "another directory with --out DIR") from None  # fmt: skip
+    except NotImplementedError:
+        raise RunError(f"{folder} is on a file system without locks; choose another directory with --out DIR") from None
+    except OSError as error:
+        text = f"{folder}: cannot be written: {error.strerror or error}"
+        raise RunError(f"{text}; choose another directory with --out DIR") from None
+    return lock
+
+
+def release(lock: FileLock) -> None:
+    """Release a lock if it is held and delete its file; waiting processes then lock a new file."""
+    if lock.is_locked:
+        with contextlib.suppress(OSError):  # Windows cannot delete an open file
+            Path(lock.lock_file).unlink()
+        lock.release()
 
 
 class RunDirectory:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.output.envelope import envelope_in_units, with_initial_heads
+from fvsolve.output.csv_files import envelope_in_units, with_initial_heads
 from fvsolve.output.unit_columns import probe_columns, time_column, to_column_units
 
 

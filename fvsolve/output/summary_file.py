@@ -9,7 +9,7 @@ from dataclasses import asdict, is_dataclass
 from pathlib import Path
 
 from fvsolve.errors import RunError, listing
-from fvsolve.output.envelope import envelope_columns
+from fvsolve.output.csv_files import envelope_columns
 from fvsolve.output.unit_columns import probe_columns, time_column
 
 # Keys without which summary.json is rejected.

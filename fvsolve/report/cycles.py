@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import FvsolveError, did_you_mean, listing
-from fvsolve.report.libraries import import_library
+from fvsolve.report import import_library
 from fvsolve.units import span
 
 PRESSURE_QUANTITIES = ("pressure", "gauge_pressure", "head")

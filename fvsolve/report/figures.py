@@ -1,6 +1,7 @@
-"""Figures of the report as plain data for plotly.js: traces and layout.
+"""Figures of the report as plain data for plotly.js: histories of probes and long sections, as traces and layout.
 
-plotly.js interprets some markup in names and titles, so all texts of a case pass through `escape_markup`.
+Long histories keep the extremes of bins. plotly.js interprets some markup in names and titles, so all texts of a case
+pass through `escape_markup`.
 """
 
 from __future__ import annotations
@@ -8,17 +9,19 @@ from __future__ import annotations
 import base64
 import html
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from fvsolve.draw.plot import probe_quantity, thin_series
 from fvsolve.draw.style import COLOURS, DOUBT, HAIR, INK, MUTED
 from fvsolve.errors import visible
-from fvsolve.report.head_animation import HeadAnimation
-from fvsolve.report.histories import HistoryPanel
 from fvsolve.report.long_section import VAPOUR_LINE as VAPOUR_LINE
-from fvsolve.report.long_section import Section, head_window
+from fvsolve.report.long_section import HeadAnimation, Section, head_window
 
+SHOWN_LINES = 8  # lines of a panel that are visible at first; a click on a name shows the others
+MAX_PROBES = 48  # greatest number of probes of a report; history.csv has all
+MAX_NUMBERS = 40_000  # greatest number of values of all series of a report together
 GREATEST_COLOUR, LEAST_COLOUR, NOW_COLOUR, VAPOUR_COLOUR, CLASS_COLOUR = (
     COLOURS[0],
     COLOURS[1],
@@ -41,6 +44,65 @@ SECTION_HEIGHT, HISTORY_HEIGHT = 920, 260  # heights of sections and histories [
 TOOLBAR_HEIGHT = 22  # height of the tool bar above the names [px]
 MAX_NAME_LENGTH = 22  # greatest number of letters of a name over a chainage
 FONT = 'system-ui, -apple-system, "Segoe UI", "Helvetica Neue", Arial, sans-serif'
+
+
+class Series(NamedTuple):
+    """Series of a probe or of a measurement, in the units of history.csv.
+
+    seen : True if it is visible at first; measured : True for a measurement
+    """
+
+    name: str
+    t: np.ndarray
+    values: np.ndarray
+    seen: bool
+    measured: bool = False
+
+
+class HistoryPanel(NamedTuple):
+    """Panel of series of one quantity and unit."""
+
+    quantity: str
+    unit: str
+    lines: list[Series]
+
+
+def history_panels(result) -> list[HistoryPanel]:
+    """Panels of histories in the order of the probes.
+
+    In a panel of more than `SHOWN_LINES` series, only those with the widest range are visible at first.
+    """
+    groups: dict[tuple[str, str], list[str]] = {}
+    for name in chosen_probes(result):
+        groups.setdefault((probe_quantity(name), result.units[name]), []).append(name)
+    measured = result.history_drawn().get("measured", {})
+    points = max(MAX_NUMBERS // max(2 * (len(chosen_probes(result)) + len(measured)), 1), 64)
+    result_panels = []
+    for (kind, unit), names in groups.items():
+        seen = names if len(names) <= SHOWN_LINES else _most_varying(result, names)
+        lines = [Series(name, *thin_series(result.t, result[name], points), name in seen) for name in names]
+        lines += [Series(name, *thin_series(*measured[name], points), name in seen, True) for name in names
+                  if name in measured]  # fmt: skip
+        result_panels.append(HistoryPanel(kind, unit, lines))
+    return result_panels
+
+
+def chosen_probes(result) -> list[str]:
+    """Names of the probes in the report: all, or if they are many, those with the widest range in each panel."""
+    if len(result.probes) <= MAX_PROBES:
+        return result.probes
+    groups: dict[tuple[str, str], list[str]] = {}
+    for name in result.probes:
+        groups.setdefault((probe_quantity(name), result.units[name]), []).append(name)
+    share = max(MAX_PROBES // len(groups), 1)
+    selected = {name for names in groups.values() for name in _most_varying(result, names, share)}
+    return [name for name in result.probes if name in selected]
+
+
+def _most_varying(result, names: list[str], count: int = SHOWN_LINES) -> set[str]:
+    extremes = result.extremes
+    swing = {name: (extremes[name].maximum or 0.0) - (extremes[name].minimum or 0.0) for name in names}
+    return set(sorted(names, key=lambda name: -swing[name])[:count])
 
 
 def section_figure(section: Section, moving: HeadAnimation | None, unit: str, along: str, bins: int) -> dict[str, Any]:

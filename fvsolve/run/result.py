@@ -1,8 +1,9 @@
-"""Class `Result` of a run: probes over time, extremes, verdicts, pictures."""
+"""Class `Result` of a run: probes over time, extremes, verdicts, pictures; check of the fields of a summary."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fvsolve.display import Displayable, save_if_path
-from fvsolve.errors import FvsolveError, Notice, RunError, did_you_mean
+from fvsolve.errors import FvsolveError, Notice, RunError, did_you_mean, listing
 from fvsolve.output.fields import read_series
 from fvsolve.output.unit_columns import UnitColumn
 from fvsolve.units import show
@@ -20,6 +21,11 @@ KINDS_WITH_FIELDS = frozenset(("pipe", "basin", "body"))  # kinds of parts that 
 
 HOLDS, OPEN, FAILS = "holds", "open", "fails"  # states of a limit
 IN_WORDS = {HOLDS: "holds", OPEN: "open", FAILS: "FAILS"}
+NESTED_ROWS = {  # rows within rows
+    ("verdicts", "worst"): ("place", "chainage", "elevation", "time", "bound", "value", "limit", "margin",
+                            "error", "state"),
+    ("peaks", "minimum"): ("error",), ("peaks", "maximum"): ("error",),
+}  # fmt: skip
 
 
 def not_valid(summary: dict) -> str:
@@ -215,7 +221,7 @@ class Result(Displayable):
     @cached_property
     def routes(self) -> dict:
         """Route -> chainage, pipe, distance, elevation, least and greatest pressure and head, times, along it."""
-        from fvsolve.output.route_table import route_envelopes
+        from fvsolve.output.csv_files import route_envelopes
 
         return route_envelopes(self.envelope, self.case)
 
@@ -388,3 +394,45 @@ class Result(Displayable):
         """Columns of a table of the probes: name, unit, least and greatest value, and their times."""
         columns = {"probe": self.probes, "unit": list(self.units.values())}
         return columns | {key: [getattr(row, key) for row in self.extremes.values()] for key in Extremes._fields}
+
+
+EXACT_ROWS = {  # rows with exactly these fields
+    "marks": ResultMark._fields, "expectations": Expectation._fields, "verdicts": LimitVerdict._fields,
+    "comparisons": Comparison._fields, "warnings": tuple(field.name for field in fields(Notice)),
+}  # fmt: skip
+ROWS = EXACT_ROWS | {
+    "extremes": Extremes._fields, "probes": ("dimension", "unit"), "methods": ("time", "method"),
+    "events": ("time", "name", "what"), "cavities": ("place", "distance", "time", "volume", "t_volume"),
+    "peaks": ("minimum", "maximum"),
+}  # fmt: skip
+
+
+def check_summary(summary: dict[str, Any], path: Path) -> None:
+    """Raise RunError if the entries of a summary were written by another version; path : its file, for the message."""
+    if faults := [*field_faults(summary)]:
+        raise RunError(
+            f"{path} {'; '.join(faults)}: it was written by another version of fvsolve; run again with --force"
+        )
+
+
+def field_faults(summary: dict[str, Any]) -> Iterator[str]:
+    """Yield a text for each key of a summary with missing entries, and for each with unknown entries."""
+    for key, expected in ROWS.items():
+        rows = as_rows(summary.get(key, []))
+        if missing := [name for name in expected if any(name not in entry for entry in rows)]:
+            yield f"lacks {listing(missing)} of {key}"
+        if key in EXACT_ROWS and (
+            unknown := list(dict.fromkeys(name for entry in rows for name in entry if name not in expected))
+        ):
+            yield f"has {listing(unknown)} of {key}, unknown to this version"
+    for (key, part), expected in NESTED_ROWS.items():
+        rows = [row for entry in as_rows(summary.get(key, [])) for row in as_rows(entry.get(part, []))]
+        if missing := [name for name in expected if any(name not in entry for entry in rows)]:
+            yield f"lacks {listing(missing)} of {key}, {part}"
+
+
+def as_rows(rows: list | dict) -> list[dict]:
+    """List of dicts from a list of dicts, from a dict of dicts, or from a single dict."""
+    if isinstance(rows, dict):
+        return [*rows.values()] if all(isinstance(row, dict) for row in rows.values()) else [rows]
+    return rows
