@@ -7,20 +7,7 @@ from typing import Annotated
 
 from typer import Option
 
-from fvsolve.cli.app import (
-    Dask,
-    Jobs,
-    Json,
-    Out,
-    Set,
-    SingleCase,
-    app,
-    clear_files,
-    comma_list,
-    folder_of,
-    load_case,
-    method_names,
-)
+from fvsolve.cli import app as cli
 from fvsolve.cli.progress import progress_line
 from fvsolve.cli.terminal import Table, present
 from fvsolve.errors import FvsolveError
@@ -35,9 +22,9 @@ ORDER_FILE = columns(
 )  # fmt: skip
 
 
-@app.command()
+@cli.app.command()
 def chart(
-    case: SingleCase,
+    case: cli.SingleCase,
     scheme: Annotated[
         str | None, Option(metavar="LIST", help="schemes to compare (default upwind,muscl,upwind5,weno5)")
     ] = None,
@@ -79,44 +66,37 @@ def chart(
     models: Annotated[
         bool, Option("--models", help="compare models, from lumped volumes to cells, instead of methods")
     ] = False,
-    jobs: Jobs = 1,
-    dask: Dask = None,
-    set: Set = [],  # noqa: B006
-    out: Out = None,
-    as_json: Json = False,
+    jobs: cli.Jobs = 1,
+    dask: cli.Dask = None,
+    set: cli.Set = [],  # noqa: B006
+    out: cli.Out = None,
+    as_json: cli.Json = False,
 ) -> None:
     """Chart error against CPU time and work for schemes, methods and resolutions; list the cheapest for each error."""
-    from fvsolve.studies import ladder
     from fvsolve.studies.accuracy.chart import chart as study
     from fvsolve.studies.accuracy.chart_files import write_chart
-    from fvsolve.studies.accuracy.model_hierarchy import DEFAULT_TARGET
 
-    loaded = load_case(case, set, scheme, method)
+    loaded = cli.load_case(case, set, scheme, method)
     if target is not None and not 0.0 < target < 1.0:
-        raise FvsolveError(
-            f"--target: {target:g} is not a valid error. Expected a fraction of the range, between 0 and 1"
-        )
+        text = f"--target: {target:g} is not a valid error"
+        raise FvsolveError(f"{text}. Expected a fraction of the range, between 0 and 1")
     if models:
         several_jobs = None if jobs == 1 else jobs
         _refuse(scheme=scheme, method=method, cells=cells, rtol=rtol, step=step, jobs=several_jobs, dask=dask, out=out)
+        from fvsolve.studies import ladder
+        from fvsolve.studies.accuracy.model_hierarchy import DEFAULT_TARGET
+
+        target = target or DEFAULT_TARGET
         with progress_line(resumable=False) as progress:
-            hierarchy = ladder(loaded, target=target or DEFAULT_TARGET, progress=progress)
-        return present(as_json, hierarchy.plain(), hierarchy_text(hierarchy, target or DEFAULT_TARGET))
-    folder = folder_of(loaded, "chart", out)
+            hierarchy = ladder(loaded, target=target, progress=progress)
+        return present(as_json, hierarchy.plain(), hierarchy_text(hierarchy, target))
+    folder = cli.folder_of(loaded, "chart", out)
     sizes = [_numbers(name, text) for name, text in (("cells", cells), ("rtol", rtol), ("step", step))]
     with progress_line() as progress:
         result = study(
-            loaded,
-            None,
-            comma_list(scheme, "--scheme"),
-            method_names(method),
-            *sizes,
-            target,
-            folder,
-            progress,
-            jobs,
-            dask,
-        )
+            loaded, None, cli.comma_list(scheme, "--scheme"), cli.method_names(method), *sizes, target, folder,
+            progress, jobs, dask,
+        )  # fmt: skip
     paths = write_chart(result, folder)
     present(as_json, result.plain() | {"files": paths}, chart_text(result, paths))
 
@@ -142,7 +122,7 @@ def _numbers(name: str, text: str | None) -> list | None:
     Raises FvsolveError for a word that is not a positive number, or for `cells` not a positive whole number.
     """
     numbers = []
-    for word in comma_list(text) or ():
+    for word in cli.comma_list(text) or ():
         try:
             value = int(word) if name == "cells" else float(word)
         except ValueError:
@@ -182,7 +162,10 @@ def chart_text(result, paths) -> Iterator:
     )
     yield "wrote " + ", ".join(str(path) for path in paths)
     if result.aim is not None:
-        yield from _target_text(result)
+        point = result.aim.point
+        yield f"\n# error {point.trajectory:.2g} (target {result.aim.target:g}), {point.seconds * 1e3:.3g} ms; use in"
+        yield "# [numerics] in place of scheme, method, courant, step, rtol and cell_time"
+        yield from result.aim.toml_lines()
 
 
 def _ms(key: str) -> Callable[[Mapping], str]:
@@ -212,13 +195,6 @@ FRONT = (
 )
 
 
-def _target_text(result) -> Iterator:
-    point = result.aim.point
-    yield f"\n# error {point.trajectory:.2g} (target {result.aim.target:g}), {point.seconds * 1e3:.3g} ms; use in"
-    yield "# [numerics] in place of scheme, method, courant, step, rtol and cell_time"
-    yield from result.aim.toml_lines()
-
-
 MODELS = (
     Column("name", "model"), Column("law"), Column("states"), Column("error", words=".4g"), Column("of"),
     Column("greatest", words=".4g"), Column("ms", "time [ms]", ".4g"), Column("rhs", "calls of f"),
@@ -227,12 +203,8 @@ MODELS = (
 
 def hierarchy_text(hierarchy, target: float) -> Iterator:
     """Error and cost of each model of a hierarchy, and the cheapest model with an error of at most `target`."""
-    rows = [
-        vars(level) | {"of": level.worst, "ms": 1e3 * level.seconds}
-        for level in hierarchy.rungs
-        if level.error is not None
-    ]
-    yield ResultTable(MODELS, rows)
+    known = [level for level in hierarchy.rungs if level.error is not None]
+    yield ResultTable(MODELS, [vars(level) | {"of": level.worst, "ms": 1e3 * level.seconds} for level in known])
     richest, cheapest = hierarchy.richest, hierarchy.cheapest
     yield (
         'error: root mean square over time of the worst probe (column "of"), over its range; '
@@ -243,13 +215,8 @@ def hierarchy_text(hierarchy, target: float) -> Iterator:
         levels = [level for level in hierarchy.rungs if level.error is None and level.reason == reason]
         yield f"{', '.join(dict.fromkeys(f'{level.name} ({level.law})' for level in levels))}: {reason}"
     gain = richest.seconds / cheapest.seconds
-    yield (
-        (
-            f"cheapest within {target:g}: {cheapest.name}, {cheapest.law}, {cheapest.states} states, "
-            f"{gain:.3g} times faster than the most detailed model"
-        ),
-        "bold",
-    )
+    model = f"{cheapest.name}, {cheapest.law}, {cheapest.states} states"
+    yield f"cheapest within {target:g}: {model}, {gain:.3g} times faster than the most detailed model", "bold"
     yield from hierarchy.rules
 
 
@@ -260,10 +227,10 @@ ORDER_COLUMNS = (
 )  # fmt: skip
 
 
-@app.command()
+@cli.app.command()
 def order(
-    case: SingleCase,
-    overrides: Set = [],  # noqa: B006
+    case: cli.SingleCase,
+    overrides: cli.Set = [],  # noqa: B006
     refine: Annotated[
         str | None,
         Option(
@@ -280,8 +247,7 @@ def order(
         ),
     ] = None,
     levels: Annotated[
-        int | None,
-        Option(help="number of refinement levels, 2 or more (default 4, or 6 if only time is refined)"),
+        int | None, Option(help="number of refinement levels, 2 or more (default 4, or 6 if only time is refined)")
     ] = None,
     cells: Annotated[
         int | None,
@@ -299,34 +265,24 @@ def order(
             "level) or auto (the first of these that suits the case)"
         ),
     ] = "auto",
-    jobs: Jobs = 1,
-    dask: Dask = None,
-    out: Out = None,
-    as_json: Json = False,
-) -> Iterator:
+    jobs: cli.Jobs = 1,
+    dask: cli.Dask = None,
+    out: cli.Out = None,
+    as_json: cli.Json = False,
+) -> None:
     """Measure the order of convergence of a case under refinement: a table, order.csv and order.png."""
     from fvsolve.studies.accuracy.order import order as study
     from fvsolve.studies.result_cache import ResultCache
 
-    loaded = load_case(case, overrides, scheme, method)
-    folder = folder_of(loaded, "order", out)
+    loaded = cli.load_case(case, overrides, scheme, method)
+    folder = cli.folder_of(loaded, "order", out)
     with progress_line() as progress, ResultCache(folder) as points:
         studies = study(
-            loaded,
-            refine=refine,
-            key=key,
-            levels=levels,
-            cells=cells,
-            schemes=comma_list(scheme, "--scheme"),
-            methods=method_names(method),
-            against=reference,
-            out=points,
-            progress=progress,
-            jobs=jobs,
-            dask=dask,
-        )
+            loaded, refine=refine, key=key, levels=levels, cells=cells, schemes=cli.comma_list(scheme, "--scheme"),
+            methods=cli.method_names(method), against=reference, out=points, progress=progress, jobs=jobs, dask=dask,
+        )  # fmt: skip
     studies = studies if isinstance(studies, list) else [studies]
-    clear_files(folder, "order.csv", "order.png", "order-*.png")
+    cli.clear_files(folder, "order.csv", "order.png", "order-*.png")
     files = [ResultTable(ORDER_FILE, [*file_rows(studies)]).write(folder / "order.csv")]
     for result in studies:
         files.append(folder / ("order.png" if len(studies) == 1 else f"order-{result.scheme}-{result.method}.png"))
@@ -367,7 +323,8 @@ def study_text(result) -> Iterator:
         yield f"{variable} [{result.error_unit(variable)[1]}]{place}"
         yield rows_of(result, variable)
     yield ""
-    yield Table(["fitted order of", "L1", "L2", "max"], fit_rows(result))
+    orders = [[f"{name}", *(fit_text(fits[norm]) for norm in NORMS)] for name, fits in result.fits.items()]
+    yield Table(["fitted order of", "L1", "L2", "max"], orders)
     yield from dict.fromkeys([*reason_lines(result), *result.notes])
     yield ""
 
@@ -385,11 +342,6 @@ def rows_of(result, variable: str) -> ResultTable:
         mark_text = marks["L1"] if same else ", ".join(f"{text} ({norm})" for norm, text in marks.items() if text)
         rows.append(plain(cells | {"mark": mark_text}))
     return ResultTable(ORDER_COLUMNS, rows)
-
-
-def fit_rows(result) -> list[list[str]]:
-    """Rows of the table of fitted orders: one for each variable, with its orders in the L1, L2 and max norm."""
-    return [[f"{name}", *(fit_text(fits[norm]) for norm in NORMS)] for name, fits in result.fits.items()]
 
 
 def fit_text(fit) -> str:

@@ -157,14 +157,12 @@ def schema() -> None:
 @app.command()
 def methods(
     name: Annotated[
-        str | None,
-        Argument(metavar="NAME", help="name of a method, or file of its tableau (default all methods)"),
+        str | None, Argument(metavar="NAME", help="name of a method, or file of its tableau (default all methods)")
     ] = None,
     out: Annotated[
         Path | None,
         Option(
-            metavar="FILE",
-            help="picture file of the stability region of NAME: .png, .svg or .pdf (default NAME.png)",
+            metavar="FILE", help="picture file of the stability region of NAME: .png, .svg or .pdf (default NAME.png)"
         ),
     ] = None,
     as_json: Json = False,

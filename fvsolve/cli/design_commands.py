@@ -9,18 +9,20 @@ from typing import Annotated
 from typer import Argument, Option
 
 from fvsolve.cli.app import Dask, Jobs, Json, Set, SingleCase, app, load_case
+from fvsolve.cli.printing import REASONS_SHOWN, time_formatter, undecided_limit_reason, where_and_when
 from fvsolve.cli.progress import progress_line
 from fvsolve.cli.sweep import RANGE_FORMAT, key_and_values
 from fvsolve.cli.terminal import Table, present
 from fvsolve.errors import CaseError, FvsolveError, collect_faults
+from fvsolve.run.result import FAILS, HOLDS, IN_WORDS, OPEN, LimitVerdict, not_valid
+from fvsolve.units import span
 
 
 @app.command()
 def size(
     case: SingleCase,
     vary: Annotated[
-        str,
-        Option("--vary", metavar="KEY=LOW,HIGH", help="key to size and its range, in SI or with units"),
+        str, Option("--vary", metavar="KEY=LOW,HIGH", help="key to size and its range, in SI or with units")
     ],
     goal: Annotated[
         str,
@@ -38,8 +40,7 @@ def size(
         float, Option(help="relative tolerance: greatest distance of the value found from a value that fails")
     ] = 0.01,
     error: Annotated[
-        bool,
-        Option("--error", help="require that margins exceed their numerical errors, estimated from further runs"),
+        bool, Option("--error", help="require that margins exceed their numerical errors, estimated from further runs")
     ] = False,
     set: Set = [],  # noqa: B006
     as_json: Json = False,
@@ -115,8 +116,7 @@ def optimise(
         ),
     ],
     minimise: Annotated[
-        str,
-        Option(metavar="max(PROBE)", help='peak to minimise, for example "max(gate.pressure)" or "max(main.head)"'),
+        str, Option(metavar="max(PROBE)", help='peak to minimise, for example "max(gate.pressure)" or "max(main.head)"')
     ],
     knots: Annotated[int, Option(metavar="N", help="number of knots between the ends of the schedule, 1 to 12")] = 3,
     runs: Annotated[int, Option(metavar="N", help="greatest number of runs")] = 60,
@@ -181,10 +181,7 @@ def study(
 
 
 def study_text(result) -> Iterator:
-    from fvsolve.cli.printing import REASONS_SHOWN, time_formatter, undecided_limit_reason, where_and_when
-    from fvsolve.run.result import FAILS, OPEN
     from fvsolve.studies.scenarios import row_name
-    from fvsolve.units import span
 
     if result.design.title:
         yield result.design.title, "bold"
@@ -230,8 +227,6 @@ def study_text(result) -> Iterator:
 
 def verdicts_of(row: dict) -> list:
     """Verdicts on the limits of a run, from its row in a study, as `LimitVerdict`."""
-    from fvsolve.run.result import LimitVerdict
-
     return [LimitVerdict(**verdict) for verdict in row["verdicts"]]
 
 
@@ -240,8 +235,6 @@ def standing(row: dict) -> str:
 
     It is "FAILS" if the run or a limit fails, else "open" or "holds"; "-" for a good run without limits.
     """
-    from fvsolve.run.result import FAILS, HOLDS, IN_WORDS, OPEN
-
     states = [FAILS] * (not row["ok"]) + [entry.state for entry in verdicts_of(row)]
     if not states:
         return "-"
@@ -249,8 +242,6 @@ def standing(row: dict) -> str:
 
 
 def _cell(verdict, row: dict) -> str:
-    from fvsolve.run.result import not_valid
-
     if verdict is None or verdict["margin"] is None:
         return "-" if verdict is None else not_valid(row) or "-"
     error = "" if verdict["error"] is None else f" +- {verdict['error']:.2g}"

@@ -9,18 +9,7 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from fvsolve.cli.app import (
-    Json,
-    Out,
-    Set,
-    app,
-    clear_files,
-    comma_list,
-    folder_of,
-    load_case,
-    method_names,
-    warn_replaced,
-)
+from fvsolve.cli import app as cli
 from fvsolve.cli.progress import interrupt_message, progress_line, run_progress
 from fvsolve.cli.terminal import Table, present
 from fvsolve.errors import FvsolveError
@@ -53,7 +42,7 @@ METHOD = (
 )  # fmt: skip
 
 
-@app.command()
+@cli.app.command()
 def energy(
     case: Annotated[
         str | None,
@@ -72,24 +61,18 @@ def energy(
     ] = None,
     scheme: Annotated[
         str | None,
-        Option(
-            metavar="S,S,...",
-            help="schemes to study (default scheme of the case, or without a case all schemes)",
-        ),
+        Option(metavar="S,S,...", help="schemes to study (default scheme of the case, or without a case all schemes)"),
     ] = None,
     method: Annotated[
         str | None,
-        Option(
-            metavar="M,M,...",
-            help="methods to study (default method of the case, or without a case all methods)",
-        ),
+        Option(metavar="M,M,...", help="methods to study (default method of the case, or without a case all methods)"),
     ] = None,
-    out: Out = None,
-    set: Set = [],  # noqa: B006
-    as_json: Json = False,
+    out: cli.Out = None,
+    set: cli.Set = [],  # noqa: B006
+    as_json: cli.Json = False,
 ) -> None:
     """Print the energy ledger of a run: energy supplied, stored, dissipated, and changed by the numerical method."""
-    schemes, methods = comma_list(scheme, "--scheme"), method_names(method)
+    schemes, methods = cli.comma_list(scheme, "--scheme"), cli.method_names(method)
     if case is None:
         from fvsolve.studies.energy.passivity import passivity
 
@@ -98,9 +81,9 @@ def energy(
             result = passivity(schemes, methods, progress)
         present(as_json, result.plain(), passivity_text(result))
     elif schemes or methods:
-        compare_pairs(load_case(case, set), schemes, methods, port, out, as_json)
+        compare_pairs(cli.load_case(case, set), schemes, methods, port, out, as_json)
     else:
-        ledger(load_case(case, set), port, out, as_json)
+        ledger(cli.load_case(case, set), port, out, as_json)
 
 
 def refuse_without_case(options: dict) -> None:
@@ -125,12 +108,12 @@ def ledger(case, port, out, as_json: bool) -> None:
     from fvsolve.studies.energy.energy_balance import energy as study
     from fvsolve.studies.energy.energy_balance import write_table
 
-    folder = folder_of(case, "energy", out)
-    warn_replaced(folder, FILES[0])
+    folder = cli.folder_of(case, "energy", out)
+    cli.warn_replaced(folder, FILES[0])
     with interrupt_message(f"interrupted: no ledger is written, {folder} may lack files; {RESTARTS}"):
         with run_progress(case) as progress:
             result = study(case, port=port, progress=progress)
-        write_table(result, clear_files(folder, *FILES) / FILES[0])
+        write_table(result, cli.clear_files(folder, *FILES) / FILES[0])
         at_port = None if result.port is None else (result.port.node, result.port.course, result.port.bound)
         clock, own = time_column(case), column("", "energy", case)
         units = clock.unit, None if own.plain else (own.to_si(1.0), own.unit)
@@ -189,7 +172,7 @@ def compare_pairs(case, schemes, methods, port, out, as_json: bool) -> None:
     from fvsolve.studies.energy.energy_of_pairs import PAIR_COLUMNS, measure_pairs
     from fvsolve.studies.result_cache import ResultCache
 
-    folder = folder_of(case, "energy", out)
+    folder = cli.folder_of(case, "energy", out)
     with progress_line() as progress, run_progress() as watch, ResultCache(folder) as points:
         rows = measure_pairs(case, schemes, methods, port, progress, points, watch)
     ResultTable(PAIR_COLUMNS, rows).write(folder / "pairs.csv")

@@ -8,30 +8,16 @@ from typing import Annotated
 
 from typer import Option
 
-from fvsolve.cli.app import (
-    Dask,
-    Jobs,
-    Json,
-    Set,
-    SingleCase,
-    app,
-    clear_files,
-    comma_list,
-    folder_of,
-    load_case,
-    method_names,
-    quantity_of,
-    value_of,
-)
+from fvsolve.cli import app as cli
 from fvsolve.cli.progress import progress_line
 from fvsolve.cli.terminal import Table, present
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.result_table import Column, ResultTable
 
 
-@app.command("failure-map")
+@cli.app.command("failure-map")
 def failure_map(
-    case: SingleCase,
+    case: cli.SingleCase,
     scheme: Annotated[
         str | None,
         Option(
@@ -75,25 +61,25 @@ def failure_map(
             help="greatest accepted error of a probe: mean over the run, as a fraction of the probe's range",
         ),
     ] = 0.02,
-    jobs: Jobs = 1,
-    dask: Dask = None,
+    jobs: cli.Jobs = 1,
+    dask: cli.Dask = None,
     out: Annotated[
         Path | None, Option(metavar="DIR", help="folder of the table and pictures (default runs/NAME.map)")
     ] = None,
-    set: Set = [],  # noqa: B006
-    as_json: Json = False,
+    set: cli.Set = [],  # noqa: B006
+    as_json: cli.Json = False,
 ) -> None:
     """Map failures of methods over time steps or values of a key. Each run is stable, ringing, wrong, blown up, ..."""
     from fvsolve.studies.failure.failure_map import failure_map as study
     from fvsolve.studies.result_cache import ResultCache
     from fvsolve.studies.sampling import key_with_unit
 
-    read_case = load_case(case, set, scheme, method)
-    folder = folder_of(read_case, "map", out)
-    steps = None if step is None else [quantity_of(word, "time", f"--step {step}") for word in comma_list(step)]
+    read_case = cli.load_case(case, set, scheme, method)
+    folder = cli.folder_of(read_case, "map", out)
+    steps = None if step is None else [cli.quantity_of(word, "time", f"--step {step}") for word in cli.comma_list(step)]
     with progress_line() as progress, ResultCache(folder) as points:
         result = study(
-            read_case, comma_list(scheme, "--scheme"), method_names(method), _numbers("--courant", courant),
+            read_case, cli.comma_list(scheme, "--scheme"), cli.method_names(method), _numbers("--courant", courant),
             steps, _key(key), tolerance, points, progress, jobs=jobs, dask=dask,
         )  # fmt: skip
     head = result.key if result.key == "step" else key_with_unit(read_case.raw, result.key, result.values)
@@ -103,7 +89,7 @@ def failure_map(
 
 def _numbers(option: str, text: str | None) -> list[float] | None:
     try:
-        return None if text is None else [float(word) for word in comma_list(text)]
+        return None if text is None else [float(word) for word in cli.comma_list(text)]
     except ValueError:
         raise FvsolveError(
             f"{option} {text}: not a list of numbers. Expected numbers with commas, for example {option} 0.5,0.9,1"
@@ -116,7 +102,7 @@ def _key(text: str | None) -> tuple[str, list] | None:
     name, equals, values = text.partition("=")
     if not equals or not name.strip():
         raise FvsolveError(f"--key {text}: expected KEY=A,B, for example nodes.body.volume=1e-6,1e-5")
-    return name.strip(), [value_of(word) for word in comma_list(values)]
+    return name.strip(), [cli.value_of(word) for word in cli.comma_list(values)]
 
 
 def _write_files(result, folder: Path, head: str) -> list[Path]:
@@ -124,7 +110,7 @@ def _write_files(result, folder: Path, head: str) -> list[Path]:
 
     rows = [{"value": result.values[row["column"]]} | row for row in result.plain()["squares"]]
     table = ResultTable([Column(key) for key in rows[0]], rows).write(
-        clear_files(folder, "map.csv", "map.png", "map.svg") / "map.csv"
+        cli.clear_files(folder, "map.csv", "map.png", "map.svg") / "map.csv"
     )
     figure = failure_map_figure(result, f"{result.case}: where methods fail", head)
     pictures = [folder / f"map.{kind}" for kind in ("png", "svg")]

@@ -69,11 +69,7 @@ def plot(
 def fatigue(
     directory: RunDirectory,
     probes: Annotated[
-        str,
-        Option(
-            metavar="A,B",
-            help="probes of pressure or head whose cycles are counted (default all such probes)",
-        ),
+        str, Option(metavar="A,B", help="probes of pressure or head whose cycles are counted (default all such probes)")
     ] = "",
     range: Annotated[
         float | None,

@@ -9,22 +9,7 @@ from typing import Annotated
 import numpy as np
 from typer import Option
 
-from fvsolve.cli.app import (
-    AtTime,
-    BeforeJump,
-    Json,
-    LinearScheme,
-    Out,
-    Set,
-    SingleCase,
-    app,
-    clear_files,
-    comma_list,
-    folder_of,
-    load_case,
-    quantity_of,
-    warn_replaced,
-)
+from fvsolve.cli import app as cli
 from fvsolve.cli.terminal import present
 from fvsolve.output.unit_columns import column
 from fvsolve.studies.result_table import ResultTable, write_csv
@@ -33,9 +18,9 @@ POLES_SHOWN = 24  # greatest number of poles on the terminal; poles.csv has all
 SYMBOLS = {"admittance": "Y", "impedance": "Z"}
 
 
-@app.command()
+@cli.app.command()
 def linearise(
-    case: SingleCase,
+    case: cli.SingleCase,
     inputs: Annotated[
         str | None,
         Option(metavar="A,B", help="inputs of the linear system, such as valve.opening,lake.pressure (default none)"),
@@ -43,12 +28,12 @@ def linearise(
     outputs: Annotated[
         str | None, Option(metavar="A,B", help="probes used as outputs (default probes of the case)")
     ] = None,
-    at: AtTime = None,
-    before: BeforeJump = False,
-    scheme: LinearScheme = None,
-    out: Out = None,
-    set: Set = [],  # noqa: B006
-    as_json: Json = False,
+    at: cli.AtTime = None,
+    before: cli.BeforeJump = False,
+    scheme: cli.LinearScheme = None,
+    out: cli.Out = None,
+    set: cli.Set = [],  # noqa: B006
+    as_json: cli.Json = False,
 ) -> None:
     """Linearise a case about a state: matrices A, B, C, D and poles."""
     from fvsolve.model.energy_norm import energy_form
@@ -56,18 +41,14 @@ def linearise(
     from fvsolve.studies.linear.linearise import linearise as ask
 
     system = ask(
-        load_case(case, set),
-        comma_list(inputs, "--inputs") or (),
-        comma_list(outputs, "--outputs"),
-        quantity_of(at, "time", f"--at {at}"),
-        before,
-        scheme,
-    )
+        cli.load_case(case, set), cli.comma_list(inputs, "--inputs") or (), cli.comma_list(outputs, "--outputs"),
+        cli.quantity_of(at, "time", f"--at {at}"), before, scheme,
+    )  # fmt: skip
     values = poles_of(system.a, energy_form(system.at.model, system.at.y))
     poles = values.poles()
-    folder = folder_of(system.at.model.case, "linearise", out)
-    warn_replaced(folder, "linear.npz")
-    clear_files(folder, "A.csv", "A-sparse.csv")  # only one of the two files is written
+    folder = cli.folder_of(system.at.model.case, "linearise", out)
+    cli.warn_replaced(folder, "linear.npz")
+    cli.clear_files(folder, "A.csv", "A-sparse.csv")  # only one of the two files is written
     ResultTable(POLES, poles).write(folder / "poles.csv")
     write_matrices(folder, system)
     result = system.plain() | {"poles": poles, "poles_are": values.description, "directory": str(folder)}
@@ -133,9 +114,9 @@ def system_text(system, values, poles: list[dict], folder: Path) -> Iterator:
     yield f"{folder}: linear.npz, {'A-sparse' if system.sparse else 'A'}.csv, B.csv, C.csv, D.csv, poles.csv"
 
 
-@app.command()
+@cli.app.command()
 def response(
-    case: SingleCase,
+    case: cli.SingleCase,
     port: Annotated[
         str,
         Option(
@@ -143,27 +124,26 @@ def response(
             help="node at which flow and pressure are taken: a reservoir, junction, inflow, chamber or tank",
         ),
     ],
-    at: AtTime = None,
-    before: BeforeJump = False,
-    scheme: LinearScheme = None,
-    out: Out = None,
-    set: Set = [],  # noqa: B006
-    as_json: Json = False,
+    at: cli.AtTime = None,
+    before: cli.BeforeJump = False,
+    scheme: cli.LinearScheme = None,
+    out: cli.Out = None,
+    set: cli.Set = [],  # noqa: B006
+    as_json: cli.Json = False,
 ) -> None:
     """Compute the transfer function of pressure and flow at a node: matrices, frequency response, positive realness."""
     from fvsolve.studies.ports.response import response as ask
 
-    loaded = load_case(case, set)
-    result = ask(loaded, port, quantity_of(at, "time", f"--at {at}"), before, scheme)
-    folder = folder_of(loaded, "response", out)
+    loaded = cli.load_case(case, set)
+    result = ask(loaded, port, cli.quantity_of(at, "time", f"--at {at}"), before, scheme)
+    folder = cli.folder_of(loaded, "response", out)
     name = f"{port}.response"
     header = ["frequency [Hz]", "w [rad/s]", "real", "imaginary", f"magnitude [{si_unit(result)}]", "phase [deg]"]
     h = result.h
     columns = [result.w / (2.0 * np.pi), result.w, h.real, h.imag, np.abs(h), np.degrees(np.angle(h))]
-    warn_replaced(folder, f"{name}.npz")
-    write_csv(
-        clear_files(folder, f"{name}.png", f"{name}.svg") / f"{name}.csv", header, np.column_stack(columns).tolist()
-    )
+    cli.warn_replaced(folder, f"{name}.npz")
+    cli.clear_files(folder, f"{name}.png", f"{name}.svg")
+    write_csv(folder / f"{name}.csv", header, np.column_stack(columns).tolist())
     np.savez(folder / f"{name}.npz", A=result.a, B=result.b, C=result.c, D=result.d, states=np.array(result.states))
     unit = output_unit(loaded, result)
     draw(result, folder / name, *unit)

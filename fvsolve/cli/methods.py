@@ -51,7 +51,8 @@ def _table_text(all_facts: dict[str, Facts]) -> Iterator:
         [
             name, str(facts.order), str(facts.error_order) if facts.adaptive else "-", str(facts.stage_order),
             str(facts.stages), facts.kind, _yes(facts.a_stable), _yes(facts.l_stable), _length(facts.real_interval),
-            _length(facts.imaginary_interval), _length(facts.ssp_radius), _pade(facts),
+            _length(facts.imaginary_interval), _length(facts.ssp_radius),
+            f"({facts.pade[0]}, {facts.pade[1]})" if facts.pade else "-",
         ]
         for name, facts in first.items()
     ]  # fmt: skip
@@ -70,9 +71,15 @@ def _table_text(all_facts: dict[str, Facts]) -> Iterator:
 def _method_text(method: Method, facts: Facts, path: Path) -> Iterator:
     yield f"{method.name} ({method.source})", "bold"
     yield ""
-    yield from [*_tableau_lines(method), *_entry_notes(method)]
+    yield from _tableau_lines(method)
+    for name, (polynomial, near) in method.numbers.items():
+        yield f"{name} = {near:.10g}, a root of {polynomial}"
+    if method.start_weight is not None:
+        yield f"embedded solution: f(t, y) has weight {method.start_weight}; other weights follow by quadrature"
     yield ""
-    yield f"R(s) = {_quotient(facts)}"
+    r = facts.stability_function
+    up, down = _polynomial(r.numerator), _polynomial(r.denominator)
+    yield f"R(s) = {up if r.denominator.degree == 0 else f'({up}) / ({down})'}"
     yield from _sentences(facts)
     yield f"stability region: {path}"
 
@@ -108,10 +115,7 @@ def _tableau_lines(method: Method) -> list[str]:
     rows, width = [], method.stages
     for text in method.text.strip().splitlines():
         left, bar, right = text.partition("|")
-        if bar:
-            rows.append([left.strip(), *right.split()])
-        else:
-            rows.append([])
+        rows.append([left.strip(), *right.split()] if bar else [])
     rows = [[_entry(x) for x in row] + [""] * (width + 1 - len(row)) if row else [] for row in rows]
     wide = [max(len(row[i]) for row in rows if row) for i in range(width + 1)]
     lines = []
@@ -121,27 +125,10 @@ def _tableau_lines(method: Method) -> list[str]:
     return lines
 
 
-def _entry_notes(method: Method) -> list[str]:
-    """Notes on the tableau of a method.
-
-    They give the values of its algebraic numbers, and the weight of f(t, y) in the embedded solution.
-    """
-    notes = [f"{name} = {near:.10g}, a root of {polynomial}" for name, (polynomial, near) in method.numbers.items()]
-    if method.start_weight is not None:
-        notes.append(f"embedded solution: f(t, y) has weight {method.start_weight}; other weights follow by quadrature")
-    return notes
-
-
 def _entry(text: str) -> str:
     if len(text) > MAX_ENTRY and re.fullmatch(r"-?[\d.]+", text):
         return text[: SHORT_DIGITS + 2] + "..."
     return text
-
-
-def _quotient(facts: Facts) -> str:
-    r = facts.stability_function
-    up, down = _polynomial(r.numerator), _polynomial(r.denominator)
-    return up if r.denominator.degree == 0 else f"({up}) / ({down})"
 
 
 def _polynomial(p: Polynomial) -> str:
@@ -170,7 +157,3 @@ def _yes(value: bool) -> str:
 
 def _length(value: float, digits: int = 6) -> str:
     return "infinite" if math.isinf(value) else f"{value:.{digits}g}"
-
-
-def _pade(facts: Facts) -> str:
-    return f"({facts.pade[0]}, {facts.pade[1]})" if facts.pade else "-"

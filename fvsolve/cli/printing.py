@@ -1,4 +1,8 @@
-"""Lines and tables about runs, checks of cases, and differences of runs, for `terminal.show`."""
+"""Lines and tables about runs, checks of cases, and differences of runs, for `terminal.show`.
+
+`summary` is the summary of a run. `parts` maps names of parts to their values by key [SI]; `keys` maps the keys of
+columns to (title, dimension).
+"""
 
 from __future__ import annotations
 
@@ -138,12 +142,8 @@ def check_text(case, facts: dict, every: bool = False) -> Iterator:
     yield case.title or case.name, "bold"
     yield _fluid_text(case, facts["fluid"])
     odd = {part["place"] for part in facts["warnings"]}
-    for group, word, keys in (
-        ("nodes", "node", NODE),
-        ("masses", "mass", MASS),
-        ("bodies", "body", BODY),
-        ("pipes", "pipe", PIPE),
-    ):
+    groups = ("nodes", "node", NODE), ("masses", "mass", MASS), ("bodies", "body", BODY), ("pipes", "pipe", PIPE)
+    for group, word, keys in groups:
         place = "links" if group == "pipes" else "nodes"
         noticed = {name for name in facts[group] if f"{place}.{name}" in odd}
         yield from _parts_table(case, word, facts[group], keys, every, noticed)
@@ -170,9 +170,7 @@ def check_text(case, facts: dict, every: bool = False) -> Iterator:
 def _parts_table(case, word: str, parts: dict, keys: dict, every: bool = True, odd: set[str] = frozenset()) -> Iterator:
     """Table of parts in the units of `[output]`, if there are any; of a long table only notable rows.
 
-    word : header of the column of names; parts : name -> key -> value [SI]
-    keys : key of a column -> (its title, its dimension)
-    every : True for all rows; odd : names of parts with notices, which are notable
+    word : header of the column of names; every : True for all rows; odd : names of parts with notices
     """
     if not parts:
         return
@@ -188,10 +186,7 @@ def _parts_table(case, word: str, parts: dict, keys: dict, every: bool = True, o
 
 
 def _wall_lines(case, pipes: dict) -> list[str]:
-    """Lines on pipe walls and the sources of their data; pipes with the same text share a line.
-
-    pipes : name -> values, as in `Model.checks`
-    """
+    """Lines on pipe walls and the sources of their data; pipes with the same text share a line."""
     alike: dict[str, list[str]] = {}
     for name, pipe in pipes.items():
         if text := _wall_text(case, pipe):
@@ -233,7 +228,7 @@ def _thread_text(facts: dict) -> str:
 def _notable_rows(parts: dict, keys: dict, odd: set[str]) -> list[str]:
     """Names of parts with the least or greatest value of a column, and of parts in `odd`, in the original order.
 
-    parts, keys : as for `_parts_table`; odd : names of parts with notices, of which at most MANY_ROWS are included
+    odd : names of parts with notices, of which at most MANY_ROWS are included
     """
     chosen = set(sorted(odd)[:MANY_ROWS])
     for key in keys:
@@ -250,10 +245,8 @@ def _fluid_text(case, fluid: dict) -> str:
         unit = column(key, dimension, case)
         if dimension == "modulus":
             unit = column(key, dimension, case, span(unit.unit))
-        texts.append(
-            f"{key.replace('_', ' ')} {'unknown' if fluid[key] is None else _number(_in_unit(unit, fluid[key]))}"
-            f"{'' if fluid[key] is None else ' ' + unit.unit}"
-        )
+        value = "unknown" if fluid[key] is None else f"{_number(_in_unit(unit, fluid[key]))} {unit.unit}"
+        texts.append(f"{key.replace('_', ' ')} {value}")
     name = "" if fluid["name"] == fluid["source"] else f" ({fluid['source']})"
     return f"fluid {fluid['name']}{name}: {', '.join(texts)}"
 
@@ -353,19 +346,12 @@ def _error_text(peak: dict) -> str:
 
 
 def where_and_when(verdict: dict, summary: dict) -> str:
-    """Text of the place, chainage and time at which the margin of a limit is least, in the units of a run.
-
-    verdict : verdict on the limit; summary : summary of the run
-    """
+    """Text of the place, chainage and time at which the margin of a limit is least, in the units of a run."""
     along = UnitColumn("chainage", "length", summary["envelope_units"]["distance"])
-    chainage = (
-        "" if verdict["chainage"] is None else f" at {_number(_in_unit(along, verdict['chainage']))} {along.unit}"
-    )
-    return (
-        verdict["place"]
-        + chainage
-        + ("" if verdict["time"] is None else f", {time_formatter(summary)(verdict['time'])}")
-    )
+    text = verdict["place"]
+    if verdict["chainage"] is not None:
+        text += f" at {_number(_in_unit(along, verdict['chainage']))} {along.unit}"
+    return text if verdict["time"] is None else f"{text}, {time_formatter(summary)(verdict['time'])}"
 
 
 def _limit_text(verdict: dict, summary: dict) -> str:
@@ -376,11 +362,9 @@ def _limit_text(verdict: dict, summary: dict) -> str:
         f"({where_and_when(verdict, summary)})"
     )
     state = IN_WORDS[this.state] if this.state != OPEN else f"OPEN, because {undecided_limit_reason(this, summary)}"
-    margin = (
-        not_valid(summary) or "-"
-        if verdict["margin"] is None
-        else f"{_number(verdict['margin'])} {span(verdict['unit'])}"
-    )
+    margin = not_valid(summary) or "-"
+    if verdict["margin"] is not None:
+        margin = f"{_number(verdict['margin'])} {span(verdict['unit'])}"
     text = f"{state}: {verdict['name']}: {value_text}, {relation} {_number(verdict['limit'])}; margin {margin}"
     if verdict["error"] is not None and verdict["margin"] is not None:
         text += f" within {verdict['error']:.2g}"
@@ -390,7 +374,7 @@ def _limit_text(verdict: dict, summary: dict) -> str:
 
 
 def undecided_limit_reason(verdict, summary: dict) -> str:
-    """Reason why a limit is undecided (state OPEN). verdict : `LimitVerdict`; summary : summary of the run"""
+    """Reason why a limit is undecided (state OPEN). verdict : `LimitVerdict`"""
     if verdict.doubtful:
         return "its margin is smaller than its error"
     return undecided_reason(summary) or f"its {'value' if verdict.margin is None else 'error'} is not known"
@@ -415,7 +399,7 @@ def mark_lines(marks: list[dict], time_text) -> list[str]:
 
 
 def undecided_reason(summary: dict) -> str:
-    """Reason why a run cannot confirm a limit that it does not exceed; "" if it can. summary : summary of the run"""
+    """Reason why a run cannot confirm a limit that it does not exceed; "" if it can."""
     late = [notice["text"] for notice in summary["warnings"] if notice["kind"] == "end"]
     if text := not_valid(summary):
         return f"the run is {text}"
@@ -442,14 +426,11 @@ def _cost_text(summary: dict) -> str:
     rejected = f", {summary['rejections']} rejected" if summary["rejections"] else ""
     cells = f", {summary['cells']} cells" if summary["cells"] else ""
     cost = f" ({_number(summary['cost'])} ns per cell and step)" if summary["cells"] and summary["cost"] else ""
-    newton = (
-        f", {summary['jacobians']} Jacobians, {summary['factorisations']} factorisations"
-        if summary["jacobians"]
-        else ""
-    )
-    newton += (
-        f", {summary['newton']} Newton iterations, {summary['newton_failures']} failed" if summary["newton"] else ""
-    )
+    newton = ""
+    if summary["jacobians"]:
+        newton += f", {summary['jacobians']} Jacobians, {summary['factorisations']} factorisations"
+    if summary["newton"]:
+        newton += f", {summary['newton']} Newton iterations, {summary['newton_failures']} failed"
     return f"{summary['steps']} steps{rejected}{newton}{cells}, {summary['seconds']:.3g} s{cost}"
 
 

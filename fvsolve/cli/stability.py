@@ -10,24 +10,10 @@ from typing import Annotated
 import numpy as np
 from typer import Argument, Option
 
-from fvsolve.cli.app import (
-    AtTime,
-    BeforeJump,
-    Dask,
-    Jobs,
-    Json,
-    Set,
-    app,
-    clear_files,
-    comma_list,
-    folder_of,
-    load_case,
-    method_names,
-    quantity_of,
-    writable_folder,
-)
+from fvsolve.cli import app as cli
 from fvsolve.cli.progress import progress_line
 from fvsolve.cli.terminal import Table, present
+from fvsolve.errors import FvsolveError
 from fvsolve.step_limits.advection_limit import AdvectionLimit, advection_limits
 from fvsolve.step_limits.symbol import WEIGHTS
 from fvsolve.studies.result_table import Column, ResultTable, cell_text, columns
@@ -60,7 +46,7 @@ LIMIT_EXPLANATIONS = {
 LEGEND = "l: the longest waves set the limit, s: the shortest (two cells), b: a wave between, a: all waves together"
 
 
-@app.command()
+@cli.app.command()
 def stability(
     case: Annotated[
         str | None,
@@ -96,10 +82,10 @@ def stability(
             "limit, or 0.5 if the limit is 0)"
         ),
     ] = None,
-    at: AtTime = None,
-    before: BeforeJump = False,
-    jobs: Jobs = 1,
-    dask: Dask = None,
+    at: cli.AtTime = None,
+    before: cli.BeforeJump = False,
+    jobs: cli.Jobs = 1,
+    dask: cli.Dask = None,
     out: Annotated[
         Path | None,
         Option(
@@ -107,42 +93,28 @@ def stability(
             help="folder of tables and pictures (default runs/NAME.stability, or no files without a case)",
         ),
     ] = None,
-    set: Set = [],  # noqa: B006
-    as_json: Json = False,
+    set: cli.Set = [],  # noqa: B006
+    as_json: cli.Json = False,
 ) -> None:
     """Compute the greatest stable step of a case, predicted and measured, and bounds on it."""
-    of_a_case = {
-        "--set": set,
-        "--at": at,
-        "--left-limit": before,
-        "--jobs": jobs if jobs != 1 else None,
-        "--dask": dask,
-    }
+    of_a_case = {"--set": set, "--at": at, "--left-limit": before, "--jobs": None if jobs == 1 else jobs}
+    of_a_case |= {"--dask": dask}
     refuse_options(case, of_a_case, {"--cells": cells, "--courant": courant})
     if case is None:
-        from fvsolve.cli.stability import without_case
-
         return present(as_json, *without_case(scheme, method, cells, steps, out, courant))
     from fvsolve.studies.stability.power_growth import STEPS
     from fvsolve.studies.stability.stability import stability as ask
 
-    loaded = load_case(case, set, scheme, method)
-    folder = folder_of(loaded, "stability", out)
+    loaded = cli.load_case(case, set, scheme, method)
+    folder = cli.folder_of(loaded, "stability", out)
     with progress_line() as progress:
         result = ask(
-            loaded,
-            comma_list(scheme, "--scheme"),
-            method_names(method),
-            quantity_of(at, "time", f"--at {at}"),
-            before,
-            steps or STEPS,
-            out=folder,
-            progress=progress,
-            jobs=jobs,
-            dask=dask,
-        )
+            loaded, cli.comma_list(scheme, "--scheme"), cli.method_names(method),
+            cli.quantity_of(at, "time", f"--at {at}"), before, steps or STEPS, out=folder, progress=progress,
+            jobs=jobs, dask=dask,
+        )  # fmt: skip
     table = ResultTable(STABILITY_FILE, [row.plain() | {"notes": "; ".join(row.notes)} for row in result.rows])
-    files = [table.write(clear_files(folder, "stability.csv", "spectrum-*.png") / "stability.csv").name]
+    files = [table.write(cli.clear_files(folder, "stability.csv", "spectrum-*.png") / "stability.csv").name]
     if len(result.rows) <= PICTURES:
         files += pictures(result, folder)
     present(as_json, result.plain() | {"directory": str(folder), "files": files}, stability_text(result, folder, files))
@@ -154,8 +126,6 @@ def refuse_options(case: str | None, of_a_case: dict, of_a_grid: dict) -> None:
     case : name of the case, or None
     of_a_case : name -> value of the options that need a case; of_a_grid : name -> value of the options for no case
     """
-    from fvsolve.errors import FvsolveError
-
     useless = [name for name, value in (of_a_grid if case else of_a_case).items() if value not in (None, False, [])]
     if useless:
         reason = "not valid with a case, only without" if case else "needs a case: fvsolve stability CASE"
@@ -257,12 +227,12 @@ def without_case(
     courant : Courant number at which the growth of waves is printed; out : folder for CSV files, or None
     Raises FvsolveError for unknown names.
     """
-    named, methods = comma_list(scheme, "--scheme") or None, method_names(method) or None
+    named, methods = cli.comma_list(scheme, "--scheme") or None, cli.method_names(method) or None
     linear = None if named is None else [name for name in named if name not in LIMITED]
     runs, limited = _measure(named, linear, methods, cells, steps)
     limits = advection_limits(linear, methods, courant) if linear is None or linear else []
     if out is not None:
-        writable_folder(out)
+        cli.writable_folder(out)
         for name, rows in (("limits", [entry.plain() for entry in limits]),
                            ("measured", [entry.plain() for entry in runs]),
                            ("limited", [entry.flat() for entry in limited])):  # fmt: skip

@@ -9,21 +9,7 @@ from typing import Annotated
 
 from typer import Option
 
-from fvsolve.cli.app import (
-    Dask,
-    Jobs,
-    Json,
-    Out,
-    Seed,
-    Set,
-    SingleCase,
-    app,
-    clear_files,
-    folder_of,
-    load_case,
-    value_of,
-    writable_folder,
-)
+from fvsolve.cli import app as cli
 from fvsolve.cli.progress import progress_line
 from fvsolve.cli.terminal import Table, present
 from fvsolve.errors import FvsolveError
@@ -59,9 +45,9 @@ MAX_COLUMNS = 6  # greatest number of columns of the table on a terminal, withou
 MAX_ROWS = 100  # greatest number of rows of that table
 
 
-@app.command()
+@cli.app.command()
 def sweep(
-    case: SingleCase,
+    case: cli.SingleCase,
     set: Values = [],  # noqa: B006
     points: Annotated[
         Path | None,
@@ -78,12 +64,12 @@ def sweep(
         ),
     ] = None,
     vary: Ranges = [],  # noqa: B006
-    seed: Seed = 0,
-    jobs: Jobs = 1,
-    dask: Dask = None,
+    seed: cli.Seed = 0,
+    jobs: cli.Jobs = 1,
+    dask: cli.Dask = None,
     outcome: Outcomes = [],  # noqa: B006
-    out: Out = None,
-    as_json: Json = False,
+    out: cli.Out = None,
+    as_json: cli.Json = False,
 ) -> None:
     """Run a case for every combination of values. The table has a row for each run; a failed run has its reason."""
     from fvsolve import studies
@@ -94,8 +80,8 @@ def sweep(
     if vary and sample is None:
         raise FvsolveError(f"--vary {vary[0]}: expected --sample sobol:N too. For a grid of values use --set KEY=a,b,c")
     varied = {key: values for key, values in values_by_key.items() if key not in fixed} | ranges(vary, "--vary")
-    loaded = load_case(case, [])
-    folder = folder_of(loaded, "sweep", out)
+    loaded = cli.load_case(case, [])
+    folder = cli.folder_of(loaded, "sweep", out)
     with progress_line() as progress:
         result = studies.sweep(loaded, varied, fixed, jobs, folder, progress, points, sample, seed, dask)
     heads = {key: key_with_unit(loaded.raw, key, [row[key] for row in result.rows]) for key in result.keys}
@@ -123,15 +109,13 @@ def write_charts(result, outcomes: list[str], folder: Path, heads: dict[str, str
     """
     from fvsolve.draw.object_pictures import outcome_figure
 
-    available = result.outcomes
-    names = [result.outcome(name) for name in outcomes] or [
-        column for column in available if column.startswith(("max(", "min("))
-    ]
-    clear_files(folder / "charts", "*max-*.png", "*min-*.png", "final-*.png")
+    names = [result.outcome(name) for name in outcomes]
+    names = names or [column for column in result.outcomes if column.startswith(("max(", "min("))]
+    cli.clear_files(folder / "charts", "*max-*.png", "*min-*.png", "final-*.png")
     paths = []
     for name in names:
         stem = re.sub(r"[^A-Za-z0-9.@_-]+", "-", name.partition(" [")[0]).strip("-")
-        path = writable_folder(folder / "charts") / f"{stem}.png"
+        path = cli.writable_folder(folder / "charts") / f"{stem}.png"
         outcome_figure(result, name, heads).savefig(path)
         paths.append(path)
     return paths
@@ -145,7 +129,7 @@ def key_and_values(text: str, option: str = "--set", expected: str = VALUES_FORM
     key, equals, listed = text.partition("=")
     if not (equals and key.strip() and listed.strip()):
         raise FvsolveError(f"{option} {text}: expected {expected}")
-    return key.strip(), [value_of(entry) for entry in split_list(listed)]
+    return key.strip(), [cli.value_of(entry) for entry in split_list(listed)]
 
 
 def split_list(text: str) -> list[str]:
@@ -190,9 +174,9 @@ def _text(value) -> str:
     return "-" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-@app.command()
+@cli.app.command()
 def sensitivity(
-    case: SingleCase,
+    case: cli.SingleCase,
     vary: Annotated[
         list[str],
         Option(
@@ -205,38 +189,35 @@ def sensitivity(
     samples: Annotated[
         int,
         Option(
-            metavar="N",
-            help="base sample size, a power of two; for k keys the study makes about 1.25 N (k + 2) runs",
+            metavar="N", help="base sample size, a power of two; for k keys the study makes about 1.25 N (k + 2) runs"
         ),
     ] = 64,
-    seed: Seed = 0,
-    jobs: Jobs = 1,
-    dask: Dask = None,
-    set: Set = [],  # noqa: B006
-    out: Out = None,
-    as_json: Json = False,
+    seed: cli.Seed = 0,
+    jobs: cli.Jobs = 1,
+    dask: cli.Dask = None,
+    set: cli.Set = [],  # noqa: B006
+    out: cli.Out = None,
+    as_json: cli.Json = False,
 ) -> None:
     """Compute the sensitivity of an outcome to keys: Sobol indices and Morris effects over ranges."""
     from fvsolve import studies
 
-    loaded = load_case(case, set)
-    folder = folder_of(loaded, "sensitivity", out)
+    loaded = cli.load_case(case, set)
+    folder = cli.folder_of(loaded, "sensitivity", out)
     with progress_line() as progress:
         result = studies.sensitivity(
             loaded, ranges(vary, "--vary"), outcome, samples, seed, None, jobs, dask, folder, progress
         )
-    paths = [
-        result.sheet.write(clear_files(folder, "sensitivity.csv", "sensitivity.png") / "sensitivity.csv"),
-        folder / "sensitivity.png",
-    ]
-    result.plot(paths[1])
-    below = f"{paths[0]}: {result.outcome}, {result.runs} runs"
+    cli.clear_files(folder, "sensitivity.csv", "sensitivity.png")
+    path = result.sheet.write(folder / "sensitivity.csv")
+    result.plot(folder / "sensitivity.png")
+    below = f"{path}: {result.outcome}, {result.runs} runs"
     present(as_json, result.plain() | {"directory": str(folder)}, [_key_table(result), below])
 
 
-@app.command()
+@cli.app.command()
 def calibrate(
-    case: SingleCase,
+    case: cli.SingleCase,
     parameter: Annotated[
         list[str],
         Option(
@@ -244,16 +225,16 @@ def calibrate(
             help="key to calibrate and its range, in SI or with units; repeat the option for more keys",
         ),
     ],
-    seed: Seed = 0,
-    jobs: Jobs = 1,
-    dask: Dask = None,
-    set: Set = [],  # noqa: B006
-    as_json: Json = False,
+    seed: cli.Seed = 0,
+    jobs: cli.Jobs = 1,
+    dask: cli.Dask = None,
+    set: cli.Set = [],  # noqa: B006
+    as_json: cli.Json = False,
 ) -> None:
     """Calibrate keys of a case against the measured series in its [compare]."""
     from fvsolve import studies
 
-    loaded = load_case(case, set)
+    loaded = cli.load_case(case, set)
     with progress_line(resumable=False) as progress:
         result = studies.calibrate(loaded, ranges(parameter, "--parameter"), None, seed, jobs, dask, progress)
     present(as_json, result.plain(), calibration_text(loaded, result))
@@ -264,10 +245,8 @@ def calibration_text(case, result) -> Iterator:
     from fvsolve.output.unit_columns import column
     from fvsolve.studies.sampling import si_unit_of
 
-    texts, probes = (
-        [],
-        {series.probe.text: series.probe for series in case.compare.values() if series.probe is not None},
-    )
+    probes = {series.probe.text: series.probe for series in case.compare.values() if series.probe is not None}
+    texts = []
     for name, rms in result.rms.items():
         probe = probes[name]
         unit_column = column(probe.text, probe.dimension, case, probe.unit)

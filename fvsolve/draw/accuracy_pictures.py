@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -40,16 +41,9 @@ def order_figure(sizes: Sequence[float], curves: Mapping, measure: str, title: s
         panel(ax, np.asarray(sizes, float), curves[name], name)
         ax.set_xticks(sizes, [f"{size:.3g}" for size in sizes])
         ax.set_xticks([], minor=True)
-        ax.set_xlabel(measure, fontsize=8.5, color=style.INK)
-    style.title(figure, wrap_text(title, 62 * columns))
+        style.name_axes(ax, measure)
+    style.title(figure, textwrap.fill(title, 62 * columns))
     return figure
-
-
-def wrap_text(text: str, width: int) -> str:
-    """Break a text into lines of at most `width` letters."""
-    import textwrap
-
-    return "\n".join(textwrap.wrap(text, width))
 
 
 def panel(axes, sizes, norms: Mapping, name: str) -> None:
@@ -121,7 +115,6 @@ def chart_figure(curves: Sequence[Curve], rows: Sequence[str], columns: Sequence
     markers = _assign_signs([curve.marker for curve in curves], METHOD_MARKERS)
     for axes in grid.flat:
         style.style_axes(axes)
-    for axes in grid.flat:
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.margins(x=0.04)
@@ -132,21 +125,12 @@ def chart_figure(curves: Sequence[Curve], rows: Sequence[str], columns: Sequence
                 _curve(axes, curve, curve.errors[i], curve.costs[j], colours[curve.colour], markers[curve.marker])
             _front(axes, curves, i, j, floors[i])
         _limits(panels, [curve.errors[i][~curve.failed] for curve in curves], floors[i], failed)
-        panels[0].set_ylabel(rows[i], fontsize=8.5, color=style.INK)
+        style.name_axes(panels[0], y=rows[i])
         if failed:
-            panels[0].text(
-                0.99,
-                FAILED_HEIGHT,
-                "failed",
-                transform=panels[0].transAxes,
-                fontsize=7.5,
-                ha="right",
-                va="center",
-                color=style.DOUBT,
-                in_layout=False,
-            )
+            panels[0].text(0.99, FAILED_HEIGHT, "failed", transform=panels[0].transAxes, fontsize=7.5, ha="right",
+                           va="center", color=style.DOUBT, in_layout=False)  # fmt: skip
     for axes, name in zip(grid[-1], columns, strict=True):
-        axes.set_xlabel(name, fontsize=8.5, color=style.INK)
+        style.name_axes(axes, name)
     for axes in grid.flat:
         style.label_decades(axes)
     _legend(figure, colours, markers, curves)
@@ -177,17 +161,10 @@ def _curve(axes, curve: Curve, errors, costs, colour: str, marker: str) -> None:
     lost = curve.failed & np.isfinite(costs) & (costs > 0)
     if lost.any():
         axes.plot(
-            costs[lost],
-            np.full(lost.sum(), FAILED_HEIGHT),
-            color=colour,
-            marker=marker,
-            markersize=4.5,
-            linestyle="none",
-            markerfacecolor="none",
-            transform=axes.get_xaxis_transform(),
-            clip_on=False,
+            costs[lost], np.full(lost.sum(), FAILED_HEIGHT), color=colour, marker=marker, markersize=4.5,
+            linestyle="none", markerfacecolor="none", transform=axes.get_xaxis_transform(), clip_on=False,
             in_layout=False,
-        )
+        )  # fmt: skip
 
 
 def _front(axes, curves, i: int, j: int, floor: float) -> None:
@@ -265,9 +242,8 @@ def energy_figure(t, supplied, stored, dissipated, numerical, title="", port=Non
     top.plot(t, total / size, color=style.INK, linewidth=1.2, label="total supplied")
     _stack(middle, t, {"dissipated": dissipated, "stored": stored}, size)
     middle.plot(t, (total + start) / size, color=style.INK, linewidth=1.2, label="supplied and\nstored at the start")
-    small, own = given or energy_unit(
-        max((np.max(np.abs(line), initial=0.0) for line in numerical.values()), default=0.0)
-    )
+    losses = [np.max(np.abs(line), initial=0.0) for line in numerical.values()]
+    small, own = given or energy_unit(max(losses, default=0.0))
     for (name, values), colour in zip(numerical.items(), style.COLOURS, strict=False):
         look = {"color": style.INK, "linestyle": (0, (4, 2))} if name == "remainder" else {"color": colour}
         low.plot(t, values / small, linewidth=1.2, label=name, **look)
@@ -275,11 +251,11 @@ def energy_figure(t, supplied, stored, dissipated, numerical, title="", port=Non
     names = (f"supplied [{unit}]", f"dissipated, stored [{unit}]", f"numerical loss [{own}]")
     for axes, name in zip((top, middle, low), names, strict=True):
         style.style_axes(axes)
-        axes.set_ylabel(name, fontsize=8.5, color=style.INK)
+        style.name_axes(axes, y=name)
         style.legend(axes)
     for axes in more:
         _port_panel(axes, t, *port, given)
-    (more or [low])[-1].set_xlabel(f"time [{clock}]", fontsize=8.5, color=style.INK)
+    style.name_axes((more or [low])[-1], x=f"time [{clock}]")
     style.title(figure, title)
     return figure
 
@@ -303,7 +279,7 @@ def _port_panel(axes, t, name, work, bound, given) -> None:
         axes.plot(t, bound / size, label="lower bound", **look)
     axes.axhline(0.0, color=style.MUTED, linewidth=0.6)
     style.style_axes(axes)
-    axes.set_ylabel(f"port {name} [{unit}]", fontsize=8.5, color=style.INK)
+    style.name_axes(axes, y=f"port {name} [{unit}]")
     style.legend(axes)
 
 

@@ -50,10 +50,7 @@ class FieldCanvas:
         else:
             style.style_axes(axes)
             axes.ticklabel_format(axis="both", style="plain", useOffset=False)
-            axes.set_xlabel(f"x [{unit}]", fontsize=8.5, color=style.INK)
-            axes.set_ylabel(
-                f"y [{unit}]" if self.aspect.kind == "plan" else f"z [{rises}]", fontsize=8.5, color=style.INK
-            )
+            style.name_axes(axes, f"x [{unit}]", f"y [{unit}]" if self.aspect.kind == "plan" else f"z [{rises}]")
         self.sheet.figure.canvas.draw()
         size = (round(axes.bbox.width), round(axes.bbox.height))
         self.plotter = pyvista.Plotter(off_screen=True, window_size=size)
@@ -164,11 +161,9 @@ class FieldCanvas:
     def _basin(self, mesh: Any) -> None:
         """Draw the bed of a basin, its buildings and the water."""
         rise, field = self.aspect.rise, self.scene.quantity.name
-        surface = (
-            frame_meshes.water_mesh(mesh, rise, (field,), frame_meshes.WET_DEPTH * self.scene.height.factor)
-            if field != "bed"
-            else None
-        )
+        if field != "bed":
+            least = frame_meshes.WET_DEPTH * self.scene.height.factor
+            surface = frame_meshes.water_mesh(mesh, rise, (field,), least)
         block = frame_meshes.raised_cells(mesh)
         top = self.box[5] + BUILDING_HEIGHT * (self.box[5] - self.box[4])
         mesh.points[:, 2] *= rise
@@ -176,18 +171,14 @@ class FieldCanvas:
             self.plotter.add_mesh(wall, color=BUILDING_COLOUR, ambient=AMBIENT_LIGHT)
         if field == "bed":
             return self._coloured(mesh.cell_data_to_point_data(), True)
-        self.plotter.add_mesh(
-            mesh.extract_cells(~block) if block.any() else mesh, color=BED_COLOUR, smooth_shading=False
-        )
+        bed = mesh.extract_cells(~block) if block.any() else mesh
+        self.plotter.add_mesh(bed, color=BED_COLOUR, smooth_shading=False)
         if block.any():
             self.plotter.add_mesh(mesh.extract_cells(block), color=BUILDING_COLOUR, ambient=AMBIENT_LIGHT)
         if not surface.n_cells:
             return None
-        self.plotter.add_mesh(
-            frame_meshes.water_sides(surface, frame_meshes.depth_direction(mesh) * (1.0, 1.0, rise)),
-            color=SIDE_COLOUR,
-            lighting=False,
-        )
+        sides = frame_meshes.water_sides(surface, frame_meshes.depth_direction(mesh) * (1.0, 1.0, rise))
+        self.plotter.add_mesh(sides, color=SIDE_COLOUR, lighting=False)
         if field in surface.point_data:
             self._coloured(surface, True)
         else:

@@ -34,9 +34,8 @@ def case_figure(case):
         own = [at[name] for name, node in case.nodes.items() if node.kind == kind]
         axes.scatter(*zip(*own, strict=True), s=40, label=kind, color=style.COLOURS[k % len(style.COLOURS)], zorder=2)
     for name in case.nodes if len(case.nodes) <= MAX_NAMED_NODES else ():
-        axes.annotate(
-            name, at[name], xytext=(0, 7), textcoords="offset points", fontsize=8, color=style.INK, ha="center"
-        )
+        axes.annotate(name, at[name], xytext=(0, 7), textcoords="offset points", fontsize=8, color=style.INK,
+                      ha="center")  # fmt: skip
     axes.margins(0.1)
     style.legend(axes)
     style.title(figure, case.title or case.name)
@@ -81,10 +80,19 @@ def node_positions(case) -> dict[str, tuple[float, float]]:
 
 @style.without_markup
 def model_figure(model):
-    """Bar chart of the heads at the nodes of a model at the start, see `bar_figure`."""
-    names, unit = model.node_names, model.case.unit_of("head")
-    heads = [convert(node["head"], "head", unit) for node in model.checks["nodes"].values()]
-    return bar_figure(names, heads, f"head at the start [{unit}]", model.case.title or model.case.name)
+    """Bar chart of the heads at the first MAX_NAMED_NODES nodes of a model at the start."""
+    names, unit = model.node_names[:MAX_NAMED_NODES], model.case.unit_of("head")
+    heads = [convert(node["head"], "head", unit) for node in model.checks["nodes"].values()][:MAX_NAMED_NODES]
+    figure = style.figure(0.9 + 0.22 * max(len(names), 3))
+    axes = figure.subplots()
+    axes.barh(range(len(names)), heads, color=style.COLOURS[0], height=0.6)
+    style.style_axes(axes)
+    axes.set_yticks(range(len(names)), names, fontsize=8)
+    axes.invert_yaxis()
+    axes.ticklabel_format(axis="x", scilimits=(-4, 5))
+    style.name_axes(axes, f"head at the start [{unit}]")
+    style.title(figure, model.case.title or model.case.name)
+    return figure
 
 
 @style.without_markup
@@ -94,7 +102,7 @@ def state_figure(state):
     axes = figure.subplots()
     axes.plot(state.y, color=style.COLOURS[0], linewidth=1.0)
     style.style_axes(axes)
-    axes.set_xlabel("index of the state", fontsize=8.5, color=style.INK)
+    style.name_axes(axes, "index of the state")
     style.title(figure, f"state at t = {state.t:g} s")
     return figure
 
@@ -121,22 +129,7 @@ def sweep_figure(sweep):
         style.style_axes(axes)
         axes.margins(x=0.03)
         axes.set_ylabel(name, fontsize=8, color=style.INK)
-    panels[-1].set_xlabel(key if numbers else "run", fontsize=8.5, color=style.INK)
-    return figure
-
-
-def bar_figure(names, values, label: str, title: str):
-    """Bar chart with a bar for each of the first MAX_NAMED_NODES names; label : label of the axis of values."""
-    names, values = list(names)[:MAX_NAMED_NODES], list(values)[:MAX_NAMED_NODES]
-    figure = style.figure(0.9 + 0.22 * max(len(names), 3))
-    axes = figure.subplots()
-    axes.barh(range(len(names)), values, color=style.COLOURS[0], height=0.6)
-    style.style_axes(axes)
-    axes.set_yticks(range(len(names)), names, fontsize=8)
-    axes.invert_yaxis()
-    axes.ticklabel_format(axis="x", scilimits=(-4, 5))
-    axes.set_xlabel(label, fontsize=8.5, color=style.INK)
-    style.title(figure, title)
+    style.name_axes(panels[-1], key if numbers else "run")
     return figure
 
 
@@ -166,9 +159,9 @@ def outcome_figure(sweep, name: str, heads: Mapping[str, str]):
         axes.margins(x=0.04)
         if words:
             axes.set_xticks(range(len(words)), words, fontsize=7, rotation=30, ha="right")
-        axes.set_xlabel(heads[key], fontsize=8.5, color=style.INK)
+        style.name_axes(axes, heads[key])
         if k % across == 0:
-            axes.set_ylabel(name, fontsize=8.5, color=style.INK)
+            style.name_axes(axes, y=name)
     style.legend(panels[len(keys) - 1])
     return figure
 
@@ -199,8 +192,7 @@ def map_figure(sweep, names, heads: Mapping[str, str]):
     panels = figure.subplots(down, across, squeeze=False).ravel()
     for axes, name in zip(panels, names, strict=False):
         _map(axes, sweep, name)
-        axes.set_xlabel(heads[sweep.keys[0]], fontsize=8.5, color=style.INK)
-        axes.set_ylabel(heads[sweep.keys[1]], fontsize=8.5, color=style.INK)
+        style.name_axes(axes, heads[sweep.keys[0]], heads[sweep.keys[1]])
     for axes in panels[len(names) :]:
         axes.set_axis_off()
     return figure
@@ -260,7 +252,7 @@ def sensitivity_figure(result):
         axes.locator_params(axis="x", nbins=5)
         axes.ticklabel_format(axis="x", scilimits=(-3, 4))
         axes.xaxis.get_offset_text().set(fontsize=8, color=style.MUTED)
-        axes.set_xlabel(label, fontsize=8.5, color=style.INK)
+        style.name_axes(axes, label)
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False, fontsize=8, borderaxespad=0.2)
     panels[0].set_yticks(range(len(result.keys)), [break_key(key) for key in result.keys], fontsize=8)
     panels[0].invert_yaxis()

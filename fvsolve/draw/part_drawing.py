@@ -14,10 +14,8 @@ from fvsolve.draw.view import DrawnScene
 from fvsolve.errors import visible
 
 SYMBOL_SPACING = 4.8  # least distance of symbols, in half widths of a symbol
-SMALL_SYMBOL_COUNT, MAX_NAMED_PIPES = (
-    40,
-    14,
-)  # number of parts above which symbols are small; greatest number of pipes with names
+SMALL_SYMBOL_COUNT = 40  # number of parts above which symbols are small
+MAX_NAMED_PIPES = 14  # greatest number of pipes with names
 MAX_PARTS_WITH_JOINTS = 400  # greatest number of parts with symbols and names for plain junctions
 HALO_WIDTH = 2.2  # width of the white border of a name [points]
 EDGE_MARGIN = 5.0  # free margin of the sheet [pixels]
@@ -119,19 +117,11 @@ def _write_names(stage, scene: DrawnScene, segments, at, blocks, ties) -> tuple[
     sizes = [text.get_window_extent(renderer).size for text in texts]
     ticks = [text.get_window_extent(renderer).extents for text in stage.texts]
     point = figure.dpi / 72.0
-    places = place_labels(
-        [item.at for item in labels],
-        sizes,
-        [point * item.gap for item in labels],
-        np.vstack([blocks, np.reshape(ticks, (-1, 4))]),
-        np.vstack([points_along(np.concatenate([pixels, ties])), axes.transData.transform(stage.cover)]),
-        (
-            EDGE_MARGIN + axes.bbox.x0 * axes.axison,
-            axes.bbox.y0 - EDGE_MARGIN,
-            figure.bbox.x1 - EDGE_MARGIN,
-            axes.bbox.y1 + EDGE_MARGIN,
-        ),
-    )
+    at, gaps = [item.at for item in labels], [point * item.gap for item in labels]
+    lines = np.vstack([points_along(np.concatenate([pixels, ties])), axes.transData.transform(stage.cover)])
+    left, right = EDGE_MARGIN + axes.bbox.x0 * axes.axison, figure.bbox.x1 - EDGE_MARGIN
+    within = left, axes.bbox.y0 - EDGE_MARGIN, right, axes.bbox.y1 + EDGE_MARGIN
+    places = place_labels(at, sizes, gaps, np.vstack([blocks, np.reshape(ticks, (-1, 4))]), lines, within)
     for text, corner in zip(texts, places, strict=True):
         if corner is None:
             text.remove()

@@ -99,12 +99,10 @@ def _without_doubles(lines: list[DrawnLine], values: np.ndarray, probes, measure
     tolerance = SAME_TOLERANCE * np.ptp(seen[np.isfinite(seen)]) if np.isfinite(seen).any() else 0.0
     result: list[DrawnLine] = []
     for line in lines:
-        under = None
-        if probes[line.column][0] not in measured and not line.alike:
-            under = next(
-                (other for other in result if _coincide(values[:, other.column], values[:, line.column], tolerance)),
-                None,
-            )
+        may_join = probes[line.column][0] not in measured and not line.alike
+        drawn = result if may_join else []
+        own = values[:, line.column]
+        under = next((other for other in drawn if _coincide(values[:, other.column], own, tolerance)), None)
         if under is None:
             result.append(line)
         else:
@@ -154,10 +152,10 @@ def history_figure(t, values, probes, time_unit="s", marks=(), measured=None, ti
     rows = figure.subplots(max(len(drawn), 1), 1, sharex=True, squeeze=False)[:, 0]
     for axes, panel in zip(rows, drawn, strict=False):
         _panel(axes, t, values, probes, panel.lines, measured or {}, still if axes is rows[-1] else [])
-        axes.set_ylabel(f"{panel.quantity.replace('_', ' ')} [{panel.unit}]", fontsize=8.5, color=style.INK)
+        style.name_axes(axes, y=f"{panel.quantity.replace('_', ' ')} [{panel.unit}]")
     for axes in rows:
         _shade(axes, t, marks, first=axes is rows[0])
-    rows[-1].set_xlabel(f"time [{time_unit}]", fontsize=8.5, color=style.INK)
+    style.name_axes(rows[-1], f"time [{time_unit}]")
     figure.align_ylabels(rows)
     style.title(figure, title)
     return figure
@@ -182,7 +180,7 @@ def envelope_figure(envelope, units, title=""):
     for axes in list(grid.flat)[len(names) :]:
         axes.set_visible(False)
     for axes in grid[:, 0]:
-        axes.set_ylabel(f"head [{units['max_head']}]", fontsize=8.5, color=style.INK)
+        style.name_axes(axes, y=f"head [{units['max_head']}]")
     figure.supxlabel(f"distance from the start of the pipe [{units['distance']}]", fontsize=8.5, color=style.INK)
     handles = {
         label: handle for axes in grid.flat for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
@@ -217,9 +215,8 @@ def _panel(axes, t, values, probes, lines, measured, still) -> None:
     style.style_axes(axes)
     for i, curve in enumerate(lines[:MAX_LINES]):
         name, colour = probes[curve.column][0], style.COLOURS[i % len(style.COLOURS)]
-        axes.plot(
-            *thin_series(t, values[:, curve.column]), color=colour, linewidth=1.0, label=_wrapped_label(curve.label)
-        )
+        label = textwrap.fill(curve.label, LEGEND_WIDTH, break_long_words=False)  # the legend stays narrow
+        axes.plot(*thin_series(t, values[:, curve.column]), color=colour, linewidth=1.0, label=label)
         if name in measured:
             axes.plot(*measured[name], ":", color=colour, linewidth=1.4, label=f"{curve.label}, measured")
     if len(lines) > MAX_LINES:
@@ -237,11 +234,6 @@ def _panel(axes, t, values, probes, lines, measured, still) -> None:
     style.legend(axes)
 
 
-def _wrapped_label(label: str) -> str:
-    """Label broken into lines, so that the legend stays narrow."""
-    return textwrap.fill(label, LEGEND_WIDTH, break_long_words=False)
-
-
 def _shade(axes, t, marks, first: bool) -> None:
     if not marks or not len(t):
         return
@@ -251,17 +243,9 @@ def _shade(axes, t, marks, first: bool) -> None:
     late = begun > 0.5 * (t[0] + t[-1])
     offset = 28 if begun < t[0] + 0.05 * (t[-1] - t[0]) else 4  # leaves space for the power of ten of the axis
     if first:
-        axes.annotate(
-            f"not to be trusted from here: {cause}",
-            (begun, 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(-4 if late else offset, 2),
-            textcoords="offset points",
-            ha="right" if late else "left",
-            va="bottom",
-            fontsize=7.5,
-            color=style.DOUBT,
-        )
+        place = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "va": "bottom"}
+        axes.annotate(f"not to be trusted from here: {cause}", (begun, 1.0), xytext=(-4 if late else offset, 2),
+                      ha="right" if late else "left", fontsize=7.5, color=style.DOUBT, **place)  # fmt: skip
 
 
 def _profile(axes, arrays, hilly: bool) -> None:
@@ -280,20 +264,18 @@ def _profile(axes, arrays, hilly: bool) -> None:
 
 
 @style.without_markup
-def section_figure(chainage, along, units, lines, seen, parted=(), beyond=(), posts=(), labels=(), title=""):
-    """Figure of heads along a route, with pipe, vapour line, pressure class and limits; shaded where cavities formed.
+def section_figure(section, window, units, title=""):
+    """Figure of heads along a path, with pipe, vapour line, pressure class and limits; shaded where cavities formed.
 
-    chainage : float64[n]; along : quantity of envelope.csv -> float64[n]; lines : name of a line -> float64[n]
-    units : quantity -> unit; seen : `HeadWindow`, ends of the head axis and texts of the limits above and below it
-    parted : spans of chainage with cavities; beyond : (chainage, head, name) of points where a limit is violated
-    posts : chainages of vertical lines
-    labels : (chainage, names, True for a device, False for only a junction) of each label above the axes
+    section, window : `Section` of `fvsolve.report.long_section`, and its `HeadWindow`; units : quantity -> unit
     """
     figure = style.figure(9.2)
     axes = figure.subplots()
     style.style_axes(axes)
-    for a, b in parted:
+    for a, b in section.cavity_spans:
         axes.axvspan(a, b, color=style.COLOURS[3], alpha=0.15, linewidth=0)
+    k, posts = section.drawn_indices(), [device.chainage for device in section.devices]
+    chainage, along = section.chainage[k], {name: values[k] for name, values in section.along.items()}
     high, low = along["max_head"], along["min_head"]
     axes.fill_between(chainage, low, high, color=style.COLOURS[0], alpha=0.08, linewidth=0)
     axes.plot(chainage, high, color=style.COLOURS[0], linewidth=1.4, label="maximum head")
@@ -301,25 +283,29 @@ def section_figure(chainage, along, units, lines, seen, parted=(), beyond=(), po
     axes.plot(chainage, along["initial_head"], color=style.INK, linewidth=0.9, linestyle=(0, (5, 3)),
               label="initial head")  # fmt: skip
     axes.plot(chainage, along["elevation"], color=style.MUTED, linewidth=2.4, label="pipe")
-    for name, line in lines.items():
-        axes.plot(chainage, line, label=name, **(LINE_LOOKS.get(name) or LIMIT_LOOKS[name.rpartition(", ")[2]]))
-    if parted:
+    for name, line in section.lines.items():
+        look = LINE_LOOKS.get(name) or LIMIT_LOOKS[name.rpartition(", ")[2]]
+        axes.plot(chainage, line[k], label=name, **look)
+    if section.cavity_spans:
         axes.fill_between([], [], color=style.COLOURS[3], alpha=0.3, label="vapour pressure reached")
-    if beyond:
-        at, heads, _ = zip(*beyond, strict=True)
+    if section.violations:
+        at, heads, _ = zip(*section.violations, strict=True)
         axes.plot(at, heads, "x", color=style.DOUBT, markersize=7, markeredgewidth=2.0, clip_on=False, zorder=5,
                   label="limit passed")  # fmt: skip
     axes.set_xlim(min([chainage[0], *posts]), max([chainage[-1], *posts]))
-    axes.set_ylim(seen.low, seen.high)
+    axes.set_ylim(window.low, window.high)
     red = style.COLOURS[6]
-    for limits, edge in ((seen.above, 1), (seen.below, 0)):
+    for limits, edge in ((window.above, 1), (window.below, 0)):
         if limits:
             axes.annotate("\n".join(limits), (0.97, edge), xycoords="axes fraction", xytext=(0, -22 if edge else 22),
                           textcoords="offset points", ha="right", va="top" if edge else "bottom", fontsize=8,
                           color=red, arrowprops={"arrowstyle": "->", "color": red, "relpos": (1, edge)})  # fmt: skip
-    _places(axes, posts, labels)
-    axes.set_xlabel(f"chainage [{units['distance']}]", fontsize=8.5, color=style.INK)
-    axes.set_ylabel(f"head [{units['max_head']}]", fontsize=8.5, color=style.INK)
+    for x in posts:
+        axes.axvline(x, color=style.HAIR, linewidth=0.8, zorder=0)
+    for x, names, stands in section.labels():
+        axes.annotate(short_name(names), (x, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 4), rotation=40,
+                      fontsize=7.5, textcoords="offset points", color=style.INK if stands else style.MUTED)  # fmt: skip
+    style.name_axes(axes, f"chainage [{units['distance']}]", f"head [{units['max_head']}]")
     figure.legend(loc="outside lower center", ncols=4, handlelength=3, frameon=False, fontsize=8, labelcolor=style.INK)
     style.title(figure, title)
     return figure
@@ -340,22 +326,16 @@ def phase_figure(pairs, title=""):
         axes.margins(0.05)
         axes.plot(*_thin_path(x[2], y[2]), color=style.COLOURS[0], linewidth=1.0)
         axes.plot(x[2][:1], y[2][:1], "o", color=style.COLOURS[1], markersize=5)
-        axes.set_xlabel(f"{x[0]} [{x[1]}]", fontsize=8.5, color=style.INK)
-        axes.set_ylabel(f"{y[0]} [{y[1]}]", fontsize=8.5, color=style.INK)
+        style.name_axes(axes, f"{x[0]} [{x[1]}]", f"{y[0]} [{y[1]}]")
     for axes in list(grid.flat)[len(pairs) :]:
         axes.set_visible(False)
     style.title(figure, title)
     return figure
 
 
-def _places(axes, posts, labels) -> None:
-    """Draw a vertical line at each chainage of `posts`, and the names in `labels`; see `section_figure`."""
-    for x in posts:
-        axes.axvline(x, color=style.HAIR, linewidth=0.8, zorder=0)
-    for x, names, stands in labels:
-        text = names if len(names) <= MAX_NAME_LENGTH else f"{names[: MAX_NAME_LENGTH - 1]}\u2026"
-        axes.annotate(text, (x, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 4), rotation=40, fontsize=7.5,
-                      textcoords="offset points", color=style.INK if stands else style.MUTED)  # fmt: skip
+def short_name(text: str) -> str:
+    """Name over a chainage; a text longer than `MAX_NAME_LENGTH` is cut."""
+    return text if len(text) <= MAX_NAME_LENGTH else f"{text[: MAX_NAME_LENGTH - 1]}\u2026"
 
 
 def _thin_path(x, y) -> tuple:

@@ -8,6 +8,7 @@ valve), else OTHER_NODE or OTHER_LINK: a new kind of part needs no entry here.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
@@ -68,10 +69,8 @@ HEAD_HEIGHT = 0.62  # height above the axes for the title [inch]
 MARGIN = 0.62  # margin of axes with ticks [inch]
 HALF_SYMBOL = 8.0  # half width of a symbol [points]
 EVEN_RANGE = 0.05  # half width of the colour range of a uniform field, as a fraction of its value
-EVEN_TOLERANCE, ZERO_TOLERANCE = (
-    1e-9,
-    1e-3,
-)  # relative range of a uniform field; ends of the range shown as zero, as a fraction of it
+EVEN_TOLERANCE = 1e-9  # relative range of a uniform field
+ZERO_TOLERANCE = 1e-3  # end of a range that is shown as zero, as a fraction of the range
 LEGEND_ROWS = 4  # rows of the legend
 FRAME_TIME = 100  # duration of a frame [ms]
 
@@ -101,7 +100,8 @@ def strokes(symbol: str) -> list[tuple[str, tuple[tuple[float, float], ...], boo
             fill, at = "white", at + 1
         elif word == "O":
             x, y, r = map(float, words[at + 1 : at + 4])
-            result.append((fill, _circle(x, y, r), True))
+            angles = [k * math.pi / 16 for k in range(32)]
+            result.append((fill, [(x + r * math.cos(angle), y + r * math.sin(angle)) for angle in angles], True))
             fill, at = "white", at + 4
         else:
             if word == "M":
@@ -109,12 +109,6 @@ def strokes(symbol: str) -> list[tuple[str, tuple[tuple[float, float], ...], boo
             result[-1][1].append((float(words[at + 1]), float(words[at + 2])))
             at += 3
     return [(fill, tuple(points), closed) for fill, points, closed in result]
-
-
-def _circle(x: float, y: float, r: float) -> list[tuple[float, float]]:
-    from math import cos, pi, sin
-
-    return [(x + r * cos(k * pi / 16), y + r * sin(k * pi / 16)) for k in range(32)]
 
 
 class PictureSheet:
@@ -144,11 +138,7 @@ class PictureSheet:
     def caption(self, title: str, below: str) -> None:
         """Set the title, and the smaller line below it."""
         for text, content in zip(self._captions, (title, below), strict=True):
-            text.set_text(
-                visible(
-                    content if len(content) <= style.MAX_TITLE_LENGTH else content[: style.MAX_TITLE_LENGTH - 3] + "..."
-                )
-            )
+            text.set_text(visible(style.cut_title(content)))
 
     def bar(self, limits: tuple[float, float], label: str) -> list[str]:
         """Draw the colour bar with a label; return the texts of its ticks. limits : values at the ends of the bar"""

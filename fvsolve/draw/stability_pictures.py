@@ -38,8 +38,7 @@ def region_figure(r: Callable, title: str = ""):
     axes.contour(x, y, size, levels=[1.0], colors=[style.INK], linewidths=1.0)
     for line in (axes.axhline, axes.axvline):
         line(0.0, color=style.MUTED, linewidth=0.6)
-    axes.set_xlabel("Re hλ", fontsize=8.5, color=style.INK)
-    axes.set_ylabel("Im hλ", fontsize=8.5, color=style.INK)
+    style.name_axes(axes, "Re hλ", "Im hλ")
     axes.ticklabel_format(style="plain")
     bar = figure.colorbar(filled, ax=axes, shrink=0.6, pad=0.02)
     bar.set_label("|R|", fontsize=8.5, color=style.INK)
@@ -85,7 +84,8 @@ def spectrum_figure(r: Callable, values: np.ndarray, field: np.ndarray | None = 
     axes = figure.axes[0]
     low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
     if field is not None:
-        axes.plot(*closed_line(field), color=style.COLOURS[2], linewidth=1.2, label="field of values")
+        closed = np.append(field, field[:1])
+        axes.plot(closed.real, closed.imag, color=style.COLOURS[2], linewidth=1.2, label="field of values")
     inside = (values.real >= low[0]) & (values.real <= high[0]) & (np.abs(values.imag) <= high[1])
     axes.plot(values.real, values.imag, ".", color=style.COLOURS[1], markersize=4, label="eigenvalues")
     axes.set_xlim(low[0], high[0])
@@ -96,12 +96,6 @@ def spectrum_figure(r: Callable, values: np.ndarray, field: np.ndarray | None = 
         title=f"{far} of {values.size} eigenvalues lie outside" if far else None, title_fontsize=8,
     )  # fmt: skip
     return figure
-
-
-def closed_line(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Real and imaginary parts of complex points, with the first point repeated at the end."""
-    line = np.append(points, points[:1])
-    return line.real, line.imag
 
 
 @style.without_markup
@@ -132,11 +126,10 @@ def response_figure(w, h, labels: tuple[str, str], dips=(), poles=(), tolerance=
                         color=style.DOUBT, alpha=0.25, linewidth=0.8)  # fmt: skip
     axes[0].set_xscale("log")
     _logarithmic(axes[0], np.abs(values))
-    axes[0].set_ylabel(f"|{name}|  [{unit}]", fontsize=8.5, color=style.INK)
+    style.name_axes(axes[0], y=f"|{name}|  [{unit}]")
     _phase(axes[1], phase)
     _real(axes[2], real)
-    axes[2].set_ylabel(f"Re {name}  [{unit}]", fontsize=8.5, color=style.INK)
-    axes[2].set_xlabel("frequency [Hz]", fontsize=8.5, color=style.INK)
+    style.name_axes(axes[2], "frequency [Hz]", f"Re {name}  [{unit}]")
     axes[2].set_title(note, fontsize=8.5, color=style.INK, loc="left", wrap=True)
     style.title(figure, title)
     return figure
@@ -159,7 +152,7 @@ def _phase(axes, phase) -> None:
     least, greatest = np.nanmin(phase), np.nanmax(phase)
     axes.set_ylim(min(-100.0, least - 10.0), max(100.0, greatest + 10.0))
     axes.set_yticks([x for x in range(-180, 181, 45) if axes.get_ylim()[0] <= x <= axes.get_ylim()[1]])
-    axes.set_ylabel("phase [deg]", fontsize=8.5, color=style.INK)
+    style.name_axes(axes, y="phase [deg]")
 
 
 def _real(axes, real) -> None:
@@ -199,7 +192,7 @@ def failure_map_figure(result, title: str = "", head: str = ""):
     for axes, scheme in zip(panels, result.schemes, strict=True):
         _panel(axes, result, scheme)
     label = "step, and Courant number" if result.wave_rate else "step"
-    panels[-1].set_xlabel(label if result.key == "step" else head or result.key, fontsize=8.5, color=style.INK)
+    style.name_axes(panels[-1], label if result.key == "step" else head or result.key)
     _legend(figure, result)
     style.title(figure, title)
     return figure
@@ -229,11 +222,8 @@ def _panel(axes, result, scheme: str) -> None:
         squares = result.row(scheme, method)
         for square in squares:
             colour, hatch = VERDICT_COLOURS[square.verdict], "////" if square.verdict == "not run" else None
-            axes.add_patch(
-                Rectangle(
-                    (square.column - 0.5, row - 0.5), 1, 1, facecolor=colour, edgecolor="white", hatch=hatch, lw=1.2
-                )
-            )
+            corner = square.column - 0.5, row - 0.5
+            axes.add_patch(Rectangle(corner, 1, 1, facecolor=colour, edgecolor="white", hatch=hatch, lw=1.2))
             ink = "white" if square.verdict in DARK_VERDICTS else style.INK
             axes.text(square.column, row, _error_text(square), ha="center", va="center", fontsize=6.5, color=ink)
         place = limit_place(result, squares)
@@ -286,21 +276,11 @@ def _legend(figure, result) -> None:
     from matplotlib.patches import Patch
 
     seen = {square.verdict for square in result.squares}
-    handles = [
-        Patch(facecolor=colour, label=word, hatch="////" if word == "not run" else None)
-        for word, colour in VERDICT_COLOURS.items()
-        if word in seen
-    ]
+    handles = [Patch(facecolor=colour, label=word, hatch="////" if word == "not run" else None)
+               for word, colour in VERDICT_COLOURS.items() if word in seen]  # fmt: skip
     looks = {"dotted" if scheme in result.limited else "solid" for scheme in result.schemes}
     labels = {"solid": "predicted limit", "dotted": "predicted limit, with the weights of smooth flow"}
-    handles += [
-        Line2D([], [], color=style.INK, lw=2.2, linestyle=look, label=labels[look]) for look in labels if look in looks
-    ]
-    figure.legend(
-        handles=handles,
-        loc="outside lower left",
-        ncols=5 if len(result.values) > 8 else 3,
-        frameon=False,
-        fontsize=8,
-        labelcolor=style.INK,
-    )
+    for look in [look for look in labels if look in looks]:
+        handles.append(Line2D([], [], color=style.INK, lw=2.2, linestyle=look, label=labels[look]))
+    figure.legend(handles=handles, loc="outside lower left", ncols=5 if len(result.values) > 8 else 3, frameon=False,
+                  fontsize=8, labelcolor=style.INK)  # fmt: skip

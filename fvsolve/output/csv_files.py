@@ -50,9 +50,8 @@ class HistoryFile:
         Later rows are cut off. Raises RunError if the file is missing or shorter.
         """
         if not self.path.is_file() or self.path.stat().st_size < size:
-            raise RunError(
-                f"{self.path} is missing or shorter than at its checkpoint; start the run again with --force"
-            )
+            text = "is missing or shorter than at its checkpoint; start the run again with --force"
+            raise RunError(f"{self.path} {text}")
         self._file = open(self.path, "r+b")
         self._file.truncate(size)
         self._file.seek(size)
@@ -101,10 +100,8 @@ def read_table(path: Path) -> np.ndarray:
             text = f"a row does not have {names} numbers; the file was truncated or edited; run again with --force"
             raise RunError(f"{path} cannot be read: {text}") from None
     if table.size and table.shape[1] != names:
-        raise RunError(
-            f"{path} cannot be read: rows have {table.shape[1]} numbers, the header has {names} columns; "
-            "run again with --force"
-        )
+        text = f"rows have {table.shape[1]} numbers, the header has {names} columns; run again with --force"
+        raise RunError(f"{path} cannot be read: {text}")
     return table if table.size else np.empty((0, names))
 
 

@@ -118,16 +118,18 @@ class RunDirectory:
             (self.folder / name).unlink(missing_ok=True)
         clear_reports(self.folder)
         if self.restart is None:
-            self._start()
+            clear_run_files(self.folder)
+            for series in (self.history, self.fields, self.lines):
+                if series:
+                    series.start()
             self._write_case()
             self.checkpoint(state, {})
             return
         self._write_case()
         self.history.continue_from(self.restart.rows, self.restart.history_bytes)
-        if self.fields:
-            self.fields.continue_from(self.restart.frames)
-        if self.lines:
-            self.lines.continue_from(self.restart.frames)
+        for series in (self.fields, self.lines):
+            if series:
+                series.continue_from(self.restart.frames)
 
     def rows(self, t, values) -> None:
         """Append rows of probe values to history.csv. t : float64[k] [s]; values : float64[k, probes] in SI"""
@@ -215,14 +217,6 @@ class RunDirectory:
         if restart and restart.t > self.model.case.numerics.end:
             raise RunError(f"{path} is at t = {restart.t:.6g} s, after numerics.end; start the run again with --force")
         return restart
-
-    def _start(self) -> None:
-        clear_run_files(self.folder)
-        self.history.start()
-        if self.fields:
-            self.fields.start()
-        if self.lines:
-            self.lines.start()
 
     def _write_case(self) -> None:
         case = self.model.case

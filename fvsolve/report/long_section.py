@@ -13,7 +13,7 @@ from fvsolve.case.case import default_cells
 from fvsolve.case.extent import OF_PRESSURE
 from fvsolve.errors import RunError
 from fvsolve.output.csv_files import ENVELOPE_QUANTITIES, joined_envelopes
-from fvsolve.output.fields import read_pipes, read_series
+from fvsolve.output.fields import read_pipe_lines, read_series
 from fvsolve.output.unit_columns import UnitColumn
 from fvsolve.report.section_pipes import SectionPath
 from fvsolve.run.result import FAILS
@@ -25,13 +25,10 @@ SECTION_QUANTITIES = ("elevation", "initial_head", "min_head", "max_head", "min_
 HEAD_QUANTITIES = ("initial_head", "min_head", "max_head")
 VAPOUR_LINE = "vapour line"
 LABEL_DISTANCE = 0.035  # least distance of names, as a fraction of the length; closer names would overlap
-LIMIT_REACH = (
-    0.5  # limits farther away than this fraction of the range of heads are only named at the edge of the picture
-)
-EDGE_MARGIN, NAME_MARGIN = (
-    0.05,
-    0.07,
-)  # fractions of the head axis: free at each end, and for each limit that is named there
+# Limits farther away than this fraction of the range of heads are only named at the edge of the picture.
+LIMIT_REACH = 0.5
+# Fractions of the head axis: free at each end, and for each limit that is named there.
+EDGE_MARGIN, NAME_MARGIN = 0.05, 0.07
 MAX_BINS = 150  # greatest number of bins of a long line; the extremes of head and elevation of each bin are drawn
 MAX_POINTS = 240  # greatest number of points of an animated line
 MAX_NUMBERS = 45_000  # greatest number of values of all animated lines of a report; frames are skipped above it
@@ -136,12 +133,7 @@ class Section:
         if n <= 4 * bins:
             return np.arange(n)
         edges = np.linspace(0, n, bins + 1).astype(int)
-        most = [
-            ("max_head", np.argmax),
-            ("min_head", np.argmin),
-            ("elevation", np.argmax),
-            ("elevation", np.argmin),
-        ]
+        most = [("max_head", np.argmax), ("min_head", np.argmin), ("elevation", np.argmax), ("elevation", np.argmin)]
         lines = [(self.along[name], end) for name, end in most]
         rows = [a + end(line[a:b]) for line, end in lines for a, b in zip(edges[:-1], edges[1:], strict=True)]
         return np.unique([0, *rows, n - 1])
@@ -196,12 +188,9 @@ def head_window(sections: Sequence[Section], unit: str) -> HeadWindow:
             low = min(low, max(limit[0], followed[0] - reach))
             high = max(high, min(limit[1], followed[1] + reach))
     span = high - low or 1.0
-    return HeadWindow(
-        low - (EDGE_MARGIN + NAME_MARGIN * len(below)) * span,
-        high + (EDGE_MARGIN + NAME_MARGIN * len(above)) * span,
-        above,
-        below,
-    )
+    low -= (EDGE_MARGIN + NAME_MARGIN * len(below)) * span
+    high += (EDGE_MARGIN + NAME_MARGIN * len(above)) * span
+    return HeadWindow(low, high, above, below)
 
 
 def value_range(lines: list[np.ndarray]) -> tuple[float, float] | None:
@@ -348,7 +337,7 @@ def _cells_along(result, way: SectionPath, counts: dict[str, int]) -> tuple[np.n
 
 def _read_heads(path: Path, cells: int) -> np.ndarray:
     """Heads of all pipe cells in a frame [m]; raises RunError if their number differs from that of the case."""
-    heads = read_pipes(path, "head")
+    heads = read_pipe_lines(path, "head")[2]
     if len(heads) != cells:
         counts = f"number of pipe cells {len(heads)}, but {cells} in the case"
         raise RunError(f"{path}: {counts}; run the case again with --force")

@@ -1,4 +1,8 @@
-"""HTML reports of runs and studies: files with all data, scripts and styles, which need no network."""
+"""HTML reports of runs and studies: files with all data, scripts and styles, which need no network.
+
+In functions for a study, `study` is the data of study.json, and `runs` is a list of (row of study.json, `Result`) for
+each run; row["page"] is the address of the report of the run.
+"""
 
 from __future__ import annotations
 
@@ -34,6 +38,8 @@ def page(result, ways: list[SectionPath]) -> str:
     sections = [section_of(result, way) for way in ways]
     figures: dict[str, Any] = {}
     probes = run_tables.extremes_of_probes(result)
+    places = [*run_tables.worst_tables(result), *run_tables.ranked_pipes(result)]
+    numerics = run_tables.settings, run_tables.ledgers, run_tables.claim_table, run_tables.comparisons
     filled = {
         "invalid": not_valid(result.summary),
         "title": visible(result.summary["title"] or result.summary["case"]),
@@ -47,20 +53,11 @@ def page(result, ways: list[SectionPath]) -> str:
         "sections": _sections(result, sections, figures),
         "histories": _histories(result, figures),
         "probes_left_out": len(result.probes) - len(plots.chosen_probes(result)),
-        "places": _nonempty(
-            [*run_tables.worst_tables(result), *run_tables.ranked_pipes(result), probes if result.envelope else None]
-        ),
-        "model": _nonempty(model_tables.all_tables(result)),
-        "numbers": _nonempty(
-            [
-                run_tables.settings(result),
-                run_tables.ledgers(result),
-                run_tables.claim_table(result),
-                run_tables.comparisons(result),
-            ]
-        ),
+        "places": [*places, *[probes] * bool(probes and result.envelope)],
+        "model": [*filter(None, model_tables.all_tables(result))],
+        "numbers": [*filter(None, [table(result) for table in numerics])],
         "told": _warning_texts([notice.text for notice in result.warnings if notice.ok]),
-        "happened": _nonempty([run_tables.cavities(result), run_tables.events(result)]),
+        "happened": [table for table in (run_tables.cavities(result), run_tables.events(result)) if table],
         "versions": run_tables.versions(result),
     }
     return render_page("page", filled, figures)
@@ -90,11 +87,8 @@ def render_page(name: str, filled: dict[str, Any], figures: dict[str, Any]) -> s
 def css_string(text: str) -> str:
     """CSS string of a text; all but ASCII letters and digits are escaped, so that the text cannot end the string."""
     text = text if len(text) <= MAX_PAPER_TITLE else f"{text[: MAX_PAPER_TITLE - 1]}\u2026"
-    return (
-        '"'
-        + "".join(letter if letter.isascii() and letter.isalnum() else f"\\{ord(letter):x} " for letter in text)
-        + '"'
-    )
+    letters = [letter if letter.isascii() and letter.isalnum() else f"\\{ord(letter):x} " for letter in text]
+    return f'"{"".join(letters)}"'
 
 
 def script_json(data: Any) -> str:
@@ -136,21 +130,13 @@ def _histories(result, figures: dict[str, Any]) -> list[dict[str, Any]]:
     return entries
 
 
-def _nonempty(tables: list[ReportTable | None]) -> list[ReportTable]:
-    return [table for table in tables if table is not None and table.rows]
-
-
 def _warning_texts(texts: list[str]) -> list[str]:
     more = len(texts) - MAX_WARNINGS
     return [visible(text) for text in texts[:MAX_WARNINGS]] + ([f"{more} more in summary.json"] if more > 0 else [])
 
 
 def study_page(study: dict[str, Any], runs: list[tuple[dict[str, Any], Any]]) -> str:
-    """HTML text of the report of a study.
-
-    study : data of study.json
-    runs : (row of study.json, `Result`) of each run; row["page"] is the address of its report
-    """
+    """HTML text of the report of a study."""
     figures: dict[str, Any] = {}
     first = runs[0][1]
     events = [
@@ -163,7 +149,7 @@ def study_page(study: dict[str, Any], runs: list[tuple[dict[str, Any], Any]]) ->
         "version": first.summary["versions"]["fvsolve"], "description": visible(first.case.description),
         "words": study_sentences(study, runs), "matrix": [run_matrix(runs)], "events": events,
         "failing": failing_limits(runs), "changes": change_tables(study), "first": run_name(runs[0][0]),
-        "model": [table for table in model_tables.all_tables(first) if table],
+        "model": [table for table in model_tables.all_tables(first) if table is not None],
         "told": warning_texts(runs), "versions": run_tables.versions(first),
     }  # fmt: skip
     return render_page("study", filled, figures)
@@ -175,10 +161,7 @@ def run_name(row: dict[str, Any]) -> str:
 
 
 def study_sentences(study: dict[str, Any], runs: list) -> list[Sentence]:
-    """Sentences at the top of the report of a study, on runs that stopped early or are not valid, and on limits.
-
-    study, runs : as for `study_page`
-    """
+    """Sentences at the top of the report of a study, on runs that stopped early or are not valid, and on limits."""
     sentences = [Sentence("bad", f"{run_name(row)} stopped early.", f"{result.reason}.")
              for row, result in runs if result.reason != "finished"]  # fmt: skip
     sentences += [Sentence("bad", f"{run_name(row)} is not to be trusted.", item.text)
@@ -186,16 +169,11 @@ def study_sentences(study: dict[str, Any], runs: list) -> list[Sentence]:
     if doubted := [item for item in runs if item[1].marks]:
         marks = [mark for _, result in doubted for mark in result.marks]
         reasons = {mark.what: mark.text.partition(": ")[2].partition(";")[0] for mark in marks}
-        sentences.append(
-            Sentence("doubt", "Partly not to be trusted:", f"{'; '.join(reasons.values())}.", run_links(doubted))
-        )
+        text = f"{'; '.join(reasons.values())}."
+        sentences.append(Sentence("doubt", "Partly not to be trusted:", text, run_links(doubted)))
     if not any(result.verdicts for _, result in runs):
-        return [
-            *sentences,
-            Sentence(
-                "none", "No limits were stated.", "The study shows what happens, but not whether this is allowed."
-            ),
-        ]
+        text = "The study shows what happens, but not whether this is allowed."
+        return [*sentences, Sentence("none", "No limits were stated.", text)]
     names = [visible(name) or "the unchanged case" for name in study["holds"]]
     if names:
         sentences.append(Sentence("good", f"All limits hold in all events with {', '.join(names)}.", ""))
@@ -219,15 +197,12 @@ def run_state(result) -> str:
 
 
 def run_links(runs: list) -> tuple[tuple[str, str], ...]:
-    """Names of runs and the addresses of their reports, as pairs; runs : as for `study_page`."""
+    """Names of runs and the addresses of their reports, as pairs."""
     return tuple((run_name(row), row["page"]) for row, _ in runs)
 
 
 def run_matrix(runs: list) -> ReportTable:
-    """Table with a row for each run: verdict and the margin of each limit, with a link to its report.
-
-    runs : as for `study_page`
-    """
+    """Table with a row for each run: verdict and the margin of each limit, with a link to its report."""
     names = {verdict.name: verdict.unit for _, result in runs for verdict in result.verdicts}
     with_error = any(verdict.error is not None for _, result in runs for verdict in result.verdicts)
     rows = []
@@ -245,11 +220,8 @@ def run_matrix(runs: list) -> ReportTable:
     return ReportTable("Runs", heads, rows, units, bad, links=[row["page"] for row, _ in runs])
 
 
-def failing_limits(runs: list) -> ReportTable | None:
-    """Table of the limits that fail or are open in each run, with position and time; None if all hold.
-
-    runs : as for `study_page`
-    """
+def failing_limits(runs: list) -> ReportTable:
+    """Table of the limits that fail or are open in each run, with position and time."""
     length, time = (column("", dimension, runs[0][1].case) for dimension in ("length", "time"))
     pages = [row["page"] for row, result in runs for item in result.verdicts if not item.ok]
     rows = [[run_name(row), item.name, IN_WORDS[item.state], item.value, item.limit, item.unit, item.margin,
@@ -257,20 +229,15 @@ def failing_limits(runs: list) -> ReportTable | None:
             for row, result in runs for item in result.verdicts if not item.ok]  # fmt: skip
     heads = ("run", "limit", "verdict", "value", "allowed", "unit", "margin", "unit", "worst place", "chainage", "time")
     units = ("",) * 9 + (length.unit, time.unit)
-    return (
-        ReportTable("", heads, rows, units, mixed_units=frozenset({3, 4, 6}), most=MAX_FAILED_ROWS, links=pages)
-        if rows
-        else None
-    )
+    return ReportTable("", heads, rows, units, mixed_units=frozenset({3, 4, 6}), most=MAX_FAILED_ROWS, links=pages)
 
 
 def change_tables(study: dict[str, Any]) -> list[ReportTable]:
     """Tables of the keys that events and protections set, with their values in TOML."""
     tables = []
     for group in ("events", "protections"):
-        rows = [
-            [name, key, inline(value)] for name, keys in study["changes"][group].items() for key, value in keys.items()
-        ]
+        rows = [[name, key, inline(value)]
+                for name, keys in study["changes"][group].items() for key, value in keys.items()]  # fmt: skip
         tables += [ReportTable(group.capitalize(), (group[:-1], "key", "value"), rows)] if rows else []
     return tables
 
@@ -279,7 +246,6 @@ def event_figures(event: str | None, number: int, runs: list, figures: dict[str,
     """Values for the template on the figures of an event, each of which shows the runs of all protections.
 
     event : name of the event; number : its number, for the keys under which the figures are added to `figures`
-    runs : as for `study_page`
     """
     own = [(row["protection"] or "", result) for row, result in runs if row["event"] == event]
     runs_drawn = [(name, result, section_paths(result)) for name, result in own]
@@ -303,10 +269,7 @@ def event_figures(event: str | None, number: int, runs: list, figures: dict[str,
 
 
 def warning_texts(runs: list) -> list[str]:
-    """First `MAX_WARNINGS` texts of warnings of all runs, each once, with the names of the runs in which it occurs.
-
-    runs : as for `study_page`
-    """
+    """First `MAX_WARNINGS` texts of warnings of all runs, each once, with the names of the runs in which it occurs."""
     by_text: dict[str, list[str]] = {}
     for row, result in runs:
         for item in result.warnings:

@@ -35,7 +35,11 @@ def write_pictures(
         raise FvsolveError("\n".join(faults))
     title, drawn = result.summary["title"], {}
     for k, way in enumerate(sections, 1):
-        drawn["section.png" if len(sections) == 1 else f"section-{k}.png"] = _section_figure(result, way)
+        section = section_of(result, way)
+        window = head_window([section], envelope_column(result, "max_head").unit)
+        names = "\n".join(filter(None, [title, way.name]))
+        figure = section_figure(section, window, result.summary["envelope_units"], names)
+        drawn["section.png" if len(sections) == 1 else f"section-{k}.png"] = figure
     if picked:
         data = result.history_drawn()
         columns = [result.probes.index(name) for name in picked]
@@ -96,20 +100,3 @@ def _chosen_sections(sections: list[SectionPath], route: str, others: bool, faul
         hint = did_you_mean(route, names) or f"; the run has {listing(names) or 'none'}"
         faults.append(f"{show(route)}: unknown route{hint}")
     return named
-
-
-def _section_figure(result, way: SectionPath):
-    sec = section_of(result, way)
-    k, title = sec.drawn_indices(), "\n".join(filter(None, [result.summary["title"], way.name]))
-    return section_figure(
-        sec.chainage[k],
-        {name: values[k] for name, values in sec.along.items()},
-        result.summary["envelope_units"],
-        {name: line[k] for name, line in sec.lines.items()},
-        head_window([sec], envelope_column(result, "max_head").unit),
-        sec.cavity_spans,
-        sec.violations,
-        [device.chainage for device in sec.devices],
-        sec.labels(),
-        title,
-    )

@@ -116,9 +116,8 @@ def write_tables(report_tables: list[ReportTable], path: Path) -> Path:
 def workbook_tables(result, sections: list[SectionPath]) -> list[ReportTable]:
     """All tables of a run for a workbook; a table of a section has a row for each point."""
     words = ReportTable("Summary", ("", ""), [[item.head, item.text] for item in run_tables.top_sentences(result)])
-    notes = ReportTable(
-        "Warnings", ("kind", "place", "text"), [[item.kind, item.place, item.text] for item in result.warnings]
-    )
+    warnings = [[item.kind, item.place, item.text] for item in result.warnings]
+    notes = ReportTable("Warnings", ("kind", "place", "text"), warnings)
     versions = run_tables.versions(result)
     contents = [
         words,
@@ -138,38 +137,30 @@ def workbook_tables(result, sections: list[SectionPath]) -> list[ReportTable]:
         notes,
         ReportTable("Versions", versions.headers, versions.rows),
     ]
-    return [item for item in contents if item is not None and item.rows]
+    return [table for table in contents if table]
 
 
 def study_tables(runs: list) -> list[ReportTable]:
     """Tables of a study with the long sections of all runs; runs : (row of study.json, `Result`) of each run."""
-    contents = [page.run_matrix(runs), page.failing_limits(runs)]
+    contents, failing = [page.run_matrix(runs)], page.failing_limits(runs)
+    contents += [failing] if failing else []
     for row, result in runs:
         for way in section_paths(result):
             along = _section_table(result, section_of(result, way))
             title = f"{Path(row['directory']).name} {way.name}"
             rows = [[page.run_name(row), *cells] for cells in along.rows]
-            contents.append(
-                replace(along, title=title, headers=["run", *along.headers], units=["", *along.units], rows=rows)
-            )
-    return [table for table in contents if table is not None]
+            heads = {"headers": ["run", *along.headers], "units": ["", *along.units]}
+            contents.append(replace(along, title=title, rows=rows, **heads))
+    return contents
 
 
 def _section_table(result, sec: Section) -> ReportTable:
     """Table of a long section, with a row for each point."""
     head = envelope_column(result, "min_head").unit
-    columns = [
-        sec.chainage,
-        sec.pipe,
-        *(sec.along[name] for name in SECTION_HEADERS),
-        *sec.lines.values(),
-    ]
+    columns = [sec.chainage, sec.pipe, *(sec.along[name] for name in SECTION_HEADERS), *sec.lines.values()]
     heads = ["chainage", "pipe", *SECTION_HEADERS.values(), *sec.lines]
-    units = [
-        envelope_column(result, "distance").unit,
-        "",
-        *(envelope_column(result, name).unit for name in SECTION_HEADERS),
-    ]
+    units = [envelope_column(result, "distance").unit, ""]
+    units += [envelope_column(result, name).unit for name in SECTION_HEADERS]
     rows = [list(row) for row in zip(*(column.tolist() for column in columns), strict=True)]
     return ReportTable(f"Section {sec.way.name}", heads, rows, [*units, *[head] * len(sec.lines)])
 

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fvsolve.case.pipe_routes import Leg
 from fvsolve.output.unit_columns import UnitColumn, column
 from fvsolve.report.long_section import envelope_column
 from fvsolve.report.section_pipes import SectionPath
@@ -45,10 +44,8 @@ def top_sentences(result) -> list[Sentence]:
     rows = []
     if result.reason != "finished":
         reached, end = (result.case.amount(item, "time", 6) for item in (summary["t"], result.case.numerics.end))
-        reached = f"The run reached t = {reached} of {end}"
-        rows.append(
-            Sentence("bad", "This run stopped early.", f"{result.reason}. {reached}; later values are unknown.")
-        )
+        text = f"{result.reason}. The run reached t = {reached} of {end}; later values are unknown."
+        rows.append(Sentence("bad", "This run stopped early.", text))
     rows += [Sentence("bad", "Not to be trusted.", item.text) for item in result.warnings if not item.ok]
     rows += [*_mark_sentences(result), verdict_sentence(result)]
     for state, level, head in ((FAILS, "bad", "The run does not meet an expected value of the case."),
@@ -75,20 +72,12 @@ def _mark_sentences(result) -> list[Sentence]:
     return [Sentence("doubt", f"Results from {when[0]} on are not to be trusted.", text)]
 
 
-def is_sound(result) -> bool:
-    """True if a run reached its end, its results are ok and it has no marks."""
-    return result.reason == "finished" and result.ok and not result.marks
-
-
 def verdict_sentence(result) -> Sentence:
     """Sentence on the limits of the case: some are violated, some are open, all hold, or none is stated."""
     verdicts = result.verdicts
     if not verdicts:
-        return Sentence(
-            "none",
-            "No limits were stated.",
-            "The case has no [limits], so this report shows what happens, but not whether this is allowed.",
-        )
+        text = "The case has no [limits], so this report shows what happens, but not whether this is allowed."
+        return Sentence("none", "No limits were stated.", text)
     states = [item.state for item in verdicts]
     failed = [item.name for item, state in zip(verdicts, states, strict=True) if state == FAILS]
     if failed:
@@ -99,11 +88,9 @@ def verdict_sentence(result) -> Sentence:
         return Sentence("doubt", f"The verdict of {'limits' if len(unsure) > 1 else 'a limit'} is open.",
                     f"{', '.join(unsure)}: {open_reason(result)}.")  # fmt: skip
     summary = f"All {len(verdicts)} limits hold" if len(verdicts) > 1 else "The limit holds"
-    return (
-        Sentence("good", f"{summary}.", "")
-        if is_sound(result)
-        else Sentence("doubt", f"{summary}, as far as results are reliable.", "")
-    )
+    if result.reason == "finished" and result.ok and not result.marks:
+        return Sentence("good", f"{summary}.", "")
+    return Sentence("doubt", f"{summary}, as far as results are reliable.", "")
 
 
 def open_reason(result) -> str:
@@ -119,30 +106,27 @@ def open_reason(result) -> str:
     return "margins are smaller than the numerical errors"
 
 
-def verdict_table(result) -> ReportTable | None:
-    """Table of the verdicts on limits, violated limits first; None without limits."""
+def verdict_table(result) -> ReportTable:
+    """Table of the verdicts on limits, violated limits first."""
     order = (FAILS, OPEN, HOLDS)
     ordered = sorted(result.verdicts, key=lambda check: order.index(check.state))
     length, height, time = (column("", dimension, result.case) for dimension in ("length", "head", "time"))
     errors = any(check.error is not None for check in ordered)
     rows = []
     for check in ordered:
-        requirement = (
-            f"{check.quantity.replace('_', ' ')} {BOUND_WORDS[check.bound]} {value_text(check.limit)} {check.unit}"
-        )
+        limit = f"{value_text(check.limit)} {check.unit}"
+        requirement = f"{check.quantity.replace('_', ' ')} {BOUND_WORDS[check.bound]} {limit}"
         margin_unit = span(check.unit)
         unit_text = check.unit if margin_unit == check.unit else f"{check.unit}, margin {margin_unit}"
         place = in_unit(length, check.chainage), in_unit(height, check.elevation), in_unit(time, check.time)
         margin = not_valid(result.summary) or None if check.margin is None else check.margin
-        rows.append(
-            [check.name, requirement, IN_WORDS[check.state], check.value, *[check.error] * errors, margin,
-             unit_text, check.place, *place]
-        )  # fmt: skip
+        rows.append([check.name, requirement, IN_WORDS[check.state], check.value, *[check.error] * errors, margin,
+                     unit_text, check.place, *place])  # fmt: skip
     heads = ("limit", "requirement", "verdict", "value", *[ERROR_HEADER] * errors, "margin", "unit", "worst place")
     heads += ("chainage", "elevation", "time")
     bad = frozenset(k for k, check in enumerate(ordered) if check.state == FAILS)
     units = ("",) * (7 + errors) + (length.unit, height.unit, time.unit)
-    return ReportTable("Limits", heads, rows, units, bad, frozenset({3, 4, *[5] * errors})) if rows else None
+    return ReportTable("Limits", heads, rows, units, bad, frozenset({3, 4, *[5] * errors}))
 
 
 def worst_tables(result) -> list[ReportTable]:
@@ -152,19 +136,9 @@ def worst_tables(result) -> list[ReportTable]:
     for check in result.verdicts:
         keys = ((length, "chainage"), (height, "elevation"), (time, "time"))
         errors = any(row["error"] is not None for row in check.worst)
-        rows = [
-            [
-                row["place"],
-                *(in_unit(shown, row[key]) for shown, key in keys),
-                row["value"],
-                *[row["error"]] * errors,
-                BOUND_WORDS[row["bound"]],
-                row["limit"],
-                row["margin"],
-                IN_WORDS[row["state"]],
-            ]
-            for row in check.worst
-        ]
+        rows = [[row["place"], *(in_unit(shown, row[key]) for shown, key in keys), row["value"],
+                 *[row["error"]] * errors, BOUND_WORDS[row["bound"]], row["limit"], row["margin"],
+                 IN_WORDS[row["state"]]] for row in check.worst]  # fmt: skip
         bad = frozenset(k for k, row in enumerate(check.worst) if row["state"] == FAILS)
         margin_unit = span(check.unit)
         units = ("", length.unit, height.unit, time.unit, check.unit, *[margin_unit] * errors, "", check.unit,
@@ -175,17 +149,13 @@ def worst_tables(result) -> list[ReportTable]:
     return tables
 
 
-def claim_table(result) -> ReportTable | None:
-    """Table of the expected values of the case and of the computed values; None without expected values."""
+def claim_table(result) -> ReportTable:
+    """Table of the expected values of the case and of the computed values."""
     rows = [[item.text, item.claimed, item.found, item.tolerance, item.unit, IN_WORDS[item.state]]
             for item in result.expectations]  # fmt: skip
     bad = frozenset(k for k, item in enumerate(result.expectations) if item.state == FAILS)
     heads = ("expectation", "expected", "computed", "tolerance", "unit", "verdict")
-    return (
-        ReportTable("Expected values of the case", heads, rows, bad=bad, mixed_units=frozenset({1, 2, 3}))
-        if rows
-        else None
-    )
+    return ReportTable("Expected values of the case", heads, rows, bad=bad, mixed_units=frozenset({1, 2, 3}))
 
 
 def claim_text(item) -> str:
@@ -205,28 +175,19 @@ def extremes_of_pipes(result, ways: list[SectionPath]) -> ReportTable | None:
     legs = {leg.pipe: leg for way in ways for leg in way.legs}
     if len(ways) > 1 or all(leg.begin == 0.0 and not leg.backwards for leg in legs.values()):
         legs = {}  # the chainage equals the distance, or the section would be ambiguous
-    rows = []
+    rows, along = [], envelope_column(result, "distance")
     for name, words, most, when in EXTREMES:
         ends = {pipe: int(most(arrays[name])) for pipe, arrays in envelope.items()}
         pipes = list(ends)
         pipe = pipes[int(most([envelope[key][name][ends[key]] for key in pipes]))]
         arrays, k = envelope[pipe], ends[pipe]
-        chainage = [_chainage(result, legs.get(pipe), arrays["distance"][k])] if legs else []
-        rows.append(
-            [
-                words,
-                float(arrays[name][k]),
-                envelope_column(result, name).unit,
-                pipe,
-                float(arrays["distance"][k]),
-                *chainage,
-                float(arrays["elevation"][k]),
-                float(arrays[when][k]),
-            ]
-        )
-    units = [
-        envelope_column(result, key).unit for key in ("distance", *["distance"] * bool(legs), "elevation", "t_max")
-    ]
+        value, distance, height, time = (float(arrays[key][k]) for key in (name, "distance", "elevation", when))
+        leg = legs.get(pipe)
+        chainage = None if leg is None else float(along.from_si(leg.chainage(along.to_si(arrays["distance"][k]))))
+        rows.append([words, value, envelope_column(result, name).unit, pipe, distance, *[chainage] * bool(legs),
+                     height, time])  # fmt: skip
+    keys = ("distance", *["distance"] * bool(legs), "elevation", "t_max")
+    units = [envelope_column(result, key).unit for key in keys]
     heads = ("", "value", "unit", "pipe", "from its start", *["chainage"] * bool(legs), "elevation", "time")
     return ReportTable("Worst of all pipes", heads, rows, ("",) * 4 + tuple(units), mixed_units=frozenset({1}))
 
@@ -250,8 +211,8 @@ def _ranking(result, name: str, words: str, most, when: str) -> ReportTable:
                  more="in envelope.csv and in the workbook (--xlsx)")  # fmt: skip
 
 
-def extremes_of_probes(result) -> ReportTable | None:
-    """Table of the extremes of each probe over all accepted steps, with times and errors; None without probes."""
+def extremes_of_probes(result) -> ReportTable:
+    """Table of the extremes of each probe over all accepted steps, with times and errors."""
     peaks, rows, invalid = result.summary.get("peaks", {}), [], not_valid(result.summary) or None
     clock = UnitColumn("t", "time", result.summary["time_unit"])
     for name, extremes in result.extremes.items():
@@ -263,16 +224,7 @@ def extremes_of_probes(result) -> ReportTable | None:
     units = [clock.unit if column == "time" else "" for column in heads]
     loose = frozenset(2 + k for k, column in enumerate(heads) if column != "time")
     return ReportTable("Probes", ("probe", "unit", *heads), rows, ("", "", *units), mixed_units=loose,
-                 more="in summary.json and in the workbook (--xlsx)") if rows else None  # fmt: skip
-
-
-def _chainage(result, leg: Leg | None, distance: float) -> float | None:
-    """Chainage of a point at a distance from the start of a pipe, in the units of the envelope.
-
-    leg : leg of the pipe in a section, or None: then the result is None
-    """
-    shown = envelope_column(result, "distance")
-    return None if leg is None else float(shown.from_si(leg.chainage(shown.to_si(distance))))
+                 more="in summary.json and in the workbook (--xlsx)")  # fmt: skip
 
 
 def settings(result) -> ReportTable:
@@ -319,26 +271,26 @@ def versions(result) -> ReportTable:
     return ReportTable("", ("", ""), rows)
 
 
-def events(result) -> ReportTable | None:
-    """Table of events of self-acting parts with their times; None without events."""
+def events(result) -> ReportTable:
+    """Table of events of self-acting parts with their times."""
     rows = [[event["time"], event["name"], event["what"]] for event in result.summary["events"]]
-    return ReportTable("Events", ("time", "part", "event"), rows, ("s",), more="in summary.json") if rows else None
+    return ReportTable("Events", ("time", "part", "event"), rows, ("s",), more="in summary.json")
 
 
-def cavities(result) -> ReportTable | None:
-    """Table of cavities in pipes: first position and time, greatest volume and its time; None without cavities."""
+def cavities(result) -> ReportTable:
+    """Table of cavities in pipes: first position and time, greatest volume and its time."""
     rows = [[row["place"].removeprefix("links."), row["distance"], row["time"], row["volume"], row["t_volume"]]
             for row in result.summary["cavities"]]  # fmt: skip
     heads = ("pipe", "first at", "time", "greatest volume", "time")
-    return ReportTable("Cavities", heads, rows, ("", "m", "s", "m3", "s")) if rows else None
+    return ReportTable("Cavities", heads, rows, ("", "m", "s", "m3", "s"))
 
 
-def comparisons(result) -> ReportTable | None:
-    """Table that compares probes with measured series; None without measurements."""
+def comparisons(result) -> ReportTable:
+    """Table that compares probes with measured series."""
     rows = [[row.probe, row.file, row.unit, row.rms, row.greatest_difference, row.measured_peak, row.computed_peak]
             for row in result.comparisons]  # fmt: skip
     heads = ("probe", "measured", "unit", "rms", "greatest difference", "peak measured", "computed")
-    return ReportTable("Against measurements", heads, rows, mixed_units=frozenset({3, 4, 5, 6})) if rows else None
+    return ReportTable("Against measurements", heads, rows, mixed_units=frozenset({3, 4, 5, 6}))
 
 
 def _scheme_text(numerics) -> str:

@@ -8,18 +8,8 @@ import numpy as np
 
 from fvsolve.case.extent import OF_PRESSURE
 from fvsolve.output.unit_columns import UnitColumn, column, probe_columns
-from fvsolve.run.result import FAILS, HOLDS, OPEN
+from fvsolve.run.result import FAILS, HOLDS, OPEN, Comparison
 from fvsolve.run.verdicts import in_quantity, part_extremes, places, verdict
-
-RESULT_KEYS = (
-    "rms",
-    "greatest_difference",
-    "t_greatest_difference",
-    "measured_peak",
-    "t_measured_peak",
-    "computed_peak",
-    "t_computed_peak",
-)
 
 
 def comparison(compare, column: UnitColumn, result) -> dict:
@@ -32,22 +22,16 @@ def comparison(compare, column: UnitColumn, result) -> dict:
     time, measured = compare.t + compare.shift, column.from_si(compare.v)
     within = (time >= t[0]) & (time <= t[-1]) if len(t) else np.zeros(len(time), bool)
     time, measured = time[within], measured[within]
-    head = {
-        "probe": column.name,
-        "unit": column.unit,
-        "file": compare.file,
-        "shift": float(compare.shift),
-        "points": len(time),
-    }
+    head = [column.name, column.unit, compare.file, float(compare.shift), len(time)]
     if not len(time):
-        return head | dict.fromkeys(RESULT_KEYS)
+        return dict.fromkeys(Comparison._fields) | dict(zip(Comparison._fields, head, strict=False))
     difference = interpolated(t, computed, time) - measured
     overlap = (t >= time.min()) & (t <= time.max())
     peak, top = int(np.argmax(measured)), int(np.argmax(np.where(overlap, computed, -np.inf)))
     worst = int(np.argmax(np.abs(difference)))
     values = [np.sqrt(np.mean(difference**2)), difference[worst], time[worst]]
     values += [measured[peak], time[peak], computed[top], t[top]]
-    return head | dict(zip(RESULT_KEYS, map(float, values), strict=True))
+    return dict(zip(Comparison._fields, [*head, *map(float, values)], strict=True))
 
 
 def interpolated(t: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.ndarray:

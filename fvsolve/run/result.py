@@ -314,7 +314,7 @@ class Result(Displayable):
         speed of bodies; without all of these only the parts are drawn. `contours` : number of contour lines. Raises
         RunError without frames, FvsolveError if drawing is not possible.
         """
-        if field is None and self._without_fields:
+        if field is None and self.directory is not None and not self._kinds & KINDS_WITH_FIELDS:
             return self._draw([], "parts", path, ".png", 0)
         times = [t for t, _ in self._frames()]
         t = times[-1] if time is None else min(times, key=lambda frame_time: abs(frame_time - time))
@@ -326,10 +326,9 @@ class Result(Displayable):
         return self._draw(list(dict.fromkeys(t for t, _ in self._frames())), field, path, ".gif", contours)
 
     @property
-    def _without_fields(self) -> bool:
-        """True if no part has fields that frames show, and the result is in a run directory."""
-        kinds = {part.kind for part in (*self.case.nodes.values(), *self.case.links.values())}
-        return self.directory is not None and not kinds & KINDS_WITH_FIELDS
+    def _kinds(self) -> set[str]:
+        """Kinds of the parts of the case."""
+        return {part.kind for part in (*self.case.nodes.values(), *self.case.links.values())}
 
     def _frames(self) -> list[tuple[float, Path]]:
         if self.directory is None or not (self.directory / "fields.pvd").is_file():
@@ -343,7 +342,7 @@ class Result(Displayable):
         """Text of the reason for which a run has no frames."""
         if self.directory is None:
             return "nothing was written; run again with a run directory (`out`)"
-        if not {part.kind for part in (*self.case.nodes.values(), *self.case.links.values())} & KINDS_WITH_FIELDS:
+        if not self._kinds & KINDS_WITH_FIELDS:
             return "the case has no basin, body or pipe"
         if self.case.output.fields == 0:
             return "[output] fields is 0; run again with --set output.fields=20 --force"
@@ -367,13 +366,11 @@ class Result(Displayable):
 
     def _measured(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         compared = self.case.compare if self.comparisons else {}
-        return {
-            series.probe.text: (
-                self._time.from_si(series.t + series.shift),
-                self.column(series.probe.text).from_si(series.v),
-            )
-            for series in compared.values()
-        }
+        measured = {}
+        for series in compared.values():
+            name = series.probe.text
+            measured[name] = self._time.from_si(series.t + series.shift), self.column(name).from_si(series.v)
+        return measured
 
     def column(self, probe: str) -> UnitColumn:
         """Name, dimension and unit of a probe, with conversions to and from SI.
@@ -410,9 +407,8 @@ ROWS = EXACT_ROWS | {
 def check_summary(summary: dict[str, Any], path: Path) -> None:
     """Raise RunError if the entries of a summary were written by another version; path : its file, for the message."""
     if faults := [*field_faults(summary)]:
-        raise RunError(
-            f"{path} {'; '.join(faults)}: it was written by another version of fvsolve; run again with --force"
-        )
+        text = "it was written by another version of fvsolve; run again with --force"
+        raise RunError(f"{path} {'; '.join(faults)}: {text}")
 
 
 def field_faults(summary: dict[str, Any]) -> Iterator[str]:
@@ -421,9 +417,8 @@ def field_faults(summary: dict[str, Any]) -> Iterator[str]:
         rows = as_rows(summary.get(key, []))
         if missing := [name for name in expected if any(name not in entry for entry in rows)]:
             yield f"lacks {listing(missing)} of {key}"
-        if key in EXACT_ROWS and (
-            unknown := list(dict.fromkeys(name for entry in rows for name in entry if name not in expected))
-        ):
+        unknown = list(dict.fromkeys(name for entry in rows for name in entry if name not in expected))
+        if key in EXACT_ROWS and unknown:
             yield f"has {listing(unknown)} of {key}, unknown to this version"
     for (key, part), expected in NESTED_ROWS.items():
         rows = [row for entry in as_rows(summary.get(key, [])) for row in as_rows(entry.get(part, []))]

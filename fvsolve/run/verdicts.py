@@ -154,17 +154,12 @@ def places(model, summary) -> list[list[dict[str, Any]]]:
         extent = limit.extent
         shown = column(extent.quantity, "head" if extent.quantity == "pressure_head" else extent.dimension, model.case)
         shared = {"name": limit.name, "quantity": extent.quantity, "until": float(summary.t)}
-        nearest_rows = [
-            row
-            for part in part_extremes(model, summary, extent)
-            for row in nearest(model, summary, limit, part, complete)
-        ]
-        tables.append(
-            [
-                row_of(row, shown, chainage, extent) | shared | {PLACES_KEY: place_margins(model, extent, shown, row)}
-                for row in nearest_rows
-            ]
-        )
+        rows = []
+        for part in part_extremes(model, summary, extent):
+            for row in nearest(model, summary, limit, part, complete):
+                margins = {PLACES_KEY: place_margins(model, extent, shown, row)}
+                rows.append(row_of(row, shown, chainage, extent) | shared | margins)
+        tables.append(rows)
     return tables
 
 
