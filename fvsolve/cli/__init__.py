@@ -1,7 +1,5 @@
 """Command line interface; the only package that prints or exits."""
 
-from __future__ import annotations
-
 import sys
 import warnings
 from importlib import import_module

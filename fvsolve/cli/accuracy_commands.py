@@ -1,7 +1,5 @@
 """`fvsolve chart` and `fvsolve order`: work-precision charts of methods and models, observed order of convergence."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from typing import Annotated
 
@@ -9,7 +7,7 @@ from typer import Option
 
 from fvsolve.cli import app as cli
 from fvsolve.cli.progress import progress_line
-from fvsolve.cli.terminal import Table, present
+from fvsolve.cli.terminal import TextTable, present
 from fvsolve.errors import FvsolveError
 from fvsolve.output.summary_file import plain
 from fvsolve.studies.accuracy.order_picture import NORMS, SHOWN_VARIABLES, study_title, variable_unit
@@ -324,7 +322,7 @@ def study_text(result) -> Iterator:
         yield rows_of(result, variable)
     yield ""
     orders = [[f"{name}", *(fit_text(fits[norm]) for norm in NORMS)] for name, fits in result.fits.items()]
-    yield Table(["fitted order of", "L1", "L2", "max"], orders)
+    yield TextTable(["fitted order of", "L1", "L2", "max"], orders)
     yield from dict.fromkeys([*reason_lines(result), *result.notes])
     yield ""
 

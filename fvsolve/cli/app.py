@@ -1,7 +1,5 @@
 """Typer application, arguments and options common to several commands, and the reading of a case."""
 
-from __future__ import annotations
-
 import functools
 import os
 import sys

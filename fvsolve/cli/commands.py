@@ -1,7 +1,5 @@
 """Commands for runs, cases and methods."""
 
-from __future__ import annotations
-
 import os
 import sys
 from contextlib import closing
@@ -11,7 +9,7 @@ from typing import Annotated
 from typer import Argument, Option
 
 from fvsolve.cli.app import Cases, Json, RunDirectory, Set, SingleCase, app, load_case, quantity_of
-from fvsolve.cli.terminal import Table, present, print_json, show
+from fvsolve.cli.terminal import TextTable, present, print_json, show
 from fvsolve.errors import FvsolveError, visible
 
 
@@ -130,7 +128,7 @@ def list_cases(as_json: Json = False) -> None:
     from fvsolve.case import shipped
 
     titles = shipped.titles()
-    present(as_json, titles, [Table(["case", "title"], [*titles.items()])])
+    present(as_json, titles, [TextTable(["case", "title"], [*titles.items()])])
 
 
 @app.command()

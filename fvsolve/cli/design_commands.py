@@ -1,7 +1,5 @@
 """`fvsolve size`, `optimise` and `study`: values of keys, valve schedules and protections that keep the limits."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
@@ -12,7 +10,7 @@ from fvsolve.cli.app import Dask, Jobs, Json, Set, SingleCase, app, load_case
 from fvsolve.cli.printing import REASONS_SHOWN, time_formatter, undecided_limit_reason, where_and_when
 from fvsolve.cli.progress import progress_line
 from fvsolve.cli.sweep import RANGE_FORMAT, key_and_values
-from fvsolve.cli.terminal import Table, present
+from fvsolve.cli.terminal import TextTable, present
 from fvsolve.errors import CaseError, FvsolveError, collect_faults
 from fvsolve.run.result import FAILS, HOLDS, IN_WORDS, OPEN, LimitVerdict, not_valid
 from fvsolve.units import span
@@ -73,7 +71,7 @@ def size_text(result) -> Iterator:
              run.limit if run.reason == "finished" else run.reason] for run in result.runs]  # fmt: skip
     unit = f" {result.unit}" if result.unit else ""
     key = f"{result.key} [{result.unit}]" if unit else result.key
-    yield Table([key, "", "least margin over limit", "of"], rows)
+    yield TextTable([key, "", "least margin over limit", "of"], rows)
     for text in result.ties:
         yield f"with {text}"
     for text in dict.fromkeys(run.open for run in result.runs if run.open):
@@ -150,7 +148,7 @@ def schedule_text(result, case) -> Iterator:
     rows = [[f"{clock.from_si(t):.6g}", *(format(own.from_si(value), spec) for value in pair)]
             for t, *pair in zip(result.best.time, result.linear.value, result.best.value, strict=True)]  # fmt: skip
     heads = [name if bare else f"{name} [{own.unit}]" for name in ("linear", "best")]
-    yield Table([clock.header, *heads], rows)
+    yield TextTable([clock.header, *heads], rows)
     peaks = ["-" if value.peak is None else f"{value.peak:.6g} {result.unit}" for value in (result.linear, result.best)]
     yield f"{result.minimise}: linear {peaks[0]}, best {peaks[1]}; {result.runs} runs", "green"
     yield result.schedule
@@ -195,7 +193,7 @@ def study_text(result) -> Iterator:
         verdicts = {verdict["name"]: verdict for verdict in row["verdicts"]}
         cells = [_cell(verdicts.get(name), row) for name in limits]
         rows.append([row_name(row), standing(row), *cells])
-    yield Table(["run", "", *(f"margin of {name}" for name in limits.values())], rows)
+    yield TextTable(["run", "", *(f"margin of {name}" for name in limits.values())], rows)
     for row in result.rows:
         if not row["ok"]:
             yield f"{row_name(row)}: {row['reason']}", "bold red"

@@ -1,7 +1,5 @@
 """`fvsolve energy`: energy ledger of a run, and passivity of schemes, methods and ports."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
@@ -11,7 +9,7 @@ from typer import Argument, Option
 
 from fvsolve.cli import app as cli
 from fvsolve.cli.progress import interrupt_message, progress_line, run_progress
-from fvsolve.cli.terminal import Table, present
+from fvsolve.cli.terminal import TextTable, present
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.result_table import Column, ResultTable, cell_text
 
@@ -143,7 +141,7 @@ def ledger_text(result, case, folder) -> Iterator:
             rest = sum(lines[name][-1] for name in order[LINES:])
             rows.append([kind, f"{len(order) - LINES} others", *amount(rest)])
     rows += [["numerical", name, *amount(values[-1])] for name, values in result.numerical().items()]
-    yield Table(["kind", "part", joules.header, "share [%]"], rows)
+    yield TextTable(["kind", "part", joules.header, "share [%]"], rows)
     yield ""
     text, left = f"remainder {case.amount(result.remainder[-1], 'energy')}", result.newton_counts
     if left:

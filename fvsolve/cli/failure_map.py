@@ -1,7 +1,5 @@
 """`fvsolve failure-map`: map of the failures of methods on a case."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
@@ -10,7 +8,7 @@ from typer import Option
 
 from fvsolve.cli import app as cli
 from fvsolve.cli.progress import progress_line
-from fvsolve.cli.terminal import Table, present
+from fvsolve.cli.terminal import TextTable, present
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.result_table import Column, ResultTable
 
@@ -134,7 +132,7 @@ def map_text(result, files: list[Path], head: str) -> Iterator:
         squares = {method: result.row(scheme, method) for method in result.methods}
         rows = [[method, *(square.verdict for square in row), _limit_text(result, row)]
                 for method, row in squares.items()]  # fmt: skip
-        yield Table(heads, rows)
+        yield TextTable(heads, rows)
         yield ""
     present = {square.verdict: None for square in result.squares}
     for word in VERDICT_TEXTS:

@@ -1,7 +1,5 @@
 """`fvsolve report`, `plot`, `fatigue`, `import` and `precompile`: reports of runs, networks, compiled code."""
 
-from __future__ import annotations
-
 import shutil
 import sys
 from collections.abc import Iterator
@@ -13,7 +11,7 @@ from typer import Argument, Option
 
 from fvsolve.case import shipped
 from fvsolve.cli.app import Json, RunDirectory, app, quantity_of
-from fvsolve.cli.terminal import Table, present
+from fvsolve.cli.terminal import TextTable, present
 from fvsolve.errors import FvsolveError, listing
 
 SHORT = (
@@ -120,7 +118,7 @@ def cycle_text(results: list[dict], per_day: float) -> Iterator:
     """
     rows = [[entry["probe"], entry["unit"], f"{size:.5g}", f"{count:g}"]
             for entry in results for size, count in entry["cycles"]]  # fmt: skip
-    yield Table(["probe", "unit", "range up to", "cycles"], rows)
+    yield TextTable(["probe", "unit", "range up to", "cycles"], rows)
     for entry in [entry for entry in results if "share" in entry]:
         years = 1.0 / (entry["share"] * per_day * 365.25) if entry["share"] > 0.0 else float("inf")
         life = "unlimited" if years == float("inf") else f"{years:.4g} years"

@@ -1,7 +1,5 @@
 """`fvsolve linearise` and `fvsolve response`: state-space matrices and poles, transfer function at a port."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated

@@ -1,14 +1,12 @@
 """Output of `fvsolve methods`: table of all methods, or the tableau and properties of one method."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
 
 from fvsolve.cli.app import method_name
-from fvsolve.cli.terminal import Table
+from fvsolve.cli.terminal import TextTable
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers import METHODS, Facts, Method, analyse, method_named
 from fvsolve.steppers.numbers.polynomial import Polynomial, sign
@@ -56,7 +54,7 @@ def _table_text(all_facts: dict[str, Facts]) -> Iterator:
         ]
         for name, facts in first.items()
     ]  # fmt: skip
-    yield Table(heads, rows)
+    yield TextTable(heads, rows)
     yield ""
     for name, facts in all_facts.items():
         if name != facts.name:

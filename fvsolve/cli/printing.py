@@ -4,12 +4,10 @@
 columns to (title, dimension).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 from fvsolve.case.resource_checks import byte_text, disk_size
-from fvsolve.cli.terminal import Table
+from fvsolve.cli.terminal import TextTable
 from fvsolve.errors import listing
 from fvsolve.output.directory import existing_pictures
 from fvsolve.output.unit_columns import UnitColumn, column
@@ -178,7 +176,7 @@ def _parts_table(case, word: str, parts: dict, keys: dict, every: bool = True, o
     names = list(parts) if every or len(parts) <= MANY_ROWS else _notable_rows(parts, keys, odd)
     rows = [[name, *(_number(_in_unit(unit, parts[name].get(key))) for key, unit in zip(keys, columns, strict=True))]
             for name in names]  # fmt: skip
-    yield Table([word, *(unit.name if unit.dimension == "number" else unit.header for unit in columns)], rows)
+    yield TextTable([word, *(unit.name if unit.dimension == "number" else unit.header for unit in columns)], rows)
     if len(names) < len(parts):
         yield (f"... {len(parts) - len(names)} more of {len(parts)}; the table has only parts with the least "
                "or greatest value of a column or with a notice, --all prints all")  # fmt: skip
@@ -291,7 +289,7 @@ def difference_text(results: dict, summary: dict) -> Iterator:
     for name, probe in results["probes"].items():
         time = None if probe["t_greatest"] is None else clock.from_si(probe["t_greatest"])
         rows.append([name, span(probe["unit"]), *map(_number, (probe["greatest"], time, probe["rms"]))])
-    yield Table(["probe", "unit", "greatest difference", f"at [{clock.unit}]", "rms"], rows)
+    yield TextTable(["probe", "unit", "greatest difference", f"at [{clock.unit}]", "rms"], rows)
     for key in ("only_a", "only_b"):
         if results[key]:
             yield f"only in {results[key[-1]]}: {', '.join(results[key])}"
@@ -310,7 +308,7 @@ def _extremes(run) -> Iterator:
             row[3:3] = [_error_text(peak["minimum"])]
             row[6:6] = [_error_text(peak["maximum"])]
     if rows:
-        yield Table(heads, rows[:ROWS])
+        yield TextTable(heads, rows[:ROWS])
     if len(rows) > ROWS:
         where = f"in {run.directory / 'summary.json'}" if run.directory else "in Result.extremes"
         yield f"... {len(rows) - ROWS} more {where}"

@@ -1,7 +1,5 @@
 """Progress of runs and studies on standard error, and handling of Ctrl-C."""
 
-from __future__ import annotations
-
 import signal
 import sys
 import threading

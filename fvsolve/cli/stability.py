@@ -1,7 +1,5 @@
 """`fvsolve stability`: greatest stable step of a case, or Courant limits of a uniform periodic grid without a case."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,7 +10,7 @@ from typer import Argument, Option
 
 from fvsolve.cli import app as cli
 from fvsolve.cli.progress import progress_line
-from fvsolve.cli.terminal import Table, present
+from fvsolve.cli.terminal import TextTable, present
 from fvsolve.errors import FvsolveError
 from fvsolve.step_limits.advection_limit import AdvectionLimit, advection_limits
 from fvsolve.step_limits.symbol import WEIGHTS
@@ -286,7 +284,7 @@ def _limited_text(limited: LimitedLimit) -> Iterator:
         [f"  {n}", *(cell_text(row[i], ".3g") for row in limited.measured.values())]
         for i, n in enumerate(limited.steps)
     ]
-    yield Table(["  steps", *limited.measured], rows)
+    yield TextTable(["  steps", *limited.measured], rows)
 
 
 def _limit(x: float) -> str:
@@ -347,7 +345,7 @@ def _limit_table(limits: list[AdvectionLimit]) -> Iterator:
         else:
             shown.append([name, *(_cell(row[scheme]) for scheme in schemes)])
     yield "Courant limits of linear advection on a uniform periodic grid (von Neumann)", "bold"
-    yield Table(["method", *schemes], shown)
+    yield TextTable(["method", *schemes], shown)
     yield LEGEND
     small = "none: a wave grows at every step, however small"
     yield f"{small}; every: stable at every step; +: stable again at larger steps"

@@ -1,7 +1,5 @@
 """`fvsolve sweep`, `sensitivity` and `calibrate`: runs over combinations, samples and ranges of keys."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +9,7 @@ from typer import Option
 
 from fvsolve.cli import app as cli
 from fvsolve.cli.progress import progress_line
-from fvsolve.cli.terminal import Table, present
+from fvsolve.cli.terminal import TextTable, present
 from fvsolve.errors import FvsolveError
 
 Values = Annotated[
@@ -158,7 +156,7 @@ def sweep_text(result, folder: Path, heads: dict[str, str]) -> Iterator:
         [*(as_option_text(row[key]) for key in result.keys), *(_text(row.get(name)) for name in shown)]
         for row in first_rows
     ]
-    yield Table([*heads.values(), *shown], rows)
+    yield TextTable([*heads.values(), *shown], rows)
     for row in first_rows:
         values = ", ".join(f"{key} = {as_option_text(row[key])}" for key in result.keys)
         if not row["ok"]:
@@ -257,7 +255,7 @@ def calibration_text(case, result) -> Iterator:
     yield from ((doubt, "yellow") for doubt in result.doubts)
 
 
-def _key_table(result, units: dict[str, str] = {}) -> Table:  # noqa: B006
+def _key_table(result, units: dict[str, str] = {}) -> TextTable:  # noqa: B006
     """Table of the keys of a sensitivity study or a calibration; units : key -> its heading with unit, if it has one"""
     heads, rows = result.sheet.words()
-    return Table(heads, [[units.get(key, key), *row] for key, *row in rows])
+    return TextTable(heads, [[units.get(key, key), *row] for key, *row in rows])

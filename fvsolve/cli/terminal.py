@@ -1,7 +1,5 @@
 """Presentation of the result of a command: JSON, or lines and tables on the terminal."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Iterable, Sequence
@@ -14,7 +12,7 @@ WIDTH = 160  # line width of output that does not go to a terminal
 
 
 @dataclass(frozen=True)
-class Table:
+class TextTable:
     """Table for the terminal; columns that contain a number or "-" are right-aligned."""
 
     headers: Sequence[str]
@@ -42,7 +40,7 @@ def print_json(data: Any) -> None:
 
 
 def show(items: Iterable) -> None:
-    """Print lines and tables on standard output: texts, pairs (text, style), and objects `Table` or `ResultTable`.
+    """Print lines and tables on standard output: texts, pairs (text, style), and objects `TextTable` or `ResultTable`.
 
     Texts are printed literally: markup and control characters have no effect. Output that does not go to a terminal is
     wide and without color.
@@ -55,10 +53,10 @@ def show(items: Iterable) -> None:
             text, style = (item, None) if isinstance(item, str) else item
             console.print(visible(text), style=style, highlight=False, markup=False, soft_wrap=True)
         else:
-            console.print(_grid(item if isinstance(item, Table) else Table(*item.words())))
+            console.print(_grid(item if isinstance(item, TextTable) else TextTable(*item.words())))
 
 
-def _grid(table: Table):
+def _grid(table: TextTable):
     from rich.table import Table as Grid
     from rich.text import Text
 

@@ -1,7 +1,5 @@
 """Pictures of accuracy: orders of convergence, work-precision charts, and energy balances over time."""
 
-from __future__ import annotations
-
 import math
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -115,6 +113,7 @@ def chart_figure(curves: Sequence[Curve], rows: Sequence[str], columns: Sequence
     markers = _assign_signs([curve.marker for curve in curves], METHOD_MARKERS)
     for axes in grid.flat:
         style.style_axes(axes)
+    for axes in grid.flat:  # after the style of all: axes share their scales
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.margins(x=0.04)

@@ -1,7 +1,5 @@
 """Pictures of basins and bodies from .vtu files, with surfaces drawn by PyVista."""
 
-from __future__ import annotations
-
 import pickle
 import sys
 from pathlib import Path

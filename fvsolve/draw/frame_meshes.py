@@ -1,7 +1,5 @@
 """Frames of a run as PyVista meshes in output units, and the surface of the water in a basin."""
 
-from __future__ import annotations
-
 import math
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Picture of a network: pipes in the colours of a field, symbols and names of parts, axes."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from fvsolve.draw import style

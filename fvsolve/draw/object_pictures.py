@@ -1,7 +1,5 @@
 """Figures of cases, models, states, sweeps and sensitivities; most are drawn by a method `plot()`."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

@@ -1,7 +1,5 @@
 """Symbols, connections and names of parts in a picture; names are placed without overlap."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

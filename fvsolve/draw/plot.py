@@ -3,8 +3,6 @@
 Constant and duplicate curves are left out of history.png.
 """
 
-from __future__ import annotations
-
 import textwrap
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Projection of points in space onto the picture plane, and axes of the projected scene."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -6,8 +6,6 @@ the colour of water. A kind without a symbol uses the symbol of the kind from wh
 valve), else OTHER_NODE or OTHER_LINK: a new kind of part needs no entry here.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import cache

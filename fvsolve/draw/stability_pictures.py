@@ -1,7 +1,5 @@
 """Pictures of stability: regions of methods, eigenvalues, frequency responses and maps of failures."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

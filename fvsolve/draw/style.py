@@ -1,7 +1,5 @@
 """Style of pictures: colours, figures, axes, legends and titles."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Pictures and animations of a field: the scene that they show, drawn off screen by matplotlib or PyVista."""
 
-from __future__ import annotations
-
 import os
 import pickle
 import subprocess

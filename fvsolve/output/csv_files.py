@@ -1,7 +1,5 @@
 """CSV files of a run: history.csv, envelope.csv, routes.csv, and lines/NAME-000012.csv along lines in basins."""
 
-from __future__ import annotations
-
 import csv
 import re
 from pathlib import Path
@@ -14,16 +12,9 @@ from fvsolve.errors import RunError
 from fvsolve.output.unit_columns import UnitColumn, column, split_header, to_column_units
 
 ENVELOPE_QUANTITIES = {
-    "distance": "length",
-    "elevation": "head",
-    "initial_head": "head",
-    "min_pressure": "pressure",
-    "t_min": "time",
-    "max_pressure": "pressure",
-    "t_max": "time",
-    "min_head": "head",
-    "max_head": "head",
-}
+    "distance": "length", "elevation": "head", "initial_head": "head", "min_pressure": "pressure", "t_min": "time",
+    "max_pressure": "pressure", "t_max": "time", "min_head": "head", "max_head": "head",
+}  # fmt: skip
 VELOCITY_AXES = {"u": 0, "v": 1}  # of velocities
 LINE_FILE = re.compile(r"(.+)-(\d{6,})\.csv")
 

@@ -1,7 +1,5 @@
 """Run directory: the object that writes all files of a run, and functions that lock, read and clear the directory."""
 
-from __future__ import annotations
-
 import contextlib
 import shutil
 from collections.abc import Iterator

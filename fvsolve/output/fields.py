@@ -5,8 +5,6 @@ the centre of mass and to the points; force elements are lines, and a sloshing m
 its position. Cell data are in SI, pressures are absolute, and every array carries its unit as the VTK key UNITS_LABEL.
 """
 
-from __future__ import annotations
-
 import html
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Receiver of the results of a run without a directory: rows are stored in memory."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from fvsolve.output.csv_files import envelope_in_units, with_initial_heads

@@ -5,8 +5,6 @@ Otherwise nodes are laid out so that distances in the plan approximate the lengt
 then stress majorization; Gansner, Koren and North 2004). The layout of a network is deterministic.
 """
 
-from __future__ import annotations
-
 import heapq
 
 import numpy as np

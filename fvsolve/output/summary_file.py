@@ -1,7 +1,5 @@
 """summary.json: results of a run for people and programs."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -1,7 +1,5 @@
 """Reports of finished runs: an offline HTML page, a workbook of tables, pictures and pressure cycles."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import Any
 

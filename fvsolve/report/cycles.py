@@ -5,8 +5,6 @@ endures N cycles of a range R0 endures N (R0 / R)^m cycles of a range R (Basquin
 ranges is the sum of counted over endured cycles (Palmgren 1924, Miner 1945).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

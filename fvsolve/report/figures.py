@@ -4,8 +4,6 @@ Long histories keep the extremes of bins. plotly.js interprets some markup in na
 pass through `escape_markup`.
 """
 
-from __future__ import annotations
-
 import base64
 import html
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Long sections: results, limits and devices along a path, in the units of [output], and animated heads."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path

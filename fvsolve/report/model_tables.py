@@ -1,7 +1,5 @@
 """Tables of the model: fluid, pipes, pipe walls and other parts, in the units of [output]."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from fvsolve.case.case import default_cells

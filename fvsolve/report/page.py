@@ -4,8 +4,6 @@ In functions for a study, `study` is the data of study.json, and `runs` is a lis
 each run; row["page"] is the address of the report of the run.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

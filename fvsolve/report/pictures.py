@@ -1,7 +1,5 @@
 """Picture files of a run: long sections, histories of chosen probes, and phase planes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Report files of a run or study: HTML pages, and workbooks (.xlsx) of all tables with all rows."""
 
-from __future__ import annotations
-
 import math
 import os
 from dataclasses import replace

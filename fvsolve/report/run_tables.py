@@ -1,7 +1,5 @@
 """Sentences and tables of the report of a run: verdicts, extremes, method, ledgers, events, versions."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

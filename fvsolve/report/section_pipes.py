@@ -4,8 +4,6 @@ Sections are the routes of the case, then the longest paths through the remainin
 A path continues through common nodes and through links other than pipes between two junctions.
 """
 
-from __future__ import annotations
-
 import heapq
 from typing import NamedTuple
 

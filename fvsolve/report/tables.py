@@ -1,7 +1,5 @@
 """Report tables: rows of words and numbers under headers with units, aligned at the decimal points."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

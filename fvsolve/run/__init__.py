@@ -1,7 +1,5 @@
 """Public `run()` and `open_run()`: from a case to its result, files and pictures."""
 
-from __future__ import annotations
-
 import contextlib
 import time
 import warnings

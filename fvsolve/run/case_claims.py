@@ -1,7 +1,5 @@
 """Comparison of a run with its case (expected values, limits, measured series), and of two runs."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Data of the pictures that `view` draws of a run: frames, units, and positions of parts."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

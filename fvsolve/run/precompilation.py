@@ -3,8 +3,6 @@
 Code and fluid properties are stored in the cache folder, which can be copied to machines of the same kind.
 """
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Class `Result` of a run: probes over time, extremes, verdicts, pictures; check of the fields of a summary."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import fields
 from functools import cached_property
