@@ -133,6 +133,7 @@ def _numbers(name: str, text: str | None) -> list | None:
 
 
 def chart_text(result, paths) -> Iterator:
+    """Cheapest settings for each error, default setting, references, failed points and files of a chart."""
     floor = result.floor["trajectory"]
     yield f"{result.case}: error over the trajectory (mean over time, of the probe with the largest relative error)"
     yield ResultTable(FRONT, [vars(row) for row in result.front])

@@ -7,13 +7,10 @@ from typing import Annotated
 from typer import Argument, Option
 
 from fvsolve.cli.app import Dask, Jobs, Json, Set, SingleCase, app, load_case
-from fvsolve.cli.printing import REASONS_SHOWN, time_formatter, undecided_limit_reason, where_and_when
 from fvsolve.cli.progress import progress_line
 from fvsolve.cli.sweep import RANGE_FORMAT, key_and_values
 from fvsolve.cli.terminal import TextTable, present
 from fvsolve.errors import CaseError, FvsolveError, collect_faults
-from fvsolve.run.result import FAILS, HOLDS, IN_WORDS, OPEN, LimitVerdict, not_valid
-from fvsolve.units import span
 
 
 @app.command()
@@ -66,6 +63,7 @@ def size(
 
 
 def size_text(result) -> Iterator:
+    """Values tried in a size search, and the value found."""
     rows = [[f"{run.value:.6g}", "holds" if run.ok else "open" if run.open else "FAILS",
              "-" if run.margin is None else f"{run.margin:.4g}",
              run.limit if run.reason == "finished" else run.reason] for run in result.runs]  # fmt: skip
@@ -138,6 +136,7 @@ def optimise(
 
 
 def schedule_text(result, case) -> Iterator:
+    """Linear and best schedule of an optimisation, and their peaks."""
     from fvsolve.output.unit_columns import column, time_column
     from fvsolve.studies.sampling import key_quantity
 
@@ -179,39 +178,33 @@ def study(
 
 
 def study_text(result) -> Iterator:
+    """Margins of all limits in all runs of a study, failed and open limits, and protections that hold all limits."""
+    from fvsolve.cli import printing
+    from fvsolve.run.result import FAILS, OPEN, LimitVerdict
     from fvsolve.studies.scenarios import row_name
 
     if result.design.title:
         yield result.design.title, "bold"
-    limits = {
-        verdict["name"]: f"{verdict['name']} [{span(verdict['unit'])}]"
-        for row in result.rows
-        for verdict in row["verdicts"]
-    }
-    rows = []
-    for row in result.rows:
-        verdicts = {verdict["name"]: verdict for verdict in row["verdicts"]}
-        cells = [_cell(verdicts.get(name), row) for name in limits]
-        rows.append([row_name(row), standing(row), *cells])
-    yield TextTable(["run", "", *(f"margin of {name}" for name in limits.values())], rows)
+    yield _margin_table(result)
     for row in result.rows:
         if not row["ok"]:
             yield f"{row_name(row)}: {row['reason']}", "bold red"
         if row["marks"]:
             first = min(row["marks"], key=lambda mark: mark["time"])
-            text = f"{first['text']}: results from {time_formatter(row)(first['time'])} on are not to be trusted"
-            yield f"{row_name(row)}: {text}", "yellow"
+            time = printing.time_formatter(row)(first["time"])
+            yield f"{row_name(row)}: {first['text']}: results from {time} on are not to be trusted", "yellow"
         for note in row["warnings"]:
             if note["kind"] == "end":
                 yield f"{row_name(row)}: {note['text']}", "yellow"
-        for verdict in verdicts_of(row):
+        for verdict in [LimitVerdict(**verdict) for verdict in row["verdicts"]]:
             if verdict.state in (FAILS, OPEN):
                 value = "-" if verdict.value is None else f"{verdict.value:.6g}"
-                place = where_and_when(verdict._asdict(), row)
+                place = printing.where_and_when(verdict._asdict(), row)
                 text = f"{row_name(row)}: {verdict.name}: {value} {verdict.unit} ({place})"
-                reason = "" if verdict.state == FAILS else f": open, because {undecided_limit_reason(verdict, row)}"
-                yield text + reason, "red" if verdict.state == FAILS else "yellow"
-        for text in row.get("resolution", {"reasons": []})["reasons"][:REASONS_SHOWN]:
+                if verdict.state == OPEN:
+                    text += f": open, because {printing.undecided_limit_reason(verdict, row)}"
+                yield text, "red" if verdict.state == FAILS else "yellow"
+        for text in row.get("resolution", {"reasons": []})["reasons"][: printing.REASONS_SHOWN]:
             yield f"{row_name(row)}: error of {text}", "yellow"
     names = [name or "the case as it is" for name in result.holds]
     if result.limited:
@@ -223,24 +216,25 @@ def study_text(result) -> Iterator:
     yield f"{result.folder}: study.json, study.csv and a directory for each run"
 
 
-def verdicts_of(row: dict) -> list:
-    """Verdicts on the limits of a run, from its row in a study, as `LimitVerdict`."""
-    return [LimitVerdict(**verdict) for verdict in row["verdicts"]]
+def _margin_table(result) -> TextTable:
+    """Table of the status of each run of a study, and of the margin of each limit in it.
 
-
-def standing(row: dict) -> str:
-    """Status of a run in a word, from its row in a study.
-
-    It is "FAILS" if the run or a limit fails, else "open" or "holds"; "-" for a good run without limits.
+    The status is "FAILS" if the run or a limit fails, else "open" or "holds"; "-" for a good run without limits.
     """
-    states = [FAILS] * (not row["ok"]) + [entry.state for entry in verdicts_of(row)]
-    if not states:
-        return "-"
-    return IN_WORDS[next((entry for entry in (FAILS, OPEN) if entry in states), HOLDS)]
+    from fvsolve.run.result import FAILS, HOLDS, IN_WORDS, OPEN, not_valid
+    from fvsolve.studies.scenarios import row_name
+    from fvsolve.units import span
 
-
-def _cell(verdict, row: dict) -> str:
-    if verdict is None or verdict["margin"] is None:
-        return "-" if verdict is None else not_valid(row) or "-"
-    error = "" if verdict["error"] is None else f" +- {verdict['error']:.2g}"
-    return f"{verdict['margin']:.5g}{error}"
+    limits, rows = {}, []
+    for verdict in [verdict for row in result.rows for verdict in row["verdicts"]]:
+        limits[verdict["name"]] = f"{verdict['name']} [{span(verdict['unit'])}]"
+    for row in result.rows:
+        states = [FAILS] * (not row["ok"]) + [verdict["state"] for verdict in row["verdicts"]]
+        status = IN_WORDS[next((state for state in (FAILS, OPEN) if state in states), HOLDS)] if states else "-"
+        margins = dict.fromkeys(limits, "-")
+        for verdict in row["verdicts"]:
+            error = "" if verdict["error"] is None else f" +- {verdict['error']:.2g}"
+            known = verdict["margin"] is not None
+            margins[verdict["name"]] = f"{verdict['margin']:.5g}{error}" if known else not_valid(row) or "-"
+        rows.append([row_name(row), status, *margins.values()])
+    return TextTable(["run", "", *(f"margin of {name}" for name in limits.values())], rows)

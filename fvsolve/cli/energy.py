@@ -125,6 +125,7 @@ def ledger(case, port, out, as_json: bool) -> None:
 
 
 def ledger_text(result, case, folder) -> Iterator:
+    """Energy balance of a run by part, its remainder, the passivity verdict at a port, and the files."""
     from fvsolve.output.unit_columns import column
 
     rows, joules = [], column("energy", "energy", case)

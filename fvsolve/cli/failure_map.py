@@ -118,6 +118,7 @@ def _write_files(result, folder: Path, head: str) -> list[Path]:
 
 
 def map_text(result, files: list[Path], head: str) -> Iterator:
+    """Verdict of each run of a failure map, meaning of the verdicts, reference and files; head : label of columns"""
     from fvsolve.draw.stability_pictures import column_labels
     from fvsolve.studies.failure.run_verdict import VERDICT_TEXTS
 
