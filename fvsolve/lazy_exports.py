@@ -1,7 +1,5 @@
 """Public names of a package, imported on first use."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Mapping
 from importlib import import_module

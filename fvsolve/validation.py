@@ -1,7 +1,5 @@
 """Checks of the arguments of public functions: numbers, names, arrays, paths."""
 
-from __future__ import annotations
-
 import functools
 import inspect
 import math

@@ -116,12 +116,14 @@ FAULTS = [
     ),
     Fault("studies/ports/positive_real.py", "order = n.degree - d.degree", "order = d.degree - n.degree"),
     Fault(
-        "output/line_files.py",
+        "output/csv_files.py",
         'self.along("u", fields), self.along("v", fields)',
         'self.along("u", fields), self.along("u", fields)',
     ),
     Fault(
-        "cli/models_output.py", "gain = richest.seconds / cheapest.seconds", "gain = cheapest.seconds / richest.seconds"
+        "cli/accuracy_commands.py",
+        "gain = richest.seconds / cheapest.seconds",
+        "gain = cheapest.seconds / richest.seconds",
     ),
     Fault("basins/frame_forces.py", "spin + f1 - p1 * z", "spin + f1 + p1 * z"),
     Fault(
@@ -147,7 +149,7 @@ FAULTS = [
     ),
     Fault("parts/tank.py", "0.5 * s * (area[k + 1] - area[k])", "0.505 * s * (area[k + 1] - area[k])"),
     Fault("parts/pump/law_curve.py", "residual = drop + weight * head", "residual = drop + 1.01 * weight * head"),
-    Fault("run/comparison.py", "compare.t + compare.shift", "compare.t - compare.shift"),
+    Fault("run/case_claims.py", "compare.t + compare.shift", "compare.t - compare.shift"),
     Fault("epanet/part_tables.py", "2.0 * GRAVITY * drop / velocity**2", "2.02 * GRAVITY * drop / velocity**2"),
     Fault("solve/run_summary.py", 'row["inflow"] - row["outflow"] for name', 'row["inflow"] + row["outflow"] for name'),
     Fault("exact/laminar_line.py", "self.length - places if self.reversed", "places if self.reversed"),

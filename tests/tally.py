@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 from collections import defaultdict
-from importlib import import_module
 
 from reference import folders
 
@@ -25,7 +24,7 @@ class Tally:
         Integrator.__init__ = self._after(
             Integrator.__init__, lambda stepper, method, *_: self._add("method", method.name)
         )
-        cli._modules_for = self._after(cli._modules_for, lambda command: self._add("command", *command))
+        cli.application = self._after(cli.application, lambda *command: self._add("command", *command))
 
     def add(self, plain: dict[str, list[str]]) -> None:
         for kind, names in plain.items():
@@ -70,18 +69,15 @@ def parts() -> dict[str, type]:
 def expected() -> dict[str, set[str]]:
     """Every part, scheme, method, law, command and shipped case, by kind."""
     from fvsolve import cli
-    from fvsolve.cli.app import app
     from fvsolve.fluid.laws import LAWS
     from fvsolve.schemes import SCHEMES
     from fvsolve.steppers.tableau import METHODS
 
-    for module in cli.COMMANDS:
-        import_module(f"fvsolve.cli.{module}")
     return {
         "part": set(parts()),
         "scheme": set(SCHEMES),
         "method": {method.name for method in METHODS.values()},
         "law": set(LAWS),
-        "command": {command.name or command.callback.__name__ for command in app.registered_commands},
+        "command": {command.name or command.callback.__name__ for command in cli.application().registered_commands},
         "shipped case": {path.stem for path in folders.CASES.glob("*.toml")},
     }

@@ -1,7 +1,5 @@
 """Command line interface; the only package that prints or exits."""
 
-from __future__ import annotations
-
 import sys
 import warnings
 from importlib import import_module
@@ -10,26 +8,27 @@ from fvsolve.errors import FvsolveError, visible
 
 __all__ = ["main"]
 
-# Modules that add commands to the application. A module of a single command usually has the name of the command.
-COMMANDS = (
-    "commands",
-    "chart",
-    "energy",
-    "failure_map",
-    "epanet_import",
-    "linearise",
-    "optimise",
-    "order",
-    "precompile",
-    "report_commands",
-    "response",
-    "scenarios",
-    "sensitivity",
-    "sizing",
-    "stability",
-    "sweep",
-)
-BASIC_COMMANDS = ("run", "check", "list", "new", "schema", "methods", "compare", "view")  # commands of `commands`
+# Command -> module that adds it to the application, in the order of the help text.
+COMMANDS = dict.fromkeys(("run", "check", "list", "new", "schema", "methods", "compare", "view"), "commands") | {
+    "chart": "accuracy_commands",
+    "energy": "energy",
+    "failure-map": "failure_map",
+    "import": "file_commands",
+    "linearise": "linear_commands",
+    "optimise": "design_commands",
+    "order": "accuracy_commands",
+    "precompile": "file_commands",
+    "report": "file_commands",
+    "plot": "file_commands",
+    "fatigue": "file_commands",
+    "response": "linear_commands",
+    "study": "design_commands",
+    "sweep": "sweep",
+    "sensitivity": "sweep",
+    "calibrate": "sweep",
+    "size": "design_commands",
+    "stability": "stability",
+}
 
 
 def main() -> None:
@@ -43,11 +42,7 @@ def main() -> None:
             stream.reconfigure(errors="backslashreplace")  # a terminal with a small character set must not end a run
     before, warnings.formatwarning = warnings.formatwarning, lambda message, *_, **__: f"{visible(str(message))}\n"
     try:
-        for module in _modules_for(sys.argv[1:2]):
-            import_module(f"fvsolve.cli.{module}")
-        from fvsolve.cli.app import app
-
-        app(prog_name="fvsolve")
+        application(*sys.argv[1:2])(prog_name="fvsolve")
     except FvsolveError as error:
         _exit_with(str(error), 2)
     except KeyboardInterrupt:
@@ -65,11 +60,14 @@ def main() -> None:
         warnings.formatwarning = before
 
 
-def _modules_for(command: list[str]) -> tuple[str, ...]:
-    """Modules to import for a command line: `commands` for a basic command, otherwise all modules."""
-    if command and command[0] in BASIC_COMMANDS:
-        return COMMANDS[:1]
-    return COMMANDS
+def application(command: str = ""):
+    """Typer application with the commands of the module of `command`, or with all commands for any other text."""
+    for module in dict.fromkeys([COMMANDS[command]] if command in COMMANDS else COMMANDS.values()):
+        import_module(f"fvsolve.cli.{module}")
+    from fvsolve.cli.app import app
+
+    app.registered_commands.sort(key=lambda info: [*COMMANDS].index(info.name or info.callback.__name__))
+    return app
 
 
 def _exit_with(message: str, code: int) -> None:

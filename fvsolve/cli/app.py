@@ -1,15 +1,15 @@
-"""Typer application, options common to all commands, and the reading of a case."""
-
-from __future__ import annotations
+"""Typer application, arguments and options common to several commands, and the reading of a case."""
 
 import functools
-import json
+import os
 import sys
+from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer import Argument, Option
 
-from fvsolve.errors import CaseError, Fault
+from fvsolve.errors import CaseError, Fault, FvsolveError
 
 app = typer.Typer(
     help="Hydraulic transients by finite volumes: a TOML file in; pressures, flows and fields out.",
@@ -18,6 +18,46 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+
+Cases = Annotated[list[str], Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
+SingleCase = Annotated[str, Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
+RunDirectory = Annotated[Path, Argument(metavar="RUN", help="a run directory")]
+Set = Annotated[
+    list[str],
+    Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="new value of a key of the case, for example links.main.cells=400; repeat the option for more keys",
+    ),
+]
+Json = Annotated[bool, Option("--json", help="print one JSON object on standard output instead of text")]
+Out = Annotated[
+    Path | None,
+    Option(metavar="DIR", help="folder of tables and pictures (default runs/NAME.COMMAND, such as runs/main.sweep)"),
+]
+Jobs = Annotated[int, Option(metavar="N", help="number of runs at a time, each in its own process")]
+Dask = Annotated[
+    str | None,
+    Option(
+        metavar="ADDRESS",
+        help="address of a Dask scheduler whose workers make the runs, for example tcp://10.0.0.1:8786",
+    ),
+]
+Seed = Annotated[int, Option(metavar="N", help="seed of the random samples")]
+AtTime = Annotated[
+    str | None,
+    Option(
+        metavar="T",
+        help='time of the state about which the case is linearised: seconds, or "20 ms" (default start of the run)',
+    ),
+]
+BeforeJump = Annotated[
+    bool, Option("--left-limit", help="if a schedule has a kink or jump at the time --at, use its values just before")
+]
+LinearScheme = Annotated[
+    str | None,
+    Option(metavar="NAME", help="linear scheme, for example upwind5 (default scheme of the case, if it is linear)"),
+]
 
 
 def _version(requested: bool) -> None:
@@ -31,23 +71,10 @@ def _version(requested: bool) -> None:
 @app.callback()
 def all_commands(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="print the version and exit")
+        bool, Option("--version", callback=_version, is_eager=True, help="print the version and exit")
     ] = False,
 ) -> None:
     """Hydraulic transients by finite volumes: a TOML file in; pressures, flows and fields out."""
-
-
-Cases = Annotated[list[str], typer.Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
-SingleCase = Annotated[str, typer.Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
-Set = Annotated[
-    list[str],
-    typer.Option(
-        "--set",
-        metavar="KEY=VALUE",
-        help="new value of a key of the case, for example links.main.cells=400; repeat the option for more keys",
-    ),
-]
-Json = Annotated[bool, typer.Option("--json", help="print one JSON object on standard output instead of text")]
 
 
 def load_case(name: str, overrides: list[str], scheme: str | None = None, method: str | None = None):
@@ -65,8 +92,6 @@ def load_case(name: str, overrides: list[str], scheme: str | None = None, method
     try:
         case = load(path, settings)
     except CaseError as error:
-        from fvsolve.cli.study_options import comma_list, method_names
-
         given = {"scheme": comma_list(scheme), "method": method_names(method)}
         first = {f"numerics.{key}": names[0] for key, names in given.items() if names}
         if first and not faults:
@@ -112,8 +137,74 @@ def value_of(text: str):
     return parsed["value"] if parsed.keys() == {"value"} else text.strip()
 
 
-def print_json(data) -> None:
-    """Print one JSON object on standard output, with unrounded numbers."""
-    from fvsolve.output.summary_file import plain
+def quantity_of(text: str | None, dimension: str, label: str) -> float | None:
+    """Value [SI] of a text in the format of a case file, such as "20 ms"; None for None.
 
-    print(json.dumps(plain(data), allow_nan=False))
+    label : option with the text, for the message. Raises FvsolveError for any other text.
+    """
+    from fvsolve.units import parse
+
+    try:
+        return None if text is None else parse(value_of(text), dimension)
+    except ValueError as error:
+        raise FvsolveError(f"{label}: {error}") from None
+
+
+def comma_list(text: str | None, option: str = "") -> list[str] | None:
+    """Words of a list `a,b,c`, without duplicates; None for None. Raises FvsolveError for a list without words.
+
+    option : name of the option, for the message
+    """
+    if text is None:
+        return None
+    words = list(dict.fromkeys(word.strip() for word in text.split(",") if word.strip()))
+    if not words:
+        raise FvsolveError(f'{option} "{text}" is an empty list. Expected names or numbers separated by commas')
+    return words
+
+
+def method_names(text: str | None) -> list[str] | None:
+    """Names of the methods in a list `A,B`; None for None.
+
+    A word may also be the path of a tableau file, see `method_name`.
+    """
+    names = comma_list(text, "--method")
+    return None if names is None else [method_name(name) for name in names]
+
+
+def method_name(word: str) -> str:
+    """Name of a method. If the word is the path of a tableau file, register it as a method named after the file."""
+    from fvsolve.steppers.tableau import METHODS, method_of_file
+
+    path = Path(word)
+    return word if word in METHODS or not path.is_file() else method_of_file(path).name
+
+
+def folder_of(case, study: str, out: Path | None) -> Path:
+    """Create and return the folder for the files of a study: `out`, or runs/NAME.STUDY if `out` is None."""
+    return writable_folder(out or Path("runs") / f"{case.name}.{study}")
+
+
+def warn_replaced(folder: Path, name: str) -> None:
+    """Print a notice that an earlier result will be replaced, if the folder contains the file `name`."""
+    if (folder / name).exists():
+        print(f"{folder}: the results of an earlier command are replaced; to keep them, use --out DIR", file=sys.stderr)
+
+
+def clear_files(folder: Path, *patterns: str) -> Path:
+    """Delete the files in a folder that match glob patterns, left by an earlier command; returns the folder."""
+    for path in [file for pattern in patterns for file in folder.glob(pattern)]:
+        path.unlink()
+    return folder
+
+
+def writable_folder(folder: Path) -> Path:
+    """Create the folder and return it. Raises FvsolveError if it is not writable."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        text = f"{folder}: cannot be written: {error.strerror or error}"
+        raise FvsolveError(f"{text}. Use another directory with --out DIR") from None
+    if not os.access(folder, os.W_OK):
+        raise FvsolveError(f"{folder}: cannot be written: permission denied. Use another directory with --out DIR")
+    return folder

@@ -1,16 +1,15 @@
 """Commands for runs, cases and methods."""
 
-from __future__ import annotations
-
 import os
 import sys
 from contextlib import closing
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
-from fvsolve.cli.app import Cases, Json, Set, SingleCase, app, load_case, print_json, value_of
+from fvsolve.cli.app import Cases, Json, RunDirectory, Set, SingleCase, app, load_case, quantity_of
+from fvsolve.cli.terminal import TextTable, present, print_json, show
 from fvsolve.errors import FvsolveError, visible
 
 
@@ -19,21 +18,19 @@ def run(
     cases: Cases,
     out: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             metavar="DIR",
             help="run directory, or for several cases the folder of their run directories DIR/NAME (default runs/NAME)",
         ),
     ] = None,
     set: Set = [],  # noqa: B006
-    resume: Annotated[
-        bool, typer.Option("--resume", help="continue an interrupted run from its last checkpoint")
-    ] = False,
-    force: Annotated[bool, typer.Option("--force", help="replace an earlier run in the run directory")] = False,
-    threads: Annotated[int, typer.Option(metavar="N", help="number of threads that share the rows of basin cells")] = 1,
-    no_pictures: Annotated[bool, typer.Option("--no-pictures", help="write no pictures")] = False,
+    resume: Annotated[bool, Option("--resume", help="continue an interrupted run from its last checkpoint")] = False,
+    force: Annotated[bool, Option("--force", help="replace an earlier run in the run directory")] = False,
+    threads: Annotated[int, Option(metavar="N", help="number of threads that share the rows of basin cells")] = 1,
+    no_pictures: Annotated[bool, Option("--no-pictures", help="write no pictures")] = False,
     estimate_error: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--estimate-error",
             help="estimate the errors of peaks, from further runs at half, one and twice the resolution",
         ),
@@ -78,9 +75,8 @@ def _run(model, place: Path, force: bool, resume: bool, threads: int, painter, q
     from fvsolve.cli import printing
     from fvsolve.cli.progress import run_progress
     from fvsolve.run import draw, sink_of, solved
-    from fvsolve.run.cost_estimate import cost_text
 
-    if text := cost_text(model):
+    if text := printing.cost_estimate(model):
         print(visible(text), file=sys.stderr, flush=True)
     with closing(sink_of(model, place, force, resume, threads)) as sink:
         with run_progress(model.case) as progress:
@@ -88,12 +84,12 @@ def _run(model, place: Path, force: bool, resume: bool, threads: int, painter, q
         if error:
             _judge(result, model.case)
         if not quiet:
-            printing.print_result(result)
+            show(printing.result_text(result))
             sys.stdout.flush()
         if painter is not None:
             draw(result, painter)
     if not quiet:
-        printing.print_files(result)
+        show(printing.files_text(result))
     return result
 
 
@@ -110,7 +106,7 @@ def _judge(result, case) -> None:
 def check(
     case: SingleCase,
     set: Set = [],  # noqa: B006
-    every: Annotated[bool, typer.Option("--all", help="print all rows of long tables")] = False,
+    every: Annotated[bool, Option("--all", help="print all rows of long tables")] = False,
     as_json: Json = False,
 ) -> None:
     """Print the contents of a case as read, its initial state and its expected cost."""
@@ -123,29 +119,22 @@ def check(
     report_data = model.checks
     report_data["warnings"] += [notice.plain() for notice in step_limits(model)]
     report_data["threads"] = divisible_rows(model)
-    if as_json:
-        print_json(report_data)
-    else:
-        printing.print_checks(model.case, report_data, every)
+    present(as_json, report_data, printing.check_text(model.case, report_data, every))
 
 
 @app.command("list")
 def list_cases(as_json: Json = False) -> None:
     """List the shipped cases."""
     from fvsolve.case import shipped
-    from fvsolve.cli import printing
 
     titles = shipped.titles()
-    if as_json:
-        print_json(titles)
-    else:
-        printing.print_titles(titles)
+    present(as_json, titles, [TextTable(["case", "title"], [*titles.items()])])
 
 
 @app.command()
 def new(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="a shipped case, see `fvsolve list`")],
-    file: Annotated[Path | None, typer.Argument(metavar="FILE", help="file to write (default NAME.toml)")] = None,
+    name: Annotated[str, Argument(metavar="NAME", help="a shipped case, see `fvsolve list`")],
+    file: Annotated[Path | None, Argument(metavar="FILE", help="file to write (default NAME.toml)")] = None,
 ) -> None:
     """Copy a shipped case and the files it uses."""
     from fvsolve.case import copying
@@ -166,14 +155,12 @@ def schema() -> None:
 @app.command()
 def methods(
     name: Annotated[
-        str | None,
-        typer.Argument(metavar="NAME", help="name of a method, or file of its tableau (default all methods)"),
+        str | None, Argument(metavar="NAME", help="name of a method, or file of its tableau (default all methods)")
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="picture file of the stability region of NAME: .png, .svg or .pdf (default NAME.png)",
+        Option(
+            metavar="FILE", help="picture file of the stability region of NAME: .png, .svg or .pdf (default NAME.png)"
         ),
     ] = None,
     as_json: Json = False,
@@ -183,67 +170,52 @@ def methods(
 
     if name is None and out is not None:
         raise FvsolveError("--out is valid for a single method only. Add the NAME of the method")
-    output = methods.table_output() if name is None else methods.method_output(name, out)
-    if as_json:
-        print_json(output.plain)
-    else:
-        output.show()
+    present(as_json, *(methods.all_methods() if name is None else methods.single_method(name, out)))
 
 
 @app.command()
 def compare(
-    run_a: Annotated[Path, typer.Argument(metavar="RUN_A", help="run directory, as written by fvsolve run --out")],
-    run_b: Annotated[Path, typer.Argument(metavar="RUN_B", help="run directory that is compared with RUN_A")],
+    run_a: Annotated[Path, Argument(metavar="RUN_A", help="run directory, as written by fvsolve run --out")],
+    run_b: Annotated[Path, Argument(metavar="RUN_B", help="run directory that is compared with RUN_A")],
     as_json: Json = False,
 ) -> None:
     """Compare two runs: greatest and rms difference (RUN_B minus RUN_A) of each common probe."""
     from fvsolve.cli import printing
     from fvsolve.run import open_run
-    from fvsolve.run.comparison import differences
+    from fvsolve.run.case_claims import differences
 
     first = open_run(run_a)
     result = differences(first, open_run(run_b))
-    if as_json:
-        print_json(result)
-    else:
-        printing.print_differences(result, first.summary)
+    present(as_json, result, printing.difference_text(result, first.summary))
 
 
 @app.command()
 def view(
-    directory: Annotated[Path, typer.Argument(metavar="RUN", help="a run directory")],
+    directory: RunDirectory,
     time: Annotated[
         str | None,
-        typer.Option(
-            metavar="T", help='time whose nearest frame is drawn: seconds, or "20 ms" (default the last frame)'
-        ),
+        Option(metavar="T", help='time whose nearest frame is drawn: seconds, or "20 ms" (default the last frame)'),
     ] = None,
     field: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="quantity to draw, such as pressure, head, flow, velocity or depth (default pressure, or for a case "
             "without pipes the first field of its basins or the speed of its bodies)"
         ),
     ] = None,
     contours: Annotated[
-        int, typer.Option(metavar="N", min=0, max=100, help="number of contour lines on the surfaces of basins")
+        int, Option(metavar="N", min=0, max=100, help="number of contour lines on the surfaces of basins")
     ] = 0,
-    animate: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="animation of all frames, a .gif or .mp4 file")
-    ] = None,
+    animate: Annotated[Path | None, Option(metavar="FILE", help="animation of all frames, a .gif or .mp4 file")] = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="picture file (default RUN/view-FIELD.png, with the name of the field)"),
+        Option(metavar="FILE", help="picture file (default RUN/view-FIELD.png, with the name of the field)"),
     ] = None,
 ) -> None:
     """Draw a quantity in all parts at one time, or an animation of all stored times, into a file."""
     from fvsolve.run import open_run
-    from fvsolve.units import parse
 
-    try:
-        when = None if time is None else parse(value_of(time), "time")
-    except ValueError as error:
-        raise FvsolveError(f"--time: {error}") from None
+    when = quantity_of(time, "time", "--time")
     if animate is not None and not time is out is None:
         raise FvsolveError("--animate draws all times into its own file. Remove --time and --out")
     run = open_run(directory)

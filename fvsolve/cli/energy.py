@@ -1,26 +1,15 @@
 """`fvsolve energy`: energy ledger of a run, and passivity of schemes, methods and ports."""
 
-from __future__ import annotations
-
 import math
-import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import replace
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
-from fvsolve.cli.app import Json, Set, app, load_case, print_json
-from fvsolve.cli.study_options import (
-    Out,
-    clear_files,
-    comma_list,
-    folder_of,
-    method_names,
-    progress_line,
-    warn_replaced,
-)
+from fvsolve.cli import app as cli
+from fvsolve.cli.progress import interrupt_message, progress_line, run_progress
+from fvsolve.cli.terminal import TextTable, present
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.result_table import Column, ResultTable, cell_text
 
@@ -29,37 +18,13 @@ EFFECTS = {  # verdict of the JSON file -> text of the terminal
     "the numbers dissipate": "the numerical method dissipates energy",
     "the numbers create energy": "the numerical method creates energy",
 }
-OptionalCase = Annotated[
-    str | None,
-    typer.Argument(
-        metavar="CASE",
-        help="case file or shipped case to run (default none: list the passivity of schemes and methods)",
-    ),
-]
-Port = Annotated[
-    str | None,
-    typer.Option(
-        metavar="NODE",
-        help="node at which the passivity of the network is checked: a reservoir, inflow or junction (default none)",
-    ),
-]
-Schemes = Annotated[
-    str | None,
-    typer.Option(
-        metavar="S,S,...",
-        help="schemes to study (default scheme of the case, or without a case all schemes)",
-    ),
-]
-Methods = Annotated[
-    str | None,
-    typer.Option(
-        metavar="M,M,...",
-        help="methods to study (default method of the case, or without a case all methods)",
-    ),
-]
 LINES = 12  # greatest number of lines of a kind on the terminal; energy.csv has all
 RESTARTS = "the same command starts from the beginning"
 FILES = ("energy.csv", "energy.png", "energy.svg")
+SCHEME = (
+    Column("scheme"), Column("passive", "never grows"), Column("rate", "rate [per cell time]", ".4g"),
+    Column("gain", "greatest gain", ".4g"),
+)  # fmt: skip
 
 
 def _limit(key: str) -> Callable[[Mapping], str]:
@@ -67,10 +32,6 @@ def _limit(key: str) -> Callable[[Mapping], str]:
     return lambda row: "any" if math.isinf(row[key]) else "none" if row[key] == 0.0 else f"{row[key]:.6g}"
 
 
-SCHEME = (
-    Column("scheme"), Column("passive", "never grows"), Column("rate", "rate [per cell time]", ".4g"),
-    Column("gain", "greatest gain", ".4g"),
-)  # fmt: skip
 METHOD = (
     Column("method"), Column("any_network", "any network"),
     Column("chamber", "driven chamber",
@@ -79,25 +40,48 @@ METHOD = (
 )  # fmt: skip
 
 
-@app.command()
+@cli.app.command()
 def energy(
-    case: OptionalCase = None,
-    port: Port = None,
-    scheme: Schemes = None,
-    method: Methods = None,
-    out: Out = None,
-    set: Set = [],  # noqa: B006
-    as_json: Json = False,
+    case: Annotated[
+        str | None,
+        Argument(
+            metavar="CASE",
+            help="case file or shipped case to run (default none: list the passivity of schemes and methods)",
+        ),
+    ] = None,
+    port: Annotated[
+        str | None,
+        Option(
+            metavar="NODE",
+            help="node at which the passivity of the network is checked: a reservoir, inflow or junction "
+            "(default none)",
+        ),
+    ] = None,
+    scheme: Annotated[
+        str | None,
+        Option(metavar="S,S,...", help="schemes to study (default scheme of the case, or without a case all schemes)"),
+    ] = None,
+    method: Annotated[
+        str | None,
+        Option(metavar="M,M,...", help="methods to study (default method of the case, or without a case all methods)"),
+    ] = None,
+    out: cli.Out = None,
+    set: cli.Set = [],  # noqa: B006
+    as_json: cli.Json = False,
 ) -> None:
     """Print the energy ledger of a run: energy supplied, stored, dissipated, and changed by the numerical method."""
-    schemes, methods = comma_list(scheme, "--scheme"), method_names(method)
+    schemes, methods = cli.comma_list(scheme, "--scheme"), cli.method_names(method)
     if case is None:
+        from fvsolve.studies.energy.passivity import passivity
+
         refuse_without_case({"--port": port, "--out": out, "--set": set})
-        print_claims(schemes, methods, as_json)
+        with progress_line() as progress, interrupt_message(f"interrupted: no results are saved; {RESTARTS}"):
+            result = passivity(schemes, methods, progress)
+        present(as_json, result.plain(), passivity_text(result))
     elif schemes or methods:
-        compare_pairs(load_case(case, set), schemes, methods, port, out, as_json)
+        compare_pairs(cli.load_case(case, set), schemes, methods, port, out, as_json)
     else:
-        ledger(load_case(case, set), port, out, as_json)
+        ledger(cli.load_case(case, set), port, out, as_json)
 
 
 def refuse_without_case(options: dict) -> None:
@@ -111,34 +95,23 @@ def refuse_without_case(options: dict) -> None:
                            "without a case the passivity of schemes and methods is listed, without files")  # fmt: skip
 
 
-@contextmanager
-def interrupt_message(words: str) -> Iterator[None]:
-    """Context manager that, at Ctrl-C, prints `words` and exits with code 130."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        print(f"\n{words}", file=sys.stderr)
-        sys.exit(130)
-
-
 def ledger(case, port, out, as_json: bool) -> None:
     """Run a case, write its energy balance and a picture, and print the balance with the passivity verdict at a port.
 
     It ends the program, with exit code 130 if interrupted, 1 if the run is not ok, else 0.
     port : name of a node, or None for no verdict; out : folder of the files, or None for runs/NAME.energy
     """
-    from fvsolve.cli.progress import run_progress
-    from fvsolve.draw.energy_picture import energy_figure
+    from fvsolve.draw.accuracy_pictures import energy_figure
     from fvsolve.output.unit_columns import column, time_column
     from fvsolve.studies.energy.energy_balance import energy as study
     from fvsolve.studies.energy.energy_balance import write_table
 
-    folder = folder_of(case, "energy", out)
-    warn_replaced(folder, FILES[0])
+    folder = cli.folder_of(case, "energy", out)
+    cli.warn_replaced(folder, FILES[0])
     with interrupt_message(f"interrupted: no ledger is written, {folder} may lack files; {RESTARTS}"):
         with run_progress(case) as progress:
             result = study(case, port=port, progress=progress)
-        write_table(result, clear_files(folder, *FILES) / FILES[0])
+        write_table(result, cli.clear_files(folder, *FILES) / FILES[0])
         at_port = None if result.port is None else (result.port.node, result.port.course, result.port.bound)
         clock, own = time_column(case), column("", "energy", case)
         units = clock.unit, None if own.plain else (own.to_si(1.0), own.unit)
@@ -146,18 +119,16 @@ def ledger(case, port, out, as_json: bool) -> None:
                                result.numerical(), case.title or case.name, at_port, units)  # fmt: skip
         for name in FILES[1:]:
             figure.savefig(folder / name)
-    if as_json:
-        print_json(result.plain() | {"directory": str(folder), "files": list(FILES)})
-    else:
-        _ledger(result, case, folder)
-    sys.exit(130 if result.reason == "interrupted" else 0 if result.ok else 1)
+    facts = result.plain() | {"directory": str(folder), "files": list(FILES)}
+    code = 130 if result.reason == "interrupted" else 0 if result.ok else 1
+    present(as_json, facts, ledger_text(result, case, folder), code)
 
 
-def _ledger(result, case, folder) -> None:
-    from fvsolve.cli.terminal import console, line, table
+def ledger_text(result, case, folder) -> Iterator:
+    """Energy balance of a run by part, its remainder, the passivity verdict at a port, and the files."""
     from fvsolve.output.unit_columns import column
 
-    terminal, rows, joules = console(), [], column("energy", "energy", case)
+    rows, joules = [], column("energy", "energy", case)
 
     def amount(value: float) -> list[str]:
         share = f"{100.0 * value / result.throughput:.4g}" if result.throughput > 0.0 else "-"
@@ -171,25 +142,24 @@ def _ledger(result, case, folder) -> None:
             rest = sum(lines[name][-1] for name in order[LINES:])
             rows.append([kind, f"{len(order) - LINES} others", *amount(rest)])
     rows += [["numerical", name, *amount(values[-1])] for name, values in result.numerical().items()]
-    table(["kind", "part", joules.header, "share [%]"], rows, terminal)
-    line(terminal, "")
+    yield TextTable(["kind", "part", joules.header, "share [%]"], rows)
+    yield ""
     text, left = f"remainder {case.amount(result.remainder[-1], 'energy')}", result.newton_counts
     if left:
         text += f", of which Newton residuals cause {case.amount(result.newton[-1], 'energy')}; the rest is"
     passed, effect = case.amount(result.throughput, "energy", 6), EFFECTS[result.verdict]
-    line(
-        terminal,
-        f"{text}{'' if left else ','} {result.relative:.3g} of the energy throughput {passed}: {effect}",
-    )
+    yield f"{text}{'' if left else ','} {result.relative:.3g} of the energy throughput {passed}: {effect}"
     if result.port is not None:
-        line(terminal, result.port.text, None if result.port.passive else "bold red")
+        yield result.port.text, None if result.port.passive else "bold red"
     for mark in result.marks:
-        line(terminal, mark, "yellow")
+        yield mark, "yellow"
     cut = result.reason == "interrupted"
     ended = f"{result.reason} at t = {case.amount(result.t[-1], 'time', 6)}" if result.ok or cut else result.reason
-    line(terminal, f"{ended}; {result.steps} steps{f': the ledger ends at this time, {RESTARTS}' if cut else ''}",
-         None if result.ok else "bold red")  # fmt: skip
-    line(terminal, f"{folder}: {', '.join(FILES)}")
+    yield (
+        f"{ended}; {result.steps} steps{f': the ledger ends at this time, {RESTARTS}' if cut else ''}",
+        None if result.ok else "bold red",
+    )
+    yield f"{folder}: {', '.join(FILES)}"
 
 
 def compare_pairs(case, schemes, methods, port, out, as_json: bool) -> None:
@@ -198,25 +168,17 @@ def compare_pairs(case, schemes, methods, port, out, as_json: bool) -> None:
     It ends the program with exit code 2 if all pairs were refused.
     port : name of a node, or None; out : folder of the files, or None for runs/NAME.energy
     """
-    from fvsolve.cli.progress import interruptible
-    from fvsolve.cli.terminal import console, line, print_sheet
     from fvsolve.studies.energy.energy_balance import PAIR_COLUMNS, measure_pairs
     from fvsolve.studies.result_cache import ResultCache
 
-    folder = folder_of(case, "energy", out)
-    with progress_line() as progress, interruptible() as watch, ResultCache(folder) as points:
+    folder = cli.folder_of(case, "energy", out)
+    with progress_line() as progress, run_progress() as watch, ResultCache(folder) as points:
         rows = measure_pairs(case, schemes, methods, port, progress, points, watch)
     ResultTable(PAIR_COLUMNS, rows).write(folder / "pairs.csv")
-    if as_json:
-        print_json({"pairs": rows, "directory": str(folder), "files": ["pairs.csv"]})
-        sys.exit(2 if all(row["creates"] is None for row in rows) else 0)
-    terminal = console()
     heads = [_in_unit(column, case) for column in PAIR_COLUMNS if port or column.key not in ("relative", "margin")]
-    print_sheet(ResultTable(heads, rows), terminal)
-    refused = _print_outcome(case, rows, terminal)
-    line(terminal, f"{folder}: pairs.csv, points.jsonl")
-    if len(refused) == len(rows):
-        sys.exit(2)
+    text = [ResultTable(heads, rows), *_outcome_text(case, rows), f"{folder}: pairs.csv, points.jsonl"]
+    facts = {"pairs": rows, "directory": str(folder), "files": ["pairs.csv"]}
+    present(as_json, facts, text, code=2 if all(row["creates"] is None for row in rows) else 0)
 
 
 def _in_unit(heading: Column, case) -> Column:
@@ -233,33 +195,25 @@ def _in_unit(heading: Column, case) -> Column:
     return replace(heading, head=own.header, words=words)
 
 
-def _print_outcome(case, rows, terminal) -> list[dict]:
-    """Print the pairs of scheme and method that create energy, and the refused pairs with reason and remedy.
-
-    Returns the rows of the refused pairs.
-    """
-    from fvsolve.cli.terminal import line
-
+def _outcome_text(case, rows) -> Iterator:
+    """Pairs of scheme and method that create energy, and refused pairs with reason and remedy."""
     refused = [row for row in rows if row["reason"].startswith("refused")]
     ran = [row for row in rows if row not in refused]
     for row in ran:
         if ":" in row["reason"]:
-            line(terminal, f"{_pair(row)}: {row['reason']}", "yellow")
+            yield f"{_pair(row)}: {row['reason']}", "yellow"
     for reason, pairs in _by_reason(refused).items():
-        line(terminal, f"{', '.join(pairs)}: {reason}", "bold red")
+        yield f"{', '.join(pairs)}: {reason}", "bold red"
     if case.numerics.step is None and any("estimates no error" in row["reason"] for row in refused):
         span = case.numerics.end - case.numerics.start
-        line(
-            terminal, f"or set a fixed step for all pairs: --set numerics.step={span / 1000.0:.1g} (s, run time / 1000)"
-        )
+        yield f"or set a fixed step for all pairs: --set numerics.step={span / 1000.0:.1g} (s, run time / 1000)"
     bad = [_pair(row) for row in ran if row["creates"]]
     if bad:
-        line(terminal, f"pairs that create energy in this run: {', '.join(bad)}")
+        yield f"pairs that create energy in this run: {', '.join(bad)}"
     elif ran:
-        line(terminal, f"none of {'the pairs that ran' if refused else 'the pairs'} creates energy in this run")
+        yield f"none of {'the pairs that ran' if refused else 'the pairs'} creates energy in this run"
     else:
-        line(terminal, "no pair ran, so the creation of energy was not checked")
-    return refused
+        yield "no pair ran, so the creation of energy was not checked"
 
 
 def _by_reason(rows) -> dict[str, list[str]]:
@@ -278,45 +232,33 @@ def _pair(row) -> str:
     return f"{row['scheme']} with {row['method']}"
 
 
-def print_claims(schemes, methods, as_json: bool) -> None:
-    """Print the passivity of schemes and methods that follows from their coefficients."""
-    from fvsolve.cli.terminal import console, line, print_sheet
-    from fvsolve.studies.energy.passivity import CELLS, passivity
+def passivity_text(result) -> Iterator:
+    """Passivity of schemes and methods that follows from their coefficients."""
+    from fvsolve.studies.energy.passivity import CELLS
 
-    with progress_line() as progress, interrupt_message(f"interrupted: no results are saved; {RESTARTS}"):
-        result = passivity(schemes, methods, progress)
-    if as_json:
-        print_json(result.plain())
-        return
-    terminal = console()
     known = [entry for entry in result.schemes if entry.passive is not None]
-    line(terminal, f"Schemes: energy of a closed pipe of {CELLS} cells, continuous in time", "bold")
-    print_sheet(ResultTable(SCHEME, [vars(entry) for entry in known]), terminal)
+    yield f"Schemes: energy of a closed pipe of {CELLS} cells, continuous in time", "bold"
+    yield ResultTable(SCHEME, [vars(entry) for entry in known])
     for entry in result.schemes:
         if entry.passive is None:
-            line(
-                terminal,
+            yield (
                 f"{entry.scheme} is limited (nonlinear), so no matrix describes it; check its energy in a run: "
-                f"fvsolve energy CASE --scheme {entry.scheme}",
+                f"fvsolve energy CASE --scheme {entry.scheme}"
             )
-    line(terminal, "")
-    line(
-        terminal,
+    yield ""
+    yield (
         "Methods: passivity on any network at any step; greatest passive step on a leak, a resonator, a closed pipe",
         "bold",
     )
     good = [entry.scheme for entry in known if entry.passive]
     limit = {(entry.scheme, entry.method): entry.courant for entry in result.pairs}
     rows = [vars(entry) | {name: limit[name, entry.method] for name in good} for entry in result.methods]
-    print_sheet(ResultTable([*METHOD, *(Column(name, f"{name}: C", _limit(name)) for name in good)], rows), terminal)
+    yield ResultTable([*METHOD, *(Column(name, f"{name}: C", _limit(name)) for name in good)], rows)
     bad = [entry.scheme for entry in known if not entry.passive]
     if bad:
-        line(
-            terminal,
-            f"schemes that create energy at pipe ends with every method, up to the gain above: {', '.join(bad)}",
-        )
+        yield f"schemes that create energy at pipe ends with every method, up to the gain above: {', '.join(bad)}"
     never = [
         f"{entry.scheme} with {entry.method}" for entry in result.pairs if entry.courant == 0.0 and entry.scheme in good
     ]
     if never:
-        line(terminal, f"pairs that create energy at every step size: {', '.join(never)}")
+        yield f"pairs that create energy at every step size: {', '.join(never)}"

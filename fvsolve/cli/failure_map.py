@@ -1,25 +1,24 @@
 """`fvsolve failure-map`: map of the failures of methods on a case."""
 
-from __future__ import annotations
-
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Option
 
-from fvsolve.cli.app import Json, Set, SingleCase, app, load_case, print_json, value_of
-from fvsolve.cli.study_options import Dask, Jobs, clear_files, comma_list, folder_of, method_names, progress_line
+from fvsolve.cli import app as cli
+from fvsolve.cli.progress import progress_line
+from fvsolve.cli.terminal import TextTable, present
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.result_table import Column, ResultTable
-from fvsolve.units import parse
 
 
-@app.command("failure-map")
+@cli.app.command("failure-map")
 def failure_map(
-    case: SingleCase,
+    case: cli.SingleCase,
     scheme: Annotated[
         str | None,
-        typer.Option(
+        Option(
             metavar="A,B",
             help="schemes, one panel for each (default upwind and the scheme of the case, or the latter alone for a "
             "stiff case or a case without cells)",
@@ -27,13 +26,11 @@ def failure_map(
     ] = None,
     method: Annotated[
         str | None,
-        typer.Option(
-            metavar="A,B", help="methods, one row for each (default euler, ssp-rk3, rk4 and four implicit methods)"
-        ),
+        Option(metavar="A,B", help="methods, one row for each (default euler, ssp-rk3, rk4 and four implicit methods)"),
     ] = None,
     courant: Annotated[
         str | None,
-        typer.Option(
+        Option(
             metavar="A,B",
             help="Courant numbers, one column for each, or a single one with --key (default 0.25 to 3, or ten time "
             "steps for a stiff case or a case without cells)",
@@ -41,7 +38,7 @@ def failure_map(
     ] = None,
     step: Annotated[
         str | None,
-        typer.Option(
+        Option(
             metavar="A,B",
             help='time steps instead of Courant numbers, for example "1 ms,2 ms", one column for each, or a single '
             "step with --key",
@@ -49,7 +46,7 @@ def failure_map(
     ] = None,
     key: Annotated[
         str | None,
-        typer.Option(
+        Option(
             metavar="KEY=A,B",
             help="key of the case and its values, one column for each, instead of columns of time steps or Courant "
             "numbers",
@@ -57,55 +54,44 @@ def failure_map(
     ] = None,
     tolerance: Annotated[
         float,
-        typer.Option(
+        Option(
             metavar="X",
             help="greatest accepted error of a probe: mean over the run, as a fraction of the probe's range",
         ),
     ] = 0.02,
-    jobs: Jobs = 1,
-    dask: Dask = None,
+    jobs: cli.Jobs = 1,
+    dask: cli.Dask = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="folder of the table and pictures (default runs/NAME.map)")
+        Path | None, Option(metavar="DIR", help="folder of the table and pictures (default runs/NAME.map)")
     ] = None,
-    set: Set = [],  # noqa: B006
-    as_json: Json = False,
+    set: cli.Set = [],  # noqa: B006
+    as_json: cli.Json = False,
 ) -> None:
     """Map failures of methods over time steps or values of a key. Each run is stable, ringing, wrong, blown up, ..."""
     from fvsolve.studies.failure.failure_map import failure_map as study
     from fvsolve.studies.result_cache import ResultCache
     from fvsolve.studies.sampling import key_with_unit
 
-    read_case = load_case(case, set, scheme, method)
-    folder = folder_of(read_case, "map", out)
+    read_case = cli.load_case(case, set, scheme, method)
+    folder = cli.folder_of(read_case, "map", out)
+    steps = None if step is None else [cli.quantity_of(word, "time", f"--step {step}") for word in cli.comma_list(step)]
     with progress_line() as progress, ResultCache(folder) as points:
         result = study(
-            read_case, comma_list(scheme, "--scheme"), method_names(method), _numbers("--courant", courant),
-            _steps(step), _key(key), tolerance, points, progress, jobs=jobs, dask=dask,
+            read_case, cli.comma_list(scheme, "--scheme"), cli.method_names(method), _numbers("--courant", courant),
+            steps, _key(key), tolerance, points, progress, jobs=jobs, dask=dask,
         )  # fmt: skip
     head = result.key if result.key == "step" else key_with_unit(read_case.raw, result.key, result.values)
     files = _write_files(result, folder, head)
-    if as_json:
-        print_json(result.plain() | {"files": [str(file) for file in files]})
-    else:
-        _show(result, files, head)
+    present(as_json, result.plain() | {"files": [str(file) for file in files]}, map_text(result, files, head))
 
 
 def _numbers(option: str, text: str | None) -> list[float] | None:
     try:
-        return None if text is None else [float(word) for word in comma_list(text)]
+        return None if text is None else [float(word) for word in cli.comma_list(text)]
     except ValueError:
         raise FvsolveError(
             f"{option} {text}: not a list of numbers. Expected numbers with commas, for example {option} 0.5,0.9,1"
         ) from None
-
-
-def _steps(text: str | None) -> list[float] | None:
-    if text is None:
-        return None
-    try:
-        return [parse(value_of(word), "time") for word in comma_list(text)]
-    except ValueError as error:
-        raise FvsolveError(f"--step {text}: {error}") from None
 
 
 def _key(text: str | None) -> tuple[str, list] | None:
@@ -114,15 +100,15 @@ def _key(text: str | None) -> tuple[str, list] | None:
     name, equals, values = text.partition("=")
     if not equals or not name.strip():
         raise FvsolveError(f"--key {text}: expected KEY=A,B, for example nodes.body.volume=1e-6,1e-5")
-    return name.strip(), [value_of(word) for word in comma_list(values)]
+    return name.strip(), [cli.value_of(word) for word in cli.comma_list(values)]
 
 
 def _write_files(result, folder: Path, head: str) -> list[Path]:
-    from fvsolve.draw.failure_map_picture import failure_map_figure
+    from fvsolve.draw.stability_pictures import failure_map_figure
 
     rows = [{"value": result.values[row["column"]]} | row for row in result.plain()["squares"]]
     table = ResultTable([Column(key) for key in rows[0]], rows).write(
-        clear_files(folder, "map.csv", "map.png", "map.svg") / "map.csv"
+        cli.clear_files(folder, "map.csv", "map.png", "map.svg") / "map.csv"
     )
     figure = failure_map_figure(result, f"{result.case}: where methods fail", head)
     pictures = [folder / f"map.{kind}" for kind in ("png", "svg")]
@@ -131,57 +117,47 @@ def _write_files(result, folder: Path, head: str) -> list[Path]:
     return [table, *pictures]
 
 
-def _show(result, files: list[Path], head: str) -> None:
-    from fvsolve.cli import terminal
-    from fvsolve.draw.failure_map_picture import column_labels
+def map_text(result, files: list[Path], head: str) -> Iterator:
+    """Verdict of each run of a failure map, meaning of the verdicts, reference and files; head : label of columns"""
+    from fvsolve.draw.stability_pictures import column_labels
     from fvsolve.studies.failure.run_verdict import VERDICT_TEXTS
 
-    console = terminal.console()
     for scheme in result.schemes:
         heading = "steps" if result.key == "step" else head
-        terminal.line(console, f"{scheme}, {heading}:" if result.wave_rate else f"{heading}:", "bold")
+        yield f"{scheme}, {heading}:" if result.wave_rate else f"{heading}:", "bold"
         heads = [
             "method",
             *(label.split("\n")[-1 if _by_courant(result) else 0] for label in column_labels(result)),
             "predicted",
         ]
-        rows = [
-            [
-                method,
-                *(square.verdict for square in result.row(scheme, method)),
-                _limit(result, result.row(scheme, method)),
-            ]
-            for method in result.methods
-        ]
-        terminal.table(heads, rows, console)
-        terminal.line(console, "")
+        squares = {method: result.row(scheme, method) for method in result.methods}
+        rows = [[method, *(square.verdict for square in row), _limit_text(result, row)]
+                for method, row in squares.items()]  # fmt: skip
+        yield TextTable(heads, rows)
+        yield ""
     present = {square.verdict: None for square in result.squares}
     for word in VERDICT_TEXTS:
         if word in present:
-            terminal.line(console, f"{word}: {VERDICT_TEXTS[word]}")
-    terminal.line(console, f"tolerance: {result.tolerance:g} of a probe's range (mean error over the run, worst probe)")
-    terminal.line(console, f"reference: {result.reference}; its error is at most {result.doubt:.2g}")
-    terminal.line(
-        console,
+            yield f"{word}: {VERDICT_TEXTS[word]}"
+    yield f"tolerance: {result.tolerance:g} of a probe's range (mean error over the run, worst probe)"
+    yield f"reference: {result.reference}; its error is at most {result.doubt:.2g}"
+    yield (
         "predicted limit: least step at which an eigenmode grows 1000 times within the run "
-        "(docs/course.md, equation 13)",
+        "(docs/course.md, equation 13)"
     )
     if result.lines:
-        terminal.line(
-            console,
+        yield (
             "or at which a wave between a delay line and a node that stores liquid grows 1000 times; growth caused by "
-            "jumps is not predicted",
+            "jumps is not predicted"
         )
     if result.limited:
-        terminal.line(
-            console,
+        yield (
             f"predicted limits of {', '.join(result.limited)}: estimates with the weights of the scheme in smooth "
-            "flow, not bounds",
+            "flow, not bounds"
         )
     for reason in {square.measures.reason: None for square in result.squares if square.verdict == "refused"}:
-        terminal.line(console, f"refused: {reason}")
-    for file in files:
-        terminal.line(console, str(file))
+        yield f"refused: {reason}"
+    yield from map(str, files)
 
 
 def _by_courant(result) -> bool:
@@ -192,8 +168,8 @@ def _by_courant(result) -> bool:
     return result.key == "step" and bool(result.wave_rate) and min(result.values) * result.wave_rate >= 0.01
 
 
-def _limit(result, row) -> str:
-    from fvsolve.draw.failure_map_picture import time_text
+def _limit_text(result, row) -> str:
+    from fvsolve.draw.stability_pictures import time_text
 
     limits = {square.limit for square in row}
     if len(limits) > 1:

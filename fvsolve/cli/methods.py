@@ -1,15 +1,12 @@
 """Output of `fvsolve methods`: table of all methods, or the tableau and properties of one method."""
 
-from __future__ import annotations
-
 import math
 import re
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
 
-from fvsolve.cli import terminal
-from fvsolve.cli.study_options import method_name
+from fvsolve.cli.app import method_name
+from fvsolve.cli.terminal import TextTable
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers import METHODS, Facts, Method, analyse, method_named
 from fvsolve.steppers.numbers.polynomial import Polynomial, sign
@@ -20,26 +17,18 @@ SHORT_DIGITS = 14  # digits printed of a longer entry
 MAX_COEFFICIENT = 40  # greatest length of a coefficient of R that is printed exactly, in characters
 
 
-@dataclass(frozen=True)
-class MethodOutput:
-    """Output of `fvsolve methods` in two forms.
-
-    plain : values for JSON; show : function that prints text
-    """
-
-    plain: dict
-    show: Callable[[], None]
-
-
-def table_output() -> MethodOutput:
-    """Table of all methods, explicit methods first."""
+def all_methods() -> tuple[dict, Iterator]:
+    """Table of all methods, explicit methods first : (values for JSON, text)."""
     all_facts = {name: analyse(method) for name, method in METHODS.items()}
-    return MethodOutput({name: facts.plain() for name, facts in all_facts.items()}, lambda: _table(all_facts))
+    return {name: facts.plain() for name, facts in all_facts.items()}, _table_text(all_facts)
 
 
-def method_output(name: str, out: Path | None) -> MethodOutput:
-    """Tableau, stability function R(s) and properties of a method; writes a picture of its stability region."""
-    from fvsolve.draw.region_picture import region_figure
+def single_method(name: str, out: Path | None) -> tuple[dict, Iterator]:
+    """Tableau, stability function R(s) and properties of a method : (values for JSON, text).
+
+    It writes a picture of the stability region to the file `out`, by default NAME.png.
+    """
+    from fvsolve.draw.stability_pictures import region_figure
 
     name = method_name(name)
     method = method_named(name)
@@ -50,48 +39,47 @@ def method_output(name: str, out: Path | None) -> MethodOutput:
     path.parent.mkdir(parents=True, exist_ok=True)
     region_figure(facts.stability_function, f"{method.name}: |R(hλ)| ≤ 1").savefig(path)
     array = {"a": method.a, "b": method.b, "c": method.c, "error": method.error, "start_error": method.start_error}
-    return MethodOutput(facts.plain() | array | {"picture": str(path)}, lambda: _show(method, facts, path))
+    return facts.plain() | array | {"picture": str(path)}, _method_text(method, facts, path)
 
 
-def _table(all_facts: dict[str, Facts]) -> None:
-    console = terminal.console()
+def _table_text(all_facts: dict[str, Facts]) -> Iterator:
     first = {name: facts for name, facts in all_facts.items() if name == facts.name}
     heads = ["method", "order", "error", "stage", "stages", "kind", "A", "L", "real", "imaginary", "SSP", "Padé"]
     rows = [
         [
             name, str(facts.order), str(facts.error_order) if facts.adaptive else "-", str(facts.stage_order),
             str(facts.stages), facts.kind, _yes(facts.a_stable), _yes(facts.l_stable), _length(facts.real_interval),
-            _length(facts.imaginary_interval), _length(facts.ssp_radius), _pade(facts),
+            _length(facts.imaginary_interval), _length(facts.ssp_radius),
+            f"({facts.pade[0]}, {facts.pade[1]})" if facts.pade else "-",
         ]
         for name, facts in first.items()
     ]  # fmt: skip
-    terminal.table(heads, rows, console)
-    terminal.line(console, "")
+    yield TextTable(heads, rows)
+    yield ""
     for name, facts in all_facts.items():
         if name != facts.name:
-            terminal.line(console, f"{name} is {facts.name}")
-    terminal.line(
-        console,
-        "error: order of the embedded solution; stage: stage order; A, L: A-stable, L-stable; real, imaginary:",
-    )
-    terminal.line(
-        console,
+            yield f"{name} is {facts.name}"
+    yield "error: order of the embedded solution; stage: stage order; A, L: A-stable, L-stable; real, imaginary:"
+    yield (
         "greatest stable |h lambda| on the axis; SSP: SSP radius, in Euler steps; "
-        "Padé: degrees of numerator and denominator of R",
+        "Padé: degrees of numerator and denominator of R"
     )
 
 
-def _show(method: Method, facts: Facts, path: Path) -> None:
-    console = terminal.console()
-    terminal.line(console, f"{method.name} ({method.source})", "bold")
-    terminal.line(console, "")
-    for text in [*_tableau_lines(method), *_entry_notes(method)]:
-        terminal.line(console, text)
-    terminal.line(console, "")
-    terminal.line(console, f"R(s) = {_quotient(facts)}")
-    for text in _sentences(facts):
-        terminal.line(console, text)
-    terminal.line(console, f"stability region: {path}")
+def _method_text(method: Method, facts: Facts, path: Path) -> Iterator:
+    yield f"{method.name} ({method.source})", "bold"
+    yield ""
+    yield from _tableau_lines(method)
+    for name, (polynomial, near) in method.numbers.items():
+        yield f"{name} = {near:.10g}, a root of {polynomial}"
+    if method.start_weight is not None:
+        yield f"embedded solution: f(t, y) has weight {method.start_weight}; other weights follow by quadrature"
+    yield ""
+    r = facts.stability_function
+    up, down = _polynomial(r.numerator), _polynomial(r.denominator)
+    yield f"R(s) = {up if r.denominator.degree == 0 else f'({up}) / ({down})'}"
+    yield from _sentences(facts)
+    yield f"stability region: {path}"
 
 
 def _sentences(facts: Facts) -> list[str]:
@@ -125,10 +113,7 @@ def _tableau_lines(method: Method) -> list[str]:
     rows, width = [], method.stages
     for text in method.text.strip().splitlines():
         left, bar, right = text.partition("|")
-        if bar:
-            rows.append([left.strip(), *right.split()])
-        else:
-            rows.append([])
+        rows.append([left.strip(), *right.split()] if bar else [])
     rows = [[_entry(x) for x in row] + [""] * (width + 1 - len(row)) if row else [] for row in rows]
     wide = [max(len(row[i]) for row in rows if row) for i in range(width + 1)]
     lines = []
@@ -138,27 +123,10 @@ def _tableau_lines(method: Method) -> list[str]:
     return lines
 
 
-def _entry_notes(method: Method) -> list[str]:
-    """Notes on the tableau of a method.
-
-    They give the values of its algebraic numbers, and the weight of f(t, y) in the embedded solution.
-    """
-    notes = [f"{name} = {near:.10g}, a root of {polynomial}" for name, (polynomial, near) in method.numbers.items()]
-    if method.start_weight is not None:
-        notes.append(f"embedded solution: f(t, y) has weight {method.start_weight}; other weights follow by quadrature")
-    return notes
-
-
 def _entry(text: str) -> str:
     if len(text) > MAX_ENTRY and re.fullmatch(r"-?[\d.]+", text):
         return text[: SHORT_DIGITS + 2] + "..."
     return text
-
-
-def _quotient(facts: Facts) -> str:
-    r = facts.stability_function
-    up, down = _polynomial(r.numerator), _polynomial(r.denominator)
-    return up if r.denominator.degree == 0 else f"({up}) / ({down})"
 
 
 def _polynomial(p: Polynomial) -> str:
@@ -187,7 +155,3 @@ def _yes(value: bool) -> str:
 
 def _length(value: float, digits: int = 6) -> str:
     return "infinite" if math.isinf(value) else f"{value:.{digits}g}"
-
-
-def _pade(facts: Facts) -> str:
-    return f"({facts.pade[0]}, {facts.pade[1]})" if facts.pade else "-"

@@ -1,13 +1,12 @@
 """Courant limits of a uniform periodic grid: output of `fvsolve stability` without a case."""
 
-from __future__ import annotations
-
 import math
+from collections.abc import Iterator
 from pathlib import Path
 
-from fvsolve.cli import terminal
-from fvsolve.cli.app import print_json
-from fvsolve.cli.study_options import comma_list, method_names, progress_line, writable_folder
+from fvsolve.cli import app as cli
+from fvsolve.cli.progress import progress_line
+from fvsolve.cli.terminal import TextTable
 from fvsolve.step_limits.advection_limit import AdvectionLimit, advection_limits
 from fvsolve.step_limits.symbol import WEIGHTS
 from fvsolve.studies.result_table import Column, ResultTable, cell_text
@@ -38,10 +37,10 @@ LEGEND = "l: the longest waves set the limit, s: the shortest (two cells), b: a 
 
 
 def without_case(
-    scheme: str | None, method: str | None, cells: int | None, steps: int | None, as_json: bool, out: Path | None,
+    scheme: str | None, method: str | None, cells: int | None, steps: int | None, out: Path | None,
     courant: float | None = None,
-) -> None:  # fmt: skip
-    """Print Courant limits of schemes and methods on a periodic grid, as text or as JSON.
+) -> tuple[dict, Iterator]:  # fmt: skip
+    """Courant limits of schemes and methods on a periodic grid : (values for JSON, text).
 
     scheme, method : names separated by commas, or None for all linear schemes and all methods
     cells, steps : cells of the grid and steps of a run. If one of them is given, limits of explicit methods are also
@@ -49,29 +48,35 @@ def without_case(
     courant : Courant number at which the growth of waves is printed; out : folder for CSV files, or None
     Raises FvsolveError for unknown names.
     """
-    named, methods = comma_list(scheme, "--scheme") or None, method_names(method) or None
+    named, methods = cli.comma_list(scheme, "--scheme") or None, cli.method_names(method) or None
     linear = None if named is None else [name for name in named if name not in LIMITED]
     runs, limited = _measure(named, linear, methods, cells, steps)
     limits = advection_limits(linear, methods, courant) if linear is None or linear else []
     if out is not None:
-        writable_folder(out)
+        cli.writable_folder(out)
         for name, rows in (("limits", [entry.plain() for entry in limits]),
                            ("measured", [entry.plain() for entry in runs]),
                            ("limited", [entry.flat() for entry in limited])):  # fmt: skip
             if rows:
                 ResultTable([Column(key) for key in rows[0]], rows).write(out / f"{name}.csv")
-    if as_json:
-        print_json({"limits": limits, "measured": runs, "limited": limited})
-        return
-    if len(limits) <= SHOWN_ROWS:
-        for entry in limits:
-            _show(entry)
-    else:
-        _table(limits)
+    return {"limits": limits, "measured": runs, "limited": limited}, _limits_text(limits, runs, limited)
+
+
+def _limits_text(limits: list[AdvectionLimit], runs: list[MeasuredLimit], limited: list[LimitedLimit]) -> Iterator:
+    """Courant limits in sentences or as a table, then limits measured in runs of linear and of limited schemes."""
+    if len(limits) > SHOWN_ROWS:
+        yield from _limit_table(limits)
+    for limit in limits if len(limits) <= SHOWN_ROWS else ():
+        yield f"{limit.scheme} with {limit.method}: {_limit_in_words(limit)}", "bold"
+        yield from (f"  {words}" for words in _sentences(limit))
     if runs:
-        _table_of_runs(runs)
+        first = runs[0]
+        yield ""
+        head = f"Least Courant number that fails on a periodic grid of {first.cells} cells"
+        yield f"{head}: a wave grows {THRESHOLD:g}-fold in {first.steps} steps", "bold"
+        yield ResultTable(RUNS, [run.plain() for run in runs])
     for entry in limited:
-        _show_limited(entry)
+        yield from _limited_text(entry)
 
 
 def _measure(named, linear, methods, cells: int | None, steps: int | None) -> tuple[list, list]:
@@ -89,38 +94,20 @@ def _measure(named, linear, methods, cells: int | None, steps: int | None) -> tu
     return runs, limits
 
 
-def _table_of_runs(runs: list[MeasuredLimit]) -> None:
-    console, first = terminal.console(), runs[0]
-    terminal.line(console, "")
-    head = f"Least Courant number that fails on a periodic grid of {first.cells} cells: a wave grows {THRESHOLD:g}-fold"
-    terminal.line(console, f"{head} in {first.steps} steps", "bold")
-    terminal.print_sheet(ResultTable(RUNS, [run.plain() for run in runs]), console)
-
-
-def _show_limited(limited: LimitedLimit) -> None:
-    """Print the limits of one limited scheme with one method, with frozen weights and from runs."""
-    console, name = terminal.console(), f"{limited.scheme} ({limited.limiter})" if limited.limiter else limited.scheme
-    terminal.line(console, f"{name} with {limited.method}: {LIMIT_EXPLANATIONS[limited.sharp]}", "bold")
+def _limited_text(limited: LimitedLimit) -> Iterator:
+    """Limits of one limited scheme with one method, with frozen weights and from runs."""
+    name = f"{limited.scheme} ({limited.limiter})" if limited.limiter else limited.scheme
+    yield f"{name} with {limited.method}: {LIMIT_EXPLANATIONS[limited.sharp]}", "bold"
     frozen = ", ".join(f"{branch} {_limit(limit.limit)}" for branch, limit in limited.frozen.items())
-    terminal.line(console, f"  limits if the weights of the scheme are held constant: {frozen}")
+    yield f"  limits if the weights of the scheme are held constant: {frozen}"
     if limited.monotone is not None:
-        terminal.line(console, f"  up to Courant number {limited.monotone:.6g} the total variation cannot grow")
-    terminal.line(
-        console, f"  least Courant number that failed on {limited.cells} cells, in runs of the limited scheme:"
-    )
+        yield f"  up to Courant number {limited.monotone:.6g} the total variation cannot grow"
+    yield f"  least Courant number that failed on {limited.cells} cells, in runs of the limited scheme:"
     rows = [
         [f"  {n}", *(cell_text(row[i], ".3g") for row in limited.measured.values())]
         for i, n in enumerate(limited.steps)
     ]
-    terminal.table(["  steps", *limited.measured], rows, console)
-
-
-def _show(limit: AdvectionLimit) -> None:
-    """Print the Courant limit of one scheme with one method in sentences."""
-    console = terminal.console()
-    terminal.line(console, f"{limit.scheme} with {limit.method}: {_limit_in_words(limit)}", "bold")
-    for words in _sentences(limit):
-        terminal.line(console, f"  {words}")
+    yield TextTable(["  steps", *limited.measured], rows)
 
 
 def _limit(x: float) -> str:
@@ -165,12 +152,12 @@ def _growth(growth: float) -> str:
     return f"1 + {growth:.3e}" if growth < 1e-3 else f"{1 + growth:.6g}"
 
 
-def _table(limits: list[AdvectionLimit]) -> None:
-    """Print a table of Courant limits with a row for each method and a column for each scheme.
+def _limit_table(limits: list[AdvectionLimit]) -> Iterator:
+    """Table of Courant limits with a row for each method and a column for each scheme.
 
     Methods that are stable at every Courant number with all schemes share one line below the table.
     """
-    console, rows, free = terminal.console(), {}, []
+    rows, free = {}, []
     for limit in limits:
         rows.setdefault(limit.method, {})[limit.scheme] = limit
     schemes = [name for name in WEIGHTS if any(name in row for row in rows.values())]
@@ -180,18 +167,16 @@ def _table(limits: list[AdvectionLimit]) -> None:
             free.append(name)
         else:
             shown.append([name, *(_cell(row[scheme]) for scheme in schemes)])
-    terminal.line(console, "Courant limits of linear advection on a uniform periodic grid (von Neumann)", "bold")
-    terminal.table(["method", *schemes], shown, console)
-    terminal.line(console, LEGEND)
-    terminal.line(
-        console,
-        "none: a wave grows at every step, however small; every: stable at every step; +: stable again at larger steps",
-    )
+    yield "Courant limits of linear advection on a uniform periodic grid (von Neumann)", "bold"
+    yield TextTable(["method", *schemes], shown)
+    yield LEGEND
+    small = "none: a wave grows at every step, however small"
+    yield f"{small}; every: stable at every step; +: stable again at larger steps"
     if free:
-        terminal.line(console, f"stable at every Courant number with all these schemes: {', '.join(free)}")
+        yield f"stable at every Courant number with all these schemes: {', '.join(free)}"
     unproved = [f"{limit.scheme} with {limit.method}" for limit in limits if not limit.proved]
     if unproved:
-        terminal.line(console, f"not proved between sampled waves: {', '.join(unproved)}")
+        yield f"not proved between sampled waves: {', '.join(unproved)}"
 
 
 def _cell(limit: AdvectionLimit) -> str:

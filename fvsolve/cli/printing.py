@@ -1,14 +1,17 @@
-"""Terminal output of runs, checks of cases, and differences of runs."""
+"""Lines and tables about runs, checks of cases, and differences of runs, for `terminal.show`.
 
-from __future__ import annotations
+`summary` is the summary of a run. `parts` maps names of parts to their values by key [SI]; `keys` maps the keys of
+columns to (title, dimension).
+"""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
-from fvsolve.cli.terminal import console as _console
-from fvsolve.cli.terminal import line as _line
-from fvsolve.cli.terminal import table as _table
+from fvsolve.case.resource_checks import byte_text, disk_size
+from fvsolve.cli.terminal import TextTable
 from fvsolve.errors import listing
 from fvsolve.output.directory import existing_pictures
+from fvsolve.output.unit_columns import UnitColumn, column
+from fvsolve.run.result import IN_WORDS, OPEN, LimitVerdict, not_valid
 from fvsolve.units import span
 
 ROWS = 20  # greatest number of rows of a table of probes; summary.json has all
@@ -37,59 +40,73 @@ PIPE = {
 }
 
 BASIN = {
-    "physics": ("physics", ""), "cells": ("cells", ""), "path": ("kernels over", ""), "area": ("area", "area"),
-    "depth": ("depth", "level"), "wave_speed": ("wave speed", "velocity"), "memory": ("memory [B]", ""),
+    "physics": ("physics", "number"), "cells": ("cells", "number"), "path": ("kernels over", "number"),
+    "area": ("area", "area"), "depth": ("depth", "level"), "wave_speed": ("wave speed", "velocity"),
+    "memory": ("memory [B]", "number"),
 }  # fmt: skip
 PATCH = {
-    "faces": ("faces", ""), "length": ("length", "length"), "area": ("cells behind", "area"),
-    "reflects": ("waves reflected", ""),
+    "faces": ("faces", "number"), "length": ("length", "length"), "area": ("cells behind", "area"),
+    "reflects": ("waves reflected", "number"),
 }  # fmt: skip
+LONG_RUN, LARGE_FILES = 180.0, 1e9  # [s], [B] above which the cost of a run is estimated before it starts
+DURATIONS = ((86400.0 * 365.25, "years"), (86400.0, "days"), (3600.0, "hours"), (60.0, "minutes"))
 PLACES_SHOWN = 3
 EVENTS_SHOWN = 12
 REASONS_SHOWN = 10  # summary.json has all
 
 
-def print_result(run) -> None:
-    """Print the results of a run: extremes, marks, cavities, events, ledgers, verdicts, comparisons, notices and steps.
+def cost_estimate(model) -> str:
+    """Text on the expected duration and file sizes of a run; "" if both are small."""
+    seconds, bytes_ = model.checks["expected_seconds"] or 0.0, disk_size(model.case)
+    parts = [duration(seconds)] if seconds > LONG_RUN else []
+    parts += [f"{byte_text(bytes_)} on disk"] if bytes_ > LARGE_FILES else []
+    return f"{model.case.name} will take about {' and '.join(parts)}" if parts else ""
+
+
+def duration(seconds: float) -> str:
+    """Text of a duration in a suitable unit, such as "2.5 hours"."""
+    length, name = next((unit for unit in DURATIONS if seconds >= 2.0 * unit[0]), (1.0, "s"))
+    return f"{seconds / length:.2g} {name}"
+
+
+def result_text(run) -> Iterator:
+    """Results of a run: extremes, marks, cavities, events, ledgers, verdicts, comparisons, notices and steps.
 
     Verdicts are those on expectations and limits. At most ROWS probes, EVENTS_SHOWN events and REASONS_SHOWN reasons of
-    errors are printed. All notices of wrong results are printed, but of many other notices only the first EVENTS_SHOWN.
+    errors are listed. All notices of wrong results are listed, but of many other notices only the first EVENTS_SHOWN.
     """
     summary, time_text = run.summary, time_formatter(run.summary)
-    console = _console()
     if summary["title"]:
-        _line(console, summary["title"], "bold")
-    _print_extremes(console, run)
+        yield summary["title"], "bold"
+    yield from _extremes(run)
     for text in mark_lines(summary["marks"], time_text):
-        _line(console, text, "yellow")
+        yield text, "yellow"
     for cavity in summary["cavities"]:
-        _line(console, cavity["text"])
+        yield cavity["text"]
     for event in summary["events"][:EVENTS_SHOWN]:
-        _line(console, f"{event['name']} {event['what']} at t = {time_text(event['time'])}")
+        yield f"{event['name']} {event['what']} at t = {time_text(event['time'])}"
     if len(summary["events"]) > EVENTS_SHOWN:
         more = len(summary["events"]) - EVENTS_SHOWN
-        _line(console, f"and {more} more event{'s' if more > 1 else ''}; summary.json has all")
+        yield f"and {more} more event{'s' if more > 1 else ''}; summary.json has all"
     for name, ledger in summary["ledgers"].items():
-        _line(console, f"{name} ledger: {_ledger_text(ledger)}")
+        yield f"{name} ledger: {_ledger_text(ledger)}"
     for claim in summary["expectations"]:
-        _line(console, _expectation_text(claim, summary), "green" if claim["ok"] else "bold red")
+        yield _expectation_text(claim, summary), "green" if claim["ok"] else "bold red"
     for verdict in summary["verdicts"]:
-        _line(console, _limit_text(verdict, summary), "green" if verdict["ok"] else "bold red")
+        yield _limit_text(verdict, summary), "green" if verdict["ok"] else "bold red"
     for measured in summary["comparisons"]:
-        _line(console, _comparison_text(measured, summary))
-    _print_notices(console, summary["warnings"])
+        yield _comparison_text(measured, summary)
+    yield from _notices(summary["warnings"])
     if "resolution" in summary:
-        _line(console, summary["resolution"]["words"])
+        yield summary["resolution"]["words"]
         for text in summary["resolution"]["reasons"][:REASONS_SHOWN]:
-            _line(console, f"error of {text}", "yellow")
+            yield f"error of {text}", "yellow"
     end = "" if "at t = " in summary["reason"] else f" at t = {time_text(summary['t'])}"
-    _line(console, f"{summary['reason']}{end}; {_cost_text(summary)}", None if run.ok else "bold red")
+    yield f"{summary['reason']}{end}; {_cost_text(summary)}", None if run.ok else "bold red"
 
 
 def time_column(summary: dict):
     """Column of times in the time unit of a run, from its summary."""
-    from fvsolve.output.unit_columns import UnitColumn
-
     return UnitColumn("t", "time", summary["time_unit"])
 
 
@@ -99,12 +116,12 @@ def time_formatter(summary: dict) -> Callable[[float], str]:
     return lambda t: f"{_number(float(clock.from_si(t)))} {clock.unit}"
 
 
-def print_files(run) -> None:
-    """Print the files in the run directory, and how to resume an interrupted run."""
+def files_text(run) -> Iterator:
+    """Files in the run directory, and how to resume an interrupted run."""
     names = sorted([*run.summary["files"], *existing_pictures(run.directory)])
-    _line(_console(), f"{run.directory}: {', '.join(names)}")
+    yield f"{run.directory}: {', '.join(names)}"
     if run.reason.startswith("interrupted"):
-        _line(_console(), "to resume, use the same command with --resume")
+        yield "to resume, use the same command with --resume"
 
 
 def exit_code(run) -> int:
@@ -114,30 +131,24 @@ def exit_code(run) -> int:
     return 0 if run.ok and all(claim.ok for claim in [*run.expectations, *run.verdicts]) else 1
 
 
-def print_checks(case, facts: dict, every: bool = False) -> None:
-    """Print fluid, parts and basins at the start, moving parts, notices, the step and its cost.
+def check_text(case, facts: dict, every: bool = False) -> Iterator:
+    """Contents of a case: fluid, parts and basins at the start, moving parts, notices, the step and its cost.
 
     facts : contents of the case, as `Model.checks`, with the result of `divisible_rows` as "threads"
     every : True for all rows, otherwise only notable rows of long tables
     """
-    console = _console()
-    _line(console, case.title or case.name, "bold")
-    _line(console, _fluid_text(case, facts["fluid"]))
+    yield case.title or case.name, "bold"
+    yield _fluid_text(case, facts["fluid"])
     odd = {part["place"] for part in facts["warnings"]}
-    for group, word, keys in (
-        ("nodes", "node", NODE),
-        ("masses", "mass", MASS),
-        ("bodies", "body", BODY),
-        ("pipes", "pipe", PIPE),
-    ):
+    groups = ("nodes", "node", NODE), ("masses", "mass", MASS), ("bodies", "body", BODY), ("pipes", "pipe", PIPE)
+    for group, word, keys in groups:
         place = "links" if group == "pipes" else "nodes"
-        _print_states(
-            console, case, word, facts[group], keys, every, {name for name in facts[group] if f"{place}.{name}" in odd}
-        )
+        noticed = {name for name in facts[group] if f"{place}.{name}" in odd}
+        yield from _parts_table(case, word, facts[group], keys, every, noticed)
     basins = facts["basins"]
-    _print_rows(console, case, "basin", basins, BASIN)
+    yield from _parts_table(case, "basin", basins, BASIN)
     patches = {f"{name}.{patch}": faces for name, part in basins.items() for patch, faces in part["patches"].items()}
-    _print_rows(console, case, "patch", patches, PATCH)
+    yield from _parts_table(case, "patch", patches, PATCH)
     notes = [f"unsteady friction of {name}: {_unsteady_friction_text(part['unsteady'])}"
             for name, part in facts["pipes"].items() if "unsteady" in part]  # fmt: skip
     notes += _wall_lines(case, facts["pipes"])
@@ -146,36 +157,34 @@ def print_checks(case, facts: dict, every: bool = False) -> None:
              for name, part in lines.items()]  # fmt: skip
     if lines:
         notes += [f"{name} has cells: {part['line_why']}" for name, part in facts["pipes"].items() if name not in lines]
-    _print_first(console, notes, every)
-    _print_first(console, [f"moves from the start: {text}" for text in facts["moving"]], every)
-    _print_notices(console, facts["warnings"], every)
+    yield from _first(notes, every)
+    yield from _first([f"moves from the start: {text}" for text in facts["moving"]], every)
+    yield from _notices(facts["warnings"], every)
     if facts["basins"]:
-        _line(console, _thread_text(facts["threads"]))
-    _line(console, _step_text(case, facts))
+        yield _thread_text(facts["threads"])
+    yield _step_text(case, facts)
 
 
-def _print_rows(console, case, word: str, parts: dict, keys: dict) -> None:
-    """Print a table of basins or patches in the units of `[output]`, if there are any.
+def _parts_table(case, word: str, parts: dict, keys: dict, every: bool = True, odd: set[str] = frozenset()) -> Iterator:
+    """Table of parts in the units of `[output]`, if there are any; of a long table only notable rows.
 
-    word : header of the column of names; parts : name -> key -> value [SI]
-    keys : key of a column -> (its title, its dimension or "")
+    word : header of the column of names; every : True for all rows; odd : names of parts with notices
     """
-    from fvsolve.output.unit_columns import column
-
-    columns = [column(title, dimension, case) if dimension else None for title, dimension in keys.values()]
-    heads = [title if part is None else part.header for (title, _), part in zip(keys.values(), columns, strict=True)]
-    rows = [[name, *(_number(part.get(key) if unit is None else _in_unit(unit, part.get(key)))
-                     for key, unit in zip(keys, columns, strict=True))] for name, part in parts.items()]  # fmt: skip
-    if rows:
-        _table([word, *heads], rows, console)
-        _line(console, "")
+    if not parts:
+        return
+    columns = [column(title, dimension, case) for title, dimension in keys.values()]
+    names = list(parts) if every or len(parts) <= MANY_ROWS else _notable_rows(parts, keys, odd)
+    rows = [[name, *(_number(_in_unit(unit, parts[name].get(key))) for key, unit in zip(keys, columns, strict=True))]
+            for name in names]  # fmt: skip
+    yield TextTable([word, *(unit.name if unit.dimension == "number" else unit.header for unit in columns)], rows)
+    if len(names) < len(parts):
+        yield (f"... {len(parts) - len(names)} more of {len(parts)}; the table has only parts with the least "
+               "or greatest value of a column or with a notice, --all prints all")  # fmt: skip
+    yield ""
 
 
 def _wall_lines(case, pipes: dict) -> list[str]:
-    """Lines on pipe walls and the sources of their data; pipes with the same text share a line.
-
-    pipes : name -> values, as in `Model.checks`
-    """
+    """Lines on pipe walls and the sources of their data; pipes with the same text share a line."""
     alike: dict[str, list[str]] = {}
     for name, pipe in pipes.items():
         if text := _wall_text(case, pipe):
@@ -184,8 +193,6 @@ def _wall_lines(case, pipes: dict) -> list[str]:
 
 
 def _wall_text(case, pipe: dict) -> str:
-    from fvsolve.output.unit_columns import column
-
     texts = []
     if "allowable_pressure" in pipe:
         unit = column("allowable", "gauge_pressure", case)
@@ -216,31 +223,10 @@ def _thread_text(facts: dict) -> str:
     return f"threads: up to {facts['most']} share {rows}{whole}"
 
 
-def _print_states(console, case, word: str, parts: dict, keys: dict, every: bool, odd: set[str]) -> None:
-    """Print a table of parts at the start in the units of `[output]`; of a long table only notable rows.
-
-    every : True for all rows; odd : names of parts with notices, which are notable
-    Other arguments as for `_print_rows`.
-    """
-    from fvsolve.output.unit_columns import column
-
-    if not parts:
-        return
-    columns = [column(title, dimension, case) for title, dimension in keys.values()]
-    names = list(parts) if every or len(parts) <= MANY_ROWS else _notable_rows(parts, keys, odd)
-    rows = [[name, *(_number(_in_unit(unit, parts[name][key])) for key, unit in zip(keys, columns, strict=True))]
-            for name in names]  # fmt: skip
-    _table([word, *(unit.name if unit.dimension == "number" else unit.header for unit in columns)], rows, console)
-    if len(names) < len(parts):
-        _line(console, f"... {len(parts) - len(names)} more of {len(parts)}; the table has only parts with the least "
-                       "or greatest value of a column or with a notice, --all prints all")  # fmt: skip
-    _line(console, "")
-
-
 def _notable_rows(parts: dict, keys: dict, odd: set[str]) -> list[str]:
     """Names of parts with the least or greatest value of a column, and of parts in `odd`, in the original order.
 
-    parts, keys : as for `_print_rows`; odd : names of parts with notices, of which at most MANY_ROWS are included
+    odd : names of parts with notices, of which at most MANY_ROWS are included
     """
     chosen = set(sorted(odd)[:MANY_ROWS])
     for key in keys:
@@ -252,17 +238,13 @@ def _notable_rows(parts: dict, keys: dict, odd: set[str]) -> list[str]:
 
 def _fluid_text(case, fluid: dict) -> str:
     """Text on the fluid in the units of `[output]`; the bulk modulus has the unit of pressure differences."""
-    from fvsolve.output.unit_columns import column
-
     texts = []
     for key, dimension in FLUID.items():
         unit = column(key, dimension, case)
         if dimension == "modulus":
             unit = column(key, dimension, case, span(unit.unit))
-        texts.append(
-            f"{key.replace('_', ' ')} {'unknown' if fluid[key] is None else _number(_in_unit(unit, fluid[key]))}"
-            f"{'' if fluid[key] is None else ' ' + unit.unit}"
-        )
+        value = "unknown" if fluid[key] is None else f"{_number(_in_unit(unit, fluid[key]))} {unit.unit}"
+        texts.append(f"{key.replace('_', ' ')} {value}")
     name = "" if fluid["name"] == fluid["source"] else f" ({fluid['source']})"
     return f"fluid {fluid['name']}{name}: {', '.join(texts)}"
 
@@ -274,24 +256,23 @@ def _in_unit(column, value):
     return value if value is None or column.plain else float(column.from_si(value))
 
 
-def _print_first(console, lines: list[str], every: bool) -> None:
-    """Print lines; every : True for all lines, False for only the first EVENTS_SHOWN of many lines."""
+def _first(lines: list[str], every: bool) -> Iterator:
+    """Lines, and a note on omitted lines; every : True for all lines, False for only the first of many lines."""
     count = len(lines) if every or len(lines) <= EVENTS_SHOWN + 2 else EVENTS_SHOWN
-    for text in lines[:count]:
-        _line(console, text)
+    yield from lines[:count]
     if len(lines) > count:
-        _line(console, f"... {len(lines) - count} more of this kind")
+        yield f"... {len(lines) - count} more of this kind"
 
 
-def _print_notices(console, warnings: list[dict], every: bool = False) -> None:
-    """Print all notices of wrong results in bold red, then the other notices.
+def _notices(warnings: list[dict], every: bool = False) -> Iterator:
+    """All notices of wrong results in bold red, then the other notices.
 
-    every : True for all other notices, False for only the first of them, as for `_print_first`
+    every : True for all other notices, False for only the first of them, as for `_first`
     """
     for notice in warnings:
         if not notice["ok"]:
-            _line(console, f"note: {notice['text']}", "bold red")
-    _print_first(console, [f"note: {notice['text']}" for notice in warnings if notice["ok"]], every)
+            yield f"note: {notice['text']}", "bold red"
+    yield from _first([f"note: {notice['text']}" for notice in warnings if notice["ok"]], every)
 
 
 def _unsteady_friction_text(terms: dict) -> str:
@@ -299,30 +280,22 @@ def _unsteady_friction_text(terms: dict) -> str:
             f"{terms['frequency']:.3g} Hz")  # fmt: skip
 
 
-def print_titles(cases: dict[str, str]) -> None:
-    """Print names and titles of the shipped cases."""
-    _table(["case", "title"], [[name, title] for name, title in cases.items()])
+def difference_text(results: dict, summary: dict) -> Iterator:
+    """Differences of two runs for each common probe, and the probes that only one of the runs has.
 
-
-def print_differences(results: dict, summary: dict) -> None:
-    """Print the differences of two runs for each common probe, and the probes that only one of the runs has.
-
-    results : as from `differences` in `run.comparison`; summary : of the first run, whose time unit is used
+    results : as from `differences` in `run.case_claims`; summary : of the first run, whose time unit is used
     """
     clock, rows = time_column(summary), []
     for name, probe in results["probes"].items():
         time = None if probe["t_greatest"] is None else clock.from_si(probe["t_greatest"])
         rows.append([name, span(probe["unit"]), *map(_number, (probe["greatest"], time, probe["rms"]))])
-    _table(["probe", "unit", "greatest difference", f"at [{clock.unit}]", "rms"], rows)
+    yield TextTable(["probe", "unit", "greatest difference", f"at [{clock.unit}]", "rms"], rows)
     for key in ("only_a", "only_b"):
         if results[key]:
-            _line(_console(), f"only in {results[key[-1]]}: {', '.join(results[key])}")
+            yield f"only in {results[key[-1]]}: {', '.join(results[key])}"
 
 
-def _print_extremes(console, run) -> None:
-    from fvsolve.output.unit_columns import UnitColumn
-    from fvsolve.run.result import not_valid
-
+def _extremes(run) -> Iterator:
     clock = UnitColumn("at", "time", run.summary["time_unit"])
     missing = not_valid(run.summary) or "-"
     rows = [[name, run.units[name], missing if extreme.minimum is None else _number(extreme.minimum),
@@ -335,10 +308,10 @@ def _print_extremes(console, run) -> None:
             row[3:3] = [_error_text(peak["minimum"])]
             row[6:6] = [_error_text(peak["maximum"])]
     if rows:
-        _table(heads, rows[:ROWS], console)
+        yield TextTable(heads, rows[:ROWS])
     if len(rows) > ROWS:
         where = f"in {run.directory / 'summary.json'}" if run.directory else "in Result.extremes"
-        _line(console, f"... {len(rows) - ROWS} more {where}")
+        yield f"... {len(rows) - ROWS} more {where}"
 
 
 def _step_text(case, facts: dict) -> str:
@@ -356,8 +329,6 @@ def _ledger_text(ledger: dict) -> str:
 
 
 def _expectation_text(claim: dict, summary: dict) -> str:
-    from fvsolve.run.result import IN_WORDS, OPEN
-
     reason = "" if claim["state"] != OPEN else undecided_reason(summary) or "its value is not known"
     verdict = f"OPEN, because {reason}" if reason else IN_WORDS[claim["state"]]
     return (
@@ -373,26 +344,15 @@ def _error_text(peak: dict) -> str:
 
 
 def where_and_when(verdict: dict, summary: dict) -> str:
-    """Text of the place, chainage and time at which the margin of a limit is least, in the units of a run.
-
-    verdict : verdict on the limit; summary : summary of the run
-    """
-    from fvsolve.output.unit_columns import UnitColumn
-
+    """Text of the place, chainage and time at which the margin of a limit is least, in the units of a run."""
     along = UnitColumn("chainage", "length", summary["envelope_units"]["distance"])
-    chainage = (
-        "" if verdict["chainage"] is None else f" at {_number(_in_unit(along, verdict['chainage']))} {along.unit}"
-    )
-    return (
-        verdict["place"]
-        + chainage
-        + ("" if verdict["time"] is None else f", {time_formatter(summary)(verdict['time'])}")
-    )
+    text = verdict["place"]
+    if verdict["chainage"] is not None:
+        text += f" at {_number(_in_unit(along, verdict['chainage']))} {along.unit}"
+    return text if verdict["time"] is None else f"{text}, {time_formatter(summary)(verdict['time'])}"
 
 
 def _limit_text(verdict: dict, summary: dict) -> str:
-    from fvsolve.run.result import IN_WORDS, OPEN, LimitVerdict, not_valid
-
     this = LimitVerdict(**verdict)
     relation = "at least" if verdict["bound"] == "minimum" else "at most"
     value_text = (
@@ -400,11 +360,9 @@ def _limit_text(verdict: dict, summary: dict) -> str:
         f"({where_and_when(verdict, summary)})"
     )
     state = IN_WORDS[this.state] if this.state != OPEN else f"OPEN, because {undecided_limit_reason(this, summary)}"
-    margin = (
-        not_valid(summary) or "-"
-        if verdict["margin"] is None
-        else f"{_number(verdict['margin'])} {span(verdict['unit'])}"
-    )
+    margin = not_valid(summary) or "-"
+    if verdict["margin"] is not None:
+        margin = f"{_number(verdict['margin'])} {span(verdict['unit'])}"
     text = f"{state}: {verdict['name']}: {value_text}, {relation} {_number(verdict['limit'])}; margin {margin}"
     if verdict["error"] is not None and verdict["margin"] is not None:
         text += f" within {verdict['error']:.2g}"
@@ -414,7 +372,7 @@ def _limit_text(verdict: dict, summary: dict) -> str:
 
 
 def undecided_limit_reason(verdict, summary: dict) -> str:
-    """Reason why a limit is undecided (state OPEN). verdict : `LimitVerdict`; summary : summary of the run"""
+    """Reason why a limit is undecided (state OPEN). verdict : `LimitVerdict`"""
     if verdict.doubtful:
         return "its margin is smaller than its error"
     return undecided_reason(summary) or f"its {'value' if verdict.margin is None else 'error'} is not known"
@@ -439,9 +397,7 @@ def mark_lines(marks: list[dict], time_text) -> list[str]:
 
 
 def undecided_reason(summary: dict) -> str:
-    """Reason why a run cannot confirm a limit that it does not exceed; "" if it can. summary : summary of the run"""
-    from fvsolve.run.result import not_valid
-
+    """Reason why a run cannot confirm a limit that it does not exceed; "" if it can."""
     late = [notice["text"] for notice in summary["warnings"] if notice["kind"] == "end"]
     if text := not_valid(summary):
         return f"the run is {text}"
@@ -468,14 +424,11 @@ def _cost_text(summary: dict) -> str:
     rejected = f", {summary['rejections']} rejected" if summary["rejections"] else ""
     cells = f", {summary['cells']} cells" if summary["cells"] else ""
     cost = f" ({_number(summary['cost'])} ns per cell and step)" if summary["cells"] and summary["cost"] else ""
-    newton = (
-        f", {summary['jacobians']} Jacobians, {summary['factorisations']} factorisations"
-        if summary["jacobians"]
-        else ""
-    )
-    newton += (
-        f", {summary['newton']} Newton iterations, {summary['newton_failures']} failed" if summary["newton"] else ""
-    )
+    newton = ""
+    if summary["jacobians"]:
+        newton += f", {summary['jacobians']} Jacobians, {summary['factorisations']} factorisations"
+    if summary["newton"]:
+        newton += f", {summary['newton']} Newton iterations, {summary['newton_failures']} failed"
     return f"{summary['steps']} steps{rejected}{newton}{cells}, {summary['seconds']:.3g} s{cost}"
 
 

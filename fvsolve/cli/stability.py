@@ -1,20 +1,20 @@
-"""`fvsolve stability`: greatest stable step, predicted and measured, and bounds on it."""
+"""`fvsolve stability`: greatest stable step of a case, predicted and measured, and bounds on it."""
 
-from __future__ import annotations
-
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-import typer
+from typer import Argument, Option
 
-from fvsolve.cli.app import Json, Set, app, load_case, print_json
-from fvsolve.cli.linearise import AtTime, BeforeJump, time_of
-from fvsolve.cli.study_options import Dask, Jobs, clear_files, comma_list, folder_of, method_names, progress_line
+from fvsolve.cli import app as cli
+from fvsolve.cli.progress import progress_line
+from fvsolve.cli.terminal import present
+from fvsolve.errors import FvsolveError
 from fvsolve.studies.result_table import Column, ResultTable, columns
 
 PICTURES = 12  # greatest number of pairs of scheme and method for which pictures are drawn
-FILE = columns(
+STABILITY_FILE = columns(
     scheme="scheme", method="method", steps="steps", threshold="threshold", states="states",
     predicted="predicted [s]", predicted_courant="predicted Courant", after="after steps",
     measured="measured [s]", measured_courant="measured Courant", difference="difference",
@@ -23,98 +23,80 @@ FILE = columns(
 )  # fmt: skip
 
 
-@app.command()
+@cli.app.command()
 def stability(
     case: Annotated[
         str | None,
-        typer.Argument(metavar="CASE", help="case file or shipped case (default none: advection on a periodic grid)"),
+        Argument(metavar="CASE", help="case file or shipped case (default none: advection on a periodic grid)"),
     ] = None,
     scheme: Annotated[
         str | None,
-        typer.Option(
+        Option(
             metavar="A,B", help="schemes to study (default scheme of the case, or without a case all linear schemes)"
         ),
     ] = None,
     method: Annotated[
         str | None,
-        typer.Option(
-            metavar="A,B", help="methods to study (default method of the case, or without a case all methods)"
-        ),
+        Option(metavar="A,B", help="methods to study (default method of the case, or without a case all methods)"),
     ] = None,
     steps: Annotated[
         int | None,
-        typer.Option(
+        Option(
             help="number of steps over which growth is measured; without a case it adds measured limits of linear "
             "schemes (default 1000)"
         ),
     ] = None,
     cells: Annotated[
         int | None,
-        typer.Option(
+        Option(
             help="number of cells of the periodic grid on which growth is measured, only without a case (default 100)"
         ),
     ] = None,
     courant: Annotated[
         float | None,
-        typer.Option(
+        Option(
             help="Courant number at which growth is computed, only without a case (default 1 % above the stability "
             "limit, or 0.5 if the limit is 0)"
         ),
     ] = None,
-    at: AtTime = None,
-    before: BeforeJump = False,
-    jobs: Jobs = 1,
-    dask: Dask = None,
+    at: cli.AtTime = None,
+    before: cli.BeforeJump = False,
+    jobs: cli.Jobs = 1,
+    dask: cli.Dask = None,
     out: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             metavar="DIR",
             help="folder of tables and pictures (default runs/NAME.stability, or no files without a case)",
         ),
     ] = None,
-    set: Set = [],  # noqa: B006
-    as_json: Json = False,
+    set: cli.Set = [],  # noqa: B006
+    as_json: cli.Json = False,
 ) -> None:
     """Compute the greatest stable step of a case, predicted and measured, and bounds on it."""
-    of_a_case = {
-        "--set": set,
-        "--at": at,
-        "--left-limit": before,
-        "--jobs": jobs if jobs != 1 else None,
-        "--dask": dask,
-    }
+    of_a_case = {"--set": set, "--at": at, "--left-limit": before, "--jobs": None if jobs == 1 else jobs}
+    of_a_case |= {"--dask": dask}
     refuse_options(case, of_a_case, {"--cells": cells, "--courant": courant})
     if case is None:
         from fvsolve.cli.periodic_grid import without_case
 
-        without_case(scheme, method, cells, steps, as_json, out, courant)
-        return
+        return present(as_json, *without_case(scheme, method, cells, steps, out, courant))
     from fvsolve.studies.stability.growth import STEPS
     from fvsolve.studies.stability.stability import stability as ask
 
-    loaded = load_case(case, set, scheme, method)
-    folder = folder_of(loaded, "stability", out)
+    loaded = cli.load_case(case, set, scheme, method)
+    folder = cli.folder_of(loaded, "stability", out)
     with progress_line() as progress:
         result = ask(
-            loaded,
-            comma_list(scheme, "--scheme"),
-            method_names(method),
-            time_of(at),
-            before,
-            steps or STEPS,
-            out=folder,
-            progress=progress,
-            jobs=jobs,
-            dask=dask,
-        )
-    table = ResultTable(FILE, [row.plain() | {"notes": "; ".join(row.notes)} for row in result.rows])
-    files = [table.write(clear_files(folder, "stability.csv", "spectrum-*.png") / "stability.csv").name]
+            loaded, cli.comma_list(scheme, "--scheme"), cli.method_names(method),
+            cli.quantity_of(at, "time", f"--at {at}"), before, steps or STEPS, out=folder, progress=progress,
+            jobs=jobs, dask=dask,
+        )  # fmt: skip
+    table = ResultTable(STABILITY_FILE, [row.plain() | {"notes": "; ".join(row.notes)} for row in result.rows])
+    files = [table.write(cli.clear_files(folder, "stability.csv", "spectrum-*.png") / "stability.csv").name]
     if len(result.rows) <= PICTURES:
         files += pictures(result, folder)
-    if as_json:
-        print_json(result.plain() | {"directory": str(folder), "files": files})
-    else:
-        print_stability(result, folder, files)
+    present(as_json, result.plain() | {"directory": str(folder), "files": files}, stability_text(result, folder, files))
 
 
 def refuse_options(case: str | None, of_a_case: dict, of_a_grid: dict) -> None:
@@ -123,8 +105,6 @@ def refuse_options(case: str | None, of_a_case: dict, of_a_grid: dict) -> None:
     case : name of the case, or None
     of_a_case : name -> value of the options that need a case; of_a_grid : name -> value of the options for no case
     """
-    from fvsolve.errors import FvsolveError
-
     useless = [name for name, value in (of_a_grid if case else of_a_case).items() if value not in (None, False, [])]
     if useless:
         reason = "not valid with a case, only without" if case else "needs a case: fvsolve stability CASE"
@@ -138,7 +118,7 @@ def pictures(result, folder: Path) -> list[str]:
     not positive and finite, the step is 1 / (greatest magnitude of an eigenvalue). Pairs on a case with delay lines
     have no picture. result : as from `stability`
     """
-    from fvsolve.draw.spectrum_picture import spectrum_figure
+    from fvsolve.draw.stability_pictures import spectrum_figure
     from fvsolve.steppers import analyse
 
     names = []
@@ -158,31 +138,25 @@ def pictures(result, folder: Path) -> list[str]:
     return names
 
 
-def print_stability(result, folder: Path, files: list[str]) -> None:
-    """Print the table of stable steps of a case, and its notes."""
-    from fvsolve.cli import terminal
-
-    rows = result.rows
-    console, first_row = terminal.console(), rows[0]
+def stability_text(result, folder: Path, files: list[str]) -> Iterator:
+    """Table of stable steps of a case, and its notes."""
+    rows, first_row = result.rows, result.rows[0]
     cells = first_row.rate > 0.0
-    terminal.line(
-        console,
+    yield (
         f"{result.case} at {first_row.when}: {first_row.states} states; a step fails if a deviation grows "
-        f"{first_row.threshold:g} times (energy norm) within {first_row.steps} steps",
+        f"{first_row.threshold:g} times (energy norm) within {first_row.steps} steps"
     )
     if cells:
-        terminal.line(console, f"Courant number: step times {first_row.rate:.6g} 1/s; bounds as Courant numbers")
-    terminal.print_sheet(
-        ResultTable(terminal_columns(cells), [line for row in rows for line in table_lines(row)]), console
-    )
+        yield f"Courant number: step times {first_row.rate:.6g} 1/s; bounds as Courant numbers"
+    yield ResultTable(terminal_columns(cells), [line for row in rows for line in table_lines(row)])
     for row in rows:
         for note in row.notes:
-            terminal.line(console, f"  {row_label(row)}: {note}")
+            yield f"  {row_label(row)}: {note}"
         for bound, reason in row.left_out.items():
-            terminal.line(console, f"  {row_label(row)}: {bound.replace('_', ' ')}: {reason}")
+            yield f"  {row_label(row)}: {bound.replace('_', ' ')}: {reason}"
     for text in result.notes:
-        terminal.line(console, f"  {text}")
-    terminal.line(console, f"{folder}: {', '.join(files)}")
+        yield f"  {text}"
+    yield f"{folder}: {', '.join(files)}"
 
 
 def terminal_columns(cells: bool) -> list[Column]:

@@ -1,21 +1,20 @@
-"""`fvsolve sweep`: one run for every combination of values of keys."""
-
-from __future__ import annotations
+"""`fvsolve sweep`, `sensitivity` and `calibrate`: runs over combinations, samples and ranges of keys."""
 
 import re
-import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Option
 
-from fvsolve.cli.app import Json, SingleCase, app, load_case, print_json, value_of
-from fvsolve.cli.study_options import Dask, Jobs, Out, Seed, clear_files, folder_of, progress_line, writable_folder
+from fvsolve.cli import app as cli
+from fvsolve.cli.progress import progress_line
+from fvsolve.cli.terminal import TextTable, present
 from fvsolve.errors import FvsolveError
 
 Values = Annotated[
     list[str],
-    typer.Option(
+    Option(
         "--set",
         metavar="KEY=a,b,c",
         help="values of a key, one run for each, or a single value for all runs; repeat the option for more keys",
@@ -23,7 +22,7 @@ Values = Annotated[
 ]
 Ranges = Annotated[
     list[str],
-    typer.Option(
+    Option(
         "--vary",
         metavar="KEY=LOW,HIGH",
         help="key to vary with --sample and its range, in SI or with units; repeat the option for more keys",
@@ -31,7 +30,7 @@ Ranges = Annotated[
 ]
 Outcomes = Annotated[
     list[str],
-    typer.Option(
+    Option(
         "--quantity",
         metavar="max(PROBE)",
         help="quantity to chart over the keys: max, min or final of a probe; repeat the option for more quantities "
@@ -44,31 +43,31 @@ MAX_COLUMNS = 6  # greatest number of columns of the table on a terminal, withou
 MAX_ROWS = 100  # greatest number of rows of that table
 
 
-@app.command()
+@cli.app.command()
 def sweep(
-    case: SingleCase,
+    case: cli.SingleCase,
     set: Values = [],  # noqa: B006
     points: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             metavar="FILE.csv",
             help="CSV file of the values of keys in all runs: a row for each run, a column for each key",
         ),
     ] = None,
     sample: Annotated[
         str | None,
-        typer.Option(
+        Option(
             metavar="sobol:N",
             help="sample of N runs in the ranges of --vary: sobol:N (Sobol) or lhs:N (Latin hypercube)",
         ),
     ] = None,
     vary: Ranges = [],  # noqa: B006
-    seed: Seed = 0,
-    jobs: Jobs = 1,
-    dask: Dask = None,
+    seed: cli.Seed = 0,
+    jobs: cli.Jobs = 1,
+    dask: cli.Dask = None,
     outcome: Outcomes = [],  # noqa: B006
-    out: Out = None,
-    as_json: Json = False,
+    out: cli.Out = None,
+    as_json: cli.Json = False,
 ) -> None:
     """Run a case for every combination of values. The table has a row for each run; a failed run has its reason."""
     from fvsolve import studies
@@ -79,17 +78,14 @@ def sweep(
     if vary and sample is None:
         raise FvsolveError(f"--vary {vary[0]}: expected --sample sobol:N too. For a grid of values use --set KEY=a,b,c")
     varied = {key: values for key, values in values_by_key.items() if key not in fixed} | ranges(vary, "--vary")
-    loaded = load_case(case, [])
-    folder = folder_of(loaded, "sweep", out)
+    loaded = cli.load_case(case, [])
+    folder = cli.folder_of(loaded, "sweep", out)
     with progress_line() as progress:
         result = studies.sweep(loaded, varied, fixed, jobs, folder, progress, points, sample, seed, dask)
     heads = {key: key_with_unit(loaded.raw, key, [row[key] for row in result.rows]) for key in result.keys}
     charts = write_charts(result, outcome, folder, heads)
-    if as_json:
-        print_json(result.plain() | {"directory": str(folder), "charts": [str(path) for path in charts]})
-    else:
-        _show(result, folder, heads)
-    sys.exit(0 if all(row["ok"] for row in result.rows) else 1)
+    facts = result.plain() | {"directory": str(folder), "charts": [str(path) for path in charts]}
+    present(as_json, facts, sweep_text(result, folder, heads), code=0 if all(row["ok"] for row in result.rows) else 1)
 
 
 def ranges(texts: list[str], option: str) -> dict[str, list]:
@@ -109,17 +105,15 @@ def write_charts(result, outcomes: list[str], folder: Path, heads: dict[str, str
 
     Pictures of earlier sweeps in this folder are deleted. heads : key -> heading of the key with its unit
     """
-    from fvsolve.draw.sweep_picture import outcome_figure
+    from fvsolve.draw.object_pictures import outcome_figure
 
-    available = result.outcomes
-    names = [result.outcome(name) for name in outcomes] or [
-        column for column in available if column.startswith(("max(", "min("))
-    ]
-    clear_files(folder / "charts", "*max-*.png", "*min-*.png", "final-*.png")
+    names = [result.outcome(name) for name in outcomes]
+    names = names or [column for column in result.outcomes if column.startswith(("max(", "min("))]
+    cli.clear_files(folder / "charts", "*max-*.png", "*min-*.png", "final-*.png")
     paths = []
     for name in names:
         stem = re.sub(r"[^A-Za-z0-9.@_-]+", "-", name.partition(" [")[0]).strip("-")
-        path = writable_folder(folder / "charts") / f"{stem}.png"
+        path = cli.writable_folder(folder / "charts") / f"{stem}.png"
         outcome_figure(result, name, heads).savefig(path)
         paths.append(path)
     return paths
@@ -133,7 +127,7 @@ def key_and_values(text: str, option: str = "--set", expected: str = VALUES_FORM
     key, equals, listed = text.partition("=")
     if not (equals and key.strip() and listed.strip()):
         raise FvsolveError(f"{option} {text}: expected {expected}")
-    return key.strip(), [value_of(entry) for entry in split_list(listed)]
+    return key.strip(), [cli.value_of(entry) for entry in split_list(listed)]
 
 
 def split_list(text: str) -> list[str]:
@@ -152,11 +146,9 @@ def split_list(text: str) -> list[str]:
     return [part.strip() for part in parts if part.strip()]
 
 
-def _show(result, folder: Path, heads: dict[str, str]) -> None:
-    from fvsolve.cli import terminal
+def sweep_text(result, folder: Path, heads: dict[str, str]) -> Iterator:
     from fvsolve.studies.sweep import as_option_text
 
-    console = terminal.console()
     columns = [*result.keys, "ok", *(name for name in result.columns if name.startswith(("min(", "max(")))]
     shown = columns[len(result.keys) : len(result.keys) + 1 + MAX_COLUMNS]
     first_rows = result.rows[:MAX_ROWS]
@@ -164,17 +156,106 @@ def _show(result, folder: Path, heads: dict[str, str]) -> None:
         [*(as_option_text(row[key]) for key in result.keys), *(_text(row.get(name)) for name in shown)]
         for row in first_rows
     ]
-    terminal.table([*heads.values(), *shown], rows, console)
+    yield TextTable([*heads.values(), *shown], rows)
     for row in first_rows:
         values = ", ".join(f"{key} = {as_option_text(row[key])}" for key in result.keys)
         if not row["ok"]:
-            terminal.line(console, f"{values}: {row['reason']}", "bold red")
+            yield f"{values}: {row['reason']}", "bold red"
         if row.get("marks"):
-            terminal.line(console, f"{values}: {row['marks']}", "yellow")
+            yield f"{values}: {row['marks']}", "yellow"
     reused = f", {result.reused} of them reused from an earlier sweep" if result.reused else ""
     reused += f", the first {MAX_ROWS} are printed here" if len(result.rows) > MAX_ROWS else ""
-    terminal.line(console, f"{folder / 'sweep.csv'}: {len(result.rows)} rows{reused}")
+    yield f"{folder / 'sweep.csv'}: {len(result.rows)} rows{reused}"
 
 
 def _text(value) -> str:
     return "-" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+@cli.app.command()
+def sensitivity(
+    case: cli.SingleCase,
+    vary: Annotated[
+        list[str],
+        Option(
+            "--vary",
+            metavar="KEY=LOW,HIGH",
+            help="key to vary and its range, in SI or with units; repeat the option for more keys",
+        ),
+    ],
+    outcome: Annotated[str, Option(metavar="max(PROBE)", help="outcome to analyse: min, max or final of a probe")],
+    samples: Annotated[
+        int,
+        Option(
+            metavar="N", help="base sample size, a power of two; for k keys the study makes about 1.25 N (k + 2) runs"
+        ),
+    ] = 64,
+    seed: cli.Seed = 0,
+    jobs: cli.Jobs = 1,
+    dask: cli.Dask = None,
+    set: cli.Set = [],  # noqa: B006
+    out: cli.Out = None,
+    as_json: cli.Json = False,
+) -> None:
+    """Compute the sensitivity of an outcome to keys: Sobol indices and Morris effects over ranges."""
+    from fvsolve import studies
+
+    loaded = cli.load_case(case, set)
+    folder = cli.folder_of(loaded, "sensitivity", out)
+    with progress_line() as progress:
+        result = studies.sensitivity(
+            loaded, ranges(vary, "--vary"), outcome, samples, seed, None, jobs, dask, folder, progress
+        )
+    cli.clear_files(folder, "sensitivity.csv", "sensitivity.png")
+    path = result.sheet.write(folder / "sensitivity.csv")
+    result.plot(folder / "sensitivity.png")
+    below = f"{path}: {result.outcome}, {result.runs} runs"
+    present(as_json, result.plain() | {"directory": str(folder)}, [_key_table(result), below])
+
+
+@cli.app.command()
+def calibrate(
+    case: cli.SingleCase,
+    parameter: Annotated[
+        list[str],
+        Option(
+            metavar="KEY=LOW,HIGH",
+            help="key to calibrate and its range, in SI or with units; repeat the option for more keys",
+        ),
+    ],
+    seed: cli.Seed = 0,
+    jobs: cli.Jobs = 1,
+    dask: cli.Dask = None,
+    set: cli.Set = [],  # noqa: B006
+    as_json: cli.Json = False,
+) -> None:
+    """Calibrate keys of a case against the measured series in its [compare]."""
+    from fvsolve import studies
+
+    loaded = cli.load_case(case, set)
+    with progress_line(resumable=False) as progress:
+        result = studies.calibrate(loaded, ranges(parameter, "--parameter"), None, seed, jobs, dask, progress)
+    present(as_json, result.plain(), calibration_text(loaded, result))
+
+
+def calibration_text(case, result) -> Iterator:
+    """Calibrated values of the keys, differences from the measured series, and doubts."""
+    from fvsolve.output.unit_columns import column
+    from fvsolve.studies.sampling import si_unit_of
+
+    probes = {series.probe.text: series.probe for series in case.compare.values() if series.probe is not None}
+    texts = []
+    for name, rms in result.rms.items():
+        probe = probes[name]
+        unit_column = column(probe.text, probe.dimension, case, probe.unit)
+        texts.append(f"rms of {name} {unit_column.span_from_si(rms):.6g} {unit_column.span_unit}")
+    units = {key: f"{key} [{unit}]" if (unit := si_unit_of(case.raw, key)) else key for key in result.values}
+    yield _key_table(result, units)
+    yield ", ".join([*texts, f"{result.runs} runs"])
+    yield from ((doubt, "yellow") for doubt in result.doubts)
+
+
+def _key_table(result, units: dict[str, str] = {}) -> TextTable:  # noqa: B006
+    """Table of the keys of a sensitivity study or a calibration; units : key -> its heading with unit, if it has one"""
+    heads, rows = result.sheet.words()
+    return TextTable(heads, [[units.get(key, key), *row] for key, *row in rows])

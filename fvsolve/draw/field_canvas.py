@@ -1,7 +1,5 @@
 """Pictures of basins and bodies from .vtu files, with surfaces drawn by PyVista."""
 
-from __future__ import annotations
-
 import pickle
 import sys
 from pathlib import Path
@@ -9,14 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.draw import style, water_surface
-from fvsolve.draw.animation import write_animation
-from fvsolve.draw.frame_meshes import field_extent, read_frame, tubes
+from fvsolve.draw import frame_meshes, style
 from fvsolve.draw.part_drawing import draw_parts
 from fvsolve.draw.projection import WATER_VIEW, Projection, box_corners, draw_box, fit_limits, round_scale
-from fvsolve.draw.scene import DrawnScene
-from fvsolve.draw.sheet import COLOUR_MAP, HALF_SYMBOL, PictureSheet
-from fvsolve.draw.symbols import WATER
+from fvsolve.draw.sheet import COLOUR_MAP, HALF_SYMBOL, WATER, PictureSheet, write_animation
+from fvsolve.draw.view import DrawnScene
 
 FLAT_SHARE = 0.08  # height over width below which bodies are drawn in plan, or depth over width for a profile
 LOW_SHARE = 0.05  # height over width below which basins are drawn with enlarged heights
@@ -53,10 +48,7 @@ class FieldCanvas:
         else:
             style.style_axes(axes)
             axes.ticklabel_format(axis="both", style="plain", useOffset=False)
-            axes.set_xlabel(f"x [{unit}]", fontsize=8.5, color=style.INK)
-            axes.set_ylabel(
-                f"y [{unit}]" if self.aspect.kind == "plan" else f"z [{rises}]", fontsize=8.5, color=style.INK
-            )
+            style.name_axes(axes, f"x [{unit}]", f"y [{unit}]" if self.aspect.kind == "plan" else f"z [{rises}]")
         self.sheet.figure.canvas.draw()
         size = (round(axes.bbox.width), round(axes.bbox.height))
         self.plotter = pyvista.Plotter(off_screen=True, window_size=size)
@@ -74,7 +66,7 @@ class FieldCanvas:
         caption, files = self.scene.frames[k]
         self.plotter.clear_actors()
         for file in files:
-            self._add(read_frame(file, self.scene))
+            self._add(frame_meshes.read_frame(file, self.scene))
         self.image.set_data(self.plotter.screenshot(transparent_background=True, return_img=True))
         rise = self.aspect.rise / self.scene.height_ratio
         notes = [] if abs(rise - 1.0) < 1e-9 else [f"heights drawn {rise:.3g} times"]
@@ -82,7 +74,7 @@ class FieldCanvas:
 
     def _measure(self) -> None:
         """Find the range of the field and the bounding box, and choose the projection."""
-        self.limits, self.box, self.wet = field_extent(self.scene)
+        self.limits, self.box, self.wet = frame_meshes.field_extent(self.scene)
         x, y, z = (self.box[1::2] - self.box[::2]).tolist()
         if self.wet:
             slant, wide = self.scene.height_ratio, max(x, y)
@@ -122,7 +114,7 @@ class FieldCanvas:
         """
         self.cover, self.labels, segments = np.zeros((0, 2)), [], [np.zeros((0, 2, 2))]
         for file in self.scene.frames[0][1]:
-            mesh = read_frame(file, self.scene)
+            mesh = frame_meshes.read_frame(file, self.scene)
             points = self.aspect.on_sheet(mesh.points)
             if 3 not in mesh.celltypes:
                 self.cover = np.vstack([self.cover, self.aspect.on_sheet(mesh.cell_centers().points)])
@@ -154,43 +146,37 @@ class FieldCanvas:
             return self._basin(mesh)
         mesh.points[:, 2] *= self.aspect.rise
         if "body" in mesh.cell_data and (field != "speed" or self.wet):
-            shape = tubes(mesh, self.box)
+            shape = frame_meshes.tubes(mesh, self.box)
             if shape.n_points:  # bodies without extent have no points
                 self.plotter.add_mesh(shape, color=BODY_COLOUR, ambient=AMBIENT_LIGHT)
         elif field in mesh.cell_data:
             plane = 3 not in mesh.celltypes
-            self._coloured(mesh.cell_data_to_point_data() if plane else tubes(mesh, self.box), plane)
+            self._coloured(mesh.cell_data_to_point_data() if plane else frame_meshes.tubes(mesh, self.box), plane)
             if plane:
-                rim = water_surface.boundary_edges(mesh)
+                rim = frame_meshes.boundary_edges(mesh)
                 self.plotter.add_mesh(rim, color=style.INK, line_width=2)
 
     def _basin(self, mesh: Any) -> None:
         """Draw the bed of a basin, its buildings and the water."""
         rise, field = self.aspect.rise, self.scene.quantity.name
-        surface = (
-            water_surface.water_mesh(mesh, rise, (field,), water_surface.WET_DEPTH * self.scene.height.factor)
-            if field != "bed"
-            else None
-        )
-        block = water_surface.raised_cells(mesh)
+        if field != "bed":
+            least = frame_meshes.WET_DEPTH * self.scene.height.factor
+            surface = frame_meshes.water_mesh(mesh, rise, (field,), least)
+        block = frame_meshes.raised_cells(mesh)
         top = self.box[5] + BUILDING_HEIGHT * (self.box[5] - self.box[4])
         mesh.points[:, 2] *= rise
-        for wall in water_surface.buildings(mesh, rise * top):
+        for wall in frame_meshes.buildings(mesh, rise * top):
             self.plotter.add_mesh(wall, color=BUILDING_COLOUR, ambient=AMBIENT_LIGHT)
         if field == "bed":
             return self._coloured(mesh.cell_data_to_point_data(), True)
-        self.plotter.add_mesh(
-            mesh.extract_cells(~block) if block.any() else mesh, color=BED_COLOUR, smooth_shading=False
-        )
+        bed = mesh.extract_cells(~block) if block.any() else mesh
+        self.plotter.add_mesh(bed, color=BED_COLOUR, smooth_shading=False)
         if block.any():
             self.plotter.add_mesh(mesh.extract_cells(block), color=BUILDING_COLOUR, ambient=AMBIENT_LIGHT)
         if not surface.n_cells:
             return None
-        self.plotter.add_mesh(
-            water_surface.water_sides(surface, water_surface.depth_direction(mesh) * (1.0, 1.0, rise)),
-            color=SIDE_COLOUR,
-            lighting=False,
-        )
+        sides = frame_meshes.water_sides(surface, frame_meshes.depth_direction(mesh) * (1.0, 1.0, rise))
+        self.plotter.add_mesh(sides, color=SIDE_COLOUR, lighting=False)
         if field in surface.point_data:
             self._coloured(surface, True)
         else:

@@ -1,6 +1,4 @@
-"""Frames of a run as PyVista meshes, with lengths and the drawn field in output units."""
-
-from __future__ import annotations
+"""Frames of a run as PyVista meshes in output units, and the surface of the water in a basin."""
 
 import math
 import sys
@@ -9,12 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.draw import water_surface
-from fvsolve.draw.scene import DrawnScene
 from fvsolve.draw.sheet import colour_range
+from fvsolve.draw.view import DrawnScene
 from fvsolve.errors import did_you_mean, listing
 
 TUBE_RADIUS = 0.008  # radius of a pipe as a fraction of the diagonal of the scene
+WET_DEPTH = 1e-4  # least depth of water that is drawn [m]
+WALL_SLOPE = 1.0  # least slope of the bed that counts as a wall
+BUILDING_INSET = 1e-3  # relative reduction of a building, so that its walls do not coincide with those of the water
 
 
 def field_extent(scene: DrawnScene) -> tuple[tuple[float, float], np.ndarray, bool]:
@@ -31,9 +31,7 @@ def field_extent(scene: DrawnScene) -> tuple[tuple[float, float], np.ndarray, bo
         if field in mesh.cell_data:
             values = mesh[field]
             if "depth" in mesh.cell_data and field != "bed":
-                values = values[
-                    mesh["depth"] > water_surface.WET_DEPTH * scene.height.factor
-                ]  # only wet cells are drawn
+                values = values[mesh["depth"] > WET_DEPTH * scene.height.factor]  # only wet cells are drawn
             lows.append(float(values.min(initial=math.inf)))
             highs.append(float(values.max(initial=-math.inf)))
         boxes.append(mesh_box(mesh))
@@ -89,3 +87,161 @@ def tubes(mesh: Any, box) -> Any:
     """
     reach = math.dist(box[::2], box[1::2])
     return mesh.extract_surface(algorithm=None).tube(radius=TUBE_RADIUS * max(reach, 1e-9))
+
+
+def water_mesh(mesh: Any, rise: float, fields: tuple[str, ...], least: float = WET_DEPTH) -> Any:
+    """Mesh of the water surface of a basin, cut at the shore, with `height` above the bed at its points.
+
+    Cells deeper than `least` are wet; heights and `least` are in the unit of the depths of `mesh`. The surface of wet
+    cells is extrapolated over adjacent dry cells. If it lies above their bed, as at a front on level ground, the shore
+    is drawn at the middle of the dry cells.
+    fields : names of fields whose values at points are means over wet cells; rise : factor on heights
+    """
+    cells, wet = _cells(mesh), mesh.cell_data["depth"] > least
+    up = depth_direction(mesh)
+    bed = mesh.points @ up
+    if "normal" in mesh.cell_data:  # levels of a basin on a body are in the axes of the body
+        bed += np.mean(mesh.cell_data["bed"] - mesh.cell_centers().points @ up)
+    at = _at_points(cells, wet, mesh.cell_data["surface"], mesh.n_points)
+    known = np.isfinite(at)
+    beyond = _extended(cells, ~wet, at, mesh.n_points)
+    height = np.where(known, at, beyond) - bed
+    height = np.where(known, height, -np.abs(height))
+    height = np.where(np.isfinite(height), height, -1.0)
+    surface = mesh.copy()
+    surface.clear_data()
+    surface.point_data["height"] = height
+    for name in fields:
+        if name in mesh.cell_data:
+            values = _at_points(cells, wet, mesh.cell_data[name], mesh.n_points)
+            surface.point_data[name] = np.nan_to_num(
+                np.where(known, values, _extended(cells, ~wet, values, mesh.n_points))
+            )
+    lift = np.where(known, at, np.where(np.isfinite(beyond), beyond, bed)) - bed
+    surface.points = (mesh.points + lift[:, None] * up) * (1.0, 1.0, rise)
+    return surface.clip_scalar(scalars="height", value=0.0, invert=False)
+
+
+def water_sides(surface: Any, up: np.ndarray) -> Any:
+    """Mesh of the vertical sides of the water, from the rim of its surface down to the bed.
+
+    up : float64[3]  direction of depth, with the factor on heights
+    """
+    import pyvista
+
+    rim = boundary_edges(surface)
+    low = rim.points - np.maximum(rim.point_data["height"], 0.0)[:, None] * up
+    ends = rim.lines.reshape(-1, 3)[:, 1:]
+    faces = np.column_stack([np.full(len(ends), 4), ends, ends[:, ::-1] + rim.n_points])
+    return pyvista.PolyData(np.vstack([rim.points, low]), faces.ravel())
+
+
+def depth_direction(mesh: Any) -> np.ndarray:
+    """Direction of depth in a basin : float64[3], vertical, or normal to the bed of a basin on a body."""
+    return mesh.cell_data["normal"].mean(axis=0) if "normal" in mesh.cell_data else np.array([0.0, 0.0, 1.0])
+
+
+def buildings(mesh: Any, top: float) -> list[Any]:
+    """Meshes of buildings: the holes within the outer boundary of a basin, from the bed up to `top`."""
+    import pyvista
+
+    meshes = []
+    for loop in boundary_loops(mesh)[1:]:
+        middle = loop.mean(axis=0)
+        foot = middle + (1.0 - BUILDING_INSET) * (loop - middle)
+        n = len(foot)
+        head = np.column_stack([foot[:, :2], np.full(n, max(top, foot[:, 2].max()))])
+        walls = [[4, k, (k + 1) % n, n + (k + 1) % n, n + k] for k in range(n)]
+        meshes.append(pyvista.PolyData(np.vstack([foot, head]), np.hstack(walls)))
+        meshes.append(pyvista.PolyData(head, [n, *range(n)]).triangulate())
+    return meshes
+
+
+def boundary_loops(mesh: Any) -> list[np.ndarray]:
+    """Closed boundary lines of a basin, each float64[k, 3], largest first."""
+    rim = boundary_edges(mesh)
+    follow: dict[int, list[int]] = {}
+    for a, b in rim.lines.reshape(-1, 3)[:, 1:]:
+        follow.setdefault(int(a), []).append(int(b))
+        follow.setdefault(int(b), []).append(int(a))
+    result, unvisited = [], set(follow)
+    while unvisited:
+        walk = [unvisited.pop()]
+        while candidates := [point for point in follow[walk[-1]] if point in unvisited]:
+            walk.append(candidates[0])
+            unvisited.discard(candidates[0])
+        result.append(np.asarray(rim.points)[walk])
+    return sorted(result, key=lambda line: -float(np.linalg.norm(np.ptp(line, axis=0))))
+
+
+def raised_cells(mesh: Any) -> np.ndarray:
+    """Mask of the cells of raised blocks of the bed, such as buildings : bool[n].
+
+    These are cells steeper than WALL_SLOPE, and the higher cells that they enclose.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    cells, z = _cells(mesh), mesh.points[:, 2]
+    low, high, size = (np.full(mesh.n_cells, np.nan) for _ in range(3))
+    for rows, corners in cells:
+        low[rows], high[rows] = z[corners].min(axis=1), z[corners].max(axis=1)
+        size[rows] = np.linalg.norm(mesh.points[corners[:, 0], :2] - mesh.points[corners[:, 2], :2], axis=1)
+    steep = high - low > WALL_SLOPE * size
+    if not steep.any():
+        return steep
+    rows = np.concatenate([np.repeat(rows, corners.shape[1]) for rows, corners in cells])
+    columns = np.concatenate([corners.ravel() for _, corners in cells])
+    touch = coo_matrix((np.ones(len(rows)), (rows, columns)), (mesh.n_cells, mesh.n_points)).tocsr()
+    flat = np.flatnonzero(~steep)
+    adjacent = (touch[flat] @ touch[flat].T) >= 2  # cells that share a face
+    _, piece = connected_components(adjacent, directed=False)
+    main = np.bincount(piece).argmax()
+    result = steep.copy()
+    for k in set(piece) - {main}:
+        inner = flat[piece == k]
+        if low[inner].min() > low[steep].min() + 0.5 * (high[steep] - low[steep]).min():
+            result[inner] = True
+    return result
+
+
+def _cells(mesh: Any) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Cells of a mesh, by their shape : list of (indices int[k], points of the corners int[k, 3 or 4])."""
+    return [(np.flatnonzero(mesh.celltypes == kind), corners) for kind, corners in mesh.cells_dict.items()]
+
+
+def _at_points(cells, chosen: np.ndarray, values: np.ndarray, n: int) -> np.ndarray:
+    """Mean of cell values over the chosen cells around each of n points, NaN for a point without such cells.
+
+    cells : as from `_cells`; chosen : bool[cells]; values : float64[cells]
+    """
+    total, count = np.zeros(n), np.zeros(n)
+    for rows, corners in cells:
+        mask = chosen[rows]
+        np.add.at(total, corners[mask], values[rows[mask], None])
+        np.add.at(count, corners[mask], 1.0)
+    return np.where(count > 0.0, total / np.where(count > 0.0, count, 1.0), np.nan)
+
+
+def _extended(cells, chosen: np.ndarray, at: np.ndarray, n: int) -> np.ndarray:
+    """Values extrapolated to n points : float64[n], NaN for a point without known values nearby.
+
+    The value at a point is the mean over the chosen cells around it; the value of a cell is the mean of those values at
+    its corners that are not NaN.
+    cells : as from `_cells`; at : float64[n]  values at points, NaN if not known; chosen : bool[cells]
+    """
+    total, count = np.zeros(n), np.zeros(n)
+    for rows, corners in cells:
+        corners_chosen = corners[chosen[rows]]
+        known = np.isfinite(at[corners_chosen])
+        has = known.any(axis=1)
+        mean = np.where(known, at[corners_chosen], 0.0)[has].sum(axis=1) / known[has].sum(axis=1)
+        np.add.at(total, corners_chosen[has], mean[:, None])
+        np.add.at(count, corners_chosen[has], 1.0)
+    return np.where(count > 0.0, total / np.where(count > 0.0, count, 1.0), np.nan)
+
+
+def boundary_edges(mesh: Any) -> Any:
+    return mesh.extract_surface(algorithm=None).extract_feature_edges(
+        boundary_edges=True, feature_edges=False, manifold_edges=False, non_manifold_edges=False
+    )

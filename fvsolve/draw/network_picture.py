@@ -1,14 +1,12 @@
 """Picture of a network: pipes in the colours of a field, symbols and names of parts, axes."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from fvsolve.draw import style
 from fvsolve.draw.part_drawing import MAX_PARTS_WITH_JOINTS, SMALL_SYMBOL_COUNT, draw_parts
 from fvsolve.draw.projection import box_corners, choose_projection, draw_box, fit_limits
-from fvsolve.draw.scene import DrawnScene
 from fvsolve.draw.sheet import COLOUR_MAP, HALF_SYMBOL, SIZE, PictureSheet, colour_range
+from fvsolve.draw.view import DrawnScene
 
 PIPE_WIDTH, EDGE_WIDTH = 3.6, 4.8  # widths of a pipe and of its edge [points]
 LEVEL_HEIGHT = 3.2  # height of a picture of a network along a level line [inch]
@@ -32,15 +30,11 @@ class NetworkPicture:
         self.aspect = choose_projection(self.all, len(scene.parts) > SMALL_SYMBOL_COUNT, scene.height_ratio)
         if self.aspect.kind == "profile" and scene.plan == "laid out":  # the first pipe begins at 0
             self.aspect.begin = float(self.aspect.on_sheet(points if len(points) else self.all)[:, 0].min())
-        line = self.aspect.kind == "profile"
-        self.level = line and not np.ptp(self.all[:, 2]) > 0.0
-        self.sheet = PictureSheet(
-            film, ruled=self.aspect.kind != "aslant", high=LEVEL_HEIGHT if self.level else SIZE[1]
-        )
-        self.axes, self.half = (
-            self.sheet.axes,
-            HALF_SYMBOL if len(scene.parts) <= SMALL_SYMBOL_COUNT else 0.7 * HALF_SYMBOL,
-        )
+        self.level = self.aspect.kind == "profile" and not np.ptp(self.all[:, 2]) > 0.0
+        high = LEVEL_HEIGHT if self.level else SIZE[1]
+        self.sheet = PictureSheet(film, ruled=self.aspect.kind != "aslant", high=high)
+        self.axes = self.sheet.axes
+        self.half = HALF_SYMBOL if len(scene.parts) <= SMALL_SYMBOL_COUNT else 0.7 * HALF_SYMBOL
         segments = self.aspect.on_sheet(points)[lines]
         self.lines = self._pipes(segments)
         self._axes()
@@ -101,11 +95,9 @@ class NetworkPicture:
             box = self.all.min(axis=0), self.all.max(axis=0)
             margin = BOX_MARGIN * np.ptp(self.all, axis=0).max() * np.array([1.0, 1.0, 0.0])
             box = box[0] - margin, box[1] + margin
-            fit_limits(
-                axes,
-                self.aspect.on_sheet(np.vstack([box_corners(*box)[::2], box_corners(*box)[1:2], self.all])),
-                BOX_MARGINS,
-            )
+            corners = box_corners(*box)
+            seen = self.aspect.on_sheet(np.vstack([corners[::2], corners[1:2], self.all]))
+            fit_limits(axes, seen, BOX_MARGINS)
             self.texts = draw_box(axes, self.aspect, *box, (f"x{unit}", f"y{unit}", f"z [{high}]"))
             return self._height_lines()
         style.style_axes(axes)
@@ -120,8 +112,7 @@ class NetworkPicture:
             axes.set_ylim(low[1] - (space[1] or 1.0), most[1] + (space[1] or 1.0))
             along = "x" if tuple(self.aspect.right) == (1.0, 0.0, 0.0) and self.scene.plan != "laid out" else "distance"
             names = f"{along}{unit}", f"elevation [{high}]"
-        axes.set_xlabel(names[0], fontsize=8.5, color=style.INK)
-        axes.set_ylabel("" if self.level else names[1], fontsize=8.5, color=style.INK)
+        style.name_axes(axes, names[0], "" if self.level else names[1])
         if self.scene.plan == "schematic":  # drawn distances have no meaning
             axes.set_axis_off()
         if self.level:

@@ -1,28 +1,26 @@
-"""Drawing of the symbols and names of parts in a picture."""
-
-from __future__ import annotations
+"""Symbols, connections and names of parts in a picture; names are placed without overlap."""
 
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from fvsolve.draw import label_placement as naming
 from fvsolve.draw import style
 from fvsolve.draw.projection import Projection
-from fvsolve.draw.scene import DrawnScene
-from fvsolve.draw.sheet import draw_symbol
-from fvsolve.draw.symbols import symbol_of
+from fvsolve.draw.sheet import draw_symbol, symbol_of
+from fvsolve.draw.view import DrawnScene
 from fvsolve.errors import visible
 
 SYMBOL_SPACING = 4.8  # least distance of symbols, in half widths of a symbol
-SMALL_SYMBOL_COUNT, MAX_NAMED_PIPES = (
-    40,
-    14,
-)  # number of parts above which symbols are small; greatest number of pipes with names
+SMALL_SYMBOL_COUNT = 40  # number of parts above which symbols are small
+MAX_NAMED_PIPES = 14  # greatest number of pipes with names
 MAX_PARTS_WITH_JOINTS = 400  # greatest number of parts with symbols and names for plain junctions
 HALO_WIDTH = 2.2  # width of the white border of a name [points]
 EDGE_MARGIN = 5.0  # free margin of the sheet [pixels]
+# Directions of a name from its point, best first.
+LABEL_PLACES = [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1)]
+RANK_COST = 0.5  # cost of each lower rank of a direction, in covered points of lines
+POINT_SPACING, PADDING = 4.0, 3.0  # distance of points along lines, and free space around names [pixels]
 
 
 def draw_parts(stage, scene: DrawnScene, segments: np.ndarray) -> tuple[int, int]:
@@ -117,19 +115,11 @@ def _write_names(stage, scene: DrawnScene, segments, at, blocks, ties) -> tuple[
     sizes = [text.get_window_extent(renderer).size for text in texts]
     ticks = [text.get_window_extent(renderer).extents for text in stage.texts]
     point = figure.dpi / 72.0
-    places = naming.place_labels(
-        [item.at for item in labels],
-        sizes,
-        [point * item.gap for item in labels],
-        np.vstack([blocks, np.reshape(ticks, (-1, 4))]),
-        np.vstack([naming.points_along(np.concatenate([pixels, ties])), axes.transData.transform(stage.cover)]),
-        (
-            EDGE_MARGIN + axes.bbox.x0 * axes.axison,
-            axes.bbox.y0 - EDGE_MARGIN,
-            figure.bbox.x1 - EDGE_MARGIN,
-            axes.bbox.y1 + EDGE_MARGIN,
-        ),
-    )
+    at, gaps = [item.at for item in labels], [point * item.gap for item in labels]
+    lines = np.vstack([points_along(np.concatenate([pixels, ties])), axes.transData.transform(stage.cover)])
+    left, right = EDGE_MARGIN + axes.bbox.x0 * axes.axison, figure.bbox.x1 - EDGE_MARGIN
+    within = left, axes.bbox.y0 - EDGE_MARGIN, right, axes.bbox.y1 + EDGE_MARGIN
+    places = place_labels(at, sizes, gaps, np.vstack([blocks, np.reshape(ticks, (-1, 4))]), lines, within)
     for text, corner in zip(texts, places, strict=True):
         if corner is None:
             text.remove()
@@ -155,3 +145,59 @@ def _names_to_draw(scene: DrawnScene, at, pixels, half: float) -> list[DrawnName
     middles = {name: pixels[scene.pipes[0][3] == k].reshape(-1, 2) for k, name in enumerate(scene.names)}
     pipes = [DrawnName(name, item[len(item) // 2], 4.0, look) for name, item in middles.items() if len(item)]
     return parts + pipes + joints
+
+
+def place_labels(at, sizes, gaps, blocks, lines, within) -> list[tuple[float, float] | None]:
+    """Lower left corner of each name [pixels], None for a name without free space; names are placed in order.
+
+    at, sizes : float64[n, 2]  points of the names, and widths and heights of the names [pixels]
+    gaps : float64[n]          distances from a point to its name [pixels]
+    blocks : float64[b, 4]     boxes (left, low, right, high) that names may not cover
+    lines : float64[l, 2]      points that names should not cover; each covered point has a cost
+    within : box (left, low, right, high) that contains all names
+    """
+    taken = [np.asarray(block, float) for block in blocks]
+    places: list[tuple[float, float] | None] = []
+    for (x, y), (wide, high), gap in zip(at, sizes, gaps, strict=True):
+        best, least = None, np.inf
+        for rank, (dx, dy) in enumerate(LABEL_PLACES):
+            reach = gap if 0 in (dx, dy) else 0.75 * gap
+            left = x + dx * reach - (0.5 - 0.5 * dx) * wide
+            low = y + dy * reach - (0.5 - 0.5 * dy) * high
+            box = np.array([left, low, left + wide, low + high])
+            wider = box + (-PADDING, 0.0, PADDING, 0.0)
+            if _is_outside(box, within) or any(_overlap(wider, other) for other in taken):
+                continue
+            cost = RANK_COST * rank + (_covered_points(box, lines) if len(lines) else 0)
+            if cost < least:
+                best, least = box, cost
+        places.append(None if best is None else (float(best[0]), float(best[1])))
+        if best is not None:
+            taken.append(best)
+    return places
+
+
+def _overlap(a, b) -> bool:
+    return bool(a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3])
+
+
+def _is_outside(box, within) -> bool:
+    return bool(box[0] < within[0] or box[1] < within[1] or box[2] > within[2] or box[3] > within[3])
+
+
+def _covered_points(box, points) -> int:
+    x, y = points[:, 0], points[:, 1]
+    return int(
+        ((x > box[0] - PADDING) & (x < box[2] + PADDING) & (y > box[1] - PADDING) & (y < box[3] + PADDING)).sum()
+    )
+
+
+def points_along(segments: np.ndarray) -> np.ndarray:
+    """Points along line segments at distances of about POINT_SPACING : float64[k, 2]. segments : float64[c, 2, 2]"""
+    if not len(segments):
+        return np.zeros((0, 2))
+    lengths = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
+    parts = [
+        np.linspace(a, b, max(2, int(length / POINT_SPACING))) for (a, b), length in zip(segments, lengths, strict=True)
+    ]
+    return np.concatenate(parts)

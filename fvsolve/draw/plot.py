@@ -1,20 +1,138 @@
-"""Figures of history.png (probes over time) and envelope.png (extreme heads along pipes)."""
+"""Figures of runs: history.png, envelope.png, long sections and phase planes.
 
-from __future__ import annotations
+Constant and duplicate curves are left out of history.png.
+"""
 
 import textwrap
+from dataclasses import dataclass
 
 import numpy as np
 
 from fvsolve.draw import style
-from fvsolve.draw.curve_selection import select_curves
 
+CONSTANT_TOLERANCE = 1e-9  # greatest range of a constant curve, as a fraction of its size
+SAME_TOLERANCE = 1e-3  # greatest difference of coinciding curves, as a fraction of the range of their panel
+ALIKE_TOLERANCE = (
+    1e-6  # greatest residual of a curve after scaling and shifting another to it, as a fraction of its range
+)
+OF_PRESSURE = ("pressure", "gauge_pressure", "head", "level")  # equivalent quantities at a fixed place
 MAX_PANELS = 6  # greatest number of panels
 MAX_LINES = 8  # greatest number of curves in a panel
 MAX_CONSTANTS = 4  # greatest number of constant probes with names
 LEGEND_WIDTH = 26  # letters of a line of a legend
 MAX_PIPES = 6  # greatest number of pipes drawn; the longest are chosen
 MAX_POINTS = 4000  # greatest number of rows drawn; of longer tables the extremes of bins are drawn
+LINE_LOOKS = {"vapour line": {"color": style.COLOURS[3], "linewidth": 1.2, "linestyle": ":"},
+         "class line": {"color": style.COLOURS[6], "linewidth": 1.4, "linestyle": "-."}}  # fmt: skip
+LIMIT_LOOKS = {"maximum": {"color": style.COLOURS[6], "linewidth": 1.1, "linestyle": (0, (9, 3))},
+          "minimum": {"color": style.COLOURS[6], "linewidth": 1.1,
+                      "linestyle": (0, (6, 2, 1.5, 2, 1.5, 2))}}  # fmt: skip
+MAX_NAME_LENGTH = 22  # greatest number of letters of a name over a chainage
+
+
+@dataclass
+class DrawnLine:
+    """Curve of a column of history.csv.
+
+    column : index of the column; names : places (part, and position on it) whose values the curve shows
+    alike : other quantities at the same place with an equivalent curve, which are not drawn
+    """
+
+    column: int
+    names: list[str]
+    alike: list[str]
+
+    @property
+    def label(self) -> str:
+        return ", ".join(self.names) + (f" ({', '.join(self.alike)} alike)" if self.alike else "")
+
+
+@dataclass
+class DrawnPanel:
+    """Curves of a panel, which have the same quantity and unit."""
+
+    quantity: str
+    unit: str
+    lines: list[DrawnLine]
+
+
+def select_curves(values: np.ndarray, probes, measured=()) -> tuple[list[DrawnPanel], list[tuple[str, str, float]]]:
+    """Panels with the curves to draw, and constant probes : (list of `DrawnPanel`, list of (probe, unit, value)).
+
+    values : float64[k, n]; probes : (name, unit) of each column
+    measured : names of probes with measurements, which are always drawn
+    """
+    swings = [_range_of(values[:, k]) for k in range(len(probes))]
+    still = [k for k, (name, _) in enumerate(probes) if swings[k] is None and name not in measured]
+    if len(still) == len(probes):
+        still = []  # if all probes are constant, all are drawn
+    panels: dict[tuple[str, str], DrawnPanel] = {}
+    leaders: dict[str, list[tuple[int, DrawnLine]]] = {}
+    for k, (name, unit) in enumerate(probes):
+        if k in still:
+            continue
+        place, quantity = _place_and_quantity(name)
+        line = DrawnLine(k, [place], [])
+        if name not in measured and quantity in OF_PRESSURE:
+            first = next(
+                (leader for j, leader in leaders.get(place, []) if _is_scaled(values[:, j], values[:, k])), None
+            )
+            if first is not None:
+                first.alike.append(quantity.replace("_", " "))
+                continue
+            leaders.setdefault(place, []).append((k, line))
+        panels.setdefault((quantity, unit), DrawnPanel(quantity, unit, [])).lines.append(line)
+    for panel in panels.values():
+        panel.lines = _without_doubles(panel.lines, values, probes, measured)
+    return list(panels.values()), [(*probes[k], float(values[0, k])) for k in still if len(values)]
+
+
+def _without_doubles(lines: list[DrawnLine], values: np.ndarray, probes, measured) -> list[DrawnLine]:
+    """Curves of a panel without duplicates: coinciding curves become one curve, which has the places of all in `names`.
+
+    A curve with measurements, or with quantities in `alike`, does not become part of another curve.
+    values, probes, measured : as for `select_curves`
+    """
+    seen = np.concatenate([values[:, line.column] for line in lines])
+    tolerance = SAME_TOLERANCE * np.ptp(seen[np.isfinite(seen)]) if np.isfinite(seen).any() else 0.0
+    result: list[DrawnLine] = []
+    for line in lines:
+        may_join = probes[line.column][0] not in measured and not line.alike
+        drawn = result if may_join else []
+        own = values[:, line.column]
+        under = next((other for other in drawn if _coincide(values[:, other.column], own, tolerance)), None)
+        if under is None:
+            result.append(line)
+        else:
+            under.names += line.names
+    return result
+
+
+def _place_and_quantity(probe: str) -> tuple[str, str]:
+    """Place and quantity of a probe: (`main at 0.5`, `pressure`) for `main.pressure@0.5`."""
+    path, _, spot = probe.partition("@")
+    place, _, quantity = path.rpartition(".")
+    return place + (f" at {spot}" if spot else ""), quantity
+
+
+def _range_of(values: np.ndarray) -> float | None:
+    """Range of a curve; None if it is constant."""
+    finite = values[np.isfinite(values)]
+    swing = float(np.ptp(finite)) if finite.size else 0.0
+    return swing if swing > CONSTANT_TOLERANCE * float(np.abs(finite).max(initial=0.0)) else None
+
+
+def _coincide(a: np.ndarray, b: np.ndarray, tolerance: float) -> bool:
+    return bool(np.array_equal(np.isnan(a), np.isnan(b)) and not (np.abs(a - b) > tolerance).any())
+
+
+def _is_scaled(a: np.ndarray, b: np.ndarray) -> bool:
+    """True if curve b is curve a times a positive factor plus a constant; False if either is constant or not finite."""
+    low, high = int(a.argmin()), int(a.argmax())
+    if not (np.isfinite(a).all() and np.isfinite(b).all() and a[low] < a[high]):
+        return False
+    scale = (b[high] - b[low]) / (a[high] - a[low])
+    return bool(scale > 0.0 and np.abs(b - b[low] - scale * (a - a[low])).max() <= ALIKE_TOLERANCE * np.ptp(b))
 
 
 @style.without_markup
@@ -32,10 +150,10 @@ def history_figure(t, values, probes, time_unit="s", marks=(), measured=None, ti
     rows = figure.subplots(max(len(drawn), 1), 1, sharex=True, squeeze=False)[:, 0]
     for axes, panel in zip(rows, drawn, strict=False):
         _panel(axes, t, values, probes, panel.lines, measured or {}, still if axes is rows[-1] else [])
-        axes.set_ylabel(f"{panel.quantity.replace('_', ' ')} [{panel.unit}]", fontsize=8.5, color=style.INK)
+        style.name_axes(axes, y=f"{panel.quantity.replace('_', ' ')} [{panel.unit}]")
     for axes in rows:
         _shade(axes, t, marks, first=axes is rows[0])
-    rows[-1].set_xlabel(f"time [{time_unit}]", fontsize=8.5, color=style.INK)
+    style.name_axes(rows[-1], f"time [{time_unit}]")
     figure.align_ylabels(rows)
     style.title(figure, title)
     return figure
@@ -60,7 +178,7 @@ def envelope_figure(envelope, units, title=""):
     for axes in list(grid.flat)[len(names) :]:
         axes.set_visible(False)
     for axes in grid[:, 0]:
-        axes.set_ylabel(f"head [{units['max_head']}]", fontsize=8.5, color=style.INK)
+        style.name_axes(axes, y=f"head [{units['max_head']}]")
     figure.supxlabel(f"distance from the start of the pipe [{units['distance']}]", fontsize=8.5, color=style.INK)
     handles = {
         label: handle for axes in grid.flat for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
@@ -95,9 +213,8 @@ def _panel(axes, t, values, probes, lines, measured, still) -> None:
     style.style_axes(axes)
     for i, curve in enumerate(lines[:MAX_LINES]):
         name, colour = probes[curve.column][0], style.COLOURS[i % len(style.COLOURS)]
-        axes.plot(
-            *thin_series(t, values[:, curve.column]), color=colour, linewidth=1.0, label=_wrapped_label(curve.label)
-        )
+        label = textwrap.fill(curve.label, LEGEND_WIDTH, break_long_words=False)  # the legend stays narrow
+        axes.plot(*thin_series(t, values[:, curve.column]), color=colour, linewidth=1.0, label=label)
         if name in measured:
             axes.plot(*measured[name], ":", color=colour, linewidth=1.4, label=f"{curve.label}, measured")
     if len(lines) > MAX_LINES:
@@ -115,11 +232,6 @@ def _panel(axes, t, values, probes, lines, measured, still) -> None:
     style.legend(axes)
 
 
-def _wrapped_label(label: str) -> str:
-    """Label broken into lines, so that the legend stays narrow."""
-    return textwrap.fill(label, LEGEND_WIDTH, break_long_words=False)
-
-
 def _shade(axes, t, marks, first: bool) -> None:
     if not marks or not len(t):
         return
@@ -129,17 +241,9 @@ def _shade(axes, t, marks, first: bool) -> None:
     late = begun > 0.5 * (t[0] + t[-1])
     offset = 28 if begun < t[0] + 0.05 * (t[-1] - t[0]) else 4  # leaves space for the power of ten of the axis
     if first:
-        axes.annotate(
-            f"not to be trusted from here: {cause}",
-            (begun, 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(-4 if late else offset, 2),
-            textcoords="offset points",
-            ha="right" if late else "left",
-            va="bottom",
-            fontsize=7.5,
-            color=style.DOUBT,
-        )
+        place = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "va": "bottom"}
+        axes.annotate(f"not to be trusted from here: {cause}", (begun, 1.0), xytext=(-4 if late else offset, 2),
+                      ha="right" if late else "left", fontsize=7.5, color=style.DOUBT, **place)  # fmt: skip
 
 
 def _profile(axes, arrays, hilly: bool) -> None:
@@ -155,3 +259,85 @@ def _profile(axes, arrays, hilly: bool) -> None:
     if hilly:  # if all elevations are zero, they would only compress the heads
         axes.plot(x, ground, color=style.MUTED, linewidth=1.8, label="pipe")
     axes.set_xlim(0.0, x[-1] + x[0])
+
+
+@style.without_markup
+def section_figure(section, window, units, title=""):
+    """Figure of heads along a path, with pipe, vapour line, pressure class and limits; shaded where cavities formed.
+
+    section, window : `Section` of `fvsolve.report.long_section`, and its `HeadWindow`; units : quantity -> unit
+    """
+    figure = style.figure(9.2)
+    axes = figure.subplots()
+    style.style_axes(axes)
+    for a, b in section.cavity_spans:
+        axes.axvspan(a, b, color=style.COLOURS[3], alpha=0.15, linewidth=0)
+    k, posts = section.drawn_indices(), [device.chainage for device in section.devices]
+    chainage, along = section.chainage[k], {name: values[k] for name, values in section.along.items()}
+    high, low = along["max_head"], along["min_head"]
+    axes.fill_between(chainage, low, high, color=style.COLOURS[0], alpha=0.08, linewidth=0)
+    axes.plot(chainage, high, color=style.COLOURS[0], linewidth=1.4, label="maximum head")
+    axes.plot(chainage, low, color=style.COLOURS[1], linewidth=1.4, label="minimum head")
+    axes.plot(chainage, along["initial_head"], color=style.INK, linewidth=0.9, linestyle=(0, (5, 3)),
+              label="initial head")  # fmt: skip
+    axes.plot(chainage, along["elevation"], color=style.MUTED, linewidth=2.4, label="pipe")
+    for name, line in section.lines.items():
+        look = LINE_LOOKS.get(name) or LIMIT_LOOKS[name.rpartition(", ")[2]]
+        axes.plot(chainage, line[k], label=name, **look)
+    if section.cavity_spans:
+        axes.fill_between([], [], color=style.COLOURS[3], alpha=0.3, label="vapour pressure reached")
+    if section.violations:
+        at, heads, _ = zip(*section.violations, strict=True)
+        axes.plot(at, heads, "x", color=style.DOUBT, markersize=7, markeredgewidth=2.0, clip_on=False, zorder=5,
+                  label="limit passed")  # fmt: skip
+    axes.set_xlim(min([chainage[0], *posts]), max([chainage[-1], *posts]))
+    axes.set_ylim(window.low, window.high)
+    red = style.COLOURS[6]
+    for limits, edge in ((window.above, 1), (window.below, 0)):
+        if limits:
+            axes.annotate("\n".join(limits), (0.97, edge), xycoords="axes fraction", xytext=(0, -22 if edge else 22),
+                          textcoords="offset points", ha="right", va="top" if edge else "bottom", fontsize=8,
+                          color=red, arrowprops={"arrowstyle": "->", "color": red, "relpos": (1, edge)})  # fmt: skip
+    for x in posts:
+        axes.axvline(x, color=style.HAIR, linewidth=0.8, zorder=0)
+    for x, names, stands in section.labels():
+        axes.annotate(short_name(names), (x, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 4), rotation=40,
+                      fontsize=7.5, textcoords="offset points", color=style.INK if stands else style.MUTED)  # fmt: skip
+    style.name_axes(axes, f"chainage [{units['distance']}]", f"head [{units['max_head']}]")
+    figure.legend(loc="outside lower center", ncols=4, handlelength=3, frameon=False, fontsize=8, labelcolor=style.INK)
+    style.title(figure, title)
+    return figure
+
+
+@style.without_markup
+def phase_figure(pairs, title=""):
+    """Figure with a phase plane for each pair of probes; a dot marks the start.
+
+    pairs : list of (probe of x, probe of y), each probe as (name, unit, values : float64[k])
+    """
+    across = min(len(pairs), 2)
+    down = -(-len(pairs) // across)
+    figure = style.figure(0.6 + (4.4 if across == 1 else 3.6) * down, width=5.6 if across == 1 else style.WIDTH)
+    grid = figure.subplots(down, across, squeeze=False)
+    for axes, (x, y) in zip(grid.flat, pairs, strict=False):
+        style.style_axes(axes)
+        axes.margins(0.05)
+        axes.plot(*_thin_path(x[2], y[2]), color=style.COLOURS[0], linewidth=1.0)
+        axes.plot(x[2][:1], y[2][:1], "o", color=style.COLOURS[1], markersize=5)
+        style.name_axes(axes, f"{x[0]} [{x[1]}]", f"{y[0]} [{y[1]}]")
+    for axes in list(grid.flat)[len(pairs) :]:
+        axes.set_visible(False)
+    style.title(figure, title)
+    return figure
+
+
+def short_name(text: str) -> str:
+    """Name over a chainage; a text longer than `MAX_NAME_LENGTH` is cut."""
+    return text if len(text) <= MAX_NAME_LENGTH else f"{text[: MAX_NAME_LENGTH - 1]}\u2026"
+
+
+def _thin_path(x, y) -> tuple:
+    """Reduce a long path (x, y) to the extremes of both coordinates in bins of consecutive points : (x, y)."""
+    rows = np.arange(len(x), dtype=float)
+    indices = np.union1d(thin_series(rows, x)[0], thin_series(rows, y)[0]).astype(int)
+    return x[indices], y[indices]

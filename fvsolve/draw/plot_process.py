@@ -60,13 +60,9 @@ class PlotProcess:
         # A process group of its own: Ctrl-C must interrupt only the run, which then reports on pictures.
         options = {"start_new_session": True} if os.name == "posix" else {"creationflags": 0x200}
         with contextlib.suppress(OSError):  # the system allows no second process
-            self.process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "fvsolve.draw.plot_process"],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                env=os.environ | {"PYTHONPATH": path},
-                **options,
-            )
+            self.process = subprocess.Popen([sys.executable, "-P", "-m", "fvsolve.draw.plot_process"],
+                                            stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                            env=os.environ | {"PYTHONPATH": path}, **options)  # fmt: skip
 
     def draw(self, pictures: Iterable[Picture]) -> dict[Path, str]:
         """Write pictures; returns the error text of each picture that could not be drawn, by its path."""

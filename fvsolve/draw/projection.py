@@ -1,7 +1,5 @@
 """Projection of points in space onto the picture plane, and axes of the projected scene."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -14,11 +12,8 @@ LARGE_NETWORK_VIEW = (0.2, -1.0, 2.0)  # direction to the observer for large net
 HEIGHT_SHARE = 0.4  # drawn height of a network as a fraction of its width
 STRAIGHT_TOLERANCE = 1e-6  # width over length up to which a network counts as straight and is drawn in profile
 TICK_SPACING = 40.0  # least distance of ticks [points]
-TICK_LENGTH, LABEL_OFFSET, TITLE_OFFSET = (
-    5.0,
-    9.0,
-    42.0,
-)  # distances from an edge: end of ticks, tick labels, axis name [points]
+# Distances from an edge: end of ticks, tick labels, axis name [points].
+TICK_LENGTH, LABEL_OFFSET, TITLE_OFFSET = 5.0, 9.0, 42.0
 PLAUSIBLE_SCALE = (0.3, 1.02)  # range of drawn length / length of pipes for a plan that is to scale
 
 
@@ -63,11 +58,8 @@ def choose_projection(points: np.ndarray, large: bool = False, slant: float = 1.
         return Projection("profile", along=np.where(np.abs(along) < STRAIGHT_TOLERANCE, 0.0, along))
     if spans[2] <= 1e-9 * max(spans):
         return Projection("plan")
-    return Projection(
-        "aslant",
-        slant * round_scale(HEIGHT_SHARE * max(spans[:2]) / (slant * spans[2])),
-        seen=LARGE_NETWORK_VIEW if large else NETWORK_VIEW,
-    )
+    rise = slant * round_scale(HEIGHT_SHARE * max(spans[:2]) / (slant * spans[2]))
+    return Projection("aslant", rise, seen=LARGE_NETWORK_VIEW if large else NETWORK_VIEW)
 
 
 def round_scale(value: float) -> float:
@@ -119,15 +111,10 @@ def draw_box(axes, aspect: Projection, low, high, names: tuple[str, str, str]) -
         out = np.array([along[1], -along[0]])
         out *= 1.0 if out @ (ends.mean(axis=0) - middle) > 0.0 else -1.0
         pixels = np.linalg.norm(np.diff(axes.transData.transform(ends), axis=0))
-        count = max(
-            1, min(6, int(pixels / (axes.figure.dpi / 72.0 * (TICK_SPACING if axis < 2 else 0.6 * TICK_SPACING))))
-        )
-        ticks = [
-            t
-            for t in MaxNLocator(count, steps=[1, 2, 2.5, 5, 10]).tick_values(a, b)
-            if a - 1e-9 * (b - a) <= t <= b + 1e-9 * (b - a)
-        ]
-        for tick in ticks:
+        spacing = TICK_SPACING if axis < 2 else 0.6 * TICK_SPACING
+        count = max(1, min(6, int(pixels / (axes.figure.dpi / 72.0 * spacing))))
+        ticks, beyond = MaxNLocator(count, steps=[1, 2, 2.5, 5, 10]).tick_values(a, b), 1e-9 * (b - a)
+        for tick in [tick for tick in ticks if a - beyond <= tick <= b + beyond]:
             at = ends[0] + (tick - a) / (b - a) * (ends[1] - ends[0])
             texts.append(_write(axes, at, out, f"{tick:.6g}", LABEL_OFFSET, style.INK, 7.5))
             axes.annotate("", at, xytext=tuple(TICK_LENGTH * out), textcoords="offset points", annotation_clip=False,

@@ -1,13 +1,64 @@
-"""Sheet of a picture: title, axes, colour bar, symbols and their legend."""
+"""Sheet of a picture: title, axes, colour bar, symbols of parts and their legend, and files of frames.
 
-from __future__ import annotations
+A symbol is a text of strokes in a square from -1 to 1, with the flow along x. `M x y` moves and `L x y` draws to a
+point, `Z` closes a stroke, `O x y r` is a circle. Closed strokes are filled white, after `*` with ink, after `~` with
+the colour of water. A kind without a symbol uses the symbol of the kind from which it is derived (an orifice is a
+valve), else OTHER_NODE or OTHER_LINK: a new kind of part needs no entry here.
+"""
+
+import math
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from fvsolve.draw import style
-from fvsolve.draw.symbols import WATER, strokes, symbol_of
 from fvsolve.errors import visible
 
+VALVE_BODY = "M -1 -.6 L 1 .6 L 1 -.6 L -1 .6 Z"
+VALVE_STEM = "M 0 0 L 0 .7"
+CAPSULE = "M -.7 -.9 L .7 -.9 L .7 .4 L .55 .75 L .3 .93 L 0 1 L -.3 .93 L -.55 .75 L -.7 .4 Z"
+FILLED_BOX = "M -.8 -.8 L -.8 .8 L .8 .8 L .8 -.8 Z"
+SYMBOLS = {
+    "junction": "* O 0 0 .32",
+    "reservoir": "M -.9 .7 L .9 .7 L 0 -.5 Z M -.6 -.75 L .6 -.75 M -.3 -1 L .3 -1",  # a free surface
+    "tank": "M -.75 .9 L -.75 -.9 L .75 -.9 L .75 .9 Z ~ M -.75 .2 L -.75 -.9 L .75 -.9 L .75 .2 Z",
+    "basin": "M -1 .5 L -1 -.6 L 1 -.6 L 1 .5 Z ~ M -1 .1 L -.5 .25 L 0 .1 L .5 .25 L 1 .1 L 1 -.6 L -1 -.6 Z",
+    "accumulator": f"{CAPSULE} ~ M -.7 0 L -.7 -.9 L .7 -.9 L .7 0 Z",
+    "chamber": "O 0 0 .8",
+    "inflow": "* M -.2 -.5 L -.2 .5 L .9 0 Z M -1 0 L -.2 0",
+    "air-valve": "O 0 -.2 .65 M 0 .45 L 0 1 M -.3 .7 L 0 1 L .3 .7",
+    "valve": VALVE_BODY,
+    "orifice": "M 0 1 L 0 .3 M 0 -1 L 0 -.3 M -.25 1 L .25 1 M -.25 -1 L .25 -1",
+    "leak": "M 0 .9 L .55 -.2 L .4 -.7 L 0 -.9 L -.4 -.7 L -.55 -.2 Z",
+    "check-valve": "* M -.8 -.7 L -.8 .7 L .7 0 Z M .75 -.8 L .75 .8",
+    "relief-valve": f"{VALVE_BODY} M 0 0 L -.25 .25 L .25 .45 L -.25 .65 L .25 .85 L 0 1",  # its spring
+    "surge-anticipating": f"{VALVE_BODY} {VALVE_STEM} * O 0 .75 .25",  # its pilot
+    "rupture-disc": "M -.8 -.7 L -.8 .7 L .8 .7 L .8 -.7 Z M -.2 -.7 L .1 -.35 L .2 0 L .1 .35 L -.2 .7",
+    "pressure-reducing": f"{VALVE_BODY} {VALVE_STEM} M -.5 .6 L -.3 1 L .3 1 L .5 .6 Z * M 0 0 L 1 .6 L 1 -.6 Z",
+    "pressure-sustaining": f"{VALVE_BODY} {VALVE_STEM} M -.5 .6 L -.3 1 L .3 1 L .5 .6 Z * M 0 0 L -1 .6 L -1 -.6 Z",
+    "flow-control": f"{VALVE_BODY} {VALVE_STEM} M -.5 .6 L -.3 1 L .3 1 L .5 .6 Z",
+    "pump": "O 0 0 .9 * M -.4 .7 L -.4 -.7 L .85 0 Z",
+    "turbine": "O 0 0 .9 * M .4 .7 L .4 -.7 L -.85 0 Z",
+    "spool-valve": "M -1 -.4 L -1 .4 L 1 .4 L 1 -.4 Z M -.35 -.4 L -.35 .4 M .35 -.4 L .35 .4 M -.8 -.3 L -.5 .3",
+    "cylinder": "M -1 -.5 L -1 .5 L .6 .5 L .6 -.5 Z * M -.25 -.5 L -.25 .5 L -.05 .5 L -.05 -.5 Z M 0 0 L 1 0",
+    "rigid-column": "* M -1 -.2 L -1 .2 L 1 .2 L 1 -.2 Z",
+    "bushing": "M -.8 -.4 L .8 -.4 M -.8 .4 L .8 .4 * M -.6 -.15 L -.6 .15 L .6 .15 L .6 -.15 Z",
+    "pin": "O 0 0 .6 * O 0 0 .2",
+    "mass": f"* {FILLED_BOX}",
+    "body": "* M -.9 -.3 L -.9 .3 L .9 .3 L .9 -.3 Z",
+    "frame": "M -1 .3 L 1 .3 M -.8 -.3 L -.4 .3 M -.2 -.3 L .2 .3 M .4 -.3 L .8 .3",
+    "spring": "M -1 0 L -.7 0 L -.5 .5 L -.1 -.5 L .3 .5 L .7 -.5 L .8 0 L 1 0",
+    "damper": "M -1 0 L -.1 0 M -.1 -.35 L -.1 .35 M .5 -.5 L -.5 -.5 M .5 .5 L -.5 .5 M .5 -.5 L .5 .5 M .5 0 L 1 0",
+    "end-stop": "M -1 0 L .2 0 M .2 -.5 L .2 .5 * M .5 -.8 L .5 .8 L .8 .8 L .8 -.8 Z",
+    "force": "M -1 0 L .3 0 * M .3 -.4 L .3 .4 L 1 0 Z",
+    "torque": "M .5 -.6 L -.2 -.75 L -.75 -.2 L -.7 .4 L -.1 .75 L .4 .6 * M .3 .95 L .8 .3 L 0 .25 Z",
+}
+OTHER_NODE, OTHER_LINK = FILLED_BOX, "M -1 0 L 0 .7 L 1 0 L 0 -.7 Z"
+
+WATER = "#8ab6d6"
 SIZE = (10.0, 6.0)  # [inch]
 DPI, ANIMATION_DPI = 150, 100  # resolution of a picture, and of an animation [dots per inch]
 COLOUR_MAP = "viridis"
@@ -16,11 +67,46 @@ HEAD_HEIGHT = 0.62  # height above the axes for the title [inch]
 MARGIN = 0.62  # margin of axes with ticks [inch]
 HALF_SYMBOL = 8.0  # half width of a symbol [points]
 EVEN_RANGE = 0.05  # half width of the colour range of a uniform field, as a fraction of its value
-EVEN_TOLERANCE, ZERO_TOLERANCE = (
-    1e-9,
-    1e-3,
-)  # relative range of a uniform field; ends of the range shown as zero, as a fraction of it
+EVEN_TOLERANCE = 1e-9  # relative range of a uniform field
+ZERO_TOLERANCE = 1e-3  # end of a range that is shown as zero, as a fraction of the range
 LEGEND_ROWS = 4  # rows of the legend
+FRAME_TIME = 100  # duration of a frame [ms]
+
+
+def symbol_of(kinds: Sequence[str], link: bool) -> str:
+    """Symbol of a part, as a text of strokes (see `strokes`).
+
+    kinds : kind of the part and the kinds from which it is derived, nearest first; link : True for a link
+    """
+    return next((SYMBOLS[kind] for kind in kinds if kind in SYMBOLS), OTHER_LINK if link else OTHER_NODE)
+
+
+@cache
+def strokes(symbol: str) -> list[tuple[str, tuple[tuple[float, float], ...], bool]]:
+    """Strokes of a symbol in the order of drawing : list of (fill, points, True if closed).
+
+    fill : "white", "ink" or "water"
+    """
+    result: list[tuple[str, list, bool]] = []
+    words, at, fill = symbol.split(), 0, "white"
+    while at < len(words):
+        word = words[at]
+        if word in "*~":
+            fill, at = {"*": "ink", "~": "water"}[word], at + 1
+        elif word == "Z":
+            result[-1] = (*result[-1][:2], True)
+            fill, at = "white", at + 1
+        elif word == "O":
+            x, y, r = map(float, words[at + 1 : at + 4])
+            angles = [k * math.pi / 16 for k in range(32)]
+            result.append((fill, [(x + r * math.cos(angle), y + r * math.sin(angle)) for angle in angles], True))
+            fill, at = "white", at + 4
+        else:
+            if word == "M":
+                result.append((fill, [], False))
+            result[-1][1].append((float(words[at + 1]), float(words[at + 2])))
+            at += 3
+    return [(fill, tuple(points), closed) for fill, points, closed in result]
 
 
 class PictureSheet:
@@ -50,11 +136,7 @@ class PictureSheet:
     def caption(self, title: str, below: str) -> None:
         """Set the title, and the smaller line below it."""
         for text, content in zip(self._captions, (title, below), strict=True):
-            text.set_text(
-                visible(
-                    content if len(content) <= style.MAX_TITLE_LENGTH else content[: style.MAX_TITLE_LENGTH - 3] + "..."
-                )
-            )
+            text.set_text(visible(style.cut_title(content)))
 
     def bar(self, limits: tuple[float, float], label: str) -> list[str]:
         """Draw the colour bar with a label; return the texts of its ticks. limits : values at the ends of the bar"""
@@ -126,3 +208,25 @@ def colour_range(low: float, high: float) -> tuple[float, float]:
         return tuple(0.0 if abs(end) < ZERO_TOLERANCE * (high - low) else end for end in (low, high))
     middle, half = 0.5 * (low + high), EVEN_RANGE * most or 0.5
     return middle - half, middle + half
+
+
+def write_animation(stage: Any, count: int, out: Path) -> None:
+    """Write a single frame as a picture, several frames as an animation (.gif or .mp4), to the file `out`.
+
+    stage : object whose `show(k)` draws frame k on its `sheet`; count : number of frames
+    """
+    from PIL import Image
+
+    pictures = []
+    for k in range(count):
+        stage.show(k)
+        pictures.append(stage.sheet.picture())
+    if count == 1:
+        Image.fromarray(pictures[0]).save(out, optimize=True)
+    elif out.suffix == ".mp4":
+        import imageio
+
+        imageio.mimsave(out, pictures, fps=1000 // FRAME_TIME, macro_block_size=1)
+    else:
+        drawn = [Image.fromarray(picture).quantize(255) for picture in pictures]
+        drawn[0].save(out, save_all=True, append_images=drawn[1:], duration=FRAME_TIME, loop=0)

@@ -1,7 +1,5 @@
 """Style of pictures: colours, figures, axes, legends and titles."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 
@@ -63,6 +61,13 @@ def style_axes(axes) -> None:
     axes.yaxis.get_offset_text().set(fontsize=8, color=MUTED)
 
 
+def name_axes(axes, x: str = "", y: str = "") -> None:
+    """Write the names of the axes, except empty names."""
+    for write, name in ((axes.set_xlabel, x), (axes.set_ylabel, y)):
+        if name:
+            write(name, fontsize=8.5, color=INK)
+
+
 def label_decades(axes) -> None:
     """Label logarithmic axes only at powers of ten, unless an axis spans less than a decade."""
     from matplotlib.ticker import NullFormatter
@@ -77,19 +82,16 @@ def label_decades(axes) -> None:
 def legend(axes) -> None:
     """Draw the legend to the right of the axes, where it does not cover any curve. Without labels nothing is drawn."""
     if axes.get_legend_handles_labels()[0]:
-        axes.legend(
-            loc="upper left",
-            bbox_to_anchor=(1.005, 1.02),
-            frameon=False,
-            fontsize=8,
-            labelcolor=INK,
-            handlelength=1.4,
-            borderaxespad=0.0,
-        )
+        axes.legend(loc="upper left", bbox_to_anchor=(1.005, 1.02), frameon=False, fontsize=8, labelcolor=INK,
+                    handlelength=1.4, borderaxespad=0.0)  # fmt: skip
+
+
+def cut_title(text: str) -> str:
+    """Text of a title; a text longer than `MAX_TITLE_LENGTH` is cut."""
+    return text if len(text) <= MAX_TITLE_LENGTH else text[: MAX_TITLE_LENGTH - 3] + "..."
 
 
 def title(fig, text: str) -> None:
-    """Set the title of a figure; a text longer than `MAX_TITLE_LENGTH` is cut."""
-    text = text if len(text) <= MAX_TITLE_LENGTH else text[: MAX_TITLE_LENGTH - 3] + "..."
+    """Set the title of a figure, see `cut_title`."""
     if text:
-        fig.suptitle(visible(text), fontsize=10.5, color=INK, x=0.012, ha="left")
+        fig.suptitle(visible(cut_title(text)), fontsize=10.5, color=INK, x=0.012, ha="left")

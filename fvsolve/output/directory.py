@@ -1,31 +1,67 @@
-"""Run directory: the object that writes all files of a run, and functions that read and clear the directory."""
-
-from __future__ import annotations
+"""Run directory: the object that writes all files of a run, and functions that lock, read and clear the directory."""
 
 import contextlib
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
+from filelock import FileLock, Timeout
+
 from fvsolve.case.resource_checks import LEAST_TEXT, byte_text, disk_size
 from fvsolve.errors import RunError
-from fvsolve.output.envelope import envelope_in_units, read_envelope, with_initial_heads, write_envelope
+from fvsolve.output.csv_files import (
+    HistoryFile,
+    LineSeries,
+    clear_lines,
+    envelope_in_units,
+    read_envelope,
+    read_table,
+    with_initial_heads,
+    write_envelope,
+    write_routes,
+)
 from fvsolve.output.fields import FieldSeries
-from fvsolve.output.history_file import HistoryFile, read_table
-from fvsolve.output.line_files import LineSeries, clear_lines
-from fvsolve.output.lock import lock_folder, release
 from fvsolve.output.parallel_vtk import ParallelBasinWriter
 from fvsolve.output.restart import Restart, identity, read_restart, write_restart
-from fvsolve.output.route_table import write_routes
 from fvsolve.output.summary_file import read_summary
 from fvsolve.output.unit_columns import probe_columns, time_column
 
+LOCK_FILE = ".lock"
 RUN_FILES = ("restart.npz", "history.csv", "envelope.csv", "routes.csv", "fields.pvd", "case.toml")
 SUMMARY_FILE = "summary.json"
 PICTURE_FILES = ("history.png", "envelope.png")
 # Files of `fvsolve report` and `plot`; those of an earlier run are deleted, since they show other numbers.
 REPORT_FILES = ("report.html", "report.xlsx", "section.png", "probes.png", "phase.png")
 PICTURE_PATTERNS = ("section-*.png", "view-*.png", "view-*.gif")  # the last two of `fvsolve view`
+
+
+def lock_folder(folder: Path, writer: str) -> FileLock:
+    """Create a folder if needed and lock it; return the lock.
+
+    writer : name of another user of the folder in the message, for example "a run"
+    Raises RunError if another process has locked the folder, or it cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = FileLock(folder / LOCK_FILE, blocking=False, thread_local=False, fallback_to_soft=False)
+        lock.acquire()
+    except Timeout:
+        raise RunError(f"{folder} is in use: {writer} still writes there. Wait until it ends, stop it, or choose "
+                       "another directory with --out DIR") from None  # fmt: skip
+    except NotImplementedError:
+        raise RunError(f"{folder} is on a file system without locks; choose another directory with --out DIR") from None
+    except OSError as error:
+        text = f"{folder}: cannot be written: {error.strerror or error}"
+        raise RunError(f"{text}; choose another directory with --out DIR") from None
+    return lock
+
+
+def release(lock: FileLock) -> None:
+    """Release a lock if it is held and delete its file; waiting processes then lock a new file."""
+    if lock.is_locked:
+        with contextlib.suppress(OSError):  # Windows cannot delete an open file
+            Path(lock.lock_file).unlink()
+        lock.release()
 
 
 class RunDirectory:
@@ -80,16 +116,18 @@ class RunDirectory:
             (self.folder / name).unlink(missing_ok=True)
         clear_reports(self.folder)
         if self.restart is None:
-            self._start()
+            clear_run_files(self.folder)
+            for series in (self.history, self.fields, self.lines):
+                if series:
+                    series.start()
             self._write_case()
             self.checkpoint(state, {})
             return
         self._write_case()
         self.history.continue_from(self.restart.rows, self.restart.history_bytes)
-        if self.fields:
-            self.fields.continue_from(self.restart.frames)
-        if self.lines:
-            self.lines.continue_from(self.restart.frames)
+        for series in (self.fields, self.lines):
+            if series:
+                series.continue_from(self.restart.frames)
 
     def rows(self, t, values) -> None:
         """Append rows of probe values to history.csv. t : float64[k] [s]; values : float64[k, probes] in SI"""
@@ -177,14 +215,6 @@ class RunDirectory:
         if restart and restart.t > self.model.case.numerics.end:
             raise RunError(f"{path} is at t = {restart.t:.6g} s, after numerics.end; start the run again with --force")
         return restart
-
-    def _start(self) -> None:
-        clear_run_files(self.folder)
-        self.history.start()
-        if self.fields:
-            self.fields.start()
-        if self.lines:
-            self.lines.start()
 
     def _write_case(self) -> None:
         case = self.model.case

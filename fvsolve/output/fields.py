@@ -1,10 +1,9 @@
 """Fields of a run: the index fields.pvd and its .vtu files with the values of all cells at the output times.
 
-Pipes are chains of line cells along the network layout, with the elevation upwards. Cell data are in SI, pressures are
-absolute, and every array carries its unit as the VTK key UNITS_LABEL.
+Pipes are chains of line cells along the network layout, with the elevation upwards. Bodies are lines from the origin to
+the centre of mass and to the points; force elements are lines, and a sloshing mass is a line from its rest position to
+its position. Cell data are in SI, pressures are absolute, and every array carries its unit as the VTK key UNITS_LABEL.
 """
-
-from __future__ import annotations
 
 import html
 import re
@@ -14,6 +13,8 @@ import numpy as np
 
 from fvsolve.case.basins import patch_names
 from fvsolve.errors import RunError
+from fvsolve.kernels.dtypes import BODY_OUT, PRISMATIC
+from fvsolve.kernels.mechanism.body_layout import ATTITUDE, POSITION, SPIN, VELOCITY
 from fvsolve.output import network_layout
 
 FIELD_UNITS = {
@@ -22,12 +23,78 @@ FIELD_UNITS = {
 UNIT_XML = '<InformationKey name="UNITS_LABEL" location="vtkDataArray">{}</InformationKey>\n'
 ARRAY_END = b"</DataArray>"
 FILE_ATTRIBUTE = re.compile('file="([^"]+)"')
-
 PVD_HEAD = """<?xml version="1.0"?>
 <VTKFile type="Collection" version="0.1" byte_order="LittleEndian">
 <Collection>
 """
 PVD_TAIL = "</Collection>\n</VTKFile>\n"
+
+
+def body_points(body) -> list[tuple[float, ...]]:
+    """Points of a body in its axes, without repetition: origin, centre of mass, then its named points [m]."""
+    return list(dict.fromkeys([(0.0, 0.0, 0.0), tuple(body.centre_of_mass), *map(tuple, body.points.values())]))
+
+
+class BodyLines:
+    """Points fixed to bodies or to the world, and lines between them.
+
+    owner : int[p]         body of each point, -1 for the world
+    place : float64[p, 3]  coordinates of each point in the axes of its owner [m]
+    lines : int[l, 2]      points at the ends of each line
+    line_body : int32[l]   body of each line, -1 for none
+    """
+
+    def __init__(self, model) -> None:
+        self.model, names = model, model.body_names
+        owner, place, lines, line_body = [], [], [], []
+        drawn = [body_points(model.case.nodes[name]) if name in model.case.nodes else [] for name in names]
+        dots = max(map(len, drawn)) < 2  # if others have extent, a body with only an origin is just a joint of them
+        for i, ends in enumerate(drawn):
+            first = len(owner)
+            if not ends and (row := model.tables.bodies[i])["joint"] == PRISMATIC:  # a mode of water in a tank
+                owner += [int(row["parent"]), i]
+                place += [tuple(row["at"]), (0.0, 0.0, 0.0)]
+            elif len(ends) > 1 or (ends and dots):
+                owner += [i] * len(ends)
+                place += ends
+            if len(owner) > first:
+                lines += [(first, first + k) for k in range(1, len(owner) - first)] or [(first, first)]
+                line_body += [i] * max(len(owner) - first - 1, 1)
+        for row in model.tables.lines:
+            if min(row["from_point"], row["to_point"]) >= 0:
+                for key in ("from_point", "to_point"):
+                    point = model.tables.points[row[key]]
+                    owner.append(int(point["body"]))
+                    place.append(tuple(point["place"]))
+                lines.append((len(owner) - 2, len(owner) - 1))
+                line_body.append(-1)
+        self.owner, self.place = np.array(owner), np.array(place, dtype=float).reshape(-1, 3)
+        self.lines, self.line_body = np.array(lines).reshape(-1, 2), np.array(line_body, dtype=np.int32)
+
+    def at(self, out: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Points in world axes [m], and speeds of the midpoints of lines [m/s] : float64[p, 3], float64[l].
+
+        out : output array of the right-hand side, which contains the motion of the bodies
+        """
+        points, speed = world_points(self.model, out, self.owner, self.place)
+        return points, np.linalg.norm(speed[self.lines].mean(axis=1), axis=1)
+
+
+def world_points(model, out: np.ndarray, owner: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """World coordinates [m] and velocities [m/s] of points fixed to bodies : float64[p, 3] each.
+
+    out : output array of the right-hand side, which contains the motion of the bodies
+    owner : int[p]         body of each point, -1 for the world
+    place : float64[p, 3]  coordinates in the axes of the body [m]
+    """
+    first, n = int(model.layout["body"]), len(model.body_names)
+    points, speed = place.copy(), np.zeros_like(place)
+    for i, row in enumerate(out[first : first + BODY_OUT * n].reshape(n, BODY_OUT)):
+        own = owner == i
+        arms = place[own] @ row[ATTITUDE : ATTITUDE + 9].reshape(3, 3).T
+        points[own] = row[POSITION : POSITION + 3] + arms
+        speed[own] = row[VELOCITY : VELOCITY + 3] + np.cross(row[SPIN : SPIN + 3], arms)
+    return points, speed
 
 
 class FieldSeries:
@@ -40,21 +107,18 @@ class FieldSeries:
         self.folder, self.model, self.pieces = folder, model, None
         self.frames = 0
         places = {basin.name: np.array(basin.part.position or (0.0, 0.0)) for basin in model.basins}
-        self.places = places
         if model.pipes:
-            self.places = places = network_layout.plan_positions(
-                model.case, {pipe.name: pipe.length for pipe in model.pipes}
-            )
+            places = network_layout.plan_positions(model.case, {pipe.name: pipe.length for pipe in model.pipes})
             self.points, self.lines = pipe_geometry(model, places)
             self.owner = points_on_bodies(model, self.points)
         moving = {basin.name: np.zeros(2) for basin in model.basins if basin.part.on is not None}
-        self.places = places = {**places, **moving}  # a basin on a body is drawn in world axes, as bodies are
+        self.places = places | moving  # a basin on a body is drawn in world axes, as bodies are
         carried = {name: scalar.unit for name, scalar in model.case.scalars.items()}
         units = {basin.name: basin.units | (carried if basin.scalars else {}) for basin in model.basins}
         self.basins = {
-            basin.name: (*basin_geometry(basin, places[basin.name]), units[basin.name]) for basin in model.basins
+            basin.name: (*basin_geometry(basin, self.places[basin.name]), units[basin.name]) for basin in model.basins
         }
-        self.bodies = body_lines_of(model)
+        self.bodies = BodyLines(model) if model.body_names else None
         self.pipes = [pipe.name for pipe in model.pipes]
         self.units = FIELD_UNITS | carried
         cells = [pipe.cells for pipe in model.pipes]
@@ -87,58 +151,49 @@ class FieldSeries:
 
     def write(self, t: float, frame: dict) -> None:
         """Write the frame at time `t` [s]; frame : result of `RunData.fields`."""
-        name = f"fields/{self.frames:06d}.vtu"
-        for part, (basin, (points, cells, units)) in enumerate(self.basins.items(), 1):
-            file, owner_basin = f"fields/{basin}-{self.frames:06d}.vtu", self.model.basins[part - 1]
-            if self.pieces is not None and basin in self.pieces.rows:
-                file = f"fields/{basin}-{self.frames:06d}.pvtu"
-                self.pieces.write(self.folder / file, owner_basin, self.places[basin], frame[basin], units)
-                self._add_to_collection(f'<DataSet timestep="{float(t)!r}" part="{part}" file="{file}"/>\n')
-                continue
-            values = frame[basin]
-            if owner_basin.part.on is not None:
-                values = values | owner_basin.vectors_at(values, frame["out"], self.model.layout)
-            blocks = {key: split_blocks(value, cells) for key, value in values.items()}
-            if basin in frame["points"]:  # moving basins have points of their own at each time
-                points = np.append(self.places[basin], 0.0) + frame["points"][basin]
-            write_frame(self.folder / file, points, cells, blocks, units)
-            self._add_to_collection(f'<DataSet timestep="{float(t)!r}" part="{part}" file="{file}"/>\n')
+        for part, basin in enumerate(self.model.basins, 1):
+            self._write_basin(t, part, basin, frame)
         if self.bodies:
             file, (points, speed) = f"fields/bodies-{self.frames:06d}.vtu", self.bodies.at(frame["out"])
             blocks = {"body": [self.bodies.line_body], "speed": [speed]}
             write_frame(self.folder / file, points, [("line", self.bodies.lines)], blocks, {"speed": "m/s"})
-            self._add_to_collection(f'<DataSet timestep="{float(t)!r}" part="{len(self.basins) + 1}" file="{file}"/>\n')
-        if not self.pipes:
-            self.frames += 1
-            return
-        data = {name: [np.concatenate([frame[pipe][name] for pipe in self.pipes])] for name in self.units}
-        data["pipe"] = [self.pipe]
-        write_frame(self.folder / name, self.points_at(frame), [("line", self.lines)], data, self.units)
-        self._add_to_collection(f'<DataSet timestep="{float(t)!r}" part="0" file="{name}"/>\n')
+            self._add_to_collection(t, len(self.basins) + 1, file)
+        if self.pipes:
+            file = f"fields/{self.frames:06d}.vtu"
+            data = {name: [np.concatenate([frame[pipe][name] for pipe in self.pipes])] for name in self.units}
+            data["pipe"] = [self.pipe]
+            write_frame(self.folder / file, self.points_at(frame), [("line", self.lines)], data, self.units)
+            self._add_to_collection(t, 0, file)
         self.frames += 1
+
+    def _write_basin(self, t: float, part: int, basin, frame: dict) -> None:
+        """Write the fields of a basin at time `t` [s]; part : its number in the index; frame : as for `write`."""
+        points, cells, units = self.basins[basin.name]
+        file, values = f"fields/{basin.name}-{self.frames:06d}.vtu", frame[basin.name]
+        if self.pieces is not None and basin.name in self.pieces.rows:
+            file = f"fields/{basin.name}-{self.frames:06d}.pvtu"
+            self.pieces.write(self.folder / file, basin, self.places[basin.name], values, units)
+        else:
+            if basin.part.on is not None:
+                values = values | basin.vectors_at(values, frame["out"], self.model.layout)
+            blocks = {key: split_blocks(value, cells) for key, value in values.items()}
+            if basin.name in frame["points"]:  # moving basins have points of their own at each time
+                points = np.append(self.places[basin.name], 0.0) + frame["points"][basin.name]
+            write_frame(self.folder / file, points, cells, blocks, units)
+        self._add_to_collection(t, part, file)
 
     def points_at(self, frame: dict) -> np.ndarray:
         """Points of the pipes in world axes at the time of a frame : float64[n, 3] [m]; points on bodies move."""
         if not (self.owner >= 0).any():
             return self.points
-        from fvsolve.output.body_lines import world_points
-
         return world_points(self.model, frame["out"], self.owner, self.points)[0]
 
-    def _add_to_collection(self, line: str) -> None:
+    def _add_to_collection(self, t: float, part: int, file: str) -> None:
+        line = f'<DataSet timestep="{float(t)!r}" part="{part}" file="{file}"/>\n'
         # A single write over the closing tags: the file stays valid if the process is killed before or after it.
         with open(self.folder / "fields.pvd", "r+b", buffering=0) as file:
             file.seek(-len(PVD_TAIL), 2)
             file.write((line + PVD_TAIL).encode())
-
-
-def body_lines_of(model):
-    """`BodyLines` that represent the bodies of a model in pictures; None if it has no bodies."""
-    if not model.body_names:
-        return None
-    from fvsolve.output.body_lines import BodyLines
-
-    return BodyLines(model)
 
 
 def write_frame(path: Path, points: np.ndarray, cells: list, data: dict[str, list], units: dict[str, str]) -> None:
@@ -250,11 +305,6 @@ def read_series(path: Path) -> list[tuple[float, Path]]:
         return [(float(entry.attrib["timestep"]), path.parent / entry.attrib["file"]) for entry in root.iter("DataSet")]
     except (OSError, ElementTree.ParseError, KeyError, ValueError) as error:
         raise RunError(f"{path} cannot be read: {error}") from None
-
-
-def read_pipes(path: Path, quantity: str) -> np.ndarray:
-    """Read a quantity of all pipe cells from a .vtu file : float64[cells] in SI; raises RunError if unreadable."""
-    return read_pipe_lines(path, quantity)[2]
 
 
 def read_pipe_lines(path: Path, quantity: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -1,10 +1,8 @@
 """Receiver of the results of a run without a directory: rows are stored in memory."""
 
-from __future__ import annotations
-
 import numpy as np
 
-from fvsolve.output.envelope import envelope_in_units, with_initial_heads
+from fvsolve.output.csv_files import envelope_in_units, with_initial_heads
 from fvsolve.output.unit_columns import probe_columns, time_column, to_column_units
 
 

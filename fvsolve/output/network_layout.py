@@ -5,8 +5,6 @@ Otherwise nodes are laid out so that distances in the plan approximate the lengt
 then stress majorization; Gansner, Koren and North 2004). The layout of a network is deterministic.
 """
 
-from __future__ import annotations
-
 import heapq
 
 import numpy as np
@@ -59,9 +57,8 @@ def cut_positions(case, stated: dict[str, tuple]) -> dict[str, tuple]:
         if all(end in stated for end in ends):
             share = np.cumsum([piece.length for piece in pieces]) / sum(piece.length for piece in pieces)
             first, last = (np.array(stated[end], float) for end in ends)
-            result |= {
-                piece.to: tuple(first + at * (last - first)) for piece, at in zip(pieces[:-1], share, strict=False)
-            }
+            for piece, at in zip(pieces[:-1], share, strict=False):
+                result[piece.to] = tuple(first + at * (last - first))
     return {name: position for name, position in result.items() if name in case.nodes and name not in stated}
 
 
@@ -105,8 +102,7 @@ def _plan(count: int, edges: list[tuple[int, int, float]]) -> np.ndarray:
     if count > MAX_DENSE_NODES:
         return _radial_plan(count, edges)
     distance = _distances(count, edges)
-    plan = _minimise_stress(_classical_scaling(distance), distance)
-    plan = _oriented(plan)
+    plan = _oriented(_minimise_stress(_classical_scaling(distance), distance))
     return np.round(plan, 6 - int(np.ceil(np.log10(distance.max()))))
 
 
@@ -139,14 +135,10 @@ def _classical_scaling(distance: np.ndarray) -> np.ndarray:
         plan[:, column] = vector * np.sign(vector[largest]) * np.sqrt(max(values[-1 - column], 0.0))
     # In two dimensions branches of equal length may coincide; a small fixed displacement separates them.
     angle = 2.399963 * np.arange(count)
-    return plan + 1e-3 * distance.max() * np.column_stack([np.cos(angle), np.sin(angle)]) * _has_branches(distance)
-
-
-def _has_branches(distance: np.ndarray) -> float:
-    """1 if the network has branches, 0 for a chain of nodes, which stays straight."""
     farthest = np.unravel_index(np.argmax(distance), distance.shape)
     off = distance[farthest[0]] + distance[farthest[1]] - distance[farthest]
-    return float(off.max() > 1e-9 * distance.max())
+    has_branches = float(off.max() > 1e-9 * distance.max())  # a chain of nodes stays straight
+    return plan + 1e-3 * distance.max() * np.column_stack([np.cos(angle), np.sin(angle)]) * has_branches
 
 
 def _minimise_stress(plan: np.ndarray, distance: np.ndarray) -> np.ndarray:

@@ -4,8 +4,6 @@ Rank 0 has the values of all cells. The other ranks wait for a broadcast of a fu
 (`solve.mpi_ranks`).
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

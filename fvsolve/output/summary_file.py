@@ -1,7 +1,5 @@
 """summary.json: results of a run for people and programs."""
 
-from __future__ import annotations
-
 import json
 import math
 import os
@@ -9,7 +7,7 @@ from dataclasses import asdict, is_dataclass
 from pathlib import Path
 
 from fvsolve.errors import RunError, listing
-from fvsolve.output.envelope import envelope_columns
+from fvsolve.output.csv_files import envelope_columns
 from fvsolve.output.unit_columns import probe_columns, time_column
 
 # Keys without which summary.json is rejected.
@@ -29,10 +27,8 @@ def summary_data(summary, model) -> dict:
         "ok": bool(summary.ok),
         "t": float(summary.t),
         "invalid_from": plain(float(summary.invalid_from)),
-        "marks": [
-            {"what": mark.what, "place": mark.place, "time": float(mark.time), "text": mark.text}
-            for mark in summary.marks
-        ],
+        "marks": [{"what": mark.what, "place": mark.place, "time": float(mark.time), "text": mark.text}
+                  for mark in summary.marks],
         "cavities": [asdict(cavity) for cavity in summary.cavities],
         "events": [{"time": float(item.time), "name": item.name, "what": item.what} for item in summary.events],
         "probes": {item.name: {"dimension": item.dimension, "unit": item.unit} for item in probe_columns(model)},
@@ -50,7 +46,7 @@ def summary_data(summary, model) -> dict:
         "seconds_setup": float(summary.seconds_setup),
         "cost": plain(summary.cost),
         "warnings": [item.plain() for item in (*model.warnings, *summary.warnings)],
-    }
+    }  # fmt: skip
 
 
 def plain(value):
@@ -91,9 +87,8 @@ def read_summary(path: Path) -> dict:
             raise ValueError(f"this is not the summary of a run (missing: {listing(missing)}); run again with --force")
         return summary
     except FileNotFoundError:
-        raise RunError(
-            f"{path.parent} does not hold a finished run (no {path.name}); check the path, or finish the run"
-        ) from None
+        text = f"does not hold a finished run (no {path.name}); check the path, or finish the run"
+        raise RunError(f"{path.parent} {text}") from None
     except (OSError, ValueError) as error:
         raise RunError(f"{path} cannot be read: {error}") from None
 

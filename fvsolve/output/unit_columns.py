@@ -1,7 +1,5 @@
 """Columns of result tables: name, dimension and unit, with conversion from and to SI."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,1 +1,17 @@
 """Reports of finished runs: an offline HTML page, a workbook of tables, pictures and pressure cycles."""
+
+from importlib import import_module
+from typing import Any
+
+from fvsolve.errors import FvsolveError
+
+
+def import_library(name: str) -> Any:
+    """Import a module of the extra `report`: Jinja2, Plotly, XlsxWriter or rainflow.
+
+    Raises FvsolveError with the command to install it if it is missing.
+    """
+    try:
+        return import_module(name)
+    except ImportError:
+        raise FvsolveError(f'a report needs {name.partition(".")[0]}: pip install "fvsolve[report]"') from None

@@ -5,15 +5,13 @@ endures N cycles of a range R0 endures N (R0 / R)^m cycles of a range R (Basquin
 ranges is the sum of counted over endured cycles (Palmgren 1924, Miner 1945).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fvsolve.errors import FvsolveError, did_you_mean, listing
-from fvsolve.report.libraries import import_library
+from fvsolve.report import import_library
 from fvsolve.units import span
 
 PRESSURE_QUANTITIES = ("pressure", "gauge_pressure", "head")

@@ -1,31 +1,27 @@
-"""Figures of the report as plain data for plotly.js: traces and layout.
+"""Figures of the report as plain data for plotly.js: histories of probes and long sections, as traces and layout.
 
-plotly.js interprets some markup in names and titles, so all texts of a case pass through `escape_markup`.
+Long histories keep the extremes of bins. plotly.js interprets some markup in names and titles, so all texts of a case
+pass through `escape_markup`.
 """
-
-from __future__ import annotations
 
 import base64
 import html
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from fvsolve.draw.plot import MAX_NAME_LENGTH, probe_quantity, short_name, thin_series
 from fvsolve.draw.style import COLOURS, DOUBT, HAIR, INK, MUTED
 from fvsolve.errors import visible
-from fvsolve.report.head_animation import HeadAnimation
-from fvsolve.report.histories import HistoryPanel
 from fvsolve.report.long_section import VAPOUR_LINE as VAPOUR_LINE
-from fvsolve.report.long_section import Section, head_window
+from fvsolve.report.long_section import HeadAnimation, Section, head_window
 
-GREATEST_COLOUR, LEAST_COLOUR, NOW_COLOUR, VAPOUR_COLOUR, CLASS_COLOUR = (
-    COLOURS[0],
-    COLOURS[1],
-    COLOURS[2],
-    COLOURS[3],
-    COLOURS[6],
-)
+SHOWN_LINES = 8  # lines of a panel that are visible at first; a click on a name shows the others
+MAX_PROBES = 48  # greatest number of probes of a report; history.csv has all
+MAX_NUMBERS = 40_000  # greatest number of values of all series of a report together
+GREATEST_COLOUR, LEAST_COLOUR, NOW_COLOUR, VAPOUR_COLOUR = COLOURS[:4]
+CLASS_COLOUR = COLOURS[6]
 BACKGROUND = "#ffffff"
 DASH, DOT, LONG_DASH = "9px,5px", "2px,3px", "14px,5px"
 LINE_LOOKS = {VAPOUR_LINE: {"colour": VAPOUR_COLOUR, "width": 1.4, "dash": DOT},
@@ -39,8 +35,69 @@ DARK_COLOURS = {INK: "#dde3ea", MUTED: "#9aa7b5", HAIR: "#37424e", BACKGROUND: "
 )  # colours for dark screens; printed pages use the light ones
 SECTION_HEIGHT, HISTORY_HEIGHT = 920, 260  # heights of sections and histories [px]
 TOOLBAR_HEIGHT = 22  # height of the tool bar above the names [px]
-MAX_NAME_LENGTH = 22  # greatest number of letters of a name over a chainage
 FONT = 'system-ui, -apple-system, "Segoe UI", "Helvetica Neue", Arial, sans-serif'
+
+
+class Series(NamedTuple):
+    """Series of a probe or of a measurement, in the units of history.csv.
+
+    seen : True if it is visible at first; measured : True for a measurement
+    """
+
+    name: str
+    t: np.ndarray
+    values: np.ndarray
+    seen: bool
+    measured: bool = False
+
+
+class HistoryPanel(NamedTuple):
+    """Panel of series of one quantity and unit."""
+
+    quantity: str
+    unit: str
+    lines: list[Series]
+
+
+def history_panels(result) -> list[HistoryPanel]:
+    """Panels of histories in the order of the probes.
+
+    In a panel of more than `SHOWN_LINES` series, only those with the widest range are visible at first.
+    """
+    chosen, measured = chosen_probes(result), result.history_drawn().get("measured", {})
+    points = max(MAX_NUMBERS // max(2 * (len(chosen) + len(measured)), 1), 64)
+    result_panels = []
+    for (kind, unit), names in _by_panel(result, chosen).items():
+        seen = names if len(names) <= SHOWN_LINES else _most_varying(result, names)
+        lines = [Series(name, *thin_series(result.t, result[name], points), name in seen) for name in names]
+        lines += [Series(name, *thin_series(*measured[name], points), name in seen, True) for name in names
+                  if name in measured]  # fmt: skip
+        result_panels.append(HistoryPanel(kind, unit, lines))
+    return result_panels
+
+
+def chosen_probes(result) -> list[str]:
+    """Names of the probes in the report: all, or if they are many, those with the widest range in each panel."""
+    if len(result.probes) <= MAX_PROBES:
+        return result.probes
+    groups = _by_panel(result, result.probes)
+    share = max(MAX_PROBES // len(groups), 1)
+    selected = {name for names in groups.values() for name in _most_varying(result, names, share)}
+    return [name for name in result.probes if name in selected]
+
+
+def _by_panel(result, probes: list[str]) -> dict[tuple[str, str], list[str]]:
+    """Names of probes by panel : (quantity, unit) -> names."""
+    groups: dict[tuple[str, str], list[str]] = {}
+    for name in probes:
+        groups.setdefault((probe_quantity(name), result.units[name]), []).append(name)
+    return groups
+
+
+def _most_varying(result, names: list[str], count: int = SHOWN_LINES) -> set[str]:
+    extremes = result.extremes
+    swing = {name: (extremes[name].maximum or 0.0) - (extremes[name].minimum or 0.0) for name in names}
+    return set(sorted(names, key=lambda name: -swing[name])[:count])
 
 
 def section_figure(section: Section, moving: HeadAnimation | None, unit: str, along: str, bins: int) -> dict[str, Any]:
@@ -50,21 +107,12 @@ def section_figure(section: Section, moving: HeadAnimation | None, unit: str, al
     bins : number of bins into which a long line is divided; only the extremes of each bin are drawn
     """
     k = section.drawn_indices(bins)
-    x, lines = (
-        packed_array(section.chainage[k], "f4"),
-        {name: packed_array(values[k], "f4") for name, values in section.along.items()},
-    )
+    x = packed_array(section.chainage[k], "f4")
+    lines = {name: packed_array(values[k], "f4") for name, values in section.along.items()}
+    shade = {"fill": "tonexty", "fillcolor": "rgba(11,106,168,0.08)"}
     data = [
         _line("maximum head", x, lines["max_head"], GREATEST_COLOUR, width=2),
-        _line(
-            "minimum head",
-            x,
-            lines["min_head"],
-            LEAST_COLOUR,
-            width=2,
-            fill="tonexty",
-            fillcolor="rgba(11,106,168,0.08)",
-        ),
+        _line("minimum head", x, lines["min_head"], LEAST_COLOUR, width=2, **shade),
         _line("initial head", x, lines["initial_head"], INK, width=1.2, dash=DASH),
         _line("pipe", x, lines["elevation"], MUTED, width=3.5),
     ]
@@ -79,15 +127,8 @@ def section_figure(section: Section, moving: HeadAnimation | None, unit: str, al
                      "marker": {"symbol": "x-thin", "size": 10, "line": {"color": DOUBT, "width": 2.5}}})  # fmt: skip
     shapes = [_band(a, b, VAPOUR_COLOUR, 0.18) for a, b in section.cavity_spans]
     if moving is not None:
-        data.append(
-            _line(
-                "head now",
-                packed_array(moving.chainage, "f4"),
-                packed_array(moving.heads[0], "f4"),
-                NOW_COLOUR,
-                width=2.6,
-            )
-        )
+        places, heads = packed_array(moving.chainage, "f4"), packed_array(moving.heads[0], "f4")
+        data.append(_line("head now", places, heads, NOW_COLOUR, width=2.6))
     layout = _section_layout([section], unit, along)
     layout["shapes"] = [*shapes, *layout["shapes"]]
     figure: dict[str, Any] = {"data": data, "layout": layout}
@@ -113,10 +154,8 @@ def study_section_figure(several: list[tuple[str, Section]], unit: str, along: s
         high, low = (packed_array(section.along[key][k], "f4") for key in ("max_head", "min_head"))
         data.append(_line(name or "the case", x, high, colour, width=2, **group))
         data.append(_line("", x, low, colour, width=2, dash=DASH, showlegend=False, **group))
-    return {
-        "data": data,
-        "layout": _section_layout([first, *(section for _, section in several if section is not first)], unit, along),
-    }
+    others = [section for _, section in several if section is not first]
+    return {"data": data, "layout": _section_layout([first, *others], unit, along)}
 
 
 def history_figure(panel: HistoryPanel, time_unit: str, doubt: float | None) -> dict[str, Any]:
@@ -128,13 +167,8 @@ def history_figure(panel: HistoryPanel, time_unit: str, doubt: float | None) -> 
     for line in panel.lines:
         place = names.index(line.name)
         colour = COLOURS[place % len(COLOURS)]
-        trace = _line(
-            line.name,
-            packed_array(line.t),
-            packed_array(line.values),
-            colour,
-            dash=DASHES[place // len(COLOURS) % len(DASHES)],
-        )
+        dash = DASHES[place // len(COLOURS) % len(DASHES)]
+        trace = _line(line.name, packed_array(line.t), packed_array(line.values), colour, dash=dash)
         if line.measured:
             trace |= {"mode": "markers", "name": f"{trace['name']}, measured", "marker": {"size": 4, "color": colour}}
         data.append(trace | ({} if line.seen else {"visible": "legendonly"}))
@@ -168,6 +202,7 @@ def _layout(y: str, x: str, height: int) -> dict[str, Any]:
     axis = {"showline": True, "linecolor": MUTED, "gridcolor": HAIR, "zeroline": False, "ticks": "outside",
             "tickcolor": MUTED, "ticklen": 4, "automargin": True, "exponentformat": "power", "minexponent": 6,
             "separatethousands": True}  # fmt: skip
+    background = {"bgcolor": BACKGROUND, "bordercolor": HAIR}
     return {
         "height": height,
         "margin": {"l": 62, "r": 14, "t": TOOLBAR_HEIGHT + 6, "b": 50},
@@ -177,12 +212,7 @@ def _layout(y: str, x: str, height: int) -> dict[str, Any]:
         "font": {"family": FONT, "size": 12, "color": INK},
         "separators": ".\u202f",
         "hovermode": "x unified",
-        "hoverlabel": {
-            "namelength": -1,
-            "font": {"size": 11, "color": INK},
-            "bgcolor": BACKGROUND,
-            "bordercolor": HAIR,
-        },
+        "hoverlabel": {"namelength": -1, "font": {"size": 11, "color": INK}} | background,
         "dragmode": "zoom",
         "showlegend": False,
         "xaxis": axis | {"title": {"text": escape_markup(x), "standoff": 8}},
@@ -202,10 +232,8 @@ def _vertical_line(x: float) -> dict[str, Any]:
 
 def _limits(section: Section, x, k: np.ndarray) -> list[dict[str, Any]]:
     """Curves of the vapour line and of limits for plotly.js; x : drawn chainages, k : their indices in the section."""
-    return [
-        _line(name, x, packed_array(line[k], "f4"), **(LINE_LOOKS.get(name) or LIMIT_LOOKS[name.rpartition(", ")[2]]))
-        for name, line in section.lines.items()
-    ]
+    looks = {name: LINE_LOOKS.get(name) or LIMIT_LOOKS[name.rpartition(", ")[2]] for name in section.lines}
+    return [_line(name, x, packed_array(line[k], "f4"), **looks[name]) for name, line in section.lines.items()]
 
 
 def _section_layout(sections: list[Section], unit: str, along: str) -> dict[str, Any]:
@@ -215,9 +243,8 @@ def _section_layout(sections: list[Section], unit: str, along: str) -> dict[str,
     """
     first, seen = sections[0], head_window(sections, unit)
     layout, names = _layout(f"head [{unit}]", f"chainage [{along}]", SECTION_HEIGHT), _place_names(first)
-    layout["margin"]["t"] = (
-        TOOLBAR_HEIGHT + 26 + 6 * max((len(name["hovertext"][:MAX_NAME_LENGTH]) for name in names), default=0)
-    )
+    letters = max((len(name["hovertext"][:MAX_NAME_LENGTH]) for name in names), default=0)
+    layout["margin"]["t"] = TOOLBAR_HEIGHT + 26 + 6 * letters
     layout["shapes"] = [_vertical_line(device.chainage) for device in first.devices]
     layout["annotations"] = [*names, *_limit_arrow(seen.above, 1), *_limit_arrow(seen.below, 0)]
     layout["xaxis"]["range"] = list(first.ends)
@@ -243,13 +270,9 @@ def _place_names(section: Section) -> list[dict[str, Any]]:
     late = section.ends[0] + 0.9 * (section.ends[1] - section.ends[0])
     return [{"x": x, "y": 1.02, "xref": "x", "yref": "paper", "showarrow": False, "textangle": -45,
              "xanchor": "right" if x > late else "left", "yanchor": "bottom",
-             "text": escape_markup(_shortened(names)), "hovertext": escape_markup(names),
+             "text": escape_markup(short_name(names)), "hovertext": escape_markup(names),
              "font": {"size": 11, "color": INK if stands else MUTED}}
             for x, names, stands in section.labels()]  # fmt: skip
-
-
-def _shortened(text: str) -> str:
-    return text if len(text) <= MAX_NAME_LENGTH else f"{text[: MAX_NAME_LENGTH - 1]}\u2026"
 
 
 def _range_at_rest(panel: HistoryPanel) -> dict[str, Any]:

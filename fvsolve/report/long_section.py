@@ -1,34 +1,91 @@
-"""Data of a long section: elevation, heads, limits and devices along the chainage, in the units of [output]."""
+"""Long sections: results, limits and devices along a path, in the units of [output], and animated heads."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from fvsolve.case.case import default_cells
 from fvsolve.case.extent import OF_PRESSURE
-from fvsolve.output.route_table import joined_envelopes
-from fvsolve.report.envelope_units import envelope_column, head_of
-from fvsolve.report.section_limits import limit_lines
+from fvsolve.errors import RunError
+from fvsolve.output.csv_files import ENVELOPE_QUANTITIES, joined_envelopes
+from fvsolve.output.fields import read_pipe_lines, read_series
+from fvsolve.output.unit_columns import UnitColumn
 from fvsolve.report.section_pipes import SectionPath
 from fvsolve.run.result import FAILS
 from fvsolve.run.verdicts import NEAR, Chainages
 
+MAX_LIMIT_LINES = 6  # greatest number of limit lines in a section
 SECTION_QUANTITIES = ("elevation", "initial_head", "min_head", "max_head", "min_pressure", "max_pressure",
          "t_min", "t_max")  # fmt: skip
 HEAD_QUANTITIES = ("initial_head", "min_head", "max_head")
 VAPOUR_LINE = "vapour line"
 LABEL_DISTANCE = 0.035  # least distance of names, as a fraction of the length; closer names would overlap
-LIMIT_REACH = (
-    0.5  # limits farther away than this fraction of the range of heads are only named at the edge of the picture
-)
-EDGE_MARGIN, NAME_MARGIN = (
-    0.05,
-    0.07,
-)  # fractions of the head axis: free at each end, and for each limit that is named there
+# Limits farther away than this fraction of the range of heads are only named at the edge of the picture.
+LIMIT_REACH = 0.5
+# Fractions of the head axis: free at each end, and for each limit that is named there.
+EDGE_MARGIN, NAME_MARGIN = 0.05, 0.07
 MAX_BINS = 150  # greatest number of bins of a long line; the extremes of head and elevation of each bin are drawn
+MAX_POINTS = 240  # greatest number of points of an animated line
+MAX_NUMBERS = 45_000  # greatest number of values of all animated lines of a report; frames are skipped above it
+
+
+def envelope_column(result, name: str) -> UnitColumn:
+    """Column of a quantity of the envelope (extremes along pipes), with its unit and conversions from and to SI."""
+    unit, ambient = result.summary["envelope_units"][name], result.summary["ambient_pressure"]
+    return UnitColumn(name, ENVELOPE_QUANTITIES[name], unit, ambient)
+
+
+def head_of(result, pressure: float | np.ndarray, elevation: np.ndarray) -> np.ndarray:
+    """Heads of absolute pressures [Pa] at elevations; heads and elevations are in the units of the envelope."""
+    height = envelope_column(result, "elevation")
+    law: Callable[..., Any] = result.case.law.head
+    return envelope_column(result, "max_head").from_si(law(pressure, height.to_si(elevation)))
+
+
+def limit_lines(result, pipe: np.ndarray, elevation: np.ndarray) -> dict[str, np.ndarray]:
+    """Heads of pressure classes and limits along a section : name -> float64[n], at most `MAX_LIMIT_LINES` lines.
+
+    The line of pressure classes is first; values are NaN where a limit does not apply.
+    pipe : str[n]  pipe of each point; elevation : float64[n]; heads and elevations are in the units of the envelope
+    """
+    case, lines = result.case, {}
+    classes = {name: getattr(case.links[name], "allowable_pressure", None) for name in np.unique(pipe).tolist()}
+    if any(allowable is not None for allowable in classes.values()):
+        gauge = np.array([np.nan if classes[name] is None else classes[name] for name in pipe.tolist()])
+        lines["class line"] = _as_head(result, "gauge_pressure", gauge, elevation)
+    for limit in case.limits.values():
+        quantity, parts = limit.extent.quantity, [name for group, name in limit.extent.parts if group == "links"]
+        applies = np.isin(pipe, parts)
+        if quantity not in OF_PRESSURE or not applies.any():
+            continue
+        for bound in ("minimum", "maximum"):
+            value = getattr(limit, bound)
+            if value is None or isinstance(value, str):
+                continue  # "vacuum" is the line of the pipe itself, and the vapour line is drawn anyway
+            line = _as_head(result, quantity, value, elevation)
+            lines[f"{limit.name}, {bound}"] = np.where(applies, line, np.nan)
+        if limit.class_fraction is not None and limit.class_fraction != 1.0:
+            gauge = np.array([limit.class_fraction * (classes[name] or np.nan) for name in pipe.tolist()])
+            line = _as_head(result, "gauge_pressure", gauge, elevation)
+            lines[f"{limit.name}, maximum"] = np.where(applies, line, np.nan)
+    return dict(list(lines.items())[:MAX_LIMIT_LINES])
+
+
+def _as_head(result, quantity: str, value, elevation: np.ndarray) -> np.ndarray:
+    """Head that corresponds to a `value` [SI] of pressure, gauge pressure, pressure head or head, in the unit of heads.
+
+    quantity : quantity of the value; elevation : float64[n]  in the unit of heads
+    """
+    shown = envelope_column(result, "max_head")
+    if quantity == "head":
+        return shown.from_si(value + 0.0 * elevation)
+    if quantity == "pressure_head":
+        return elevation + shown.from_si(value)
+    ambient = result.case.ambient_pressure if quantity == "gauge_pressure" else 0.0
+    return head_of(result, value + ambient, elevation)
 
 
 class SectionDevice(NamedTuple):
@@ -74,12 +131,7 @@ class Section:
         if n <= 4 * bins:
             return np.arange(n)
         edges = np.linspace(0, n, bins + 1).astype(int)
-        most = [
-            ("max_head", np.argmax),
-            ("min_head", np.argmin),
-            ("elevation", np.argmax),
-            ("elevation", np.argmin),
-        ]
+        most = [("max_head", np.argmax), ("min_head", np.argmin), ("elevation", np.argmax), ("elevation", np.argmin)]
         lines = [(self.along[name], end) for name, end in most]
         rows = [a + end(line[a:b]) for line, end in lines for a, b in zip(edges[:-1], edges[1:], strict=True)]
         return np.unique([0, *rows, n - 1])
@@ -134,12 +186,9 @@ def head_window(sections: Sequence[Section], unit: str) -> HeadWindow:
             low = min(low, max(limit[0], followed[0] - reach))
             high = max(high, min(limit[1], followed[1] + reach))
     span = high - low or 1.0
-    return HeadWindow(
-        low - (EDGE_MARGIN + NAME_MARGIN * len(below)) * span,
-        high + (EDGE_MARGIN + NAME_MARGIN * len(above)) * span,
-        above,
-        below,
-    )
+    low -= (EDGE_MARGIN + NAME_MARGIN * len(below)) * span
+    high += (EDGE_MARGIN + NAME_MARGIN * len(above)) * span
+    return HeadWindow(low, high, above, below)
 
 
 def value_range(lines: list[np.ndarray]) -> tuple[float, float] | None:
@@ -226,3 +275,68 @@ def _devices(result, way: SectionPath) -> list[SectionDevice]:
                   if link.kind != "pipe" and place in link.ports.values()]  # fmt: skip
         devices.append(SectionDevice(chainage, place, tuple(parts)))
     return devices
+
+
+class HeadAnimation(NamedTuple):
+    """Head along a section at several times.
+
+    chainage : float64[n] and heads : float64[k, n], in the units of the envelope; times : float64[k] [s]
+    """
+
+    chainage: np.ndarray
+    times: np.ndarray
+    heads: np.ndarray
+
+
+def head_animations(result, ways: Iterable[SectionPath]) -> list[HeadAnimation]:
+    """Animated heads of the sections `ways`, with about `MAX_NUMBERS` values at most; [] if no frames were stored.
+
+    Raises RunError if a frame cannot be read.
+    """
+    ways, frames = list(ways), _pipe_frames(result)
+    if not frames or not ways:
+        return []
+    counts = default_cells({name: result.case.links[name] for name in result.envelope}, result.case.properties,
+                           result.case.numerics.cell_time)  # fmt: skip
+    spots = [_cells_along(result, way, counts) for way in ways]
+    n = sum(len(indices) for _, indices in spots)
+    step = -(-len(frames) * n // MAX_NUMBERS)
+    frames = [*frames[:-1:step], frames[-1]]
+    heads = np.array([_read_heads(path, sum(counts.values())) for _, path in frames])
+    shown = envelope_column(result, "max_head").from_si(heads)
+    times = np.array([t for t, _ in frames])
+    return [HeadAnimation(chainage, times, shown[:, indices]) for chainage, indices in spots]
+
+
+def _pipe_frames(result) -> list[tuple[float, Path]]:
+    """Times [s] and files of the stored frames of pipes : list of (time, path)."""
+    index = None if result.directory is None else result.directory / "fields.pvd"
+    if index is None or not index.is_file():
+        return []
+    return [(t, path) for t, path in read_series(index) if path.stem.isdecimal()]
+
+
+def _cells_along(result, way: SectionPath, counts: dict[str, int]) -> tuple[np.ndarray, np.ndarray]:
+    """At most `MAX_POINTS` cells along a section, evenly chosen : (their chainages, their indices in a frame).
+
+    counts : pipe -> number of its cells, in the order of a frame. Chainages are in the unit of the envelope.
+    """
+    first = dict(zip(counts, np.cumsum([0, *counts.values()]).tolist(), strict=False))
+    chainage, indices = [], []
+    for leg in way.legs:
+        order, n = slice(None, None, -1 if leg.backwards else 1), counts[leg.pipe]
+        x = (np.arange(n) + 0.5) * (leg.end - leg.begin) / n
+        chainage.append(leg.chainage(x)[order])
+        indices.append(first[leg.pipe] + np.arange(n)[order])
+    chainage, indices = np.concatenate(chainage), np.concatenate(indices)
+    picked = np.unique(np.linspace(0, len(indices) - 1, min(MAX_POINTS, len(indices))).round().astype(int))
+    return envelope_column(result, "distance").from_si(chainage[picked]), indices[picked]
+
+
+def _read_heads(path: Path, cells: int) -> np.ndarray:
+    """Heads of all pipe cells in a frame [m]; raises RunError if their number differs from that of the case."""
+    heads = read_pipe_lines(path, "head")[2]
+    if len(heads) != cells:
+        counts = f"number of pipe cells {len(heads)}, but {cells} in the case"
+        raise RunError(f"{path}: {counts}; run the case again with --force")
+    return heads

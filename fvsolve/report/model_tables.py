@@ -1,7 +1,5 @@
 """Tables of the model: fluid, pipes, pipe walls and other parts, in the units of [output]."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from fvsolve.case.case import default_cells
@@ -20,15 +18,8 @@ FLUID_ROWS = (
     ("sound_speed", "speed of sound", "velocity"), ("viscosity", "viscosity", "viscosity"),
     ("vapor_pressure", "vapour pressure", "pressure"),
 )  # fmt: skip
-HIDDEN_KEYS = (
-    "position",
-    "elevation",
-    "type",
-    "from",
-    "to",
-    "ports",
-    "scalars",
-)  # in other columns, or only for pictures
+# Keys in other columns, or only for pictures.
+HIDDEN_KEYS = ("position", "elevation", "type", "from", "to", "ports", "scalars")
 
 
 def all_tables(result) -> list[ReportTable | None]:
@@ -95,19 +86,14 @@ def walls(result) -> ReportTable | None:
         if wall is not None:
             row[2:4] = float(thick.from_si(wall.thickness)), float(modulus.from_si(wall.youngs_modulus))
         rows.append(row)
-    heads, units = (
-        ("pipe", "allowable", "wall", "modulus", "source"),
-        ("", allowable.span_unit, thick.unit, modulus.unit),
-    )
+    heads = ("pipe", "allowable", "wall", "modulus", "source")
+    units = ("", allowable.span_unit, thick.unit, modulus.unit)
     return ReportTable("Walls", heads, rows, units, more=FULL_VALUES_NOTE) if rows else None
 
 
 def _friction_text(link, case) -> str:
-    return (
-        _value_text(type(link).values()["friction"], plain_value(link.friction), case)
-        .removeprefix("(model ")
-        .removesuffix(")")
-    )
+    text = _value_text(type(link).values()["friction"], plain_value(link.friction), case)
+    return text.removeprefix("(model ").removesuffix(")")
 
 
 def parts(result) -> ReportTable:
@@ -138,11 +124,9 @@ def _value_text(value: Any, given: Any, case) -> str:
     """Text of the value of a key in the units of [output]; value : declaration of the key, given : its value in SI."""
     dimension = getattr(value, "dimension", None)
     if isinstance(given, dict):
-        text = ", ".join(
-            f"{key.replace('_', ' ')} {_value_text(_value_of_key(value, key), item, case)}"
-            for key, item in given.items()
-        )
-        text = f"({text})"
+        texts = [f"{key.replace('_', ' ')} {_value_text(_value_of_key(value, key), item, case)}"
+                 for key, item in given.items()]  # fmt: skip
+        text = f"({', '.join(texts)})"
     elif isinstance(given, bool) or isinstance(given, str):
         text = inline(given).strip('"')
     elif dimension is None or not _is_numeric(given):

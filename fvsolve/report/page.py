@@ -1,34 +1,43 @@
-"""HTML report of a run: one file with all data, scripts and styles, which needs no network."""
+"""HTML reports of runs and studies: files with all data, scripts and styles, which need no network.
 
-from __future__ import annotations
+In functions for a study, `study` is the data of study.json, and `runs` is a list of (row of study.json, `Result`) for
+each run; row["page"] is the address of the report of the run.
+"""
 
 import json
 from pathlib import Path
 from typing import Any
 
+from fvsolve.case.text import inline
+from fvsolve.draw.plot import probe_quantity, thin_series
 from fvsolve.errors import visible
-from fvsolve.report import model_tables, numerics, reliability, worst_places
-from fvsolve.report.envelope_units import envelope_column
-from fvsolve.report.figures import DARK_COLOURS, history_figure, section_figure
-from fvsolve.report.head_animation import head_animations
-from fvsolve.report.histories import chosen_probes, history_panels
-from fvsolve.report.libraries import plotly_source, template
-from fvsolve.report.long_section import MAX_BINS, Section, section_of
-from fvsolve.report.section_pipes import SectionPath
-from fvsolve.report.tables import ReportTable, value_text
-from fvsolve.run.result import not_valid
+from fvsolve.output.unit_columns import column
+from fvsolve.report import figures as plots
+from fvsolve.report import import_library, model_tables, run_tables
+from fvsolve.report.long_section import MAX_BINS, Section, envelope_column, head_animations, section_of
+from fvsolve.report.run_tables import Sentence, open_reason
+from fvsolve.report.section_pipes import SectionPath, section_paths
+from fvsolve.report.tables import ERROR_HEADER, ReportTable, in_unit, value_text
+from fvsolve.run.result import FAILS, HOLDS, IN_WORDS, OPEN, not_valid
+from fvsolve.units import span
 
 TEMPLATE_FOLDER = Path(__file__).parent
 MAX_SHARED_BINS = 900  # greatest number of bins of all sections together
 MAX_PAPER_TITLE = 100  # greatest number of letters of the title on each printed page
 MAX_WARNINGS = 40  # greatest number on the page; summary.json has all
+SERIES_POINTS = 400  # greatest number of points of a series
+MAX_PROBES, MAX_SECTIONS = 6, 2  # greatest numbers of probes and sections of an event, from its first run
+MAX_FAILED_ROWS = 200  # greatest number of rows of limits that fail or are open
+CAPTION = "Maximum (solid) and minimum (dashed) head over all accepted steps, by protection."
 
 
 def page(result, ways: list[SectionPath]) -> str:
     """HTML text of the report of a run; ways : paths of its long sections."""
     sections = [section_of(result, way) for way in ways]
     figures: dict[str, Any] = {}
-    probes = worst_places.extremes_of_probes(result)
+    probes = run_tables.extremes_of_probes(result)
+    places = [*run_tables.worst_tables(result), *run_tables.ranked_pipes(result)]
+    numerics = run_tables.settings, run_tables.ledgers, run_tables.claim_table, run_tables.comparisons
     filled = {
         "invalid": not_valid(result.summary),
         "title": visible(result.summary["title"] or result.summary["case"]),
@@ -36,27 +45,18 @@ def page(result, ways: list[SectionPath]) -> str:
         "description": visible(result.case.description),
         "source": visible(result.case.source),
         "ended": result.summary.get("ended", ""),
-        "words": reliability.top_sentences(result),
-        "limits": reliability.verdict_table(result),
-        "worst": worst_places.extremes_of_pipes(result, ways) or probes,
+        "words": run_tables.top_sentences(result),
+        "limits": run_tables.verdict_table(result),
+        "worst": run_tables.extremes_of_pipes(result, ways) or probes,
         "sections": _sections(result, sections, figures),
         "histories": _histories(result, figures),
-        "probes_left_out": len(result.probes) - len(chosen_probes(result)),
-        "places": _nonempty(
-            [*reliability.worst_tables(result), *worst_places.ranked_pipes(result), probes if result.envelope else None]
-        ),
-        "model": _nonempty(model_tables.all_tables(result)),
-        "numbers": _nonempty(
-            [
-                numerics.settings(result),
-                numerics.ledgers(result),
-                reliability.claim_table(result),
-                numerics.comparisons(result),
-            ]
-        ),
+        "probes_left_out": len(result.probes) - len(plots.chosen_probes(result)),
+        "places": [*places, *[probes] * bool(probes and result.envelope)],
+        "model": [*filter(None, model_tables.all_tables(result))],
+        "numbers": [*filter(None, [table(result) for table in numerics])],
         "told": _warning_texts([notice.text for notice in result.warnings if notice.ok]),
-        "happened": _nonempty([numerics.cavities(result), numerics.events(result)]),
-        "versions": numerics.versions(result),
+        "happened": [table for table in (run_tables.cavities(result), run_tables.events(result)) if table],
+        "versions": run_tables.versions(result),
     }
     return render_page("page", filled, figures)
 
@@ -68,13 +68,16 @@ def render_page(name: str, filled: dict[str, Any], figures: dict[str, Any]) -> s
     """
     files = {"table": "table.html.j2", "page": f"{name}.html.j2", "css": "page.css", "js": "page.js"}
     texts = {key: (TEMPLATE_FOLDER / file).read_text(encoding="utf-8") for key, file in files.items()}
-    return template(texts["table"] + texts["page"]).render(
+    jinja = import_library("jinja2")
+    options = {"trim_blocks": True, "lstrip_blocks": True, "undefined": jinja.StrictUndefined}
+    environment = jinja.Environment(autoescape=True, **options)  # escapes all values, so that none becomes markup
+    return environment.from_string(texts["table"] + texts["page"]).render(
         filled,
         css=texts["css"],
         script=texts["js"],
-        library=plotly_source(),
+        library=import_library("plotly.offline").get_plotlyjs(),  # so that the page needs no network
         figures=script_json(figures),
-        dark=json.dumps(DARK_COLOURS),
+        dark=json.dumps(plots.DARK_COLOURS),
         paper=css_string(filled["title"]),
     )
 
@@ -82,11 +85,8 @@ def render_page(name: str, filled: dict[str, Any], figures: dict[str, Any]) -> s
 def css_string(text: str) -> str:
     """CSS string of a text; all but ASCII letters and digits are escaped, so that the text cannot end the string."""
     text = text if len(text) <= MAX_PAPER_TITLE else f"{text[: MAX_PAPER_TITLE - 1]}\u2026"
-    return (
-        '"'
-        + "".join(letter if letter.isascii() and letter.isalnum() else f"\\{ord(letter):x} " for letter in text)
-        + '"'
-    )
+    letters = [letter if letter.isascii() and letter.isalnum() else f"\\{ord(letter):x} " for letter in text]
+    return f'"{"".join(letters)}"'
 
 
 def script_json(data: Any) -> str:
@@ -108,7 +108,7 @@ def _sections(result, sections: list[Section], figures: dict[str, Any]) -> list[
     entries, bins = [], min(MAX_BINS, MAX_SHARED_BINS // max(len(sections), 1))
     for k, item in enumerate(sections):
         line = moving[k] if moving else None
-        figures[f"section-{k}"] = section_figure(item, line, height, along, bins)
+        figures[f"section-{k}"] = plots.section_figure(item, line, height, along, bins)
         entries.append({"id": f"section-{k}", "name": visible(item.way.name),
                      "length": f"{value_text(envelope_column(result, 'distance').from_si(item.way.length))} {along}",
                      "frames": 0 if line is None else len(line.times), "pipes": len(item.way.legs),
@@ -121,17 +121,158 @@ def _histories(result, figures: dict[str, Any]) -> list[dict[str, Any]]:
     drawn = result.history_drawn()
     doubt = min((time for time, _ in drawn.get("marks", ())), default=None)
     entries = []
-    for k, panel in enumerate(history_panels(result)):
-        figures[f"history-{k}"] = history_figure(panel, drawn["time_unit"], doubt)
+    for k, panel in enumerate(plots.history_panels(result)):
+        figures[f"history-{k}"] = plots.history_figure(panel, drawn["time_unit"], doubt)
         hidden = sum(not line.seen for line in panel.lines)
         entries.append({"id": f"history-{k}", "name": panel.quantity.replace("_", " "), "hidden": hidden})
     return entries
 
 
-def _nonempty(tables: list[ReportTable | None]) -> list[ReportTable]:
-    return [table for table in tables if table is not None and table.rows]
-
-
 def _warning_texts(texts: list[str]) -> list[str]:
     more = len(texts) - MAX_WARNINGS
     return [visible(text) for text in texts[:MAX_WARNINGS]] + ([f"{more} more in summary.json"] if more > 0 else [])
+
+
+def study_page(study: dict[str, Any], runs: list[tuple[dict[str, Any], Any]]) -> str:
+    """HTML text of the report of a study."""
+    figures: dict[str, Any] = {}
+    first = runs[0][1]
+    events = [
+        {"id": f"event-{k}", "name": visible(name or "All runs"), "figures": event_figures(name, k, runs, figures)}
+        for k, name in enumerate(dict.fromkeys(row["event"] for row, _ in runs))
+    ]
+    filled = {
+        "title": visible(study["title"] or study["study"]), "said": study, "case": visible(first.summary["case"]),
+        "ended": max(result.summary.get("ended", "") for _, result in runs),
+        "version": first.summary["versions"]["fvsolve"], "description": visible(first.case.description),
+        "words": study_sentences(study, runs), "matrix": [run_matrix(runs)], "events": events,
+        "failing": failing_limits(runs), "changes": change_tables(study), "first": run_name(runs[0][0]),
+        "model": [table for table in model_tables.all_tables(first) if table is not None],
+        "told": warning_texts(runs), "versions": run_tables.versions(first),
+    }  # fmt: skip
+    return render_page("study", filled, figures)
+
+
+def run_name(row: dict[str, Any]) -> str:
+    """Name of a run from its event and protection, such as `trip with vessel`; row : row of study.json."""
+    return visible(" with ".join(name for name in (row["event"], row["protection"]) if name) or "the case")
+
+
+def study_sentences(study: dict[str, Any], runs: list) -> list[Sentence]:
+    """Sentences at the top of the report of a study, on runs that stopped early or are not valid, and on limits."""
+    sentences = [Sentence("bad", f"{run_name(row)} stopped early.", f"{result.reason}.")
+             for row, result in runs if result.reason != "finished"]  # fmt: skip
+    sentences += [Sentence("bad", f"{run_name(row)} is not to be trusted.", item.text)
+              for row, result in runs for item in result.warnings if not item.ok]  # fmt: skip
+    if doubted := [item for item in runs if item[1].marks]:
+        marks = [mark for _, result in doubted for mark in result.marks]
+        reasons = {mark.what: mark.text.partition(": ")[2].partition(";")[0] for mark in marks}
+        text = f"{'; '.join(reasons.values())}."
+        sentences.append(Sentence("doubt", "Partly not to be trusted:", text, run_links(doubted)))
+    if not any(result.verdicts for _, result in runs):
+        text = "The study shows what happens, but not whether this is allowed."
+        return [*sentences, Sentence("none", "No limits were stated.", text)]
+    names = [visible(name) or "the unchanged case" for name in study["holds"]]
+    if names:
+        sentences.append(Sentence("good", f"All limits hold in all events with {', '.join(names)}.", ""))
+    else:
+        sentences.append(Sentence("bad", "No protection holds all limits in all events.", ""))
+    if failed := [item for item in runs if run_state(item[1]) == FAILS]:
+        sentences.append(Sentence("bad", "Fails:", "", run_links(failed)))
+    if unsure := [item for item in runs if run_state(item[1]) == OPEN]:
+        reasons = dict.fromkeys(open_reason(result) for _, result in unsure)
+        sentences.append(Sentence("doubt", "Open:", f"{'; '.join(reasons)}.", run_links(unsure)))
+    return sentences
+
+
+def run_state(result) -> str:
+    """Worst state of the limits of a run: `FAILS`, `OPEN` or `HOLDS`; "" without limits.
+
+    For a run that is not ok the state is `FAILS`.
+    """
+    states = [FAILS] * (not result.ok) + [item.state for item in result.verdicts]
+    return next((item for item in (FAILS, OPEN, HOLDS) if item in states), "")
+
+
+def run_links(runs: list) -> tuple[tuple[str, str], ...]:
+    """Names of runs and the addresses of their reports, as pairs."""
+    return tuple((run_name(row), row["page"]) for row, _ in runs)
+
+
+def run_matrix(runs: list) -> ReportTable:
+    """Table with a row for each run: verdict and the margin of each limit, with a link to its report."""
+    names = {verdict.name: verdict.unit for _, result in runs for verdict in result.verdicts}
+    with_error = any(verdict.error is not None for _, result in runs for verdict in result.verdicts)
+    rows = []
+    for row, result in runs:
+        verdicts = {verdict.name: verdict for verdict in result.verdicts}
+        no_margin = not_valid(result.summary) or None
+        margins = [no_margin if key == "margin" and value is None and name in verdicts else value
+                   for name in names for key in ("margin", *["error"] * with_error)
+                   for value in [getattr(verdicts.get(name), key, None)]]  # fmt: skip
+        rows.append([run_name(row), IN_WORDS.get(run_state(result), ""), *margins])
+    heads = ["run", "verdict"]
+    heads += [word for name in names for word in (f"margin of {name}", *[ERROR_HEADER] * with_error)]
+    units = ["", ""] + [span(unit) for unit in names.values() for _ in range(1 + with_error)]
+    bad = frozenset(k for k, (_, result) in enumerate(runs) if run_state(result) == FAILS)
+    return ReportTable("Runs", heads, rows, units, bad, links=[row["page"] for row, _ in runs])
+
+
+def failing_limits(runs: list) -> ReportTable:
+    """Table of the limits that fail or are open in each run, with position and time."""
+    length, time = (column("", dimension, runs[0][1].case) for dimension in ("length", "time"))
+    pages = [row["page"] for row, result in runs for item in result.verdicts if not item.ok]
+    rows = [[run_name(row), item.name, IN_WORDS[item.state], item.value, item.limit, item.unit, item.margin,
+             span(item.unit), item.place, in_unit(length, item.chainage), in_unit(time, item.time)]
+            for row, result in runs for item in result.verdicts if not item.ok]  # fmt: skip
+    heads = ("run", "limit", "verdict", "value", "allowed", "unit", "margin", "unit", "worst place", "chainage", "time")
+    units = ("",) * 9 + (length.unit, time.unit)
+    return ReportTable("", heads, rows, units, mixed_units=frozenset({3, 4, 6}), most=MAX_FAILED_ROWS, links=pages)
+
+
+def change_tables(study: dict[str, Any]) -> list[ReportTable]:
+    """Tables of the keys that events and protections set, with their values in TOML."""
+    tables = []
+    for group in ("events", "protections"):
+        rows = [[name, key, inline(value)]
+                for name, keys in study["changes"][group].items() for key, value in keys.items()]  # fmt: skip
+        tables += [ReportTable(group.capitalize(), (group[:-1], "key", "value"), rows)] if rows else []
+    return tables
+
+
+def event_figures(event: str | None, number: int, runs: list, figures: dict[str, Any]) -> list[dict[str, Any]]:
+    """Values for the template on the figures of an event, each of which shows the runs of all protections.
+
+    event : name of the event; number : its number, for the keys under which the figures are added to `figures`
+    """
+    own = [(row["protection"] or "", result) for row, result in runs if row["event"] == event]
+    runs_drawn = [(name, result, section_paths(result)) for name, result in own]
+    entries = []
+    for k, first in enumerate(next((paths for *_, paths in runs_drawn if paths), [])[:MAX_SECTIONS]):
+        several = [(name, section_of(result, path)) for name, result, paths in runs_drawn
+                   for path in paths if path.name == first.name]  # fmt: skip
+        height, along = envelope_column(own[0][1], "max_head").unit, envelope_column(own[0][1], "distance").unit
+        figures[f"section-{number}-{k}"] = plots.study_section_figure(several, height, along)
+        entries.append({"id": f"section-{number}-{k}", "name": visible(first.name), "caption": CAPTION})
+    shared = [name for name in own[0][1].probes if all(name in result.units for _, result in own)]
+    for k, probe in enumerate(shared[:MAX_PROBES]):
+        lines = [
+            plots.Series(name or "the case", *thin_series(result.t, result[probe], SERIES_POINTS), seen=True)
+            for name, result in own
+        ]
+        panel = plots.HistoryPanel(probe_quantity(probe), own[0][1].units[probe], lines)
+        figures[f"history-{number}-{k}"] = plots.history_figure(panel, own[0][1].summary["time_unit"], None)
+        entries.append({"id": f"history-{number}-{k}", "name": visible(probe), "caption": ""})
+    return entries
+
+
+def warning_texts(runs: list) -> list[str]:
+    """First `MAX_WARNINGS` texts of warnings of all runs, each once, with the names of the runs in which it occurs."""
+    by_text: dict[str, list[str]] = {}
+    for row, result in runs:
+        for item in result.warnings:
+            by_text.setdefault(item.text, []).append(run_name(row))
+    texts = [
+        f"{text} ({', '.join(names) if len(names) < len(runs) else 'all runs'})" for text, names in by_text.items()
+    ]
+    return [visible(item) for item in texts[:MAX_WARNINGS]]

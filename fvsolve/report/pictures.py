@@ -1,16 +1,12 @@
 """Picture files of a run: long sections, histories of chosen probes, and phase planes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 
 from fvsolve.display import save_if_path
-from fvsolve.draw.plot import history_figure
-from fvsolve.draw.section_picture import phase_figure, section_figure
+from fvsolve.draw.plot import history_figure, phase_figure, section_figure
 from fvsolve.errors import FvsolveError, did_you_mean, listing
-from fvsolve.report.envelope_units import envelope_column
-from fvsolve.report.long_section import head_window, section_of
+from fvsolve.report.long_section import envelope_column, head_window, section_of
 from fvsolve.report.report_files import open_checked_run
 from fvsolve.report.section_pipes import SectionPath, section_paths
 from fvsolve.run.result import not_valid
@@ -37,7 +33,11 @@ def write_pictures(
         raise FvsolveError("\n".join(faults))
     title, drawn = result.summary["title"], {}
     for k, way in enumerate(sections, 1):
-        drawn["section.png" if len(sections) == 1 else f"section-{k}.png"] = _section_figure(result, way)
+        section = section_of(result, way)
+        window = head_window([section], envelope_column(result, "max_head").unit)
+        names = "\n".join(filter(None, [title, way.name]))
+        figure = section_figure(section, window, result.summary["envelope_units"], names)
+        drawn["section.png" if len(sections) == 1 else f"section-{k}.png"] = figure
     if picked:
         data = result.history_drawn()
         columns = [result.probes.index(name) for name in picked]
@@ -98,20 +98,3 @@ def _chosen_sections(sections: list[SectionPath], route: str, others: bool, faul
         hint = did_you_mean(route, names) or f"; the run has {listing(names) or 'none'}"
         faults.append(f"{show(route)}: unknown route{hint}")
     return named
-
-
-def _section_figure(result, way: SectionPath):
-    sec = section_of(result, way)
-    k, title = sec.drawn_indices(), "\n".join(filter(None, [result.summary["title"], way.name]))
-    return section_figure(
-        sec.chainage[k],
-        {name: values[k] for name, values in sec.along.items()},
-        result.summary["envelope_units"],
-        {name: line[k] for name, line in sec.lines.items()},
-        head_window([sec], envelope_column(result, "max_head").unit),
-        sec.cavity_spans,
-        sec.violations,
-        [device.chainage for device in sec.devices],
-        sec.labels(),
-        title,
-    )

@@ -1,21 +1,31 @@
-"""Report files of a run or study: HTML pages and workbook; checks that the run directory is complete."""
+"""Report files of a run or study: HTML pages, and workbooks (.xlsx) of all tables with all rows."""
 
-from __future__ import annotations
-
+import math
 import os
+from dataclasses import replace
 from pathlib import Path
 from urllib.parse import quote
 
 import numpy as np
 
-from fvsolve.errors import FvsolveError, RunError, listing
-from fvsolve.output.envelope import ENVELOPE_QUANTITIES
-from fvsolve.report.envelope_units import envelope_column
+from fvsolve.errors import FvsolveError, RunError, listing, visible
+from fvsolve.output.csv_files import ENVELOPE_QUANTITIES
+from fvsolve.report import import_library, model_tables, page, run_tables
+from fvsolve.report.long_section import Section, envelope_column, section_of
+from fvsolve.report.section_pipes import SectionPath, section_paths
+from fvsolve.report.tables import ReportTable, is_number
 from fvsolve.run import open_run
-from fvsolve.studies.scenarios import STUDY
+from fvsolve.studies.scenarios import STUDY, open_study
 
 PAGE_FILE = "report.html"
 REQUIRED_KEYS = ("fluid", "cells", "methods", "steps", "rejections", "rhs", "seconds", "events", "cavities")
+MAX_COLUMN_WIDTH = 60  # greatest initial width of a column [letters]
+MAX_SHEET_NAME = 31  # greatest length of the name of a sheet [letters]; it must not contain these signs:
+FORBIDDEN_SIGNS = "[]:*?/\\'"
+SECTION_HEADERS = {"elevation": "elevation", "initial_head": "initial head", "min_head": "minimum head",
+         "max_head": "maximum head", "min_pressure": "minimum pressure",
+         "max_pressure": "maximum pressure", "t_min": "time of the minimum",
+         "t_max": "time of the maximum"}  # fmt: skip
 
 
 def write_report(directory: str | Path, out: str | Path | None = None, xlsx: bool = False) -> list[Path]:
@@ -26,11 +36,6 @@ def write_report(directory: str | Path, out: str | Path | None = None, xlsx: boo
     Raises RunError if the directory does not hold a finished run, FvsolveError if a library is missing or a file cannot
     be written.
     """
-    from fvsolve.report.libraries import import_library
-    from fvsolve.report.page import page
-    from fvsolve.report.section_pipes import section_paths
-    from fvsolve.report.workbook import write_workbook
-
     for name in ("jinja2", "plotly", *["xlsxwriter"] * xlsx):
         import_library(name)
     path = Path(out) if out is not None else Path(directory) / PAGE_FILE
@@ -38,8 +43,8 @@ def write_report(directory: str | Path, out: str | Path | None = None, xlsx: boo
         return _write_study(Path(directory), path, xlsx)
     result = open_checked_run(Path(directory))
     sections = section_paths(result)
-    write_page(path, page(result, sections))
-    return [path, write_workbook(result, sections, path.with_suffix(".xlsx"))] if xlsx else [path]
+    write_page(path, page.page(result, sections))
+    return [path, write_tables(workbook_tables(result, sections), path.with_suffix(".xlsx"))] if xlsx else [path]
 
 
 def write_page(path: Path, text: str) -> None:
@@ -57,18 +62,12 @@ def _write_study(directory: Path, path: Path, xlsx: bool) -> list[Path]:
     Returns the paths of the page of the study and of the workbook.
     directory : of the study; path : of its page, which links to the pages of the runs
     """
-    from fvsolve.report.page import page
-    from fvsolve.report.section_pipes import section_paths
-    from fvsolve.report.study_report import study_page
-    from fvsolve.report.workbook import study_tables, write_tables
-    from fvsolve.studies.scenarios import open_study
-
     study, runs = open_study(directory), []
     for row in study["runs"]:
         own, result = Path(row["directory"]) / PAGE_FILE, open_checked_run(Path(row["directory"]))
-        write_page(own, page(result, section_paths(result)))
+        write_page(own, page.page(result, section_paths(result)))
         runs.append((row | {"page": quote(os.path.relpath(own, path.parent).replace(os.sep, "/"))}, result))
-    write_page(path, study_page(study, runs))
+    write_page(path, page.study_page(study, runs))
     return [path, write_tables(study_tables(runs), path.with_suffix(".xlsx"))] if xlsx else [path]
 
 
@@ -92,3 +91,102 @@ def open_checked_run(directory: Path):
         if length - x[-1] > max([2.0 * x[0], *np.diff(x)]):  # the last cell is missing
             raise RunError(f"{directory / 'envelope.csv'} lacks the last rows of {pipe}; {again}")
     return result
+
+
+def write_tables(report_tables: list[ReportTable], path: Path) -> Path:
+    """Write tables, one sheet each; returns the path. Raises FvsolveError if it cannot be written.
+
+    Text is stored as text, never as a formula, link or number.
+    """
+    plain = {"strings_to_formulas": False, "strings_to_urls": False, "strings_to_numbers": False}
+    book = import_library("xlsxwriter").Workbook(str(path), {**plain, "nan_inf_to_errors": True})
+    bold = book.add_format({"bold": True, "text_wrap": True, "valign": "bottom"})
+    taken: set[str] = set()
+    for table in report_tables:
+        _write_sheet(book, table, _sheet_name(table.title, taken), bold)
+    try:
+        book.close()
+    except Exception as error:  # XlsxWriter wraps errors of the operating system
+        raise FvsolveError(f"{path}: cannot be written: {error}; choose another file with --out") from None
+    return path
+
+
+def workbook_tables(result, sections: list[SectionPath]) -> list[ReportTable]:
+    """All tables of a run for a workbook; a table of a section has a row for each point."""
+    words = ReportTable("Summary", ("", ""), [[item.head, item.text] for item in run_tables.top_sentences(result)])
+    warnings = [[item.kind, item.place, item.text] for item in result.warnings]
+    notes = ReportTable("Warnings", ("kind", "place", "text"), warnings)
+    versions = run_tables.versions(result)
+    contents = [
+        words,
+        run_tables.verdict_table(result),
+        *run_tables.worst_tables(result),
+        run_tables.extremes_of_pipes(result, sections),
+        *run_tables.ranked_pipes(result),
+        run_tables.extremes_of_probes(result),
+        *(_section_table(result, section_of(result, way)) for way in sections),
+        run_tables.cavities(result),
+        run_tables.events(result),
+        *model_tables.all_tables(result),
+        run_tables.settings(result),
+        run_tables.ledgers(result),
+        run_tables.claim_table(result),
+        run_tables.comparisons(result),
+        notes,
+        ReportTable("Versions", versions.headers, versions.rows),
+    ]
+    return [table for table in contents if table]
+
+
+def study_tables(runs: list) -> list[ReportTable]:
+    """Tables of a study with the long sections of all runs; runs : (row of study.json, `Result`) of each run."""
+    contents, failing = [page.run_matrix(runs)], page.failing_limits(runs)
+    contents += [failing] if failing else []
+    for row, result in runs:
+        for way in section_paths(result):
+            along = _section_table(result, section_of(result, way))
+            title = f"{Path(row['directory']).name} {way.name}"
+            rows = [[page.run_name(row), *cells] for cells in along.rows]
+            heads = {"headers": ["run", *along.headers], "units": ["", *along.units]}
+            contents.append(replace(along, title=title, rows=rows, **heads))
+    return contents
+
+
+def _section_table(result, sec: Section) -> ReportTable:
+    """Table of a long section, with a row for each point."""
+    head = envelope_column(result, "min_head").unit
+    columns = [sec.chainage, sec.pipe, *(sec.along[name] for name in SECTION_HEADERS), *sec.lines.values()]
+    heads = ["chainage", "pipe", *SECTION_HEADERS.values(), *sec.lines]
+    units = [envelope_column(result, "distance").unit, ""]
+    units += [envelope_column(result, name).unit for name in SECTION_HEADERS]
+    rows = [list(row) for row in zip(*(column.tolist() for column in columns), strict=True)]
+    return ReportTable(f"Section {sec.way.name}", heads, rows, [*units, *[head] * len(sec.lines)])
+
+
+def _write_sheet(book, table: ReportTable, name: str, bold) -> None:
+    sheet = book.add_worksheet(name)
+    heads = [f"{head} [{unit}]" if unit else head for head, unit in table.heads]
+    for k, head in enumerate(heads):
+        sheet.write_string(0, k, visible(head), bold)
+        letters = max([len(head), *(len(str(row[k])) for row in table.rows[:200])])
+        sheet.set_column(k, k, min(letters + 2, MAX_COLUMN_WIDTH))
+    for i, row in enumerate(table.rows, 1):
+        for k, value in enumerate(row):
+            if value is None or is_number(value) and not math.isfinite(value):
+                continue
+            if is_number(value):
+                sheet.write_number(i, k, value)
+            else:
+                sheet.write_string(i, k, visible(str(value)))
+    sheet.freeze_panes(1, 1)
+
+
+def _sheet_name(title: str, taken: set[str]) -> str:
+    """Valid name for a sheet, from a title; it differs from all names in `taken`, to which it is added."""
+    plain = "".join("-" if sign in FORBIDDEN_SIGNS else sign for sign in visible(title)).strip() or "table"
+    name, k = plain[:MAX_SHEET_NAME], 1
+    while name.casefold() in taken:
+        k += 1
+        name = f"{plain[: MAX_SHEET_NAME - 1 - len(str(k))]} {k}"
+    taken.add(name.casefold())
+    return name

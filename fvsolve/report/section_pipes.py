@@ -4,8 +4,6 @@ Sections are the routes of the case, then the longest paths through the remainin
 A path continues through common nodes and through links other than pipes between two junctions.
 """
 
-from __future__ import annotations
-
 import heapq
 from typing import NamedTuple
 
@@ -69,10 +67,8 @@ def section_paths(result) -> list[SectionPath]:
 
 def _is_covered(way: SectionPath, ways: list[SectionPath]) -> bool:
     """True if a path consists of the pieces of one cut pipe, and all these pieces are on another path."""
-    pipes = [leg.pipe for leg in way.legs]
-    return is_cut(way.name, pipes) and any(
-        set(pipes) <= {leg.pipe for leg in other.legs} for other in ways if other is not way
-    )
+    pipes, others = [leg.pipe for leg in way.legs], [other for other in ways if other is not way]
+    return is_cut(way.name, pipes) and any(set(pipes) <= {leg.pipe for leg in other.legs} for other in others)
 
 
 def _joins_junctions(link, case) -> bool:
@@ -91,9 +87,8 @@ def _path_of_chain(chain: list[tuple[str, bool, float]], result) -> SectionPath:
     first, last = chain[0], chain[-1]
     begins = _initial_head(result, first[0], last=first[1])
     ends = _initial_head(result, last[0], last=not last[1])
-    if ends > begins + 1e-9 * abs(begins) or (
-        ends >= begins and sum(turned for _, turned, _ in chain) * 2 > len(chain)
-    ):
+    mostly_turned = sum(turned for _, turned, _ in chain) * 2 > len(chain)
+    if ends > begins + 1e-9 * abs(begins) or (ends >= begins and mostly_turned):
         chain = [(pipe, not turned, length) for pipe, turned, length in reversed(chain)]
     at, legs = 0.0, []
     for pipe, turned, length in chain:

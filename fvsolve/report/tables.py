@@ -1,7 +1,5 @@
 """Report tables: rows of words and numbers under headers with units, aligned at the decimal points."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,11 +12,8 @@ DECIMALS = 6  # greatest number of decimals, unless the least number of the colu
 MAX_SHARED_DIGITS = 7  # greatest number of digits after the first if all numbers of a column have the same decimals
 MAX_ROWS = 60  # greatest number of rows of a table on the page, unless the table states `most`
 ERROR_HEADER = "\u00b1"  # header of columns of errors, shown with two digits
-NARROW_SPACE, FIGURE_SPACE, POINT_SPACE = (
-    "\u202f",
-    "\u2007",
-    "\u2008",
-)  # spaces: between thousands, as wide as a digit, as wide as a point
+# Spaces: between thousands, as wide as a digit, as wide as a point.
+NARROW_SPACE, FIGURE_SPACE, POINT_SPACE = "\u202f", "\u2007", "\u2008"
 
 
 def in_unit(unit_column, value: float | None) -> float | None:
@@ -47,6 +42,10 @@ class ReportTable:
     most: int = MAX_ROWS
     more: str = ""
     links: Sequence[str] = ()
+
+    def __bool__(self) -> bool:
+        """True if the table has rows; a table without rows is left out."""
+        return bool(self.rows)
 
     @property
     def heads(self) -> list[tuple[str, str]]:
@@ -79,11 +78,8 @@ class ReportTable:
     def left_out(self) -> str:
         """Note below a table that has more rows than the page shows; "" if all rows are shown."""
         hidden = len(self.rows) - self.most
-        return (
-            f"{hidden} more row{'' if hidden == 1 else 's'}: {self.more or 'in the workbook (--xlsx)'}"
-            if hidden > 0
-            else ""
-        )
+        text = f"{hidden} more row{'' if hidden == 1 else 's'}: {self.more or 'in the workbook (--xlsx)'}"
+        return text if hidden > 0 else ""
 
 
 def is_number(value: Any) -> bool:

@@ -1,7 +1,5 @@
 """Public `run()` and `open_run()`: from a case to its result, files and pictures."""
 
-from __future__ import annotations
-
 import contextlib
 import time
 import warnings
@@ -16,7 +14,7 @@ from fvsolve.output.restart import identity
 from fvsolve.output.summary_file import summary_data, write_summary
 from fvsolve.run import mpi_run
 from fvsolve.run.case_claims import claims
-from fvsolve.run.result import Result
+from fvsolve.run.result import Result, check_summary
 from fvsolve.validation import COUNT_FROM_ONE, FLAG, FUNCTION, PATH, TABLE, validated
 
 __all__ = ["Result", "open_run", "run"]
@@ -63,10 +61,8 @@ def open_run(directory: str | Path) -> Result:
 
     Raises RunError if the run is not finished, or was written by another version of fvsolve.
     """
-    from fvsolve.run.summary_fields import check
-
     contents = read_directory(Path(directory))
-    check(contents[0], Path(directory) / SUMMARY_FILE)
+    check_summary(contents[0], Path(directory) / SUMMARY_FILE)
     return Result(*contents)
 
 

@@ -1,7 +1,5 @@
 """Runs under MPI: tasks of rank 0 and of the other ranks, with a check that all have the same case."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import signal

@@ -1,14 +1,12 @@
 """Data of the pictures that `view` draws of a run: frames, units, and positions of parts."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
 
 from fvsolve.case.basins import patch_names
 from fvsolve.draw.projection import PLAUSIBLE_SCALE
-from fvsolve.draw.scene import DrawnPart, DrawnScene, DrawnUnit
+from fvsolve.draw.view import DrawnPart, DrawnScene, DrawnUnit
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.output import network_layout
 from fvsolve.output.fields import FIELD_UNITS, read_pipe_lines
@@ -58,19 +56,16 @@ def unit_of(case, field: str) -> DrawnUnit:
     """Unit of a quantity in pictures: as in `[output]`, by default bar for pressures; "" for unknown names."""
     if field in case.scalars:
         return DrawnUnit(field, case.scalars[field].unit)
-    own = {
-        key: own_dimension
-        for name in case.meshes
-        for key, own_dimension in case.nodes[name].physics_type.fields.items()
-    }
-    dimension = (own | DIMENSIONS).get(field)
+    dimensions = {}
+    for name in case.meshes:
+        dimensions |= case.nodes[name].physics_type.fields
+    dimension = (dimensions | DIMENSIONS).get(field)
     if dimension is None:
         return DrawnUnit(field, "")
     unit_column = column(field, dimension, case)
     if unit_column.plain and dimension in DEFAULT_UNITS:
-        unit_column = column(
-            field, dimension, case, unit_column.unit if dimension in case.output.units else DEFAULT_UNITS[dimension]
-        )
+        label = unit_column.unit if dimension in case.output.units else DEFAULT_UNITS[dimension]
+        unit_column = column(field, dimension, case, label)
     return DrawnUnit(field, unit_column.unit, unit_column.span_from_si(1.0), float(unit_column.from_si(0.0)))
 
 
@@ -79,9 +74,7 @@ def lengths_of(case) -> tuple[DrawnUnit, DrawnUnit]:
     bodies = any(node.kind == "body" for node in case.nodes.values())
     plan, height = ("position", "position") if bodies else ("length", "level" if case.meshes else "head")
     columns = [column(name, name, case) for name in (plan, height)]
-    return tuple(
-        DrawnUnit(unit_column.name, unit_column.unit, unit_column.span_from_si(1.0)) for unit_column in columns
-    )
+    return tuple(DrawnUnit(own.name, own.unit, own.span_from_si(1.0)) for own in columns)
 
 
 def parts_of(case, plan: dict[str, np.ndarray]) -> list[DrawnPart]:

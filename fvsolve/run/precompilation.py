@@ -3,8 +3,6 @@
 Code and fluid properties are stored in the cache folder, which can be copied to machines of the same kind.
 """
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable, Sequence
@@ -50,18 +48,13 @@ def warm(
     """
     folder, began = _folder(), time.perf_counter()
     before = code_files(folder)
-    tasks = (
-        [("steps", "")]
-        + [("attempt", kind) for kind in STEPS if whole]
-        + [("algebra", kind) for kind in LINEAR if whole]
-    )
-    _all(tasks, jobs or processor_count(), lambda done, task: progress(done, len(tasks) + len(cases), task))
+    tasks = [("steps", "")]
+    if whole:
+        tasks += [*(("attempt", kind) for kind in STEPS), *(("algebra", kind) for kind in LINEAR)]
+    count, total = jobs or processor_count(), len(tasks) + len(cases)
+    _all(tasks, count, lambda done, task: progress(done, total, task))
     case_tasks = [("case", str(path)) for path in cases]
-    _all(
-        case_tasks,
-        jobs or processor_count(),
-        lambda done, task: progress(len(tasks) + done, len(tasks) + len(cases), task),
-    )
+    _all(case_tasks, count, lambda done, task: progress(len(tasks) + done, total, task))
     after = code_files(folder)
     return CacheState(
         str(folder), store.target()["name"], len(after.keys() - before.keys()), len(after), sum(after.values()),
@@ -110,35 +103,29 @@ def _all(tasks: list[tuple[str, str]], jobs: int, progress: Callable[[int, str],
 
 
 def run_task(task: tuple[str, str]) -> None:
-    """Compile the code of a task (kind, name) in this process."""
-    kind, name = task
-    TASKS[kind](name)
+    """Compile the code of a task (kind, name) in this process.
 
-
-def steps(_: str) -> None:
-    """Compile the time loop, and the empty linear algebra of explicit methods."""
-    from fvsolve.steppers.run_handle import no_algebra
-    from fvsolve.steppers.time_loop import compiled
-
-    compiled(), no_algebra()
-
-
-def attempt(kind: str) -> None:
-    """Compile the step of a kind of methods, such as "explicit"."""
+    Kinds of tasks: "steps", the time loop and the empty linear algebra of explicit methods; "attempt", the step of a
+    kind of methods, such as "explicit"; "algebra", the linear solver of a kind, for real and for complex matrices;
+    "case", the code that a case file needs.
+    """
+    from fvsolve.steppers import run_handle, structure, time_loop
     from fvsolve.steppers.integrator import attempt_of
 
-    attempt_of(kind)
+    kind, name = task
+    if kind == "steps":
+        time_loop.compiled()
+        run_handle.no_algebra()
+    elif kind == "attempt":
+        attempt_of(name)
+    elif kind == "algebra":
+        for complex in (False, True):
+            structure.functions(name, complex)
+    else:
+        compile_case(name)
 
 
-def algebra(kind: str) -> None:
-    """Compile the linear solver of a kind, for real and for complex matrices."""
-    from fvsolve.steppers.structure import functions
-
-    for complex in (False, True):
-        functions(kind, complex)
-
-
-def case(path: str) -> None:
+def compile_case(path: str) -> None:
     """Compile the code that a case needs: initial state, checks, first steps and energies."""
     from fvsolve.output.memory_sink import MemorySink
     from fvsolve.run import model_of
@@ -152,6 +139,3 @@ def case(path: str) -> None:
     sink, state = MemorySink(model), initial_state(model)
     sink.begin(model, state)
     solve(model, state, sink, stop)
-
-
-TASKS = {"steps": steps, "attempt": attempt, "algebra": algebra, "case": case}

@@ -1,8 +1,7 @@
-"""Class `Result` of a run: probes over time, extremes, verdicts, pictures."""
+"""Class `Result` of a run: probes over time, extremes, verdicts, pictures; check of the fields of a summary."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fvsolve.display import Displayable, save_if_path
-from fvsolve.errors import FvsolveError, Notice, RunError, did_you_mean
+from fvsolve.errors import FvsolveError, Notice, RunError, did_you_mean, listing
 from fvsolve.output.fields import read_series
 from fvsolve.output.unit_columns import UnitColumn
 from fvsolve.units import show
@@ -20,6 +19,11 @@ KINDS_WITH_FIELDS = frozenset(("pipe", "basin", "body"))  # kinds of parts that 
 
 HOLDS, OPEN, FAILS = "holds", "open", "fails"  # states of a limit
 IN_WORDS = {HOLDS: "holds", OPEN: "open", FAILS: "FAILS"}
+NESTED_ROWS = {  # rows within rows
+    ("verdicts", "worst"): ("place", "chainage", "elevation", "time", "bound", "value", "limit", "margin",
+                            "error", "state"),
+    ("peaks", "minimum"): ("error",), ("peaks", "maximum"): ("error",),
+}  # fmt: skip
 
 
 def not_valid(summary: dict) -> str:
@@ -215,7 +219,7 @@ class Result(Displayable):
     @cached_property
     def routes(self) -> dict:
         """Route -> chainage, pipe, distance, elevation, least and greatest pressure and head, times, along it."""
-        from fvsolve.output.route_table import route_envelopes
+        from fvsolve.output.csv_files import route_envelopes
 
         return route_envelopes(self.envelope, self.case)
 
@@ -308,7 +312,7 @@ class Result(Displayable):
         speed of bodies; without all of these only the parts are drawn. `contours` : number of contour lines. Raises
         RunError without frames, FvsolveError if drawing is not possible.
         """
-        if field is None and self._without_fields:
+        if field is None and self.directory is not None and not self._kinds & KINDS_WITH_FIELDS:
             return self._draw([], "parts", path, ".png", 0)
         times = [t for t, _ in self._frames()]
         t = times[-1] if time is None else min(times, key=lambda frame_time: abs(frame_time - time))
@@ -320,10 +324,9 @@ class Result(Displayable):
         return self._draw(list(dict.fromkeys(t for t, _ in self._frames())), field, path, ".gif", contours)
 
     @property
-    def _without_fields(self) -> bool:
-        """True if no part has fields that frames show, and the result is in a run directory."""
-        kinds = {part.kind for part in (*self.case.nodes.values(), *self.case.links.values())}
-        return self.directory is not None and not kinds & KINDS_WITH_FIELDS
+    def _kinds(self) -> set[str]:
+        """Kinds of the parts of the case."""
+        return {part.kind for part in (*self.case.nodes.values(), *self.case.links.values())}
 
     def _frames(self) -> list[tuple[float, Path]]:
         if self.directory is None or not (self.directory / "fields.pvd").is_file():
@@ -337,7 +340,7 @@ class Result(Displayable):
         """Text of the reason for which a run has no frames."""
         if self.directory is None:
             return "nothing was written; run again with a run directory (`out`)"
-        if not {part.kind for part in (*self.case.nodes.values(), *self.case.links.values())} & KINDS_WITH_FIELDS:
+        if not self._kinds & KINDS_WITH_FIELDS:
             return "the case has no basin, body or pipe"
         if self.case.output.fields == 0:
             return "[output] fields is 0; run again with --set output.fields=20 --force"
@@ -361,13 +364,11 @@ class Result(Displayable):
 
     def _measured(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         compared = self.case.compare if self.comparisons else {}
-        return {
-            series.probe.text: (
-                self._time.from_si(series.t + series.shift),
-                self.column(series.probe.text).from_si(series.v),
-            )
-            for series in compared.values()
-        }
+        measured = {}
+        for series in compared.values():
+            name = series.probe.text
+            measured[name] = self._time.from_si(series.t + series.shift), self.column(name).from_si(series.v)
+        return measured
 
     def column(self, probe: str) -> UnitColumn:
         """Name, dimension and unit of a probe, with conversions to and from SI.
@@ -388,3 +389,43 @@ class Result(Displayable):
         """Columns of a table of the probes: name, unit, least and greatest value, and their times."""
         columns = {"probe": self.probes, "unit": list(self.units.values())}
         return columns | {key: [getattr(row, key) for row in self.extremes.values()] for key in Extremes._fields}
+
+
+EXACT_ROWS = {  # rows with exactly these fields
+    "marks": ResultMark._fields, "expectations": Expectation._fields, "verdicts": LimitVerdict._fields,
+    "comparisons": Comparison._fields, "warnings": tuple(field.name for field in fields(Notice)),
+}  # fmt: skip
+ROWS = EXACT_ROWS | {
+    "extremes": Extremes._fields, "probes": ("dimension", "unit"), "methods": ("time", "method"),
+    "events": ("time", "name", "what"), "cavities": ("place", "distance", "time", "volume", "t_volume"),
+    "peaks": ("minimum", "maximum"),
+}  # fmt: skip
+
+
+def check_summary(summary: dict[str, Any], path: Path) -> None:
+    """Raise RunError if the entries of a summary were written by another version; path : its file, for the message."""
+    if faults := [*field_faults(summary)]:
+        text = "it was written by another version of fvsolve; run again with --force"
+        raise RunError(f"{path} {'; '.join(faults)}: {text}")
+
+
+def field_faults(summary: dict[str, Any]) -> Iterator[str]:
+    """Yield a text for each key of a summary with missing entries, and for each with unknown entries."""
+    for key, expected in ROWS.items():
+        rows = as_rows(summary.get(key, []))
+        if missing := [name for name in expected if any(name not in entry for entry in rows)]:
+            yield f"lacks {listing(missing)} of {key}"
+        unknown = list(dict.fromkeys(name for entry in rows for name in entry if name not in expected))
+        if key in EXACT_ROWS and unknown:
+            yield f"has {listing(unknown)} of {key}, unknown to this version"
+    for (key, part), expected in NESTED_ROWS.items():
+        rows = [row for entry in as_rows(summary.get(key, [])) for row in as_rows(entry.get(part, []))]
+        if missing := [name for name in expected if any(name not in entry for entry in rows)]:
+            yield f"lacks {listing(missing)} of {key}, {part}"
+
+
+def as_rows(rows: list | dict) -> list[dict]:
+    """List of dicts from a list of dicts, from a dict of dicts, or from a single dict."""
+    if isinstance(rows, dict):
+        return [*rows.values()] if all(isinstance(row, dict) for row in rows.values()) else [rows]
+    return rows

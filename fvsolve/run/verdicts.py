@@ -1,8 +1,9 @@
-"""Verdicts on the design limits of a case, from the extremes of a run."""
+"""Extremes over all steps in the parts of a limit or claim, and verdicts on the design limits of a case."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,10 +12,11 @@ from fvsolve.case import schedule_ends
 from fvsolve.case.design_limits import VACUUM
 from fvsolve.case.extent import OF_PRESSURE
 from fvsolve.case.pipe_routes import Leg, is_cut, legs, pipe_leg
+from fvsolve.output.csv_files import with_initial_heads
 from fvsolve.output.unit_columns import UnitColumn, column
-from fvsolve.run.part_extremes import PartExtremes, in_quantity, part_extremes, pressure_of
 from fvsolve.run.result import FAILS, HOLDS, OPEN
 
+ENVELOPE_KEYS = ("distance", "elevation", "min_pressure", "t_min", "max_pressure", "t_max")
 ROUNDING = 1e-9  # relative to a limit and the typical size of its quantity; a smaller excess is within the limit
 SIZES = {"pressure": 1e5, "gauge_pressure": 1e5, "head": 10.0, "pressure_head": 10.0}
 MAGNITUDES = ("velocity", "force")  # quantities of which a limit bounds the magnitude
@@ -23,6 +25,89 @@ WORST = 10  # places that a limit lists
 STATES = (FAILS, OPEN, HOLDS)  # worst first
 SHARED = ("name", "quantity", "until")  # keys with one value for all places of a limit
 PLACES_KEY = "beside"  # key of a row that is not written to files: all places of its part and bound
+
+
+@dataclass(frozen=True)
+class PartExtremes:
+    """Extremes at the n recorded positions of a part : float64[n] each; n is 1 except for pipes.
+
+    distance : from the `from` end of a pipe [m], nan for other parts; elevation [m]
+    minimum, maximum : extremes over all steps [SI, pressures absolute]; t_min, t_max : their times [s]
+    """
+
+    group: str
+    part: str
+    distance: np.ndarray
+    elevation: np.ndarray
+    minimum: np.ndarray
+    t_min: np.ndarray
+    maximum: np.ndarray
+    t_max: np.ndarray
+
+
+def part_extremes(model, summary, extent) -> list[PartExtremes]:
+    """Extremes of every part of an extent; quantities of pressure as absolute pressures.
+
+    Extremes from the time at which a diverged run is not valid are nan.
+    """
+    is_pressure = extent.quantity in OF_PRESSURE
+    pipes = {pipe.name: pipe for pipe in model.pipes}
+    envelope = with_initial_heads(summary, model) if is_pressure else {}
+    quantity = "pressure" if is_pressure else extent.quantity
+    rows: dict[str, list] = {}  # watched probes along pipes
+    for probe in model.watched:
+        if probe.straight and probe.quantity == quantity:
+            rows.setdefault(probe.name, []).append(probe)
+    parts = []
+    for group, name in extent.parts:
+        if group == "links" and name in envelope:
+            parts.append(PartExtremes(group, name, *(np.asarray(envelope[name][key]) for key in ENVELOPE_KEYS)))
+        elif group == "links" and name in rows:
+            parts.append(along_pipe(summary, pipes[name], rows[name]))
+        else:
+            z = model.elevation.get(name, np.nan) if group == "nodes" else np.nan
+            extremes = summary.watched[f"{group}.{name}.{quantity}"]
+            parts.append(PartExtremes(group, name, np.array([np.nan]), np.array([z]), *np.array([extremes]).T))
+    return parts if np.isinf(summary.invalid_from) else [valid(probe, summary.invalid_from) for probe in parts]
+
+
+def valid(part: PartExtremes, until: float) -> PartExtremes:
+    """Copy of the extremes of a part, with nan for those that occurred at the time `until` [s] or later."""
+    sides = {side: np.where(getattr(part, f"t_{side[:3]}") < until, getattr(part, side), np.nan)
+             for side in ("minimum", "maximum")}  # fmt: skip
+    return replace(part, **sides)
+
+
+def along_pipe(summary, pipe, rows: list) -> PartExtremes:
+    """Extremes along a pipe, from the probes `rows` of which only extremes are recorded."""
+    distance = np.array([probe.fraction for probe in rows]) * pipe.length
+    extremes = np.array([summary.watched[probe.text] for probe in rows])
+    return PartExtremes("links", pipe.name, distance, pipe.height(distance), *extremes.T)
+
+
+def in_quantity(model, quantity: str, pressure, elevation):
+    """Convert absolute pressures [Pa] to the quantity "pressure", "gauge_pressure", "head" or "pressure_head" [SI].
+
+    elevation : elevation of the points [m]
+    """
+    if quantity == "pressure":
+        return pressure
+    if quantity == "gauge_pressure":
+        return pressure - model.case.ambient_pressure
+    head = model.head(pressure, elevation)
+    return head if quantity == "head" else head - elevation
+
+
+def pressure_of(model, quantity: str, value: float, elevation):
+    """Absolute pressure [Pa] from a value of "pressure", "gauge_pressure", "head" or "pressure_head" [SI].
+
+    elevation : elevation of the points [m]. The result is nan below the minimum pressure of the fluid.
+    """
+    if quantity == "pressure":
+        return value
+    if quantity == "gauge_pressure":
+        return value + model.case.ambient_pressure
+    return model.case.law.pressure_under(value - elevation if quantity == "head" else value)
 
 
 class Nearest(NamedTuple):
@@ -69,17 +154,12 @@ def places(model, summary) -> list[list[dict[str, Any]]]:
         extent = limit.extent
         shown = column(extent.quantity, "head" if extent.quantity == "pressure_head" else extent.dimension, model.case)
         shared = {"name": limit.name, "quantity": extent.quantity, "until": float(summary.t)}
-        nearest_rows = [
-            row
-            for part in part_extremes(model, summary, extent)
-            for row in nearest(model, summary, limit, part, complete)
-        ]
-        tables.append(
-            [
-                row_of(row, shown, chainage, extent) | shared | {PLACES_KEY: place_margins(model, extent, shown, row)}
-                for row in nearest_rows
-            ]
-        )
+        rows = []
+        for part in part_extremes(model, summary, extent):
+            for row in nearest(model, summary, limit, part, complete):
+                margins = {PLACES_KEY: place_margins(model, extent, shown, row)}
+                rows.append(row_of(row, shown, chainage, extent) | shared | margins)
+        tables.append(rows)
     return tables
 
 

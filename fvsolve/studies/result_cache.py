@@ -12,7 +12,7 @@ from typing import Any
 
 from fvsolve import jit
 from fvsolve.errors import RunError
-from fvsolve.output.lock import lock_folder, release
+from fvsolve.output.directory import lock_folder, release
 from fvsolve.output.restart import identity
 from fvsolve.output.summary_file import plain
 from fvsolve.steppers.tableau import BUILT_IN, METHODS

@@ -19,8 +19,8 @@ import fvsolve
 from fvsolve.basins.basin_probes import observe_dense_flows, observe_flows
 from fvsolve.basins.liquid.liquid_probes import observe_liquid
 from fvsolve.draw import frame_meshes as of_view
-from fvsolve.draw.scene import DrawnScene
 from fvsolve.draw.sheet import PictureSheet, colour_range
+from fvsolve.draw.view import DrawnScene
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.mesh import read, rectangle
 from fvsolve.mesh.mesh_points import MeshPoints
@@ -293,7 +293,7 @@ def test_a_line_that_lies_in_no_basin_is_refused():
 
 
 def test_a_line_across_a_hole_has_nothing_there(tmp_path):
-    from fvsolve.output.line_files import LineSampler
+    from fvsolve.output.csv_files import LineSampler
 
     case = fvsolve.load(liquid([], size=[4.0, 4.0], cells=[16, 16], holes=[[1.0, 1.0, 2.0, 2.5]]) | {
         "output": {"every": 1e-4, "lines": {"cut": {"basin": "block", "from": [0, 2], "to": [4, 2], "points": 9}}}

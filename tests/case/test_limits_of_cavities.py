@@ -19,8 +19,7 @@ from fvsolve.report.long_section import head_window, section_of
 from fvsolve.report.report_files import write_report
 from fvsolve.report.section_pipes import section_paths
 from fvsolve.run import model_of
-from fvsolve.run.part_extremes import part_extremes
-from fvsolve.run.verdicts import nearest, verdict
+from fvsolve.run.verdicts import nearest, part_extremes, verdict
 from fvsolve.solve import initial_state, solve
 from fvsolve.studies.calibrate import calibrate
 from fvsolve.studies.closure_optimisation import optimise

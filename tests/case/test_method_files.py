@@ -93,7 +93,7 @@ def test_two_files_of_one_name_are_not_one_method(tmp_path):
 
 @pytest.mark.parametrize("inside", [True, False])
 def test_a_chart_prints_a_line_that_the_case_accepts(tmp_path, inside):
-    from fvsolve.cli.study_options import method_name
+    from fvsolve.cli.app import method_name
     from fvsolve.studies.accuracy.chart import _target_setting, chart
 
     case = placed(tmp_path / "case", method="dormand-prince")

@@ -272,11 +272,12 @@ def ladder(pipes: int) -> dict:
 
 def test_check_shows_what_stands_out_of_many_in_the_units_of_the_output(capsys):
     from fvsolve.cli import printing
+    from fvsolve.cli.terminal import show
 
     model = model_of(load(ladder(50)))
-    printing.print_checks(model.case, model.checks)
+    show(printing.check_text(model.case, model.checks))
     short = capsys.readouterr().out
-    printing.print_checks(model.case, model.checks, every=True)
+    show(printing.check_text(model.case, model.checks, every=True))
     whole = capsys.readouterr().out
     rows = lambda text: {line.split()[0] for line in text.splitlines() if re.match(r" *[pn]\d+ ", line)}  # noqa: E731
     assert {f"p{k}" for k in range(1, 51)} | {f"n{k}" for k in range(1, 51)} == rows(whole)

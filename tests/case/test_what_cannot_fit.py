@@ -10,8 +10,8 @@ from reference.scenes import still
 
 import fvsolve
 from fvsolve.case.resource_checks import disk_size, free_memory
+from fvsolve.cli.printing import cost_estimate, duration
 from fvsolve.errors import CaseError, RunError
-from fvsolve.run.cost_estimate import cost_text, duration
 
 POOL = {"type": "basin", "physics": "transport", "size": [1.0, 1.0], "cells": [4, 4], "velocity": {"u": 0, "v": 0}}
 
@@ -94,8 +94,8 @@ def test_a_unit_of_many_letters_is_refused_at_once():
 
 def test_a_long_run_is_told_before_it_starts(fvs, tmp_path, monkeypatch):
     long = fvsolve.build(fvsolve.load(branched(), {"numerics.end": 1e12, "output.every": 1e9}))
-    assert re.fullmatch(r"case will take about \S+ years", cost_text(long))
+    assert re.fullmatch(r"case will take about \S+ years", cost_estimate(long))
     large = fvsolve.build(fvsolve.load(branched(fields=10**6), {"numerics.end": 1e-2, "output.every": 1e-3}))
-    assert re.fullmatch(r"case will take about .* GB on disk", cost_text(large))
-    assert cost_text(fvsolve.build(fvsolve.load(still()))) == ""
+    assert re.fullmatch(r"case will take about .* GB on disk", cost_estimate(large))
+    assert cost_estimate(fvsolve.build(fvsolve.load(still()))) == ""
     assert [duration(one) for one in (100.0, 240.0, 86400.0, 1e6)] == ["1e+02 s", "4 minutes", "24 hours", "12 days"]

@@ -8,7 +8,7 @@ import pytest
 from reference.scenes import junction, lake, pipe, ramp, reservoir, scene, valve
 
 from fvsolve.case import load
-from fvsolve.cli.response import output_unit
+from fvsolve.cli.linear_commands import output_unit
 from fvsolve.studies import response
 
 UNITS = {

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fvsolve.draw.curve_selection import select_curves
+from fvsolve.draw.plot import select_curves
 
 T = np.linspace(0.0, 1.0, 200)
 WAVE, OTHER = np.sin(7.0 * T), np.cos(5.0 * T)

@@ -11,11 +11,11 @@ from pytest import approx
 from reference.scenes import lake, pipe, scene, valve
 
 import fvsolve
-from fvsolve.draw import water_surface
-from fvsolve.draw.label_placement import place_labels
+from fvsolve.draw import frame_meshes
 from fvsolve.draw.network_picture import NetworkPicture
+from fvsolve.draw.part_drawing import place_labels
 from fvsolve.draw.projection import Projection, choose_projection, round_scale
-from fvsolve.draw.symbols import OTHER_LINK, OTHER_NODE, SYMBOLS, strokes, symbol_of
+from fvsolve.draw.sheet import OTHER_LINK, OTHER_NODE, SYMBOLS, strokes, symbol_of
 from fvsolve.parts.link import Link
 from fvsolve.parts.node import Node
 from fvsolve.run.plot_scene import scene_of
@@ -143,8 +143,8 @@ def bowl():
 
 def test_the_shore_is_where_the_surface_meets_the_bed_to_a_part_of_a_cell(bowl):
     mesh, radius, cell = bowl
-    found = water_surface.water_mesh(mesh, 1.0, ("depth",))
-    shore = np.vstack(water_surface.boundary_loops(found))
+    found = frame_meshes.water_mesh(mesh, 1.0, ("depth",))
+    shore = np.vstack(frame_meshes.boundary_loops(found))
     off = np.hypot(shore[:, 0], shore[:, 1]) - radius
     assert len(shore) > 60 and np.abs(off).max() < 0.15 * cell
     assert np.asarray(found.points)[:, 2] == approx(np.full(found.n_points, 0.1 * radius), abs=1e-6)
@@ -155,7 +155,7 @@ def test_the_shore_of_a_basin_that_rides_is_as_good_in_its_own_axes(bowl):
     turn, place = np.array([[0.8, 0.0, 0.6], [0.0, 1.0, 0.0], [-0.6, 0.0, 0.8]]), (3.0, 4.0, 5.0)
     mesh.points = mesh.points @ turn.T + place
     mesh.cell_data["normal"] = np.tile(turn[:, 2], (mesh.n_cells, 1))
-    shore = (np.vstack(water_surface.boundary_loops(water_surface.water_mesh(mesh, 1.0, ()))) - place) @ turn
+    shore = (np.vstack(frame_meshes.boundary_loops(frame_meshes.water_mesh(mesh, 1.0, ()))) - place) @ turn
     assert np.abs(np.hypot(shore[:, 0], shore[:, 1]) - radius).max() < 0.15 * cell
     assert shore[:, 2] == approx(np.full(len(shore), 0.1 * radius), abs=1e-3)
 
@@ -164,11 +164,11 @@ def test_what_is_cut_out_of_a_basin_and_what_rises_from_its_bed_are_houses(bowl)
     mesh, _, _ = bowl
     middle = mesh.cell_centers().points
     inside = (np.abs(middle[:, 0] - 2.0) < 0.5) & (np.abs(middle[:, 1]) < 0.5)
-    walls, roof = water_surface.buildings(mesh.extract_cells(~inside), 2.0)
+    walls, roof = frame_meshes.buildings(mesh.extract_cells(~inside), 2.0)
     assert roof.area == approx(1.0, rel=0.1) and (walls.bounds[5], roof.bounds[4]) == (2.0, 2.0)
-    assert not water_surface.buildings(mesh, 2.0) and not water_surface.raised_cells(mesh).any()
+    assert not frame_meshes.buildings(mesh, 2.0) and not frame_meshes.raised_cells(mesh).any()
     at = np.asarray(mesh.points)
     at[(np.abs(at[:, 0] - 2.0) < 0.45) & (np.abs(at[:, 1]) < 0.45), 2] += 3.0
     mesh.points = at
-    rises = water_surface.raised_cells(mesh)
+    rises = frame_meshes.raised_cells(mesh)
     assert inside[rises].sum() >= 16 and rises.sum() <= 40

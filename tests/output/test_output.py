@@ -15,8 +15,8 @@ from reference.scenes import AMBIENT
 
 import fvsolve
 from fvsolve.output import network_layout
+from fvsolve.output.csv_files import HistoryFile, read_headers, read_table
 from fvsolve.output.fields import FieldSeries, read_series
-from fvsolve.output.history_file import HistoryFile, read_headers, read_table
 from fvsolve.output.unit_columns import UnitColumn
 
 UNITS = {"pressure": "barg", "flow": "l/s", "time": "ms"}

@@ -18,8 +18,7 @@ from fvsolve.report.figures import escape_markup
 from fvsolve.report.page import page, script_json
 from fvsolve.report.report_files import write_report
 from fvsolve.report.section_pipes import section_paths
-from fvsolve.run.result import Result
-from fvsolve.run.summary_fields import ROWS
+from fvsolve.run.result import ROWS, Result
 
 WICKED = "</script><script>alert('x')</script> & \"quoted\" $5 {{ 7 * 7 }} <!-- \u2028 </style><b>bold"
 

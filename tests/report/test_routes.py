@@ -7,10 +7,9 @@ import pytest
 from reference.scenes import GRAVITY, RHO, junction, lake, pipe, scene, step, valve
 
 import fvsolve
-from fvsolve.draw.section_picture import LIMIT_LOOKS, LINE_LOOKS
+from fvsolve.draw.plot import LIMIT_LOOKS, LINE_LOOKS
 from fvsolve.report.figures import section_figure
-from fvsolve.report.head_animation import head_animations
-from fvsolve.report.long_section import head_window, section_of
+from fvsolve.report.long_section import head_animations, head_window, section_of
 from fvsolve.report.section_pipes import section_paths
 
 CHAINAGE, ELEVATION = [0.0, 130.0, 300.0, 500.0], [0.0, 42.0, 5.0, 20.0]

@@ -48,7 +48,7 @@ def test_dollars_are_drawn_as_dollars():
 def test_powers_of_ten_stay_powers():
     from matplotlib.text import Text
 
-    from fvsolve.draw.convergence_picture import order_figure
+    from fvsolve.draw.accuracy_pictures import order_figure
     from fvsolve.studies.accuracy.fit import Fit
 
     none = Fit((1.0, 1.0), 1.0, 0.1, ("", "", ""), 1.0)

@@ -116,7 +116,7 @@ def test_a_scene_without_pressures_has_no_port():
 
 
 def test_a_sparse_matrix_goes_to_a_file_of_its_own_name(tmp_path):
-    from fvsolve.cli.linearise import write_matrices
+    from fvsolve.cli.linear_commands import write_matrices
 
     for cells, name in ((5, "A.csv"), (501, "A-sparse.csv")):
         folder = tmp_path / str(cells)

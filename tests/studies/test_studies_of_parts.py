@@ -8,7 +8,7 @@ from reference import pump_trip
 from reference.folders import CASES
 
 import fvsolve
-from fvsolve.cli.order import variable_unit
+from fvsolve.cli.accuracy_commands import variable_unit
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.accuracy import model_hierarchy, refine
 from fvsolve.studies.accuracy.chart_settings import (

@@ -17,7 +17,7 @@ import fvsolve
 from fvsolve.case.text import write
 from fvsolve.cli.app import value_of
 from fvsolve.cli.sweep import split_list
-from fvsolve.draw.sweep_picture import outcome_figure
+from fvsolve.draw.object_pictures import outcome_figure
 from fvsolve.errors import CaseError, FvsolveError, RunError
 from fvsolve.studies import sweep
 from fvsolve.studies.sweep import Sweep, as_option_text

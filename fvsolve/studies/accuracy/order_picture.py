@@ -14,7 +14,7 @@ def order_picture(study):
 
     study : an `Order`; at most twice `SHOWN_VARIABLES` of its variables are drawn
     """
-    from fvsolve.draw.convergence_picture import order_figure
+    from fvsolve.draw.accuracy_pictures import order_figure
 
     length_factor, length = study.shown.get("length", (1.0, "m")) if study.plan.measure == CELLS else (1.0, "")
     measure = CELLS.replace("[m]", f"[{length}]") if length else study.plan.measure

@@ -1,0 +1,224 @@
+"""`fvsolve report`, `plot`, `fatigue`, `import` and `precompile`: reports of runs, networks, compiled code."""
+
+import shutil
+import sys
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+from typer import Argument, Option
+
+from fvsolve.case import shipped
+from fvsolve.cli.app import Json, RunDirectory, app, quantity_of
+from fvsolve.cli.terminal import TextTable, present
+from fvsolve.errors import FvsolveError, listing
+
+SHORT = (
+    'pipes shorter than a cell, which make steps small with pipe_model = "finite-volume" '
+    "(--min-pipe-length lengthens them)"
+)
+
+
+@app.command()
+def report(
+    directory: Annotated[Path, Argument(metavar="RUN_OR_STUDY", help="directory of a run or a study")],
+    out: Annotated[
+        Path | None, Option(metavar="FILE", help="file of the report (default RUN_OR_STUDY/report.html)")
+    ] = None,
+    xlsx: Annotated[
+        bool, Option("--xlsx", help="also write the tables as an Excel workbook in the folder of the report")
+    ] = False,
+) -> None:
+    """Write an offline HTML page of a run or a study: verdicts, long sections, histories, model, numerics."""
+    from fvsolve.report.report_files import write_report
+
+    for path in write_report(directory, out, xlsx):
+        print(path)
+
+
+@app.command()
+def plot(
+    directory: RunDirectory,
+    probes: Annotated[str, Option(metavar="A,B", help="probes whose histories are drawn (default none)")] = "",
+    route: Annotated[
+        str,
+        Option(
+            metavar="NAME",
+            help="route whose long section is drawn (default all routes, or none with --probes or --phase)",
+        ),
+    ] = "",
+    phase: Annotated[
+        list[str],
+        Option(
+            metavar="X:Y", help="phase plane to draw, probe Y over probe X; repeat the option for more (default none)"
+        ),
+    ] = [],  # noqa: B006
+    out: Annotated[Path | None, Option(metavar="DIR", help="folder of the pictures (default RUN)")] = None,
+) -> None:
+    """Draw long sections (heads, limits, devices), histories of probes and phase planes, without a browser."""
+    from fvsolve.report.pictures import write_pictures
+
+    for path in write_pictures(directory, probes, route, phase, out):
+        print(path)
+
+
+@app.command()
+def fatigue(
+    directory: RunDirectory,
+    probes: Annotated[
+        str, Option(metavar="A,B", help="probes of pressure or head whose cycles are counted (default all such probes)")
+    ] = "",
+    range: Annotated[
+        float | None,
+        Option(
+            metavar="R",
+            help="range of pressure or head that causes failure after --allowable-range cycles, in the unit of the "
+            "probe (default none: cycles are only counted)",
+        ),
+    ] = None,
+    allowable_range: Annotated[
+        float | None,
+        Option(metavar="N", help="number of cycles of the range --range until failure, required with --range"),
+    ] = None,
+    slope: Annotated[
+        float | None,
+        Option(
+            metavar="M",
+            help="exponent of the fatigue strength, required with --range: N (R/r)^M cycles of a range r cause failure",
+        ),
+    ] = None,
+    per_day: Annotated[
+        float,
+        Option(
+            metavar="N", help="number of occurrences of the run per day, from which its fatigue life in years follows"
+        ),
+    ] = 1.0,
+    as_json: Json = False,
+) -> None:
+    """Count pressure cycles of a run by rainflow counting, and estimate the fatigue life of its parts."""
+    from fvsolve.report import cycles as counting
+    from fvsolve.run import open_run
+
+    given = [entry for entry in (range, allowable_range, slope) if entry is not None]
+    if len(given) not in (0, 3) or any(not entry > 0.0 for entry in given) or not per_day > 0.0:
+        raise FvsolveError(
+            "--range, --allowable-range, --slope: expected all three or none; these and --per-day must be above 0"
+        )
+    strength = counting.FatigueStrength(*given) if given else None
+    names = [name.strip() for name in probes.split(",") if name.strip()]
+    results = counting.cycles(open_run(directory), names or None, strength)
+    present(as_json, {"probes": results}, cycle_text(results, per_day))
+
+
+def cycle_text(results: list[dict], per_day: float) -> Iterator:
+    """Table of pressure cycles, and the fatigue life of each part if its strength is given.
+
+    results : as from `cycles`; per_day : number of occurrences of the run per day
+    """
+    rows = [[entry["probe"], entry["unit"], f"{size:.5g}", f"{count:g}"]
+            for entry in results for size, count in entry["cycles"]]  # fmt: skip
+    yield TextTable(["probe", "unit", "range up to", "cycles"], rows)
+    for entry in [entry for entry in results if "share" in entry]:
+        years = 1.0 / (entry["share"] * per_day * 365.25) if entry["share"] > 0.0 else float("inf")
+        life = "unlimited" if years == float("inf") else f"{years:.4g} years"
+        yield (
+            f"{entry['probe']}: a run uses {entry['share']:.3g} of the fatigue life; with {per_day:g} runs a day the "
+            f"life is {life}"
+        )
+
+
+@app.command("import")
+def import_(
+    source: Annotated[Path, Argument(metavar="FILE", help="EPANET network to import, for example town.inp")],
+    case: Annotated[
+        Path | None,
+        Argument(
+            metavar="CASE",
+            help="case file to write, or its folder (default the name of FILE with .toml, in the current folder)",
+        ),
+    ] = None,
+    hour: Annotated[
+        float, Option(metavar="H", help="hours from the start of the EPANET run to the initial state of the case")
+    ] = 0.0,
+    wave_speed: Annotated[str, Option(metavar="A", help="wave speed of all pipes, in m/s or with a unit")] = "1200 m/s",
+    min_pipe_length: Annotated[
+        str | None,
+        Option(
+            metavar="L",
+            help='length to which shorter pipes are lengthened, for example "10 m" (default none: pipes keep their '
+            "lengths)",
+        ),
+    ] = None,
+) -> None:
+    """Import an EPANET network: write its case file and print all differences from EPANET."""
+    from fvsolve.epanet import import_network
+
+    to = case or Path(f"{source.stem}.toml")
+    if to.is_dir():
+        to = to / f"{source.stem}.toml"
+    if not to.suffix:
+        to = to.with_suffix(".toml")
+    if to.exists():
+        raise FvsolveError(f"{to} exists. Give another file: fvsolve import {source} CASE")
+    speed = _positive("--wave-speed", wave_speed, "velocity")
+    shortest = _positive("--min-pipe-length", min_pipe_length, "length") if min_pipe_length else 0.0
+    network = import_network(source, hour, speed, shortest)
+    to.parent.mkdir(parents=True, exist_ok=True)
+    to.write_text(network.text, encoding="utf-8")
+    written = [to]
+    described = to.parent / shipped.SCHEMA
+    if (shipped.folder() / shipped.SCHEMA).is_file() and not described.exists():
+        shutil.copyfile(shipped.folder() / shipped.SCHEMA, described)
+        written.append(described)
+    for path in written:
+        print(path)
+    for text, names in [*network.notes, *([(SHORT, network.short_pipes)] if network.short_pipes else [])]:
+        print(f"{text}: {listing(names)}", file=sys.stderr)
+
+
+def _positive(option: str, text: str, dimension: str) -> float:
+    """Value [SI] of an option from its text; raises FvsolveError if it is not positive."""
+    value = quantity_of(text, dimension, option)
+    if not value > 0.0:
+        raise FvsolveError(f"{option}: {text} is not positive")
+    return value
+
+
+@app.command()
+def precompile(
+    cases: Annotated[
+        list[str],
+        Option(
+            "--for",
+            metavar="CASE",
+            help="case file or shipped case to compile for; repeat the option for more (default all shipped cases)",
+        ),
+    ] = [],  # noqa: B006
+    jobs: Annotated[
+        int | None, Option(metavar="N", min=1, help="number of processes (default number of processors)")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Compile the functions that cases need on this machine, so that later runs start at once."""
+    from fvsolve.case import load, shipped
+    from fvsolve.cli.progress import progress_bar
+    from fvsolve.run.precompilation import warm as warmed
+
+    paths = [shipped.find(name) for name in cases or shipped.names()]
+    for path in paths:  # report faults of a case before compiling
+        load(path)
+    with progress_bar("compiling") as progress:
+        result = warmed(paths, not cases, jobs, progress)
+    present(as_json, asdict(result), cache_text(result))
+
+
+def cache_text(result) -> Iterator:
+    """State of the cache of compiled code, as from `warm`."""
+    text = (
+        f"{result.compiled} functions compiled in {result.seconds:.0f} s"
+        if result.compiled
+        else "all functions were compiled already"
+    )
+    yield f"{text}; the cache holds {result.functions} functions, {result.bytes / 1e6:.1f} MB, for {result.target}"
+    yield f"{result.directory}"
