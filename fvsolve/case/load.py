@@ -34,6 +34,7 @@ from fvsolve.case.probe import Probe, default_probes, read_probe
 from fvsolve.case.raw import Raw, copy_paths, override, read_raw, split_key
 from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.case.update_values import update_values
+from fvsolve.data import read_table
 from fvsolve.errors import CaseError, Fault, FluidError, did_you_mean, listing
 from fvsolve.fluid import properties
 from fvsolve.parts import KINDS, Basin, Chamber, Friction, Pipe, Scalar
@@ -41,7 +42,6 @@ from fvsolve.parts.body.part import Body, BodyPoint
 from fvsolve.parts.node import Node
 from fvsolve.parts.pipe.part import MOST_CELLS
 from fvsolve.parts.schedule import Scheduled
-from fvsolve.parts.synonyms import SYNONYMS
 from fvsolve.parts.table_model import faults_of_error, read_keys
 from fvsolve.parts.value import (
     ROOT,
@@ -546,7 +546,7 @@ class _Reader:
             hint = did_you_mean(str(kind), known)
             if isinstance(kind, str) and kind in KINDS[other]:
                 hint = f"; it belongs under [{other}]"
-            synonym = SYNONYMS.get(str(kind).casefold().replace("_", "-").replace(" ", "-"))
+            synonym = read_table("part_synonyms").get(str(kind).casefold().replace("_", "-").replace(" ", "-"))
             hint = f"; use {synonym}" if synonym else f"; types are {listing(sorted(known))}{hint}"
             self.fault((group, name, "type"), f"unknown type {show(kind)}{hint}")
             return None

@@ -14,7 +14,7 @@ import fvsolve
 
 FLOORS = {  # folder -> role -> folders that a file of this role may import besides files of its own role
     "parts": {
-        "part": {"parts", "units", "errors", "names", "steppers", "attitude"},
+        "part": {"parts", "units", "errors", "names", "data", "steppers", "attitude"},
         "law": {"kernels", "jit"},
         "lower": {"parts", "model", "steady", "kernels", "errors", "units", "fluid", "schemes", "attitude"},
     },
