@@ -15,12 +15,12 @@ from fvsolve.basins.diffusion import diffusion_work
 from fvsolve.basins.lower_mesh import lower_mesh
 from fvsolve.basins.physics_codes import physics_code
 from fvsolve.case.basins import boundary_cells
-from fvsolve.case.cell_means import is_grid, means, samples
 from fvsolve.case.sections import DEFAULT_COURANT as COURANT
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.scheme_codes import CODES, family
 from fvsolve.model.state_names import Numbered
+from fvsolve.parts.formula import is_grid, means, samples
 from fvsolve.schemes import LIMITERS, SCHEMES
 from fvsolve.steppers.analysis.absolute_monotonicity import ssp_radius
 from fvsolve.steppers.built_in_methods import METHODS

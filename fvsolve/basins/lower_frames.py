@@ -6,8 +6,8 @@ import numpy as np
 
 from fvsolve.basins.basin_frames import CELL_POSITIONS, FRAME_SIZE, POTENTIALS, REST_LEVEL, REST_SURFACE
 from fvsolve.basins.cell_sides import BLOCK, blocks
-from fvsolve.case.basins_on_bodies import carriers, free_joints
-from fvsolve.case.patches_on_bodies import level_over
+from fvsolve.case.bodies import carriers, free_joints
+from fvsolve.case.nodes_on_bodies import level_over
 
 
 def lower_frame(draft, basin, row) -> None:

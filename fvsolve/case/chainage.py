@@ -196,10 +196,8 @@ def faults(table: dict[str, Any]) -> Iterator[tuple[tuple, str]]:
         if (reason := unfit_reason(group, part)) is not None:
             yield (*key, "on"), reason
         elif "from" in part:
-            yield (
-                (*key, "from"),
-                "`on` and `at` place this link on a pipe, where it starts; remove `from`, or `on` and `at`",
-            )
+            text = "`on` and `at` place this link on a pipe, where it starts; remove `from`, or `on` and `at`"
+            yield (*key, "from"), text
 
 
 def cut(

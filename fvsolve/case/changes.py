@@ -9,9 +9,8 @@ from typing import Any
 from fvsolve.case import defaults
 from fvsolve.case.case import Case
 from fvsolve.case.chainage import original_keys, pieces_of, placed
+from fvsolve.case.claims import COMPARE_KEYS, expect_keys, limit_keys
 from fvsolve.case.defaults import raw_link
-from fvsolve.case.design_limits import limit_keys
-from fvsolve.case.expectations import COMPARE_KEYS, expect_keys
 from fvsolve.case.load import TOP
 from fvsolve.case.pipe_routes import Route
 from fvsolve.case.raw import split_key
@@ -73,9 +72,8 @@ def declaration_of(raw: dict[str, Any], keys: tuple[str, ...]) -> Value:
         try:
             result = outer.below(key)
         except KeyError:
-            raise FvsolveError(
-                f"unknown key {show('.'.join(keys))}; expected a key of the case, such as numerics.end"
-            ) from None
+            text = f"unknown key {show('.'.join(keys))}; expected a key of the case, such as numerics.end"
+            raise FvsolveError(text) from None
         if result is None:
             return outer
     return result

@@ -84,10 +84,8 @@ def find_faults(table: Mapping[str, Any], setting: ReadContext) -> Iterator[tupl
         return
     for kind, keys in given.items():
         if kind not in KINDS:
-            yield (
-                ("defaults", kind),
-                f"{show(kind)} has no defaults{did_you_mean(kind, KINDS)}; expected defaults of pipe",
-            )
+            text = f"{show(kind)} has no defaults{did_you_mean(kind, KINDS)}; expected defaults of pipe"
+            yield ("defaults", kind), text
         elif not isinstance(keys, dict):
             yield ("defaults", kind), f"{show(keys)} is not a table; expected keys of a {kind}"
         else:

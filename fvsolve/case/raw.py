@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve.case.defaults import default_place
-from fvsolve.case.toml_lines import key_lines
+from fvsolve.case.text import key_lines
 from fvsolve.errors import CaseError, Fault, article, did_you_mean
 from fvsolve.units import show
 

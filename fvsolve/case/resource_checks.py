@@ -43,10 +43,8 @@ def find_faults(
         yield ("links", worst, "cells"), text
     least = LEAST_STEP * max(abs(numerics.start), abs(numerics.end))
     if output.every is not None and not output.every > least:
-        yield (
-            ("output", "every"),
-            f"{output.every:g} s is below the rounding error of the time; expected more than {least:.2g} s",
-        )
+        text = f"{output.every:g} s is below the rounding error of the time; expected more than {least:.2g} s"
+        yield ("output", "every"), text
     elif output.every is not None and output.probes is not None and span > 0.0:
         rows, columns = span / output.every, 1 + len(output.probes)
         if not fits(2 * NUMBER * rows * columns):

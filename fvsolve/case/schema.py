@@ -8,9 +8,11 @@ from json import dumps, loads
 from typing import Any
 
 from fvsolve.case import defaults
-from fvsolve.case.design_limits import limit_keys
-from fvsolve.case.load import GROUPS, KEYS, LINKLESS, TOP
+from fvsolve.case.claims import limit_keys
+from fvsolve.case.load import KEYS, TOP
+from fvsolve.case.part_reading import LINKLESS
 from fvsolve.case.pipe_routes import Route
+from fvsolve.case.reading import GROUPS
 from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.parts import KINDS, Scalar
 from fvsolve.parts.schedule import Scheduled

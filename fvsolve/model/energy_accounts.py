@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.case.moving_network_checks import missing_reactions
+from fvsolve.case.nodes_on_bodies import missing_reactions
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.lowering import lowering_of, rows_in

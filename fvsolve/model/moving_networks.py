@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.case import moving_network_checks
-from fvsolve.case.basins_on_bodies import free_joints
+from fvsolve.case import nodes_on_bodies
+from fvsolve.case.bodies import free_joints
 from fvsolve.kernels import dtypes as rec
 
 ROUNDING = 1e-9  # specific force times length [J/kg] below which it counts as rounding
@@ -45,7 +45,7 @@ def lower_moving_segments(draft) -> None:
         rows.append((body, start, end, swept, -rise, heavy))
     draft.moving_segment_table = np.array(rows, rec.MOVING_SEGMENT) if rows else np.zeros(0, rec.MOVING_SEGMENT)
     if reads_joint_forces(draft):
-        for place, text in moving_network_checks.missing_reactions(draft.case.nodes, draft.case.links):
+        for place, text in nodes_on_bodies.missing_reactions(draft.case.nodes, draft.case.links):
             draft.fault(".".join(place), f"a probe reads forces of joints, but {text}")
 
 

@@ -197,12 +197,8 @@ def _rotation_faults(values: dict[str, Any]) -> Iterator[tuple[str, str]]:
         return
     off, determinant = attitude.defect(np.array(values["matrix"]))
     if off > TOLERANCE:
-        yield (
-            "matrix",
-            f"is not a rotation: R'R differs from the identity by {off:.3g}; expected orthogonal columns of length 1",
-        )
+        text = f"is not a rotation: R'R differs from the identity by {off:.3g}; expected orthogonal columns of length 1"
+        yield "matrix", text
     elif determinant < 0.0:
-        yield (
-            "matrix",
-            "is a reflection: its determinant is -1; expected a rotation, with determinant +1 and right-handed axes",
-        )
+        text = "is a reflection: its determinant is -1; expected a rotation, with determinant +1 and right-handed axes"
+        yield "matrix", text

@@ -136,9 +136,8 @@ class Nested(Value):
 
     def read(self, given: Any, setting: ReadContext) -> Table:
         if isinstance(given, list) and len(given) > 1 and all(isinstance(item, dict) for item in given):
-            raise ValueError(
-                f"is a list of {len(given)} tables; expected a single table{', ' * bool(self.about)}{self.about}"
-            )
+            text = f"is a list of {len(given)} tables; expected a single table{', ' * bool(self.about)}{self.about}"
+            raise ValueError(text)
         return given if isinstance(given, self.model) else self.model.model_validate(given, context=setting)
 
     def below(self, key: str) -> Value | None:

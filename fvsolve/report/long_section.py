@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fvsolve.case.extent import OF_PRESSURE
+from fvsolve.case.probe import OF_PRESSURE
 from fvsolve.output.route_table import joined_envelopes
 from fvsolve.report.envelope_units import envelope_column, head_of
 from fvsolve.report.section_limits import limit_lines

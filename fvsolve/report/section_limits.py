@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.case.extent import OF_PRESSURE
+from fvsolve.case.probe import OF_PRESSURE
 from fvsolve.report.envelope_units import envelope_column, head_of
 
 MAX_LIMIT_LINES = 6  # greatest number of limit lines in a section

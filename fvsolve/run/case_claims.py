@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from fvsolve.case.extent import OF_PRESSURE
+from fvsolve.case.probe import OF_PRESSURE
 from fvsolve.output.unit_columns import UnitColumn, column, probe_columns
 from fvsolve.run.comparison import comparison, interpolated
 from fvsolve.run.part_extremes import in_quantity, part_extremes

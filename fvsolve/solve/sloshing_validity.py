@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.case import sloshing
-from fvsolve.case.basins_on_bodies import free_joints
+from fvsolve.case.bodies import free_joints
 from fvsolve.errors import Notice
 
 SMALL_WAVE = 0.2  # wave height up to which a wave is small, as a fraction of the depth

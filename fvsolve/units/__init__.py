@@ -61,9 +61,8 @@ def find(spelling: str, dimension: str, number: str = "") -> Unit:
     number : text of the number before the unit, for the message
     """
     if len(spelling) > LONGEST:  # pint would take minutes to read it
-        raise ValueError(
-            f"{show(f'{number} {spelling}'.strip())}: unknown unit of {len(spelling)} letters; {expected(dimension)}"
-        )
+        text = f"{show(f'{number} {spelling}'.strip())}: unknown unit of {len(spelling)} letters; {expected(dimension)}"
+        raise ValueError(text)
     base = DIMENSIONS[dimension].base or dimension
     unit = UNITS.get(_canonical(spelling))
     if unit is None:

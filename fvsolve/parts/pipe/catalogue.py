@@ -236,9 +236,8 @@ def _nominal_size(nominal: str) -> float:
 def _ductile(series: str, number: int, name: str, size: float) -> ClassSize:
     if size not in ductile():
         nearest = sorted(ductile(), key=lambda dn: abs(dn - size))[:3]
-        raise ValueError(
-            f"no data for DN{size:g} of ductile iron; the nearest sizes are {listing([f'DN{x}' for x in nearest])}"
-        )
+        text = f"no data for DN{size:g} of ductile iron; the nearest sizes are {listing([f'DN{x}' for x in nearest])}"
+        raise ValueError(text)
     (outer, walls), spare = ductile()[int(size)], 1.3 + 0.001 * size
     if series == "K":
         if not 7 <= number <= 14:
@@ -263,9 +262,8 @@ def _plastic(series: str, number: float, name: str, size: float, material: str |
                          'materials, or a class such as "SDR11" and the key `allowable_pressure`')  # fmt: skip
     ratio = number if series == "SDR" else 1.0 + 20.0 * strength / (DESIGN_COEFFICIENT * number)
     if not SDR_RANGE[0] <= ratio <= SDR_RANGE[1]:
-        raise ValueError(
-            f"{name} has SDR {ratio:g} (diameter over wall). Expected {SDR_RANGE[0]:g} to {SDR_RANGE[1]:g}"
-        )
+        text = f"{name} has SDR {ratio:g} (diameter over wall). Expected {SDR_RANGE[0]:g} to {SDR_RANGE[1]:g}"
+        raise ValueError(text)
     wall = size / ratio
     allowable = None if strength is None else BAR * 20.0 * strength / (DESIGN_COEFFICIENT * (ratio - 1.0))
     source = f"{name} of {size:g} mm outer diameter: wall d / SDR, SDR {ratio:.4g}"
