@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve import units
-from fvsolve.case import defaults
+from fvsolve.case.raw import default_place, pipe_of_piece, raw_link
 from fvsolve.errors import Notice
 from fvsolve.parts import Pipe
 from fvsolve.parts.pipe.pipe_wall import elastic_compliance
@@ -46,7 +46,7 @@ def range_notices(case: Any) -> list[Notice]:
     result += [_notice(("limits", name), ("class_fraction",), case, limit.class_fraction, MAX_CLASS_FRACTION,
                       f"{limit.class_fraction:g} times the pressure class; 1 is the class itself")
               for name, limit in case.limits.items() if (limit.class_fraction or 0.0) > MAX_CLASS_FRACTION]  # fmt: skip
-    result += [_notice(("links", defaults.pipe_of_piece(case.raw, name)), ("wave_speed",), case, *odd)
+    result += [_notice(("links", pipe_of_piece(case.raw, name)), ("wave_speed",), case, *odd)
               for name, link in case.links.items() if (odd := wave_speed_mismatch(case, name, link))]  # fmt: skip
     return list({(notice.place, notice.text): notice for notice in result}.values())
 
@@ -59,7 +59,7 @@ def wave_speed_mismatch(case: Any, name: str, pipe: Any) -> tuple[float, float, 
     """
     if getattr(pipe, "wave_speed", None) is None or pipe.material is None:
         return None
-    keys = defaults.raw_link(case.raw, name)
+    keys = raw_link(case.raw, name)
     try:
         wall = Pipe.model_validate(
             {"from": "a", "to": "b", "length": 1.0, **{k: keys[k] for k in WALL_KEYS if k in keys}}
@@ -134,7 +134,7 @@ def _raw_value(raw: Any, keys: tuple[Any, ...]) -> Any:
 
 
 def _notice(place: tuple, keys: tuple, case: Any, value: float, limit: float, text: str) -> Notice:
-    path = defaults.default_place(case.raw, (*place, *keys))
+    path = default_place(case.raw, (*place, *keys))
     where, key = ".".join(path[: len(place)]), ".".join(map(str, keys))
     return Notice("range", where, f"{f'{where}.{key}' if where else key}: {text}", key, value, limit)
 

@@ -23,17 +23,8 @@ from fvsolve.units import show
 
 CHAINAGE_KEYS = ("on", "at")
 TIE = 1e-6  # rounding bias [cells]: a pipe drawn in the other direction gets the same cells
-PIECE_KEYS = (
-    "length",
-    "cells",
-    "minor_loss",
-    "fittings",
-    "profile",
-    "from",
-    "to",
-    "pieces",
-    "bends",
-)  # keys of a pipe that its pieces do not take over
+# Keys of a pipe that its pieces do not take over.
+PIECE_KEYS = ("length", "cells", "minor_loss", "fittings", "profile", "from", "to", "pieces", "bends")
 Report = Callable[[tuple, str], None]
 
 

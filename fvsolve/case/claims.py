@@ -20,7 +20,7 @@ from fvsolve.errors import did_you_mean
 from fvsolve.parts import value as val
 from fvsolve.parts.table_model import read_keys
 from fvsolve.parts.time_series import copy_name, find_file, read_columns
-from fvsolve.parts.value import NEEDED, VALUE, Quantity, ReadContext, ValueFault, nonnegative
+from fvsolve.parts.value import NEEDED, VALUE, Quantity, ReadContext, ValueFault, faults_of, nonnegative
 from fvsolve.units import show
 
 FUNCTIONS = ("max", "min", "mean", "final", "at")
@@ -101,7 +101,7 @@ def read_expect(claim: str, given: Any, kinds: Kinds, routes: Mapping[str, Any],
             faults.append(((), "tolerance is missing; expected rtol, atol or both"))
         values = read_keys(given, keys, setting)
     except ValueError as error:
-        raise ValueFault(faults + getattr(error, "faults", [((), str(error))])) from None
+        raise ValueFault(faults + faults_of(error)) from None
     if faults:
         raise ValueFault(faults)
     return None if target is None else Expect(claim, function, probe, extent, time, **values)
@@ -187,6 +187,7 @@ class Bound(val.Value):
     """Value of a key that bounds a quantity: a number with the dimension of the quantity, or "vacuum" or "vapor"."""
 
     changes = VALUE
+    schema = {"type": ["number", "string"]}
 
     def __init__(self, dimension: str, named: bool) -> None:
         self.item, self.named = Quantity(dimension, changes=VALUE), named
@@ -202,20 +203,15 @@ class Bound(val.Value):
             hint = did_you_mean(given, NAMED) if isinstance(given, str) and self.named else ""
             raise ValueError(f"{error}{hint}") from None
 
-    def json(self) -> dict[str, Any]:
-        return {"type": ["number", "string"]}
-
 
 class On(val.Value):
     """Value of the key `on` of a limit: names of parts or routes, which are looked up when all parts are read."""
 
     changes = VALUE
+    schema = {"type": ["string", "array"], "items": {"type": "string"}}
 
     def read(self, given: Any, setting: ReadContext) -> Any:
         return tuple(given) if isinstance(given, list) else given
-
-    def json(self) -> dict[str, Any]:
-        return {"type": ["string", "array"], "items": {"type": "string"}}
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve import exact, units
-from fvsolve.case import basins, chainage, checks, claims, connections, defaults, part_reading, resource_checks, shipped
+from fvsolve.case import basins, chainage, checks, claims, connections, part_reading, resource_checks, shipped
 from fvsolve.case.case import Case, wave_speed
 from fvsolve.case.part_reading import Parts
 from fvsolve.case.pipe_routes import legs, read_routes
 from fvsolve.case.probe import default_probes, read_probe
-from fvsolve.case.raw import Raw, copy_paths, override, read_raw, split_key
+from fvsolve.case.raw import Raw, copy_paths, default_faults, override, read_raw, split_key
 from fvsolve.case.reading import Reading
 from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.errors import FluidError, did_you_mean
@@ -211,7 +211,7 @@ def check_names(reading: Reading) -> None:
     """Read the signals and check the defaults. Raises CaseError if a table of named parts is not a table."""
     table = reading.raw.table
     reading.setting.signals = reading.group("signals")
-    reading.add(defaults.find_faults(table, reading.setting))
+    reading.add(default_faults(table, reading.setting))
     tables = [table.get(name, {}) for name in NAME_TABLES]
     tables += tables[-1].values() if isinstance(tables[-1], dict) else []  # of defaults
     if not all(isinstance(table, dict) for table in tables):

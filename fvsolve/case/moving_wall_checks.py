@@ -61,13 +61,7 @@ def area_growth(mesh: Any, axis: int, share: np.ndarray) -> np.ndarray:
 
 
 def find_faults(
-    name: str,
-    basin: Any,
-    mesh: Any,
-    nodes: dict[str, Any],
-    joined: set[str],
-    times: tuple[float, float],
-    named: Any,
+    name: str, basin: Any, mesh: Any, nodes: dict[str, Any], joined: set[str], times: tuple[float, float], named: Any
 ) -> Iterator[tuple[tuple, str]]:
     """Faults (key path, message) of the moving walls of a basin.
 

@@ -6,8 +6,9 @@ import functools
 import re
 from typing import Any, NamedTuple
 
-from fvsolve.case import basins, bodies, chainage, connections, defaults, resource_checks
+from fvsolve.case import basins, bodies, chainage, connections, resource_checks
 from fvsolve.case.case import default_cells
+from fvsolve.case.raw import fill_pipes, with_defaults
 from fvsolve.case.reading import GROUPS, Reading
 from fvsolve.case.sections import Numerics
 from fvsolve.data import read_table
@@ -47,7 +48,7 @@ def cut_pipes(reading: Reading, properties: Any, numerics: Numerics | None) -> c
     odd = list(chainage.faults(table))
     reading.add(odd)
     astray = {keys[:2] for keys, _ in odd}
-    pipes, table = {}, defaults.fill_pipes(table)
+    pipes, table = {}, fill_pipes(table)
     for name, given in table["links"].items():
         if chainage.is_pipe(given) and ("links", name) not in astray:
             own = {key: item for key, item in given.items() if key != "pieces"}
@@ -121,7 +122,7 @@ def part_kind(reading: Reading, group: str, name: str, part: dict[str, Any]) -> 
 
 def read_part(reading: Reading, table: dict[str, Any], kind: Any, given: dict[str, Any]) -> Any:
     """Part of the class `kind` from its keys in the file, completed by the defaults of the case `table`."""
-    rest = {key: value for key, value in defaults.with_defaults(table, given).items() if key != "type"}
+    rest = {key: value for key, value in with_defaults(table, given).items() if key != "type"}
     kind = kind.variant(rest) if issubclass(kind, Node) else kind
     return kind.model_validate(rest, context=reading.setting)
 

@@ -28,6 +28,7 @@ class PipeNames(Value):
     )
     takes = "list of names"
     changes = VALUE
+    schema = {"type": "array", "items": {"type": "string"}, "minItems": 1}
 
     def read(self, given: Any, setting: ReadContext) -> tuple[str, ...]:
         if not isinstance(given, (list, tuple)) or not given:
@@ -37,9 +38,6 @@ class PipeNames(Value):
         if faults:
             raise ValueFault(faults)
         return tuple(given)
-
-    def json(self) -> dict[str, Any]:
-        return {"type": "array", "items": {"type": "string"}, "minItems": 1}
 
 
 class Route(Table):

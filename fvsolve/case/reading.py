@@ -6,11 +6,10 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from fvsolve.case import defaults, text
-from fvsolve.case.raw import Raw
+from fvsolve.case import text
+from fvsolve.case.raw import Raw, default_place
 from fvsolve.errors import CaseError, Fault
-from fvsolve.parts.table_model import faults_of_error
-from fvsolve.parts.value import ROOT, ReadContext, ValueFault
+from fvsolve.parts.value import ROOT, ReadContext, faults_of
 from fvsolve.units import show
 
 GROUPS = {
@@ -46,7 +45,7 @@ class Reading:
         if ROOT in keys:
             keys = keys[len(keys) - keys[::-1].index(ROOT) :]
         own = (*self.origin.get(keys[:2], keys[:2]), *keys[2:])
-        keys = defaults.default_place(self.raw.table, own)
+        keys = default_place(self.raw.table, own)
         place = text.path(keys)
         if keys != own and any(fault.place == place for fault in self.faults):
             return  # a faulty default, already reported for another part
@@ -65,11 +64,8 @@ class Reading:
         """Catch a ValueError of the `with` block and add its faults; keys : key path of the value that is read."""
         try:
             yield
-        except ValueFault as error:
-            self.add(((*keys, *below), message) for below, message in error.faults)
         except ValueError as error:
-            faults = faults_of_error(error, []) if hasattr(error, "errors") else [((), str(error))]
-            self.add(((*keys, *below), message) for below, message in faults)
+            self.add(faults_of(error, *keys))
 
     def reuse(self, place: tuple, given: Any, make: Callable[[], Any]) -> Any:
         """Value as read for the earlier case if its raw content is the same object, otherwise the result of `make()`.

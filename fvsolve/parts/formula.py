@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -65,6 +65,8 @@ class SpatialFieldKey(Value):
     A file has the columns x, y and the value.
     """
 
+    schema: ClassVar[dict[str, Any]] = {"type": ["number", "string", "object"]}
+
     dimension: str
     about: str = ""
     range: Range = anything
@@ -98,9 +100,6 @@ class SpatialFieldKey(Value):
     @property
     def takes(self) -> str:
         return f"{Quantity(self.dimension, self.range).takes}; formula"
-
-    def json(self) -> dict[str, Any]:
-        return {"type": ["number", "string", "object"]}
 
 
 def read_points(path: Path, dimension: str) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from fvsolve.case.case import Case
-from fvsolve.case.defaults import raw_link
+from fvsolve.case.raw import raw_link
 from fvsolve.case.sections import DEFAULT_COURANT, uses_error_control
 from fvsolve.model.delay_line_selection import slowest_pipe
 from fvsolve.steppers.built_in_methods import AUTO, METHODS

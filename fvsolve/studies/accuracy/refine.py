@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fvsolve.case.defaults import raw_link
+from fvsolve.case.raw import raw_link
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.steppers.built_in_methods import AUTO, METHODS
 from fvsolve.studies.accuracy.case_resolution import (
