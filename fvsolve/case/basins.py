@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from fvsolve.case import moving_wall_checks, nodes_on_bodies
-from fvsolve.case.resource_checks import BASIN_CELL, LONGEST_NAME, byte_text, free_memory
+from fvsolve.case.resource_checks import BASIN_CELL, byte_text, free_memory, name_faults
 from fvsolve.case.sections import Output
 from fvsolve.errors import MeshError, did_you_mean, listing
 from fvsolve.fluid.laws import law_names
@@ -127,10 +127,7 @@ def line_faults(output: Output, nodes: dict[str, Any]) -> Faults:
     """
     for name, line in output.lines.items():
         pool, key = nodes.get(line.basin), ("output", "lines", name)
-        if len(name) > LONGEST_NAME:
-            yield key, f"has {len(name)} letters; expected at most {LONGEST_NAME}"
-        if not re.fullmatch(r"[\w-]+", name):
-            yield key, f"{show(name)} is not a valid name; a name has only letters, digits, _ and -"
+        yield from ((key, text) for text in name_faults(name))
         if line.basin in nodes and pool is None:
             continue  # the basin itself is faulty
         if not isinstance(pool, BasinFields):

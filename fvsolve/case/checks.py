@@ -5,7 +5,6 @@ The keys of a part are checked when it is read, its connections in `connections`
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -13,7 +12,7 @@ from fvsolve import units
 from fvsolve.case import basins, bodies, connections, nodes_on_bodies, sloshing
 from fvsolve.case.claims import Expect
 from fvsolve.case.raw import Raw
-from fvsolve.case.resource_checks import LONGEST_NAME
+from fvsolve.case.resource_checks import name_faults
 from fvsolve.case.sections import CAVITY_SCHEMES, FluidSpec, Numerics
 from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.fluid.laws import LAWS, law_names
@@ -198,11 +197,8 @@ def reserved_names() -> set[str]:
 def scalar_faults(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], fluid: Any) -> Faults:
     """Faults (key path, message) of names of scalars, their values in parts, and parts that do not support them."""
     for name in scalars:
-        if len(name) > LONGEST_NAME:
-            yield ("scalars", name), f"has {len(name)} letters; expected at most {LONGEST_NAME}"
-        if not re.fullmatch(r"[\w-]+", name):
-            yield ("scalars", name), f"{show(name)} is not a valid name; a name has only letters, digits, _ and -"
-        elif name in reserved_names():
+        yield from ((("scalars", name), text) for text in name_faults(name))
+        if name in reserved_names():
             yield ("scalars", name), f"{show(name)} is a reserved name; expected another name"
     for group, parts in (("nodes", nodes), ("links", links)):
         for name, part in parts.items():

@@ -1,4 +1,8 @@
-"""Nodes, basins and links on bodies: checks of their keys, and positions and water depths of patches of basins."""
+"""Nodes, basins and links on bodies: checks of their keys, and positions and water depths of patches of basins.
+
+Arguments: nodes, links : parts by name; named : tables of all nodes, also of faulty nodes; poses : name of a body ->
+`Pose`; patches : patches of basins on bodies, by full name.
+"""
 
 from __future__ import annotations
 
@@ -30,19 +34,13 @@ def with_elevation(node: Node, poses: dict[str, Any]) -> Node:
 
 
 def has_elevation(node: Node, poses: dict[str, Any]) -> bool:
-    """True if a node is fixed in the world, or is on a body with a known pose and is not a basin.
-
-    poses : name of a body -> `Pose`
-    """
+    """True if a node is fixed in the world, or is on a body with a known pose and is not a basin."""
     on = getattr(node, "on", None)
     return on is None or (on in poses and not isinstance(node, Basin))
 
 
 def find_faults(nodes: dict[str, Any], links: dict[str, Any], patches: dict[str, Any], named: Any) -> Faults:
-    """Faults (key path, message) of nodes on bodies, and of links that join them.
-
-    patches : patches of basins on bodies, by full name; named : tables of all nodes, also of faulty nodes
-    """
+    """Faults (key path, message) of nodes on bodies, and of links that join them."""
     for name, node in nodes.items():
         if isinstance(node, Basin) or not isinstance(node, PlaceOnBody):
             continue
@@ -112,7 +110,7 @@ def node_of(place: str, nodes: dict[str, Any]) -> Any:
 def link_faults(link: Any, ends: list[str], nodes: dict[str, Any], patches: dict[str, Any]) -> Faults:
     """Faults (key path in the link, message) of a link with an end on a body, or with a route on a body.
 
-    ends : names of the places that its hydraulic ports join; patches : patches of basins on bodies, by full name
+    ends : names of the places that its hydraulic ports join
     """
     stand = [node_of(place, nodes) for place in ends]
     on = [getattr(node, "on", None) for node in stand]
@@ -160,10 +158,7 @@ def patch_faults(end: str, node: Any) -> Iterator[str]:
 
 
 def position_text(ends: list[str], patches: dict[str, Any]) -> str:
-    """Text with the computed positions of the ends of a link that are patches; "" if no end is a patch.
-
-    patches : patches of basins on bodies, by full name
-    """
+    """Text with the computed positions of the ends of a link that are patches; "" if no end is a patch."""
     texts = [
         f"{end} at [{', '.join(f'{coordinate:.7g}' for coordinate in patches[end].at)}]"
         for end in ends
@@ -173,10 +168,7 @@ def position_text(ends: list[str], patches: dict[str, Any]) -> str:
 
 
 def basin_faults(name: str, basin: Any, nodes: dict[str, Any], named: Any) -> Faults:
-    """Faults (key path, message) of the keys of a basin that place it on a body, or apply only on a body.
-
-    named : tables of all nodes, also of faulty nodes
-    """
+    """Faults (key path, message) of the keys of a basin that place it on a body, or apply only on a body."""
     key = ("nodes", name)
     yield from place_faults(name, basin, nodes, named)
     if basin.on is None:
@@ -209,10 +201,7 @@ def basin_faults(name: str, basin: Any, nodes: dict[str, Any], named: Any) -> Fa
 
 
 def place_faults(name: str, node: PlaceOnBody, nodes: dict[str, Any], named: Any) -> Faults:
-    """Faults (key path, message) of the keys that place a node on a body: `on`, `at`, `attitude`, `elevation`.
-
-    named : tables of all nodes, also of faulty nodes
-    """
+    """Faults (key path, message) of the keys that place a node on a body: `on`, `at`, `attitude`, `elevation`."""
     key = ("nodes", name)
     if node.on is None:
         for other in ("at", "attitude"):
@@ -227,10 +216,7 @@ def place_faults(name: str, node: PlaceOnBody, nodes: dict[str, Any], named: Any
 
 
 def body_faults(on: str, nodes: dict[str, Any], named: Any) -> Iterator[str]:
-    """Yield a fault text if the name `on` is not that of a body.
-
-    named : tables of all nodes, also of faulty nodes
-    """
+    """Yield a fault text if the name `on` is not that of a body."""
     bodies = [body for body, node in nodes.items() if isinstance(node, Body)]
     bodies += [body for body in named if body not in nodes and getattr(named[body], "get", {}.get)("type") == "body"]
     if not isinstance(nodes.get(on), Body):
@@ -244,7 +230,6 @@ def overturned(nodes: dict[str, Any], poses: dict[str, Any]) -> Faults:
     """Faults of tanks and free-surface basins that are tilted by 90 degrees or more, so that the water runs out.
 
     Frozen water is not checked. A tank or basin is checked only if all joints from its body to the world are fixed.
-    poses : name of a body -> `Pose`
     """
     for name, node in nodes.items():
         on = getattr(node, "on", None)

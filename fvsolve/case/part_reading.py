@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import re
 from typing import Any, NamedTuple
 
 from fvsolve.case import basins, bodies, chainage, connections, resource_checks
@@ -87,11 +86,7 @@ def _read_group(reading: Reading, network: chainage.CutTable, group: str) -> dic
         reading.fault((), f"[{group}] is missing: {GROUPS[group]}")
     result = {}
     for name, part in table.get(group, {}).items():
-        if not re.fullmatch(r"[\w-]+", name):
-            reading.fault((group, name), f"{show(name)} is not a valid name; a name has only letters, digits, _ and -")
-        if len(name) > resource_checks.LONGEST_NAME:
-            text = f"has {len(name)} letters; expected at most {resource_checks.LONGEST_NAME}"
-            reading.fault((group, name), text)
+        reading.add(((group, name), text) for text in resource_checks.name_faults(name))
         if not isinstance(part, dict):
             reading.fault((group, name), f"{show(part)} is not a table; expected a table with a type")
             continue

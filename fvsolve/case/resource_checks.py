@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Iterator
 from typing import Any
 
 from fvsolve.parts import Pipe
 from fvsolve.steppers.built_in_methods import METHODS
 from fvsolve.steppers.tolerances import LEAST_STEP
+from fvsolve.units import show
 
 LONGEST_NAME = 60  # letters; names are parts of file names, which may have 255 bytes
 CELL, IMPLICIT_CELL, BASIN_CELL = 500, 3000, 600  # memory of a cell [B]
@@ -64,6 +66,14 @@ def rounding_faults(numerics: Any, crossing: float) -> Iterator[tuple[tuple, str
         text = f"{numerics.courant:g} gives steps of {numerics.courant * crossing:.2g} s"
         text += ", below the rounding error of the time"
         yield ("numerics", "courant"), f"{text}; expected more than {least / crossing:.2g}"
+
+
+def name_faults(name: str) -> Iterator[str]:
+    """Texts of the faults of a name in the case: invalid characters, or too many letters for the name of a file."""
+    if not re.fullmatch(r"[\w-]+", name):
+        yield f"{show(name)} is not a valid name; a name has only letters, digits, _ and -"
+    if len(name) > LONGEST_NAME:
+        yield f"has {len(name)} letters; expected at most {LONGEST_NAME}"
 
 
 def disk_size(case: Any, text: int = TEXT, frame_cell: int = FRAME_CELL) -> float:
