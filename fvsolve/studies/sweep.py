@@ -17,7 +17,7 @@ from fvsolve.case.raw import read_raw
 from fvsolve.case.text import inline
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, RunError, did_you_mean, listing
-from fvsolve.fluid.property_cache import coolprop_version
+from fvsolve.fluid.coolprop import coolprop_version
 from fvsolve.output.restart import program_versions
 from fvsolve.studies.parallel import run_tasks
 from fvsolve.studies.result_cache import ResultCache, digest_of, write_errors
