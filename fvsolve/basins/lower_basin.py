@@ -17,10 +17,10 @@ from fvsolve.basins.fifth_order import fifth_order_work
 from fvsolve.basins.lower_mesh import lower_mesh
 from fvsolve.basins.physics_codes import physics_code
 from fvsolve.case.basins import boundary_cells
-from fvsolve.case.cell_means import is_grid, means, samples
 from fvsolve.case.sections import DEFAULT_COURANT as COURANT
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
+from fvsolve.parts.formula import is_grid, means, samples
 from fvsolve.schemes import LIMITERS, SCHEMES
 from fvsolve.steppers.analysis.stability_properties import ssp_radius
 from fvsolve.steppers.tableau import METHODS

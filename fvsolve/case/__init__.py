@@ -1,7 +1,7 @@
 """Reading of case files: keys, units, and checks between the parts of a case."""
 
 from fvsolve.case.case import Case
-from fvsolve.case.expectations import Compare, Expect
+from fvsolve.case.claims import Compare, Expect
 from fvsolve.case.load import load
 from fvsolve.case.probe import Probe
 from fvsolve.case.raw import locate_faults

@@ -13,15 +13,14 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from fvsolve.case import basins_on_bodies, moving_wall_checks
-from fvsolve.case.cell_means import means, samples
-from fvsolve.case.patches_on_bodies import on_body
-from fvsolve.case.resource_checks import BASIN_CELL, LONGEST_NAME, byte_text, free_memory
+from fvsolve.case import moving_wall_checks, nodes_on_bodies
+from fvsolve.case.resource_checks import BASIN_CELL, byte_text, free_memory, name_faults
 from fvsolve.case.sections import Output
 from fvsolve.errors import MeshError, did_you_mean, listing
 from fvsolve.fluid.laws import law_names
 from fvsolve.parts import Basin
 from fvsolve.parts.basin import BasinStart, MovingWall, PatchNode
+from fvsolve.parts.formula import means, samples
 from fvsolve.parts.value import ReadContext, ValueFault
 from fvsolve.units import show
 
@@ -73,13 +72,19 @@ class BasinFields:
         return MeshPoints(self.mesh)
 
 
-def lumped_fields(basin: Basin) -> dict[str, str]:
-    """Fields (name -> dimension) of a basin without cells: the depth with sloshing modes, otherwise none."""
-    return (
-        {"depth": basin.physics_type.fields["depth"]}
-        if basin.sloshing == "modes" and basin.physics_type.has_modes
-        else {}
-    )
+def probe_kinds(name: str, basin: Basin, mesh: Mesh | None, lumped: Mesh | None, scalars: dict) -> dict[str, Any]:
+    """Kinds of a basin and of its patches for the reading of probes, by full name.
+
+    mesh, lumped : mesh of a basin with cells, or of a basin whose water is lumped masses; the other is None
+    A basin without cells has the depth with sloshing modes, otherwise no fields; its kind is None if it is faulty.
+    """
+    own = basin.physics_type
+    if lumped is not None:
+        fields = {"depth": own.fields["depth"]} if basin.sloshing == "modes" and own.has_modes else {}
+        return {name: BasinFields(fields, lumped) if own.has_modes else None}
+    fields = own.fields | (dict.fromkeys(scalars, "number") if own.carries else {})
+    patches = {f"{name}.{patch}": place_kind(basin, patch) for patch in patch_names(mesh)}
+    return {name: BasinFields(fields, mesh), **patches}
 
 
 def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
@@ -122,10 +127,7 @@ def line_faults(output: Output, nodes: dict[str, Any]) -> Faults:
     """
     for name, line in output.lines.items():
         pool, key = nodes.get(line.basin), ("output", "lines", name)
-        if len(name) > LONGEST_NAME:
-            yield key, f"has {len(name)} letters; expected at most {LONGEST_NAME}"
-        if not re.fullmatch(r"[\w-]+", name):
-            yield key, f"{show(name)} is not a valid name; a name has only letters, digits, _ and -"
+        yield from ((key, text) for text in name_faults(name))
         if line.basin in nodes and pool is None:
             continue  # the basin itself is faulty
         if not isinstance(pool, BasinFields):
@@ -171,7 +173,7 @@ def places(name: str, basin: Basin, mesh: Mesh, pose: Any = None) -> dict[str, P
             basin, lambda shape: means(samples(shape, mesh)), boundary_cells(mesh, patch), mesh.area
         )
         if basin.on is not None:
-            rest = on_body(basin, mesh, patch, rest, pose)
+            rest = nodes_on_bodies.on_body(basin, mesh, patch, rest, pose)
         kind = place_kind(basin, patch)
         result[f"{name}.{patch}"] = kind.model_construct(position=None, basin=name, patch=patch, **rest)
     return result
@@ -217,7 +219,7 @@ def find_faults(
         if fluid is not None and not own.accepts_law(fluid.law):
             laws = law_names(lambda law, own=own: own.accepts_law(law.name))
             yield ("fluid", "law"), f"{show(fluid.law)} does not apply to {own.description}; expected {laws}"
-        yield from basins_on_bodies.find_faults(name, basin, nodes, all_nodes)
+        yield from nodes_on_bodies.basin_faults(name, basin, nodes, all_nodes)
         if name not in meshes:
             continue
         known = patch_names(meshes[name])
@@ -226,21 +228,15 @@ def find_faults(
             if patch not in known:
                 yield (*key, "patches", patch), f"the mesh has no such patch; {_patch_hint(basin, known, patch)}"
             elif f"{name}.{patch}" in joined and not own.joined:
-                yield (
-                    (*key, "patches", patch),
-                    "a link joins this patch, but the key `velocity` gives the flow; expected no link",
-                )
+                text = "a link joins this patch, but the key `velocity` gives the flow; expected no link"
+                yield (*key, "patches", patch), text
             elif f"{name}.{patch}" in joined and (options.boundary or options.impedance) is not None:
                 key_name = "boundary" if options.boundary else "impedance"
-                yield (
-                    (*key, "patches", patch, key_name),
-                    "a link joins this patch and is its boundary; leave this key out",
-                )
+                text = "a link joins this patch and is its boundary; leave this key out"
+                yield (*key, "patches", patch, key_name), text
             if options.impedance is not None and not own.allows_impedance:
-                yield (
-                    (*key, "patches", patch, "impedance"),
-                    f"does not apply to physics {show(basin.physics)}; leave this key out",
-                )
+                text = f"does not apply to physics {show(basin.physics)}; leave this key out"
+                yield (*key, "patches", patch, "impedance"), text
         shapes = [*own.formulas(basin, meshes[name])]
         if basin.start is not None:
             shapes += [

@@ -220,10 +220,8 @@ def open_pins(nodes: dict[str, Any], links: dict[str, Any], poses_of: dict[str, 
         gap = float(np.linalg.norm(link.directions() @ (turn.T @ (there - here))))
         if gap > PIN_GAP * (1.0 + float(np.linalg.norm(points[0][1]))):
             across = " across the axis of the pin" if link.axis else ""
-            yield (
-                ("links", name),
-                f"{link.from_} and {link.to} lie {gap:.4g} m apart{across} at the start; expected the same place",
-            )
+            text = f"{link.from_} and {link.to} lie {gap:.4g} m apart{across} at the start; expected the same place"
+            yield ("links", name), text
 
 
 def find_faults(nodes: dict[str, Any], named: Any) -> Faults:
@@ -256,21 +254,28 @@ def find_faults(nodes: dict[str, Any], named: Any) -> Faults:
             ring.append(up)
         ring = ring[ring.index(up) :]
         text = " on ".join([*ring, ring[0]])
-        yield (
-            ("nodes", ring[0], "joint", "on"),
-            f"is carried by itself: {text}; remove `on` from one of these bodies and close the loop by a pin",
-        )
-        loop -= {member for member in loop if set(carrier_chain(bodies, member)) & set(ring)}
+        text = f"is carried by itself: {text}; remove `on` from one of these bodies and close the loop by a pin"
+        yield ("nodes", ring[0], "joint", "on"), text
+        loop -= {member for member in loop if {*carriers(member, bodies)} & {*ring}}
 
 
-def carrier_chain(bodies: dict[str, Body], name: str) -> list[str]:
-    """Names of a body and of all bodies that carry it, each once."""
-    names = [name]
-    while (up := carrier_of(bodies[names[-1]])[0]) in bodies and up not in names:
-        names.append(up)
-    return names
+def free_joints(on: str, nodes: dict[str, Any]) -> Iterator[str]:
+    """Yield the names of the bodies, from `on` to the world, whose joints move freely (neither fixed nor driven)."""
+    for body in carriers(on, nodes):
+        joint = nodes[body].joint
+        if joint.kind != "fixed" and joint.drive_schedule is None:
+            yield body
+
+
+def carriers(on: str, nodes: dict[str, Any]) -> Iterator[str]:
+    """Yield the names of the body `on` and of all bodies that carry it, from `on` to the world."""
+    seen: set[str] = set()
+    while isinstance(nodes.get(on), Body) and on not in seen:
+        seen.add(on)
+        yield on
+        on = carrier_of(nodes[on])[0]
 
 
 def ends_in_loop(nodes: dict[str, Any], bodies: dict[str, Body], name: str) -> bool:
     """True if the carriers of a body form a loop; False if they end at the world, a frame or a missing node."""
-    return carrier_of(bodies[carrier_chain(bodies, name)[-1]])[0] in bodies
+    return carrier_of(bodies[[*carriers(name, bodies)][-1]])[0] in bodies

@@ -9,12 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve import units
-from fvsolve.case import basins, bodies, moving_network_checks, schedule_ends, text, usual_ranges
-from fvsolve.case.design_limits import DesignLimit
-from fvsolve.case.expectations import Compare, Expect
-from fvsolve.case.extent import of_profiles
+from fvsolve.case import basins, bodies, case_notices, nodes_on_bodies, sloshing, text
+from fvsolve.case.claims import Compare, DesignLimit, Expect
 from fvsolve.case.pipe_routes import Route
-from fvsolve.case.probe import Probe
+from fvsolve.case.probe import Probe, of_profiles
 from fvsolve.case.sections import CAVITY_SCHEMES, DEFAULT_CELLS, ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, Notice, did_you_mean, listing
@@ -119,7 +117,7 @@ class Case(Displayable):
             if name in self.meshes:
                 result |= basins.places(name, node, self.meshes[name], self.poses.get(node.on))
             elif node.domain == "hydraulic":
-                result |= moving_network_checks.with_elevation(node, self.poses).inner(name)[0]
+                result |= nodes_on_bodies.with_elevation(node, self.poses).inner(name)[0]
         for name, link in self.links.items():
             result |= link.inner(name)[0]
             if "A" in link.owns:
@@ -143,12 +141,10 @@ class Case(Displayable):
     @cached_property
     def nodes_with_water(self) -> dict[str, Node]:
         """Nodes at the start, with lumped water as added mass of bodies and sloshing modes as extra bodies."""
-        from fvsolve.case.basins_on_bodies import nodes_with_water
-
         nodes = {**self.nodes, **self.equilibrium_nodes} if self.equilibrium_nodes else self.nodes
         if not self.lumped:
             return nodes
-        return nodes_with_water(nodes, self.lumped, self.properties.density, self.gravity, self.numerics.start)
+        return sloshing.nodes_with_water(nodes, self.lumped, self.properties.density, self.gravity, self.numerics.start)
 
     @cached_property
     def as_stated(self) -> Case:
@@ -184,7 +180,7 @@ class Case(Displayable):
     @cached_property
     def notices(self) -> list[Notice]:
         """Notices of values outside usual ranges and of schedules after the end of the run."""
-        return [*usual_ranges.notices(self), *schedule_ends.notices(self)]
+        return [*case_notices.range_notices(self), *case_notices.end_notices(self)]
 
     @cached_property
     def elevations_stated(self) -> bool:

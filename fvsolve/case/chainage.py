@@ -4,6 +4,9 @@ The keys `on = "main", at = "1.84 km"` place a part 1.84 km along the pipe `main
 a node : the pipe runs through it
 a link without `from` and `to` : it lies in the pipe
 a link with only `to`, or with one port : it branches off the pipe
+
+Arguments: table : nested dicts of a case as in the file; report : function that takes the key path and the message of a
+fault.
 """
 
 from __future__ import annotations
@@ -23,17 +26,8 @@ from fvsolve.units import show
 
 CHAINAGE_KEYS = ("on", "at")
 TIE = 1e-6  # rounding bias [cells]: a pipe drawn in the other direction gets the same cells
-PIECE_KEYS = (
-    "length",
-    "cells",
-    "minor_loss",
-    "fittings",
-    "profile",
-    "from",
-    "to",
-    "pieces",
-    "bends",
-)  # keys of a pipe that its pieces do not take over
+# Keys of a pipe that its pieces do not take over.
+PIECE_KEYS = ("length", "cells", "minor_loss", "fittings", "profile", "from", "to", "pieces", "bends")
 Report = Callable[[tuple, str], None]
 
 
@@ -92,7 +86,6 @@ def placed(table: dict[str, Any]) -> list[tuple[str, str, dict[str, Any]]]:
     """List of (group, name, keys) of the parts that are placed on a pipe.
 
     These are parts with a chainage `at`, or with a pipe as `on`; keys : table of the part
-    table : nested dicts of a case as in the file
     """
     links = table.get("links")
     pipes = [name for name, link in links.items() if is_pipe(link)] if isinstance(links, dict) else []
@@ -145,10 +138,7 @@ def add_bends(table: dict[str, Any]) -> dict[str, Any]:
 
 
 def pieces_of(table: dict[str, Any]) -> dict[str, list[str]]:
-    """Names of the pieces into which `cut` divides pipes : name of a cut pipe -> names of its pieces.
-
-    table : nested dicts of a case as in the file
-    """
+    """Names of the pieces into which `cut` divides pipes : name of a cut pipe -> names of its pieces."""
     counts: dict[str, int] = {}
     for _, _, part in placed(add_bends(table)):
         if isinstance(part.get("on"), str):
@@ -160,7 +150,7 @@ def settings(table: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """Copy of overrides (dotted key -> value) in which keys of pipe pieces are replaced by keys of the file.
 
     The file states the keys of a piece in the table `pieces` of its pipe.
-    table : nested dicts of a case as in the file; given : overrides
+    given : overrides
     """
     return {".".join(own) if (own := original_keys(table, keys := split_key(str(key)))) != keys else key: value
             for key, value in given.items()}  # fmt: skip
@@ -170,7 +160,6 @@ def original_keys(table: dict[str, Any], keys: tuple[str, ...]) -> tuple[str, ..
     """Key path in the file of the key path `keys`, which may be that of a key of a pipe piece.
 
     The keys of a piece are in the table `pieces` of its pipe; any other key path is returned unchanged.
-    table : nested dicts of a case as in the file
     """
     match = re.fullmatch(r"(.+)-\d+", keys[1]) if len(keys) > 2 and keys[0] == "links" else None
     if match and keys[1] not in table.get("links", {}) and keys[1] in pieces_of(table).get(match[1], ()):
@@ -196,10 +185,8 @@ def faults(table: dict[str, Any]) -> Iterator[tuple[tuple, str]]:
         if (reason := unfit_reason(group, part)) is not None:
             yield (*key, "on"), reason
         elif "from" in part:
-            yield (
-                (*key, "from"),
-                "`on` and `at` place this link on a pipe, where it starts; remove `from`, or `on` and `at`",
-            )
+            text = "`on` and `at` place this link on a pipe, where it starts; remove `from`, or `on` and `at`"
+            yield (*key, "from"), text
 
 
 def cut(
@@ -210,7 +197,6 @@ def cut(
     table : nested dicts of the case, with junctions at bends (`add_bends`) and defaults (`fill_pipes`)
     read_pipes : pipes without faults, as read; cells : number of cells of each of these pipes
     faulty : (group, name) of parts with a fault from `faults`
-    report : function that takes the key path and the message of a fault
     """
     result = CutTable({**table, "nodes": dict(table["nodes"]), "links": {}, "routes": dict(table.get("routes", {}))},
                    frozenset(table["links"]))  # fmt: skip
@@ -251,7 +237,7 @@ def cut(
 def add_unknown_pieces(result: CutTable, name: str, given: dict[str, Any], parts: list[Placed], report: Report) -> None:
     """Add the pieces of a pipe that cannot be cut to the table of `result`, with their connections as the only keys.
 
-    name, given : name of the pipe and its keys in the file; parts : parts on it; report : as for `cut`
+    name, given : name of the pipe and its keys in the file; parts : parts on it
     """
     names = result.pieces[name] = [f"{name}-{k + 1}" for k in range(len(parts) + 1)]
     name_faults(result, name, given, parts, names, report)
@@ -272,7 +258,7 @@ def add_unknown_pieces(result: CutTable, name: str, given: dict[str, Any], parts
 def read_distance(part: Placed, on: str | None, pipe: Pipe | None, report: Report) -> bool:
     """Set the distance of a part along its pipe; return True. If its chainage is faulty, report it and return False.
 
-    on, pipe : name of the pipe, and the pipe as read (None if faulty: the distance is not set); report : as for `cut`
+    on, pipe : name of the pipe, and the pipe as read (None if faulty: the distance is not set)
     """
     key, given = (part.group, part.name, "at"), part.given["at"]
     try:
@@ -294,10 +280,7 @@ def read_distance(part: Placed, on: str | None, pipe: Pipe | None, report: Repor
 
 
 def sort_parts(parts: list[Placed], report: Report) -> bool:
-    """Sort the parts on a pipe by distance; return True. If two have the same distance, report it and return False.
-
-    report : as for `cut`
-    """
+    """Sort the parts on a pipe by distance; return True. If two have the same distance, report it and return False."""
     parts.sort(key=lambda part: part.distance)
     pairs = [(part, other) for part, other in zip(parts, parts[1:], strict=False) if part.distance == other.distance]
     for part, other in pairs:
@@ -322,7 +305,7 @@ def cut_pipe(
     """Add the pieces of a pipe, the nodes between them and the route along them to the table of `result`.
 
     given, whole : keys of the pipe in the file, and the pipe as read; parts : parts on it, by distance
-    cells : number of cells of the pipe; report : as for `cut`
+    cells : number of cells of the pipe
     A piece has its share of these cells by length, rounded, at least 1.
     """
     edges = np.array([0.0, *(part.distance for part in parts), whole.length])

@@ -6,15 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from fvsolve.case import defaults
 from fvsolve.case.case import Case
 from fvsolve.case.chainage import original_keys, pieces_of, placed
-from fvsolve.case.defaults import raw_link
-from fvsolve.case.design_limits import limit_keys
-from fvsolve.case.expectations import COMPARE_KEYS, expect_keys
+from fvsolve.case.claims import COMPARE_KEYS, expect_keys, limit_keys
 from fvsolve.case.load import TOP
 from fvsolve.case.pipe_routes import Route
-from fvsolve.case.raw import split_key
+from fvsolve.case.raw import WITH_DEFAULTS, default_values, raw_link, split_key
 from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.errors import FvsolveError
 from fvsolve.parts import KINDS, Scalar
@@ -73,9 +70,8 @@ def declaration_of(raw: dict[str, Any], keys: tuple[str, ...]) -> Value:
         try:
             result = outer.below(key)
         except KeyError:
-            raise FvsolveError(
-                f"unknown key {show('.'.join(keys))}; expected a key of the case, such as numerics.end"
-            ) from None
+            text = f"unknown key {show('.'.join(keys))}; expected a key of the case, such as numerics.end"
+            raise FvsolveError(text) from None
         if result is None:
             return outer
     return result
@@ -102,7 +98,7 @@ def declarations(raw: dict[str, Any]) -> dict[str, Value]:
     for group, kinds in KINDS.items():
         parts = raw.get(group, {}).items()
         result[group] = Keys({name: Keys({"type": Value(), **kinds[entry["type"]].values()}) for name, entry in parts})
-    result["defaults"] = Keys({kind: Keys(defaults.values(kind)) for kind in defaults.KINDS})
+    result["defaults"] = Keys({kind: Keys(default_values(kind)) for kind in WITH_DEFAULTS})
     for group, name, _ in placed(raw):
         where = {"on": Text(), "at": Quantity("length", changes=SHAPE)}
         result[group] = Keys({**result[group].values, name: Keys({**result[group].values[name].values, **where})})

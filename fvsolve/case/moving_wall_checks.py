@@ -61,13 +61,7 @@ def area_growth(mesh: Any, axis: int, share: np.ndarray) -> np.ndarray:
 
 
 def find_faults(
-    name: str,
-    basin: Any,
-    mesh: Any,
-    nodes: dict[str, Any],
-    joined: set[str],
-    times: tuple[float, float],
-    named: Any,
+    name: str, basin: Any, mesh: Any, nodes: dict[str, Any], joined: set[str], times: tuple[float, float], named: Any
 ) -> Iterator[tuple[tuple, str]]:
     """Faults (key path, message) of the moving walls of a basin.
 
@@ -88,10 +82,8 @@ def find_faults(
             yield (*key, patch), "a link joins here, and this is a moving wall; join the link to a fixed patch"
     yield from (((*key, *below), text) for below, text in faults_between(basin, mesh, walls, times))
     if walls and basin.holes:
-        yield (
-            ("nodes", name, "holes"),
-            "would be deformed by the moving mesh; expected no holes in a basin with a moving wall",
-        )
+        text = "would be deformed by the moving mesh; expected no holes in a basin with a moving wall"
+        yield ("nodes", name, "holes"), text
 
 
 def wall_faults(
@@ -114,10 +106,8 @@ def wall_faults(
         yield from ((("body",), text) for text in body_faults(options.body, nodes, outward(mesh, patch)[0]))
     normals = mesh.normal[mesh.patch(patch)]
     if np.ptp(normals, axis=0).max() > 1e-9 or np.abs(normals[0]).max() < 1.0 - 1e-9:
-        yield (
-            (),
-            "is not perpendicular to x or y; expected a straight wall perpendicular to the axis along which it moves",
-        )
+        text = "is not perpendicular to x or y; expected a straight wall perpendicular to the axis along which it moves"
+        yield (), text
         return
     axis, side = outward(mesh, patch)
     at = mesh.points[:, axis]

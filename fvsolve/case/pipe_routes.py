@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Annotated, Any
 
+from fvsolve.case.chainage import CutTable, is_pipe
+from fvsolve.case.connections import islands, kind_of
+from fvsolve.case.probe import ALL
+from fvsolve.case.reading import Reading
 from fvsolve.errors import article, did_you_mean, listing
-from fvsolve.parts import KINDS
+from fvsolve.parts import Pipe
 from fvsolve.parts.table_model import Table
 from fvsolve.parts.value import VALUE, Quantity, ReadContext, Value, ValueFault
 from fvsolve.units import show
@@ -23,6 +28,7 @@ class PipeNames(Value):
     )
     takes = "list of names"
     changes = VALUE
+    schema = {"type": "array", "items": {"type": "string"}, "minItems": 1}
 
     def read(self, given: Any, setting: ReadContext) -> tuple[str, ...]:
         if not isinstance(given, (list, tuple)) or not given:
@@ -32,9 +38,6 @@ class PipeNames(Value):
         if faults:
             raise ValueFault(faults)
         return tuple(given)
-
-    def json(self) -> dict[str, Any]:
-        return {"type": "array", "items": {"type": "string"}, "minItems": 1}
 
 
 class Route(Table):
@@ -102,17 +105,7 @@ def expand_pieces(route: Route, pieces: dict[str, list[str]], links: dict[str, A
     return options[0]
 
 
-def is_pipe(given: Any) -> bool:
-    """True if a link is a pipe; given : its keys as in the file."""
-    return isinstance(given, dict) and given.get("type") == "pipe"
-
-
-def has_known_type(given: Any) -> bool:
-    """True if the type of a link is known; given : its keys as in the file."""
-    return isinstance(given, dict) and str(given.get("type")) in KINDS["links"]
-
-
-def find_faults(
+def route_faults(
     routes: dict[str, Route | None], links: dict[str, Any], named: dict[str, Any], pieces: dict[str, list[str]]
 ) -> Iterator[tuple]:
     """Faults (key path, message) of routes: names that are not pipes, and pipes that are not consecutive.
@@ -120,7 +113,9 @@ def find_faults(
     named : links as in the file, also faulty links; pieces : cut pipe -> names of its pieces
     """
     pipes = [
-        item for item, given in named.items() if item not in links and (is_pipe(given) or not has_known_type(given))
+        item
+        for item, given in named.items()
+        if item not in links and (is_pipe(given) or kind_of("links", given) is None)
     ]
     pipes += [item for item, link in links.items() if link.kind == "pipe"]
     for name, route in routes.items():
@@ -166,21 +161,12 @@ def joined_places(links: dict[str, Any], named: dict[str, Any] = {}) -> dict[str
     Links with other ports than `from` and `to` do not count. links : links by name
     named : links as in the file, also faulty links, which are assumed to join their nodes
     """
-    root: dict[str, str] = {}
-
-    def find(name: str) -> str:
-        while root.setdefault(name, name) != name:
-            name = root[name]
-        return name
-
     pairs = [(link.ports["from"], link.ports["to"]) for link in links.values()
              if link.kind != "pipe" and set(link.ports) == {"from", "to"}]  # fmt: skip
     pairs += [(given.get("from"), given.get("to")) for name, given in named.items()
               if name not in links and isinstance(given, dict) and not is_pipe(given)]  # fmt: skip
-    for first, second in pairs:
-        if isinstance(first, str) and isinstance(second, str):
-            root[find(first)] = find(second)
-    return {name: find(name) for name in list(root)}
+    known = {str(k): [*pair] for k, pair in enumerate(pairs) if all(isinstance(place, str) for place in pair)}
+    return {name: group[0] for group in islands(known) for name in group}
 
 
 def directions(route: Route, links: dict[str, Any], named: dict[str, Any] = {}) -> list[list[tuple[int, bool]]]:  # noqa: B006
@@ -231,3 +217,29 @@ def legs(route: Route, links: dict[str, Any]) -> list[Leg]:
         result.append(Leg(pipe, begin, end, backwards))
         begin = end
     return result
+
+
+def read_routes(reading: Reading, network: CutTable, links: dict[str, Any]) -> dict[str, Route | None]:
+    """Routes by name; None for a faulty route. links : links without faults"""
+    table, result = network.table, {}
+    named, odd = table.get("links", {}), set()
+    for name, given in table.get("routes", {}).items():
+        result[name] = None
+        if name in table.get("nodes", {}) or name in named or name in ALL:
+            text = f"{show(name)} is also the name of a node or link, or a reserved word; expected another name"
+            reading.fault(("routes", name), text)
+            continue
+        with reading.catch("routes", name):
+            result[name] = expand_pieces(Route.model_validate(given, context=reading.setting), network.pieces, links)
+            continue
+        odd.add(name)
+        with suppress(KeyError, TypeError, ValueError):
+            pipes = Route.values()["pipes"].read(given["pipes"], reading.setting)
+            result[name] = expand_pieces(Route.model_construct(pipes=pipes), network.pieces, links)
+    faulty = list(route_faults(result, links, named, network.pieces)) if network.connections_known else []
+    reading.add(faulty)
+    lost = odd | {keys[1] for keys, _ in faulty}
+    pipes = {name for name, link in links.items() if isinstance(link, Pipe)}
+    lost |= {name for name, route in result.items()
+             if route and (not pipes.issuperset(route.pipes) or first_gap(route, links) is not None)}  # fmt: skip
+    return {name: None if name in lost else route for name, route in result.items()}

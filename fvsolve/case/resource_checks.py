@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Iterator
 from typing import Any
 
 from fvsolve.parts import Pipe
 from fvsolve.steppers.loop_records import LEAST_STEP
 from fvsolve.steppers.tableau import METHODS
+from fvsolve.units import show
 
 LONGEST_NAME = 60  # letters; names are parts of file names, which may have 255 bytes
 CELL, IMPLICIT_CELL, BASIN_CELL = 500, 3000, 600  # memory of a cell [B]
@@ -43,10 +45,8 @@ def find_faults(
         yield ("links", worst, "cells"), text
     least = LEAST_STEP * max(abs(numerics.start), abs(numerics.end))
     if output.every is not None and not output.every > least:
-        yield (
-            ("output", "every"),
-            f"{output.every:g} s is below the rounding error of the time; expected more than {least:.2g} s",
-        )
+        text = f"{output.every:g} s is below the rounding error of the time; expected more than {least:.2g} s"
+        yield ("output", "every"), text
     elif output.every is not None and output.probes is not None and span > 0.0:
         rows, columns = span / output.every, 1 + len(output.probes)
         if not fits(2 * NUMBER * rows * columns):
@@ -66,6 +66,14 @@ def rounding_faults(numerics: Any, crossing: float) -> Iterator[tuple[tuple, str
         text = f"{numerics.courant:g} gives steps of {numerics.courant * crossing:.2g} s"
         text += ", below the rounding error of the time"
         yield ("numerics", "courant"), f"{text}; expected more than {least / crossing:.2g}"
+
+
+def name_faults(name: str) -> Iterator[str]:
+    """Texts of the faults of a name in the case: invalid characters, or too many letters for the name of a file."""
+    if not re.fullmatch(r"[\w-]+", name):
+        yield f"{show(name)} is not a valid name; a name has only letters, digits, _ and -"
+    if len(name) > LONGEST_NAME:
+        yield f"has {len(name)} letters; expected at most {LONGEST_NAME}"
 
 
 def disk_size(case: Any, text: int = TEXT, frame_cell: int = FRAME_CELL) -> float:

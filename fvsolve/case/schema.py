@@ -7,10 +7,12 @@ from collections import Counter
 from json import dumps, loads
 from typing import Any
 
-from fvsolve.case import defaults
-from fvsolve.case.design_limits import limit_keys
-from fvsolve.case.load import GROUPS, KEYS, LINKLESS, TOP
+from fvsolve.case.claims import limit_keys
+from fvsolve.case.load import KEYS, TOP
+from fvsolve.case.part_reading import LINKLESS
 from fvsolve.case.pipe_routes import Route
+from fvsolve.case.raw import NOT_DEFAULT, WITH_DEFAULTS
+from fvsolve.case.reading import GROUPS
 from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.parts import KINDS, Scalar
 from fvsolve.parts.schedule import Scheduled
@@ -51,10 +53,7 @@ def full_schema() -> dict[str, Any]:
     properties["routes"] = {"type": "object", "additionalProperties": _with_shared_definitions(Route, definitions)}
     limit = keys_json(limit_keys("pressure", "pressure"))
     properties["limits"] = {"type": "object", "additionalProperties": limit}
-    properties["expect"] = properties["compare"] = {
-        "type": "object",
-        "additionalProperties": {"type": "object"},
-    }
+    properties["expect"] = properties["compare"] = {"type": "object", "additionalProperties": {"type": "object"}}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "fvsolve case",
@@ -167,9 +166,9 @@ def _with_shared_definitions(model: Any, definitions: dict[str, Any]) -> dict[st
 def _defaults(definitions: dict[str, Any]) -> dict[str, Any]:
     """Schema of the tables `[defaults.KIND]`, with the keys of the parts, all optional."""
     result = {}
-    for kind, model in defaults.KINDS.items():
+    for kind, model in WITH_DEFAULTS.items():
         keys = _with_shared_definitions(model, definitions)["properties"]
-        own = {key: _without_siblings(value) for key, value in keys.items() if key not in defaults.NOT_DEFAULT}
+        own = {key: _without_siblings(value) for key, value in keys.items() if key not in NOT_DEFAULT}
         result[kind] = {"type": "object", "properties": own, "additionalProperties": False}
     return {"type": "object", "properties": result, "additionalProperties": False}
 

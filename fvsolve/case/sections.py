@@ -13,29 +13,11 @@ from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.exact import NAMES
 from fvsolve.fluid import LAWS
 from fvsolve.fluid.coolprop import OIL_WORDS
+from fvsolve.parts import value as val
 from fvsolve.parts.pipe.part import LINES
 from fvsolve.parts.table_model import NamedTables, Table
 from fvsolve.parts.time_series import copy_name, find_file
-from fvsolve.parts.value import (
-    BY_CELLS,
-    PROFILE,
-    SHAPE,
-    VALUE,
-    Choice,
-    Flag,
-    Number,
-    Quantity,
-    ReadContext,
-    Rows,
-    Text,
-    UsualRange,
-    Value,
-    ValueFault,
-    Whole,
-    between,
-    nonnegative,
-    positive,
-)
+from fvsolve.parts.value import BY_CELLS, SHAPE, VALUE, Choice, Number, Quantity, ReadContext, positive
 from fvsolve.schemes import LIMITERS, SCHEMES
 from fvsolve.steppers.structure import KINDS
 from fvsolve.steppers.tableau import AUTO, BUILT_IN, METHODS, method_of_file
@@ -58,18 +40,18 @@ DEFAULT_ACCURACY = 1e-2  # fraction of the largest jump
 
 
 # Ranges of liquids, after CoolProp and the CRC Handbook: liquid hydrogen to mercury, light liquids to cold heavy oil.
-TEMPERATURES = UsualRange(
+TEMPERATURES = val.UsualRange(
     60.0, 1000.0, "liquefied gases to molten salt"
 )  # for fluid "user"; other fluids have their own range
-DENSITIES = UsualRange(60.0, 14e3, "liquid hydrogen to mercury")
-MODULI = UsualRange(1e7, 4e10, "liquefied gases to mercury")
-VISCOSITIES = UsualRange(1e-5, 5.0, "liquefied gases to heavy fuel oil")
+DENSITIES = val.UsualRange(60.0, 14e3, "liquid hydrogen to mercury")
+MODULI = val.UsualRange(1e7, 4e10, "liquefied gases to mercury")
+VISCOSITIES = val.UsualRange(1e-5, 5.0, "liquefied gases to heavy fuel oil")
 
 
 class FluidSpec(Table):
     """Table `[fluid]`: fluid, its state and its density law. Stated properties replace the properties from CoolProp."""
 
-    name: Annotated[str, Text('a CoolProp fluid, "ISO VG 46", "INCOMP::..." or "user"', BY_CELLS)]
+    name: Annotated[str, val.Text('a CoolProp fluid, "ISO VG 46", "INCOMP::..." or "user"', BY_CELLS)]
     temperature: Annotated[
         float, Quantity("temperature", positive, "temperature at which properties are evaluated [K]", changes=BY_CELLS)
     ] = 293.15
@@ -86,24 +68,26 @@ class FluidSpec(Table):
     bulk_modulus: Annotated[
         float | None, Quantity("modulus", positive, "isentropic bulk modulus [Pa]", MODULI, BY_CELLS)
     ] = None
-    viscosity: Annotated[float | None, Quantity("viscosity", nonnegative, "dynamic viscosity [Pa s]", VISCOSITIES)] = (
-        None
-    )
-    vapor_pressure: Annotated[float | None, Quantity("pressure", nonnegative, "vapour pressure [Pa]")] = None
+    viscosity: Annotated[
+        float | None, Quantity("viscosity", val.nonnegative, "dynamic viscosity [Pa s]", VISCOSITIES)
+    ] = None
+    vapor_pressure: Annotated[float | None, Quantity("pressure", val.nonnegative, "vapour pressure [Pa]")] = None
     air_fraction: Annotated[
         float | None,
         Number(
-            between(0, 1), f"volume fraction of air at 1 atm, law mixture; {CAVITY_AIR:g} with cavitation if left out"
+            val.between(0, 1),
+            f"volume fraction of air at 1 atm, law mixture; {CAVITY_AIR:g} with cavitation if left out",
         ),
     ] = None
     gas_exponent: Annotated[
-        float | None, Number(between(1, 2), "polytropic exponent of the gas, law mixture: 1 isothermal, 1.4 adiabatic")
+        float | None,
+        Number(val.between(1, 2), "polytropic exponent of the gas, law mixture: 1 isothermal, 1.4 adiabatic"),
     ] = None
     saturation_pressure: Annotated[
         float | None, Quantity("pressure", positive, "pressure above which all gas is dissolved, law mixture [Pa]")
     ] = None
     cavitation: Annotated[
-        bool | None, Flag("cavities of gas and vapour: vapour pressure is added to the gas pressure, law mixture")
+        bool | None, val.Flag("cavities of gas and vapour: vapour pressure is added to the gas pressure, law mixture")
     ] = None
 
     @classmethod
@@ -178,7 +162,7 @@ class Numerics(Table):
             STARTS,
             "steady: stated levels, pressures and flows are kept, the rest is in equilibrium; equilibrium: nothing "
             "moves and bodies and masses are placed where their forces balance; rest: no flow",
-            changes=PROFILE,
+            changes=val.PROFILE,
         ),
     ] = "steady"
     scheme: Annotated[
@@ -197,7 +181,7 @@ class Numerics(Table):
             MethodNames(),
             f"Runge-Kutta method; {DEFAULT_METHOD} (with rtol {DEFAULT_METHOD_RTOL}, with cavitation {CAVITY_METHOD}, "
             f"with scalars or friction in basins {DEFAULT_METHOD_SSP}) if left out",
-            changes=PROFILE,
+            changes=val.PROFILE,
         ),
     ] = None
     courant: Annotated[
@@ -213,7 +197,7 @@ class Numerics(Table):
     rtol: Annotated[
         float | None,
         Number(
-            between(0, 1, open=True),
+            val.between(0, 1, open=True),
             f"relative tolerance of the error per step; {DEFAULT_RTOL:g} (without cells, with auto, or with adaptive "
             "implicit methods) if left out",
         ),
@@ -238,13 +222,12 @@ class Numerics(Table):
         ),
     ] = None
     pipe_model: Annotated[
-        str,
-        Choice("pipe model", LINES, "model of pipes that state no pipe_model", changes=SHAPE),
+        str, Choice("pipe model", LINES, "model of pipes that state no pipe_model", changes=SHAPE)
     ] = "finite-volume"
     delay_tolerance: Annotated[
         float,
         Number(
-            between(0, 1, open=True),
+            val.between(0, 1, open=True),
             "allowed error of pipe models chosen by auto, and size below which jumps in a delay line are smoothed; "
             "both as a fraction of the largest jump",
             changes=SHAPE,
@@ -288,33 +271,16 @@ def uses_error_control(method: str | None) -> bool:
     return method == AUTO or (known is not None and known.adaptive and not known.explicit)
 
 
-class OutputUnits(Value):
+class OutputUnits(val.Value):
     """Value of `units` in `[output]`: unit of each quantity of probes and parts."""
 
     about = 'unit per quantity, for example { pressure = "barg", flow = "l/s" }; SI, absolute if left out'
     takes = "`{ QUANTITY = UNIT }`"
     changes = VALUE
     quantities = (
-        "pressure",
-        "gauge_pressure",
-        "head",
-        "level",
-        "flow",
-        "velocity",
-        "position",
-        "force",
-        "torque",
-        "angle",
-        "angular_velocity",
-        "acceleration",
-        "energy",
-        "power",
-        "time",
-        "length",
-        "area",
-        "volume",
-        "density",
-    )
+        "pressure", "gauge_pressure", "head", "level", "flow", "velocity", "position", "force", "torque", "angle",
+        "angular_velocity", "acceleration", "energy", "power", "time", "length", "area", "volume", "density",
+    )  # fmt: skip
 
     def read(self, given: Any, setting: ReadContext) -> dict[str, str]:
         if not isinstance(given, dict):
@@ -332,7 +298,7 @@ class OutputUnits(Value):
             except ValueError as error:
                 faults.append(((quantity,), str(error)))
         if faults:
-            raise ValueFault(faults)
+            raise val.ValueFault(faults)
         filled = dict(given)
         if "pressure" in given and not units.find(given["pressure"], "pressure").absolute:
             filled.setdefault("gauge_pressure", given["pressure"])
@@ -346,32 +312,34 @@ class OutputUnits(Value):
         }
 
 
-class ProbeNames(Value):
+class ProbeNames(val.Value):
     """Value of `probes` in `[output]`: a list of texts, which are read as probes later, when all parts are read."""
 
     about = "recorded quantities; those of all nodes and links if left out"
     takes = "list of probes"
+    schema = {"type": "array", "items": {"type": "string"}}
 
     def read(self, given: Any, setting: ReadContext) -> tuple[Any, ...]:
         if not isinstance(given, (list, tuple)):
             raise ValueError(f'{show(given)} is not a list; expected for example ["gate.pressure"]')
         return tuple(given)
 
-    def json(self) -> dict[str, Any]:
-        return {"type": "array", "items": {"type": "string"}}
-
 
 class OutputLine(Table):
     """Table of one line across a basin, along which its fields are written with every frame."""
 
-    basin: Annotated[str, Text("name of the basin", VALUE)]
+    basin: Annotated[str, val.Text("name of the basin", VALUE)]
     from_: Annotated[
         tuple[float, float],
-        Rows("length", length=2, about="x, y of the start of the line [m]", changes=VALUE),
+        val.Rows("length", length=2, about="x, y of the start of the line [m]", changes=VALUE),
         Field(alias="from"),
     ]
-    to: Annotated[tuple[float, float], Rows("length", length=2, about="x, y of the end of the line [m]", changes=VALUE)]
-    points: Annotated[int, Whole(between(2, 10**5), "number of evenly spaced points, with both ends", VALUE)] = 101
+    to: Annotated[
+        tuple[float, float], val.Rows("length", length=2, about="x, y of the end of the line [m]", changes=VALUE)
+    ]
+    points: Annotated[
+        int, val.Whole(val.between(2, 10**5), "number of evenly spaced points, with both ends", VALUE)
+    ] = 101
 
 
 class Output(Table):
@@ -386,7 +354,7 @@ class Output(Table):
             changes=VALUE,
         ),
     ] = None
-    fields: Annotated[int, Whole(between(0, 10**6), "number of frames of the fields, 0 for none", VALUE)] = (
+    fields: Annotated[int, val.Whole(val.between(0, 10**6), "number of frames of the fields, 0 for none", VALUE)] = (
         DEFAULT_FRAMES
     )
     probes: Annotated[Any, ProbeNames()] = None

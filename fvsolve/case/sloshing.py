@@ -20,9 +20,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fvsolve.case.bodies import point_inertia
-from fvsolve.case.cell_means import means, samples
+from fvsolve.case.bodies import point_inertia, poses
 from fvsolve.parts.body import Body, Joint
+from fvsolve.parts.formula import means, samples
 from fvsolve.parts.schedule import constant
 
 MODES = 3  # modes along x, and along y
@@ -189,10 +189,10 @@ def cylinder_inertia(a: float, h: float) -> float:
     return float(wall + lids)
 
 
-def find_faults(nodes: dict[str, Any], lumped: dict[str, Any], poses: dict[str, Any]) -> Faults:
+def find_faults(nodes: dict[str, Any], lumped: dict[str, Any], stand: dict[str, Any]) -> Faults:
     """Faults (key path, message) of basins whose water is modelled by sloshing modes.
 
-    lumped : basin -> mesh, of basins without cells; poses : name of a body -> `Pose`
+    lumped : basin -> mesh, of basins without cells; stand : name of a body -> `Pose`
     """
     for name, mesh in lumped.items():
         basin, key = nodes[name], ("nodes", name)
@@ -208,7 +208,7 @@ def find_faults(nodes: dict[str, Any], lumped: dict[str, Any], poses: dict[str, 
         elif not basin.level > bed[0]:
             yield (*key, "level"), f"{basin.level:g} m is not above the bed, at {bed[0]:g} m; expected a higher level"
         yield from unsupported_keys(key, basin)
-        if (pose := poses.get(basin.on)) is not None:
+        if (pose := stand.get(basin.on)) is not None:
             upright = float((pose.attitude @ basin.rotation)[2, 2])
             if upright < UPRIGHT:
                 text = f"the bed is {np.degrees(np.arccos(upright)):.3g} deg off level at the start, where modes are "
@@ -220,10 +220,8 @@ def weightless(nodes: dict[str, Any], gravity: float | None) -> Faults:
     for name, basin in nodes.items():
         if gravity == 0.0 and getattr(getattr(basin, "physics_type", None), "has_modes", False):
             if not (basin.on and basin.sloshing == "frozen"):
-                yield (
-                    ("gravity",),
-                    f'the water in {name} needs gravity; expected more than 0, or sloshing = "frozen" on a body',
-                )
+                text = f'the water in {name} needs gravity; expected more than 0, or sloshing = "frozen" on a body'
+                yield ("gravity",), text
                 return
 
 
@@ -320,3 +318,59 @@ def hidden_body(mass: float, inertia: np.ndarray, joint: Joint, centre: np.ndarr
         mass=mass, inertia=tuple(map(tuple, inertia.tolist())), joint=joint, points={},
         centre_of_mass=tuple(np.asarray(centre).tolist()),
     )  # fmt: skip
+
+
+def nodes_with_water(
+    nodes: dict[str, Any], lumped: dict[str, Any], density: float, gravity: float, t: float
+) -> dict[str, Any]:
+    """Copy of `nodes` with the water of basins without cells as masses.
+
+    The water is added to the mass, centre of mass and inertia of its body; sloshing modes are additional bodies.
+    lumped : basin -> mesh, of the basins without cells; density of the water [kg/m3]; gravity [m/s2]
+    t : start time [s]
+    """
+    result = dict(nodes)
+    for name, mesh in lumped.items():
+        basin, body = nodes[name], result[nodes[name].on]
+        mass_of = frozen_water if basin.sloshing == "frozen" else held_water
+        mass, centre, inertia = mass_of(basin, mesh, density)
+        turn = basin.rotation
+        centre = np.array(basin.place) + turn @ centre
+        both, own = body.mass + mass, np.array(body.centre_of_mass)
+        middle = (body.mass * own + mass * centre) / both
+        total = (
+            body.inertia_matrix()
+            + point_inertia(body.mass, own - middle)
+            + turn @ inertia @ turn.T
+            + point_inertia(mass, centre - middle)
+        )
+        change = {"mass": both, "centre_of_mass": tuple(middle.tolist()), "inertia": tuple(map(tuple, total.tolist()))}
+        result[nodes[name].on] = body.model_copy(update=change)
+    swinging = {name: mesh for name, mesh in lumped.items() if nodes[name].sloshing == "modes"}
+    stand = poses(result, t) if swinging else {}
+    for name, mesh in swinging.items():
+        result |= mode_bodies(name, nodes[name], mesh, stand[nodes[name].on], density, gravity)
+    return result
+
+
+def frozen_water(basin: Any, mesh: Any, density: float) -> tuple[float, np.ndarray, np.ndarray]:
+    """Mass [kg], centre [m] and inertia about the centre [kg m2] of water at rest, in the axes of the basin.
+
+    The water is the sum of prisms over the cells. centre : float64[3]; inertia : float64[3, 3]
+    """
+    bed = means(samples(basin.bed, mesh))
+    depth = np.maximum(basin.level - bed, 0.0)
+    mass = density * mesh.area * depth
+    places = np.column_stack([mesh.centre, bed + 0.5 * depth])
+    total, wide = float(mass.sum()), mesh.area / 12.0
+    centre = mass @ places / total
+    if mesh.grid is not None and len(mesh.cells) == mesh.grid.nx * mesh.grid.ny:
+        along, across = np.diff(mesh.grid.x) ** 2 / 12.0, np.diff(mesh.grid.y) ** 2 / 12.0
+        along, across = np.tile(along, mesh.grid.ny), np.repeat(across, mesh.grid.nx)
+    else:
+        along = across = wide
+    high = depth**2 / 12.0
+    inertia = np.diag([mass @ (across + high), mass @ (along + high), mass @ (along + across)])
+    for m, place in zip(mass, places - centre, strict=True):
+        inertia += point_inertia(float(m), place)
+    return total, centre, inertia

@@ -137,9 +137,9 @@ def new(
     file: Annotated[Path | None, Argument(metavar="FILE", help="file to write (default NAME.toml)")] = None,
 ) -> None:
     """Copy a shipped case and the files it uses."""
-    from fvsolve.case import copying
+    from fvsolve.case import load, shipped
 
-    for path in copying.copy(name, file or Path(f"{name}.toml")):
+    for path in shipped.copy(name, file or Path(f"{name}.toml"), load):
         print(path)
 
 

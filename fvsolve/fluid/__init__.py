@@ -8,11 +8,10 @@ from typing import Any
 
 from fvsolve.errors import FluidError, did_you_mean
 from fvsolve.fluid.air import Air, check_cavities
-from fvsolve.fluid.coolprop import celsius
+from fvsolve.fluid.coolprop import cached_properties, celsius
 from fvsolve.fluid.isentrope_table import FluidTable
 from fvsolve.fluid.laws import LAWS
 from fvsolve.fluid.oils import OILS, oil_name, oil_properties
-from fvsolve.fluid.property_cache import cached_properties
 
 __all__ = ["LAWS", "Fluid", "FluidTable", "properties"]
 

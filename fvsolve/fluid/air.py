@@ -46,8 +46,7 @@ def air_of(given: dict[str, float]) -> Air:
         raise FluidError("air_fraction", f"{fraction:g} is not a volume fraction; expected at least 0 and below 1")
     if cavitation and fraction == 0.0:
         raise FluidError(
-            "cavitation",
-            "needs free gas, from which cavities grow; try `air_fraction = 1e-7` for a degassed liquid",
+            "cavitation", "needs free gas, from which cavities grow; try `air_fraction = 1e-7` for a degassed liquid"
         )
     exponent, saturation = given.get("gas_exponent", 1.0), given.get("saturation_pressure", math.inf)
     if not 1.0 <= exponent <= 2.0:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve import attitude, units
-from fvsolve.case import check
+from fvsolve.case import checks
 from fvsolve.case.bodies import joint_coordinate
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
@@ -205,7 +205,7 @@ def with_equilibrium(case, draft) -> tuple[Any, list[Notice]]:
     draft.check()
     case = replace(case, equilibrium_nodes=moved_nodes(at, result.y))
     nodes, surroundings = case.nodes | case.equilibrium_nodes, (case.ambient_pressure, case.gravity, None, None)
-    for keys, text in check.parts(nodes, case.links, *surroundings, at.t, case.meshes, case.lumped):
+    for keys, text in checks.part_faults(nodes, case.links, *surroundings, at.t, case.meshes, case.lumped):
         draft.fault(".".join(map(str, keys)), f"where forces balance {text}")
     draft.check()
     return case, [*position_notices(case), *instability_notices(at, result)]

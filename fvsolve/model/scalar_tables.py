@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.case.cell_means import means, samples
 from fvsolve.kernels import dtypes as rec
+from fvsolve.parts.formula import means, samples
 from fvsolve.steppers.tableau import METHODS
 
 STORES = (rec.TANK, rec.CHAMBER)

@@ -60,9 +60,8 @@ class Arithmetic:
         self.text, self.source = text, text.replace("^", "**").strip()
         about = f"{show(text)} is not a formula of x and y"
         if len(text) > MAX_LENGTH:
-            raise ValueError(
-                f'{about}: it has {len(text)} characters; expected at most {MAX_LENGTH}, or {{ file = "NAME.csv" }}'
-            )
+            text = f'{about}: it has {len(text)} characters; expected at most {MAX_LENGTH}, or {{ file = "NAME.csv" }}'
+            raise ValueError(text)
         try:
             tree = ast.parse(self.source, mode="eval").body
         except (MemoryError, RecursionError):

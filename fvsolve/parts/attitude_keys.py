@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -31,18 +32,9 @@ class Attitude(Table):
     (45); a matrix. If several forms are given, they must agree; the first in this order is used.
     """
 
-    roll: Annotated[
-        float | None,
-        Quantity("angle", about="angle about x, the last rotation [rad]; 0 if left out", usual=USUAL_ANGLES),
-    ] = None
-    pitch: Annotated[
-        float | None,
-        Quantity("angle", about="angle about y, the second rotation [rad]; 0 if left out", usual=USUAL_ANGLES),
-    ] = None
-    yaw: Annotated[
-        float | None,
-        Quantity("angle", about="angle about z, the first rotation [rad]; 0 if left out", usual=USUAL_ANGLES),
-    ] = None
+    roll: Annotated[float | None, Angle("angle about x, the last rotation [rad]; 0 if left out")] = None
+    pitch: Annotated[float | None, Angle("angle about y, the second rotation [rad]; 0 if left out")] = None
+    yaw: Annotated[float | None, Angle("angle about z, the first rotation [rad]; 0 if left out")] = None
     zyz: Annotated[
         tuple[float, ...] | None,
         Rows(
@@ -158,11 +150,8 @@ def valid_values(table: type[Table], given: dict[str, Any], setting: ReadContext
     """
     result = {}
     for key, value in table.values().items():
-        try:
-            if key in given:
-                result[key] = value.read(given[key], setting)
-        except ValueError:
-            continue
+        with suppress(KeyError, ValueError):
+            result[key] = value.read(given[key], setting)
     return result
 
 
@@ -173,12 +162,7 @@ def length_notices(key: str, given: tuple[float, ...] | None) -> Iterator[tuple[
     """
     length = math.hypot(*given) if given else 1.0
     if abs(length - 1.0) > ROUNDING:
-        yield (
-            (key,),
-            length,
-            1.0,
-            f"the vector has length {length:.6g}, not 1, and is divided by this length",
-        )
+        yield ((key,), length, 1.0, f"the vector has length {length:.6g}, not 1, and is divided by this length")
 
 
 def is_zero_vector(given: tuple[float, ...] | None) -> bool:
@@ -197,12 +181,8 @@ def _rotation_faults(values: dict[str, Any]) -> Iterator[tuple[str, str]]:
         return
     off, determinant = attitude.defect(np.array(values["matrix"]))
     if off > TOLERANCE:
-        yield (
-            "matrix",
-            f"is not a rotation: R'R differs from the identity by {off:.3g}; expected orthogonal columns of length 1",
-        )
+        text = f"is not a rotation: R'R differs from the identity by {off:.3g}; expected orthogonal columns of length 1"
+        yield "matrix", text
     elif determinant < 0.0:
-        yield (
-            "matrix",
-            "is a reflection: its determinant is -1; expected a rotation, with determinant +1 and right-handed axes",
-        )
+        text = "is a reflection: its determinant is -1; expected a rotation, with determinant +1 and right-handed axes"
+        yield "matrix", text

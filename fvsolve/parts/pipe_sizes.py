@@ -15,19 +15,8 @@ from fvsolve.units import show
 
 # NPS of each DN below 100; from DN 100 on, DN = 25 NPS (ASME B36.10M).
 DN_NPS = {
-    6: 0.125,
-    8: 0.25,
-    10: 0.375,
-    15: 0.5,
-    20: 0.75,
-    25: 1.0,
-    32: 1.25,
-    40: 1.5,
-    50: 2.0,
-    65: 2.5,
-    80: 3.0,
-    90: 3.5,
-}
+    6: 0.125, 8: 0.25, 10: 0.375, 15: 0.5, 20: 0.75, 25: 1.0, 32: 1.25, 40: 1.5, 50: 2.0, 65: 2.5, 80: 3.0, 90: 3.5,
+}  # fmt: skip
 
 # name -> loss coefficient from fluids.fittings (f), inner diameter d [m] and f_T
 FITTINGS: dict[str, Callable[[Any, float, float], float]] = {

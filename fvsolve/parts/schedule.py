@@ -9,27 +9,10 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import did_you_mean, listing
+from fvsolve.parts import value as val
 from fvsolve.parts.table_model import keys_json, read_keys
 from fvsolve.parts.time_series import copy_name, find_file, read_columns
-from fvsolve.parts.value import (
-    NEEDED,
-    PROFILE,
-    ROOT,
-    Choice,
-    Number,
-    Quantity,
-    Range,
-    ReadContext,
-    Rows,
-    Text,
-    UsualRange,
-    Value,
-    ValueFault,
-    anything,
-    check_increasing,
-    nonnegative,
-    positive,
-)
+from fvsolve.parts.value import NEEDED, Choice, Number, Quantity, Range, ReadContext, Rows, Text, Value, ValueFault
 from fvsolve.units import show
 
 KINDS = ("linear", "step", "smooth")
@@ -99,10 +82,10 @@ class Scheduled(Value):
     """Value of a case file that may change with time: number, text, table, file, ramp, wave or signal."""
 
     dimension: str
-    range: Range = anything
+    range: Range = val.anything
     about: str = ""
-    usual: UsualRange | None = None
-    changes: str = PROFILE
+    usual: val.UsualRange | None = None
+    changes: str = val.PROFILE
 
     def read(self, given: Any, setting: ReadContext) -> Schedule:
         if isinstance(given, Schedule):
@@ -127,14 +110,14 @@ class Scheduled(Value):
             "table": {"time": (Rows("time"), NEEDED), "value": (Rows(*item), NEEDED), "kind": kind},
             "ramp": {
                 "start": (Quantity("time"), NEEDED),
-                "duration": (Quantity("time", nonnegative), NEEDED),
+                "duration": (Quantity("time", val.nonnegative), NEEDED),
                 "value": (Rows(*item, length=2), NEEDED),
-                "exponent": (Number(positive), 1.0),
+                "exponent": (Number(val.positive), 1.0),
             },
             "wave": {
                 "mean": (Quantity(self.dimension), NEEDED),
                 "amplitude": (Quantity(AMPLITUDE_DIMENSIONS.get(self.dimension, self.dimension)), NEEDED),
-                "period": (Quantity("time", positive), NEEDED),
+                "period": (Quantity("time", val.positive), NEEDED),
                 "phase": (Quantity("angle"), 0.0),
             },
             "file": {"file": (Text(), NEEDED), "time": (Text(), None), "value": (Text(), None), "kind": kind},
@@ -156,7 +139,7 @@ class Scheduled(Value):
                 [(("value",), f"has length {len(v)}, but `time` has length {len(t)}; expected equal lengths")]
             )
         try:
-            check_increasing(t, given["time"], "times")
+            val.check_increasing(t, given["time"], "times")
         except ValueError as error:
             raise ValueFault([(("time",), str(error))]) from None
         if len(v) == 1:
@@ -188,7 +171,7 @@ class Scheduled(Value):
         try:
             path = find_file(values["file"], setting)
             t, v, *headers = read_columns(path, values["time"], values["value"], self.dimension, setting)
-            check_increasing(t, t.tolist(), f"{path.name}: times")
+            val.check_increasing(t, t.tolist(), f"{path.name}: times")
             for x in v.tolist():
                 self.range.check(x, x)
         except ValueError as error:
@@ -209,10 +192,8 @@ class Scheduled(Value):
             )
         try:
             schedule = self.read(shared, setting)
-        except ValueFault as error:
-            raise ValueFault([((ROOT, "signals", name, *below), text) for below, text in error.faults]) from None
         except ValueError as error:
-            raise ValueFault([((ROOT, "signals", name), str(error))]) from None
+            raise ValueFault(val.faults_of(error, val.ROOT, "signals", name)) from None
         setting.used[name] = schedule.table()
         return Schedule(
             schedule.kind, schedule.time, schedule.value, schedule.exponent, {"signal": name}, schedule.wave

@@ -7,26 +7,34 @@ from typing import Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
-from fvsolve.errors import did_you_mean, listing
+from fvsolve.errors import listing
 from fvsolve.parts.context import CaseContext, Faults
-from fvsolve.parts.value import NEEDED, ReadContext, Value, ValueFault, context_of
+from fvsolve.parts.value import (
+    NEEDED,
+    ReadContext,
+    Value,
+    ValueFault,
+    context_of,
+    faults_of,
+    key_hint,
+    pydantic_faults,
+    read_each,
+)
 from fvsolve.units import show
 
 
 def read_keys(given: dict[str, Any], keys: dict[str, tuple[Value, Any]], setting: ReadContext) -> dict[str, Any]:
     """Read a table by its keys; keys : key -> (declaration, default). Raises ValueFault with all faults."""
     result = {key: default for key, (_, default) in keys.items()}
-    faults = [((key,), f"unknown key{_key_hint(str(key), list(keys))}") for key in given if key not in keys]
+    faults = [((key,), f"unknown key{key_hint(str(key), list(keys))}") for key in given if key not in keys]
     for key, (value, default) in keys.items():
         try:
             if key in given:
                 result[key] = value.read(given[key], setting)
             elif default is NEEDED:
                 faults.append(((), f"{key} is missing"))
-        except ValueFault as error:
-            faults += [((key, *below), message) for below, message in error.faults]
         except ValueError as error:
-            faults.append(((key,), str(error)))
+            faults += faults_of(error, key)
     if faults:
         raise ValueFault(faults)
     return result
@@ -40,10 +48,6 @@ def keys_json(keys: dict[str, tuple[Value, Any]]) -> dict[str, Any]:
         "required": [key for key, (_, default) in keys.items() if default is NEEDED],
         "additionalProperties": False,
     }
-
-
-def _key_hint(name: str, keys: list[str]) -> str:
-    return did_you_mean(name, keys) or f"; keys are {listing(keys)}"
 
 
 class Table(BaseModel):
@@ -85,7 +89,7 @@ class Table(BaseModel):
         try:
             table = handler(given)
         except ValidationError as error:
-            raise ValueFault(faults + faults_of_error(error, cls.keys(), cls.synonyms)) from None
+            raise ValueFault(faults + pydantic_faults(error, cls.keys(), cls.synonyms)) from None
         if faults:
             raise ValueFault(faults)
         return table
@@ -136,9 +140,8 @@ class Nested(Value):
 
     def read(self, given: Any, setting: ReadContext) -> Table:
         if isinstance(given, list) and len(given) > 1 and all(isinstance(item, dict) for item in given):
-            raise ValueError(
-                f"is a list of {len(given)} tables; expected a single table{', ' * bool(self.about)}{self.about}"
-            )
+            text = f"is a list of {len(given)} tables; expected a single table{', ' * bool(self.about)}{self.about}"
+            raise ValueError(text)
         return given if isinstance(given, self.model) else self.model.model_validate(given, context=setting)
 
     def below(self, key: str) -> Value | None:
@@ -159,25 +162,15 @@ class Nested(Value):
 class NamedTables(Value):
     """Value of a case file that contains tables of the same type, name -> table."""
 
+    schema = {"type": "object", "additionalProperties": {"type": "object"}}
+
     def __init__(self, model: type[Table], about: str) -> None:
         self.model, self.about = model, about
 
     def read(self, given: Any, setting: ReadContext) -> dict[str, Any]:
         if not isinstance(given, dict):
             raise ValueError(f"{show(given)} is not a table of tables by name; expected {self.about}")
-        result, faults = {}, []
-        for name, item in given.items():
-            try:
-                result[name] = (
-                    item if isinstance(item, self.model) else self.model.model_validate(item, context=setting)
-                )
-            except ValueFault as error:
-                faults += [((name, *below), message) for below, message in error.faults]
-            except ValueError as error:
-                faults += [((name, *below), message) for below, message in faults_of_error(error, self.model.keys())]
-        if faults:
-            raise ValueFault(faults)
-        return result
+        return read_each(given.items(), lambda item: self.model.model_validate(item, context=setting))
 
     def below(self, key: str) -> Value | None:
         return Nested(self.model)
@@ -185,9 +178,6 @@ class NamedTables(Value):
     @property
     def takes(self) -> str:
         return f"`{{ NAME = {{ {', '.join(self.model.keys())} }} }}`"
-
-    def json(self) -> dict[str, Any]:
-        return {"type": "object", "additionalProperties": {"type": "object"}}
 
 
 def plain_value(value: Any) -> Any:
@@ -212,27 +202,3 @@ def missing_key_faults(given: dict[str, Any], keys: tuple[str, ...]) -> list[tup
     if any(key in given for key in keys):
         return []
     return [((), f"expected one of {', '.join(keys)}" if len(keys) > 1 else f"{keys[0]} is missing")]
-
-
-def faults_of_error(
-    error: ValidationError,
-    keys: list[str],
-    synonyms: dict[str, str] = {},  # noqa: B006
-) -> list[tuple[tuple[Any, ...], str]]:
-    """Faults (key path, text) in an error of pydantic.
-
-    keys : keys of the table; synonyms : keys of other programs -> equivalent here
-    """
-    result = []
-    for entry in error.errors(include_url=False):
-        place, cause = tuple(entry["loc"]), entry.get("ctx", {}).get("error")
-        if isinstance(cause, ValueFault):
-            result += [(place + below, message) for below, message in cause.faults]
-        elif entry["type"] == "missing":
-            result.append((place[:-1], f"{place[-1]} is missing"))
-        elif entry["type"] == "extra_forbidden":
-            hint = synonyms.get(str(place[-1]).casefold().replace("-", "_"))
-            result.append((place, f"unknown key{f'; use {hint}' if hint else _key_hint(str(place[-1]), keys)}"))
-        else:
-            result.append((place, str(cause) if cause else entry["msg"]))
-    return result

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from pydantic import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
 from fvsolve import units
-from fvsolve.errors import did_you_mean
+from fvsolve.errors import did_you_mean, listing
 from fvsolve.units import show
 
 ROOT = object()  # in the key path of a fault: the following keys start at the top of the case
@@ -34,6 +34,53 @@ class ValueFault(ValueError):
     def __init__(self, faults: list[tuple[tuple[Any, ...], str]], instead: dict[str, Any] | None = None):
         self.faults, self.replacement = faults, instead
         super().__init__("; ".join(message for _, message in faults))
+
+
+def faults_of(error: ValueError, *keys: Any) -> list[tuple[tuple[Any, ...], str]]:
+    """Faults (key path, message) of an error of a value at the key path `keys`."""
+    if hasattr(error, "errors"):
+        faults = pydantic_faults(error, [], {})
+    else:
+        faults = getattr(error, "faults", [((), str(error))])
+    return [((*keys, *below), message) for below, message in faults]
+
+
+def pydantic_faults(error: Any, known: list[str], synonyms: Mapping[str, str]) -> list[tuple[tuple[Any, ...], str]]:
+    """Faults (key path, text) in an error of pydantic.
+
+    known : keys of the table; synonyms : keys of other programs -> equivalent here
+    """
+    result = []
+    for entry in error.errors(include_url=False):
+        place, cause = tuple(entry["loc"]), entry.get("ctx", {}).get("error")
+        if isinstance(cause, ValueFault):
+            result += [(place + below, message) for below, message in cause.faults]
+        elif entry["type"] == "missing":
+            result.append((place[:-1], f"{place[-1]} is missing"))
+        elif entry["type"] == "extra_forbidden":
+            hint = synonyms.get(str(place[-1]).casefold().replace("-", "_"))
+            result.append((place, f"unknown key{f'; use {hint}' if hint else key_hint(str(place[-1]), known)}"))
+        else:
+            result.append((place, str(cause) if cause else entry["msg"]))
+    return result
+
+
+def key_hint(name: str, keys: list[str]) -> str:
+    """Text on the valid key that is most similar to an unknown key, else on all valid keys."""
+    return did_you_mean(name, keys) or f"; keys are {listing(keys)}"
+
+
+def read_each(entries: Iterable[tuple[Any, Any]], read: Callable[[Any], Any]) -> dict[Any, Any]:
+    """Values of the pairs (key, given) : key -> read(given). Raises ValueFault with the faults of all entries."""
+    result, faults = {}, []
+    for key, given in entries:
+        try:
+            result[key] = read(given)
+        except ValueError as error:
+            faults += faults_of(error, key)
+    if faults:
+        raise ValueFault(faults)
+    return result
 
 
 @dataclass
@@ -105,10 +152,13 @@ class Value:
 
     about : description; "...; TEXT if left out" describes the default
     changes : effect of a changed value on an existing model: VALUE, PROFILE, BY_CELLS or SHAPE
+    takes : text on the valid values, in Markdown: unit, range, words; schema : JSON schema of the value
     """
 
     about: str = ""
     changes: str = SHAPE
+    takes: ClassVar[str] = ""
+    schema: ClassVar[dict[str, Any]] = {}
 
     def read(self, given: Any, setting: ReadContext) -> Any:
         """Value of the part for a value of the case file.
@@ -123,12 +173,7 @@ class Value:
 
     def json(self) -> dict[str, Any]:
         """JSON schema of the value in the case file."""
-        return {}
-
-    @property
-    def takes(self) -> str:
-        """Text on the valid values, in Markdown: unit, range, words."""
-        return ""
+        return self.schema
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.with_info_plain_validator_function(lambda given, info: self.read(given, context_of(info)))
@@ -226,11 +271,8 @@ class Choice(Value):
             raise ValueError(f"{show(given)} is not text; expected one of {', '.join(self.words)}")
         if given not in self.words:
             synonym = self.synonyms.get(given.casefold().replace("_", "-"))
-            hint = (
-                f"; use {synonym}"
-                if synonym
-                else did_you_mean(given, self.words) or f"; expected one of {', '.join(self.words)}"
-            )
+            hint = f"; use {synonym}" if synonym else did_you_mean(given, self.words)
+            hint = hint or f"; expected one of {', '.join(self.words)}"
             raise ValueError(f"no {self.noun} named {show(given)}{hint}")
         return given
 
@@ -249,18 +291,13 @@ class Flag(Value):
 
     about: str = ""
     changes: str = SHAPE
+    takes: ClassVar[str] = "`true`, `false`"
+    schema: ClassVar[dict[str, Any]] = {"type": "boolean"}
 
     def read(self, given: Any, setting: ReadContext) -> bool:
         if not isinstance(given, bool):
             raise ValueError(f"{show(given)} is neither true nor false; expected true or false, without quotes")
         return given
-
-    @property
-    def takes(self) -> str:
-        return "`true`, `false`"
-
-    def json(self) -> dict[str, Any]:
-        return {"type": "boolean"}
 
 
 @dataclass(frozen=True)
@@ -269,18 +306,13 @@ class Text(Value):
 
     about: str = ""
     changes: str = SHAPE
+    takes: ClassVar[str] = "text"
+    schema: ClassVar[dict[str, Any]] = {"type": "string"}
 
     def read(self, given: Any, setting: ReadContext) -> str:
         if not isinstance(given, str):
             raise ValueError(f"{show(given)} is not text; expected text in quotes")
         return given
-
-    @property
-    def takes(self) -> str:
-        return "text"
-
-    def json(self) -> dict[str, Any]:
-        return {"type": "string"}
 
 
 @dataclass(frozen=True)
@@ -305,24 +337,16 @@ class Rows(Value):
         if self.length is not None and len(given) != self.length:
             raise ValueError(f"{show(given)} has {len(given)} values; expected {self.length}")
         item = Quantity(self.dimension, self.range)
-        values, faults = [], []
-        for index, entry in enumerate(given):
-            try:
-                values.append(item.read(entry, setting))
-            except ValueError as error:
-                faults.append(((index,), str(error)))
-        if faults:
-            raise ValueFault(faults)
+        values = tuple(read_each(enumerate(given), lambda entry: item.read(entry, setting)).values())
         if self.rising:
             check_increasing(values, given)
-        return tuple(values)
+        return values
 
     @property
     def takes(self) -> str:
         unit = units.DIMENSIONS[self.dimension].si
-        return (
-            f"list of {unit}" if self.length is None else f"[{', '.join([unit] * self.length)}]"
-        ) + self.range.bounds
+        entries = f"list of {unit}" if self.length is None else f"[{', '.join([unit] * self.length)}]"
+        return entries + self.range.bounds
 
     def json(self) -> dict[str, Any]:
         return {"type": "array", "items": Quantity(self.dimension).json(), "minItems": self.length or 1}
@@ -339,17 +363,8 @@ class Matrix(Value):
     def read(self, given: Any, setting: ReadContext) -> tuple[tuple[float, ...], ...]:
         if not isinstance(given, (list, tuple)) or len(given) != 3:
             raise ValueError(f"{show(given)} is not a matrix; expected three rows of three numbers")
-        rows, faults = [], []
-        for index, row in enumerate(given):
-            try:
-                rows.append(Rows(self.dimension, length=3).read(row, setting))
-            except ValueFault as error:
-                faults += [((index, *below), text) for below, text in error.faults]
-            except ValueError as error:
-                faults.append(((index,), str(error)))
-        if faults:
-            raise ValueFault(faults)
-        return tuple(rows)
+        item = Rows(self.dimension, length=3)
+        return tuple(read_each(enumerate(given), lambda row: item.read(row, setting)).values())
 
     @property
     def takes(self) -> str:

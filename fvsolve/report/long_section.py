@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fvsolve.case.case import default_cells
-from fvsolve.case.extent import OF_PRESSURE
+from fvsolve.case.probe import OF_PRESSURE
 from fvsolve.errors import RunError
 from fvsolve.output.csv_files import ENVELOPE_QUANTITIES, joined_envelopes
 from fvsolve.output.fields import read_pipe_lines, read_series

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from fvsolve.case.extent import OF_PRESSURE
+from fvsolve.case.probe import OF_PRESSURE
 from fvsolve.output.unit_columns import UnitColumn, column, probe_columns
 from fvsolve.run.result import FAILS, HOLDS, OPEN, Comparison
 from fvsolve.run.verdicts import in_quantity, part_extremes, places, verdict

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fvsolve.case import schedule_ends
-from fvsolve.case.design_limits import VACUUM
-from fvsolve.case.extent import OF_PRESSURE
+from fvsolve.case import case_notices
+from fvsolve.case.claims import VACUUM
 from fvsolve.case.pipe_routes import Leg, is_cut, legs, pipe_leg
+from fvsolve.case.probe import OF_PRESSURE
 from fvsolve.output.csv_files import with_initial_heads
 from fvsolve.output.unit_columns import UnitColumn, column
 from fvsolve.run.result import FAILS, HOLDS, OPEN
@@ -148,7 +148,7 @@ def places(model, summary) -> list[list[dict[str, Any]]]:
     If a limit is not exceeded but the run is not ok, has marks, or ends before a schedule does, the state is open.
     """
     chainage = Chainages(model.case)
-    complete = bool(summary.ok and not summary.marks and not schedule_ends.notices(model.case))
+    complete = bool(summary.ok and not summary.marks and not case_notices.end_notices(model.case))
     tables = []
     for limit in model.case.limits.values():
         extent = limit.extent

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.case import sloshing
-from fvsolve.case.basins_on_bodies import free_joints
+from fvsolve.case.bodies import free_joints
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.delay_lines.wave_history import CORRECTED_TIME

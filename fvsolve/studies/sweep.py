@@ -15,7 +15,7 @@ from fvsolve.case.raw import read_raw, split_key
 from fvsolve.case.text import inline
 from fvsolve.display import Displayable
 from fvsolve.errors import CaseError, FvsolveError, RunError, did_you_mean, listing
-from fvsolve.fluid.property_cache import coolprop_version
+from fvsolve.fluid.coolprop import coolprop_version
 from fvsolve.output.restart import program_versions
 from fvsolve.output.summary_file import plain
 from fvsolve.studies.outcome import NO_FIELDS, STUDY_ARGUMENTS, end_if_interrupted, has_diverged, refusal_text

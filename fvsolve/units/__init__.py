@@ -11,8 +11,7 @@ import math
 import re
 from typing import Any
 
-from fvsolve.units.pint_units import pint_unit
-from fvsolve.units.spellings import DIMENSIONS, LIKELY, NEAR_MISSES, UNITS, Dimension, Unit
+from fvsolve.units.spellings import DIMENSIONS, LIKELY, NEAR_MISSES, UNITS, Dimension, Unit, pint_unit
 
 __all__ = [
     "DIMENSIONS", "UNITS", "Dimension", "Kinematic", "Unit", "convert", "find", "likely", "parse", "show", "span",
@@ -21,6 +20,7 @@ __all__ = [
 
 LONGEST = 100  # greatest length of a unit [characters]
 MAX_NUMBER = 1e100  # greatest magnitude of a quantity [SI]
+WATER_DENSITY = 1000.0  # [kg/m3]
 _NUMBER = re.compile(r"\s*([+-]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
 
 
@@ -61,9 +61,8 @@ def find(spelling: str, dimension: str, number: str = "") -> Unit:
     number : text of the number before the unit, for the message
     """
     if len(spelling) > LONGEST:  # pint would take minutes to read it
-        raise ValueError(
-            f"{show(f'{number} {spelling}'.strip())}: unknown unit of {len(spelling)} letters; {expected(dimension)}"
-        )
+        text = f"{show(f'{number} {spelling}'.strip())}: unknown unit of {len(spelling)} letters; {expected(dimension)}"
+        raise ValueError(text)
     base = DIMENSIONS[dimension].base or dimension
     unit = UNITS.get(_canonical(spelling))
     if unit is None:
@@ -132,8 +131,9 @@ def likely(given: Any, dimension: str, least: float, greatest: float) -> str:
     """
     match = _NUMBER.fullmatch(given) if isinstance(given, str) else None
     number, spelling = match.groups() if match else (f"{given:g}", DIMENSIONS[dimension].si)
-    fit = [unit for unit, weight in LIKELY.get(DIMENSIONS[dimension].base or dimension, {}).items()
-           if unit != _canonical(spelling) and least <= weight * UNITS[unit].si(float(number)) <= greatest]  # fmt: skip
+    units = [unit for unit in LIKELY.get(DIMENSIONS[dimension].base or dimension, ()) if unit != _canonical(spelling)]
+    weights = {"cSt": WATER_DENSITY}  # a kinematic viscosity instead of a dynamic one
+    fit = [unit for unit in units if least <= weights.get(unit, 1.0) * UNITS[unit].si(float(number)) <= greatest]
     fit = [show(f"{number} {unit}") for unit in fit[: 2 if dimension == "viscosity" else 1]]
     return f"; did you mean {' or '.join(fit)}?" if fit else ""
 

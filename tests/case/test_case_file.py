@@ -15,7 +15,7 @@ from reference import folders
 
 from fvsolve.case import Case, FluidSpec, Numerics, Output, load, schema
 from fvsolve.case import sections as defaults
-from fvsolve.case.expectations import COMPARE_KEYS, expect_keys
+from fvsolve.case.claims import COMPARE_KEYS, expect_keys
 from fvsolve.case.schema import full_schema, schema_text
 from fvsolve.errors import CaseError
 from fvsolve.parts import KINDS, Friction, Wall

@@ -12,8 +12,7 @@ from hypothesis_profiles import examples
 from reference import folders
 
 from fvsolve.case import Case, load
-from fvsolve.case.text import write
-from fvsolve.case.toml_lines import key_lines
+from fvsolve.case.text import key_lines, write
 from fvsolve.errors import CaseError
 
 CASES = sorted(folders.CASES.glob("*.toml"))

@@ -12,8 +12,8 @@ from reference import folders, scenes
 
 from fvsolve import run
 from fvsolve.case import load
+from fvsolve.case.case_notices import range_notices
 from fvsolve.case.sections import FluidSpec
-from fvsolve.case.usual_ranges import notices
 from fvsolve.errors import listing
 from fvsolve.parts import KINDS
 from fvsolve.run import model_of
@@ -128,7 +128,7 @@ def test_examples_of_the_docs_are_within_what_practice_knows(name):
                 continue
     if isinstance(raw.get("fluid"), dict) and "name" in raw["fluid"]:
         said["fluid"] = FluidSpec.model_validate(raw["fluid"])
-    assert not [note.text for note in notices(SimpleNamespace(**said))]
+    assert not [note.text for note in range_notices(SimpleNamespace(**said))]
 
 
 @pytest.mark.parametrize(

@@ -239,7 +239,7 @@ def test_a_damaged_cache_file_is_asked_again(empty_cache, damage):
 
 def test_a_new_coolprop_asks_again(empty_cache, monkeypatch):
     properties("Water", ROOM, ATM)
-    monkeypatch.setattr("fvsolve.fluid.property_cache.coolprop_version", lambda: "99.0")
+    monkeypatch.setattr("fvsolve.fluid.coolprop.coolprop_version", lambda: "99.0")
     assert properties("Water", ROOM, ATM).source == "CoolProp 99.0"
     assert len(list(empty_cache.iterdir())) == 2
 

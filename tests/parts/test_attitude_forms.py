@@ -14,7 +14,8 @@ from scipy.spatial.transform import Rotation
 from fvsolve import load
 from fvsolve.errors import CaseError
 from fvsolve.parts.attitude_keys import Attitude
-from fvsolve.parts.table_model import Nested, Table, faults_of_error
+from fvsolve.parts.table_model import Nested, Table
+from fvsolve.parts.value import pydantic_faults
 
 QUARTER = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
 
@@ -30,7 +31,7 @@ def read(**given) -> Attitude:
 def faults(**given) -> dict[str, str]:
     with pytest.raises(ValidationError) as found:
         read(**given)
-    return {".".join(map(str, keys)): text for keys, text in faults_of_error(found.value, ["attitude"])}
+    return {".".join(map(str, keys)): text for keys, text in pydantic_faults(found.value, ["attitude"], {})}
 
 
 def notes(one: Attitude) -> list[tuple[str, str]]:

@@ -9,9 +9,9 @@ from reference.scenes import junction, lake, pipe, scene
 import fvsolve
 from fvsolve import load
 from fvsolve.errors import CaseError
-from fvsolve.parts.pipe.materials import SOURCES, materials
+from fvsolve.parts.pipe.catalogue import class_size, ductile
+from fvsolve.parts.pipe.materials import materials, sources
 from fvsolve.parts.pipe.pipe_wall import Wall, restraint_factor
-from fvsolve.parts.pipe.pressure_classes import class_size, ductile
 
 # SLR Pipeline, technical details: DN, DE, nominal wall of K9 and of the preferred C class [mm]
 SLR = [
@@ -106,7 +106,7 @@ def test_every_figure_names_the_page_it_was_read_on():
     for material in materials().values():
         for key, figure in material.figures.items():
             assert figure.least <= figure.used <= figure.greatest
-            assert figure.sources and all(SOURCES[one] in figure.description for one in figure.sources)
+            assert figure.sources and all(sources()[one] in figure.description for one in figure.sources)
             assert key not in material.missing_keys
     assert materials()["PE100"].figures["youngs_modulus"].used == 1.3e9  # the greatest of the sources
 

@@ -12,14 +12,14 @@ from reference.scenes import GRAVITY, RHO, area
 from scipy.integrate import solve_ivp
 
 import fvsolve
-from fvsolve.parts.pump.suter_tables import SPEEDS, SUTER_TABLES, quadrants
+from fvsolve.parts.pump.suter_tables import NAMES, quadrants, suter_tables
 
 FLOW, HEAD, OMEGA, INERTIA, EFFICIENCY = 0.1, 50.0, 150.0, 2.0, 0.8
 TORQUE = RHO * GRAVITY * FLOW * HEAD / EFFICIENCY / OMEGA
 SPECIFIC = OMEGA * 30.0 / math.pi * math.sqrt(FLOW) / HEAD**0.75
 CURVE = {"flow": [FLOW], "head": [HEAD]}
 SHAFT = {"curve": CURVE, "rated_speed": OMEGA, "inertia": INERTIA, "efficiency": EFFICIENCY}
-RADIAL, EDGE = [np.array(row) for row in SUTER_TABLES["radial-25"]], math.atan(2.0)
+RADIAL, EDGE = [np.array(row) for row in suter_tables()["radial-25"]], math.atan(2.0)
 STEP = 2.0 * math.pi / 88
 
 
@@ -67,9 +67,9 @@ def torque(n, q):
     return TORQUE * (n * n + v * v) * suter(RADIAL[1], n, v)
 
 
-@pytest.mark.parametrize("name", SPEEDS)
+@pytest.mark.parametrize("name", NAMES)
 def test_a_table_goes_round_is_one_at_the_rated_point_and_resists_where_the_pump_stands(name):
-    wh, wb = (np.array(row) for row in SUTER_TABLES[name])
+    wh, wb = (np.array(row) for row in suter_tables()[name])
     assert len(wh) == len(wb) == 89 and wh[0] == wh[-1] and wb[0] == wb[-1]
     assert 2.0 * wh[55] == 2.0 * wb[55] == approx(1.0)
     assert (wh[44:56] > 0.0).all() and (wb[44:56] > 0.0).all()  # head and torque of a pump are positive
@@ -81,9 +81,9 @@ def test_a_table_goes_round_is_one_at_the_rated_point_and_resists_where_the_pump
 def test_between_two_tables_it_is_the_logarithm_that_counts_and_beyond_them_the_nearest():
     middle = quadrants(math.sqrt(25.0 * 35.0))
     assert middle.words == "radial-25 and radial-35"
-    assert middle.head == approx(0.5 * sum(np.array(SUTER_TABLES[one][0]) for one in ("radial-25", "radial-35")))
+    assert middle.head == approx(0.5 * sum(np.array(suter_tables()[one][0]) for one in ("radial-25", "radial-35")))
     assert quadrants(10.0).words == "radial-25" and quadrants(400.0).words == "axial-260"
-    assert quadrants(94.0).head == approx(SUTER_TABLES["mixed-94"][0])
+    assert quadrants(94.0).head == approx(suter_tables()["mixed-94"][0])
     assert SPECIFIC < 25.0
 
 

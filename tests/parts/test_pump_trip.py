@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import fvsolve
-from fvsolve.parts.pump.suter_tables import SUTER_TABLES
+from fvsolve.parts.pump.suter_tables import suter_tables
 from fvsolve.studies.energy.energy_balance import energy
 from fvsolve.studies.linear.linearise import linearise
 
@@ -27,7 +27,7 @@ SECTION = area(BORE)
 TIGHT = {"method": "dormand-prince", "rtol": 1e-11}
 SUTER = {"suter": {"rated_flow": 0.1, "rated_head": 50.0, "table": "radial-35"}}
 FOUR = {**SUTER, "rated_speed": OMEGA, "inertia": INERTIA, "efficiency": EFFICIENCY}
-WH, WB = (np.array(row) for row in SUTER_TABLES["radial-35"])
+WH, WB = (np.array(row) for row in suter_tables()["radial-35"])
 
 
 def head(n, q):

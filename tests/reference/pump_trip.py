@@ -23,7 +23,7 @@ B = (SHUT_OFF - HEADS[0]) / FLOWS[0] ** C
 LAST = (SHUT_OFF / B) ** (1.0 / C)
 TAIL = C * B * LAST ** (C - 1.0) / (2.0 * LAST)
 # WB of a radial pump of specific speed 25 from zero flow to zero speed, at intervals of pi / 44, with its source in
-# fvsolve/parts/pump/suter_tables.py. The specific speed of this pump is 11.6.
+# fvsolve/data/suter_tables.toml. The specific speed of this pump is 11.6.
 WB = """
  0.471  0.513  0.555  0.597  0.610  0.621  0.631  0.632  0.618  0.583  0.541  0.500
  0.437  0.373  0.300  0.216  0.131  0.043 -0.033 -0.096 -0.189 -0.319 -0.437

@@ -14,11 +14,11 @@ from fvsolve.basins.free_surface.bed_friction import RATE_CAP
 from fvsolve.basins.free_surface.surface_probes import DEPTH
 from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.basins.lower_basin import BasinRows
-from fvsolve.case.basins_on_bodies import free_joints
-from fvsolve.case.cell_means import means, samples
+from fvsolve.case.bodies import free_joints
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.rhs_assembly import RhsTerms
+from fvsolve.parts.formula import means, samples
 from fvsolve.steppers.analysis.stability_properties import in_euler_steps
 from fvsolve.steppers.tableau import AUTO, METHODS
 

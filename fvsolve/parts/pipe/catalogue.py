@@ -2,20 +2,41 @@
 
 Values of the case file take precedence. The key `source`, if it is not given, lists the sources of all other values,
 except those of steel schedules.
+
+Ductile iron, class K: nominal wall e = K (0.5 + 0.001 DN) mm, at least 6 mm; least wall e - (1.3 + 0.001 DN) mm.
+Class C: least walls of EN 545:2010; the nominal wall is 1.3 + 0.001 DN mm more. Allowable pressure of K classes:
+20 e R / (D S) bar, at most 64 bar, with e the least wall, D = DE - e, DE the outer diameter, R = 420 MPa the tensile
+strength and S = 3 the safety factor. A C class has the pressure of its name. Polyethylene by SDR: e = d / SDR, d the
+outer diameter, allowable pressure 20 MRS / (C (SDR - 1)) bar, MRS the minimum required strength [MPa] and C the design
+coefficient; by PN: the wall with that allowable pressure.
 """
 
 from __future__ import annotations
 
-from typing import Any
+import functools
+import re
+from typing import Any, NamedTuple
 
+from fvsolve.data import read_table
+from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts.conduit import DARCY, KEYS_OF_MODEL, pipe_size
 from fvsolve.parts.pipe.materials import Material, materials
-from fvsolve.parts.pipe.pressure_classes import SCHEDULE, UnknownSize, class_size, unknown_class
 from fvsolve.parts.value import ValueFault
 from fvsolve.units import parse, show
 
 STEELS = ("steel", "stainless-steel", "hydraulic-tube")
 WALL_KEYS = ("youngs_modulus", "poisson_ratio")
+EN_545 = "EN 545:2010, brochure of Duktus"
+K_SOURCES = "ISO 2531, EN 545: Winsen DCI, Dimensions and pressure ratings; Aquaflo and SLR Pipeline, tables of K9"
+PE_SOURCES = "ISO 4427: PE100+ Association, SDR; Firat, PE pipe technical informations (MRS, C = 1.25 for water)"
+STRENGTH, SAFETY = 420.0, 3.0  # tensile strength of ductile iron [MPa], and safety factor of EN 545
+MAX_PRESSURE = 64.0  # greatest allowable pressure of K classes [bar]
+MRS = {"PE80": 8.0, "PE100": 10.0}  # minimum required strength [MPa]
+DESIGN_COEFFICIENT = 1.25  # C, for water
+SDR_RANGE = (6.0, 41.0)  # least and greatest SDR
+BAR = 1e5
+IRON, PLASTIC = re.compile(r"(K|C|CLASS)(\d+)"), re.compile(r"(SDR|PN)(\d+(?:\.\d+)?)")
+SCHEDULE = re.compile(r"(?:schedule|sch\.?)\s*(\w+)", re.IGNORECASE)
 
 
 def from_catalogue(given: dict[str, Any]) -> dict[str, Any]:
@@ -76,7 +97,7 @@ def _add_class(table: dict[str, Any], sources: list[str], material: str | None) 
     except ValueError as error:
         raise ValueFault([(("nominal" if isinstance(error, UnknownSize) else "class",), str(error))]) from None
     del table["class"], table["nominal"]
-    _size(table, size.diameter, size.thickness)
+    _add_size(table, size.diameter, size.thickness)
     if size.pressure is not None:
         table.setdefault("allowable_pressure", size.pressure)
     sources.append(size.source)
@@ -103,10 +124,10 @@ def _add_schedule(table: dict[str, Any], material: Material | None) -> None:
         return  # reported where the key is read
     del table["nominal"]
     table.pop("schedule", None)
-    _size(table, bore, thickness)
+    _add_size(table, bore, thickness)
 
 
-def _size(table: dict[str, Any], bore: float, thickness: float) -> None:
+def _add_size(table: dict[str, Any], bore: float, thickness: float) -> None:
     """Add the bore inside the lining, and the wall thickness if the wave speed follows from the wall.
 
     bore, thickness : of the pipe without lining [m]
@@ -154,3 +175,96 @@ def _add_roughness(table: dict[str, Any], sources: list[str], material: Material
         figure = material.figures["roughness"]
         table["friction"] = {**friction, "roughness": figure.used}
         sources.append(figure.description)
+
+
+class ClassSize(NamedTuple):
+    """Data of a class at a nominal size: bore and wall thickness [m], allowable gauge pressure [Pa] or None, source."""
+
+    diameter: float
+    thickness: float
+    pressure: float | None
+    source: str
+
+
+class UnknownSize(ValueError):
+    """Error for a text that is not a nominal size of classes, such as "NPS 4"."""
+
+
+@functools.cache
+def ductile() -> dict[int, tuple[float, dict[int, float]]]:
+    """Ductile iron pipes: DN -> (outer diameter, class -> least wall) [mm]."""
+    table, sizes = read_table("ductile_iron"), {}
+    for size, (outer, *walls) in table["sizes"].items():
+        least = {pressure: wall for pressure, wall in zip(table["classes"], walls, strict=True) if wall == wall}
+        sizes[int(size)] = float(outer), least
+    return sizes
+
+
+def class_size(name: str, nominal: str, material: str | None) -> ClassSize:
+    """Size data of a class at a nominal size, for a material name or None.
+
+    Raises ValueError for an unknown class, a class of another material or a size without data, UnknownSize for a text
+    that is not a nominal size.
+    """
+    text = name.strip().upper().replace(" ", "")
+    if match := IRON.fullmatch(text):
+        if material != "ductile-iron":
+            raise ValueError(f'{name} is a class of ductile iron; expected material = "ductile-iron"')
+        return _ductile(match[1][0], int(match[2]), name, _nominal_size(nominal))
+    if match := PLASTIC.fullmatch(text):
+        return _plastic(match[1], float(match[2]), name, _nominal_size(nominal), material)
+    raise ValueError(unknown_class(name))
+
+
+def unknown_class(name: str) -> str | None:
+    """Text of the fault if a name is not a class of any material; None for a known class."""
+    text = name.strip().upper().replace(" ", "")
+    if IRON.fullmatch(text) or PLASTIC.fullmatch(text) or SCHEDULE.fullmatch(name.strip()):
+        return None
+    known = ("K9", "C40", "SDR11", "PN16", "schedule 40")
+    return f"unknown class {show(name)}{did_you_mean(name, known)}; expected for example {listing(known)}"
+
+
+def _nominal_size(nominal: str) -> float:
+    match = re.fullmatch(r"D[NE]?\s*(\d+(?:\.\d+)?)", nominal.strip(), re.IGNORECASE)
+    if match is None:
+        raise UnknownSize(f'{show(nominal)} is not a nominal size of a class; expected for example "DN300"')
+    return float(match[1])
+
+
+def _ductile(series: str, number: int, name: str, size: float) -> ClassSize:
+    if size not in ductile():
+        nearest = sorted(ductile(), key=lambda dn: abs(dn - size))[:3]
+        text = f"no data for DN{size:g} of ductile iron; the nearest sizes are {listing([f'DN{x}' for x in nearest])}"
+        raise ValueError(text)
+    (outer, walls), spare = ductile()[int(size)], 1.3 + 0.001 * size
+    if series == "K":
+        if not 7 <= number <= 14:
+            raise ValueError(f"unknown class {show(name)}; expected K7 to K14")
+        wall = max(number * (0.5 + 0.001 * size), 6.0)
+        least = wall - spare
+        allowable = min(20.0 * least * STRENGTH / ((outer - least) * SAFETY), MAX_PRESSURE)
+        source = f"K{number} DN{size:g}: wall {wall:g} mm, K (0.5 + 0.001 DN), at least 6 mm; {K_SOURCES}"
+    elif number not in walls:
+        available = [f"C{pressure}" for pressure in walls]
+        raise ValueError(f"no class {show(name)} of DN{size:g} in the catalogue; expected one of {listing(available)}")
+    else:
+        wall, allowable = walls[number] + spare, float(number)
+        source = f"C{number} DN{size:g}: wall at least {walls[number]:g} mm, nominal wall {spare:g} mm more; {EN_545}"
+    return ClassSize(1e-3 * (outer - 2.0 * wall), 1e-3 * wall, BAR * allowable, source)
+
+
+def _plastic(series: str, number: float, name: str, size: float, material: str | None) -> ClassSize:
+    strength = MRS.get(material or "")
+    if series == "PN" and strength is None:
+        raise ValueError(f"the wall of {name} is known only for {listing(list(MRS))}. Expected one of these "
+                         'materials, or a class such as "SDR11" and the key `allowable_pressure`')  # fmt: skip
+    ratio = number if series == "SDR" else 1.0 + 20.0 * strength / (DESIGN_COEFFICIENT * number)
+    if not SDR_RANGE[0] <= ratio <= SDR_RANGE[1]:
+        text = f"{name} has SDR {ratio:g} (diameter over wall). Expected {SDR_RANGE[0]:g} to {SDR_RANGE[1]:g}"
+        raise ValueError(text)
+    wall = size / ratio
+    allowable = None if strength is None else BAR * 20.0 * strength / (DESIGN_COEFFICIENT * (ratio - 1.0))
+    source = f"{name} of {size:g} mm outer diameter: wall d / SDR, SDR {ratio:.4g}"
+    source += f"; {PE_SOURCES}" if strength else "; no source for its allowable pressure"
+    return ClassSize(1e-3 * (size - 2.0 * wall), 1e-3 * wall, allowable, source)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.parts.pump.suter_tables import SUTER_TABLES
+from fvsolve.parts.pump.suter_tables import NAMES, suter_tables
 from fvsolve.parts.table_model import keys_json, read_keys
 from fvsolve.parts.value import (
     NEEDED,
@@ -210,7 +210,7 @@ class Suter(Value):
     keys = {
         "rated_flow": (Quantity("flow", positive), NEEDED),
         "rated_head": (Quantity("head", positive), NEEDED),
-        "table": (Choice("table", SUTER_TABLES, "a published table"), None),
+        "table": (Choice("table", NAMES, "a published table"), None),
         "head": (Rows("number"), ()),
         "torque": (Rows("number"), ()),
     }
@@ -227,14 +227,14 @@ class Suter(Value):
                 [(("table",), "already gives head and torque; remove `table`, or remove `head` and `torque`")]
             )
         if table is not None:
-            values["head"], values["torque"] = SUTER_TABLES[table]
+            values["head"], values["torque"] = suter_tables()[table]
         head, torque, faults = values["head"], values["torque"], []
         if len(head) != len(torque):
             faults.append(
                 (("torque",), f"has length {len(torque)}, but `head` has length {len(head)}; expected equal lengths")
             )
         if not head and not torque:
-            raise ValueFault([((), f"expected `table`, or `head` and `torque`; tables are {', '.join(SUTER_TABLES)}")])
+            raise ValueFault([((), f"expected `table`, or `head` and `torque`; tables are {', '.join(NAMES)}")])
         for key, series in (("head", head), ("torque", torque)):
             if len(series) < 9:
                 faults.append(((key,), f"{len(series)} values; expected at least 9, from x = 0 to x = 2 pi"))

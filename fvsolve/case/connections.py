@@ -1,0 +1,274 @@
+"""Connections of a case: places that links join, unknown names, unconnected nodes, wrong domains.
+
+Arguments of most functions are keys as in the file: nodes, links : name -> keys; node, link : keys of one part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from fvsolve.case.bodies import WORLD
+from fvsolve.errors import article, did_you_mean, listing
+from fvsolve.parts import KINDS, Chamber
+from fvsolve.units import show
+
+Faults = Iterator[tuple[tuple, str]]
+
+
+def network(table: dict[str, Any]) -> Faults:
+    """Faults (key path, message) of connections of a case: unknown names, unconnected nodes, wrong domains.
+
+    Further faults are separate networks, networks in which no part sets a pressure, and junctions that join only rigid
+    columns.
+    table : nested dicts of the case as in the file
+    """
+    nodes, links = ({n: p for n, p in _dict(table.get(group)).items()} for group in ("nodes", "links"))
+    gone = [name for name in (*nodes, *links) if has_unknown_places(name, nodes, links)]
+    places = _places(nodes, links, gone)
+    ends: dict[str, list[str]] = {}
+    unjoined = 0  # ports that join no known place
+    for name, link in links.items():
+        ports = _ports(_dict(link))
+        faults = _port_faults(ports, places, nodes, links, _dict(link))
+        yield from ((("links", name, *keys), text) for keys, text in faults)
+        joined = [place for _, place, _ in ports if isinstance(place, str)]
+        unjoined += len(ports) - len({*joined} & places.keys())
+        ends[name] = [place for place in [*joined, *_owned_places(name, link)] if place in places]
+    for group in ("nodes", "links"):
+        kinds = [_dict(node).get("type") for node in nodes.values()]
+        alone = "body" in kinds or any(own_places(name, node) is not None for name, node in nodes.items())
+        if table.get(group) == {} and not alone:
+            yield (group,), "is empty; expected at least two nodes and a link between them"
+    tied = {name: _joined_places(name, node, places) for name, node in nodes.items()}
+    hanging = _carrier_pairs(nodes, places)
+    touched = {place for places in [*ends.values(), *tied.values(), *hanging] for place in places}
+    loose = [name for name, node in nodes.items() if name not in gone and own_places(name, node) is None
+             and not touched & {name, *points_of(name, node)}]  # fmt: skip
+    if len(loose) > unjoined:  # otherwise faulty ports may be those that join them
+        yield from ((("nodes", name), "no link touches it") for name in loose)
+    if unjoined or gone:
+        return  # the connections are not known
+    own = {name: [name, *ties] if name in places else ties for name, ties in tied.items() if ties}
+    own |= {f"{name}.": [name, *points] for name, node in nodes.items() if (points := points_of(name, node))}
+    own |= {f"{k}..": group for k, group in enumerate(hanging)}
+    yield from _island_faults(islands(own | {f"links.{name}": places for name, places in ends.items()}), nodes, places)
+    yield from _rigid_junctions(nodes, links, ends)
+
+
+def _port_faults(
+    ports: list, places: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], link: Any
+) -> Faults:
+    """Faults (key path in the link, message) of the ports of a link.
+
+    ports : as from `_ports`; places : names that links can join -> domain
+    """
+    fits = True
+    for keys, place, domain in ports:
+        if isinstance(place, str) and place not in places:
+            yield keys, _unknown_place(place, places, nodes, links)
+        elif isinstance(place, str) and None not in (domain, places[place]) and not _fits(places[place], domain):
+            fits = False
+            yield keys, _wrong_domain(place, domain, places, nodes, link)
+    sorts = {places.get(place): (keys, place) for keys, place, _ in ports if isinstance(place, str)}
+    if fits and {"translational", "spatial"} <= set(sorts):
+        keys, place = sorts["translational"]
+        text = f"{show(place)} is a place on the axis of masses, {show(sorts['spatial'][1])} a place in space"
+        yield keys, f"{text}; expected two masses, or two points in space (FRAME.POINT for a frame)"
+    for k, (keys, place, _) in enumerate(ports):
+        if isinstance(place, str) and place in [other for _, other, _ in ports[:k]]:
+            yield keys, f"joins {show(place)} to itself"
+
+
+def _island_faults(groups: list[list[str]], nodes: dict[str, Any], places: dict[str, Any]) -> Faults:
+    """Faults of several islands (groups of connected names), and of islands in which nothing fixes the pressure.
+
+    places : names that links can join -> domain
+    """
+    if len(groups) > 1:
+        sizes = " | ".join(listing(island, 6) for island in groups)
+        text = f"disconnected network of {len(groups)} parts: {sizes}"
+        yield ("links",), f"{text}; join these parts, or write a case for each part"
+    for island in groups:
+        wet = [name for name in island if places[name] in ("hydraulic", None)]
+        kinds = [kind_of("nodes", nodes[name]) if name in nodes else Chamber for name in wet]
+        if kinds and all(kind is not None and not kind.fixes_pressure for kind in kinds):
+            where = "" if len(groups) == 1 else f" of {listing(island, 6)}"
+            yield ("nodes",), f"nothing fixes the pressure{where}; expected a reservoir, tank or chamber"
+
+
+def _dict(value: Any) -> dict[str, Any]:
+    return value if isinstance(value, dict) else {}
+
+
+def kind_of(group: str, part: Any) -> Any:
+    """Class of a part from its keys in the file; None if its type is unknown."""
+    return KINDS[group].get(str(_dict(part).get("type")))
+
+
+def _owned_places(name: str, link: Any) -> dict[str, str]:
+    """Domains of the nodes that a link contains, such as the chambers of a cylinder : full name -> domain."""
+    kind = kind_of("links", link)
+    return {f"{name}.{place}": domain for place, domain in kind.owns.items()} if kind else {}
+
+
+def own_places(name: str, node: Any) -> list[str] | None:
+    """Full names of the places of a node that links join, such as the patches of a basin.
+
+    None for a node that links join by its own name.
+    """
+    kind = kind_of("nodes", node)
+    own = kind.own_places(_dict(node)) if kind else None
+    return None if own is None else [f"{name}.{place}" for place in own]
+
+
+def kind_name(part: Any, group: str = "nodes") -> str | None:
+    """Type of a part from its keys in the file; None if the type is unknown."""
+    kind = kind_of(group, part)
+    return None if kind is None else kind.kind
+
+
+def has_mesh_file(node: Any) -> bool:
+    """True if a node is a basin with its mesh in a file."""
+    return _dict(node).get("type") == "basin" and "mesh" in node
+
+
+def named_places(name: str, links: dict[str, Any]) -> list[str]:
+    """Names of points, patches or chambers of the part `name` that links join, without "NAME." before them."""
+    places = [place for link in links.values() for _, place, _ in _ports(_dict(link)) if isinstance(place, str)]
+    return [place.partition(".")[2] for place in places if place.startswith(f"{name}.")]
+
+
+def ends_of(link: Any) -> list[str]:
+    """Values of the keys `from` and `to` of a link in the file, as text."""
+    return [str(_dict(link).get(key)) for key in ("from", "to")]
+
+
+def _joined_places(name: str, node: Any, places: dict[str, Any]) -> list[str]:
+    """Names that are connected to a node without a link: its own places (see `own_places`), and bodies in its keys.
+
+    These are the body that carries the node, and bodies that move walls of a basin.
+    places : names that links can join
+    """
+    own, kind = own_places(name, node) or [], kind_of("nodes", node)
+    return own + [body for body in (kind.bodies(_dict(node)) if kind else ()) if body in places]
+
+
+def points_of(name: str, node: Any) -> list[str]:
+    """Full names NODE.POINT of the points of a node."""
+    kind = kind_of("nodes", node)
+    return [f"{name}.{point}" for point in _dict(_dict(node).get("points"))] if kind and "points" in kind.keys() else []
+
+
+def _carrier_pairs(nodes: dict[str, Any], places: dict[str, Any]) -> list[list[str]]:
+    """Pairs of connected names: each body with its carrier, and one point of each frame with the world.
+
+    places : names that links can join
+    """
+    pairs = []
+    for name, node in nodes.items():
+        kind, on = _dict(node).get("type"), _dict(_dict(node).get("joint")).get("on")
+        if kind == "body":
+            pairs.append([name, on] if isinstance(on, str) and on in places else [name, WORLD])
+        elif kind == "frame" and points_of(name, node):
+            pairs.append([points_of(name, node)[0], WORLD])
+    return pairs
+
+
+def _fits(domain: str, domains: str) -> bool:
+    """True if the domain of a node suits a port; domains : domains that the port accepts, joined by " or "."""
+    return domain in domains.split(" or ")
+
+
+def _places(nodes: dict[str, Any], links: dict[str, Any], gone: list[str]) -> dict[str, str | None]:
+    """Domain of every place that links can join, by full name; None if its part is faulty.
+
+    gone : parts whose points, patches or chambers are not known; the names that links use for these are included
+    """
+    result: dict[str, str | None] = {}
+    for name, node in nodes.items():
+        kind, own = kind_of("nodes", node), own_places(name, node)
+        result |= dict.fromkeys([name] if own is None else own, kind.domain if kind else None)
+        result |= dict.fromkeys(points_of(name, node), "spatial")
+    result |= {place: domain for name, link in links.items() for place, domain in _owned_places(name, link).items()}
+    named = [f"{name}.{place}" for name in gone for place in named_places(name, links)]
+    return dict.fromkeys(named, None) | result
+
+
+def has_unknown_places(name: str, nodes: dict[str, Any], links: dict[str, Any]) -> bool:
+    """True if the points, patches or chambers of a part are unknown because the part is faulty."""
+    for group, parts in (("nodes", nodes), ("links", links)):
+        if name in parts and kind_of(group, parts[name]) is None:
+            return True
+    node = _dict(nodes.get(name))
+    return any(not isinstance(node.get(key, {}), dict) for key in ("points", "patches"))
+
+
+def _ports(link: dict[str, Any]) -> list[tuple[tuple, Any, str | None]]:
+    """List of (key path in the link, name that the port joins, required domain) of the ports of a link.
+
+    Ports that may be left out and are not given are omitted; the name of a missing port is None. For a link of unknown
+    type the ports are `from` and `to`, with None as domain.
+    """
+    kind = kind_of("links", link)
+    if kind is None:
+        return [((key,), link.get(key), None) for key in ("from", "to")]
+    given, below = (_dict(link.get("ports")), ("ports",)) if "ports" in kind.keys() else (link, ())
+    ports = [port for port in kind.joins if port in given or port not in kind.may_lack]
+    return [((*below, port), given.get(port), kind.joins[port]) for port in ports]
+
+
+def _unknown_place(place: str, places: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any]) -> str:
+    if place in links:
+        own = [other for other in places if other not in nodes and other.startswith(f"{place}.")]
+        if own:
+            return f"{show(place)} is {article(_dict(links[place])['type'])}; its places are {listing(own)}"
+        text = f"{show(place)} is a link, and links join places, not links; put a junction between the two links"
+        return f"{text}; places are {listing(places)}"
+    return f"no place named {show(place)}; places are {listing(places)}{did_you_mean(place, places)}"
+
+
+def chambers_of(link: Any) -> list[str]:
+    """Names of the chambers with fluid that a link contains."""
+    return [place for place, domain in link.owns.items() if domain == "hydraulic"]
+
+
+def _wrong_domain(place: str, domain: str, places: dict[str, Any], nodes: dict[str, Any], link: dict[str, Any]) -> str:
+    owned = "shaft" if places[place] == "rotational" else "chamber"
+    owned = "point" if places[place] == "spatial" else owned
+    state = f"is {article(nodes[place]['type'] if place in nodes else owned)}"
+    alike = [name for name, other in places.items() if _fits(other or "", domain)]
+    has = f"; {domain} places are {listing(alike)}" if alike else ""
+    text = f"{show(place)} {state}, a {places[place]} place, and this port of {article(link['type'])} needs"
+    return f"{text} a {domain} place{has}"
+
+
+def islands(ends: dict[str, list[str]]) -> list[list[str]]:
+    """Groups of connected names, in order of appearance; ends : name of a link or node -> names that it connects."""
+    root: dict[str, str] = {}
+
+    def find(name: str) -> str:
+        while root.setdefault(name, name) != name:
+            root[name] = root[root[name]]
+            name = root[name]
+        return name
+
+    for places in ends.values():
+        for place in places:
+            root[find(place)] = find(places[0])
+    groups: dict[str, list[str]] = {}
+    for name in list(root):
+        groups.setdefault(find(name), []).append(name)
+    return [[name for name in island if name != WORLD] for island in groups.values()]
+
+
+def _rigid_junctions(nodes: dict[str, Any], links: dict[str, Any], ends: dict[str, list[str]]) -> Faults:
+    touching: dict[str, set[str]] = {}
+    for link, places in ends.items():
+        for place in places:
+            touching.setdefault(place, set()).add(str(_dict(links[link]).get("type")))
+    for name, node in nodes.items():
+        if _dict(node).get("type") in ("junction", "inflow") and touching.get(name) == {"rigid-column"}:
+            fixed = ", since its demand is constant above its required_pressure" if "required_pressure" in node else ""
+            message = f"only rigid columns join this node, so nothing sets its pressure{fixed}"
+            yield ("nodes", name), f"{message}; use a chamber with a volume"

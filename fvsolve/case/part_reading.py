@@ -1,0 +1,218 @@
+"""Stages of the reading of a case: cut pipes, parts, meshes, cells, and the kinds of places that probes may name."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any, NamedTuple
+
+from fvsolve.case import basins, bodies, chainage, connections, resource_checks
+from fvsolve.case.case import default_cells
+from fvsolve.case.raw import fill_pipes, with_defaults
+from fvsolve.case.reading import GROUPS, Reading
+from fvsolve.case.sections import Numerics
+from fvsolve.data import read_table
+from fvsolve.errors import did_you_mean, listing
+from fvsolve.parts import KINDS, Basin, Chamber, Pipe
+from fvsolve.parts.body import Body, BodyPoint
+from fvsolve.parts.node import Node
+from fvsolve.parts.pipe.part import MOST_CELLS
+from fvsolve.units import show
+
+LINKLESS = ("basin", "body")  # nodes that need no link
+
+
+class Parts(NamedTuple):
+    """Parts without faults, by name, and meshes of basins; lumped : meshes of basins whose water is lumped masses."""
+
+    nodes: dict[str, Any]
+    links: dict[str, Any]
+    meshes: dict[str, Any]
+    lumped: dict[str, Any]
+
+
+def cut_pipes(reading: Reading, properties: Any, numerics: Numerics | None) -> chainage.CutTable:
+    """Case with its pipes cut at their bends and at the parts placed on them.
+
+    properties : properties of the fluid, or None if it is faulty; numerics : table as read, or None if it is faulty
+    """
+    table = chainage.add_bends(reading.raw.table)
+    tables = (table.get("nodes"), table.get("links"), table.get("routes", {}))
+    if not all(isinstance(item, dict) for item in tables) or not chainage.placed(table):
+        return chainage.CutTable(reading.raw.table, frozenset())
+    for group, name, part in chainage.placed(table):
+        part_kind(reading, group, name, part)
+    reading.origin = {("nodes", f"{name}-bend-{k + 1}"): ("links", name, "bends", k)
+                      for name, item in table["links"].items() if chainage.is_pipe(item)
+                      for k in range(len(item["bends"]) if isinstance(item.get("bends"), list) else 0)}  # fmt: skip
+    odd = list(chainage.faults(table))
+    reading.add(odd)
+    astray = {keys[:2] for keys, _ in odd}
+    pipes, table = {}, fill_pipes(table)
+    for name, given in table["links"].items():
+        if chainage.is_pipe(given) and ("links", name) not in astray:
+            own = {key: item for key, item in given.items() if key != "pieces"}
+            with reading.catch("links", name):
+                pipes[name] = read_part(reading, reading.raw.table, Pipe, own)
+    if None in (properties, numerics):
+        counts = {name: pipe.cells or 1 for name, pipe in pipes.items()}
+    else:
+        counts = default_cells(pipes, properties, numerics.cell_time)
+    result = chainage.cut(table, pipes, counts, astray, reading.fault)
+    reading.origin |= result.origin
+    return result
+
+
+def read_parts(reading: Reading, network: chainage.CutTable) -> Parts:
+    """Nodes, links and meshes of basins without faults; nodes with the elevations of the pipe profiles at them."""
+    nodes, links = (_read_group(reading, network, group) for group in ("nodes", "links"))
+    nodes = inherit_elevations(nodes, links)
+    meshes: dict[str, Any] = {}
+    lumped: dict[str, Any] = {}
+    for name, node in nodes.items():
+        if isinstance(node, Basin):
+            with reading.catch("nodes", name):
+                read_mesh = functools.partial(basins.mesh_of, node, reading.setting)
+                (lumped if node.lumped else meshes)[name] = reading.reuse(("meshes", name), node, read_mesh)
+    sound = {name: node for name, node in nodes.items()
+             if not isinstance(node, Basin) or name in (*meshes, *lumped)}  # fmt: skip
+    return Parts(sound, links, meshes, lumped)
+
+
+def _read_group(reading: Reading, network: chainage.CutTable, group: str) -> dict[str, Any]:
+    """Nodes or links without faults; group : "nodes" or "links"."""
+    table = network.table
+    alone = any(connections.kind_name(node) in (*LINKLESS, None) for node in table.get("nodes", {}).values())
+    if group not in table and not (group == "links" and alone):
+        reading.fault((), f"[{group}] is missing: {GROUPS[group]}")
+    result = {}
+    for name, part in table.get(group, {}).items():
+        reading.add(((group, name), text) for text in resource_checks.name_faults(name))
+        if not isinstance(part, dict):
+            reading.fault((group, name), f"{show(part)} is not a table; expected a table with a type")
+            continue
+        kind = part_kind(reading, group, name, part)
+        if kind is not None and (group, name) not in network.unreadable:
+            make = functools.partial(read_part, reading, table, kind, part)
+            with reading.catch(group, name):
+                result[name] = reading.reuse((group, name), part, make)
+    return result
+
+
+def part_kind(reading: Reading, group: str, name: str, part: dict[str, Any]) -> Any:
+    """Class of a part from its keys in the file; None, with a fault, if its type is missing or unknown."""
+    known = KINDS[group]
+    if "type" not in part:
+        return reading.fault((group, name), f"type is missing; expected one of {listing(sorted(known))}")
+    kind = part["type"]
+    if isinstance(kind, str) and kind in known:
+        return known[kind]
+    other = "links" if group == "nodes" else "nodes"
+    hint = did_you_mean(str(kind), known)
+    if isinstance(kind, str) and kind in KINDS[other]:
+        hint = f"; it belongs under [{other}]"
+    synonym = read_table("part_synonyms").get(str(kind).casefold().replace("_", "-").replace(" ", "-"))
+    hint = f"; use {synonym}" if synonym else f"; types are {listing(sorted(known))}{hint}"
+    return reading.fault((group, name, "type"), f"unknown type {show(kind)}{hint}")
+
+
+def read_part(reading: Reading, table: dict[str, Any], kind: Any, given: dict[str, Any]) -> Any:
+    """Part of the class `kind` from its keys in the file, completed by the defaults of the case `table`."""
+    rest = {key: value for key, value in with_defaults(table, given).items() if key != "type"}
+    kind = kind.variant(rest) if issubclass(kind, Node) else kind
+    return kind.model_validate(rest, context=reading.setting)
+
+
+def inherit_elevations(nodes: dict[str, Any], links: dict[str, Any]) -> dict[str, Any]:
+    """Nodes with missing elevations and positions filled in from the first pipe profile that begins or ends there.
+
+    The position is that of the first or last profile point, if the profile has x and y. Nodes on bodies are unchanged.
+    """
+    result: dict[str, Any] = {}
+    for link in links.values():
+        profile = getattr(link, "profile", None)
+        if profile is None:
+            continue
+        for name, end in ((link.from_, 0), (link.to, -1)):
+            node = result.get(name, nodes.get(name))
+            if node is None or getattr(node, "on", None) is not None:
+                continue
+            given = {"elevation": float(profile.elevation[end])}
+            given |= {} if profile.plan is None else {"position": tuple(profile.plan[end].tolist())}
+            missing = {key: value for key, value in given.items() if getattr(node, key, value) is None}
+            if missing:
+                result[name] = node.model_copy(update=missing)
+    return {name: result.get(name, node) for name, node in nodes.items()} if result else nodes
+
+
+def table_kinds(table: dict[str, Any], group: str) -> dict[str, Any]:
+    """Class of each node or link of a case by name; None for an unknown type. table : nested dicts as in the file"""
+    kinds = {name: connections.kind_of(group, part) for name, part in table.get(group, {}).items()}
+    if group == "links":
+        return kinds
+    return {name: kind and kind.variant(table[group][name]) for name, kind in kinds.items()}
+
+
+def place_kinds(network: chainage.CutTable, parts: Parts, scalars: dict[str, Any], faulty: bool) -> dict[str, Any]:
+    """Kinds of places and parts that probes may name, as for `read_probe`, without routes.
+
+    faulty : True if faults were found, so that points, patches or pieces of some parts may be unknown
+    """
+    table = network.table
+    nodes, links = table_kinds(table, "nodes"), table_kinds(table, "links")
+    bare = [name for name, kind in nodes.items() if kind is Basin and name not in (*parts.meshes, *parts.lumped)]
+    nodes |= {f"{name}.{place}": Chamber for name, kind in links.items() if kind
+              for place, domain in kind.owns.items() if domain == "hydraulic"}  # fmt: skip
+    nodes |= {name: bodies.BodyQuantities(node) for name, node in parts.nodes.items() if isinstance(node, Body)}
+    for name, node in table.get("nodes", {}).items():  # faulty nodes included
+        nodes |= dict.fromkeys(connections.points_of(name, node), BodyPoint)
+    nodes |= dict.fromkeys(bare)  # faulty
+    for name in (*parts.meshes, *parts.lumped):
+        nodes |= basins.probe_kinds(name, parts.nodes[name], parts.meshes.get(name), parts.lumped.get(name), scalars)
+    pipes = {name: link for name, link in parts.links.items() if isinstance(link, Pipe)}
+    uncut = dict.fromkeys(_uncounted(table) if faulty else ())
+    return {"nodes": nodes, "links": links, "scalars": scalars, "uncut": uncut, "pipes": pipes}
+
+
+def _uncounted(table: dict[str, Any]) -> list[str]:
+    """Names of faulty parts with unknown points, patches or chambers, and of pipes with unknown pieces."""
+    nodes, links = table.get("nodes", {}), table.get("links", {})
+    pipes = [name for name, link in links.items()
+             if chainage.is_pipe(link) and not isinstance(link.get("bends", []), list)]  # fmt: skip
+    return pipes + [name for name in (*nodes, *links) if connections.has_unknown_places(name, nodes, links)]
+
+
+def network_table(network: chainage.CutTable, parts: Parts) -> dict[str, Any]:
+    """Nested dicts of the case for the check of connections, in which basins have all patches of their meshes.
+
+    A basin with a faulty mesh file has the patches that links name. A node that cannot be read is replaced by a
+    junction; links that cannot be read are left out, except pipes.
+    """
+    nodes, links = network.table.get("nodes", {}), network.table.get("links", {})
+    patches = {name: basins.patch_names(mesh) for name, mesh in parts.meshes.items()}
+    lost = [name for name, part in nodes.items()
+            if connections.has_mesh_file(part) and name not in (*parts.meshes, *parts.lumped)]  # fmt: skip
+    patches |= {name: connections.named_places(name, links) for name in lost}
+    if not patches and not network.unreadable:
+        return network.table
+    own = {name: {**nodes[name], "patches": dict.fromkeys(names, {}) | (nodes[name].get("patches") or {})}
+           for name, names in patches.items()}  # fmt: skip
+    own |= {name: {"type": "junction"} for group, name in network.unreadable if group == "nodes"}
+    unfit = [name for group, name in network.unreadable if group == "links" and not chainage.is_pipe(links[name])]
+    links = {name: part for name, part in links.items() if name not in unfit}
+    return {**network.table, "nodes": {**nodes, **own}, "links": links}
+
+
+def fill_cells(reading: Reading, links: dict[str, Any], properties: Any, numerics: Numerics | None) -> dict[str, Any]:
+    """Links in which pipes have their default number of cells; unchanged if the fluid or numerics are faulty."""
+    if properties is None or numerics is None:
+        return links
+    pipes = {name: link for name, link in links.items() if isinstance(link, Pipe)}
+    counts = default_cells(pipes, properties, numerics.cell_time)
+    worst = max(counts, key=counts.get, default=None)
+    if worst is not None and counts[worst] > MOST_CELLS:
+        text = f"would cut {worst} into {counts[worst]:.3g} cells, more than {MOST_CELLS:.0e}; expected a longer time"
+        reading.fault(("numerics", "cell_time"), text)
+        return links
+    filled = {name: links[name].model_copy(update={"cells": count}) for name, count in counts.items()
+              if count != links[name].cells}  # fmt: skip
+    return {name: filled.get(name, link) for name, link in links.items()}
