@@ -22,6 +22,7 @@ import threading
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,7 @@ __all__ = [
     "njit",
     "compile_once",
     "source_hash",
+    "specialise",
 ]
 
 TEST_BYTES = 65536  # bytes that are written to test if a folder can hold caches
@@ -329,6 +331,20 @@ def inline(function: Callable) -> Callable:
     It suits functions that are called from a single place.
     """
     return njit(function, forceinline=True)
+
+
+def specialise(template: FunctionType, name: str, **constants: Any) -> Callable:
+    """Compile a copy of a plain function in which global names have other values, such as functions, codes or None.
+
+    Branches on these constants are decided at compile time. The copy sees the globals of its module as they are at
+    this call. Numba caches such copies, which it does not do for closures.
+    name : name of the result; it must be assigned to this name in the module of the template, because code is stored
+    and pickled under it
+    constants : values of global names of the template
+    """
+    function = FunctionType(template.__code__, template.__globals__ | constants, name, template.__defaults__)
+    function.__qualname__, function.__module__, function.__doc__ = name, template.__module__, template.__doc__
+    return njit(function)
 
 
 class Intrinsic:
