@@ -28,7 +28,7 @@ def put_rates_along(liquid, grid, j, states, row, aside, through, rates, moves, 
     if moves is None or moves.speed_x.size == 0:
         put_row_rates(c, grid.kx, east, west, rate_r[a:z], rate_x[a:z], rate_y[a:z])
         return
-    speeds, along, (thrust, loss) = moves.speed_x, states[2][a:z], halves(moves.thrust)
+    speeds, along, thrust, loss = moves.speed_x, states[2][a:z], moves.thrust, moves.thrust[moves.thrust.size // 2 :]
     put_wall_pressure(c, -speeds[0], east, west, along, 1, thrust[j:], loss[j:])
     put_wall_pressure(c, speeds[nx], east[nx:], west[nx:], along[nx - 1 :], 1, thrust[ny + j :], loss[ny + j :])
     put_moving_fluxes(c, liquid.rho, speeds, 1, east, west)
@@ -50,8 +50,9 @@ def put_fluxes_across(liquid, grid, j, states, ring, row, flux, through, moves, 
         put_inward(grid.kx, down, up, through[at : at + nx])
     if moves is None or moves.speed_y.size == 0:
         return
-    speed, is_side, (thrust, loss) = moves.speed_y[j], j == 0 or j == ny, halves(moves.thrust)
+    speed, is_side = moves.speed_y[j], j == 0 or j == ny
     if is_side:
+        thrust, loss = moves.thrust, moves.thrust[moves.thrust.size // 2 :]
         along, outward = states[1][(ny - 1) * nx if j > 0 else 0 :], speed if j > 0 else -speed
         put_wall_pressure(liquid.c, outward, up, down, along, nx, thrust[at:], loss[at:])
     put_moving_fluxes(liquid.c, liquid.rho, moves.speed_y[j:], 0, up, down)
@@ -72,12 +73,6 @@ def add_rates_across(liquid, grid, j, states, before, after, rates, moves, phi):
     flow = states[1]
     along = flow[max(j - 1, 0) * nx :], flow[a:], flow[min(j + 1, ny - 1) * nx :]
     add_moving_column_rates(grid.ky[j], moves.speed_y[j:], before, after, along, rate_r[a:z], rate_y[a:z], rate_x[a:z])
-
-
-@njit
-def halves(values):
-    """First and second half of an array."""
-    return values[: values.size // 2], values[values.size // 2 :]
 
 
 @inline
