@@ -3,7 +3,7 @@
 The module EQUATION (`liquid.liquid_mesh`, `free_surface.surface_mesh`) contains the functions of a block. Their
 arguments, and those of the functions here, are
 
-fluid : fluid and scheme, with fields `scheme` and `wide_by`; mesh : `Mesh`; j, k : block, and number of a side
+fluid : fluid and scheme, with fields `scheme` and `wide_by`; mesh : `BlockMesh`; j, k : block, and number of a side
 states, rates : three states of all cells and arrays for their rates, float64[n] each
 reflect : float64[b]  reflection coefficients of boundary faces, 1 for walls; empty if all are walls
 flow : float64[f]  flows through faces, left to right, or empty; through : float64[b]  inward flows through the
@@ -30,7 +30,7 @@ from fvsolve.kernels.dtypes import UPWIND
 EQUATION = None  # of the template
 
 
-class Mesh(NamedTuple):
+class BlockMesh(NamedTuple):
     """Arrays of a mesh, see `cell_sides`.
 
     count, slots, n, ring : numbers of blocks, of sides of a cell, of cells, and of stored blocks
@@ -57,14 +57,14 @@ class Mesh(NamedTuple):
 
 @inline
 def open_mesh(floats, integers):
-    """`Mesh` of the arrays of a mesh, see `cell_sides`."""
+    """`BlockMesh` of the arrays of a mesh, see `cell_sides`."""
     slots, n, f, b, ring, count = integers[0], integers[1], integers[2], integers[3], integers[4], blocks(integers)
     at, to = HEAD + INDICES * count * slots * BLOCK // 2, MEASURES * count * slots * BLOCK
     need, edges = integers[at : at + count], integers[at + count :][:b]
     number, faces = integers[at + count + b :][:b], integers[at + count + 2 * b :]
     nx, ny, lengths = floats[to : to + b], floats[to + b : to + 2 * b], floats[to + 2 * b :][:f]
     places = integers[HEAD:].view(np.int32)
-    return Mesh(floats, integers, count, slots, n, ring, need, edges, number, faces, nx, ny, lengths, places)
+    return BlockMesh(floats, integers, count, slots, n, ring, need, edges, number, faces, nx, ny, lengths, places)
 
 
 def work_size(equation, integers):

@@ -19,7 +19,7 @@ from fvsolve.basins.free_surface import surface_mesh
 from fvsolve.basins.free_surface.surface_rates import water_mesh_rates
 from fvsolve.basins.liquid import liquid_mesh
 from fvsolve.basins.liquid.liquid_rates import mesh_rates
-from fvsolve.basins.liquid.liquid_sides import Liquid
+from fvsolve.basins.liquid.liquid_sides import LiquidScheme
 from fvsolve.basins.lower_mesh import lower_mesh
 from fvsolve.basins.mesh_blocks import work_size
 from fvsolve.kernels.dtypes import LAW_LINEAR, LAW_LOG, MUSCL, UPWIND
@@ -55,7 +55,7 @@ class Field:
 
     def liquid(self, law, scheme, y, reflect=NONE, wide=2.0, table=None):
         work, found = np.full(work_size(liquid_mesh, self.integers), np.nan), np.full_like(y, np.nan)
-        fluid = Liquid(C, RHO, table, table is not None or law == LAW_LOG, scheme, 0, 0.0, wide)
+        fluid = LiquidScheme(C, RHO, table, table is not None or law == LAW_LOG, scheme, 0, 0.0, wide)
         states = tuple(np.ascontiguousarray(y))
         return found, mesh_rates(
             fluid, self.floats, self.integers, reflect, states, NONE, NONE, work, tuple(found), None, None

@@ -19,7 +19,7 @@ from scipy.special import j0
 import fvsolve
 from fvsolve.basins.liquid import liquid_grid
 from fvsolve.basins.liquid.grid_nonlinear import log1p_vector
-from fvsolve.basins.liquid.liquid_sides import Grid, Liquid, side_kinds, work_size
+from fvsolve.basins.liquid.liquid_sides import LiquidGrid, LiquidScheme, side_kinds, work_size
 from fvsolve.kernels.dtypes import LINEAR, MINMOD, MONOTONIZED_CENTRAL, MUSCL, UPWIND, VAN_LEER, WENO5
 
 SCHEMES = {"upwind": UPWIND, "muscl": MUSCL, "upwind5": LINEAR, "weno5": WENO5}
@@ -57,8 +57,8 @@ class Box:
         if isinstance(reflect, float):
             reflect = np.full(2 * (self.nx + self.ny), reflect)
         small = 1e-18 * C**2 * (1.0 if self.log else RHO**2)
-        fluid = Liquid(C, RHO, table, self.log, SCHEMES[self.scheme], LIMITERS[self.limiter], small, 1.0)
-        grid = Grid(self.nx, self.ny, 0, self.ny, kx, ky, reflect, side_kinds(reflect, self.nx, self.ny))
+        fluid = LiquidScheme(C, RHO, table, self.log, SCHEMES[self.scheme], LIMITERS[self.limiter], small, 1.0)
+        grid = LiquidGrid(self.nx, self.ny, 0, self.ny, kx, ky, reflect, side_kinds(reflect, self.nx, self.ny))
         work, found = np.full(work_size(self.nx), np.nan), np.full((3, self.nx * self.ny), np.nan)
         states = tuple(np.ascontiguousarray(state).reshape(3, -1))
         kernel = liquid_grid.nonlinear_grid_rates if self.log else liquid_grid.linear_grid_rates

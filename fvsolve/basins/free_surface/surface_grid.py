@@ -63,7 +63,7 @@ class FaceFlows(NamedTuple):
     through: np.ndarray
 
 
-class Rows(NamedTuple):
+class RowArrays(NamedTuple):
     """Work arrays for the rows of cells and of faces that are being computed.
 
     cells : ring buffer of RING rows of cells; sides : values at the faces of two rows, to the south and north
@@ -85,13 +85,13 @@ class Rows(NamedTuple):
 
 @inline
 def open_work(work):
-    """`Rows` of a work array."""
+    """`RowArrays` of a work array."""
     at = RING * BLOCK
     sides, at = work[at : at + 3 * SIDE], at + 3 * SIDE
     fluxes, at = work[at : at + 3 * FLUX], at + 3 * FLUX
     deep, top, speeds = work[at : at + STRIDE], work[at + STRIDE : at + 2 * STRIDE], work[WORK : WORK + STRIDE]
     ends, along = sides[2 * SIDE :], fluxes[2 * FLUX :]
-    return Rows(work[: RING * BLOCK], sides, fluxes, ends, along, deep, top, speeds, work[WORK + STRIDE :])
+    return RowArrays(work[: RING * BLOCK], sides, fluxes, ends, along, deep, top, speeds, work[WORK + STRIDE :])
 
 
 @njit(forceinline=True)

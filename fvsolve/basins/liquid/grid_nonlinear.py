@@ -130,7 +130,7 @@ def put_primitives(c0, rho, table, kx, ky, r, mx, my, w, u, v, top):
 
     top : float64[nx]  greatest (|u| + c) kx + (|v| + c) ky so far in each column [1/s]
     r, mx, my : states of the row; kx, ky : 1 / widths of the columns, 1 / height of the row [1/m]
-    c0, rho, table : see `Liquid`
+    c0, rho, table : see `LiquidScheme`
     """
     if table is not None:
         for i in range(w.size):
@@ -157,7 +157,7 @@ def put_primitives(c0, rho, table, kx, ky, r, mx, my, w, u, v, top):
 def subtract_potential(c0, rho, table, phi, w):
     """Subtract the effect of a potential phi [J/kg] from the invariants w of a row of cells.
 
-    In a liquid at rest the invariants are uniform afterwards. c0, rho, table : see `Liquid`
+    In a liquid at rest the invariants are uniform afterwards. c0, rho, table : see `LiquidScheme`
     """
     for i in range(w.size):
         w[i] = invariant_at_potential(c0, rho, table, w[i], -phi[i])
@@ -175,7 +175,7 @@ def stiffness(c0, rho, table, r):
     """(1 / c^2, density times c^2) of a cell with the deviation of density r and the wave speed c.
 
     In a liquid at rest, pressure falls by about density times c^2 ln(1 + phi / c^2) where a potential rises by phi.
-    c0, rho, table : see `Liquid`
+    c0, rho, table : see `LiquidScheme`
     """
     if table is None:
         bulk = rho * c0 * c0
@@ -189,7 +189,7 @@ def balance_row(c0, rho, table, k, step, r, phi, low, high, rate):
     """Subtract from the momentum rates of a row of cells the rates that face pressures of a liquid at rest cause.
 
     So the rates of a liquid at rest in the potential phi are zero.
-    c0, rho, table : see `Liquid`; k : 1 / spacing of the cells [1/m], read at every `step`-th place
+    c0, rho, table : see `LiquidScheme`; k : 1 / spacing of the cells [1/m], read at every `step`-th place
     r : deviations of density; phi, low, high : potential [J/kg] of the cells and of the faces before and after them
     """
     for i in range(rate.size):
@@ -239,7 +239,7 @@ def put_fluxes(c0, rho, table, forward, backward, along, speeds, step, phi):
     and along the face
     speeds : None, or speeds of moving faces, read at every `step`-th place; the flux is then relative to the face
     phi : None, or the potential at the faces [J/kg], whose effect was subtracted from the waves and is added again
-    c0, rho, table : see `Liquid`
+    c0, rho, table : see `LiquidScheme`
     """
     if table is not None:
         for i in range(forward.size):

@@ -4,11 +4,12 @@ A row of cells is read once: for its own faces, then for those towards the rows 
 stored in a ring buffer. `grid_linear` and `grid_nonlinear` contain the functions of a row for both forms of the
 momentum flux. Their arguments, and those of the functions here, are
 
-liquid, grid : `Liquid` and `Grid`; j : row; states : deviation of density r [kg/m3] and mass-flow densities mx, my
-[kg/(m2 s)] of all cells, three arrays; rates : arrays for their rates
+liquid, grid : `LiquidScheme` and `LiquidGrid`; j : row
+states : deviation of density r [kg/m3] and mass-flow densities mx, my [kg/(m2 s)] of all cells, three arrays
+rates : arrays for the rates of the states
 ring, row, aside : work arrays `Ring` and `Row`, and the velocities along row j in the ring buffer
 flux, before, after : values at a row of faces, three arrays: waves, then fluxes
-through : float64[2 (nx + ny)]  inward flows through boundary faces [kg/(m s)], in the order of `Grid.reflect`, or empty
+through : float64[2 (nx + ny)]  inward flows through boundary faces [kg/(m s)], in the order of `reflect`, or empty
 work : float64[work_size(nx)]
 moves : None, or the `GridMotion` of moving walls
 phi : None, or the `Potentials` of the frame of a basin on a body (full momentum flux)

@@ -46,7 +46,7 @@ def put_primitives(full, c0, rho, table, r, mx, my, w, u, v, c):
     """Write the invariant w, both velocities u, v and the wave speed c of a block of cells [m/s].
 
     Under the density law `linear`, u, v are the mass-flow densities and w is c r [kg/(m2 s)].
-    full, c0, rho, table : see `Liquid`; r, mx, my : states of the block
+    full, c0, rho, table : see `LiquidScheme`; r, mx, my : states of the block
     """
     if table is not None:
         for i in range(r.size):
@@ -197,7 +197,7 @@ def add_side_nonlinear(c0, rho, table, cells, inside, geo, w, speeds, phi):
     cells : velocities and wave speed of the cells, for the limit of the time step; inside : values at the side
     speeds : speeds of moving sides along their outward normals [m/s], or None
     phi : None, or the potential at the sides [J/kg], whose effect was subtracted from the waves and is added again
-    rho : density at rest [kg/m3]; table : see `Liquid`; other arguments as in `add_side_linear`
+    rho : density at rest [kg/m3]; table : see `LiquidScheme`; other arguments as in `add_side_linear`
     """
     (u0, v0, c), (wl, ul, vl) = cells, inside
     bulk, per = rho * c0 * c0, 0.5 / c0

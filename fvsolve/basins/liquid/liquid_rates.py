@@ -13,7 +13,7 @@ from fvsolve.basins.basin_patches import needs_rates, put_open_flows
 from fvsolve.basins.cell_sides import BLOCK, blocks
 from fvsolve.basins.cell_stretching import deviations_of
 from fvsolve.basins.liquid import liquid_grid, liquid_mesh
-from fvsolve.basins.liquid.liquid_sides import Grid, Liquid, Potentials, side_kinds
+from fvsolve.basins.liquid.liquid_sides import LiquidGrid, LiquidScheme, Potentials, side_kinds
 from fvsolve.basins.moving_meshes import mesh_motion
 from fvsolve.basins.moving_walls import grid_motion
 from fvsolve.basins.physics_codes import physics_code
@@ -62,18 +62,18 @@ def boundary_arrays(tables, basin):
 
 @njit(forceinline=True)
 def grid_of(tables, b, reflect):
-    """`Grid` of basin b, for the band of this thread. reflect : reflection coefficients of its boundary faces"""
+    """`LiquidGrid` of basin b and the band of this thread. reflect : reflection coefficients of its boundary faces"""
     basin, plane = tables.basins[b], tables.plane
     k, nx, ny = basin["spacing"], basin["nx"], basin["ny"]
-    kx, ky = plane[k : k + nx], plane[k + nx : k + nx + ny]
-    return Grid(nx, ny, tables.bands[2 * b], tables.bands[2 * b + 1], kx, ky, reflect, side_kinds(reflect, nx, ny))
+    kx, ky, begin, stop = plane[k : k + nx], plane[k + nx : k + nx + ny], tables.bands[2 * b], tables.bands[2 * b + 1]
+    return LiquidGrid(nx, ny, begin, stop, kx, ky, reflect, side_kinds(reflect, nx, ny))
 
 
 @njit(forceinline=True)
 def liquid_of(basin, full, table):
-    """`Liquid` of a basin. full : True with the full momentum flux; table : table of `riemann_invariants`, or None"""
+    """`LiquidScheme` of a basin. full : True with the full momentum flux; table : see `LiquidScheme`"""
     c, rho, scheme, limiter = basin["speed"], basin["density"], basin["scheme"], basin["limiter"]
-    return Liquid(c, rho, table, full, scheme, limiter, basin["small"], basin["wide"])
+    return LiquidScheme(c, rho, table, full, scheme, limiter, basin["small"], basin["wide"])
 
 
 @njit

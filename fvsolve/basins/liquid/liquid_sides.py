@@ -26,7 +26,7 @@ SIDE_VALUES = GHOSTS + CLOSURE_CELLS
 SIDE_WORK = 2 * SIDE_VALUES + 2 * CLOSURE_CELLS + GHOSTS  # length of the work array of a side
 
 
-class Liquid(NamedTuple):
+class LiquidScheme(NamedTuple):
     """Liquid at rest, and the scheme of its rates.
 
     c, rho : wave speed [m/s] and density [kg/m3] at rest
@@ -48,7 +48,7 @@ class Liquid(NamedTuple):
     wide_by: float
 
 
-class Grid(NamedTuple):
+class LiquidGrid(NamedTuple):
     """Grid of nx columns and ny rows, and the band of its rows for which rates are computed.
 
     begin, stop : first row of the band, and first row after it
