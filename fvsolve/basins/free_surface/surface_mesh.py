@@ -77,7 +77,9 @@ def put_sides(water, mesh, j, first, last, reflect, cells, sides, shown, w, move
     """Write the limited values at the sides of the cells of block j."""
     floats, integers, wide_by = mesh.floats, mesh.integers, water.wide_by
     edges, b = mesh.edges[first:last], mesh.edges.size
-    put_mirror_velocities(mesh, first, last, reflect, cells[2], cells[3], shown, moves)
+    for q in range(first, last):
+        i = ring_place(mesh.edges[q], mesh.ring)
+        shown[q], shown[b + q] = mirrored_velocity(mesh, q, reflect, cells[2, i], cells[3, i], moves)
     o, shore, su, sv = (j % mesh.ring) * BLOCK, w[_SHORE:], shown[first:], shown[b + first :]
     h, e, c = cells[0], cells[1], cells[4, o:]
     limited_sides(j, floats, integers, h, wide_by, h[o:], su, edges[:0], w, sides[0])  # limits: zero to twice the depth
@@ -88,20 +90,18 @@ def put_sides(water, mesh, j, first, last, reflect, cells, sides, shown, w, move
     limited_sides(j, floats, integers, cells[3], wide_by, c, sv, edges, w, sides[3])
 
 
-@inline
-def put_mirror_velocities(mesh, first, last, reflect, u, v, shown, moves):
-    """Write mirrored velocities beyond boundary sides, from which gradients in cells are computed.
+@njit(forceinline=True)
+def mirrored_velocity(mesh, q, reflect, u, v, moves):
+    """Velocity beyond boundary side q, from the velocity (u, v) inside; both components.
 
-    At a wall that moves outward at the speed w, the normal velocity u becomes 2 w - u. u, v : velocities of cells
+    At a wall that moves outward at the speed w, the normal velocity n becomes 2 w - n.
     """
-    for q in range(first, last):
-        i, nx, ny = ring_place(mesh.edges[q], mesh.ring), mesh.nx[q], mesh.ny[q]
-        r = reflect[mesh.number[q]] if reflect.size > 0 else 1.0
-        across = u[i] * nx + v[i] * ny
-        if moves is not None:
-            across -= moves.speeds[mesh.edges[q]]
-        change = 2.0 * r * across
-        shown[q], shown[mesh.edges.size + q] = u[i] - change * nx, v[i] - change * ny
+    nx, ny, r = mesh.nx[q], mesh.ny[q], reflect[mesh.number[q]] if reflect.size > 0 else 1.0
+    across = u * nx + v * ny
+    if moves is not None:
+        across -= moves.speeds[mesh.edges[q]]
+    change = 2.0 * r * across
+    return u - change * nx, v - change * ny
 
 
 @inline
@@ -118,7 +118,9 @@ def add_side(water, mesh, j, k, first, last, reflect, cells, sides, w, moves, ph
     geo = mesh.floats[slot * MEASURES * BLOCK :]
     inside = sides[0, own:], sides[1, own:], sides[2, own:], sides[3, own:]
     gather(cells[4], mesh.places[slot * INDICES * BLOCK :], w[_C:])
-    put_mirror_sides(mesh, first, last, reflect, sides[2, own:], sides[3, own:], w, moves)
+    for q in range(first, last):
+        i = mesh.edges[q] % BLOCK
+        w[_U + i], w[_V + i] = mirrored_velocity(mesh, q, reflect, sides[2, own + i], sides[3, own + i], moves)
     centre = cells[0, o:], cells[1, o:], cells[4, o:]
     if moves is None:
         add_side_fluxes(water.g, centre, inside, geo, w, None)
@@ -126,19 +128,6 @@ def add_side(water, mesh, j, k, first, last, reflect, cells, sides, w, moves, ph
         add_side_fluxes(water.g, centre, inside, geo, w, moves.speeds[(4 * j + k) * BLOCK :])
         edges, number, rest = mesh.edges[first:last], mesh.number[first:last], water.plan[DEPTH, j * BLOCK :]
         close_walls(water.g, edges, number, reflect, rest, cells[0, o:], geo, w, moves.thrust)
-
-
-@inline
-def put_mirror_sides(mesh, first, last, reflect, ul, vl, w, moves):
-    """Write mirrored velocities beyond boundary sides to `w`, from the velocities ul, vl at the sides inside."""
-    for q in range(first, last):
-        i, nx, ny = mesh.edges[q] % BLOCK, mesh.nx[q], mesh.ny[q]
-        r = reflect[mesh.number[q]] if reflect.size > 0 else 1.0
-        across = ul[i] * nx + vl[i] * ny
-        if moves is not None:
-            across -= moves.speeds[mesh.edges[q]]
-        change = 2.0 * r * across
-        w[_U + i], w[_V + i] = ul[i] - change * nx, vl[i] - change * ny
 
 
 @njit
