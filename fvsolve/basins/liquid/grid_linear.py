@@ -10,19 +10,19 @@ from fvsolve.jit import inline, njit
 
 
 @inline
-def put_row(liquid, grid, j, states, row, phi, up, down, aside):
+def put_row(liquid, grid, j, states, work, phi, up, down, aside):
     """Write the waves across row j to up, down."""
     a, z = j * grid.nx, (j + 1) * grid.nx
     put_waves(0.5 * liquid.c, states[0][a:z], states[2][a:z], up, down)
 
 
 @inline
-def put_rates_along(liquid, grid, j, states, row, aside, through, rates, moves, phi):
+def put_rates_along(liquid, grid, j, states, work, aside, through, rates, moves, phi):
     """Write the rates of row j by the fluxes along it."""
     c, nx, ny, k, a, z = liquid.c, grid.nx, grid.ny, grid.ky[j], j * grid.nx, (j + 1) * grid.nx
-    put_waves(0.5 * c, states[0][a:z], states[1][a:z], row.east[GHOSTS : nx + GHOSTS], row.west[GHOSTS : nx + GHOSTS])
-    put_faces_along(liquid, grid, j, row, moves)
-    east, west, (rate_r, rate_x, rate_y) = row.forward, row.backward, rates
+    put_waves(0.5 * c, states[0][a:z], states[1][a:z], work.east[GHOSTS : nx + GHOSTS], work.west[GHOSTS : nx + GHOSTS])
+    put_faces_along(liquid, grid, j, work, moves)
+    east, west, (rate_r, rate_x, rate_y) = work.forward, work.backward, rates
     if through.size > 0:
         through[j], through[ny + j] = (east[0] - west[0]) / k, (west[nx] - east[nx]) / k
     if moves is None or moves.speed_x.size == 0:
@@ -40,7 +40,7 @@ def put_rates_along(liquid, grid, j, states, row, aside, through, rates, moves, 
 
 
 @inline
-def put_fluxes_across(liquid, grid, j, states, ring, row, flux, through, moves, phi):
+def put_fluxes_across(liquid, grid, j, states, work, flux, through, moves, phi):
     """Convert the waves at moving faces before row j to fluxes, and write flows and pressures at the sides."""
     nx, ny, up, down = grid.nx, grid.ny, flux[0], flux[1]
     at = 2 * ny + (nx if j > 0 else 0)

@@ -25,31 +25,31 @@ from fvsolve.kernels.reconstruction import value_weno5
 
 
 @inline
-def put_row(liquid, grid, j, states, row, phi, up, down, aside):
+def put_row(liquid, grid, j, states, work, phi, up, down, aside):
     """Write the waves across row j to up, down, and the velocities along it to `aside`."""
     c, rho, table, nx, (r, mx, my) = liquid.c, liquid.rho, liquid.table, grid.nx, states
-    a, z, v = j * nx, (j + 1) * nx, row.over[GHOSTS : nx + GHOSTS]
-    put_primitives(c, rho, table, grid.kx, grid.ky[j], r[a:z], mx[a:z], my[a:z], row.w, aside, v, row.top)
+    a, z, v = j * nx, (j + 1) * nx, work.over[GHOSTS : nx + GHOSTS]
+    put_primitives(c, rho, table, grid.kx, grid.ky[j], r[a:z], mx[a:z], my[a:z], work.w, aside, v, work.top)
     if phi is not None:
-        subtract_potential(c, rho, table, phi.cells[a:z], row.w)
-    sides.put_waves(0.5, row.w, v, up, down)
+        subtract_potential(c, rho, table, phi.cells[a:z], work.w)
+    sides.put_waves(0.5, work.w, v, up, down)
 
 
 @inline
-def put_rates_along(liquid, grid, j, states, row, aside, through, rates, moves, phi):
+def put_rates_along(liquid, grid, j, states, work, aside, through, rates, moves, phi):
     """Write the rates of row j by the fluxes along it."""
     nx, ny, k, a, z, f = grid.nx, grid.ny, grid.ky[j], j * grid.nx, (j + 1) * grid.nx, grid.nx + 1
-    mass, push, along, over = row.forward, row.backward, row.along, row.over
-    sides.put_waves(0.5, row.w, aside, row.east[GHOSTS : nx + GHOSTS], row.west[GHOSTS : nx + GHOSTS])
+    mass, push, along, over = work.forward, work.backward, work.along, work.over
+    sides.put_waves(0.5, work.w, aside, work.east[GHOSTS : nx + GHOSTS], work.west[GHOSTS : nx + GHOSTS])
     sides.mirror(nx, over, over)
-    sides.put_faces_along(liquid, grid, j, row, moves)
+    sides.put_faces_along(liquid, grid, j, work, moves)
     scheme, flux = sides.scheme_for(liquid.scheme, nx, grid.sides[0], grid.sides[1]), (mass, push, along)
     cells = over, over[1:], over[2:], over[3:], over[4:], over[5:]
     if moves is None or moves.speed_x.size == 0:
         at_faces = None if phi is None else phi.columns[j * f : (j + 1) * f]
-        put_upwind_fluxes(liquid, scheme, cells, None, 0, at_faces, row.seen, flux)
+        put_upwind_fluxes(liquid, scheme, cells, None, 0, at_faces, work.seen, flux)
     else:
-        put_upwind_fluxes(liquid, scheme, cells, moves.speed_x, 1, None, row.seen, flux)
+        put_upwind_fluxes(liquid, scheme, cells, moves.speed_x, 1, None, work.seen, flux)
         if grid.sides[0] == WALLS:
             put_wall_flux(push, 1, moves.thrust[j:], mass, along)
         if grid.sides[1] == WALLS:
@@ -63,18 +63,18 @@ def put_rates_along(liquid, grid, j, states, row, aside, through, rates, moves, 
 
 
 @inline
-def put_fluxes_across(liquid, grid, j, states, ring, row, flux, through, moves, phi):
+def put_fluxes_across(liquid, grid, j, states, work, flux, through, moves, phi):
     """Convert the waves at the faces before row j to fluxes, and write flows and pressures at the sides."""
     nx, ny, (mass, push, along) = grid.nx, grid.ny, flux
     scheme, at = sides.scheme_for(liquid.scheme, ny, grid.sides[2], grid.sides[3]), 2 * ny + (nx if j > 0 else 0)
-    aside = ring.aside
+    aside = work.aside
     a, b, c = aside[ring_offset(j - 3, nx) :], aside[ring_offset(j - 2, nx) :], aside[ring_offset(j - 1, nx) :]
     d, e, g = aside[ring_offset(j, nx) :], aside[ring_offset(j + 1, nx) :], aside[ring_offset(j + 2, nx) :]
     if moves is None or moves.speed_y.size == 0:
         at_faces = None if phi is None else phi.rows[j * nx : (j + 1) * nx]
-        put_upwind_fluxes(liquid, scheme, (a, b, c, d, e, g), None, 0, at_faces, row.seen, flux)
+        put_upwind_fluxes(liquid, scheme, (a, b, c, d, e, g), None, 0, at_faces, work.seen, flux)
     else:
-        put_upwind_fluxes(liquid, scheme, (a, b, c, d, e, g), moves.speed_y[j:], 0, None, row.seen[:nx], flux)
+        put_upwind_fluxes(liquid, scheme, (a, b, c, d, e, g), moves.speed_y[j:], 0, None, work.seen[:nx], flux)
         if (j == 0 and grid.sides[2] == WALLS) or (j == ny and grid.sides[3] == WALLS):
             put_wall_flux(push, nx, moves.thrust[at:], mass, along)
     if through.size > 0 and (j == 0 or j == ny):

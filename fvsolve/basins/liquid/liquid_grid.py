@@ -7,10 +7,10 @@ momentum flux. Their arguments, and those of the functions here, are
 liquid, grid : `LiquidScheme` and `LiquidGrid`; j : row
 states : deviation of density r [kg/m3] and mass-flow densities mx, my [kg/(m2 s)] of all cells, three arrays
 rates : arrays for the rates of the states
-ring, row, aside : work arrays `Ring` and `Row`, and the velocities along row j in the ring buffer
+work, aside : `LiquidWork`, and the velocities along row j in its ring buffer
 flux, before, after : values at a row of faces, three arrays: waves, then fluxes
 through : float64[2 (nx + ny)]  inward flows through boundary faces [kg/(m s)], in the order of `reflect`, or empty
-work : float64[work_size(nx)]
+scratch : float64[work_size(nx)], the array that contains `work`
 moves : None, or the `GridMotion` of moving walls
 phi : None, or the `Potentials` of the frame of a basin on a body (full momentum flux)
 """
@@ -41,50 +41,50 @@ def row_needed(j, ny):
     return min(max(j + GHOSTS, CLOSURE_CELLS), ny)
 
 
-def _ghost_rows(liquid, grid, north, states, ring, row, moves, phi):
+def _ghost_rows(liquid, grid, north, states, work, moves, phi):
     """Fill the three rows of ghost cells beyond the southern or northern side in the ring buffer."""
     nx, ny = grid.nx, grid.ny
     for k in range(GHOSTS):
         j = ny + k if north else -1 - k
         at, turned = ring_offset(j, nx), sides.is_reversed(j, ny)
-        up, down = ring.up[at : at + nx], ring.down[at : at + nx]
+        up, down = work.up[at : at + nx], work.down[at : at + nx]
         ahead, back = (down, up) if turned else (up, down)
         EQUATION.put_row(
-            liquid, grid, sides.mirrored_cell(j, ny), states, row, phi, ahead, back, ring.aside[at : at + nx]
+            liquid, grid, sides.mirrored_cell(j, ny), states, work, phi, ahead, back, work.aside[at : at + nx]
         )
         if moves is not None and moves.speed_y.size > 0 and turned:
             speed = moves.speed_y[ny] if north else -moves.speed_y[0]
             entering, leaving = (down, up) if north else (up, down)
             sides.correct_mirror_row(liquid.full, liquid.c, liquid.rho, speed, entering, leaving, nx)
     if grid.sides[3 if north else 2] != sides.WALLS:
-        sides.close_rows(liquid, grid, north, ring, row.spare)
+        sides.close_rows(liquid, grid, north, work)
 
 
-def _rows(liquid, grid, first, last, states, through, work, rates, moves, phi):
+def _rows(liquid, grid, first, last, states, through, scratch, rates, moves, phi):
     """Write the rates of rows `first` to `last` - 1 of the band; calls must follow in the order of rows, without gaps.
 
     Up to three rows beyond the band are read too, and more next to open sides. Rates of rows from `last` on may be
     written incompletely; the next call completes them.
     """
-    nx, ny, begin, (ring, row) = grid.nx, grid.ny, grid.begin, sides.open_work(work, grid.nx)
+    nx, ny, begin, work = grid.nx, grid.ny, grid.begin, sides.open_work(scratch, grid.nx)
     read = max(min(begin - GHOSTS, ny - CLOSURE_CELLS), 0)
     if first > begin:
         read = max(read, row_needed(first, ny))
     for j in range(first if first == begin else first + 1, last + 1):  # faces between rows j - 1 and j
         while read < row_needed(j, ny):
             at = ring_offset(read, nx)
-            up, down, aside = ring.up[at : at + nx], ring.down[at : at + nx], ring.aside[at : at + nx]
-            EQUATION.put_row(liquid, grid, read, states, row, phi, up, down, aside)
+            up, down, aside = work.up[at : at + nx], work.down[at : at + nx], work.aside[at : at + nx]
+            EQUATION.put_row(liquid, grid, read, states, work, phi, up, down, aside)
             if begin <= read < grid.stop:
-                EQUATION.put_rates_along(liquid, grid, read, states, row, aside, through, rates, moves, phi)
+                EQUATION.put_rates_along(liquid, grid, read, states, work, aside, through, rates, moves, phi)
             read += 1
         if j == begin and begin < GHOSTS:
-            GHOST_ROWS(liquid, grid, False, states, ring, row, moves, phi)
+            GHOST_ROWS(liquid, grid, False, states, work, moves, phi)
         if j == max(ny - GHOSTS + 1, begin):
-            GHOST_ROWS(liquid, grid, True, states, ring, row, moves, phi)
-        before, after = sides.face_values(ring, j - 1, nx), sides.face_values(ring, j, nx)
-        sides.put_faces_across(liquid, grid, j, ring, after[0], after[1], moves)
-        EQUATION.put_fluxes_across(liquid, grid, j, states, ring, row, after, through, moves, phi)
+            GHOST_ROWS(liquid, grid, True, states, work, moves, phi)
+        before, after = sides.face_values(work, j - 1, nx), sides.face_values(work, j, nx)
+        sides.put_faces_across(liquid, grid, j, work, after[0], after[1], moves)
+        EQUATION.put_fluxes_across(liquid, grid, j, states, work, after, through, moves, phi)
         if j > begin:
             EQUATION.add_rates_across(liquid, grid, j - 1, states, before, after, rates, moves, phi)
         if moves is not None and j > begin:
@@ -99,21 +99,21 @@ nonlinear_rows = specialise(_rows, "nonlinear_rows", EQUATION=grid_nonlinear, GH
 
 
 @njit
-def linear_grid_rates(liquid, grid, states, through, work, rates, moves, phi):
+def linear_grid_rates(liquid, grid, states, through, scratch, rates, moves, phi):
     """Write the rates of the band under the law `linear`; return the greatest c (kx + ky) of all cells [1/s]."""
-    linear_rows(liquid, grid, grid.begin, grid.stop, states, through, work, rates, moves, phi)
+    linear_rows(liquid, grid, grid.begin, grid.stop, states, through, scratch, rates, moves, phi)
     return liquid.c * max_spacing_rate(grid.kx, grid.ky)
 
 
 @njit
-def nonlinear_grid_rates(liquid, grid, states, through, work, rates, moves, phi):
+def nonlinear_grid_rates(liquid, grid, states, through, scratch, rates, moves, phi):
     """Write the rates of the band with the full momentum flux; return the greatest (|u| + c) kx + (|v| + c) ky [1/s].
 
     The greatest value is that over all rows read.
     """
-    top, most = sides.open_work(work, grid.nx)[1].top, 0.0
+    top, most = sides.open_work(scratch, grid.nx).top, 0.0
     fill(0.0, top)
-    nonlinear_rows(liquid, grid, grid.begin, grid.stop, states, through, work, rates, moves, phi)
+    nonlinear_rows(liquid, grid, grid.begin, grid.stop, states, through, scratch, rates, moves, phi)
     for i in range(top.size):
         most = max(most, top[i])
     return most

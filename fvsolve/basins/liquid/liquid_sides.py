@@ -76,28 +76,22 @@ class Potentials(NamedTuple):
     rows: np.ndarray
 
 
-class Ring(NamedTuple):
-    """Ring buffer of rows: row j of cells at (j % RING) nx, row j of faces (between rows j - 1 and j) at 3 nx (j % 2).
+class LiquidWork(NamedTuple):
+    """Work arrays of a grid: a ring buffer of rows, and arrays for a row of cells.
 
+    In the ring buffer, row j of cells is at `ring_offset`, row j of faces (between rows j - 1 and j) at 3 nx (j % 2).
     up, down : float64[RING nx]  waves across the rows; aside : velocities along the rows
     faces : float64[6 nx]  values at two rows of faces, three for each face
-    """
-
-    up: np.ndarray
-    down: np.ndarray
-    aside: np.ndarray
-    faces: np.ndarray
-
-
-class Row(NamedTuple):
-    """Work arrays for a row of cells.
-
     east, west, over : float64[nx + 6]  waves along the row and velocities across it, with ghost cells
     forward, backward, along : float64[nx + 1]  waves at the faces along the row, and velocity along these faces
     w, top : float64[nx]  invariants, and the greatest rate of each column so far [1/s]
     seen : float64[nx + 1]  waves relative to moving faces; spare : float64[SIDE_WORK]
     """
 
+    up: np.ndarray
+    down: np.ndarray
+    aside: np.ndarray
+    faces: np.ndarray
     east: np.ndarray
     west: np.ndarray
     over: np.ndarray
@@ -118,7 +112,7 @@ def work_size(nx):
 
 @inline
 def open_work(work, nx):
-    """(`Ring`, `Row`) of a grid of nx columns in its work array."""
+    """`LiquidWork` of a grid of nx columns in its work array."""
     ring, wide, f = RING * nx, nx + 2 * GHOSTS, nx + 1
     up, down, east, west = work[:ring], work[ring : 2 * ring], work[2 * ring :][:wide], work[2 * ring + wide :][:wide]
     rest = work[2 * ring + 2 * wide :]
@@ -126,7 +120,7 @@ def open_work(work, nx):
     spare, rest = rest[:SIDE_WORK], rest[SIDE_WORK:]
     aside, over, rest = rest[:ring], rest[ring:][:wide], rest[ring + wide :]
     along, seen, w, top = rest[:f], rest[f : 2 * f], rest[2 * f :][:nx], rest[2 * f + nx :][:nx]
-    return Ring(up, down, aside, faces), Row(east, west, over, forward, backward, along, w, top, seen, spare)
+    return LiquidWork(up, down, aside, faces, east, west, over, forward, backward, along, w, top, seen, spare)
 
 
 @njit(forceinline=True)
@@ -136,10 +130,10 @@ def ring_offset(j, nx):
 
 
 @inline
-def face_values(ring, j, nx):
+def face_values(work, j, nx):
     """Three arrays with the values at row j of faces, in the ring buffer."""
     at = 3 * nx * (j % 2)
-    return ring.faces[at : at + nx], ring.faces[at + nx : at + 2 * nx], ring.faces[at + 2 * nx : at + 3 * nx]
+    return work.faces[at : at + nx], work.faces[at + nx : at + 2 * nx], work.faces[at + 2 * nx : at + 3 * nx]
 
 
 @njit
@@ -217,22 +211,22 @@ def put_waves(half, r, m, forward, backward):
 
 
 @inline
-def put_faces_along(liquid, grid, j, row, moves):
-    """Write the waves at the faces along row j, from its waves in `row`, whose ghost cells are filled here.
+def put_faces_along(liquid, grid, j, work, moves):
+    """Write the waves at the faces along row j, from its waves in `work`, whose ghost cells are filled here.
 
     moves : None, or the `GridMotion` of moving walls
     """
     nx, ny, reflect, (first, last, _, _) = grid.nx, grid.ny, grid.reflect, grid.sides
     scheme, limiter, small = scheme_for(liquid.scheme, nx, first, last), liquid.limiter, liquid.small
-    east, west, forward, backward = row.east, row.west, row.forward, row.backward
+    east, west, forward, backward = work.east, work.west, work.forward, work.backward
     if moves is None or moves.speed_x.size == 0:
         mirror(nx, east, west)
     else:
         mirror_at_walls(liquid.full, liquid.c, liquid.rho, nx, moves.speed_x[0], moves.speed_x[nx], east, west)
     if first != WALLS:
-        close_side(first, scheme, limiter, small, reflect[j], nx, east, west, GHOSTS, 1, row.spare)
+        close_side(first, scheme, limiter, small, reflect[j], nx, east, west, GHOSTS, 1, work.spare)
     if last != WALLS:
-        close_side(last, scheme, limiter, small, reflect[ny + j], nx, west, east, nx + GHOSTS - 1, -1, row.spare)
+        close_side(last, scheme, limiter, small, reflect[ny + j], nx, west, east, nx + GHOSTS - 1, -1, work.spare)
     faces(scheme, limiter, small, east, east[1:], east[2:], east[3:], east[4:], forward)
     faces(scheme, limiter, small, west[5:], west[4:], west[3:], west[2:], west[1:], backward)
     if moves is not None and moves.speed_x.size > 0:
@@ -245,12 +239,12 @@ def put_faces_along(liquid, grid, j, row, moves):
 
 
 @inline
-def put_faces_across(liquid, grid, j, ring, forward, backward, moves):
+def put_faces_across(liquid, grid, j, work, forward, backward, moves):
     """Write the waves at the faces between rows j - 1 and j, from the waves across the rows in the ring buffer.
 
     moves : None, or the `GridMotion` of moving walls
     """
-    nx, ny, up, down, (_, _, first, last) = grid.nx, grid.ny, ring.up, ring.down, grid.sides
+    nx, ny, up, down, (_, _, first, last) = grid.nx, grid.ny, work.up, work.down, grid.sides
     scheme, limiter, small = scheme_for(liquid.scheme, ny, first, last), liquid.limiter, liquid.small
     a, b, c = ring_offset(j - 3, nx), ring_offset(j - 2, nx), ring_offset(j - 1, nx)
     d, e, g = ring_offset(j, nx), ring_offset(j + 1, nx), ring_offset(j + 2, nx)
@@ -340,15 +334,13 @@ def close_side(kind, scheme, limiter, small, reflect, n, entering, leaving, firs
 
 
 @njit
-def close_rows(liquid, grid, north, ring, spare):
-    """Fill the three rows of ghost cells beyond the southern or northern side, no wall, in the ring buffer.
-
-    spare : work array of length SIDE_WORK
-    """
+def close_rows(liquid, grid, north, work):
+    """Fill the three rows of ghost cells beyond the southern or northern side, no wall, in the ring buffer."""
     nx, ny, (_, _, first, last) = grid.nx, grid.ny, grid.sides
     kind, row, step = (last, ny - 1, -1) if north else (first, 0, 1)
-    entering, leaving = (ring.down, ring.up) if north else (ring.up, ring.down)
+    entering, leaving = (work.down, work.up) if north else (work.up, work.down)
     reflect, scheme = grid.reflect[2 * ny + (nx if north else 0) :], scheme_for(liquid.scheme, ny, first, last)
+    spare = work.spare
     incoming, outgoing, rest = spare[:SIDE_VALUES], spare[SIDE_VALUES : 2 * SIDE_VALUES], spare[2 * SIDE_VALUES :]
     for i in range(nx):
         for k in range(min(ny, CLOSURE_CELLS)):
