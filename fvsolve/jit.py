@@ -338,12 +338,11 @@ def specialise(template: FunctionType, name: str, **constants: Any) -> Callable:
 
     Branches on these constants are decided at compile time. The copy sees the globals of its module as they are at
     this call. Numba caches such copies, which it does not do for closures.
-    name : name of the result; it must be assigned to this name in the module of the template, because code is stored
-    and pickled under it
-    constants : values of global names of the template
+    name : name of the result; the module must assign the result to it, because code is stored and pickled under it
+    constants : values of global names of the template, and `__name__=__name__` in another module than the template's
     """
     function = FunctionType(template.__code__, template.__globals__ | constants, name, template.__defaults__)
-    function.__qualname__, function.__module__, function.__doc__ = name, template.__module__, template.__doc__
+    function.__qualname__, function.__doc__ = name, template.__doc__  # its module is the constant `__name__`
     return njit(function)
 
 

@@ -138,8 +138,8 @@ FAULTS = [
     ),
     Fault(
         "basins/free_surface/surface_patches.py",
-        "dydt[o + i] += flow * flow_weight(",
-        "dydt[o + i] -= flow * flow_weight(",
+        "dydt[o + i] += flow * near.flow_weight(",
+        "dydt[o + i] -= flow * near.flow_weight(",
     ),
     Fault("parts/pipe_sizes.py", "DN_NPS.get(number, number / 25.0)", "DN_NPS.get(number, number / 25.4)"),
     Fault(

@@ -9,7 +9,7 @@ motion of the water with velocity u ((65) of docs/course.md) is
 
 The water below a free surface has the weight g_n = -G_z per mass along the normal, and phi / g_n is added to the bed
 elevation: tilt, accelerations and centrifugal forces act like a moving bed. In a liquid, phi is added to the
-reconstructed pressure (`liquid_on_body`). So water at rest in the frame stays at rest to round-off. Neglected are
+reconstructed pressure (`liquid.liquid_rates`). So water at rest in the frame stays at rest to round-off. Neglected are
 accelerations along z away from the origin, and vertical momentum: both are of the order of angle times depth over wave
 length.
 """

@@ -15,6 +15,7 @@ the names of its rows; geo, far : first and last group of measures of that side,
 """
 
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -272,14 +273,25 @@ def put_speeds(tables, basin):
     return most
 
 
+class MeshMotion(NamedTuple):
+    """Motion of a mesh between moving walls: speeds of sides, forces, and ratios of areas.
+
+    speeds : speeds of sides along their outward normals [m/s]
+    thrust : values on boundary faces. For a liquid they are pressures above that at rest [Pa], then, under the density
+    law `linear`, speed (c^2 r^2 - |m|^2) there [kg^2/(m3 s3)]; divided by 2 rho, this is the power lost per area.
+    For water they are thrusts minus those at rest, over density and length [m3/s2]
+    wide : areas of cells over undeformed areas, see `basins.cell_stretching`
+    """
+
+    speeds: np.ndarray
+    thrust: np.ndarray
+    wide: np.ndarray
+
+
 @njit(forceinline=True)
 def mesh_motion(tables, basin):
-    """(speeds of sides, values on boundary faces, present over undeformed area of cells) of a mesh: three arrays.
-
-    The speeds are along the outward normals [m/s]. The values on boundary faces are pressures and terms of lost power,
-    see `moves` of `liquid_mesh.liquid_rates`; for water they are the thrusts of `surface_mesh.shallow_rates`.
-    """
+    """`MeshMotion` of a basin with moving walls, whose mesh is not a grid."""
     sides, thrust, rows = basin["sides"], basin["thrust"], basin["stretch"]
     count = 4 * BLOCK * blocks(tables.integers[basin["links"] :])
     plane, thrust_array = tables.plane, tables.work[thrust : thrust + 2 * basin["outer"]]
-    return plane[sides : sides + count], thrust_array, plane[rows : rows + basin["n"]]
+    return MeshMotion(plane[sides : sides + count], thrust_array, plane[rows : rows + basin["n"]])

@@ -10,6 +10,9 @@ in `plane`. On other meshes, corners take the place of grid lines (see `moving_m
 """
 
 from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
 
 from fvsolve.basins import cell_stretching as stretching
 from fvsolve.basins.basin_energy import basin_first_row
@@ -235,22 +238,32 @@ def wall_of_row(tables, basin, i):
     return tables.walls[index]["node"]
 
 
+class GridMotion(NamedTuple):
+    """Motion of a grid between moving walls: speeds of its lines, forces, and ratios of areas.
+
+    speed_x : speeds of the lines x = constant [m/s], empty for lines at rest; speed_y : of the lines y = constant
+    thrust : values on boundary faces. For a liquid they are pressures above that at rest [Pa], then terms of lost power
+    (see `MeshMotion`); for water, thrusts minus those at rest, over density and length [m3/s2]
+    wide, narrow : present over undeformed area of columns or rows, and the reciprocal
+    """
+
+    speed_x: np.ndarray
+    speed_y: np.ndarray
+    thrust: np.ndarray
+    wide: np.ndarray
+    narrow: np.ndarray
+
+
 @njit(forceinline=True)
 def grid_motion(tables, basin):
-    """Five arrays of a grid between moving walls, in this order.
-
-    - speeds of the lines x = constant, then of the lines y = constant [m/s]; empty for lines that do not move
-    - pressures and terms of lost power on boundary faces, see `liquid_mesh.liquid_rates`; for water the thrusts of
-      `surface_grid.grid_rates`
-    - present over undeformed area of columns or rows, then the reciprocal
-    """
+    """`GridMotion` of a basin with moving walls, whose mesh is a grid."""
     plane, at, rows, (count, lines) = tables.plane, basin["lines"], basin["stretch"], stretching_counts(basin)
     speeds, no_speeds = plane[at : at + lines + VECTOR_MARGIN], plane[:0]
     thrust = tables.work[basin["thrust"] : basin["thrust"] + 2 * basin["outer"]]
     wide, narrow = plane[rows : rows + count], plane[rows + count : rows + 2 * count]
     if basin["turn"] == 1:
-        return no_speeds, speeds, thrust, wide, narrow
-    return speeds, no_speeds, thrust, wide, narrow
+        return GridMotion(no_speeds, speeds, thrust, wide, narrow)
+    return GridMotion(speeds, no_speeds, thrust, wide, narrow)
 
 
 @njit
@@ -379,7 +392,7 @@ def wall_power(t, y, dydt, out, handle, power):
 def dissipated_power(tables, wall):
     """Power at a wall that the density law `linear` dissipates [W].
 
-    Under this law the motion of the wall does not carry density and momentum along, see `liquid_mesh.liquid_rates`.
+    Under this law the motion of the wall does not carry density and momentum along, see `moving_meshes.MeshMotion`.
     """
     basin, total = tables.basins[wall["basin"]], 0.0
     for m in range(wall["count"]):

@@ -15,9 +15,13 @@ from scipy.optimize import brentq
 from scipy.special import erfc
 
 from fvsolve.basins import advection_faces
-from fvsolve.basins.free_surface import surface_mesh as shallow_faces
-from fvsolve.basins.liquid import liquid_mesh as liquid_faces
+from fvsolve.basins.free_surface import surface_mesh
+from fvsolve.basins.free_surface.surface_rates import water_mesh_rates
+from fvsolve.basins.liquid import liquid_mesh
+from fvsolve.basins.liquid.liquid_rates import mesh_rates
+from fvsolve.basins.liquid.liquid_sides import LiquidScheme
 from fvsolve.basins.lower_mesh import lower_mesh
+from fvsolve.basins.mesh_blocks import work_size
 from fvsolve.kernels.dtypes import LAW_LINEAR, LAW_LOG, MUSCL, UPWIND
 from fvsolve.mesh import Mesh, read, rectangle
 
@@ -42,16 +46,19 @@ class Field:
 
     def shallow(self, scheme, plan, y, reflect=NONE, flow=NONE, wide=2.0):
         """Return (rates, greatest rate); work starts as NaN, to detect values that are read before they are written."""
-        work, found = np.full(shallow_faces.work_size(self.integers), np.nan), np.full_like(y, np.nan)
-        rate = shallow_faces.shallow_rates(
-            G, scheme, wide, self.floats, self.integers, reflect, plan, *y, flow, NONE, work, *found, None
+        work, found = np.full(work_size(surface_mesh, self.integers), np.nan), np.full_like(y, np.nan)
+        water, states = surface_mesh.MeshWater(G, scheme, wide, plan), tuple(np.ascontiguousarray(y))
+        rate = water_mesh_rates(
+            water, self.floats, self.integers, reflect, states, flow, NONE, work, tuple(found), None, None
         )
         return found, rate
 
     def liquid(self, law, scheme, y, reflect=NONE, wide=2.0, table=None):
-        work, found = np.full(liquid_faces.work_size(self.integers), np.nan), np.full_like(y, np.nan)
-        return found, liquid_faces.liquid_rates(
-            law, C, RHO, table, scheme, wide, self.floats, self.integers, reflect, *y, NONE, work, *found, None, None
+        work, found = np.full(work_size(liquid_mesh, self.integers), np.nan), np.full_like(y, np.nan)
+        fluid = LiquidScheme(C, RHO, table, table is not None or law == LAW_LOG, scheme, 0, 0.0, wide)
+        states = tuple(np.ascontiguousarray(y))
+        return found, mesh_rates(
+            fluid, self.floats, self.integers, reflect, states, NONE, NONE, work, tuple(found), None, None
         )
 
     def advection(self, scheme, flow, s, outside=None, depth=NONE, diffusivity=0.0, wide=2.0, bounds=FREE):

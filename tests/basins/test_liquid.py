@@ -17,8 +17,9 @@ from scipy.interpolate import CubicSpline
 from scipy.special import j0
 
 import fvsolve
-from fvsolve.basins.liquid import grid_linear as liquid
-from fvsolve.basins.liquid import grid_nonlinear as liquid_log
+from fvsolve.basins.liquid import liquid_grid
+from fvsolve.basins.liquid.grid_nonlinear import log1p_vector
+from fvsolve.basins.liquid.liquid_sides import LiquidGrid, LiquidScheme, side_kinds, work_size
 from fvsolve.kernels.dtypes import LINEAR, MINMOD, MONOTONIZED_CENTRAL, MUSCL, UPWIND, VAN_LEER, WENO5
 
 SCHEMES = {"upwind": UPWIND, "muscl": MUSCL, "upwind5": LINEAR, "weno5": WENO5}
@@ -51,18 +52,17 @@ class Box:
 
     def rates(self, state: np.ndarray, table: np.ndarray | None = None) -> tuple[np.ndarray, float]:
         """Return (rates, greatest rate); work starts as NaN, to detect values that are read before they are written."""
-        kernel = liquid_log if self.log else liquid
-        given = (C, RHO, table, 1e-18 * C**2) if self.log else (C, 1e-18 * (RHO * C) ** 2)
         kx, ky = (1.0 / np.diff(e) for e in self.edges())
         reflect = self.reflect
         if isinstance(reflect, float):
             reflect = np.full(2 * (self.nx + self.ny), reflect)
-        work, found = np.full(kernel.work_size(self.nx, self.ny), np.nan), np.full((3, self.nx * self.ny), np.nan)
-        flat = np.ascontiguousarray(state).reshape(3, -1)
-        codes = SCHEMES[self.scheme], LIMITERS[self.limiter]
-        still = (None, None) if self.log else (None,)
-        size = self.nx, self.ny, 0, self.ny
-        rate = kernel.grid_rates(*given, *codes, *size, kx, ky, reflect, *flat, WALLS, work, *found, *still)
+        small = 1e-18 * C**2 * (1.0 if self.log else RHO**2)
+        fluid = LiquidScheme(C, RHO, table, self.log, SCHEMES[self.scheme], LIMITERS[self.limiter], small, 1.0)
+        grid = LiquidGrid(self.nx, self.ny, 0, self.ny, kx, ky, reflect, side_kinds(reflect, self.nx, self.ny))
+        work, found = np.full(work_size(self.nx), np.nan), np.full((3, self.nx * self.ny), np.nan)
+        states = tuple(np.ascontiguousarray(state).reshape(3, -1))
+        kernel = liquid_grid.nonlinear_grid_rates if self.log else liquid_grid.linear_grid_rates
+        rate = kernel(fluid, grid, states, WALLS, work, tuple(found), None, None)
         return found.reshape(state.shape), rate
 
     def run(self, state: np.ndarray, end: float, courant: float = 0.8) -> np.ndarray:
@@ -328,7 +328,7 @@ def test_the_log_law_is_the_linear_one_for_small_waves(scheme):
 
 def test_the_logarithm_is_exact_to_round_off():
     y = np.concatenate([np.linspace(-0.5, 1.0, 1001), [1e-3, -1e-9, 3e-17]])
-    assert [liquid_log.log1p_vector(v) for v in y] == approx(np.log1p(y), rel=1e-15, abs=0.0)
+    assert [log1p_vector(v) for v in y] == approx(np.log1p(y), rel=1e-15, abs=0.0)
 
 
 def vortex(box: Box, t: float, speed: float = 3.0, drift=(2.0, 1.0)) -> np.ndarray:

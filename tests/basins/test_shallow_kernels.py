@@ -10,8 +10,8 @@ from pytest import approx
 from scipy.optimize import brentq
 
 from fvsolve.basins.free_surface.bed_friction import add_capped_friction
-from fvsolve.basins.free_surface.surface_fifth_order import put_push
-from fvsolve.basins.free_surface.surface_grid import PLANS, WORK, grid_rates
+from fvsolve.basins.free_surface.surface_grid import PLANS, WORK, FaceFlows, WaterGrid, grid_rates
+from fvsolve.basins.free_surface.surface_rows import SURFACE, put_push
 from fvsolve.kernels.dtypes import DARCY, LINEAR, MANNING, MINMOD, MONOTONIZED_CENTRAL, MUSCL, UPWIND, VAN_LEER, WENO5
 
 G = 9.80665
@@ -40,14 +40,14 @@ class Water:
 
     def rates(self, y, out):
         a, b = y.reshape(3, -1), out.reshape(3, -1)
-        rate = grid_rates(
-            G, self.scheme, self.limiter, self.nx, self.ny, 0, self.ny, self.kx, self.ky, self.reflect, self.plan,
-            a[0], a[1], a[2], self.flow_x, self.flow_y, NONE, self.work, b[0], b[1], b[2], None,
-        )  # fmt: skip
+        spacing = self.kx, self.ky
+        grid = WaterGrid(G, self.scheme, self.limiter, self.nx, self.ny, *spacing, self.reflect, self.plan)
+        flows = FaceFlows(self.flow_x, self.flow_y, NONE)
+        rate = grid_rates(grid, 0, self.ny, (a[0], a[1], a[2]), flows, self.work, (b[0], b[1], b[2]), None)
         if self.friction is not None:
             law, coefficient = self.friction
             c = np.atleast_1d(coefficient)
-            rate += add_capped_friction(law, G, c, 1e3, self.plan[0], a[0], a[1], a[2], a[1], a[2], b[1], b[2])
+            rate += add_capped_friction(law, G, c, 1e3, self.plan[0], a[0], (a[1], a[2]), (a[1], a[2]), (b[1], b[2]))
         return rate
 
     def depth(self, y):
@@ -206,9 +206,10 @@ def test_the_push_of_cubic_depth_and_surface_is_exact():
     h, e = (np.polynomial.Polynomial(c) for c in rng.standard_normal((2, 4)))
     edges = np.arange(-2.5, 3.0)
     deep, push = np.ones(1), np.zeros(1)
-    five = [np.atleast_1d(np.diff(f.integ()(edges))[k]) for f in (h, e) for k in range(5)]
-    ends = [np.atleast_1d(f(x)) for f in (h, e) for x in (-0.5, 0.5)]
-    put_push(five[2], deep, *ends, *five[:2], *five[3:5], *five[5:], push)
+    blocks = np.zeros((7, SURFACE + 1))  # five cells, and both faces of the third
+    for place, f in ((0, h), (SURFACE, e)):
+        blocks[:5, place], blocks[5:, place] = np.diff(f.integ()(edges)), f(np.array([-0.5, 0.5]))
+    put_push(*blocks, deep, push)
     whole = (h * e.deriv()).integ()
     assert push[0] == approx(whole(0.5) - whole(-0.5), rel=1e-13)
 
@@ -312,7 +313,7 @@ def test_flow_down_a_slope_nears_the_normal_one(law, coefficient):
 def test_friction_of_films_is_bounded_and_takes_no_more_than_there_is():
     h = np.array([0.0, 1e-12, 1e-6, 1e-4, 1e-2, 1.0])
     q, none, out = h * 2.0, np.zeros(6), np.zeros((2, 6))
-    rate = add_capped_friction(MANNING, G, np.array([0.03]), 50.0, none, h, q, -q, q, -q, out[0], out[1])
+    rate = add_capped_friction(MANNING, G, np.array([0.03]), 50.0, none, h, (q, -q), (q, -q), (out[0], out[1]))
     assert 90.0 < rate <= 100.0 and np.array_equal(out[0], -out[1]) and not out[:, 0].any()
     assert np.all(-out[0] <= 50.0 * q)
     assert -out[0, 5] == approx(G * 0.03**2 * math.hypot(2.0, 2.0) * 2.0, rel=1e-3)

@@ -11,8 +11,7 @@ from numpy.testing import assert_array_equal
 from fvsolve.assembly.scheme_codes import CODES
 from fvsolve.basins import advection
 from fvsolve.basins.free_surface import surface_rows as shallow_rows
-from fvsolve.basins.liquid import grid_linear as liquid
-from fvsolve.basins.liquid import grid_nonlinear as liquid_log
+from fvsolve.basins.liquid import grid_nonlinear, liquid_sides
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import reconstruction, scalar_transport
 from fvsolve.kernels.reconstruction import by_limiter, limited
@@ -58,13 +57,13 @@ def carried(code: int) -> np.ndarray:
 
 def liquid_faces(code: int) -> np.ndarray:
     found = np.zeros(CELLS)
-    liquid.faces(rec.MUSCL, code, 1e-9, *waves(5), found)
+    liquid_sides.faces(rec.MUSCL, code, 1e-9, *waves(5), found)
     return found
 
 
 def liquid_carried(code: int) -> np.ndarray:
     found = np.zeros(CELLS)
-    liquid_log.faces_upwind(rec.MUSCL, code, 1e-9, *waves(8), found)
+    grid_nonlinear.faces_upwind(rec.MUSCL, code, 1e-9, *waves(8), found)
     return found
 
 

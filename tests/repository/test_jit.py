@@ -41,6 +41,43 @@ print(value, 'numba' in sys.modules, 'numba' in sys.modules and sum(loop.numba.s
 """
 
 
+POWERS = """from fvsolve.jit import njit, specialise
+
+ADDED = None
+
+@njit
+def square(x):
+    return x * x
+
+@njit
+def cube(x):
+    return x * x * x
+
+def _sums(n):
+    \"\"\"Sum of powers.\"\"\"
+    total = 0.0
+    for i in range(n):
+        total += POWER(float(i)) if ADDED is None else POWER(float(i)) + ADDED
+    return total
+
+sum_of_squares = specialise(_sums, "sum_of_squares", POWER=square)
+sum_of_cubes = specialise(_sums, "sum_of_cubes", POWER=cube, ADDED=0.5)
+"""
+SPECIALISED = """
+import pickle, sys
+from fvsolve.kernels import powers
+from fvsolve.kernels.powers import sum_of_cubes, sum_of_squares
+print(sum_of_squares(4), sum_of_cubes(4), 'numba' in sys.modules)
+for function in (sum_of_squares, sum_of_cubes):
+    plain = getattr(function, "py_func", function)
+    assert plain(4) == function(4) and plain.__doc__ == function.__doc__ == "Sum of powers."
+    assert pickle.loads(pickle.dumps(function)) is function and function.__module__ == powers.__name__
+    if hasattr(function, "numba"):
+        stats = function.numba.stats
+        print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
+"""
+
+
 @pytest.fixture
 def package(tmp_path):
     """Small copy of the package: jit.py, store.py, and two compiled functions, the second of which calls the first."""
@@ -91,6 +128,21 @@ print(loop(4), len(law.numba.overloads), len(law.numba.within.overloads), law(1.
 """
     assert python(package, code) == ["12.0", "0", "1", "2.0", "1"]
     assert python(package, code) == ["12.0", "0", "0", "2.0", "0"]
+
+
+def test_specialisations_of_one_template_are_stored_each_under_its_own_name(package):
+    """The second process loads both without numba; without the store they come from numba's own cache."""
+    (package / "kernels" / "powers.py").write_text(POWERS)
+    assert python(package, SPECIALISED) == ["14.0", "38.0", "True", "0", "1", "0", "1"]
+    assert python(package, SPECIALISED)[:3] == ["14.0", "38.0", "False"]
+    stored = list((package.parent / "cache" / "code").rglob(f"sum_of_*{store.SUFFIX}"))
+    assert sorted(path.name.rpartition("-")[0] for path in stored) == ["sum_of_cubes", "sum_of_squares"]
+    for path in stored:
+        path.unlink()
+    assert python(package, SPECIALISED) == ["14.0", "38.0", "True", "1", "0", "1", "0"]
+    assert python(package, SPECIALISED, NUMBA_DISABLE_JIT="1") == ["14.0", "38.0", "False"]
+    (package / "kernels" / "powers.py").write_text(POWERS.replace("ADDED=0.5", "ADDED=1.5"))
+    assert python(package, SPECIALISED) == ["14.0", "42.0", "True", "0", "1", "0", "1"]
 
 
 def forged(package: Path, **changes) -> Path:

@@ -46,16 +46,16 @@ def drag_per_flow(law, g, value, depth):
 
 
 @njit
-def add_friction(law, g, coefficient, depth0, dh, qx, qy, content_x, content_y, rate_x, rate_y):
+def add_friction(law, g, coefficient, depth0, dh, flows, contents, rates):
     """Add the friction -r q to the rates of n cells; r is the decay rate of the flow [1/s], see `drag_per_flow`.
 
     law, coefficient : MANNING and n [s/m^(1/3)], or DARCY and f [-]; the coefficient is float64[n], or float64[1] for
     all cells
-    depth0, dh : depth at rest and deviation from it [m]; qx, qy : unit flows [m2/s]
-    content_x, content_y : states q that have the rates rate_x, rate_y: unit flows, or, with moving walls, unit flows
-    times present over undeformed area
+    depth0, dh : depth at rest and deviation from it [m]; flows : unit flows along x and y, two arrays
+    contents : states q along x and y that have the rates `rates`: unit flows, or, with moving walls, unit flows times
+    present over undeformed area
     """
-    is_uniform = coefficient.size == 1
+    (qx, qy), (content_x, content_y), (rate_x, rate_y), is_uniform = flows, contents, rates, coefficient.size == 1
     for i in range(dh.size):
         value = coefficient[0] if is_uniform else coefficient[i]
         rate = drag_per_flow(law, g, value, depth0[i] + dh[i]) * sqrt(qx[i] * qx[i] + qy[i] * qy[i])
@@ -64,13 +64,14 @@ def add_friction(law, g, coefficient, depth0, dh, qx, qy, content_x, content_y, 
 
 
 @njit
-def add_capped_friction(law, g, coefficient, cap, depth0, dh, qx, qy, content_x, content_y, rate_x, rate_y):
+def add_capped_friction(law, g, coefficient, cap, depth0, dh, flows, contents, rates):
     """Add friction with a capped decay rate of the flow, r / (1 + r / cap) [1/s]; return twice its greatest value.
 
     An error of the flow decays at the returned rate, which limits explicit steps. The maximum over all cells prevents
     vectorisation, and then a power is faster than `cube_root`. Other arguments as for `add_friction`
     """
-    most, is_uniform = 0.0, coefficient.size == 1
+    (qx, qy), (content_x, content_y), (rate_x, rate_y), is_uniform = flows, contents, rates, coefficient.size == 1
+    most = 0.0
     for i in range(dh.size):
         value = coefficient[0] if is_uniform else coefficient[i]
         h = max(depth0[i] + dh[i], 0.0)
@@ -88,26 +89,25 @@ def add_capped_friction(law, g, coefficient, cap, depth0, dh, qx, qy, content_x,
 
 
 @njit
-def damp_flows(law, g, coefficient, h, depth0, dh, qx, qy, content_x, content_y, rate_x, rate_y, quick_x, quick_y):
-    """Divide the rates of unit flows q, which include friction -r q, by 1 + h R, and write h R to quick_x and quick_y.
+def damp_flows(law, g, coefficient, h, depth0, dh, flows, contents, rates, quick):
+    """Divide the rates of unit flows q, which include friction -r q, by 1 + h R, and write h R to `quick`.
 
     h is the time step, and R = r + r'. Without friction, a step would lead to the flow q + h (rate + r q). Implicit
     friction reduces it to the flow Q of the decay rate r', with Q (1 + h r') = q + h (rate + r q). R is the slope of
-    friction between q and Q, so the step ends at Q if all flows have one direction. Other arguments as for
-    `add_friction`
+    friction between q and Q, so the step ends at Q if all flows have one direction.
+    quick : two arrays, for the flows along x and y; other arguments as for `add_friction`
     """
-    is_uniform = coefficient.size == 1
+    (qx, qy), (content_x, content_y), (rate_x, rate_y), is_uniform = flows, contents, rates, coefficient.size == 1
+    quick_x, quick_y = quick
     for i in range(dh.size):
         value = coefficient[0] if is_uniform else coefficient[i]
         per, flow = drag_per_flow(law, g, value, depth0[i] + dh[i]), sqrt(qx[i] * qx[i] + qy[i] * qy[i])
         rate, content = per * flow, sqrt(content_x[i] * content_x[i] + content_y[i] * content_y[i])
         stretch = 1.0 if flow == content else flow / (content + TINY)  # undeformed area over present area
-        x, y = (
-            content_x[i] + h * (rate_x[i] + rate * content_x[i]),
-            content_y[i] + h * (rate_y[i] + rate * content_y[i]),
-        )
+        x = content_x[i] + h * (rate_x[i] + rate * content_x[i])
+        y = content_y[i] + h * (rate_y[i] + rate * content_y[i])
         free = h * per * stretch * sqrt(x * x + y * y)
-        quick = h * rate + 2.0 * free / (1.0 + sqrt(1.0 + 4.0 * free))
-        rate_x[i] /= 1.0 + quick
-        rate_y[i] /= 1.0 + quick
-        quick_x[i] = quick_y[i] = quick
+        damping = h * rate + 2.0 * free / (1.0 + sqrt(1.0 + 4.0 * free))
+        rate_x[i] /= 1.0 + damping
+        rate_y[i] /= 1.0 + damping
+        quick_x[i] = quick_y[i] = damping

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.basins import mesh_blocks
 from fvsolve.basins.basin_terms import FRAME_FORCES, SHORTAGES
-from fvsolve.basins.free_surface import lower_dispersion, lower_films, surface_grid, surface_mesh
+from fvsolve.basins.free_surface import lower_notices, surface_grid, surface_mesh
 from fvsolve.basins.free_surface.bed_friction import RATE_CAP
-from fvsolve.basins.free_surface.surface_probes import DEPTH
+from fvsolve.basins.free_surface.surface_patches import DEPTH
 from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.basins.lower_basin import BasinRows
 from fvsolve.case.bodies import free_joints
@@ -27,7 +28,7 @@ WATER_TERMS = RhsTerms(
     package=PACKAGE,
     prepare="surface_patches: patch_pressures",
     boundary_inflow="surface_patches: patch_flows",
-    observe="surface_probes: observe_water",
+    observe="surface_patches: observe_water",
     power="surface_energy: add_power",
     stored="surface_energy: add_stored",
 )
@@ -71,21 +72,16 @@ class FreeSurfaceRows(BasinRows):
         self.depth = np.maximum(self.part.level - self.bed, 0.0)
 
     def pieces(self, valves: bool) -> Iterator[RhsTerms]:
-        kind = "grids" if self.is_grid else "meshes"
-        yield RhsTerms(
-            package=PACKAGE,
-            rates=f"surface_moving_walls: rates_on_moving_{kind}"
-            if self.moves
-            else f"surface_cell_rates: rates_on_{kind}",
-        )
+        kind = f"{'moving_' if self.moves else ''}{'grids' if self.is_grid else 'meshes'}"
+        yield RhsTerms(package=PACKAGE, rates=f"surface_rates: water_{kind}")
         yield WATER_TERMS
         if self.part.on is not None:
             yield FRAME_FORCES
         if self.damped:
-            yield RhsTerms(package=PACKAGE, damp="surface_cell_rates: damp_stages")
+            yield RhsTerms(package=PACKAGE, damp="surface_rates: damp_stages")
         if self.moves:
             yield RhsTerms(
-                package=PACKAGE, power="surface_moving_walls: add_power", stored="surface_moving_walls: add_stored"
+                package=PACKAGE, power="surface_energy: add_wall_power", stored="surface_energy: add_wall_stored"
             )
         yield SHORTAGES
         if valves:
@@ -157,7 +153,7 @@ class FreeSurfaceRows(BasinRows):
 
     def lower_faces(self, draft, row) -> None:
         row["unsplit"] = COURANT_FACTOR
-        row["work"] = draft.to_work(surface_mesh.work_size(self.integers))
+        row["work"] = draft.to_work(mesh_blocks.work_size(surface_mesh, self.integers))
 
     def start(self, attitude: np.ndarray | None = None) -> np.ndarray:
         states, given = np.zeros((3, self.n)), self.part.start
@@ -222,10 +218,11 @@ class FreeSurfaceRows(BasinRows):
         return float(self.case.properties.density * np.sum(self.mesh.area * (height + moves)))
 
     def notices(self, y: np.ndarray) -> list[Notice]:
-        return [*lower_dispersion.notices(self, y), *lower_dispersion.body_notices(self), *lower_films.notices(self, y)]
+        waves, bodies = lower_notices.wave_notices(self, y), lower_notices.body_notices(self)
+        return [*waves, *bodies, *lower_notices.film_notices(self, y)]
 
     def watches(self, y: np.ndarray) -> list[Any]:
-        return [*lower_dispersion.watches(self, y), *lower_films.watches(self, y)]
+        return [*lower_notices.wave_watches(self, y), *lower_notices.film_watches(self, y)]
 
     def depth_of(self, y: np.ndarray) -> np.ndarray:
         return np.maximum(self.depth + y[0], 0.0)

@@ -1,4 +1,4 @@
-"""Power and stored energy of water with a free surface.
+"""Power and stored energy of water with a free surface, also between moving walls.
 
 The stored energy per area is rho (g h^2 / 2 + g h z + |q|^2 / (2 h)): depth h [m], elevation z of the bed [m], flow per
 width q [m2/s]. For the rows of the array `power` see `basin_energy`.
@@ -10,6 +10,7 @@ from fvsolve.basins.basin_energy import basin_first_row, rest_potential
 from fvsolve.basins.boundary_cells import flow_weight, patch_area, patch_length, weighted_volume
 from fvsolve.basins.free_surface.bed_friction import drag_per_flow
 from fvsolve.basins.free_surface.surface_rows import THIN
+from fvsolve.basins.moving_walls import area_growth_rate
 from fvsolve.basins.physics_codes import physics_code
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import NO_DRAG
@@ -82,12 +83,7 @@ def patch_loss(tables, patch, flow, y):
 
     flow : [kg/s], positive into the cells at the patch, negative out of them
     """
-    st, basin, plane, integers = (
-        tables.settings[0],
-        tables.basins[patch["basin"]],
-        tables.plane,
-        tables.integers,
-    )
+    st, basin, plane, integers = tables.settings[0], tables.basins[patch["basin"]], tables.plane, tables.integers
     n, o, total, leaves = basin["n"], basin["y"], 0.0, flow < 0.0
     depths, area = plane[basin["plan"] :], plane[basin["area"] :]
     each = flow / weighted_volume(tables, patch, leaves, y)
@@ -128,3 +124,36 @@ def add_stored(t, y, dydt, out, handle, stored):
             height = (rest + weight * surface[i]) * d + 0.5 * weight * d * d
             total += area[i] * (height + 0.5 * st["rho"] * share * square)
         stored[stored.size - basins.size + b] = total
+
+
+@njit(forceinline=True)
+def is_moving(basin):
+    """True for a basin of water with a free surface and moving walls."""
+    return basin["kind"] == OWN_CODE and basin["walls"] > 0
+
+
+@njit
+def add_wall_power(t, y, dydt, out, handle, power):
+    """Correct the rate of storage in `power` for changing cell areas A: subtract rho g h^2 / 2 dA/dt [W] of cells."""
+    tables = open_tables(handle)
+    st, plane = tables.settings[0], tables.plane
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
+        for i in range(basin["n"] if is_moving(basin) else 0):
+            depth = max(plane[basin["plan"] + i] + y[basin["y"] + i], 0.0)
+            spent = 0.5 * st["rho"] * st["gravity"] * depth * depth * area_growth_rate(t, tables, basin, y, i)
+            power[basin_first_row(tables, power, b) + 3] -= plane[basin["drawn"] + i] * spent
+
+
+@njit
+def add_wall_stored(t, y, dydt, out, handle, stored):
+    """Add the energy of water at rest [J] on the area that cells have gained by the motion of walls to `stored`."""
+    tables = open_tables(handle)
+    st, plane, first = tables.settings[0], tables.plane, stored.size - tables.basins.size
+    weight = st["rho"] * st["gravity"]
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
+        for i in range(basin["n"] if is_moving(basin) else 0):
+            depth, surface = plane[basin["plan"] + i], plane[basin["plan"] + basin["n"] + i]
+            rest_energy = depth * (rest_potential(st, basin) + weight * (surface - 0.5 * depth))
+            stored[first + b] += (plane[basin["area"] + i] - plane[basin["drawn"] + i]) * rest_energy

@@ -12,44 +12,92 @@ half the depth of the deepest, and uses limited values elsewhere. It has that or
 cells; in two dimensions it is of second order, because the flux of mean values is not the mean flux.
 """
 
+from typing import NamedTuple
+
+import numpy as np
+
 from fvsolve.basins.basin_patches import put_inward
 from fvsolve.basins.cell_stretching import fill
-from fvsolve.basins.free_surface.surface_fifth_order import put_smooth
-from fvsolve.basins.free_surface.surface_rows import (
-    AFTER,
-    ALONG,
-    EAST,
-    FIELDS,
-    FLOW_EAST,
-    FLUXES,
-    GHOSTS,
-    HIGH,
-    MAX_COLUMNS,
-    NORTH,
-    PUSH,
-    SIDES,
-    STRIDE,
-    correct_ghost_end,
-    correct_ghost_row,
-    put_cells,
-    put_flows,
-    put_fluxes,
-    put_ghost_end,
-    put_ghost_row,
-    put_limited,
-    put_rates,
-)
-from fvsolve.jit import njit
+from fvsolve.basins.free_surface import surface_rows as rows_of
+from fvsolve.basins.free_surface.surface_rows import EAST, GHOSTS, HIGH, MAX_COLUMNS, NORTH, STRIDE
+from fvsolve.jit import inline, njit
 from fvsolve.kernels.dtypes import LINEAR, WENO5
-
-__all__ = ["PLANS", "WORK", "grid_rates"]
 
 PLANS = 2  # rows of `plan`: depth and surface of the profile
 RING = 8  # stored rows of cells
 REACH = 3  # greatest stencil radius of the rates, in rows
-BLOCK, SIDE, FLUX = FIELDS * STRIDE, SIDES * STRIDE, FLUXES * STRIDE
+BLOCK, SIDE, FLUX = rows_of.FIELDS * STRIDE, rows_of.SIDES * STRIDE, rows_of.FLUXES * STRIDE
 WORK = RING * BLOCK + 3 * SIDE + 3 * FLUX + 2 * STRIDE  # length of the work array of `grid_rates`
 MOVING = WORK + 3 * STRIDE
+
+
+class WaterGrid(NamedTuple):
+    """Grid of nx columns and ny rows of water, and the scheme of its rates.
+
+    g : gravity normal to the basin [m/s2]; scheme : UPWIND, MUSCL, LINEAR (upwind5) or WENO5; limiter : of MUSCL
+    kx, ky : float64[nx], float64[ny]  1 / widths of columns, 1 / heights of rows [1/m]
+    reflect : float64[2 (nx + ny)]  1 for a wall and 0 for open, in the order west, east, south, north; empty: all walls
+    plan : float64[PLANS, n]  depth at rest and surface at rest above the level [m]
+    """
+
+    g: float
+    scheme: int
+    limiter: int
+    nx: int
+    ny: int
+    kx: np.ndarray
+    ky: np.ndarray
+    reflect: np.ndarray
+    plan: np.ndarray
+
+
+class FaceFlows(NamedTuple):
+    """Flows through faces of a grid, each array empty if it is not needed.
+
+    x : float64[ny (nx + 1)], y : float64[(ny + 1) nx]  volume flows per width through faces [m2/s]
+    through : float64[2 (nx + ny)]  inward flows through boundary faces [m3/s], in the order of `WaterGrid.reflect`
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    through: np.ndarray
+
+
+class RowArrays(NamedTuple):
+    """Work arrays for the rows of cells and of faces that are being computed.
+
+    cells : ring buffer of RING rows of cells; sides : values at the faces of two rows, to the south and north
+    fluxes : fluxes through two rows of faces; ends, along : values and fluxes at faces along a row, from one cell
+    before it; deep : see `surface_rows.put_smooth`; top : greatest rate of each column so far [1/s]
+    speeds, factors : speeds of a row of moving faces, and factors of stretching cells
+    """
+
+    cells: np.ndarray
+    sides: np.ndarray
+    fluxes: np.ndarray
+    ends: np.ndarray
+    along: np.ndarray
+    deep: np.ndarray
+    top: np.ndarray
+    speeds: np.ndarray
+    factors: np.ndarray
+
+
+@inline
+def open_work(work):
+    """`RowArrays` of a work array."""
+    at = RING * BLOCK
+    sides, at = work[at : at + 3 * SIDE], at + 3 * SIDE
+    fluxes, at = work[at : at + 3 * FLUX], at + 3 * FLUX
+    deep, top, speeds = work[at : at + STRIDE], work[at + STRIDE : at + 2 * STRIDE], work[WORK : WORK + STRIDE]
+    ends, along = sides[2 * SIDE :], fluxes[2 * FLUX :]
+    return RowArrays(work[: RING * BLOCK], sides, fluxes, ends, along, deep, top, speeds, work[WORK + STRIDE :])
+
+
+@njit(forceinline=True)
+def is_fifth_order(scheme):
+    """True for a scheme of fifth order."""
+    return scheme == LINEAR or scheme == WENO5
 
 
 @njit
@@ -71,8 +119,8 @@ def factors_of(j, left, right, moves, scratch):
 
     moves : as in `grid_rates`; scratch : work array
     """
-    wide, narrow = moves[3], moves[4]
-    if moves[0].size > 0:
+    wide, narrow = moves.wide, moves.narrow
+    if moves.speed_x.size > 0:
         return wide[left:right], narrow[left:right]
     row_wide, row_narrow = scratch[: right - left], scratch[STRIDE : STRIDE + right - left]
     fill(wide[j], row_wide)
@@ -81,48 +129,58 @@ def factors_of(j, left, right, moves, scratch):
 
 
 @njit
-def put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, work, top, moves):
-    """Write columns `first` to `last` - 1 of row j of cells, with ghost cells, to the ring buffer in `work`.
+def put_row(grid, j, first, last, states, rows, moves):
+    """Write columns `first` to `last` - 1 of row j of cells, with ghost cells, to the ring buffer.
 
-    A row beyond the grid is computed from the rows inside, which must be in the buffer. fifth : True for fifth order
-    top : greatest rate of each column so far [1/s], updated here; other arguments as in `grid_rates`
+    A row beyond the grid is computed from the rows inside, which must be in the buffer. The greatest rates of columns
+    are updated.
     """
-    ring = work[: RING * BLOCK]
-    fields, left, right = FIELDS if fifth else FLOW_EAST // STRIDE, max(first - GHOSTS, 0), min(last + GHOSTS, nx)
-    cells, walls = ring[ring_offset(j, left - first) :], reflect.size > 0
-    if 0 <= j < ny:
-        a, b = j * nx + left, j * nx + right
-        h, x, y, highest = dh[a:b], qx[a:b], qy[a:b], top[GHOSTS + left - first :]
-        if moves is None:
-            put_cells(g, plan[0, a:b], plan[1, a:b], h, x, y, kx[left:right], ky[j], None, cells, highest)
-            if fifth:
-                put_flows(x, y, None, cells)
-        else:
-            factors = factors_of(j, left, right, moves, work[WORK + STRIDE :])
-            put_cells(g, plan[0, a:b], plan[1, a:b], h, x, y, kx[left:right], ky[j], factors, cells, highest)
-            if fifth:
-                put_flows(x, y, factors, cells)
-        block = ring[ring_offset(j, -GHOSTS) :]
-        if left == 0:
-            put_ghost_end(fields, 3 if fifth else 2, reflect[j] if walls else 1.0, block, GHOSTS, -1, nx)
-            if moves is not None and moves[0].size > 0:
-                correct_ghost_end(fields, 3 if fifth else 2, moves[0][0], block, GHOSTS, -1)
-        if right == nx:
-            put_ghost_end(
-                fields, 3 if fifth else 2, reflect[ny + j] if walls else 1.0, block, GHOSTS + nx - 1 - first, 1, nx
-            )
-            if moves is not None and moves[0].size > 0:
-                correct_ghost_end(fields, 3 if fifth else 2, moves[0][nx], block, GHOSTS + nx - 1 - first, 1)
+    nx, ny, fifth = grid.nx, grid.ny, is_fifth_order(grid.scheme)
+    fields, reach = (rows_of.FIELDS, 3) if fifth else (rows_of.FLOW_EAST // STRIDE, 2)
+    left, right, walls = max(first - GHOSTS, 0), min(last + GHOSTS, nx), grid.reflect.size > 0
+    if j < 0 or j >= ny:
+        put_row_beyond(grid, j, first, last, fields, rows, moves)
         return
+    a, b, cells, kx = j * nx + left, j * nx + right, rows.cells[ring_offset(j, left - first) :], grid.kx[left:right]
+    dh, qx, qy = states[0][a:b], states[1][a:b], states[2][a:b]
+    depths, surfaces, top = grid.plan[0, a:b], grid.plan[1, a:b], rows.top[GHOSTS + left - first :]
+    if moves is None:
+        rows_of.put_cells(grid.g, depths, surfaces, dh, qx, qy, kx, grid.ky[j], None, cells, top)
+        if fifth:
+            rows_of.put_flows(qx, qy, None, cells)
+    else:
+        factors = factors_of(j, left, right, moves, rows.factors)
+        rows_of.put_cells(grid.g, depths, surfaces, dh, qx, qy, kx, grid.ky[j], factors, cells, top)
+        if fifth:
+            rows_of.put_flows(qx, qy, factors, cells)
+    block, end = rows.cells[ring_offset(j, -GHOSTS) :], GHOSTS + nx - 1 - first
+    if left == 0:
+        rows_of.put_ghost_end(fields, reach, grid.reflect[j] if walls else 1.0, block, GHOSTS, -1, nx)
+        if moves is not None and moves.speed_x.size > 0:
+            rows_of.correct_ghost_end(fields, reach, moves.speed_x[0], block, GHOSTS, -1)
+    if right == nx:
+        rows_of.put_ghost_end(fields, reach, grid.reflect[ny + j] if walls else 1.0, block, end, 1, nx)
+        if moves is not None and moves.speed_x.size > 0:
+            rows_of.correct_ghost_end(fields, reach, moves.speed_x[nx], block, end, 1)
+
+
+@njit
+def put_row_beyond(grid, j, first, last, fields, rows, moves):
+    """Write columns `first` to `last` - 1 of row j, which is beyond the grid, to the ring buffer, as `put_row` does.
+
+    fields : number of quantities of a cell
+    """
+    nx, ny, n, walls = grid.nx, grid.ny, last - first, grid.reflect
     edge = 0 if j < 0 else ny - 1
     mirror = min(-1 - j, ny - 1) if j < 0 else max(2 * ny - 1 - j, 0)
-    at = 2 * ny + first if j < 0 else 2 * ny + nx + first
-    put_ghost_row(
-        last - first, fields, reflect[at : at + last - first] if walls else reflect,
-        ring[ring_offset(edge, 0) :], ring[ring_offset(mirror, 0) :], ring[ring_offset(j, 0) :],
-    )  # fmt: skip
-    if moves is not None and moves[1].size > 0:
-        correct_ghost_row(last - first, fields, moves[1][0 if j < 0 else ny], ring[ring_offset(j, 0) :])
+    at, cells = 2 * ny + first if j < 0 else 2 * ny + nx + first, rows.cells[ring_offset(j, 0) :]
+    if walls.size > 0:
+        walls = walls[at : at + n]
+    rows_of.put_ghost_row(
+        n, fields, walls, rows.cells[ring_offset(edge, 0) :], rows.cells[ring_offset(mirror, 0) :], cells
+    )
+    if moves is not None and moves.speed_y.size > 0:
+        rows_of.correct_ghost_row(n, fields, moves.speed_y[0 if j < 0 else ny], cells)
 
 
 @njit
@@ -135,8 +193,8 @@ def close_walls(g, speed, rest, side, f, thrust):
     """
     for i in range(thrust.size):
         if speed != 0.0:
-            f[i], f[i + ALONG] = 0.0, 0.0
-        thrust[i] = f[i + AFTER] + 0.5 * g * ((side[i] - rest[i]) * (side[i] + rest[i]))
+            f[i], f[i + rows_of.ALONG] = 0.0, 0.0
+        thrust[i] = f[i + rows_of.AFTER] + 0.5 * g * ((side[i] - rest[i]) * (side[i] + rest[i]))
 
 
 @njit
@@ -148,164 +206,145 @@ def close_fixed_walls(walls, f, count):
     """
     for i in range(count):
         if walls.size == 0 or walls[i] == 1.0:
-            f[i], f[i + ALONG] = 0.0, 0.0
+            f[i], f[i + rows_of.ALONG] = 0.0, 0.0
 
 
 @njit
-def grid_rates(
-    g, scheme, limiter, nx, ny, begin, stop, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y, through, work, rate_h,
-    rate_x, rate_y, moves,
-):  # fmt: skip
+def grid_rates(grid, begin, stop, states, flows, work, rates, moves):
     """Write the rates of cells of rows `begin` to `stop` - 1; return the greatest (|u| + c) kx + (|v| + c) ky [1/s].
 
     Rows are counted over the whole grid; neighbours within the stencil of the scheme are read too.
-    g : gravity normal to the basin [m/s2]; scheme : UPWIND, MUSCL, LINEAR (upwind5) or WENO5; limiter : of MUSCL
-    nx, ny : numbers of columns and rows
-    kx, ky : float64[nx], float64[ny]  1 / widths of columns, 1 / heights of rows [1/m]
-    reflect : float64[2 (nx + ny)]  1 for a wall and 0 for open, in the order west, east, south, north; empty: all walls
-    plan : float64[PLANS, n]  depth at rest and surface at rest above the level [m]
-    dh, qx, qy : float64[n]  deviation of depth from rest [m], unit flows [m2/s]; with moving walls, the changes of
-    their amounts over undeformed areas, see `basins.cell_stretching`
-    flow_x : float64[ny (nx + 1)], flow_y : float64[(ny + 1) nx]  volume flows per width through faces [m2/s], or empty
-    through : float64[2 (nx + ny)]  inward flows through boundary faces [m3/s], in the order of `reflect`, or empty
+    grid, flows : `WaterGrid`, `FaceFlows`
+    states : deviation of depth from rest [m] and both unit flows [m2/s], three arrays; with moving walls, the changes
+    of their amounts over undeformed areas, see `basins.cell_stretching`; rates : arrays for their rates
     work : float64[WORK], fastest if aligned to a cache line; float64[MOVING] if lines move
-    rate_h, rate_x, rate_y : float64[n]  rates of dh, qx, qy
-    moves : None without moving walls, else a tuple of
-        speeds of the grid lines x = constant [m/s], float64[nx + 9], empty if at rest
-        speeds of the grid lines y = constant [m/s], float64[ny + 9], empty if at rest
-        float64[2 (nx + ny)]  thrust on boundary faces minus that at rest, over density and length [m3/s2]
-        `wide` : area over undeformed area of columns or rows, and its reciprocal `narrow`, see `basins.cell_stretching`
+    moves : None, or the `GridMotion` of moving walls
     """
     most = 0.0
-    for first in range(0, nx, MAX_COLUMNS):
-        last = min(first + MAX_COLUMNS, nx)
-        rate = column_rates(
-            g, scheme, limiter, nx, ny, begin, stop, True, first, last, kx, ky, reflect, plan, dh, qx, qy, flow_x,
-            flow_y, through, work, rate_h, rate_x, rate_y, moves,
-        )  # fmt: skip
+    for first in range(0, grid.nx, MAX_COLUMNS):
+        last = min(first + MAX_COLUMNS, grid.nx)
+        rate = column_rates(grid, begin, stop, True, first, last, states, flows, work, rates, moves)
         most = max(most, rate)
     return most
 
 
 @njit
-def column_rates(
-    g, scheme, limiter, nx, ny, begin, stop, fresh, first, last, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y,
-    through, work, rate_h, rate_x, rate_y, moves,
-):  # fmt: skip
+def column_rates(grid, begin, stop, fresh, first, last, states, flows, work, rates, moves):
     """Write the rates of columns `first` to `last` - 1, at most MAX_COLUMNS; return their greatest rate [1/s].
 
     fresh : False if the last call ended at row `begin` with the same `work`; then its results are used again
     Other arguments as in `grid_rates`
     """
-    n, fifth = last - first, scheme == LINEAR or scheme == WENO5
-    ring, at = work[: RING * BLOCK], RING * BLOCK
-    sides, at = work[at : at + 3 * SIDE], at + 3 * SIDE
-    fluxes, deep, top = work[at : at + 3 * FLUX], work[at + 3 * FLUX :], work[at + 3 * FLUX + STRIDE :]
-    ends, along = sides[2 * SIDE :], fluxes[2 * FLUX :]  # of a row, starting one cell before it
-    reach = 3 if fifth else 2
-    ahead = begin + reach
+    rows, reach = open_work(work), 3 if is_fifth_order(grid.scheme) else 2
+    ahead, most = begin + reach, 0.0
     if fresh:
-        for i in range(STRIDE):
-            top[i] = 0.0
-        ahead = min(ahead, ny)
+        fill(0.0, rows.top)
+        ahead = min(ahead, grid.ny)
         for j in range(max(begin - reach, 0), ahead):
-            put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, work, top, moves)
+            put_row(grid, j, first, last, states, rows, moves)
         for j in range(-1, begin - 1 - reach, -1):
-            put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, work, top, moves)
+            put_row(grid, j, first, last, states, rows, moves)
     for j in range(begin - 1 if fresh else begin + 1, stop + 1):
         while ahead < j + reach:
-            put_row(g, ahead, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, work, top, moves)
+            put_row(grid, ahead, first, last, states, rows, moves)
             ahead += 1
-        # values of row j at its southern and northern faces
-        now, was = j & 1, (j - 1) & 1
-        here, before = ring[ring_offset(j, 0) :], ring[ring_offset(j - 1, 0) :]
-        low = sides[now * SIDE :]
-        put_limited(scheme, limiter, n, before, here, ring[ring_offset(j + 1, 0) :], low)
-        if fifth:
-            put_smooth(
-                g,
-                scheme,
-                ring[ring_offset(j - 2, 0) :],
-                before,
-                here,
-                ring[ring_offset(j + 1, 0) :],
-                ring[ring_offset(j + 2, 0) :],
-                low,
-                deep[:n],
-            )
-        if j < begin:
-            continue
-        # faces between rows j - 1 and j
-        south, north, under = fluxes[was * FLUX :], fluxes[now * FLUX :], sides[was * SIDE + HIGH :]
-        l, r = (under, low) if fifth else (before, here)  # cells that bound wave speeds
-        if moves is None or moves[1].size == 0:
-            put_fluxes(g, n, NORTH, EAST, under, low, l, r, north, None)
-        else:
-            uniform_speed = work[WORK : WORK + STRIDE]
-            for i in range(n):
-                uniform_speed[i] = moves[1][j]
-            put_fluxes(g, n, NORTH, EAST, under, low, l, r, north, uniform_speed)
-            if j == 0 or j == ny:
-                at = 2 * ny + first + (nx if j > 0 else 0)
-                rest = plan[0, (0 if j == 0 else (ny - 1) * nx) + first :]
-                close_walls(g, moves[1][j], rest, low if j == 0 else under, north, moves[2][at : at + n])
-        if fifth and ny < REACH and (j == 0 or j == ny):
-            at = 2 * ny + first + (nx if j > 0 else 0)
-            close_fixed_walls(reflect[at : at + n], north, n)
-        if flow_y.size > 0:
-            copy(north, flow_y[j * nx + first : j * nx + last])
-        if through.size > 0 and (j == 0 or j == ny):
-            at = 2 * ny + first + (nx if j > 0 else 0)
-            put_inward(-1.0 if j > 0 else 1.0, kx[first:last], north, through[at : at + n])
-        if j == begin:
-            continue
-        # row j - 1 : faces along it, and its rates
-        padded_count = (n + 9) // 8 * 8  # padded to whole vectors
-        cell = ring[ring_offset(j - 1, -1) :]
-        put_limited(scheme, limiter, padded_count, ring[ring_offset(j - 1, -2) :], cell, before, ends)
-        if fifth:
-            put_smooth(
-                g,
-                scheme,
-                ring[ring_offset(j - 1, -3) :],
-                ring[ring_offset(j - 1, -2) :],
-                cell,
-                before,
-                ring[ring_offset(j - 1, 1) :],
-                ends,
-                deep[:padded_count],
-            )
-        left, right = ends[HIGH:], ends[1:]
-        l, r = (left, right) if fifth else (cell, before)
-        if moves is None or moves[0].size == 0:
-            put_fluxes(g, (n + 8) // 8 * 8, EAST, NORTH, left, right, l, r, along, None)
-        else:
-            put_fluxes(g, (n + 8) // 8 * 8, EAST, NORTH, left, right, l, r, along, moves[0][first:])
-            rest = plan[0, (j - 1) * nx :]
-            if first == 0:
-                close_walls(g, moves[0][0], rest, right, along, moves[2][j - 1 : j])
-            if last == nx:
-                close_walls(g, moves[0][nx], rest[nx - 1 :], left[n:], along[n:], moves[2][ny + j - 1 : ny + j])
-        if fifth and nx < REACH:
-            close_fixed_walls(reflect[j - 1 : j], along, 1)
-            close_fixed_walls(reflect[ny + j - 1 : ny + j], along[n:], 1)
-        if flow_x.size > 0:
-            at = (j - 1) * (nx + 1)
-            copy(along, flow_x[at + first : at + last + 1])
-        if through.size > 0 and first == 0:
-            through[j - 1] = along[0] / ky[j - 1]
-        if through.size > 0 and last == nx:
-            through[ny + j - 1] = -along[n] / ky[j - 1]
-        a, z = (j - 1) * nx + first, (j - 1) * nx + last
-        spacing_x, spacing_y = kx[first:last], ky[j - 1]
-        push_x, push_y = ends[PUSH + 1 :], sides[was * SIDE + PUSH :]
-        to_h, to_x, to_y = rate_h[a:z], rate_x[a:z], rate_y[a:z]
-        if moves is None:
-            put_rates(g, spacing_x, spacing_y, push_x, push_y, along, south, north, None, to_h, to_x, to_y)
-        else:
-            wide, _ = factors_of(j - 1, first, last, moves, work[WORK + STRIDE :])
-            put_rates(g, spacing_x, spacing_y, push_x, push_y, along, south, north, wide, to_h, to_x, to_y)
-    most = 0.0
+        a, b = rows.cells[ring_offset(j - 2, 0) :], rows.cells[ring_offset(j - 1, 0) :]
+        d, e = rows.cells[ring_offset(j + 1, 0) :], rows.cells[ring_offset(j + 2, 0) :]
+        c, sides = rows.cells[ring_offset(j, 0) :], rows.sides[(j & 1) * SIDE :]
+        put_values(grid, last - first, a, b, c, d, e, sides, rows.deep)
+        if j >= begin:
+            put_fluxes_across(grid, j, first, last, rows, flows, moves)
+        if j > begin:
+            put_fluxes_along(grid, j - 1, first, last, rows, flows, moves)
+            put_row_rates(grid, j - 1, first, last, rows, rates, moves)
     for i in range(STRIDE):
-        most = max(most, top[i])
+        most = max(most, rows.top[i])
     return most
+
+
+@inline
+def put_values(grid, n, a, b, c, d, e, sides, deep):
+    """Write the values at both faces of n cells c to `sides`.
+
+    a, b, d, e : neighbours two and one before c, and one and two after it; deep : see `surface_rows.put_smooth`
+    """
+    rows_of.put_limited(grid.scheme, grid.limiter, n, b, c, d, sides)
+    if is_fifth_order(grid.scheme):
+        rows_of.put_smooth(grid.g, grid.scheme, a, b, c, d, e, sides, deep[:n])
+
+
+@inline
+def put_fluxes_across(grid, j, first, last, rows, flows, moves):
+    """Write the fluxes through the faces between rows j - 1 and j to `rows.fluxes`, and the flows through them.
+
+    Arguments as in `column_rates`
+    """
+    g, n, nx, ny, is_side = grid.g, last - first, grid.nx, grid.ny, j == 0 or j == grid.ny
+    fifth, at = is_fifth_order(grid.scheme), 2 * ny + first + (nx if j > 0 else 0)
+    low, under = rows.sides[(j & 1) * SIDE :], rows.sides[((j - 1) & 1) * SIDE + HIGH :]
+    before, here = rows.cells[ring_offset(j - 1, 0) :], rows.cells[ring_offset(j, 0) :]
+    north = rows.fluxes[(j & 1) * FLUX :]
+    l, r = (under, low) if fifth else (before, here)  # cells that bound wave speeds
+    if moves is None or moves.speed_y.size == 0:
+        rows_of.put_fluxes(g, n, NORTH, EAST, under, low, l, r, north, None)
+    else:
+        for i in range(n):
+            rows.speeds[i] = moves.speed_y[j]
+        rows_of.put_fluxes(g, n, NORTH, EAST, under, low, l, r, north, rows.speeds)
+        if is_side:
+            rest = grid.plan[0, (0 if j == 0 else (ny - 1) * nx) + first :]
+            close_walls(g, moves.speed_y[j], rest, low if j == 0 else under, north, moves.thrust[at : at + n])
+    if fifth and ny < REACH and is_side:
+        close_fixed_walls(grid.reflect[at : at + n], north, n)
+    if flows.y.size > 0:
+        copy(north, flows.y[j * nx + first : j * nx + last])
+    if flows.through.size > 0 and is_side:
+        put_inward(-1.0 if j > 0 else 1.0, grid.kx[first:last], north, flows.through[at : at + n])
+
+
+@inline
+def put_fluxes_along(grid, j, first, last, rows, flows, moves):
+    """Write the fluxes through the faces along row j to `rows.along`, and the flows through them.
+
+    Arguments as in `column_rates`
+    """
+    g, n, nx, ny, fifth = grid.g, last - first, grid.nx, grid.ny, is_fifth_order(grid.scheme)
+    cell, after = rows.cells[ring_offset(j, -1) :], rows.cells[ring_offset(j, 0) :]
+    a, b, e = rows.cells[ring_offset(j, -3) :], rows.cells[ring_offset(j, -2) :], rows.cells[ring_offset(j, 1) :]
+    count = (n + 8) // 8 * 8
+    put_values(grid, (n + 9) // 8 * 8, a, b, cell, after, e, rows.ends, rows.deep)  # padded to whole vectors
+    along, left, right = rows.along, rows.ends[HIGH:], rows.ends[1:]
+    l, r = (left, right) if fifth else (cell, after)  # cells that bound wave speeds
+    if moves is None or moves.speed_x.size == 0:
+        rows_of.put_fluxes(g, count, EAST, NORTH, left, right, l, r, along, None)
+    else:
+        rows_of.put_fluxes(g, count, EAST, NORTH, left, right, l, r, along, moves.speed_x[first:])
+        rest, thrust = grid.plan[0, j * nx :], moves.thrust
+        if first == 0:
+            close_walls(g, moves.speed_x[0], rest, right, along, thrust[j : j + 1])
+        if last == nx:
+            close_walls(g, moves.speed_x[nx], rest[nx - 1 :], left[n:], along[n:], thrust[ny + j : ny + j + 1])
+    if fifth and nx < REACH:
+        close_fixed_walls(grid.reflect[j : j + 1], along, 1)
+        close_fixed_walls(grid.reflect[ny + j : ny + j + 1], along[n:], 1)
+    if flows.x.size > 0:
+        copy(along, flows.x[j * (nx + 1) + first : j * (nx + 1) + last + 1])
+    if flows.through.size > 0 and first == 0:
+        flows.through[j] = along[0] / grid.ky[j]
+    if flows.through.size > 0 and last == nx:
+        flows.through[ny + j] = -along[n] / grid.ky[j]
+
+
+@inline
+def put_row_rates(grid, j, first, last, rows, rates, moves):
+    """Write the rates of row j from the fluxes through its faces; arguments as in `column_rates`."""
+    a, z, kx, ky = j * grid.nx + first, j * grid.nx + last, grid.kx[first:last], grid.ky[j]
+    was = j & 1
+    south, north = rows.fluxes[was * FLUX :], rows.fluxes[(1 - was) * FLUX :]
+    push_x, push_y = rows.ends[rows_of.PUSH + 1 :], rows.sides[was * SIDE + rows_of.PUSH :]
+    to_h, to_x, to_y = rates[0][a:z], rates[1][a:z], rates[2][a:z]
+    if moves is None:
+        rows_of.put_rates(grid.g, kx, ky, push_x, push_y, rows.along, south, north, None, to_h, to_x, to_y)
+    else:
+        wide, _ = factors_of(j, first, last, moves, rows.factors)
+        rows_of.put_rates(grid.g, kx, ky, push_x, push_y, rows.along, south, north, wide, to_h, to_x, to_y)

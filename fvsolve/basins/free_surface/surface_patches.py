@@ -1,29 +1,21 @@
-"""Patches of water with a free surface: pressures at them, and the effect of the flows of links on the cells there."""
+"""Patches and probes of water with a free surface: pressures, and the effect of the flows of links on cells."""
 
 from math import inf, sqrt
 
+from fvsolve.basins import boundary_cells as near
 from fvsolve.basins.basin_frames import potential_coefficients
 from fvsolve.basins.basin_patches import add_link_momentum, normal_gravity
-from fvsolve.basins.boundary_cells import (
-    LEAST_DEPTH,
-    SHALLOW,
-    available_fraction,
-    depth_at_patch,
-    flow_weight,
-    outflow_weight,
-    patch_area,
-    patch_length,
-    weighted_volume,
-)
+from fvsolve.basins.basin_probes import FIRST_OWN, velocity_value
 from fvsolve.basins.cell_stretching import deviations_of, stretch_of_cell
 from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.basins.physics_codes import physics_code
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import GN, PATCH, RATE
+from fvsolve.kernels.dtypes import CELL_FIELD, GN, PATCH, RATE
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.table_handle import open_tables
 
 OWN_CODE = physics_code(__package__)
+DEPTH = FIRST_OWN
 
 
 @njit
@@ -45,12 +37,12 @@ def water_at_patch(tables, patch, y):
     rest, rise, depth, volume, squares = max(low, 0.0) if basin["frame"] < 0 else 0.0, 0.0, 0.0, 0.0, 0.0
     for m in range(patch["count"]):
         i = tables.integers[patch["first"] + m]
-        h = depth_at_patch(plane, basin, i, y)
-        part = plane[basin["area"] + i] * outflow_weight(h)
-        volume, squares = volume + part, squares + part * outflow_weight(h)
+        h = near.depth_at_patch(plane, basin, i, y)
+        part = plane[basin["area"] + i] * near.outflow_weight(h)
+        volume, squares = volume + part, squares + part * near.outflow_weight(h)
         rise += part * (plane[plan + n + i] + y[basin["y"] + i] - rest)
         depth += part * h
-    filling = max(LEAST_DEPTH * patch_area(tables, patch) - volume, 0.0)
+    filling = max(near.LEAST_DEPTH * near.patch_area(tables, patch) - volume, 0.0)
     total = volume + filling
     return (rise + filling * (lowest - rest)) / total, depth / total, volume, squares
 
@@ -61,13 +53,13 @@ def bottom_pressure_at_patch(plane, basin, patch, rise, depth):
 
     The water is at rest in the frame of the basin, so its surface is an equipotential, and its height over any position
     follows from the potential phi of gravity and inertial forces. At a dry position the pressure is 0.
-    Below the depth SHALLOW it is multiplied by `available_fraction`.
+    Below the depth near.SHALLOW it is multiplied by `available_fraction`.
     rise, depth : results of `water_at_patch`
     """
     at, (fx, fy, xx, xy, yy) = patch["sizes"] + 2, potential_coefficients(plane, basin["frame"], 1.0)
     x, y, z, profile = plane[at], plane[at + 1], plane[at + 2], plane[at + 3]
     phi = x * (fx + xx * x + xy * y) + y * (fy + yy * y)
-    return available_fraction(depth) * max(plane[basin["frame"] + GN] * (rise - z) - phi, 0.0) - profile
+    return near.available_fraction(depth) * max(plane[basin["frame"] + GN] * (rise - z) - phi, 0.0) - profile
 
 
 @njit
@@ -86,15 +78,15 @@ def patch_pressures(t, y, dydt, out, handle):
             continue
         node, seen = tables.nodes[patch["node"]], deviations_of(basin, tables.seen, y)
         stored, depth, volume, squares = water_at_patch(tables, patch, seen)
-        area = patch_area(tables, patch)
+        area = near.patch_area(tables, patch)
         slope, content = st["rho"] * normal_gravity(st, tables.plane, basin), st["rho"] * area
-        spread = area * squares / (volume * volume) if volume > LEAST_DEPTH * area else 1.0
+        spread = area * squares / (volume * volume) if volume > near.LEAST_DEPTH * area else 1.0
         pressure = slope * stored
         if basin["frame"] >= 0:
             pressure = st["rho"] * bottom_pressure_at_patch(tables.plane, basin, patch, stored, depth)
         out[layout["pressure"] + patch["node"]] = pressure
         out[layout["supply"] + patch["node"]] = 0.0
-        out[layout["outflow_fraction"] + node["row"]] = available_fraction(depth)
+        out[layout["outflow_fraction"] + node["row"]] = near.available_fraction(depth)
         out[layout["stiffness"] + node["row"]] = slope * spread / content
 
 
@@ -123,36 +115,27 @@ def add_patch_flow(tables, patch, demand, y, dydt, out):
     n, o, first = basin["n"], basin["y"], patch["first"]
     _, depth, volume, _ = water_at_patch(tables, patch, y)
     leaves, available = demand < 0.0, 1.0
-    total = weighted_volume(tables, patch, leaves, y)
+    total = near.weighted_volume(tables, patch, leaves, y)
     if leaves:
-        available = available_fraction(depth)  # the rest comes from outside
-        slope = (
-            -2.0 * demand * available * min(depth / SHALLOW, 1.0) / (rho * total)
-        )  # 2: more than the slope of `outflow_weight`
-        out[RATE] = max(out[RATE], slope)
+        available = near.available_fraction(depth)  # the rest comes from outside
+        slope = -2.0 * demand * available * min(depth / near.SHALLOW, 1.0) / (rho * total)
+        out[RATE] = max(out[RATE], slope)  # 2 is more than the slope of `outflow_weight`
         out[layout["supply"] + patch["node"]] += (available * volume / total - 1.0) * demand
     flow = available * demand / (rho * total)  # of depth, over weights [1/s]
     for m in range(patch["count"] if dydt.size > 0 else 0):
         i = integers[first + m]
-        dydt[o + i] += flow * flow_weight(plane, basin, leaves, i, y) * stretch_of_cell(plane, basin, i)
-    per_width = -flow * patch_area(tables, patch) / patch_length(tables, patch)  # over weights [m/s]
+        dydt[o + i] += flow * near.flow_weight(plane, basin, leaves, i, y) * stretch_of_cell(plane, basin, i)
+    per_width = -flow * near.patch_area(tables, patch) / near.patch_length(tables, patch)  # over weights [m/s]
     for m in range(patch["faces"] if dydt.size > 0 and flow != 0.0 else 0):
         k = integers[patch["ring"] + patch["faces"] + m]
-        out_per_width = per_width * flow_weight(plane, basin, leaves, k, y)
-        h = depth_at_patch(plane, basin, k, y)
+        out_per_width = per_width * near.flow_weight(plane, basin, leaves, k, y)
+        h = near.depth_at_patch(plane, basin, k, y)
         i, at, count = o + k, patch["normals"], patch["faces"]
         share = 2.0 * h / (h * h + max(h, THIN) * max(h, THIN))
         along_x, along_y = plane[at + m], plane[at + count + m]
         u = share * (y[i + n] * along_x + y[i + 2 * n] * along_y)
-        add_link_momentum(
-            plane,
-            patch,
-            m,
-            (abs(u) + sqrt(normal_gravity(st, plane, basin) * h)) * out_per_width,
-            dydt,
-            i + n,
-            i + 2 * n,
-        )
+        push = (abs(u) + sqrt(normal_gravity(st, plane, basin) * h)) * out_per_width
+        add_link_momentum(plane, patch, m, push, dydt, i + n, i + 2 * n)
         if out_per_width > 0.0:  # outflow takes its tangential momentum along
             across, per_area = share * (y[i + 2 * n] * along_x - y[i + n] * along_y), plane[at + 2 * count + m]
             dydt[i + n] += out_per_width * per_area * across * along_y
@@ -172,5 +155,39 @@ def limit_inflow_rate(t, y, dydt, out, handle):
         receiver = valves[k]["to_node"] if drop > 0.0 else valves[k]["from_node"]
         for p in range(patches.size if tables.nodes[receiver]["kind"] == PATCH else 0):
             if patches[p]["node"] == receiver and tables.basins[patches[p]["basin"]]["kind"] == OWN_CODE:
-                wide = sqrt(patch_area(tables, patches[p]) / patches[p]["count"])
+                wide = sqrt(near.patch_area(tables, patches[p]) / patches[p]["count"])
                 out[RATE] = max(out[RATE], 2.0 * sqrt(abs(drop) / st["rho"]) / wide)
+
+
+@njit
+def observe_water(t, y, out, handle, values):
+    """Write the values of probes in cells of water: `scale` times depth plus `offset` [m], or velocities [m/s].
+
+    `scale` and `offset` are columns of the table of probes.
+    """
+    tables = open_tables(handle)
+    for k in range(tables.probes.size):
+        probe = tables.probes[k]
+        if probe["kind"] == CELL_FIELD and tables.basins[probe["index"]]["kind"] == OWN_CODE:
+            depth, u, v = read_water(tables, probe, y)
+            own = probe["side"] == DEPTH
+            values[k] = probe["scale"] * depth + probe["offset"] if own else velocity_value(probe["side"], u, v)
+
+
+@njit
+def read_water(tables, probe, y):
+    """(depth [m], velocity along x, velocity along y [m/s]) at a probe: weighted sums over its cells.
+
+    Velocities fade to zero in thin water.
+    """
+    basin, total, u, v = tables.basins[probe["index"]], 0.0, 0.0, 0.0
+    n, o = basin["n"], basin["y"]
+    for m in range(probe["count"]):
+        i, weight = tables.integers[probe["cell"] + m], tables.floats[probe["weights"] + m]
+        depth = max(tables.plane[basin["plan"] + i] + y[o + i], 0.0)
+        wet = max(depth, THIN)
+        share = 2.0 * depth / (depth * depth + wet * wet) * weight
+        total += weight * depth
+        u += share * y[o + n + i]
+        v += share * y[o + 2 * n + i]
+    return total, u, v

@@ -1,203 +1,78 @@
-"""Pressure waves of a liquid on a rectangular grid of cells, under the density law `linear`.
+"""Rows of a liquid on a rectangular grid under the density law `linear`: waves, fluxes, rates; see `liquid_grid`.
 
 r_t + div m = 0, m_t + c^2 grad r = 0: deviation of density r [kg/m3], whose pressure is c^2 r, wave speed c [m/s], and
 mass-flow densities m [kg/(m2 s)]. Along each direction the waves (c r + m) / 2 and (c r - m) / 2 are reconstructed
-upwind, which is Godunov's flux. The system is linear, so one direction at a time has the full order of the scheme. A
-row of cells is read once: for its own faces, then for those towards the rows before it; the waves of rows are stored in
-a ring buffer of `RING` rows.
+upwind, which is Godunov's flux. The system is linear, so one direction at a time has the full order of the scheme.
 """
 
-from fvsolve.basins.cell_stretching import stretch_row_rates
-from fvsolve.basins.liquid import moving_wall_waves
-from fvsolve.basins.liquid.moving_wall_waves import (
-    GHOSTS,
-    correct_mirror_row,
-    mirror_at_walls,
-    put_moving_fluxes,
-    put_wall_pressure,
-    reflect_at_wall,
-)
+from fvsolve.basins.liquid.liquid_sides import GHOSTS, WALLS, put_faces_along, put_waves
 from fvsolve.jit import inline, njit
-from fvsolve.kernels.dtypes import LINEAR, MUSCL, UPWIND, WENO5
-from fvsolve.kernels.ghost_cells import entering_ghosts, leaving_ghosts
-from fvsolve.kernels.reconstruction import by_limiter, slope, value_muscl, value_weno5
-
-WALLS, MIRRORS, OPEN = 0, 1, 2  # kinds of sides
-RING = 8  # stored rows of waves: the six of the stencil of a row of faces, and space for all three beyond a side
-CLOSURE_CELLS = 5  # cells read by the closure of a side
-SIDE_VALUES = GHOSTS + CLOSURE_CELLS
-SIDE_WORK = 2 * SIDE_VALUES + 2 * CLOSURE_CELLS + GHOSTS  # length of the work array of a side
-
-
-@njit
-def value_upwind5(a, b, c, d, e):
-    """Fifth-order upwind value at the face between c and d, from the averages a to e of five consecutive cells."""
-    return ((2.0 * a - 13.0 * b) + (47.0 * c + 27.0 * d) - 3.0 * e) * (1.0 / 60.0)
 
 
 @inline
-def faces_limited(limiter, b, c, d, f):
-    """Write to f the values at the faces between cells c and d, from cell c with a limited slope (MUSCL).
-
-    b, c, d : averages of three consecutive cells
-    """
-    for i in range(f.size):
-        f[i] = c[i] + 0.5 * slope(limiter, c[i] - b[i], d[i] - c[i])
-
-
-@njit
-def faces(scheme, limiter, small, a, b, c, d, e, f):
-    """Write to f the values at the faces between cells c and d, from the side of c (upwind).
-
-    a, b, c, d, e : averages of five consecutive cells; small : see `value_weno5`
-    """
-    if scheme == UPWIND:
-        for i in range(f.size):
-            f[i] = c[i]
-    elif scheme == LINEAR:
-        for i in range(f.size):
-            f[i] = value_upwind5(a[i], b[i], c[i], d[i], e[i])
-    elif scheme == WENO5:
-        for i in range(f.size):
-            f[i] = value_weno5(a[i], b[i], c[i], d[i], e[i], small)
-    else:
-        by_limiter(faces_limited, limiter, b, c, d, f)
-
-
-@njit
-def scheme_for(scheme, n, first, second):
-    """Scheme for a row of n cells between two sides of the kinds `first` and `second`, see `side_kind`.
-
-    It is MUSCL for fewer than five cells, except between walls or under `UPWIND`.
-    """
-    return scheme if (first == WALLS and second == WALLS) or n >= CLOSURE_CELLS or scheme == UPWIND else MUSCL
-
-
-@njit
-def side_kind(reflect):
-    """Kind of a side by the reflection coefficients of its faces.
-
-    WALLS if all are 1, MIRRORS if all are 1 or -1, else OPEN.
-    """
-    kind = WALLS
-    for k in range(reflect.size):
-        if abs(reflect[k]) != 1.0:
-            return OPEN
-        if reflect[k] != 1.0:
-            kind = MIRRORS
-    return kind
-
-
-@njit
-def mirrored_cell(j, n):
-    """Index of the cell whose mirror image is at index j, with mirrors before cell 0 and after cell n - 1."""
-    q = j % (2 * n)
-    return q if q < n else 2 * n - 1 - q
-
-
-@njit
-def is_reversed(j, n):
-    """True if the image of `mirrored_cell` at index j is reversed, so that forward and backward wave change places."""
-    return j % (2 * n) >= n
+def put_row(liquid, grid, j, states, work, phi, up, down, aside):
+    """Write the waves across row j to up, down."""
+    a, z = j * grid.nx, (j + 1) * grid.nx
+    put_waves(0.5 * liquid.c, states[0][a:z], states[2][a:z], up, down)
 
 
 @inline
-def mirror(n, forward, backward):
-    """Fill the three ghost cells beyond both ends of a row of n cells between walls.
-
-    They are mirror images of the cells, with forward and backward wave exchanged.
-    forward, backward : float64[n + 6]  waves; the cells are at [3 : n + 3]
-    """
-    for k in range(GHOSTS):
-        forward[2 - k], backward[2 - k] = backward[3 + k], forward[3 + k]
-        forward[n + 3 + k], backward[n + 3 + k] = backward[n + 2 - k], forward[n + 2 - k]
-
-
-@njit
-def close_side(kind, scheme, limiter, small, reflect, n, entering, leaving, first, step, spare):
-    """Fill the three ghost cells of both waves beyond an end of a row of n cells, where the side is not a wall.
-
-    At MIRRORS they are mirror images times the reflection coefficient. At OPEN sides the outgoing wave is extrapolated
-    by a polynomial; so is the incoming wave, with its value at the side as an additional datum, as at the ends of
-    pipes. All faces of a side have one kind: with different kinds on one side, solutions of `upwind5` would grow by
-    1e-4 per cell travel time.
-
-    kind : MIRRORS or OPEN; reflect : reflection coefficient of the side; small : see `value_weno5`
-    entering, leaving : incoming and outgoing wave; spare : work array
-    first : index of the cell next to the side; step : 1 or -1, from each cell to the next
-    """
-    incoming, outgoing, ghosts = (
-        spare[:CLOSURE_CELLS],
-        spare[CLOSURE_CELLS : 2 * CLOSURE_CELLS],
-        spare[2 * CLOSURE_CELLS : 2 * CLOSURE_CELLS + GHOSTS],
-    )
-    for k in range(CLOSURE_CELLS):
-        at = first + step * min(k, n - 1)
-        incoming[k], outgoing[k] = entering[at], leaving[at]
-    if kind == MIRRORS:
-        for k in range(GHOSTS):
-            at = first - step * (k + 1)
-            entering[at], leaving[at] = reflect * outgoing[k], reflect * incoming[k]
+def put_rates_along(liquid, grid, j, states, work, aside, through, rates, moves, phi):
+    """Write the rates of row j by the fluxes along it."""
+    c, nx, ny, k, a, z = liquid.c, grid.nx, grid.ny, grid.ky[j], j * grid.nx, (j + 1) * grid.nx
+    put_waves(0.5 * c, states[0][a:z], states[1][a:z], work.east[GHOSTS : nx + GHOSTS], work.west[GHOSTS : nx + GHOSTS])
+    put_faces_along(liquid, grid, j, work, moves)
+    east, west, (rate_r, rate_x, rate_y) = work.forward, work.backward, rates
+    if through.size > 0:
+        through[j], through[ny + j] = (east[0] - west[0]) / k, (west[nx] - east[nx]) / k
+    if moves is None or moves.speed_x.size == 0:
+        put_row_rates(c, grid.kx, east, west, rate_r[a:z], rate_x[a:z], rate_y[a:z])
         return
-    degree = 0 if scheme == UPWIND else 4
-    a, b, c = outgoing[2], outgoing[1], outgoing[0]
-    leaving_ghosts(outgoing, n, scheme, degree, limiter, small, ghosts)
-    for k in range(GHOSTS):
-        leaving[first - step * (k + 1)] = ghosts[k]
-    datum = c
-    if scheme == LINEAR:
-        datum = value_upwind5(a, b, c, ghosts[0], ghosts[1])
-    elif scheme == WENO5:
-        datum = value_weno5(a, b, c, ghosts[0], ghosts[1], small)
-    elif scheme == MUSCL:
-        datum = value_muscl(limiter, b, c, ghosts[0])
-    entering_ghosts(incoming, n, scheme, degree, reflect * datum, small, ghosts)
-    for k in range(GHOSTS):
-        entering[first - step * (k + 1)] = ghosts[k]
-
-
-@njit
-def close_row(kind, scheme, limiter, small, reflect, n, entering, leaving, first, step, spare):
-    """Fill the three rows of ghost cells beyond the southern or northern side of a grid of n rows, in the ring buffer.
-
-    reflect : reflection coefficient of the side in each column; first : row next to the side
-    step : 1 or -1, direction into the grid; other arguments as in `close_side`
-    """
-    incoming, outgoing, rest = spare[:SIDE_VALUES], spare[SIDE_VALUES : 2 * SIDE_VALUES], spare[2 * SIDE_VALUES :]
-    wide = reflect.size
-    for i in range(wide):
-        for k in range(min(n, CLOSURE_CELLS)):
-            at = ((first + step * k) % RING) * wide + i
-            incoming[GHOSTS + k], outgoing[GHOSTS + k] = entering[at], leaving[at]
-        close_side(kind, scheme, limiter, small, reflect[i], n, incoming, outgoing, GHOSTS, 1, rest)
-        for k in range(GHOSTS):
-            at = ((first - step * (k + 1)) % RING) * wide + i
-            entering[at], leaving[at] = incoming[GHOSTS - 1 - k], outgoing[GHOSTS - 1 - k]
+    speeds, along, thrust, loss = moves.speed_x, states[2][a:z], moves.thrust, moves.thrust[moves.thrust.size // 2 :]
+    put_wall_pressure(c, -speeds[0], east, west, along, 1, thrust[j:], loss[j:])
+    put_wall_pressure(c, speeds[nx], east[nx:], west[nx:], along[nx - 1 :], 1, thrust[ny + j :], loss[ny + j :])
+    put_moving_fluxes(c, liquid.rho, speeds, 1, east, west)
+    east[0] = 0.0 if grid.sides[0] == WALLS else east[0]
+    east[nx] = 0.0 if grid.sides[1] == WALLS else east[nx]
+    if through.size > 0:
+        through[j], through[ny + j] = east[0] / k, -east[nx] / k
+    put_moving_row_rates(grid.kx, speeds, east, west, along, rate_r[a:z], rate_x[a:z], rate_y[a:z])
 
 
 @inline
-def reflect_waves(reflect, leaving, entering):
-    """Write the incoming waves `entering` at faces of a side: outgoing waves `leaving` times coefficients `reflect`."""
-    for i in range(entering.size):
-        entering[i] = reflect[i] * leaving[i]
+def put_fluxes_across(liquid, grid, j, states, work, flux, through, moves, phi):
+    """Convert the waves at moving faces before row j to fluxes, and write flows and pressures at the sides."""
+    nx, ny, up, down = grid.nx, grid.ny, flux[0], flux[1]
+    at = 2 * ny + (nx if j > 0 else 0)
+    if through.size > 0 and j == 0:
+        put_inward(grid.kx, up, down, through[at : at + nx])
+    if through.size > 0 and j == ny:
+        put_inward(grid.kx, down, up, through[at : at + nx])
+    if moves is None or moves.speed_y.size == 0:
+        return
+    speed, is_side = moves.speed_y[j], j == 0 or j == ny
+    if is_side:
+        thrust, loss = moves.thrust, moves.thrust[moves.thrust.size // 2 :]
+        along, outward = states[1][(ny - 1) * nx if j > 0 else 0 :], speed if j > 0 else -speed
+        put_wall_pressure(liquid.c, outward, up, down, along, nx, thrust[at:], loss[at:])
+    put_moving_fluxes(liquid.c, liquid.rho, moves.speed_y[j:], 0, up, down)
+    if is_side and grid.sides[2 if j == 0 else 3] == WALLS:
+        for i in range(nx):
+            up[i] = 0.0
+        for i in range(nx if through.size > 0 else 0):
+            through[at + i] = 0.0
 
 
 @inline
-def put_inward(k, entering, leaving, inward):
-    """Write the inward mass flows per thickness through the faces of a side [kg/(m s)] to `inward`.
-
-    k : 1 / lengths of the faces [1/m]; entering, leaving : incoming and outgoing waves at the faces
-    """
-    for i in range(inward.size):
-        inward[i] = (entering[i] - leaving[i]) / k[i]
-
-
-@inline
-def put_waves(half, r, m, forward, backward):
-    """Write the waves (c r + m) / 2 and (c r - m) / 2 of a row of cells. half : c / 2"""
-    for i in range(r.size):
-        a, b = half * r[i], 0.5 * m[i]
-        forward[i], backward[i] = a + b, a - b
+def add_rates_across(liquid, grid, j, states, before, after, rates, moves, phi):
+    """Add to the rates of row j the fluxes through the faces before and after it."""
+    nx, ny, a, z, (rate_r, rate_x, rate_y) = grid.nx, grid.ny, j * grid.nx, (j + 1) * grid.nx, rates
+    if moves is None or moves.speed_y.size == 0:
+        add_column_rates(liquid.c, grid.ky[j], before[0], before[1], after[0], after[1], rate_r[a:z], rate_y[a:z])
+        return
+    flow = states[1]
+    along = flow[max(j - 1, 0) * nx :], flow[a:], flow[min(j + 1, ny - 1) * nx :]
+    add_moving_column_rates(grid.ky[j], moves.speed_y[j:], before, after, along, rate_r[a:z], rate_y[a:z], rate_x[a:z])
 
 
 @inline
@@ -228,237 +103,77 @@ def add_column_rates(c, k, f0, b0, f1, b1, rate_r, rate_m):
         rate_m[i] += ck * ((f0[i] + b0[i]) - (f1[i] + b1[i]))
 
 
-@njit
-def max_spacing_rate(kx, ky):
-    """Greatest sum 1 / width + 1 / height over the cells [1/m]. kx, ky : 1 / widths of columns, 1 / heights of rows"""
-    x, y = 0.0, 0.0
-    for i in range(kx.size):
-        x = max(x, kx[i])
-    for j in range(ky.size):
-        y = max(y, ky[j])
-    return x + y
+@inline
+def put_inward(k, entering, leaving, inward):
+    """Write the inward mass flows per thickness through the faces of a side [kg/(m s)] to `inward`.
 
-
-@njit
-def first_row_read(begin, ny):
-    """First row of cells that is read for the faces of a band that begins at row `begin` of ny."""
-    return max(min(begin - GHOSTS, ny - CLOSURE_CELLS), 0)
-
-
-@njit
-def row_needed(j, ny):
-    """Number of rows of cells, from row 0, that must be read before the faces between rows j - 1 and j are computed."""
-    return min(max(j + GHOSTS, CLOSURE_CELLS), ny)
-
-
-@njit
-def work_size(nx, ny):
-    """Length of the work array of `grid_rates` for nx columns and ny rows."""
-    return (2 * RING + 4) * nx + 2 * (nx + 2 * GHOSTS) + 2 * (nx + 1) + SIDE_WORK
-
-
-@njit
-def put_moving_row(c, ny, j, up, down, along, moves):
-    """Convert the waves `up` and `down` at the moving faces between rows j - 1 and j to mass and momentum fluxes.
-
-    At the sides of the grid the pressures on the faces and terms of the power lost there are written to `moves` too.
-    along : mass-flow densities along the faces, of all cells of the grid; moves : as in `grid_rates`
+    k : 1 / lengths of the faces [1/m]; entering, leaving : incoming and outgoing waves at the faces
     """
-    nx, count = up.size, moves[2].size // 2
-    if j == 0 or j == ny:
-        at, speed = 2 * ny + (nx if j > 0 else 0), moves[1][j]
-        tangential = along[(ny - 1) * nx if j > 0 else 0 :]
-        put_wall_pressure(
-            c, speed if j > 0 else -speed, up, down, tangential, nx, moves[2][at:], moves[2][count + at :]
-        )
-    put_moving_fluxes(c, moves[3], moves[1][j:], 0, up, down)
+    for i in range(inward.size):
+        inward[i] = (entering[i] - leaving[i]) / k[i]
 
 
 @njit
-def grid_rates(
-    c, small, scheme, limiter, nx, ny, begin, stop, kx, ky, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y,
-    moves,
-):  # fmt: skip
-    """Write the rates of the cells of rows `begin` to `stop` - 1; return the greatest c (kx + ky) of all cells [1/s].
+def put_wall_pressure(c, speed, forward, backward, along, n, thrust, loss):
+    """Write the pressures on n faces of a moving wall and terms of the power lost there.
 
-    Rows are counted over the whole grid; up to three rows beyond the band are read too, and more next to open sides.
-    c : wave speed [m/s]; small : square of a negligible flow density [kg2/(m4 s2)]
-    scheme : UPWIND, MUSCL, LINEAR (upwind5) or WENO5; limiter : of MUSCL
-    nx, ny : numbers of columns and rows
-    kx, ky : float64[nx], float64[ny]  1 / widths of columns, 1 / heights of rows [1/m]
-    reflect : float64[2 (nx + ny)]  reflection coefficients of the faces of the sides west, east, south, north; 1 for
-    walls, empty if all are walls
-    r, mx, my : float64[nx ny]  deviation of density [kg/m3], mass-flow densities along x and y [kg/(m2 s)]
-    through : float64[2 (nx + ny)]  inward flows through boundary faces [kg/(m s)], in the order of `reflect`, or empty
-    work : float64[work_size(nx, ny)]
-    rate_r, rate_x, rate_y : float64[nx ny]  rates of r, mx, my
-    moves : None without moving walls, else a tuple of
-        speeds of the grid lines x = constant [m/s], float64[nx + 1], empty if at rest
-        speeds of the grid lines y = constant [m/s], float64[ny + 1], empty if at rest
-        array for pressures on boundary faces and terms of the power lost there, as in `liquid_mesh.liquid_rates`
-        density at rest [kg/m3]
-        `wide` : area over undeformed area of columns or rows, see `basins.cell_stretching`
+    c : wave speed; speed : outward speed of the wall [m/s]; forward, backward : waves at the faces
+    along : mass-flow densities along the wall; thrust, loss : see `GridMotion`
     """
-    row_rates(
-        c,
-        small,
-        scheme,
-        limiter,
-        nx,
-        ny,
-        begin,
-        stop,
-        begin,
-        stop,
-        kx,
-        ky,
-        reflect,
-        side_kinds_of(reflect, nx, ny),
-        r,
-        mx,
-        my,
-        through,
-        work,
-        rate_r,
-        rate_x,
-        rate_y,
-        moves,
-    )
-    return c * max_spacing_rate(kx, ky)
+    for i in range(n):
+        x, m = forward[i] + backward[i], forward[i] - backward[i]
+        thrust[i], loss[i] = c * x, speed * (x * x - m * m - along[i] * along[i])
 
 
-@njit
-def side_kinds_of(reflect, nx, ny):
-    """Kinds (WALLS, MIRRORS or OPEN) of the western, eastern, southern and northern side, see `side_kind`."""
-    south, north = reflect[2 * ny : 2 * ny + nx], reflect[2 * ny + nx :]
-    return side_kind(reflect[:ny]), side_kind(reflect[ny : 2 * ny]), side_kind(south), side_kind(north)
+@inline
+def put_moving_fluxes(c, rho, speeds, step, forward, backward):
+    """Convert waves at moving faces to fluxes of mass and momentum relative to the faces.
 
-
-@njit
-def row_rates(
-    c, small, scheme, limiter, nx, ny, begin, stop, row, until, kx, ky, reflect, side_kinds, r, mx, my, through, work,
-    rate_r, rate_x, rate_y, moves,
-):  # fmt: skip
-    """Write the rates of rows `row` to `until` - 1 of a band; calls must follow in the order of rows, without gaps.
-
-    begin, stop : first row of the band, and first row after it
-    Rates of rows from `until` on may be written incompletely; the next call completes them.
-    side_kinds : see `side_kinds_of`; other arguments as in `grid_rates`
+    c, rho : wave speed [m/s] and density [kg/m3] at rest
+    forward, backward : waves; afterwards fluxes of mass and of momentum
+    speeds : speeds of the faces [m/s], read at every `step`-th place
     """
-    wide, f = nx + 2 * GHOSTS, nx + 1
-    up, down, work = work[: RING * nx], work[RING * nx : 2 * RING * nx], work[2 * RING * nx :]
-    between, work = work[: 4 * nx], work[4 * nx :]
-    east, west, work = work[:wide], work[wide : 2 * wide], work[2 * wide :]
-    fe, fw, spare = work[:f], work[f : 2 * f], work[2 * f :]
-    half, rows = 0.5 * c, first_row_read(begin, ny)
-    if row > begin:
-        rows = max(rows, row_needed(row, ny))
-    south, north = reflect[2 * ny : 2 * ny + nx], reflect[2 * ny + nx :]
-    to_w, to_e, to_s, to_n = side_kinds
-    along, across = scheme_for(scheme, nx, to_w, to_e), scheme_for(scheme, ny, to_s, to_n)
-    for j in range(row if row == begin else row + 1, until + 1):  # faces between rows j - 1 and j
-        while rows < row_needed(j, ny):
-            a, z, at = rows * nx, (rows + 1) * nx, (rows % RING) * nx
-            put_waves(half, r[a:z], my[a:z], up[at : at + nx], down[at : at + nx])
-            if rows < begin or rows >= stop:
-                rows += 1
-                continue
-            put_waves(half, r[a:z], mx[a:z], east[GHOSTS : nx + GHOSTS], west[GHOSTS : nx + GHOSTS])
-            if moves is None or moves[0].size == 0:
-                mirror(nx, east, west)
-            else:
-                mirror_at_walls(False, c, moves[3], nx, moves[0][0], moves[0][nx], east, west)
-            if to_w != WALLS:
-                close_side(to_w, along, limiter, small, reflect[rows], nx, east, west, GHOSTS, 1, spare)
-            if to_e != WALLS:
-                last = nx + GHOSTS - 1
-                close_side(to_e, along, limiter, small, reflect[ny + rows], nx, west, east, last, -1, spare)
-            faces(along, limiter, small, east, east[1:], east[2:], east[3:], east[4:], fe)
-            faces(along, limiter, small, west[5:], west[4:], west[3:], west[2:], west[1:], fw)
-            if moves is not None and moves[0].size > 0:
-                reflect_at_wall(False, c, moves[3], -moves[0][0], fw, fe, 1)
-                reflect_at_wall(False, c, moves[3], moves[0][nx], fe[nx:], fw[nx:], 1)
-            if to_w != WALLS:
-                fe[0] = reflect[rows] * fw[0]
-            if to_e != WALLS:
-                fw[nx] = reflect[ny + rows] * fe[nx]
-            if through.size > 0:
-                through[rows], through[ny + rows] = (fe[0] - fw[0]) / ky[rows], (fw[nx] - fe[nx]) / ky[rows]
-            if moves is None or moves[0].size == 0:
-                put_row_rates(c, kx, fe, fw, rate_r[a:z], rate_x[a:z], rate_y[a:z])
-            else:
-                speeds, count = moves[0], moves[2].size // 2
-                put_wall_pressure(c, -speeds[0], fe, fw, my[a:], 1, moves[2][rows:], moves[2][count + rows :])
-                put_wall_pressure(
-                    c,
-                    speeds[nx],
-                    fe[nx:],
-                    fw[nx:],
-                    my[z - 1 :],
-                    1,
-                    moves[2][ny + rows :],
-                    moves[2][count + ny + rows :],
-                )
-                put_moving_fluxes(c, moves[3], speeds, 1, fe, fw)
-                fe[0], fe[nx] = 0.0 if to_w == WALLS else fe[0], 0.0 if to_e == WALLS else fe[nx]
-                if through.size > 0:
-                    through[rows], through[ny + rows] = fe[0] / ky[rows], -fe[nx] / ky[rows]
-                moving_wall_waves.put_row_rates(kx, speeds, fe, fw, my[a:z], rate_r[a:z], rate_x[a:z], rate_y[a:z])
-            rows += 1
-        for side in range(2):  # rows beyond the southern and the northern side
-            first = j == begin and begin < GHOSTS if side == 0 else j == max(ny - GHOSTS + 1, begin)
-            if not first:
-                continue
-            for k in range(GHOSTS):
-                beyond = ny + k if side == 1 else -1 - k
-                a, at = mirrored_cell(beyond, ny) * nx, (beyond % RING) * nx
-                ahead, back = (down, up) if is_reversed(beyond, ny) else (up, down)
-                put_waves(half, r[a : a + nx], my[a : a + nx], ahead[at : at + nx], back[at : at + nx])
-                if moves is not None and moves[1].size > 0 and is_reversed(beyond, ny):
-                    out = -moves[1][0] if side == 0 else moves[1][ny]
-                    correct_mirror_row(
-                        False, c, moves[3], out, (down if side == 1 else up)[at:], (up if side == 1 else down)[at:], nx
-                    )
-            if side == 0 and to_s != WALLS:
-                close_row(to_s, across, limiter, small, south, ny, up, down, 0, 1, spare)
-            if side == 1 and to_n != WALLS:
-                close_row(to_n, across, limiter, small, north, ny, down, up, ny - 1, -1, spare)
-        now, before = 2 * nx * (j % 2), 2 * nx * (1 - j % 2)
-        fu, fd = between[now : now + nx], between[now + nx : now + 2 * nx]
-        a, b, d = ((j - 3) % RING) * nx, ((j - 2) % RING) * nx, ((j - 1) % RING) * nx
-        e, g, h = (j % RING) * nx, ((j + 1) % RING) * nx, ((j + 2) % RING) * nx
-        faces(across, limiter, small, up[a:], up[b:], up[d:], up[e:], up[g:], fu)
-        faces(across, limiter, small, down[h:], down[g:], down[e:], down[d:], down[b:], fd)
-        if moves is not None and moves[1].size > 0:
-            if j == 0:
-                reflect_at_wall(False, c, moves[3], -moves[1][0], fd, fu, nx)
-            if j == ny:
-                reflect_at_wall(False, c, moves[3], moves[1][ny], fu, fd, nx)
-        if j == 0 and to_s != WALLS:
-            reflect_waves(south, fd, fu)
-        if j == ny and to_n != WALLS:
-            reflect_waves(north, fu, fd)
-        if through.size > 0 and j == 0:
-            put_inward(kx, fu, fd, through[2 * ny : 2 * ny + nx])
-        if through.size > 0 and j == ny:
-            put_inward(kx, fd, fu, through[2 * ny + nx :])
-        a, z = (j - 1) * nx, j * nx
-        if moves is not None and moves[1].size > 0:
-            put_moving_row(c, ny, j, fu, fd, mx, moves)
-            if (j == 0 and to_s == WALLS) or (j == ny and to_n == WALLS):
-                for i in range(nx):
-                    fu[i] = 0.0
-                if through.size > 0:
-                    at = 2 * ny + (nx if j > 0 else 0)
-                    for i in range(nx):
-                        through[at + i] = 0.0
-            if j > begin:
-                moving_wall_waves.add_column_rates(
-                    ky[j - 1], moves[1][j - 1], moves[1][j], between[before:], between[before + nx :], fu, fd,
-                    mx[max(j - 2, 0) * nx :], mx[a:], mx[min(j, ny - 1) * nx :],
-                    rate_r[a:z], rate_y[a:z], rate_x[a:z],
-                )  # fmt: skip
-        elif j > begin:
-            add_column_rates(c, ky[j - 1], between[before:], between[before + nx :], fu, fd, rate_r[a:z], rate_y[a:z])
-        if moves is not None and j > begin:
-            stretch_row_rates(moves[0].size > 0, moves[4], 0, j - 1, rate_r[a:z], rate_x[a:z], rate_y[a:z])
+    per = 1.0 / c
+    for i in range(forward.size):
+        m, x, speed = forward[i] - backward[i], forward[i] + backward[i], speeds[step * i]
+        forward[i], backward[i] = m - speed * (rho + per * x), c * x - speed * m
+
+
+@inline
+def put_moving_row_rates(k, speeds, mass, push, along, rate_r, rate_m, rate_t):
+    """Write the rates of a row of cells from the fluxes at the moving faces along it.
+
+    Cell i is between faces i and i + 1. The faces sweep over the momentum along them, so its flux is -speed times its
+    mean over both cells.
+    k : 1 / widths of the cells [1/m]; speeds : speeds of the faces [m/s]
+    mass, push : fluxes of mass and of momentum normal to the faces; along : momentum along the faces in each cell
+    rate_r, rate_m, rate_t : as for `put_row_rates`
+    """
+    m, p, last = mass[1:], push[1:], rate_r.size - 1
+    for i in range(rate_r.size):
+        rate_r[i] = k[i] * (mass[i] - m[i])
+        rate_m[i] = k[i] * (push[i] - p[i])
+    beyond, wide, before, after, interior = along[1:], k[1:], speeds[1:], speeds[2:], rate_t[1:]
+    for i in range(last - 1):  # cells with a neighbour on either side
+        low, high = along[i] + beyond[i], beyond[i] + along[i + 2]
+        interior[i] = 0.5 * wide[i] * (after[i] * high - before[i] * low)
+    for i in (0, last):
+        low, high = along[max(i - 1, 0)] + along[i], along[i] + along[min(i + 1, last)]
+        rate_t[i] = 0.5 * k[i] * (speeds[i + 1] * high - speeds[i] * low)
+
+
+@inline
+def add_moving_column_rates(k, speeds, fluxes_before, fluxes_after, along, rate_r, rate_m, rate_t):
+    """Add to the rates of a row of cells the fluxes through the rows of moving faces before and after it.
+
+    k : 1 / height of the row [1/m]; speeds : speeds of both rows of faces
+    fluxes_before, fluxes_after : fluxes of mass and of normal momentum
+    along : momentum along the faces in the row before, in this row and in the row after
+    rate_r, rate_m, rate_t : rates of density, and of flows across and along the row
+    """
+    s0, s1, m0, p0, m1, p1 = speeds[0], speeds[1], fluxes_before[0], fluxes_before[1], fluxes_after[0], fluxes_after[1]
+    before, here, after = along
+    for i in range(rate_r.size):
+        rate_r[i] += k * (m0[i] - m1[i])
+        rate_m[i] += k * (p0[i] - p1[i])
+        rate_t[i] += 0.5 * k * (s1 * (here[i] + after[i]) - s0 * (before[i] + here[i]))

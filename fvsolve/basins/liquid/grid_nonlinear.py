@@ -1,4 +1,4 @@
-"""Pressure waves of a liquid on a rectangular grid, density laws `log` and `table`, with the full momentum flux.
+"""Rows of a liquid on a rectangular grid under the density laws `log` and `table`: waves, fluxes, rates.
 
 r_t + div m = 0, m_t + div(m m / rho) + grad p = 0: deviation of density r = rho - rho0 [kg/m3] and mass-flow densities
 m [kg/(m2 s)]. Law `log` is p = rho0 c0^2 ln(rho / rho0), c = c0 sqrt(rho0 / rho), with density rho0 and wave speed c0
@@ -6,7 +6,7 @@ at rest. With w = 2 (c0 - c) and velocity u, u - w is constant along dx/dt = u -
 (Riemann invariants). The waves (w + u) / 2 and (w - u) / 2 are reconstructed upwind. The state that both give at a face
 solves the Riemann problem with two simple waves (Osher and Solomon 1982), for subsonic flow. The velocity along a face
 is reconstructed from the upwind side of the flow. Fifth order is that of the waves: products of averages are of second
-order, with an error proportional to the Mach number. Sides and the ring buffer of rows: see `grid_linear`.
+order, with an error proportional to the Mach number. For the arguments of the first functions see `liquid_grid`.
 
 Under `table`, p, c and w = integral of c / rho d rho are read from a table (see `riemann_invariants`). A table of None
 is known at compile time, so that each law compiles and runs only its own code.
@@ -15,35 +15,97 @@ is known at compile time, so that each law compiles and runs only its own code.
 from math import sqrt
 
 from fvsolve.basins.basin_patches import put_inward
-from fvsolve.basins.cell_stretching import stretch_row_rates
-from fvsolve.basins.liquid.grid_linear import (
-    CLOSURE_CELLS,
-    RING,
-    SIDE_WORK,
-    WALLS,
-    close_row,
-    close_side,
-    faces,
-    is_reversed,
-    mirror,
-    mirrored_cell,
-    put_waves,
-    reflect_waves,
-    scheme_for,
-    side_kind,
-    value_upwind5,
-)
-from fvsolve.basins.liquid.moving_wall_waves import (
-    GHOSTS,
-    correct_mirror_row,
-    mirror_at_walls,
-    put_wall_flux,
-    reflect_at_wall,
-)
+from fvsolve.basins.liquid import liquid_sides as sides
+from fvsolve.basins.liquid.liquid_sides import GHOSTS, WALLS, ring_offset, value_upwind5
 from fvsolve.basins.liquid.riemann_invariants import invariant, invariant_at_potential, state
 from fvsolve.jit import inline, njit
 from fvsolve.kernels.dtypes import LINEAR, UPWIND, WENO5
 from fvsolve.kernels.reconstruction import by_limiter, slope, value_weno5
+
+
+@inline
+def put_row(liquid, grid, j, states, work, phi, up, down, aside):
+    """Write the waves across row j to up, down, and the velocities along it to `aside`."""
+    c, rho, table, nx, (r, mx, my) = liquid.c, liquid.rho, liquid.table, grid.nx, states
+    a, z, v = j * nx, (j + 1) * nx, work.over[GHOSTS : nx + GHOSTS]
+    put_primitives(c, rho, table, grid.kx, grid.ky[j], r[a:z], mx[a:z], my[a:z], work.w, aside, v, work.top)
+    if phi is not None:
+        subtract_potential(c, rho, table, phi.cells[a:z], work.w)
+    sides.put_waves(0.5, work.w, v, up, down)
+
+
+@inline
+def put_rates_along(liquid, grid, j, states, work, aside, through, rates, moves, phi):
+    """Write the rates of row j by the fluxes along it."""
+    nx, ny, k, a, z, f = grid.nx, grid.ny, grid.ky[j], j * grid.nx, (j + 1) * grid.nx, grid.nx + 1
+    mass, push, along, over = work.forward, work.backward, work.along, work.over
+    sides.put_waves(0.5, work.w, aside, work.east[GHOSTS : nx + GHOSTS], work.west[GHOSTS : nx + GHOSTS])
+    sides.mirror(nx, over, over)
+    sides.put_faces_along(liquid, grid, j, work, moves)
+    scheme, flux = sides.scheme_for(liquid.scheme, nx, grid.sides[0], grid.sides[1]), (mass, push, along)
+    cells = over, over[1:], over[2:], over[3:], over[4:], over[5:]
+    if moves is None or moves.speed_x.size == 0:
+        at_faces = None if phi is None else phi.columns[j * f : (j + 1) * f]
+        put_upwind_fluxes(liquid, scheme, cells, None, 0, at_faces, work.seen, flux)
+    else:
+        put_upwind_fluxes(liquid, scheme, cells, moves.speed_x, 1, None, work.seen, flux)
+        if grid.sides[0] == WALLS:
+            put_wall_flux(push, 1, moves.thrust[j:], mass, along)
+        if grid.sides[1] == WALLS:
+            put_wall_flux(push[nx:], 1, moves.thrust[ny + j :], mass[nx:], along[nx:])
+    if through.size > 0:
+        through[j], through[ny + j] = mass[0] / k, -mass[nx] / k
+    put_row_rates(grid.kx, mass, push, along, rates[0][a:z], rates[1][a:z], rates[2][a:z])
+    if phi is not None:
+        r, at_cells, low, high = states[0][a:z], phi.cells[a:z], phi.columns[j * f :], phi.columns[j * f + 1 :]
+        balance_row(liquid.c, liquid.rho, liquid.table, grid.kx, 1, r, at_cells, low, high, rates[1][a:z])
+
+
+@inline
+def put_fluxes_across(liquid, grid, j, states, work, flux, through, moves, phi):
+    """Convert the waves at the faces before row j to fluxes, and write flows and pressures at the sides."""
+    nx, ny, (mass, push, along) = grid.nx, grid.ny, flux
+    scheme, at = sides.scheme_for(liquid.scheme, ny, grid.sides[2], grid.sides[3]), 2 * ny + (nx if j > 0 else 0)
+    aside = work.aside
+    a, b, c = aside[ring_offset(j - 3, nx) :], aside[ring_offset(j - 2, nx) :], aside[ring_offset(j - 1, nx) :]
+    d, e, g = aside[ring_offset(j, nx) :], aside[ring_offset(j + 1, nx) :], aside[ring_offset(j + 2, nx) :]
+    if moves is None or moves.speed_y.size == 0:
+        at_faces = None if phi is None else phi.rows[j * nx : (j + 1) * nx]
+        put_upwind_fluxes(liquid, scheme, (a, b, c, d, e, g), None, 0, at_faces, work.seen, flux)
+    else:
+        put_upwind_fluxes(liquid, scheme, (a, b, c, d, e, g), moves.speed_y[j:], 0, None, work.seen[:nx], flux)
+        if (j == 0 and grid.sides[2] == WALLS) or (j == ny and grid.sides[3] == WALLS):
+            put_wall_flux(push, nx, moves.thrust[at:], mass, along)
+    if through.size > 0 and (j == 0 or j == ny):
+        put_inward(1.0 if j == 0 else -1.0, grid.kx, mass, through[at : at + nx])
+
+
+@inline
+def add_rates_across(liquid, grid, j, states, before, after, rates, moves, phi):
+    """Add to the rates of row j the fluxes through the faces before and after it."""
+    nx, a, z, (rate_r, rate_x, rate_y) = grid.nx, j * grid.nx, (j + 1) * grid.nx, rates
+    add_column_rates(grid.ky[j], before, after, rate_r[a:z], rate_y[a:z], rate_x[a:z])
+    if phi is not None:
+        r, at_cells, low, high = states[0][a:z], phi.cells[a:z], phi.rows[a:z], phi.rows[z : z + nx]
+        balance_row(liquid.c, liquid.rho, liquid.table, grid.ky[j:], 0, r, at_cells, low, high, rate_y[a:z])
+
+
+@inline
+def put_upwind_fluxes(liquid, scheme, cells, speeds, step, phi, seen, flux):
+    """Write the velocities along faces, reconstructed from the upwind side of the flow, and convert all to fluxes.
+
+    scheme : scheme between the sides of the grid; cells : velocities in six consecutive cells, six arrays
+    seen : work array for moving faces; flux : waves and velocity along the face, three arrays, then the fluxes
+    speeds, step, phi : as for `put_fluxes`
+    """
+    forward, backward, along = flux
+    a, b, c, d, e, g = cells
+    if speeds is None:
+        faces_upwind(scheme, liquid.limiter, liquid.small, forward, backward, a, b, c, d, e, g, along)
+    else:
+        relative_waves(speeds, step, forward, seen)
+        faces_upwind(scheme, liquid.limiter, liquid.small, seen, backward, a, b, c, d, e, g, along)
+    put_fluxes(liquid.c, liquid.rho, liquid.table, forward, backward, along, speeds, step, phi)
 
 
 @njit(forceinline=True)
@@ -66,7 +128,8 @@ def put_primitives(c0, rho, table, kx, ky, r, mx, my, w, u, v, top):
     """Write the invariant w and both velocities u, v of a row of cells [m/s], and update `top`.
 
     top : float64[nx]  greatest (|u| + c) kx + (|v| + c) ky so far in each column [1/s]
-    r, mx, my : states of the row; c0, rho, table, kx, ky : as in `grid_rates`, with ky of this row
+    r, mx, my : states of the row; kx, ky : 1 / widths of the columns, 1 / height of the row [1/m]
+    c0, rho, table : see `LiquidScheme`
     """
     if table is not None:
         for i in range(w.size):
@@ -93,7 +156,7 @@ def put_primitives(c0, rho, table, kx, ky, r, mx, my, w, u, v, top):
 def subtract_potential(c0, rho, table, phi, w):
     """Subtract the effect of a potential phi [J/kg] from the invariants w of a row of cells.
 
-    In a liquid at rest the invariants are uniform afterwards. c0, rho, table : as in `grid_rates`
+    In a liquid at rest the invariants are uniform afterwards. c0, rho, table : see `LiquidScheme`
     """
     for i in range(w.size):
         w[i] = invariant_at_potential(c0, rho, table, w[i], -phi[i])
@@ -111,7 +174,7 @@ def stiffness(c0, rho, table, r):
     """(1 / c^2, density times c^2) of a cell with the deviation of density r and the wave speed c.
 
     In a liquid at rest, pressure falls by about density times c^2 ln(1 + phi / c^2) where a potential rises by phi.
-    c0, rho, table : as in `grid_rates`
+    c0, rho, table : see `LiquidScheme`
     """
     if table is None:
         bulk = rho * c0 * c0
@@ -125,7 +188,7 @@ def balance_row(c0, rho, table, k, step, r, phi, low, high, rate):
     """Subtract from the momentum rates of a row of cells the rates that face pressures of a liquid at rest cause.
 
     So the rates of a liquid at rest in the potential phi are zero.
-    c0, rho, table : as in `grid_rates`; k : 1 / spacing of the cells [1/m], read at every `step`-th place
+    c0, rho, table : see `LiquidScheme`; k : 1 / spacing of the cells [1/m], read at every `step`-th place
     r : deviations of density; phi, low, high : potential [J/kg] of the cells and of the faces before and after them
     """
     for i in range(rate.size):
@@ -175,7 +238,7 @@ def put_fluxes(c0, rho, table, forward, backward, along, speeds, step, phi):
     and along the face
     speeds : None, or speeds of moving faces, read at every `step`-th place; the flux is then relative to the face
     phi : None, or the potential at the faces [J/kg], whose effect was subtracted from the waves and is added again
-    c0, rho, table : as in `grid_rates`
+    c0, rho, table : see `LiquidScheme`
     """
     if table is not None:
         for i in range(forward.size):
@@ -226,12 +289,13 @@ def put_row_rates(k, mass, push, along, rate_r, rate_m, rate_t):
 
 
 @inline
-def add_column_rates(k, m0, p0, t0, m1, p1, t1, rate_r, rate_m, rate_t):
-    """Add to the rates of a row of cells the fluxes through the rows of faces before (0) and after it (1).
+def add_column_rates(k, before, after, rate_r, rate_m, rate_t):
+    """Add to the rates of a row of cells the fluxes through the rows of faces before and after it.
 
-    k : 1 / height of the row [1/m]; m, p, t : fluxes of mass and of momentum normal to and along the faces
+    k : 1 / height of the row [1/m]; before, after : fluxes of mass and of momentum normal to and along the faces
     rate_r, rate_m, rate_t : rates of density, and of flows across and along the row
     """
+    (m0, p0, t0), (m1, p1, t1) = before, after
     for i in range(rate_r.size):
         rate_r[i] += k * (m0[i] - m1[i])
         rate_m[i] += k * (p0[i] - p1[i])
@@ -239,162 +303,11 @@ def add_column_rates(k, m0, p0, t0, m1, p1, t1, rate_r, rate_m, rate_t):
 
 
 @njit
-def work_size(nx, ny):
-    """Length of the work array of `grid_rates` for nx columns and ny rows."""
-    return (3 * RING + 6 + 3) * nx + 3 * (nx + 2 * GHOSTS) + 3 * (nx + 1) + SIDE_WORK
+def put_wall_flux(push, n, thrust, mass, along):
+    """Write the pressures on n faces of a wall, and set the fluxes other than the momentum flux to 0.
 
-
-@njit
-def grid_rates(
-    c0, rho, table, small, scheme, limiter, nx, ny, begin, stop, kx, ky, reflect, r, mx, my, through, work, rate_r,
-    rate_x, rate_y, moves, phi,
-):  # fmt: skip
-    """Write the rates of cells of rows `begin` to `stop` - 1; return the greatest (|u| + c) kx + (|v| + c) ky [1/s].
-
-    c0, rho : wave speed [m/s] and density [kg/m3] at rest
-    table : table of `riemann_invariants`, or None for the law `log`; small : square of a negligible velocity [m2/s2]
-    work : float64[work_size(nx, ny)], longer by nx + 1 if lines move
-    phi : None, or the potential [J/kg] of cells, of faces between columns and of faces between rows, three arrays
-    Other arguments as for `grid_linear.grid_rates`
+    No mass passes a wall, so its momentum flux `push` is the pressure. thrust : the pressures
+    mass, along : fluxes of mass and of momentum along the wall
     """
-    wide, f, size = nx + 2 * GHOSTS, nx + 1, RING * nx
-    up, down, aside, work = work[:size], work[size : 2 * size], work[2 * size : 3 * size], work[3 * size :]
-    between, work = work[: 6 * nx], work[6 * nx :]
-    w, v, top, work = work[:nx], work[nx : 2 * nx], work[2 * nx : 3 * nx], work[3 * nx :]
-    east, west, over, work = work[:wide], work[wide : 2 * wide], work[2 * wide : 3 * wide], work[3 * wide :]
-    fe, fw, ft, spare = work[:f], work[f : 2 * f], work[2 * f : 3 * f], work[3 * f :]
-    rows = max(min(begin - GHOSTS, ny - CLOSURE_CELLS), 0)
-    south, north = reflect[2 * ny : 2 * ny + nx], reflect[2 * ny + nx :]
-    to_w, to_e, to_s, to_n = (
-        side_kind(reflect[:ny]),
-        side_kind(reflect[ny : 2 * ny]),
-        side_kind(south),
-        side_kind(north),
-    )
-    along, across = scheme_for(scheme, nx, to_w, to_e), scheme_for(scheme, ny, to_s, to_n)
-    for i in range(nx):
-        top[i] = 0.0
-    for j in range(begin, stop + 1):  # faces between rows j - 1 and j
-        while rows < min(max(j + GHOSTS, CLOSURE_CELLS), ny):
-            a, z, at = rows * nx, (rows + 1) * nx, (rows % RING) * nx
-            u, v = aside[at : at + nx], over[GHOSTS : nx + GHOSTS]
-            put_primitives(c0, rho, table, kx, ky[rows], r[a:z], mx[a:z], my[a:z], w, u, v, top)
-            if phi is not None:
-                subtract_potential(c0, rho, table, phi[0][a:z], w)
-            put_waves(0.5, w, v, up[at : at + nx], down[at : at + nx])
-            if rows < begin or rows >= stop:
-                rows += 1
-                continue
-            put_waves(0.5, w, u, east[GHOSTS : nx + GHOSTS], west[GHOSTS : nx + GHOSTS])
-            if moves is None or moves[0].size == 0:
-                mirror(nx, east, west)
-            else:
-                mirror_at_walls(True, c0, rho, nx, moves[0][0], moves[0][nx], east, west)
-            mirror(nx, over, over)
-            if to_w != WALLS:
-                close_side(to_w, along, limiter, small, reflect[rows], nx, east, west, GHOSTS, 1, spare)
-            if to_e != WALLS:
-                last = nx + GHOSTS - 1
-                close_side(to_e, along, limiter, small, reflect[ny + rows], nx, west, east, last, -1, spare)
-            faces(along, limiter, small, east, east[1:], east[2:], east[3:], east[4:], fe)
-            faces(along, limiter, small, west[5:], west[4:], west[3:], west[2:], west[1:], fw)
-            if moves is not None and moves[0].size > 0:
-                reflect_at_wall(True, c0, rho, -moves[0][0], fw, fe, 1)
-                reflect_at_wall(True, c0, rho, moves[0][nx], fe[nx:], fw[nx:], 1)
-            if to_w != WALLS:
-                fe[0] = reflect[rows] * fw[0]
-            if to_e != WALLS:
-                fw[nx] = reflect[ny + rows] * fe[nx]
-            if moves is None or moves[0].size == 0:
-                faces_upwind(along, limiter, small, fe, fw, over, over[1:], over[2:], over[3:], over[4:], over[5:], ft)
-                over_faces = None if phi is None else phi[1][rows * f : (rows + 1) * f]
-                put_fluxes(c0, rho, table, fe, fw, ft, None, 0, over_faces)
-            else:
-                seen = spare[SIDE_WORK : SIDE_WORK + f]
-                relative_waves(moves[0], 1, fe, seen)
-                faces_upwind(
-                    along, limiter, small, seen, fw, over, over[1:], over[2:], over[3:], over[4:], over[5:], ft
-                )
-                put_fluxes(c0, rho, table, fe, fw, ft, moves[0], 1, None)
-                if to_w == WALLS:
-                    put_wall_flux(fw, 1, moves[2][rows:], fe, ft)
-                if to_e == WALLS:
-                    put_wall_flux(fw[nx:], 1, moves[2][ny + rows :], fe[nx:], ft[nx:])
-            if through.size > 0:
-                through[rows], through[ny + rows] = fe[0] / ky[rows], -fe[nx] / ky[rows]
-            put_row_rates(kx, fe, fw, ft, rate_r[a:z], rate_x[a:z], rate_y[a:z])
-            if phi is not None:
-                at = rows * f
-                low, high = phi[1][at : at + nx], phi[1][at + 1 : at + f]
-                balance_row(c0, rho, table, kx, 1, r[a:z], phi[0][a:z], low, high, rate_x[a:z])
-            rows += 1
-        for side in range(2):  # rows beyond the southern and the northern side
-            first = j == begin and begin < GHOSTS if side == 0 else j == max(ny - GHOSTS + 1, begin)
-            if not first:
-                continue
-            for k in range(GHOSTS):
-                row = ny + k if side == 1 else -1 - k
-                q, at = mirrored_cell(row, ny), (row % RING) * nx
-                a, z, u = q * nx, (q + 1) * nx, aside[at : at + nx]
-                ahead, back = (down, up) if is_reversed(row, ny) else (up, down)
-                put_primitives(c0, rho, table, kx, ky[q], r[a:z], mx[a:z], my[a:z], w, u, v, top)
-                if phi is not None:
-                    subtract_potential(c0, rho, table, phi[0][a:z], w)
-                put_waves(0.5, w, v, ahead[at : at + nx], back[at : at + nx])
-                if moves is not None and moves[1].size > 0 and is_reversed(row, ny):
-                    out = -moves[1][0] if side == 0 else moves[1][ny]
-                    correct_mirror_row(
-                        True, c0, rho, out, (down if side == 1 else up)[at:], (up if side == 1 else down)[at:], nx
-                    )
-            if side == 0 and to_s != WALLS:
-                close_row(to_s, across, limiter, small, south, ny, up, down, 0, 1, spare)
-            if side == 1 and to_n != WALLS:
-                close_row(to_n, across, limiter, small, north, ny, down, up, ny - 1, -1, spare)
-        now, before = 3 * nx * (j % 2), 3 * nx * (1 - j % 2)
-        gu, gd, gt = between[now : now + nx], between[now + nx : now + 2 * nx], between[now + 2 * nx : now + 3 * nx]
-        a, b, d = ((j - 3) % RING) * nx, ((j - 2) % RING) * nx, ((j - 1) % RING) * nx
-        e, g, h = (j % RING) * nx, ((j + 1) % RING) * nx, ((j + 2) % RING) * nx
-        faces(across, limiter, small, up[a:], up[b:], up[d:], up[e:], up[g:], gu)
-        faces(across, limiter, small, down[h:], down[g:], down[e:], down[d:], down[b:], gd)
-        if moves is not None and moves[1].size > 0:
-            if j == 0:
-                reflect_at_wall(True, c0, rho, -moves[1][0], gd, gu, nx)
-            if j == ny:
-                reflect_at_wall(True, c0, rho, moves[1][ny], gu, gd, nx)
-        if j == 0 and to_s != WALLS:
-            reflect_waves(south, gd, gu)
-        if j == ny and to_n != WALLS:
-            reflect_waves(north, gu, gd)
-        if moves is None or moves[1].size == 0:
-            faces_upwind(
-                across, limiter, small, gu, gd, aside[a:], aside[b:], aside[d:], aside[e:], aside[g:], aside[h:], gt
-            )
-            put_fluxes(c0, rho, table, gu, gd, gt, None, 0, None if phi is None else phi[2][j * nx : (j + 1) * nx])
-        else:
-            seen = spare[SIDE_WORK : SIDE_WORK + nx]
-            relative_waves(moves[1][j:], 0, gu, seen)
-            faces_upwind(
-                across, limiter, small, seen, gd, aside[a:], aside[b:], aside[d:], aside[e:], aside[g:], aside[h:], gt
-            )
-            put_fluxes(c0, rho, table, gu, gd, gt, moves[1][j:], 0, None)
-            if (j == 0 and to_s == WALLS) or (j == ny and to_n == WALLS):
-                put_wall_flux(gd, nx, moves[2][2 * ny + (nx if j > 0 else 0) :], gu, gt)
-        if through.size > 0 and j == 0:
-            put_inward(1.0, kx, gu, through[2 * ny : 2 * ny + nx])
-        if through.size > 0 and j == ny:
-            put_inward(-1.0, kx, gu, through[2 * ny + nx :])
-        if j > begin:
-            a, z = (j - 1) * nx, j * nx
-            add_column_rates(
-                ky[j - 1], between[before:], between[before + nx :], between[before + 2 * nx :], gu, gd, gt,
-                rate_r[a:z], rate_y[a:z], rate_x[a:z],
-            )  # fmt: skip
-            if moves is not None:
-                stretch_row_rates(moves[0].size > 0, moves[4], 0, j - 1, rate_r[a:z], rate_x[a:z], rate_y[a:z])
-            if phi is not None:
-                low, high = phi[2][a:z], phi[2][j * nx : (j + 1) * nx]
-                balance_row(c0, rho, table, ky[j - 1 :], 0, r[a:z], phi[0][a:z], low, high, rate_y[a:z])
-    most = 0.0
-    for i in range(nx):
-        most = max(most, top[i])
-    return most
+    for i in range(n):
+        thrust[i], mass[i], along[i] = push[i], 0.0, 0.0

@@ -1,16 +1,19 @@
-"""Patches of a liquid (parts of its boundary joined to a node): pressures, and the effect of the flows of links."""
+"""Patches and probes of a liquid: pressures, and the effect of the flows of links on the cells next to a patch."""
 
 from math import log1p
 
 from fvsolve.basins.basin_patches import add_link_momentum
+from fvsolve.basins.basin_probes import FIRST_OWN, velocity_value
 from fvsolve.basins.boundary_cells import patch_area, patch_length
 from fvsolve.basins.cell_stretching import deviations_of, stretch_of_cell
+from fvsolve.basins.liquid.riemann_invariants import pressure
 from fvsolve.basins.physics_codes import physics_code
-from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import LAW_LOG
+from fvsolve.jit import njit, specialise
+from fvsolve.kernels.dtypes import CELL_FIELD, LAW_LINEAR, LAW_LOG
 from fvsolve.kernels.table_handle import open_tables
 
 OWN_CODE = physics_code(__package__)
+PRESSURE = FIRST_OWN
 
 
 @njit
@@ -23,13 +26,14 @@ def mean_deviation(tables, patch, y):
     return total / patch_area(tables, patch)
 
 
-@njit
-def patch_pressures(t, y, dydt, out, handle):
+TABLED = False  # of the templates: True under the density law `table`
+
+
+def _patch_pressures(t, y, dydt, out, handle):
     """Write the pressure at every patch of a liquid and its slope to the node of the patch in `out`.
 
     The pressure is the deviation from the steady start [Pa]; the slope is per mass in the cells next to the patch
-    [Pa/kg]. Both are those of the density laws `linear` and `log`; under `table`, `liquid_table_law` replaces them. The
-    supply of the node is set to 0, the available fraction of outflow to 1.
+    [Pa/kg]. The supply of the node is set to 0, the available fraction of outflow to 1.
     """
     tables = open_tables(handle)
     layout = tables.layout[0]
@@ -38,18 +42,22 @@ def patch_pressures(t, y, dydt, out, handle):
         basin, node = tables.basins[patch["basin"]], tables.nodes[patch["node"]]
         if basin["kind"] != OWN_CODE:
             continue
-        stored, slope = (
-            mean_deviation(tables, patch, deviations_of(basin, tables.seen, y)),
-            basin["speed"] * basin["speed"],
-        )
-        pressure = slope * stored
-        if tables.settings[0]["law"] == LAW_LOG:
-            strain = stored / basin["density"]
-            pressure, slope = slope * basin["density"] * log1p(strain), slope / (1.0 + strain)
-        out[layout["pressure"] + patch["node"]] = pressure
+        mean = mean_deviation(tables, patch, deviations_of(basin, tables.seen, y))
+        slope = basin["speed"] * basin["speed"]
+        deviation = slope * mean
+        if TABLED:
+            deviation, slope = pressure(tables.plane[basin["table"] :], basin["density"], mean)
+        elif tables.settings[0]["law"] == LAW_LOG:
+            strain = mean / basin["density"]
+            deviation, slope = slope * basin["density"] * log1p(strain), slope / (1.0 + strain)
+        out[layout["pressure"] + patch["node"]] = deviation
         out[layout["supply"] + patch["node"]] = 0.0
         out[layout["outflow_fraction"] + node["row"]] = 1.0
         out[layout["stiffness"] + node["row"]] = slope / (basin["thickness"] * patch_area(tables, patch))
+
+
+patch_pressures = specialise(_patch_pressures, "patch_pressures")
+patch_pressures_table = specialise(_patch_pressures, "patch_pressures_table", TABLED=True)
 
 
 @njit
@@ -70,3 +78,53 @@ def patch_flows(t, y, dydt, out, handle):
             i = basin["y"] + tables.integers[patch["ring"] + patch["faces"] + m]
             push = -basin["speed"] * inflow / (basin["thickness"] * patch_length(tables, patch))
             add_link_momentum(tables.plane, patch, m, push, dydt, i + n, i + 2 * n)
+
+
+def _read_liquid(tables, probe, y):
+    """(pressure term, velocity along x, along y [m/s]) at a probe: weighted sums over its cells.
+
+    The pressure term is the deviation of density [kg/m3] under the density law `linear`, rho0 ln(rho / rho0) under
+    `log`: pressure above that at rest over c0^2. Under `table` it is the pressure above that at rest [Pa].
+    """
+    basin, law, total, u, v = tables.basins[probe["index"]], tables.settings[0]["law"], 0.0, 0.0, 0.0
+    n, o = basin["n"], basin["y"]
+    for m in range(probe["count"]):
+        i, weight = tables.integers[probe["cell"] + m], tables.floats[probe["weights"] + m]
+        value = y[o + i]
+        share = 1.0 / (basin["density"] + (0.0 if law == LAW_LINEAR else value)) * weight
+        if TABLED:
+            value = pressure(tables.plane[basin["table"] :], basin["density"], value)[0]
+        elif law == LAW_LOG:
+            value = basin["density"] * log1p(value / basin["density"])
+        total += weight * value
+        u += share * y[o + n + i]
+        v += share * y[o + 2 * n + i]
+    return total, u, v
+
+
+read_liquid = specialise(_read_liquid, "read_liquid")
+read_liquid_table = specialise(_read_liquid, "read_liquid_table", TABLED=True)
+READ = read_liquid  # of the template
+
+
+def _observe_liquid(t, y, out, handle, values):
+    """Write the values of probes in cells of liquids: pressures [Pa] or velocities [m/s].
+
+    A pressure is the first result of `READ` plus `offset`, under other density laws than `table` multiplied by `scale`:
+    two columns of the table of probes.
+    """
+    tables = open_tables(handle)
+    for k in range(tables.probes.size):
+        probe = tables.probes[k]
+        if probe["kind"] == CELL_FIELD and tables.basins[probe["index"]]["kind"] == OWN_CODE:
+            value, u, v = READ(tables, probe, y)
+            if probe["side"] != PRESSURE:
+                values[k] = velocity_value(probe["side"], u, v)
+            elif TABLED:
+                values[k] = value + probe["offset"]
+            else:
+                values[k] = probe["scale"] * value + probe["offset"]
+
+
+observe_liquid = specialise(_observe_liquid, "observe_liquid")
+observe_liquid_table = specialise(_observe_liquid, "observe_liquid_table", READ=read_liquid_table, TABLED=True)

@@ -7,21 +7,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fvsolve.basins import mesh_blocks
 from fvsolve.basins.basin_terms import FRAME_FORCES, SHORTAGES
-from fvsolve.basins.liquid import grid_linear, grid_nonlinear, liquid_mesh
-from fvsolve.basins.liquid.liquid_probes import PRESSURE
+from fvsolve.basins.liquid import liquid_mesh, liquid_sides
+from fvsolve.basins.liquid.liquid_patches import PRESSURE
 from fvsolve.basins.lower_basin import BasinRows
 from fvsolve.kernels.rhs_assembly import RhsTerms
 
 PACKAGE = __package__
-LIQUID_TERMS = RhsTerms(
-    package=PACKAGE,
-    prepare="liquid_patches: patch_pressures",
-    boundary_inflow="liquid_patches: patch_flows",
-    observe="liquid_probes: observe_liquid",
-    power="liquid_energy: add_power",
-    stored="liquid_energy: add_stored",
-)
 PRESSURE_SCALE = 1e5  # [Pa]
 STEPS = 8  # midpoint steps up to the height of a cell; the error of each is the cube of its strain
 SMALL = 1e-9  # negligible velocity over the wave speed
@@ -54,30 +47,29 @@ class LiquidRows(BasinRows):
 
     def pieces(self, valves: bool) -> Iterator[RhsTerms]:
         yield RhsTerms(package=PACKAGE, rates=self.rates())
-        yield LIQUID_TERMS
+        law = "_table" if self.waves is not None else ""
+        yield RhsTerms(
+            package=PACKAGE,
+            prepare=f"liquid_patches: patch_pressures{law}",
+            boundary_inflow="liquid_patches: patch_flows",
+            observe=f"liquid_patches: observe_liquid{law}",
+            power="liquid_energy: add_power",
+            stored="liquid_energy: add_stored",
+        )
         if self.part.on is not None:
             yield FRAME_FORCES
         if self.moves:
             yield RhsTerms(
-                package=PACKAGE, power="liquid_moving_walls: add_power", stored="liquid_moving_walls: add_stored"
+                package=PACKAGE, power="liquid_energy: add_wall_power", stored="liquid_energy: add_wall_stored"
             )
         yield SHORTAGES
-        if self.waves is not None:
-            yield RhsTerms(
-                package=PACKAGE,
-                prepare="liquid_table_law: patch_pressures",
-                observe="liquid_table_law: observe_pressures",
-            )
 
     def rates(self) -> str:
         """Name of the compiled function that computes the rates of the cells, as `module: function`."""
-        shape = "grids" if self.is_grid else "meshes"
-        if self.moves or self.part.on is not None:
-            module, motion = ("liquid_moving_walls", "moving") if self.moves else ("liquid_on_body", "accelerated")
-            function = "table" if self.waves is not None else "waves" if self.linear and self.is_grid else "rates"
-            return f"{module}: {function}_on_{motion}_{shape}"
-        function = "waves" if self.linear and self.is_grid else "rates"
-        return f"{'liquid_table_law' if self.waves is not None else 'liquid_cell_rates'}: {function}_on_{shape}"
+        law = "table" if self.waves is not None else "linear" if self.linear else "log"
+        mesh = "grids" if self.is_grid else "meshes"
+        kind = f"moving_{mesh}" if self.moves else mesh if self.part.on is None else f"{mesh}_on_bodies"
+        return f"liquid_rates: {law}_{kind}"
 
     @property
     def has_constant_speed(self) -> bool:
@@ -106,11 +98,9 @@ class LiquidRows(BasinRows):
         if self.waves is not None:
             self.lower_waves(draft, row)
         if self.is_grid:
-            nx, ny = self.mesh.grid.nx, self.mesh.grid.ny
-            more = nx + 1 if self.moves else 0
-            row["work"] = draft.to_work((grid_linear if self.linear else grid_nonlinear).work_size(nx, ny) + more)
+            row["work"] = draft.to_work(liquid_sides.work_size(self.mesh.grid.nx))
         else:
-            row["work"] = draft.to_work(liquid_mesh.work_size(self.integers))
+            row["work"] = draft.to_work(mesh_blocks.work_size(liquid_mesh, self.integers))
 
     def lower_waves(self, draft, row) -> None:
         """Append the table of Riemann invariants of the liquid to the arrays of the model (density law `table`).

@@ -16,10 +16,8 @@ from fvsolve.basins.liquid.riemann_invariants import HEAD
 from fvsolve.fluid.laws import TableLaw
 from fvsolve.kernels import dtypes as rec
 
-REFINEMENT, LEAST_INTERVALS = (
-    4,
-    512,
-)  # intervals of the kernels' tables per interval of the fluid, and least number over its range
+REFINEMENT = 4  # intervals of the kernels' tables per interval of the fluid
+LEAST_INTERVALS = 512  # least number of intervals over the range of the fluid
 MAX_STRETCH = 2.0  # greatest ln(rho / rho at rest) by compliant walls
 PANELS = 8  # panels of the integral per interval of the fluid
 
