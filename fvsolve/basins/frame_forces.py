@@ -36,7 +36,7 @@ from fvsolve.jit import inline, njit
 from fvsolve.kernels.dtypes import LAW_LINEAR, RATE, TANK_OUT
 from fvsolve.kernels.mechanism import body_layout as body
 from fvsolve.kernels.mechanism.body_layout import BASIN_ARM, BASIN_LOAD, EAST, MOMENTS, body_row
-from fvsolve.kernels.mechanism.vectors import cross, dot, rotate, write_vector
+from fvsolve.kernels.mechanism.vectors import cross, dot, rotate, rotate_back, write_vector
 from fvsolve.kernels.table_handle import open_tables
 
 
@@ -234,8 +234,8 @@ def load_body(tables, basin, b, y, rates, first, own, twice, euler, out):
     write_vector(out, tank + BASIN_ARM, out[arm] + rx, out[arm + 1] + ry, out[arm + 2] + rz)
     write_vector(out, tank + BASIN_LOAD, hx, hy, hz)
     write_vector(out, tank + BASIN_LOAD + 3, tx, ty, tz)
-    body.add_force(out, row, rx, ry, rz, *body.rotate_back(out, tank + EAST, hx, hy, hz))
-    body.add_torque(out, row, *body.rotate_back(out, tank + EAST, tx, ty, tz))
+    body.add_force(out, row, rx, ry, rz, *rotate_back(out, tank + EAST, hx, hy, hz))
+    body.add_torque(out, row, *rotate_back(out, tank + EAST, tx, ty, tz))
 
 
 @njit
