@@ -97,11 +97,11 @@ class Integrator:
         n : number of states, 0 for explicit methods; q : number of stages that are solved together
         reals, pairs : numbers of stored factors for real and complex shifts
         """
-        ledgers, size = self.ledger_rates.shape[1] if n else 0, int(self.newton["factor_size"][0])
+        ledgers, size = self.ledger_rates.shape[1], int(self.newton["factor_size"][0])
         self.product, self.buffer, self.ledger_slopes = np.zeros(n + ledgers), np.zeros(q * q), np.zeros(ledgers)
         for name in IMPLICIT_VECTORS:
             setattr(self, name, np.zeros(n))
-        self.last_stages, self.transformed = np.zeros((len(self.k) if n else 0, n)), np.zeros((3 * q, n))
+        self.last_stages, self.transformed = np.zeros((len(self.k), n)), np.zeros((3 * q, n))
         self.jacobian, self.factors = self.no_floats, np.zeros(reals * size)
         self.complex_factors = np.zeros(n + pairs * size, dtype=complex)
 
