@@ -31,7 +31,7 @@ from fvsolve.kernels.reconstruction import by_limiter, minmod, slope
 THIN = 1e-6  # depth below which values fade to zero [m]
 
 
-class Grid(NamedTuple):
+class AdvectionGrid(NamedTuple):
     """Grid of nx columns and ny rows, of which the rows `begin` to `stop` - 1 are computed.
 
     kx, ky : float64[nx], float64[ny]  1 / widths of columns, 1 / heights of rows [1/m]

@@ -8,7 +8,7 @@ amounts per area.
 from math import cos, pi
 
 from fvsolve.basins import advection, fifth_order
-from fvsolve.basins.advection import THIN, Grid, GridFlows
+from fvsolve.basins.advection import THIN, AdvectionGrid, GridFlows
 from fvsolve.basins.advection_faces import MeshFlows, advection_rates
 from fvsolve.basins.boundary_cells import flow_weight, has_given_flows, patch_inflow, stencil_cells, weighted_volume
 from fvsolve.basins.cell_stretching import deviations_of
@@ -147,7 +147,9 @@ def grid_arrays(tables, b):
     """(grid, depths, work array) of basin b, a grid with scalars."""
     basin = tables.basins[b]
     plane, nx, ny, k = tables.plane, basin["nx"], basin["ny"], basin["spacing"]
-    grid = Grid(nx, ny, tables.bands[2 * b], tables.bands[2 * b + 1], plane[k : k + nx], plane[k + nx : k + nx + ny])
+    grid = AdvectionGrid(
+        nx, ny, tables.bands[2 * b], tables.bands[2 * b + 1], plane[k : k + nx], plane[k + nx : k + nx + ny]
+    )
     first, last = depth_range(basin)
     return grid, tables.work[first:last], tables.work[basin["scalar_work"] + basin["n"] :]
 

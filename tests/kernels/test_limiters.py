@@ -49,7 +49,7 @@ def carried(code: int) -> np.ndarray:
     rng, rate = np.random.default_rng(4), np.zeros(n * n)
     flows, c, outside = rng.normal(size=2 * n * (n + 1)), rng.random(n * n), rng.random(4 * n)
     ones, work = np.ones(n), np.zeros(advection.second_order_work(n, n))
-    grid = advection.Grid(n, n, 0, n, ones, ones)
+    grid = advection.AdvectionGrid(n, n, 0, n, ones, ones)
     flows = advection.GridFlows(1.0, flows[: n * (n + 1)], flows[n * (n + 1) :], outside)
     advection.second_order_rates(rec.MUSCL, code, grid, 0, n, flows, c, work, rate)
     return rate

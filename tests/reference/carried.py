@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.basins import advection, fifth_order
-from fvsolve.basins.advection import Grid, GridFlows
+from fvsolve.basins.advection import AdvectionGrid, GridFlows
 from fvsolve.basins.transport.lower import face_flows, grid_flows
 from fvsolve.kernels import dtypes as rec
 from fvsolve.mesh import rectangle
@@ -40,7 +40,7 @@ class Carried:
 
     @property
     def grid(self):
-        return Grid(self.nx, self.ny, 0, self.ny, self.kx, self.ky)
+        return AdvectionGrid(self.nx, self.ny, 0, self.ny, self.kx, self.ky)
 
     def flows(self, factor=1.0):
         return GridFlows(factor, self.flow_x, self.flow_y, self.outside)
