@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.draw.scene import DrawnScene
 from fvsolve.draw.sheet import colour_range
-from fvsolve.draw.view import DrawnScene
 from fvsolve.errors import did_you_mean, listing
 
 TUBE_RADIUS = 0.008  # radius of a pipe as a fraction of the diagonal of the scene

@@ -5,8 +5,8 @@ import numpy as np
 from fvsolve.draw import style
 from fvsolve.draw.part_drawing import MAX_PARTS_WITH_JOINTS, SMALL_SYMBOL_COUNT, draw_parts
 from fvsolve.draw.projection import box_corners, choose_projection, draw_box, fit_limits
+from fvsolve.draw.scene import DrawnScene
 from fvsolve.draw.sheet import COLOUR_MAP, HALF_SYMBOL, SIZE, PictureSheet, colour_range
-from fvsolve.draw.view import DrawnScene
 
 PIPE_WIDTH, EDGE_WIDTH = 3.6, 4.8  # widths of a pipe and of its edge [points]
 LEVEL_HEIGHT = 3.2  # height of a picture of a network along a level line [inch]

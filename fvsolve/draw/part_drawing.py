@@ -7,8 +7,8 @@ import numpy as np
 
 from fvsolve.draw import style
 from fvsolve.draw.projection import Projection
+from fvsolve.draw.scene import DrawnScene
 from fvsolve.draw.sheet import draw_symbol, symbol_of
-from fvsolve.draw.view import DrawnScene
 from fvsolve.errors import visible
 
 SYMBOL_SPACING = 4.8  # least distance of symbols, in half widths of a symbol

@@ -16,7 +16,7 @@ from solve.test_threads import SCENES, liquid, water
 
 import fvsolve
 from fvsolve.draw.frame_meshes import read_frame
-from fvsolve.draw.view import DrawnScene, DrawnUnit
+from fvsolve.draw.scene import DrawnScene, DrawnUnit
 from fvsolve.output.fields import read_series
 
 pytest.importorskip("mpi4py", reason="the extra mpi is not there")
