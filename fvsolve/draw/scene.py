@@ -1,6 +1,7 @@
 """Scene of a field picture: frames, parts, names and units."""
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 

@@ -25,7 +25,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/case": (6218, 25),
     "fvsolve/cli": (3468, 16),
     "fvsolve/data": (14, 1),
-    "fvsolve/draw": (2744, 15),
+    "fvsolve/draw": (2745, 15),
     "fvsolve/epanet": (793, 5),
     "fvsolve/exact": (1161, 5),
     "fvsolve/fluid": (1016, 6),
