@@ -82,7 +82,7 @@ def main() -> int:
             spread = [pair[1][0] / pair[0][0] for pair in rounds]
             ratios.append(new / old)
             print(f"{name:28s} {1e9 * old:12.1f} ns {1e9 * new:12.1f} ns   ratio {new / old:.3f}"
-                  f"   rounds {min(spread):.3f} to {max(spread):.3f}   {rounds[0][1][1]} steps", flush=True)  # fmt: skip
+                  f"   rounds {min(spread):.3f} to {max(spread):.3f}, {rounds[0][1][1]} steps", flush=True)  # fmt: skip
         for process in workers:
             process.stdin.close()
             process.wait()
