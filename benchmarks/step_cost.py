@@ -18,7 +18,7 @@ import tempfile
 from pathlib import Path
 
 import measure
-from compare_commits import extract, revision
+from compare_commits import HERE, extract, revision
 
 SPAN, MOST_RUNS = 0.6, 200  # time in which a process repeats a run [s], and the greatest number of repeats
 LONGEST = 6.0  # a case whose run takes longer is run once a round [s]
@@ -65,6 +65,9 @@ def main() -> int:
     parser.add_argument("--cases", default="", help="names of cases, separated by commas (default all)")
     parser.add_argument("--rounds", type=int, default=3, help="turns of each commit")
     asked = parser.parse_args()
+    if asked.quick and not (HERE.parent / ".git").exists():
+        print(f"there is no git repository: {measure.SKIPPED}")
+        return 0
     names = ["two-tanks"] if asked.quick else [name for name in asked.cases.split(",") if name]
     ratios = []
     with tempfile.TemporaryDirectory(prefix="fvsolve-") as made:
