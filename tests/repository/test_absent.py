@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from fvsolve.solve.run_loop import RunLoop
 
 PIPES = {"pipes", "ghost_cells", "reconstruction", "fused_step"}
 MASSES = {"mass_dynamics"}
-BODIES = {"joints", "mass_matrix", "body_layout", "loop_constraints", "bushings"}
+BODIES = {"body_kinematics", "mass_matrix", "body_layout", "loop_constraints", "force_elements"}
 DEVICES = {"check_valve", "regulator", "pump", "accumulator"}
 MEMORY = {"relaxation"}  # of unsteady friction
 IMPLICIT = {"newton", "dirk", "irk", "ros", "structure", "linear_dense", "linear_banded", "linear_sparse"}
@@ -37,7 +38,10 @@ def compiled_with(*functions) -> set[str]:
         if not hasattr(one, "__code__") or one in seen:
             continue
         seen[one] = Path(one.__code__.co_filename).stem
-        named = [one.__globals__.get(name) for name in one.__code__.co_names]
+        names = one.__code__.co_names
+        named = [one.__globals__.get(name) for name in names]
+        spaces = [space for space in named if isinstance(space, ModuleType)]
+        named += [getattr(space, name, None) for space in spaces for name in names]
         waiting += [found for found in named if hasattr(found, "py_func")]
     return set(seen.values())
 
@@ -101,7 +105,7 @@ def test_each_room_is_compiled_where_it_is_used(compiling):
     cylinder = fvsolve.build(fvsolve.load(CASES / "closed-cylinder.toml"))  # law: log
     assert files(cylinder) & (PIPES | MASSES | BODIES) == MASSES
     arm = fvsolve.build(fvsolve.load(bodies({"arm": pendulum()}, 1.0)))
-    assert files(arm) & BODIES == BODIES - {"loop_constraints", "bushings"} and not files(arm) & PIPES
+    assert files(arm) & BODIES == BODIES - {"loop_constraints", "force_elements"} and not files(arm) & PIPES
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
