@@ -75,9 +75,9 @@ class Recorder:
         self._watch()
 
     def _watch(self) -> None:
-        from fvsolve import jit
+        from fvsolve.compile.functions import Function
 
-        code, call, compiled = jit.Function.code, jit.Function.__call__, jit.Function._compiled
+        code, call, compiled = Function.code, Function.__call__, Function._compiled
 
         def watched_code(function, letters, *more, **options):
             CALLED.add(f"{function.__module__}.{function.__qualname__}({letters})")
@@ -98,7 +98,7 @@ class Recorder:
                 if self.nested:
                     self.nested[-1] += spent
 
-        jit.Function.code, jit.Function.__call__, jit.Function._compiled = watched_code, watched_call, watched_compiled
+        Function.code, Function.__call__, Function._compiled = watched_code, watched_call, watched_compiled
 
     @pytest.hookimpl(wrapper=True, tryfirst=True)
     def pytest_runtest_protocol(self, item, nextitem):

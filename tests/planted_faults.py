@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 TOP = Path(__file__).parents[1]
-QUICK_NEEDED, ALL_NEEDED = 37, 41
+QUICK_NEEDED, ALL_NEEDED = 38, 42
 WITHOUT_OWN_TEST = (
     "--deselect",
     "tests/repository/test_planted_faults.py",
@@ -60,6 +60,7 @@ FAULTS = [
     Fault(
         "assembly/hydraulics.py", "reynolds * math.pi / 4.0 * diameter", "1.01 * reynolds * math.pi / 4.0 * diameter"
     ),
+    Fault("compile/cache_folders.py", 'digest.update(path.read_bytes() + b"\\0")', 'digest.update(b"\\0")'),
     Fault("draw/plot.py", "np.argmin(values[a:b])", "np.argmax(values[a:b])"),
     Fault("mesh/mesh.py", "angle=float(angle[sharpest])", "angle=float(1.01 * angle[sharpest])"),
     Fault("steppers/ros.py", "1.0 / (later - t) if later > t", "-1.0 / (later - t) if later > t"),

@@ -26,64 +26,33 @@ SPIN_LIMIT = 2000  # polls at a barrier before the thread yields
 
 if COMPILING:
 
-    def at_address(context, builder, kind, address, size):
-        """Generate code for an array of `size` numbers that starts at a memory address, without a copy.
-
-        context, builder : code generation of numba; kind : numba type of the array
-        """
-        from numba.core import types
-        from numba.np.arrayobj import make_array, populate_array
-
-        array = make_array(kind)(context, builder)
-        width = context.get_constant(types.intp, kind.dtype.bitwidth // 8)
-        data = builder.inttoptr(address, array.data.type)
-        populate_array(array, data=data, shape=[size], strides=[width], itemsize=width, meminfo=None)
-        return array._getvalue()
-
     @Intrinsic
     def floats_at(typingctx, address, size):
         """View of the memory at an address as an array float64[size], without a copy."""
-        from numba.core import types
+        from fvsolve.compile.code_generation import floats_at_address
 
-        def generate(context, builder, kind, args):
-            return at_address(context, builder, kind.return_type, *args)
-
-        return types.float64[::1](types.int64, types.int64), generate
+        return floats_at_address()
 
     @Intrinsic
     def address_of(typingctx, array):
         """Memory address of the first entry of an array."""
-        from numba.core import types
-        from numba.np.arrayobj import make_array
+        from fvsolve.compile.code_generation import address_of_array
 
-        def generate(context, builder, kind, args):
-            data = make_array(kind.args[0])(context, builder, args[0]).data
-            return builder.ptrtoint(data, context.get_value_type(types.int64))
-
-        return types.int64(array), generate
+        return address_of_array(array)
 
     @Intrinsic
     def store_release(typingctx, address, value):
         """Store an integer at an address, after all earlier writes are visible to other threads (release)."""
-        from numba.core import types
+        from fvsolve.compile.code_generation import atomic_store
 
-        def generate(context, builder, kind, args):
-            place = builder.inttoptr(args[0], context.get_value_type(types.int64).as_pointer())
-            builder.store_atomic(args[1], place, ordering="release", align=8)
-            return context.get_dummy_value()
-
-        return types.none(types.int64, types.int64), generate
+        return atomic_store()
 
     @Intrinsic
     def load_acquire(typingctx, address):
         """Load an integer from an address, before all later reads (acquire); counterpart of `store_release`."""
-        from numba.core import types
+        from fvsolve.compile.code_generation import atomic_load
 
-        def generate(context, builder, kind, args):
-            place = builder.inttoptr(args[0], context.get_value_type(types.int64).as_pointer())
-            return builder.load_atomic(place, ordering="acquire", align=8)
-
-        return types.int64(types.int64), generate
+        return atomic_load()
 
     @Intrinsic
     def call_processes(typingctx, address, content, numbers, size):
@@ -92,29 +61,16 @@ if COMPILING:
         content : kind of exchange, SEND_STATES, SEND_FLOWS, SEND_RATES or SEND_SUMS
         numbers, size : memory address and length of the array
         """
-        from llvmlite import ir
-        from numba.core import types
+        from fvsolve.compile.code_generation import c_call
 
-        def generate(context, builder, kind, args):
-            word = ir.IntType(64)
-            shape = ir.FunctionType(ir.VoidType(), [word] * 3)
-            builder.call(builder.inttoptr(args[0], shape.as_pointer()), args[1:])
-            return context.get_dummy_value()
-
-        return types.none(*[types.int64] * 4), generate
+        return c_call(3)
 
     @Intrinsic
     def yield_thread(typingctx, address):
         """Call the system function at an address, which yields the processor to other threads."""
-        from llvmlite import ir
-        from numba.core import types
+        from fvsolve.compile.code_generation import c_call
 
-        def generate(context, builder, kind, args):
-            shape = ir.FunctionType(ir.IntType(32), [])
-            builder.call(builder.inttoptr(args[0], shape.as_pointer()), [])
-            return context.get_dummy_value()
-
-        return types.none(types.int64), generate
+        return c_call(0, bits=32)
 else:
     import ctypes
     import time

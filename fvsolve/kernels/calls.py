@@ -65,10 +65,10 @@ def argument_types(letters: str) -> tuple:
 def _kinds() -> dict:
     from numba import types
 
-    from fvsolve.kernels.table_attributes import Tables
-    from fvsolve.kernels.vector_arguments import Vector
+    from fvsolve.compile.code_generation import Tables, Vector
 
-    own = {"V": Vector(types.float64), "H": Vector(types.int64), "T": Tables(), "D": table_types().devices.dtype}
+    vectors = {"V": Vector(types.float64), "H": Vector(types.int64)}
+    own = vectors | {"T": Tables("Tables", table_types), "D": table_types().devices.dtype}
     return plain_kinds() | own
 
 
@@ -111,19 +111,9 @@ if COMPILING:
 
         letters, returned : types of the other arguments and of the results, see `argument_types`
         """
-        from numba.core import types
+        from fvsolve.compile.code_generation import call_by_address
 
-        kinds = argument_types(letters)
-        results = argument_types(returned)
-        result = types.none if not results else results[0] if len(results) == 1 else types.Tuple(results)
-
-        def generate(context, builder, kind, args):
-            shape = context.call_conv.get_function_type(result, kinds)
-            pointer = builder.inttoptr(args[0], shape.as_pointer())
-            _, value = context.call_conv.call_function(builder, pointer, result, kinds, args[1:])
-            return value if results else context.get_dummy_value()
-
-        return result(types.int64, *kinds), generate
+        return call_by_address(argument_types(letters), argument_types(returned))
 
     @Intrinsic
     def call_rates(typingctx, address, t, y, dydt, out, handle):

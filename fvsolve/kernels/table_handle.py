@@ -8,7 +8,7 @@ tables alive, at their addresses and with their sizes.
 import numpy as np
 
 from fvsolve.jit import COMPILING, Intrinsic
-from fvsolve.kernels.dtypes import HandleTables
+from fvsolve.kernels.dtypes import HandleTables, table_types
 
 if COMPILING:
 
@@ -27,9 +27,9 @@ if COMPILING:
     @Intrinsic
     def open_tables(typingctx, handle):
         """Tables behind a handle, without reference counts; an attribute such as `tables.nodes` loads a table."""
-        from fvsolve.kernels.table_attributes import Tables, handle_address
+        from fvsolve.compile.code_generation import Tables, handle_address
 
-        return Tables()(handle), handle_address
+        return Tables("Tables", table_types)(handle), handle_address
 else:
 
     def addresses_of(tables: tuple) -> tuple:

@@ -62,11 +62,12 @@ def _program_versions() -> tuple[tuple[str, str], ...]:
     """Versions of the programs, as pairs; cached, because they cannot change within a process."""
     import fvsolve
     from fvsolve import jit
+    from fvsolve.compile import store
 
     own = {"fvsolve": fvsolve.__version__, "sources": jit.source_hash(), "python": sys.version.split()[0]}
     own |= {"numpy": np.__version__, "numba": "not used", "target": "none"}
     if jit.COMPILING:
-        own |= {"numba": jit.store.numba_version(), "target": jit.store.target()["name"]}
+        own |= {"numba": store.numba_version(), "target": store.target()["name"]}
     return tuple(own.items())
 
 

@@ -10,7 +10,9 @@ from concurrent.futures import as_completed
 from dataclasses import dataclass
 from pathlib import Path
 
-from fvsolve import jit, store
+from fvsolve import jit
+from fvsolve.compile import store
+from fvsolve.compile.cache_folders import CODE_SUFFIX
 from fvsolve.draw.plot_process import processor_count
 from fvsolve.errors import FvsolveError, RunError
 from fvsolve.run.process_pool import ProcessPool, WorkerLost
@@ -76,7 +78,7 @@ def _folder() -> Path:
 
 def code_files(folder: Path) -> dict[str, int]:
     """Paths of the files of compiled code in a folder, with their sizes [bytes]."""
-    return {str(path): path.stat().st_size for path in folder.rglob(f"*{store.SUFFIX}")}
+    return {str(path): path.stat().st_size for path in folder.rglob(f"*{CODE_SUFFIX}")}
 
 
 def _all(tasks: list[tuple[str, str]], jobs: int, progress: Callable[[int, str], None]) -> None:

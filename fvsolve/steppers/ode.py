@@ -13,7 +13,7 @@ import numpy as np
 from numba import objmode
 
 from fvsolve.errors import FvsolveError
-from fvsolve.jit import COMPILING, DeclaredFunction, code_of, compile_once
+from fvsolve.jit import COMPILING, DeclaredFunction, compile_once, compile_signature
 from fvsolve.kernels.calls import argument_types
 from fvsolve.steppers import automatic, loop_records
 from fvsolve.steppers.integrator import Integrator
@@ -241,9 +241,7 @@ def _functions(f, t0, y0):
 
 def _compile(function, letters: str) -> DeclaredFunction:
     """Compile a numba function for the time loop, with arguments of the types `letters`, see `run_handle`."""
-    kinds = argument_types(letters)
-    function.compile(kinds)
-    return DeclaredFunction(function, letters, code_of(function.overloads[kinds]))
+    return compile_signature(function, letters, argument_types(letters))
 
 
 @compile_once
@@ -258,13 +256,11 @@ def _rhs(f, t0, y0):
 
     f is called as a Python function if numba cannot compile it. t0, y0 : arguments of a trial call
     """
-    from numba.core.errors import NumbaError, UnsupportedBytecodeError
-
     fills = in_place(f)
     try:
         inner = f if hasattr(f, "py_func") else numba.njit(f)
         inner(t0, y0, np.empty_like(y0)) if fills else inner(t0, y0)
-    except (NumbaError, UnsupportedBytecodeError, TypeError, NotImplementedError):
+    except (numba.NumbaError, numba.UnsupportedBytecodeError, TypeError, NotImplementedError):
         return _call_python
 
     def rhs(t, y, dydt, out, handle):

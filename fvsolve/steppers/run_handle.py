@@ -96,7 +96,7 @@ if COMPILING:
     @Intrinsic
     def open_run(typingctx, run):
         """Arrays behind the handle of a run; an attribute such as `r.y` loads an array."""
-        from fvsolve.kernels.table_attributes import Tables, handle_address
+        from fvsolve.compile.code_generation import Tables, handle_address
 
         return Tables("Run", run_types)(run), handle_address
 

@@ -10,7 +10,7 @@ from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
-from fvsolve import jit
+from fvsolve.compile.cache_folders import EXTRA_FOLDERS, PACKAGE
 from fvsolve.errors import RunError
 from fvsolve.output.directory import lock_folder, release
 from fvsolve.output.restart import identity
@@ -120,7 +120,7 @@ def case_key(case, extra: dict) -> str:
 def package_hash() -> str:
     """Hash of all source files of fvsolve."""
     digest = hashlib.sha256()
-    for path in sorted(jit.PACKAGE.rglob("*.py")):
+    for path in sorted(PACKAGE.rglob("*.py")):
         digest.update(path.read_bytes() + b"\0")
     return digest.hexdigest()
 
@@ -130,7 +130,7 @@ def digest_of(who: dict) -> str:
 
     The result of a point of a study depends on these alone.
     """
-    who = who | {"package": package_hash(), "outside": sorted(jit.EXTRA_FOLDERS.values())}
+    who = who | {"package": package_hash(), "outside": sorted(EXTRA_FOLDERS.values())}
     text = json.dumps(who, sort_keys=True, default=str)
     arrays = [method.text for name, method in METHODS.items() if name not in BUILT_IN and f'"{name}"' in text]
     return hashlib.sha256("\n".join([text, *arrays]).encode()).hexdigest()[:24]

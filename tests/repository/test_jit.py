@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 import fvsolve
-from fvsolve import jit, store
+from fvsolve import jit
+from fvsolve.compile import cache_folders, store
 from fvsolve.steppers.run_handle import no_algebra
 
 LAW = """from fvsolve.jit import njit
@@ -80,13 +81,13 @@ for function in (sum_of_squares, sum_of_cubes):
 
 @pytest.fixture
 def package(tmp_path):
-    """Small copy of the package: jit.py, store.py, and two compiled functions, the second of which calls the first."""
+    """Small copy of the package: jit.py, the folder compile, and two compiled functions; the second calls the first."""
     folder = tmp_path / "fvsolve"
     for room in (folder, folder / "kernels", folder / "steppers"):
         room.mkdir()
         (room / "__init__.py").touch()
-    for module in (jit, store):
-        shutil.copy(module.__file__, folder)
+    shutil.copy(jit.__file__, folder)
+    shutil.copytree(Path(store.__file__).parent, folder / "compile", ignore=shutil.ignore_patterns("__pycache__"))
     (folder / "kernels" / "law.py").write_text(LAW.format(factor=2.0))
     (folder / "steppers" / "loop.py").write_text(LOOP)
     return folder
@@ -118,6 +119,43 @@ def test_second_process_needs_no_numba_and_an_edit_elsewhere_is_noticed(package)
     assert python(package, PROBE) == ["18.0", "True", "0"]  # cache of numba
     assert python(package, PROBE) == ["18.0", "False", "False"]
     assert not list(package.rglob("*.nb?")), "compiled code belongs in the cache folder"
+
+
+def test_without_the_store_all_code_comes_from_numba(package):
+    """`FVSOLVE_STORE=0`, for a numba whose machine code the store cannot load."""
+    off = {"FVSOLVE_STORE": "0"}
+    assert python(package, PROBE, **off) == ["12.0", "True", "1"]
+    assert python(package, PROBE, **off) == ["12.0", "True", "0"]
+    cold = "from fvsolve import jit; from fvsolve.compile.cache_folders import is_cached; print(jit.is_cold(), {})"
+    asked = cold.format("is_cached('loop'), is_cached('law'), is_cached('oop')")
+    assert python(package, asked, **off) == ["False", "True", "True", "False"]
+    assert not list((package.parent / "cache" / "code").rglob(f"*{store.SUFFIX}"))
+    assert python(package, PROBE) == ["12.0", "True", "0"] and python(package, PROBE) == ["12.0", "False", "False"]
+
+
+def test_a_run_without_the_store_has_the_same_results():
+    """Events, probes and error control of a whole run, to the bit."""
+    code = """
+import fvsolve
+from fvsolve.compile import store
+run = fvsolve.run("two-tanks", {"output.fields": 0})
+print(store.IN_USE, run.ok, run.summary["steps"], run.si("low.level").tobytes().hex())
+"""
+    words = {}
+    for setting in ("0", "1"):
+        environment = os.environ | {"FVSOLVE_STORE": setting, "PYTHONPATH": str(cache_folders.PACKAGE.parent)}
+        done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        words[setting] = done.stdout.split()
+    assert words["0"][:2] == ["False", "True"] and words["0"][1:] == words["1"][1:] and len(words["0"][3]) > 1000
+
+
+PRIVATE = re.compile(r"numba\.(core|np|extending|misc|_\w+)|_numba_type_|\b(lib|context|builder)\.call_conv\b")
+
+
+def test_only_one_folder_depends_on_private_names_of_numba():
+    users = {path for path in cache_folders.PACKAGE.rglob("*.py") if PRIVATE.search(path.read_text(encoding="utf-8"))}
+    assert {path.parent.name for path in users} == {"compile"} and len(users) >= 3
 
 
 def test_python_and_compiled_code_may_call_the_same_function(package):
@@ -171,10 +209,9 @@ def test_settings_that_change_code_have_a_store_of_their_own(package):
     assert told[1] == "False" and python(package, PROBE, NUMBA_DEBUG_JIT="0") == ["12.0", "False", "False"]
     said = "from fvsolve import jit; print(jit.other_caches())"
     other, own = (python(package, said, **settings) for settings in ({"NUMBA_OPT": "1"}, {}))
-    assert " ".join(other).count(jit.store.target()["processor"]) == 3, "two stores and this machine's"
-    assert (
-        own[own.index("is") + 1] == python(package, "from fvsolve.jit import store; print(store.target()['name'])")[0]
-    )
+    assert " ".join(other).count(store.target()["processor"]) == 3, "two stores and this machine's"
+    target = python(package, "from fvsolve.compile import store; print(store.target()['name'])")
+    assert own[own.index("is") + 1] == target[0]
 
 
 def test_code_of_other_sources_is_named(package):
@@ -215,7 +252,7 @@ def test_old_generations_are_deleted_and_the_newest_few_kept(package):
     for generation in range(6):
         (package / "units.py").write_text(f"GENERATION = {generation}\n")
         python(package, "from fvsolve import jit; jit.code_folder()")
-    assert len(list((package.parent / "cache" / "code").iterdir())) == jit.KEPT_GENERATIONS + 1
+    assert len(list((package.parent / "cache" / "code").iterdir())) == cache_folders.KEPT_GENERATIONS + 1
 
 
 def test_without_jit_the_plain_function_comes_back_and_numba_stays_away(package):
@@ -264,13 +301,13 @@ def test_cache_folder_falls_back_when_the_stated_one_is_not_writable(package, tm
 
 
 def test_only_rooms_that_are_hashed_compile():
-    users = {path for path in jit.PACKAGE.rglob("*.py") if "njit" in path.read_text(encoding="utf-8")}
-    assert users <= set(jit._sources()), "njit outside of jit.ROOMS would never be cached"
+    users = {path for path in cache_folders.PACKAGE.rglob("*.py") if "njit" in path.read_text(encoding="utf-8")}
+    assert users <= set(cache_folders.compiled_sources()), "njit outside of the hashed sources would never be cached"
 
 
 def test_what_declares_or_lowers_compiles_nothing():
     """Of parts only laws are hashed, of basins only compiled files; edits elsewhere keep the compiled code."""
-    hashed = {path.relative_to(jit.PACKAGE) for path in jit._sources()}
+    hashed = {path.relative_to(cache_folders.PACKAGE) for path in cache_folders.compiled_sources()}
     assert Path("basins/liquid/grid_linear.py") in hashed and Path("basins/basin_scalars.py") in hashed
     assert {path.name[:3] for path in hashed if path.parts[0] == "parts"} == {"law"}
     assert not any(path.name.startswith(("part", "lower")) for path in hashed if path.parts[0] == "basins")

@@ -25,9 +25,10 @@ from reference.scenes import (
     valve,
 )
 
-from fvsolve import jit
 from fvsolve.case import load
+from fvsolve.compile.cache_folders import PACKAGE, source_hash
 from fvsolve.errors import FvsolveError
+from fvsolve.studies import result_cache
 from fvsolve.studies.failure.failure_map import failure_map
 from fvsolve.studies.failure.run_verdict import (
     BLOWN_RANGES,
@@ -222,12 +223,12 @@ def test_finished_squares_are_kept_and_reused(tmp_path):
 
 def test_points_of_other_sources_are_not_taken_up(tmp_path, monkeypatch):
     """Sources of studies count too, although they compile nothing."""
-    jit.source_hash()  # hash of the tested sources
-    made, package = [], shutil.copytree(jit.PACKAGE, tmp_path / "fvsolve", ignore=shutil.ignore_patterns("*.pyc"))
+    source_hash()  # hash of the tested sources
+    made, package = [], shutil.copytree(PACKAGE, tmp_path / "fvsolve", ignore=shutil.ignore_patterns("*.pyc"))
     study = package / "studies" / "stability" / "stability.py"
     for words in ("", "", "# another"):
         study.write_text(study.read_text(encoding="utf-8") + words, encoding="utf-8")
-        monkeypatch.setattr(jit, "PACKAGE", package)
+        monkeypatch.setattr(result_cache, "PACKAGE", package)
         package_hash.cache_clear()
         with ResultCache(tmp_path) as points:
             points.get(load(closing()), {}, lambda said=words: made.append(said) or {"value": 1.0})

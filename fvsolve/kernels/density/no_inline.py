@@ -7,13 +7,9 @@ if COMPILING:
     @Intrinsic
     def prevent_inlining(typingctx):
         """Prevent LLVM from inlining the function that contains this call; halves the compile time of that function."""
-        from numba.core import types
+        from fvsolve.compile.code_generation import no_inlining
 
-        def generate(context, builder, kind, args):
-            builder.function.attributes.add("noinline")
-            return context.get_dummy_value()
-
-        return types.none(), generate
+        return no_inlining()
 else:
 
     def prevent_inlining():

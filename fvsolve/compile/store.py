@@ -1,4 +1,4 @@
-"""Machine code on disk, loaded by llvmlite without numba.
+"""Machine code on disk, loaded by llvmlite without numba; not used with `FVSOLVE_STORE=0`.
 
 A file contains a function for a single signature: the object code compiled by numba, and its symbols. The name of its
 folder follows from the target: all properties on which machine code depends, apart from the sources.
@@ -24,7 +24,8 @@ from typing import Any, NamedTuple
 
 DIGEST = hashlib.sha256().digest_size
 SUFFIX = ".code"
-CAN_LINK = sys.platform != "win32"  # on other systems LLVM's linker can link numba's objects
+# True if the store is used: LLVM's linker can link numba's objects on all systems but Windows.
+IN_USE = sys.platform != "win32" and os.environ.get("FVSOLVE_STORE", "1") != "0"
 # Environment variables of numba that do not change code; all others are part of the target.
 IGNORED_SETTINGS = re.compile(
     r"NUMBA_(CACHE|CHROME|COLOR|CUDA|DEBUG(?!INFO)|DEVELOPER|DUMP|DISABLE_(JIT|CUDA|PERF|TYPEINFER)|"

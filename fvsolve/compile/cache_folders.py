@@ -1,0 +1,161 @@
+"""Folders of cached data: compiled code, named by the hash of all sources on which it depends, and fluid properties."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import os
+import shutil
+import sys
+import tempfile
+import warnings
+from pathlib import Path
+
+from fvsolve.compile import store
+
+TEST_BYTES = 65536  # bytes that are written to test if a folder can hold caches
+KEPT_GENERATIONS = 3  # generations of compiled code kept in addition to the present one
+CODE_SUFFIX = store.SUFFIX if store.IN_USE else ".nbc"  # of files of compiled code; the second is numba's own
+COMPILING = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
+
+PACKAGE = Path(__file__).resolve().parent.parent
+# Sources that compiled code can depend on: packages and modules with compiled functions and, by import contract, all
+# that they may import; of `parts` the law files, of `basins` all files without a prefix of `UNCOMPILED_PREFIXES`.
+SOURCE_ROOTS = ("kernels", "steppers", "jit", "compile", "units", "errors")
+UNCOMPILED_PREFIXES = ("part", "lower")  # prefixes of files of `basins` without compiled functions
+EXTRA_FOLDERS: dict[Path, str] = {}  # other folders with compiled functions -> their folder below the code folder
+
+
+@functools.cache
+def cache_folder() -> Path:
+    """Folder of cached data: compiled code and fluid properties.
+
+    It is `FVSOLVE_CACHE` if set, else the cache folder of the user; if not writable, a folder below the temporary
+    folder.
+    """
+    for folder in (_preferred_folder(), Path(tempfile.gettempdir()) / f"fvsolve-cache-{_user()}"):
+        if _writable(folder):
+            return folder
+    return Path(tempfile.mkdtemp(prefix="fvsolve-cache-"))
+
+
+@functools.cache
+def source_hash() -> str:
+    """Hash of all sources of compiled code: sixteen hexadecimal digits of the sha256 of file names and contents."""
+    return _digest(PACKAGE, compiled_sources())
+
+
+def add_sources(folder: Path) -> None:
+    """Allow caching of functions defined in a folder outside the package, under the hash of all sources in it."""
+    folder = Path(folder).resolve()
+    EXTRA_FOLDERS[folder] = f"outside/{_digest(folder, sorted(folder.rglob('*.py')))}"
+
+
+def _digest(top: Path, paths) -> str:
+    digest = hashlib.sha256()
+    for path in paths:
+        digest.update(str(path.relative_to(top)).encode() + b"\0")
+        digest.update(path.read_bytes() + b"\0")
+    return digest.hexdigest()[:16]
+
+
+@functools.cache
+def code_folder() -> Path:
+    """Folder for the code compiled from the present sources for this machine.
+
+    It is created if missing; the oldest folders of other sources are deleted.
+    """
+    folder = cache_folder() / "code" / source_hash()
+    own = folder / store.target()["name"]
+    own.mkdir(parents=True, exist_ok=True)
+    with contextlib.suppress(OSError):  # a full disk is reported when code is saved
+        store.write_target(own)
+    os.utime(folder)
+    _prune(folder)
+    return own
+
+
+def is_cold() -> bool:
+    """True if compilation is enabled and no function of this version is cached for this machine.
+
+    Then they must be compiled first.
+    """
+    return COMPILING and not any(code_folder().rglob(f"*{CODE_SUFFIX}"))
+
+
+def is_cached(name: str) -> bool:
+    """True if the code of a function of the package is cached for this machine."""
+    if store.IN_USE:
+        return any(code_folder().glob(f"{name}-*{CODE_SUFFIX}"))
+    return any(code_folder().rglob(f"*.{name}-*{CODE_SUFFIX}"))
+
+
+def other_caches() -> str:
+    """Text about cached code from other machines or sources, which cannot be used here; "" without such code."""
+    own = code_folder()
+    folders = [path for path in cache_folder().glob("code/*/*") if any(path.rglob(f"*{CODE_SUFFIX}"))]
+    machines = sorted(path.name for path in folders if path.parent == own.parent and path != own)
+    others = sorted({path.parent.name for path in folders} - {own.parent.name})
+    if machines:
+        return f"{own.parent} contains code compiled for {', '.join(machines)}; this machine is {own.name}"
+    if others:
+        return (
+            f"{own.parent.parent} contains code compiled from other versions of the sources ({', '.join(others)}), "
+            f"which cannot be used with the present version, {own.parent.name}"
+        )
+    return ""
+
+
+@functools.cache
+def compiled_sources() -> tuple[Path, ...]:
+    packages = [path for root in SOURCE_ROOTS for path in (PACKAGE / root).rglob("*.py")]
+    modules = [path for root in SOURCE_ROOTS if (path := PACKAGE / f"{root}.py").is_file()]
+    basins = [path for path in (PACKAGE / "basins").rglob("*.py") if not path.name.startswith(UNCOMPILED_PREFIXES)]
+    return tuple(sorted([*packages, *modules, *(PACKAGE / "parts").rglob("law*.py"), *basins]))
+
+
+def _prune(present: Path) -> None:
+    """Delete the folders of code from other sources, except the newest `KEPT_GENERATIONS`.
+
+    present : folder of the present sources. Another process may delete these folders at the same time.
+    """
+    others = []
+    for path in present.parent.iterdir():
+        try:
+            others.append((path.stat().st_mtime, path))
+        except OSError:
+            continue
+    others = sorted((item for item in others if item[1] != present), reverse=True)
+    for _, path in others[KEPT_GENERATIONS:]:
+        shutil.rmtree(path, ignore_errors=True)
+
+
+def _preferred_folder() -> Path:
+    if stated := os.environ.get("FVSOLVE_CACHE"):
+        return Path(stated).expanduser().absolute()
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "fvsolve" / "cache"
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / "fvsolve"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fvsolve"
+
+
+def _user() -> str:
+    return str(os.getuid()) if hasattr(os, "getuid") else os.environ.get("USERNAME", "user")
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(bytes(TEST_BYTES))  # fails on a full disk
+        return True
+    except OSError:
+        return False
+
+
+@functools.cache
+def warn_not_cached(reason: str) -> None:
+    text = f"{cache_folder()}: compiled code cannot be saved: {reason}; each start compiles it again"
+    warnings.warn(f"{text}. Free space there, or set FVSOLVE_CACHE to another folder", RuntimeWarning, stacklevel=2)
