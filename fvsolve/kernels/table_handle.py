@@ -5,16 +5,30 @@ compilation. A handle costs nothing: compiled code loads a table where it uses i
 tables alive, at their addresses and with their sizes.
 """
 
+from ctypes import addressof, c_char
+
 import numpy as np
 
 from fvsolve.jit import COMPILING, Intrinsic
 from fvsolve.kernels.dtypes import HandleTables, table_types
 
+NO_DATA = np.zeros(1)
+EMPTY = NO_DATA.ctypes.data  # address of empty arrays
+
 if COMPILING:
 
     def addresses_of(tables: tuple) -> tuple:
         """Memory address, number of rows and number of columns of each table, one after another in a flat tuple."""
-        return tuple(x for a in tables for x in (a.ctypes.data, a.shape[0], a.shape[-1]))
+        return tuple(x for a in tables for x in (address_of_table(a), a.shape[0], a.shape[-1]))
+
+    def address_of_table(a: np.ndarray) -> int:
+        """Memory address of an array; of a byte that nobody reads for an empty array.
+
+        The attribute `ctypes` of an array takes some microseconds, but other ways refuse read-only arrays.
+        """
+        if a.size == 0:
+            return EMPTY
+        return addressof(c_char.from_buffer(a)) if a.flags.writeable else a.ctypes.data
 
     def handle_of(places: tuple) -> np.ndarray:
         """Handle of the tables at these addresses (results of `addresses_of`): int64[3 n] for n tables."""

@@ -52,6 +52,11 @@ ARRAY_KINDS = {
     "last_stages": "w", "transformed": "w",
 }  # fmt: skip
 RunArrays = namedtuple("RunArrays", ARRAY_KINDS)
+# Expected dtype and number of dimensions of each array.
+EXPECTED = [
+    (np.dtype(ARRAYS[kind][0]), ARRAYS[kind][1]) if isinstance(kind, str) else (kind, 1)
+    for kind in ARRAY_KINDS.values()
+]
 # Indices into `calls`.
 STEP, FUSED_CALL, OBSERVER, RECORDER, EVENT_FUNCTIONS, RATES = range(6)
 REAL_FACTOR, REAL_SOLVE, PAIR_FACTOR, PAIR_SOLVE, BANDS = range(6, 11)
@@ -72,10 +77,9 @@ def handle_of_run(arrays: RunArrays):
     """Handle of the arrays of a run; raises TypeError for an array of another type than in `ARRAY_KINDS`."""
     if not COMPILING:
         return arrays
-    for name, array in arrays._asdict().items():  # machine code does not check them
-        kind = ARRAY_KINDS[name]
-        dtype, axes = ARRAYS[kind] if isinstance(kind, str) else (kind, 1)
+    for i, (array, (dtype, axes)) in enumerate(zip(arrays, EXPECTED, strict=True)):  # machine code does not check them
         if array.dtype != dtype or array.ndim != axes or not array.flags.carray:
+            name = RunArrays._fields[i]
             raise TypeError(f"{name} is not a writable C-contiguous array of {dtype} with {axes} dimension(s)")
     return handle_of(addresses_of(arrays))
 
