@@ -257,7 +257,7 @@ class DeclaredFunction:
 
     def __init__(self, function: Any, letters: str, code: Code) -> None:
         self.function, self.code, self.address, self.python = function, code, code.pointer, code.python
-        self.arrays = [(i, letter) for i, letter in enumerate(letters) if letter in ARRAYS]
+        self.arrays = [(i, letter) for i, letter in enumerate(letters.lower()) if letter in ARRAYS]
 
     def __call__(self, *arguments: Any) -> Any:
         for i, letter in self.arrays:  # machine code does not check them

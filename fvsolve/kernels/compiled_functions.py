@@ -61,7 +61,7 @@ class Functions:
     def compile_job(self, job: int, functions: list, in_turn):
         """Store the addresses of all functions of a job; return the compiled `in_turn`, which calls them in order."""
         self.store_addresses(job, functions)
-        return calls.compile_as(in_turn, calls.ARGUMENTS[job].lower())
+        return calls.compile_as(in_turn, calls.ARGUMENTS[job])
 
     @functools.cached_property
     def energies(self) -> tuple:
@@ -87,8 +87,8 @@ def compile_readers(cast: ModelFeatures) -> tuple:
         for hook in READER_HOOKS:
             if (function := calls.hook_of(law, hook)) is not None:
                 calls.function_address(function, calls.HOOKS[hook][0])
-    record = calls.compile_as(calls.record_in_turn, calls.READS.lower())
-    return record, calls.compile_as(calls.events_in_turn, "tvhv")
+    record = calls.compile_as(calls.record_in_turn, calls.READS)
+    return record, calls.compile_as(calls.events_in_turn, "tVHV")
 
 
 @compile_once
@@ -97,7 +97,7 @@ def fused_step_function(needed: bool):
     step_function = unused_step
     if needed:
         from fvsolve.kernels.fused_step import fused_step_linear as step_function
-    return calls.compile_as(step_function, "ttvvvhv")
+    return calls.compile_as(step_function, "ttVVVHV")
 
 
 @njit

@@ -389,6 +389,9 @@ GN = 14  # index of g_n among the numbers of a frame, see `basins.basin_frames`
 TANK_OUT = 24  # numbers in `out` of each basin on a body, see `mechanism.body_layout`
 RATE, STATUS, WHERE, CLOSING, ARRIVES = 0, 1, 2, 3, 4  # first entries of `out`
 OUT_HEAD = 5
+# RATE before a call if the rate that limits the step is not needed, which holds at all stages of a step but the first.
+# Functions that spend time on this rate leave the value; others raise it as always.
+RATE_UNWANTED = -1.0
 NEVER = -1e300  # in ARRIVES: no jump travels to a node that responds instantly
 MOVED_BY_FORCES, JOINT_LOAD_READ = 1, 2  # load of a stretch: forces move its body; or the joint load is an output
 

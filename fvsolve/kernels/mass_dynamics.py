@@ -271,7 +271,8 @@ def mass_rates(t, y, dydt, out, handle):
     tables = open_tables(handle)
     layout, nodes, masses = tables.layout[0], tables.nodes, tables.masses
     forces(t, y, out, tables)
-    out[rec.RATE] = max(out[rec.RATE], mechanical_rate(out, tables))
+    if out[rec.RATE] != rec.RATE_UNWANTED:
+        out[rec.RATE] = max(out[rec.RATE], mechanical_rate(out, tables))
     for k in range(tables.pistons.size):
         for i in (tables.pistons[k]["a"], tables.pistons[k]["b"]):
             if not out[layout["stiffness"] + nodes[i]["row"]] > 0.0:

@@ -7,7 +7,7 @@ since the start [Pa]; supply into nodes from outside [kg/s]; net flow into nodes
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import CHAMBER, FIXED, JUNCTION, MOVING, OK, PATCH, RATE, STATUS, TANK, WHERE
+from fvsolve.kernels.dtypes import CHAMBER, FIXED, JUNCTION, MOVING, OK, PATCH, RATE, RATE_UNWANTED, STATUS, TANK, WHERE
 from fvsolve.kernels.restrictions import conductance, head_drop, open_scheduled, restriction_slope
 from fvsolve.kernels.table_handle import open_tables
 from fvsolve.kernels.tanks import BOTTOM, EVENTS, RIM
@@ -125,7 +125,8 @@ def balance_network(t, y, dydt, out, handle):
     tables = open_tables(handle)
     net_flows(out, tables)
     stored_rates(y, dydt, out, tables)
-    out[RATE] = node_rate_limit(out, tables)
+    if out[RATE] != RATE_UNWANTED:
+        out[RATE] = node_rate_limit(out, tables)
 
 
 @njit
@@ -138,6 +139,8 @@ def valve_rate_limit(t, y, dydt, out, handle):
     tables = open_tables(handle)
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
     rate = out[RATE]
+    if rate == RATE_UNWANTED:
+        return
     for k in range(valves.size):
         valve = valves[k]
         i, j = valve["from_node"], valve["to_node"]

@@ -25,7 +25,7 @@ from fvsolve.kernels.column_valve_control import (
     seating_valve,
 )
 from fvsolve.kernels.density import enthalpy, pressure_of_enthalpy
-from fvsolve.kernels.dtypes import CLOSING, NOT_CONVERGED, RATE, STATUS
+from fvsolve.kernels.dtypes import CLOSING, NOT_CONVERGED, RATE, RATE_UNWANTED, STATUS
 from fvsolve.kernels.node_newton import has_converged
 from fvsolve.kernels.restrictions import driving_pressure, head_drop, mean_density, restriction_slope
 from fvsolve.kernels.table_handle import open_tables
@@ -259,6 +259,8 @@ def column_rate_limit(t, y, dydt, out, handle):
     """
     tables = open_tables(handle)
     out[CLOSING] = 0.0
+    if out[RATE] == RATE_UNWANTED:
+        return
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
     for k in range(tables.columns.size):
         column = tables.columns[k]

@@ -45,7 +45,7 @@ def call_pieces(tables: tuple, pieces: tuple[str, ...], t: float, y: np.ndarray,
     addresses = calls.empty_calls(calls.JOBS, len(pieces) + 1)
     for k, piece in enumerate(pieces):
         addresses[calls.RHS, k] = calls.function_address(load_function(PACKAGE, piece), calls.RATES)
-    run = calls.compile_as(calls.rhs_in_turn, calls.RATES.lower())
+    run = calls.compile_as(calls.rhs_in_turn, calls.RATES)
     handle = make_handle((*tables, addresses, calls.empty_calls(0, len(calls.HOOKS))))
     run(t, y, rates, out, handle)
 

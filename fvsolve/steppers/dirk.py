@@ -22,7 +22,7 @@ from fvsolve.steppers.newton import (
     smoothed_error,
     solve_stage_from_start,
 )
-from fvsolve.steppers.run_handle import REAL_SOLVE, call_solve, evaluate, open_run, store_ledger_rates
+from fvsolve.steppers.run_handle import REAL_SOLVE, call_solve, open_run, stage_rates, store_ledger_rates
 from fvsolve.steppers.step_operations import combine, copy, error_norm
 
 
@@ -86,7 +86,7 @@ def try_stages(handle, r, t, h, now):
         row, ki = row_of(r.coefficients, s, i), k[i]
         combine(0, y.size, y, h, row, i, k, base)
         if row[i] == 0.0:
-            evaluate(handle, r, t + c[i] * h, base, ki)
+            stage_rates(handle, r, t + c[i] * h, base, ki)
             store_ledger_rates(r, i)
             continue
         shift = 1.0 / (h * row[i])

@@ -31,7 +31,7 @@ from fvsolve.steppers.newton import (
     smoothed_error,
     spectral_radius,
 )
-from fvsolve.steppers.run_handle import evaluate, open_run, store_ledger_rates
+from fvsolve.steppers.run_handle import open_run, stage_rates, store_ledger_rates
 from fvsolve.steppers.stage_sweeps import sweep
 from fvsolve.steppers.step_operations import combine, copy, error_norm, error_scale
 from fvsolve.steppers.tableau import Method
@@ -166,7 +166,7 @@ def evaluate_stages(handle, r, t, h, now):
     c, t_matrix = nodes_of(r.coefficients, q + 1), matrix(r.coefficients, q + 1, T)
     for i in range(q):
         blend(1.0, r.y[now], t_matrix, i * q, q, W * q, rows, y_stage)
-        evaluate(handle, r, t + c[i + 1] * h, y_stage, rows[F * q + i])
+        stage_rates(handle, r, t + c[i + 1] * h, y_stage, rows[F * q + i])
         store_ledger_rates(r, i + 1)
     r.state[0]["newton"] += 1.0
 
@@ -302,7 +302,7 @@ def filtered_error(handle, r, t, now, new, retry):
             break
         for e in range(y.size):
             stage[e] = y[e] + d[e]
-        evaluate(handle, r, t, stage, f)
+        stage_rates(handle, r, t, stage, f)
     return norm
 
 
@@ -322,7 +322,7 @@ def defect_at(handle, r, t, h, new, x):
         for j in range(q):
             stage[e] += h * buffer[j] * k[j + 1, e]
     for turn in range(2):
-        evaluate(handle, r, t + (1.0 + x) * h, stage, f)
+        stage_rates(handle, r, t + (1.0 + x) * h, stage, f)
         for e in range(y.size):
             d[e] = -f[e]
             for j in range(q):

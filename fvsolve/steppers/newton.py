@@ -20,7 +20,7 @@ import numpy as np
 from fvsolve.jit import inline
 from fvsolve.steppers import loop_records as rec
 from fvsolve.steppers import run_handle
-from fvsolve.steppers.run_handle import evaluate, store_ledger_rates
+from fvsolve.steppers.run_handle import stage_rates, store_ledger_rates
 from fvsolve.steppers.step_operations import copy, error_scale
 from fvsolve.steppers.structure import differences, multiply
 
@@ -81,7 +81,7 @@ def renew(handle, r, t, y, f, ledger_rates, f_work):
     f, ledger_rates : rates evaluated at (t, y); f_work : float64[n]  work array for rates
     """
     newton, state = r.newton[0], r.state[0]
-    differences(evaluate, handle, r, t, y, f, ledger_rates, f_work)
+    differences(stage_rates, handle, r, t, y, f, ledger_rates, f_work)
     state["jacobians"] += 1.0
     newton["has_jacobian"], newton["jacobian_step"] = 1.0, state["steps"]
     newton["shift"] = newton["increment_ratio"] = 0.0
@@ -248,7 +248,7 @@ def evaluate_stage(handle, r, t, h_gamma, ki, residual):
     y_stage, base, f = r.y[3], r.base, r.rate
     for j in range(ki.size):
         y_stage[j] = base[j] + h_gamma * ki[j]
-    evaluate(handle, r, t, y_stage, f)
+    stage_rates(handle, r, t, y_stage, f)
     r.state[0]["newton"] += 1.0
     for j in range(ki.size):
         residual[j] = f[j] - ki[j]

@@ -149,7 +149,7 @@ def compute_row(handle, r, t_old, due, now, old):
     else:
         interpolate_row(r, t_old, due, separate, now, old)
     limit_to_bounds(r.bounded_states, r.bounds, r.y[old], r.y[now], y_out)
-    run_handle.call_rhs(r.calls[run_handle.RATES], due, y_out, y_out[:0], r.out_row, handle)
+    run_handle.call_rhs(r.calls[run_handle.RHS_CALL], due, y_out, y_out[:0], r.out_row, handle)
 
 
 @njit

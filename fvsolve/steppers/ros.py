@@ -11,7 +11,7 @@ from fvsolve.jit import inline, njit
 from fvsolve.steppers import loop_records as rec
 from fvsolve.steppers.coefficients import nodes_of, row_of, weights_of
 from fvsolve.steppers.newton import factor_for, follow_stages, renew_at_start, spectral_radius
-from fvsolve.steppers.run_handle import REAL_SOLVE, call_solve, evaluate, open_run
+from fvsolve.steppers.run_handle import REAL_SOLVE, call_solve, open_run, stage_rates
 from fvsolve.steppers.step_operations import combine, copy, error_norm
 from fvsolve.steppers.structure import multiply
 
@@ -27,7 +27,7 @@ def slope_in_time(handle, r, t, h, now):
     slope, first, out, ledger_slopes, offset = r.base, r.k[0], r.out, r.ledger_slopes, r.control[0]["ledger_offset"]
     step = min((2.2e-16 * max(1e-5, abs(t))) ** 0.5, 1e-3 * h)
     later = t + step
-    evaluate(handle, r, later, r.y[now], slope)
+    stage_rates(handle, r, later, r.y[now], slope)
     per = 1.0 / (later - t) if later > t else 0.0  # the time difference is lost in rounding: df/dt is negligible
     for e in range(slope.size):
         slope[e] = (slope[e] - first[e]) * per
@@ -75,7 +75,7 @@ def evaluate_stage(handle, r, t, h, i, now):
         return
     s, y = r.k.shape[0], r.y[now]
     combine(0, y.size, y, h, row_of(r.coefficients, s, i), i, r.k, r.y[3])
-    evaluate(handle, r, t + nodes_of(r.coefficients, s)[i] * h, r.y[3], r.rate)
+    stage_rates(handle, r, t + nodes_of(r.coefficients, s)[i] * h, r.y[3], r.rate)
 
 
 @njit

@@ -12,13 +12,14 @@ from collections import namedtuple
 import numpy as np
 
 from fvsolve.jit import ARRAYS, COMPILING, Intrinsic, njit, plain_kinds
-from fvsolve.kernels.calls import compile_as
+from fvsolve.kernels.calls import RATES, READS, compile_as
+from fvsolve.kernels.dtypes import RATE_UNWANTED
 from fvsolve.kernels.table_handle import addresses_of, handle_of
 from fvsolve.steppers import loop_records as rec
 
 FACTOR, SOLVE, FACTOR_COMPLEX, SOLVE_COMPLEX = "hvtv", "hvv", "hvcz", "hzz"
 ATTEMPT = "hhttii"  # step of a method: handle of the model, handle of the run, t, h, row of y at the start, at the end
-FUSED_STEP, OBSERVE, EVENTS, RHS, JOIN = "ttvvvhv", "tvvhv", "tvhv", "tvvvh", "vsh"
+FUSED_STEP, OBSERVE, EVENTS, RHS, JOIN = "ttVVVHV", READS, "tVHV", RATES, "vsh"
 
 # Arrays of a run, for n states, s stages and m ledger rates : record, or letter of the type.
 ARRAY_KINDS = {
@@ -58,7 +59,7 @@ EXPECTED = [
     for kind in ARRAY_KINDS.values()
 ]
 # Indices into `calls`.
-STEP, FUSED_CALL, OBSERVER, RECORDER, EVENT_FUNCTIONS, RATES = range(6)
+STEP, FUSED_CALL, OBSERVER, RECORDER, EVENT_FUNCTIONS, RHS_CALL = range(6)
 REAL_FACTOR, REAL_SOLVE, PAIR_FACTOR, PAIR_SOLVE, BANDS = range(6, 11)
 
 
@@ -179,8 +180,19 @@ def addresses(functions: tuple):
 @njit(forceinline=True)
 def evaluate(handle, r, t, y, dydt):
     """Write the rates of the model at (t, y) to `dydt` and other results to `r.out`, and count the call."""
-    call_rhs(r.calls[RATES], t, y, dydt, r.out, handle)
+    call_rhs(r.calls[RHS_CALL], t, y, dydt, r.out, handle)
     r.state[0]["calls"] += 1.0
+
+
+@njit(forceinline=True)
+def stage_rates(handle, r, t, y, dydt):
+    """Write the rates of the model as `evaluate`, but not the rate that limits the step: only the first stage needs it.
+
+    Parts compute it at a cost of up to a third of the right-hand side.
+    """
+    r.out[rec.RATE] = RATE_UNWANTED
+    evaluate(handle, r, t, y, dydt)
+    r.out[rec.RATE] = 0.0
 
 
 @njit(forceinline=True)

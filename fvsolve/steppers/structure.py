@@ -199,7 +199,7 @@ LEAST_ROOT = 2.0**-34
 def differences(evaluate, handle, r, t, y, f, ledger_rates, f_work):
     """Write the Jacobian of f and of the ledger rates to `r.jacobian`, column by column; returns the number of calls.
 
-    evaluate : function `run_handle.evaluate`, which is called once for each colour, for one-sided differences
+    evaluate : function `run_handle.stage_rates`, which is called once for each colour, for one-sided differences
     handle, r : handle of the model, open handle of the run; f_work : float64[n]  work array for rates
     f, ledger_rates : float64[n], float64[m]  rates at (t, y), evaluated there and not taken from a stage
     The increment of a state is 2^-26 max(|y|, scale), with 2^-34 |y| in place of 2^-26 |y| for states marked fine in

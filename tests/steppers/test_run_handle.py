@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
+from reference.folders import CASES
 
+import fvsolve
 from fvsolve.jit import COMPILING
+from fvsolve.kernels.dtypes import RATE_UNWANTED
 from fvsolve.steppers import METHODS, loop_records, ode
 from fvsolve.steppers.integrator import Integrator
 
@@ -62,3 +67,21 @@ def test_restart_arrays_by_name_continue_to_the_same_bits(method):
     again.after_restore()
     assert np.array_equal(stepped(again, 3), stepped(whole, 6))
     assert again.counts() | {"rhs": 0} == whole.counts() | {"rhs": 0}  # the rates of the first state are computed again
+
+
+VALVES = ("air-valve", "check-valve-slam", "pressure-reducing", "relief-on-closed-main", "surge-tank", "two-tanks")
+
+
+@pytest.mark.parametrize("name", [*VALVES, "cylinder-servo", "four-bar", "hydropower", "pump-trip", "tumbling-body"])
+def test_a_stage_without_the_rate_limit_has_the_same_rates(name):
+    """The limit of the step is left out at all stages of a step but the first; nothing else depends on it."""
+    model = fvsolve.build(fvsolve.load(CASES / f"{name}.toml"))
+    t, y = model.case.numerics.start, model.start.copy()
+    with model.run_data() as run_data:
+        whole, out = run_data.evaluate(t, y, math.inf)
+        dydt, others = np.zeros(y.size), model.new_out()
+        others[loop_records.RATE] = RATE_UNWANTED
+        model.functions.rhs(t, y, dydt, others, run_data.handle)
+    assert np.array_equal(dydt, whole, equal_nan=True)
+    assert np.array_equal(np.delete(others, loop_records.RATE), np.delete(out, loop_records.RATE), equal_nan=True)
+    assert others[loop_records.RATE] <= out[loop_records.RATE]

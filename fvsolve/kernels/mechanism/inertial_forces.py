@@ -16,7 +16,7 @@ of flow are corrected for q''.
 
 from fvsolve.jit import njit
 from fvsolve.kernels.density import enthalpy, pressure_of_enthalpy
-from fvsolve.kernels.dtypes import JOINT_LOAD_READ, LAW_LINEAR, NO_WEIGHT, RATE, STATUS, TANK, WHERE
+from fvsolve.kernels.dtypes import JOINT_LOAD_READ, LAW_LINEAR, NO_WEIGHT, RATE, RATE_UNWANTED, STATUS, TANK, WHERE
 from fvsolve.kernels.mechanism import body_layout as layout
 from fvsolve.kernels.mechanism import fluid_loads as fluid
 from fvsolve.kernels.mechanism.body_layout import body_row
@@ -243,6 +243,8 @@ def pipe_rate_limit(t, y, dydt, out, handle):
     The damping is rho A c at both ends of a pipe; rho : density, A : area, c : wave speed. The factored mass matrix
     must be in `scratch`.
     """
+    if out[RATE] == RATE_UNWANTED:
+        return
     tables = open_tables(handle)
     damping, at = 0.0, 7 * tables.freedoms.size
     for k in range(tables.pipes.size):

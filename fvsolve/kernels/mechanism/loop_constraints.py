@@ -16,7 +16,7 @@ lambda.
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import PIN_VALUE, RATE
+from fvsolve.kernels.dtypes import PIN_VALUE, RATE, RATE_UNWANTED
 from fvsolve.kernels.mechanism import body_layout as layout
 from fvsolve.kernels.mechanism import mass_matrix as mass
 from fvsolve.kernels.mechanism.body_kinematics import body_of_point, point_at
@@ -177,7 +177,8 @@ def solve_pinned_accelerations(t, y, dydt, out, handle):
             out[at + 3 * k + r] = pins[k]["force"][r] + work[last + row]
             row += 1
     mass.spread_accelerations(out, tables)
-    out[RATE] = max(mass.body_rate_limit(out, tables), rate)
+    if out[RATE] != RATE_UNWANTED:
+        out[RATE] = max(mass.body_rate_limit(out, tables), rate)
     mass.state_rates(y, dydt, tables)
 
 

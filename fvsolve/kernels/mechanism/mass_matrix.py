@@ -14,7 +14,7 @@ torque and force, later of acceleration.
 from math import sqrt
 
 from fvsolve.jit import inline, njit
-from fvsolve.kernels.dtypes import ABOUT, BODY_OUT, FREE, PRISMATIC, RATE, REVOLUTE
+from fvsolve.kernels.dtypes import ABOUT, BODY_OUT, FREE, PRISMATIC, RATE, RATE_UNWANTED, REVOLUTE
 from fvsolve.kernels.mass_dynamics import push_stiffness
 from fvsolve.kernels.mechanism import body_kinematics as kinematics
 from fvsolve.kernels.mechanism import body_layout as layout
@@ -369,8 +369,10 @@ def oscillation_rate(stiffness, damping):
 def body_rate_limit(out, tables):
     """Upper bound of the rates of bodies [1/s], with springs and dampers of joints and force elements.
 
-    It is the `oscillation_rate`, and at least the greatest angular velocity and out[RATE].
+    It is the `oscillation_rate`, and at least the greatest angular velocity and out[RATE]; or RATE_UNWANTED.
     """
+    if out[RATE] == RATE_UNWANTED:
+        return RATE_UNWANTED
     bodies, work, lines = tables.bodies, tables.scratch, tables.lines
     stiffness, damping, turns, at = 0.0, 0.0, 0.0, 7 * tables.freedoms.size
     for i in range(bodies.size):

@@ -12,7 +12,7 @@ A disc that alone joins a rigid column controls its flow near the seat (armed[ev
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import CLOSING, RATE
+from fvsolve.kernels.dtypes import CLOSING, RATE, RATE_UNWANTED
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.self_acting_valves import control_events, controls_column, event_pair, loop_rate
 
@@ -93,7 +93,8 @@ def move(t, y, dydt, out, tables, device):
     drive, stopped = disc_drive(y, out, tables, device), armed[at] > 0.0 or armed[at + 2] > 0.0
     time, swing = floats[device["data"] + TIME_CONSTANT], floats[device["data"] + ANGULAR_FREQUENCY]
     own = 1.0 / time if device["states"] == 1 else swing * max(1.0, 2.0 * floats[device["data"] + DAMPING])
-    out[RATE] = max(out[RATE], own if stopped else disc_rate_limit(y, out, tables, device, own))
+    if out[RATE] != RATE_UNWANTED:
+        out[RATE] = max(out[RATE], own if stopped else disc_rate_limit(y, out, tables, device, own))
     if dydt.size == 0:
         return
     if device["states"] == 1:

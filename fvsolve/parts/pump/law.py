@@ -10,7 +10,7 @@ from math import sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.devices import TEMPORARY
-from fvsolve.kernels.dtypes import RATE
+from fvsolve.kernels.dtypes import RATE, RATE_UNWANTED
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.schedule_pieces import schedule_value
 from fvsolve.kernels.self_acting_valves import event_pair
@@ -131,7 +131,8 @@ def move(t, y, dydt, out, tables, device):
             dydt[device["y"]] = 0.0
         return
     torque = pump_torque(out, tables, device)
-    out[RATE] = max(out[RATE], shaft_rate(out, tables, device, torque))
+    if out[RATE] != RATE_UNWANTED:
+        out[RATE] = max(out[RATE], shaft_rate(out, tables, device, torque))
     if dydt.size == 0:
         return
     push = -torque

@@ -9,7 +9,7 @@ controls the flow of the column near its seat (armed[event + 6]).
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.dtypes import RATE
+from fvsolve.kernels.dtypes import RATE, RATE_UNWANTED
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.schedule_pieces import schedule_value
 from fvsolve.kernels.self_acting_valves import control_events, controls_column, event_pair, loop_rate
@@ -84,7 +84,8 @@ def regulator_error(t, out, tables, device):
 @njit
 def move(t, y, dydt, out, tables, device):
     """Write the rate of the opening to `dydt`, 0 at full opening and on the seat; raise out[RATE] to the rate limit."""
-    out[RATE] = max(out[RATE], regulator_rate(y, out, tables, device))
+    if out[RATE] != RATE_UNWANTED:
+        out[RATE] = max(out[RATE], regulator_rate(y, out, tables, device))
     if dydt.size == 0:
         return
     armed, at = tables.armed, device["event"]

@@ -9,7 +9,7 @@ from math import sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.devices import TEMPORARY
-from fvsolve.kernels.dtypes import JUNCTION, RATE
+from fvsolve.kernels.dtypes import JUNCTION, RATE, RATE_UNWANTED
 from fvsolve.kernels.restrictions import head_drop, valve_conductance
 from fvsolve.parts.pump.law import (
     HELD_SPEED,
@@ -78,7 +78,8 @@ def move(t, y, dydt, out, tables, device):
         if dydt.size > 0:
             dydt[device["y"]] = 0.0
         return
-    out[RATE] = max(out[RATE], shaft_rate(out, tables, device))
+    if out[RATE] != RATE_UNWANTED:
+        out[RATE] = max(out[RATE], shaft_rate(out, tables, device))
     if dydt.size == 0:
         return
     torque = turbine_torque(out, tables, device)
