@@ -6,11 +6,10 @@ from typing import Annotated
 from typer import Option
 
 from fvsolve.cli import app as cli
-from fvsolve.cli.progress import progress_line
-from fvsolve.cli.terminal import TextTable, present
+from fvsolve.cli.terminal import TextTable, present, progress_line
 from fvsolve.errors import FvsolveError
 from fvsolve.output.summary_file import plain
-from fvsolve.studies.accuracy.order_picture import NORMS, SHOWN_VARIABLES, study_title, variable_unit
+from fvsolve.studies.accuracy.order_study import NORMS, SHOWN_VARIABLES, study_title, variable_unit
 from fvsolve.studies.result_table import Column, ResultTable, columns
 
 ORDER_FILE = columns(

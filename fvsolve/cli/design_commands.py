@@ -7,9 +7,8 @@ from typing import Annotated
 from typer import Argument, Option
 
 from fvsolve.cli.app import Dask, Jobs, Json, Set, SingleCase, app, load_case
-from fvsolve.cli.progress import progress_line
 from fvsolve.cli.sweep import RANGE_FORMAT, key_and_values
-from fvsolve.cli.terminal import TextTable, present
+from fvsolve.cli.terminal import TextTable, present, progress_line
 from fvsolve.errors import CaseError, FvsolveError, collect_faults
 
 

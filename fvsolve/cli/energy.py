@@ -8,8 +8,7 @@ from typing import Annotated
 from typer import Argument, Option
 
 from fvsolve.cli import app as cli
-from fvsolve.cli.progress import interrupt_message, progress_line, run_progress
-from fvsolve.cli.terminal import TextTable, present
+from fvsolve.cli.terminal import TextTable, interrupt_message, present, progress_line, run_progress
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.result_table import Column, ResultTable, cell_text
 
@@ -72,7 +71,7 @@ def energy(
     """Print the energy ledger of a run: energy supplied, stored, dissipated, and changed by the numerical method."""
     schemes, methods = cli.comma_list(scheme, "--scheme"), cli.method_names(method)
     if case is None:
-        from fvsolve.studies.energy.passivity import passivity
+        from fvsolve.studies.passivity import passivity
 
         refuse_without_case({"--port": port, "--out": out, "--set": set})
         with progress_line() as progress, interrupt_message(f"interrupted: no results are saved; {RESTARTS}"):
@@ -103,8 +102,8 @@ def ledger(case, port, out, as_json: bool) -> None:
     """
     from fvsolve.draw.accuracy_pictures import energy_figure
     from fvsolve.output.unit_columns import column, time_column
-    from fvsolve.studies.energy.energy_balance import energy as study
-    from fvsolve.studies.energy.energy_balance import write_table
+    from fvsolve.studies.energy_balance import energy as study
+    from fvsolve.studies.energy_balance import write_table
 
     folder = cli.folder_of(case, "energy", out)
     cli.warn_replaced(folder, FILES[0])
@@ -168,7 +167,7 @@ def compare_pairs(case, schemes, methods, port, out, as_json: bool) -> None:
     It ends the program with exit code 2 if all pairs were refused.
     port : name of a node, or None; out : folder of the files, or None for runs/NAME.energy
     """
-    from fvsolve.studies.energy.energy_balance import PAIR_COLUMNS, measure_pairs
+    from fvsolve.studies.energy_balance import PAIR_COLUMNS, measure_pairs
     from fvsolve.studies.result_cache import ResultCache
 
     folder = cli.folder_of(case, "energy", out)
@@ -234,7 +233,7 @@ def _pair(row) -> str:
 
 def passivity_text(result) -> Iterator:
     """Passivity of schemes and methods that follows from their coefficients."""
-    from fvsolve.studies.energy.passivity import CELLS
+    from fvsolve.studies.passivity import CELLS
 
     known = [entry for entry in result.schemes if entry.passive is not None]
     yield f"Schemes: energy of a closed pipe of {CELLS} cells, continuous in time", "bold"

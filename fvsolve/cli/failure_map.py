@@ -7,8 +7,7 @@ from typing import Annotated
 from typer import Option
 
 from fvsolve.cli import app as cli
-from fvsolve.cli.progress import progress_line
-from fvsolve.cli.terminal import TextTable, present
+from fvsolve.cli.terminal import TextTable, present, progress_line
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.result_table import Column, ResultTable
 
@@ -68,7 +67,7 @@ def failure_map(
     as_json: cli.Json = False,
 ) -> None:
     """Map failures of methods over time steps or values of a key. Each run is stable, ringing, wrong, blown up, ..."""
-    from fvsolve.studies.failure.failure_map import failure_map as study
+    from fvsolve.studies.failure_map import failure_map as study
     from fvsolve.studies.result_cache import ResultCache
     from fvsolve.studies.sampling import key_with_unit
 
@@ -120,7 +119,7 @@ def _write_files(result, folder: Path, head: str) -> list[Path]:
 def map_text(result, files: list[Path], head: str) -> Iterator:
     """Verdict of each run of a failure map, meaning of the verdicts, reference and files; head : label of columns"""
     from fvsolve.draw.stability_pictures import column_labels
-    from fvsolve.studies.failure.run_verdict import VERDICT_TEXTS
+    from fvsolve.studies.failure_map import VERDICT_TEXTS
 
     for scheme in result.schemes:
         heading = "steps" if result.key == "step" else head

@@ -202,7 +202,7 @@ def precompile(
 ) -> None:
     """Compile the functions that cases need on this machine, so that later runs start at once."""
     from fvsolve.case import load, shipped
-    from fvsolve.cli.progress import progress_bar
+    from fvsolve.cli.terminal import progress_bar
     from fvsolve.run.precompilation import warm as warmed
 
     paths = [shipped.find(name) for name in cases or shipped.names()]

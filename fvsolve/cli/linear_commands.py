@@ -35,8 +35,8 @@ def linearise(
 ) -> None:
     """Linearise a case about a state: matrices A, B, C, D and poles."""
     from fvsolve.model.energy_norm import energy_form
-    from fvsolve.studies.linear.linearise import POLES, poles_of
-    from fvsolve.studies.linear.linearise import linearise as ask
+    from fvsolve.studies.linearise import POLES, poles_of
+    from fvsolve.studies.linearise import linearise as ask
 
     system = ask(
         cli.load_case(case, set), cli.comma_list(inputs, "--inputs") or (), cli.comma_list(outputs, "--outputs"),
@@ -92,7 +92,7 @@ def system_text(system, values, poles: list[dict], folder: Path) -> Iterator:
     system : result of `linearise`; values : result of `poles_of`; poles : rows of the table of poles
     folder : folder of the files, whose names are listed
     """
-    from fvsolve.studies.linear.linearise import POLES
+    from fvsolve.studies.linearise import POLES
 
     moving = np.abs(system.at.rate) / system.at.model.scale
     yield (

@@ -8,8 +8,7 @@ from typing import Annotated
 from typer import Option
 
 from fvsolve.cli import app as cli
-from fvsolve.cli.progress import progress_line
-from fvsolve.cli.terminal import TextTable, present
+from fvsolve.cli.terminal import TextTable, present, progress_line
 from fvsolve.errors import FvsolveError
 
 Values = Annotated[

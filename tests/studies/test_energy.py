@@ -27,7 +27,7 @@ from reference.scenes import (
 from scipy.stats import binom
 
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 BETA = WATER["bulk_modulus"]
 TIGHT = {"method": "dormand-prince", "rtol": 1e-11}

@@ -7,7 +7,7 @@ import pytest
 from reference.scenes import AMBIENT, WATER, chamber, reservoir, scene, valve
 
 import fvsolve
-from fvsolve.studies.energy.energy_balance import energy, measure_pairs
+from fvsolve.studies.energy_balance import energy, measure_pairs
 
 VOLUME, P0, P1 = 0.02, 5e5, 50e5  # pressures above ambient
 PER = VOLUME / WATER["bulk_modulus"]

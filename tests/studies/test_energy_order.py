@@ -23,7 +23,7 @@ from reference.scenes import (
 )
 
 from fvsolve.steppers import METHODS
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 FRICTION = {"model": "steady", "factor": 0.02}
 

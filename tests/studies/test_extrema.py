@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fvsolve.studies.extrema import greatest_error, troughs
+from fvsolve.studies.peak_error import greatest_error, troughs
 
 
 def triple(order: float, coefficient: float = 0.1, exact: float = 3.0) -> tuple[float, float, float]:

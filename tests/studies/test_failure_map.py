@@ -29,12 +29,12 @@ from fvsolve.case import load
 from fvsolve.compile.cache_folders import PACKAGE, source_hash
 from fvsolve.errors import FvsolveError
 from fvsolve.studies import result_cache
-from fvsolve.studies.failure.failure_map import failure_map
-from fvsolve.studies.failure.run_verdict import (
+from fvsolve.studies.failure_map import (
     BLOWN_RANGES,
     WINDOW_STEPS,
     Measures,
     excess_variation,
+    failure_map,
     probe_ranges,
     ringing_amplitude,
     run_recorded,

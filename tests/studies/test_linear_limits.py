@@ -11,8 +11,8 @@ from reference.scenes import chamber, junction, lake, pipe, scene, valve
 from fvsolve.cli import main
 from fvsolve.errors import FvsolveError
 from fvsolve.model.energy_norm import energy_form
-from fvsolve.studies.linear import state_matrices
-from fvsolve.studies.linear.linearise import eigenvalues_near, linearise, poles_of
+from fvsolve.studies import operating_point
+from fvsolve.studies.linearise import eigenvalues_near, linearise, poles_of
 from fvsolve.studies.ports.response import response
 from fvsolve.studies.stability import growth, real_runs
 from fvsolve.studies.stability.stability import stability
@@ -54,7 +54,7 @@ def test_of_20000_states_the_slowest_poles_and_the_outputs_are_found_soon():
 def test_outputs_found_by_halves_are_those_of_every_state_tried_alone(monkeypatch):
     case = line(40, ["end.pressure", "main.flow@0.37", "main.pressure@0.1"])
     found = linearise(case).c
-    monkeypatch.setattr(state_matrices, "visible_states", lambda at, *more: range(at.model.y_size))
+    monkeypatch.setattr(operating_point, "visible_states", lambda at, *more: range(at.model.y_size))
     assert np.array_equal(found, linearise(case).c) and np.count_nonzero(found) > 3
 
 

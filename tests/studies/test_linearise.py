@@ -32,7 +32,7 @@ from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.model.energy_norm import energy_form
 from fvsolve.solve import initial_state
 from fvsolve.solve.advance import advance, hold
-from fvsolve.studies.linear.linearise import find_eigenvalues, linearise, linearise_at, poles_of
+from fvsolve.studies.linearise import find_eigenvalues, linearise, linearise_at, poles_of
 
 K = 2.2e9
 TIGHT = {"method": "dormand-prince", "rtol": 1e-9}

@@ -15,8 +15,7 @@ import fvsolve
 from fvsolve.case.text import write
 from fvsolve.errors import FvsolveError
 from fvsolve.studies import ladder
-from fvsolve.studies.accuracy.model_hierarchy import change_time
-from fvsolve.studies.accuracy.model_levels import level_keys, level_names
+from fvsolve.studies.accuracy.model_hierarchy import change_time, level_keys, level_names
 
 LENGTH, DIAMETER, SPEED, FACTOR = 300.0, 0.2, 1000.0, 0.02
 AREA = math.pi / 4 * DIAMETER**2

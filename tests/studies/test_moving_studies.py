@@ -15,9 +15,9 @@ from scipy.optimize import brentq
 
 from fvsolve.case.text import write
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.energy.energy_balance import energy
-from fvsolve.studies.failure.failure_map import failure_map
-from fvsolve.studies.linear.linearise import linearise
+from fvsolve.studies.energy_balance import energy
+from fvsolve.studies.failure_map import failure_map
+from fvsolve.studies.linearise import linearise
 from fvsolve.studies.ports.response import response
 
 

@@ -10,9 +10,8 @@ from model.test_resolution import station
 from reference.scenes import area, junction, lake, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
-from fvsolve.studies.peak_error import between_rows, peak_errors
+from fvsolve.studies.peak_error import between_rows, differing_events, peak_errors
 from fvsolve.studies.resolution import refined_keys
-from fvsolve.studies.unresolved import differing_events
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from pytest import approx
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers.numbers.polynomial import Polynomial
 from fvsolve.studies import positive_real
-from fvsolve.studies.ports.rational import locate_roots
+from fvsolve.studies.ports.positive_real import locate_roots
 
 S = [1, 0]  # the polynomial s
 

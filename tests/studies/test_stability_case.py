@@ -16,8 +16,8 @@ from fvsolve.cli import main
 from fvsolve.errors import FvsolveError
 from fvsolve.model.energy_norm import energy_form
 from fvsolve.steppers import METHODS, method_named, stability_function
-from fvsolve.studies.linear.linearise import linearise, linearise_at
-from fvsolve.studies.linear.operating_point import operating_point
+from fvsolve.studies.linearise import linearise, linearise_at
+from fvsolve.studies.operating_point import operating_point
 from fvsolve.studies.stability.growth import (
     DenseGrowth,
     VectorGrowth,

@@ -11,9 +11,8 @@ import fvsolve
 from fvsolve import studies
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers.tableau import method_named
-from fvsolve.studies.linear.operating_point import with_held_schedules
-from fvsolve.studies.stability.delay_line_limits import DelayLineLimits, DelayLineRuns, read_history
-from fvsolve.studies.stability.delay_line_system import DelayLineSystem
+from fvsolve.studies.operating_point import with_held_schedules
+from fvsolve.studies.stability.delay_line_limits import DelayLineLimits, DelayLineRuns, DelayLineSystem, read_history
 
 
 def system(case: dict, method: str, h: float) -> DelayLineSystem:

@@ -9,7 +9,7 @@ import pytest
 from reference.scenes import area, chamber, reservoir, scene, valve
 
 import fvsolve
-from fvsolve.studies.linear.operating_point import operating_point
+from fvsolve.studies.operating_point import operating_point
 from fvsolve.studies.stability.real_runs import RealRuns
 from fvsolve.studies.stability.stability import LinearSystem, stability
 

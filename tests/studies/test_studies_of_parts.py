@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+
 import numpy as np
 import pytest
 from reference import pump_trip
@@ -19,14 +21,12 @@ from fvsolve.studies.accuracy.chart_settings import (
     unsupported_schemes,
 )
 from fvsolve.studies.accuracy.fit import fit
-from fvsolve.studies.accuracy.model_hierarchy import change_time
-from fvsolve.studies.accuracy.model_levels import NotApplicable, level_keys
+from fvsolve.studies.accuracy.model_hierarchy import NotApplicable, change_time, level_keys
 from fvsolve.studies.accuracy.order_study import check_order
 from fvsolve.studies.accuracy.refine import affordable_plan
-from fvsolve.studies.failure import run_verdict as watched_runs
-from fvsolve.studies.failure.map_columns import eigenvalues_of
-from fvsolve.studies.failure.run_verdict import NOT_RUN, Measures, verdict
-from fvsolve.studies.linear.linearise import linearise
+from fvsolve.studies.failure_map import NOT_RUN, Measures, run_recorded, verdict
+from fvsolve.studies.failure_map_columns import eigenvalues_of
+from fvsolve.studies.linearise import linearise
 from fvsolve.studies.outcome import GIVEN_UP, outcome
 from fvsolve.studies.reference import candidates, find_reference
 from fvsolve.studies.result_cache import ResultCache
@@ -200,6 +200,6 @@ def test_a_map_of_cavities_has_a_reference_and_a_limit():
 def test_a_square_that_takes_too_long_is_given_up_and_called_neither_wrong_nor_blown_up(monkeypatch):
     late, off = Measures(f"{GIVEN_UP} 10 s", False), Measures("finished", True, error=0.5, farthest=0.0)
     assert verdict(late, lambda: off, 0.02) == verdict(off, lambda: late, 0.02) == NOT_RUN
-    monkeypatch.setattr(watched_runs, "CPU_LIMIT", 0.0)
-    found, _ = watched_runs.run_recorded(case("relief-on-closed-main", links__main__cells=4))
+    monkeypatch.setattr(import_module("fvsolve.studies.failure_map"), "CPU_LIMIT", 0.0)
+    found, _ = run_recorded(case("relief-on-closed-main", links__main__cells=4))
     assert found.reason.startswith(GIVEN_UP) and not found.ok

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from fvsolve.cli import progress as progress_module
+from fvsolve.cli import terminal
 from fvsolve.studies import failure_map
 
 CASE = """
@@ -56,8 +56,8 @@ def test_a_map_takes_a_path(path):
 
 
 def test_without_a_terminal_a_study_says_now_and_then_where_it_is(monkeypatch, capsys):
-    monkeypatch.setattr(progress_module, "PROGRESS_INTERVAL", 1e-3)
-    with progress_module.progress_line() as progress:
+    monkeypatch.setattr(terminal, "PROGRESS_INTERVAL", 1e-3)
+    with terminal.progress_line() as progress:
         progress(3, 9, "upwind with rk4")
         latest = time.monotonic() + 5.0
         said = ""
@@ -68,8 +68,8 @@ def test_without_a_terminal_a_study_says_now_and_then_where_it_is(monkeypatch, c
 
 
 def test_a_line_of_progress_is_not_repeated_unchanged(monkeypatch, capsys):
-    monkeypatch.setattr(progress_module, "PROGRESS_INTERVAL", 1e-3)
-    with progress_module.progress_line() as progress:
+    monkeypatch.setattr(terminal, "PROGRESS_INTERVAL", 1e-3)
+    with terminal.progress_line() as progress:
         for done in (3, 4):
             progress(done, 9, "rk4")
             time.sleep(0.1)

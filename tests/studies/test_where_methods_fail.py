@@ -17,7 +17,7 @@ from reference.scenes import AMBIENT, RHO, WATER, chamber, ramp, reservoir, scen
 import fvsolve
 from fvsolve.case import load
 from fvsolve.steppers import analyse, method_named, seen_frequency, stability_function
-from fvsolve.studies.failure.run_verdict import run_recorded
+from fvsolve.studies.failure_map import run_recorded
 from fvsolve.studies.outcome import outcome, study_model
 
 

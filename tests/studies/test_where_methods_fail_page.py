@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,6 @@ from studies.test_where_methods_fail_in_pipes import LENGTH, SPEED, courant_limi
 from fvsolve.cli import main
 from fvsolve.cli.app import load_case
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.failure import failure_map
 
 TESTS = Path(__file__).parent
 PAGE = folders.page("where-methods-fail")
@@ -60,7 +60,7 @@ def test_every_map_of_the_page_takes_its_options(words, monkeypatch, tmp_path, c
         asked.append(case.name)
         raise FvsolveError("far enough: nothing is run")
 
-    monkeypatch.setattr(failure_map, "failure_map", noted)
+    monkeypatch.setattr(import_module("fvsolve.studies.failure_map"), "failure_map", noted)
     monkeypatch.setattr(sys, "argv", [*words, "--out", str(tmp_path)])
     with pytest.raises(SystemExit) as ended:
         main()

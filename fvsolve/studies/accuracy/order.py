@@ -10,8 +10,7 @@ import numpy as np
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.exact.solution import Solution, averages
 from fvsolve.model import RunData
-from fvsolve.studies.accuracy.order_result import Order
-from fvsolve.studies.accuracy.order_study import OrderStudy
+from fvsolve.studies.accuracy.order_study import Order, OrderStudy
 from fvsolve.studies.accuracy.refine import affordable_plan
 from fvsolve.studies.distance import recording_keys
 from fvsolve.studies.outcome import STUDY_ARGUMENTS, Outcome, Progress, name_list, outcome, refuse_basins, study_model

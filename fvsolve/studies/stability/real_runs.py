@@ -9,7 +9,7 @@ import numpy as np
 from fvsolve.model.energy_norm import EnergyForm
 from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
 from fvsolve.steppers import loop_records
-from fvsolve.studies.linear.operating_point import OperatingPoint
+from fvsolve.studies.operating_point import OperatingPoint
 from fvsolve.studies.stability.growth import STEP_RATIO, STEPS, THRESHOLD, StepLimit, bisect, checked_powers
 
 SMALL_DEVIATIONS = 10.0 ** -np.arange(6.0, 16.0)  # greatest at the start, in units of the small deviation of states

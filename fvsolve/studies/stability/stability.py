@@ -21,8 +21,8 @@ from fvsolve.model.energy_norm import EnergyForm, energy_form
 from fvsolve.schemes import SCHEMES, branches
 from fvsolve.steppers import automatic, method_named
 from fvsolve.steppers.tableau import AUTO
-from fvsolve.studies.linear.linearise import Linear, Spectrum, find_eigenvalues, linearise_at
-from fvsolve.studies.linear.operating_point import OperatingPoint, has_limiter, operating_point, with_weights
+from fvsolve.studies.linearise import Linear, Spectrum, find_eigenvalues, linearise_at
+from fvsolve.studies.operating_point import OperatingPoint, has_limiter, operating_point, with_weights
 from fvsolve.studies.outcome import STUDY_ARGUMENTS, Progress, name_list
 from fvsolve.studies.parallel import PickledCase, TaskPool, Work
 from fvsolve.studies.resolution import delay_lines, fixed_choices
