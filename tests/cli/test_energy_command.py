@@ -1,7 +1,5 @@
 """`fvsolve energy`: output, files, JSON and errors; ordinary runs import none of its modules."""
 
-from __future__ import annotations
-
 import csv
 import json
 import signal

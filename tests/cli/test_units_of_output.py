@@ -1,7 +1,5 @@
 """Printed numbers are in the units of `[output]`: for each command, the SI numbers converted."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

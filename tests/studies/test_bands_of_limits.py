@@ -1,7 +1,5 @@
 """Each bound and each place of a limit has its own error: a certain bound does not hide an uncertain bound."""
 
-from __future__ import annotations
-
 import csv
 import json
 

@@ -1,7 +1,5 @@
 """Each series is weighted by its own scatter, so that sigma of a key follows from the noise of its series."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from reference.scenes import GRAVITY, lake, scene, tank, valve

@@ -1,7 +1,5 @@
 """Charts of accuracy against speed: errors against closed forms, floors, failed runs, and lines for the case file."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math

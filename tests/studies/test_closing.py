@@ -1,7 +1,5 @@
 """The least peak by optimisation is near the lower bound, given by the mean pressure that stops a column."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

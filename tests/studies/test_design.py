@@ -1,7 +1,5 @@
 """A study runs each event with each protection, and a size search finds the value at which a limit is reached."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex

@@ -1,7 +1,5 @@
 """Energy balance against closed forms: supplied, stored and dissipated energy, and numerical loss."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

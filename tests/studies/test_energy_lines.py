@@ -1,7 +1,5 @@
 """Energy of delay lines: stored energy by quadrature, against closed forms, fine cells and the sum of all powers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from reference.scenes import GRAVITY, RHO, area, chamber, junction, lake, pipe, scene, step

@@ -1,7 +1,5 @@
 """The residual of Newton's method has its own account: it is no supplied energy and no loss of schemes or steps."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from reference.scenes import AMBIENT, WATER, chamber, reservoir, scene, valve

@@ -1,7 +1,5 @@
 """The energy remainder falls at the order of scheme and method, for each density law and kind of method."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Estimated errors of extremes contain the known error, whichever local maximum becomes the greatest."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Verdicts of a failure map, on synthetic runs of each kind and on real runs of known kind."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math

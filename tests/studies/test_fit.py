@@ -1,7 +1,5 @@
 """Fit of the order on errors of known order: it gives order and spread, or the reason why there is no order."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

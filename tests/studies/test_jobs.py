@@ -1,7 +1,5 @@
 """Studies with several processes give the results of one process, except measured times."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """Linearisation, stability and response of large models, and named refusals."""
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

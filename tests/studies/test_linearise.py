@@ -1,7 +1,5 @@
 """Matrices A, B, C, D of cases: closed forms, eigenfrequencies of pipes, and runs with slightly changed inputs."""
 
-from __future__ import annotations
-
 import json
 import math
 import sys

@@ -1,7 +1,5 @@
 """Hierarchy of models: simpler forms of a case, their errors, and the cheapest form within a target."""
 
-from __future__ import annotations
-
 import json
 import math
 import subprocess

@@ -1,7 +1,5 @@
 """Water in moving tanks as frozen mass, modes or cells: the hierarchy of models states which form a case needs."""
 
-from __future__ import annotations
-
 import pytest
 from reference.scenes import scene
 

@@ -1,7 +1,5 @@
 """Studies of moving cases: poles, impedances and energy balances against closed forms, and messages."""
 
-from __future__ import annotations
-
 import math
 from importlib import import_module
 

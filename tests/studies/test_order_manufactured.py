@@ -1,7 +1,5 @@
 """Manufactured solutions: start, source and exact solution as functions of x and t, and values inside pipes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from pytest import approx

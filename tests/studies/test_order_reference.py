@@ -1,7 +1,5 @@
 """References of errors: their accuracy, the estimate of it, and cases in which a reference is not accurate enough."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pareto fronts, crossings and targets of synthetic sets with known answers."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """Passivity of methods and schemes: claims from coefficients, and real runs that agree with them."""
 
-from __future__ import annotations
-
 import importlib
 import math
 

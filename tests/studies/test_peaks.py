@@ -1,7 +1,5 @@
 """Error bands of peaks contain the known error, and state no order where none is observed."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

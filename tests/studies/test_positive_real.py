@@ -1,7 +1,5 @@
 """`positive_real` on textbook functions, boundary cases, narrow bands, hidden modes and random passive networks."""
 
-from __future__ import annotations
-
 import math
 from decimal import Decimal
 from fractions import Fraction as F

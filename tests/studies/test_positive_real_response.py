@@ -1,7 +1,5 @@
 """`fvsolve response`: ports of cases against closed forms, and verdicts that depend on the scheme."""
 
-from __future__ import annotations
-
 import json
 import math
 import subprocess

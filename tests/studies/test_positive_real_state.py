@@ -1,7 +1,5 @@
 """State spaces in floats agree with the exact verdict where they decide, and sweeps of lines have a valid bound."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Stability of cases: prediction against exact growth and real runs, and bounds that mislead."""
 
-from __future__ import annotations
-
 import json
 import math
 import sys

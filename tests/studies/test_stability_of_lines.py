@@ -1,7 +1,5 @@
 """Stability with delay lines: the linear system equals the steps of the program, and runs fail at its limits."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from model.test_delay_lines import short, vessel

@@ -1,7 +1,5 @@
 """Real runs of servo axes in `stability`: rounding and the end of a case are not taken as failed steps."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Studies of cases with delay lines: orders, against cells and rays, and exact results."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

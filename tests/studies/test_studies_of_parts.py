@@ -1,7 +1,5 @@
 """Studies of cases with devices, vessels and cavities."""
 
-from __future__ import annotations
-
 from importlib import import_module
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Common features of studies: a path as case, progress without a terminal, and `--set` with `--method`."""
 
-from __future__ import annotations
-
 import time
 
 import pytest

@@ -1,7 +1,5 @@
 """Sweep: a row for each combination with the numbers of its run; finished rows are reused, failed rows explained."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

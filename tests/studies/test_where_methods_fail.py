@@ -4,8 +4,6 @@ The sections of docs/where-methods-fail.md name these tests. Tests of pipes are 
 studies/test_where_methods_fail_in_pipes.py.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

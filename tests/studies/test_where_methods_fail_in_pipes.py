@@ -3,8 +3,6 @@
 The sections of docs/where-methods-fail.md name these tests. All of them run the compiled program.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

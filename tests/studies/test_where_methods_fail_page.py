@@ -1,7 +1,5 @@
 """docs/where-methods-fail.md: its tests exist, its commands run as described, and its table is the computed one."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import sys
