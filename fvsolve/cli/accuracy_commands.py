@@ -22,53 +22,25 @@ ORDER_FILE = columns(
 @cli.app.command()
 def chart(
     case: cli.SingleCase,
-    scheme: Annotated[
-        str | None, Option(metavar="LIST", help="schemes to compare (default upwind,muscl,upwind5,weno5)")
-    ] = None,
-    method: Annotated[
-        str | None, Option(metavar="LIST", help="methods to compare (default a selection that suits the case)")
-    ] = None,
-    cells: Annotated[
-        str | None,
-        Option(
-            metavar="LIST",
-            help="numbers of cells to compare, for example 50,100,200, of the pipe with the longest travel time or of "
-            "the basin side with most cells (default up to five numbers that suit the case)",
-        ),
-    ] = None,
-    rtol: Annotated[
-        str | None,
-        Option(
-            metavar="LIST",
-            help="relative tolerances to compare, for example 1e-3,1e-6, for a case without pipes and basins "
-            "(default 1e-2 to 1e-10)",
-        ),
-    ] = None,
-    step: Annotated[
-        str | None,
-        Option(
-            metavar="LIST",
-            help="fixed time steps [s] to compare, for example 1e-3,1e-4, for a case without cells "
-            "(default seven or eight steps)",
-        ),
-    ] = None,
-    target: Annotated[
-        float | None,
-        Option(
-            metavar="ERROR",
-            help="greatest accepted error of a probe, as a fraction of its range, for which the cheapest settings or "
-            "model are printed (default none, or 0.01 with --models)",
-        ),
-    ] = None,
-    models: Annotated[
-        bool, Option("--models", help="compare models, from lumped volumes to cells, instead of methods")
-    ] = False,
-    jobs: cli.Jobs = 1,
-    dask: cli.Dask = None,
-    set: cli.Set = [],  # noqa: B006
-    out: cli.Out = None,
-    as_json: cli.Json = False,
-) -> None:
+    scheme: Annotated[str | None, Option(metavar="LIST", help="schemes to compare (default "
+        "upwind,muscl,upwind5,weno5)")] = None,
+    method: Annotated[str | None, Option(metavar="LIST", help="methods to compare (default a selection that suits "
+        "the case)")] = None,
+    cells: Annotated[str | None, Option(metavar="LIST", help="numbers of cells to compare, for example 50,100,200, "
+        "of the pipe with the longest travel time or of the basin side with most cells (default up to five numbers "
+        "that suit the case)")] = None,
+    rtol: Annotated[str | None, Option(metavar="LIST", help="relative tolerances to compare, for example 1e-3,1e-6, "
+        "for a case without pipes and basins (default 1e-2 to 1e-10)")] = None,
+    step: Annotated[str | None, Option(metavar="LIST", help="fixed time steps [s] to compare, for example 1e-3,1e-4, "
+        "for a case without cells (default seven or eight steps)")] = None,
+    target: Annotated[float | None, Option(metavar="ERROR", help="greatest accepted error of a probe, as a fraction "
+        "of its range, for which the cheapest settings or model are printed (default none, or 0.01 with "
+        "--models)")] = None,
+    models: Annotated[bool, Option("--models", help="compare models, from lumped volumes to cells, instead of "
+        "methods")] = False,
+    jobs: cli.Jobs = 1, dask: cli.Dask = None, set: cli.Set = [],  # noqa: B006
+    out: cli.Out = None, as_json: cli.Json = False,
+) -> None:  # fmt: skip
     """Chart error against CPU time and work for schemes, methods and resolutions; list the cheapest for each error."""
     from fvsolve.studies.accuracy.chart import chart as study
     from fvsolve.studies.accuracy.work_precision import write_chart
@@ -227,47 +199,21 @@ ORDER_COLUMNS = (
 
 @cli.app.command()
 def order(
-    case: cli.SingleCase,
-    overrides: cli.Set = [],  # noqa: B006
-    refine: Annotated[
-        str | None,
-        Option(
-            help="resolution to refine: both (cells and time steps), space or time "
-            "(default both, or time for a case without pipes and basins)"
-        ),
-    ] = None,
-    key: Annotated[
-        str | None,
-        Option(
-            metavar="KEY",
-            help="single key to refine, for example links.main.cells or numerics.step (default all keys that --refine "
-            "selects)",
-        ),
-    ] = None,
-    levels: Annotated[
-        int | None, Option(help="number of refinement levels, 2 or more (default 4, or 6 if only time is refined)")
-    ] = None,
-    cells: Annotated[
-        int | None,
-        Option(
-            help="number of cells, at the coarsest level, of the pipe or basin side with most cells, or of the part of "
-            "--key (default as in the case, or fewer to shorten the study)"
-        ),
-    ] = None,
+    case: cli.SingleCase, overrides: cli.Set = [],  # noqa: B006
+    refine: Annotated[str | None, Option(help="resolution to refine: both (cells and time steps), space or time "
+        "(default both, or time for a case without pipes and basins)")] = None,
+    key: Annotated[str | None, Option(metavar="KEY", help="single key to refine, for example links.main.cells or "
+        "numerics.step (default all keys that --refine selects)")] = None,
+    levels: Annotated[int | None, Option(help="number of refinement levels, 2 or more (default 4, or 6 if only time "
+        "is refined)")] = None,
+    cells: Annotated[int | None, Option(help="number of cells, at the coarsest level, of the pipe or basin side with "
+        "most cells, or of the part of --key (default as in the case, or fewer to shorten the study)")] = None,
     scheme: Annotated[str | None, Option(metavar="A,B", help="schemes to study (default scheme of the case)")] = None,
     method: Annotated[str | None, Option(metavar="A,B", help="methods to study (default method of the case)")] = None,
-    reference: Annotated[
-        str,
-        Option(
-            help="reference solution: exact (named in the case), finer (a run at a finer level), richardson (the next "
-            "level) or auto (the first of these that suits the case)"
-        ),
-    ] = "auto",
-    jobs: cli.Jobs = 1,
-    dask: cli.Dask = None,
-    out: cli.Out = None,
-    as_json: cli.Json = False,
-) -> None:
+    reference: Annotated[str, Option(help="reference solution: exact (named in the case), finer (a run at a finer "
+        "level), richardson (the next level) or auto (the first of these that suits the case)")] = "auto",
+    jobs: cli.Jobs = 1, dask: cli.Dask = None, out: cli.Out = None, as_json: cli.Json = False,
+) -> None:  # fmt: skip
     """Measure the order of convergence of a case under refinement: a table, order.csv and order.png."""
     from fvsolve.studies.accuracy.order import order as study
     from fvsolve.studies.result_cache import ResultCache

@@ -166,27 +166,17 @@ def _length(value: float, digits: int = 6) -> str:
 @app.command()
 def run(
     cases: Cases,
-    out: Annotated[
-        Path | None,
-        Option(
-            metavar="DIR",
-            help="run directory, or for several cases the folder of their run directories DIR/NAME (default runs/NAME)",
-        ),
-    ] = None,
+    out: Annotated[Path | None, Option(metavar="DIR", help="run directory, or for several cases the folder of their "
+        "run directories DIR/NAME (default runs/NAME)")] = None,
     set: Set = [],  # noqa: B006
     resume: Annotated[bool, Option("--resume", help="continue an interrupted run from its last checkpoint")] = False,
     force: Annotated[bool, Option("--force", help="replace an earlier run in the run directory")] = False,
     threads: Annotated[int, Option(metavar="N", help="number of threads that share the rows of basin cells")] = 1,
     no_pictures: Annotated[bool, Option("--no-pictures", help="write no pictures")] = False,
-    estimate_error: Annotated[
-        bool,
-        Option(
-            "--estimate-error",
-            help="estimate the errors of peaks, from further runs at half, one and twice the resolution",
-        ),
-    ] = False,
+    estimate_error: Annotated[bool, Option("--estimate-error", help="estimate the errors of peaks, from further runs "
+        "at half, one and twice the resolution")] = False,
     as_json: Json = False,
-) -> None:
+) -> None:  # fmt: skip
     """Solve cases and write their run directories."""
     from fvsolve.draw.plot_process import PlotProcess
 
@@ -254,11 +244,10 @@ def _judge(result, case) -> None:
 
 @app.command()
 def check(
-    case: SingleCase,
-    set: Set = [],  # noqa: B006
+    case: SingleCase, set: Set = [],  # noqa: B006
     every: Annotated[bool, Option("--all", help="print all rows of long tables")] = False,
     as_json: Json = False,
-) -> None:
+) -> None:  # fmt: skip
     """Print the contents of a case as read, its initial state and its expected cost."""
     from fvsolve.cli import printing
     from fvsolve.run import model_of
@@ -304,17 +293,12 @@ def schema() -> None:
 
 @app.command()
 def methods(
-    name: Annotated[
-        str | None, Argument(metavar="NAME", help="name of a method, or file of its tableau (default all methods)")
-    ] = None,
-    out: Annotated[
-        Path | None,
-        Option(
-            metavar="FILE", help="picture file of the stability region of NAME: .png, .svg or .pdf (default NAME.png)"
-        ),
-    ] = None,
+    name: Annotated[str | None, Argument(metavar="NAME", help="name of a method, or file of its tableau (default all "
+        "methods)")] = None,
+    out: Annotated[Path | None, Option(metavar="FILE", help="picture file of the stability region of NAME: .png, "
+        ".svg or .pdf (default NAME.png)")] = None,
     as_json: Json = False,
-) -> None:
+) -> None:  # fmt: skip
     """List Runge-Kutta methods: order, stability, cost. With NAME show its tableau, R(s) and stability region."""
 
     if name is None and out is not None:
@@ -341,26 +325,17 @@ def compare(
 @app.command()
 def view(
     directory: RunDirectory,
-    time: Annotated[
-        str | None,
-        Option(metavar="T", help='time whose nearest frame is drawn: seconds, or "20 ms" (default the last frame)'),
-    ] = None,
-    field: Annotated[
-        str | None,
-        Option(
-            help="quantity to draw, such as pressure, head, flow, velocity or depth (default pressure, or for a case "
-            "without pipes the first field of its basins or the speed of its bodies)"
-        ),
-    ] = None,
-    contours: Annotated[
-        int, Option(metavar="N", min=0, max=100, help="number of contour lines on the surfaces of basins")
-    ] = 0,
+    time: Annotated[str | None, Option(metavar="T", help='time whose nearest frame is drawn: seconds, or "20 ms" '
+        "(default the last frame)")] = None,
+    field: Annotated[str | None, Option(help="quantity to draw, such as pressure, head, flow, velocity or depth "
+        "(default pressure, or for a case without pipes the first field of its basins or the speed of its "
+        "bodies)")] = None,
+    contours: Annotated[int, Option(metavar="N", min=0, max=100, help="number of contour lines on the surfaces of "
+        "basins")] = 0,
     animate: Annotated[Path | None, Option(metavar="FILE", help="animation of all frames, a .gif or .mp4 file")] = None,
-    out: Annotated[
-        Path | None,
-        Option(metavar="FILE", help="picture file (default RUN/view-FIELD.png, with the name of the field)"),
-    ] = None,
-) -> None:
+    out: Annotated[Path | None, Option(metavar="FILE", help="picture file (default RUN/view-FIELD.png, with the name "
+        "of the field)")] = None,
+) -> None:  # fmt: skip
     """Draw a quantity in all parts at one time, or an animation of all stored times, into a file."""
     from fvsolve.run import open_run
 

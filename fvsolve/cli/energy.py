@@ -41,33 +41,17 @@ METHOD = (
 
 @cli.app.command()
 def energy(
-    case: Annotated[
-        str | None,
-        Argument(
-            metavar="CASE",
-            help="case file or shipped case to run (default none: list the passivity of schemes and methods)",
-        ),
-    ] = None,
-    port: Annotated[
-        str | None,
-        Option(
-            metavar="NODE",
-            help="node at which the passivity of the network is checked: a reservoir, inflow or junction "
-            "(default none)",
-        ),
-    ] = None,
-    scheme: Annotated[
-        str | None,
-        Option(metavar="S,S,...", help="schemes to study (default scheme of the case, or without a case all schemes)"),
-    ] = None,
-    method: Annotated[
-        str | None,
-        Option(metavar="M,M,...", help="methods to study (default method of the case, or without a case all methods)"),
-    ] = None,
-    out: cli.Out = None,
-    set: cli.Set = [],  # noqa: B006
+    case: Annotated[str | None, Argument(metavar="CASE", help="case file or shipped case to run (default none: list "
+        "the passivity of schemes and methods)")] = None,
+    port: Annotated[str | None, Option(metavar="NODE", help="node at which the passivity of the network is checked: "
+        "a reservoir, inflow or junction (default none)")] = None,
+    scheme: Annotated[str | None, Option(metavar="S,S,...", help="schemes to study (default scheme of the case, or "
+        "without a case all schemes)")] = None,
+    method: Annotated[str | None, Option(metavar="M,M,...", help="methods to study (default method of the case, or "
+        "without a case all methods)")] = None,
+    out: cli.Out = None, set: cli.Set = [],  # noqa: B006
     as_json: cli.Json = False,
-) -> None:
+) -> None:  # fmt: skip
     """Print the energy ledger of a run: energy supplied, stored, dissipated, and changed by the numerical method."""
     schemes, methods = cli.comma_list(scheme, "--scheme"), cli.method_names(method)
     if case is None:

@@ -15,57 +15,24 @@ from fvsolve.studies.result_table import Column, ResultTable
 @cli.app.command("failure-map")
 def failure_map(
     case: cli.SingleCase,
-    scheme: Annotated[
-        str | None,
-        Option(
-            metavar="A,B",
-            help="schemes, one panel for each (default upwind and the scheme of the case, or the latter alone for a "
-            "stiff case or a case without cells)",
-        ),
-    ] = None,
-    method: Annotated[
-        str | None,
-        Option(metavar="A,B", help="methods, one row for each (default euler, ssp-rk3, rk4 and four implicit methods)"),
-    ] = None,
-    courant: Annotated[
-        str | None,
-        Option(
-            metavar="A,B",
-            help="Courant numbers, one column for each, or a single one with --key (default 0.25 to 3, or ten time "
-            "steps for a stiff case or a case without cells)",
-        ),
-    ] = None,
-    step: Annotated[
-        str | None,
-        Option(
-            metavar="A,B",
-            help='time steps instead of Courant numbers, for example "1 ms,2 ms", one column for each, or a single '
-            "step with --key",
-        ),
-    ] = None,
-    key: Annotated[
-        str | None,
-        Option(
-            metavar="KEY=A,B",
-            help="key of the case and its values, one column for each, instead of columns of time steps or Courant "
-            "numbers",
-        ),
-    ] = None,
-    tolerance: Annotated[
-        float,
-        Option(
-            metavar="X",
-            help="greatest accepted error of a probe: mean over the run, as a fraction of the probe's range",
-        ),
-    ] = 0.02,
-    jobs: cli.Jobs = 1,
-    dask: cli.Dask = None,
-    out: Annotated[
-        Path | None, Option(metavar="DIR", help="folder of the table and pictures (default runs/NAME.map)")
-    ] = None,
+    scheme: Annotated[str | None, Option(metavar="A,B", help="schemes, one panel for each (default upwind and the "
+        "scheme of the case, or the latter alone for a stiff case or a case without cells)")] = None,
+    method: Annotated[str | None, Option(metavar="A,B", help="methods, one row for each (default euler, ssp-rk3, rk4 "
+        "and four implicit methods)")] = None,
+    courant: Annotated[str | None, Option(metavar="A,B", help="Courant numbers, one column for each, or a single one "
+        "with --key (default 0.25 to 3, or ten time steps for a stiff case or a case without cells)")] = None,
+    step: Annotated[str | None, Option(metavar="A,B", help='time steps instead of Courant numbers, for example "1 '
+        'ms,2 ms", one column for each, or a single step with --key')] = None,
+    key: Annotated[str | None, Option(metavar="KEY=A,B", help="key of the case and its values, one column for each, "
+        "instead of columns of time steps or Courant numbers")] = None,
+    tolerance: Annotated[float, Option(metavar="X", help="greatest accepted error of a probe: mean over the run, as "
+        "a fraction of the probe's range")] = 0.02,
+    jobs: cli.Jobs = 1, dask: cli.Dask = None,
+    out: Annotated[Path | None, Option(metavar="DIR", help="folder of the table and pictures (default "
+        "runs/NAME.map)")] = None,
     set: cli.Set = [],  # noqa: B006
     as_json: cli.Json = False,
-) -> None:
+) -> None:  # fmt: skip
     """Map failures of methods over time steps or values of a key. Each run is stable, ringing, wrong, blown up, ..."""
     from fvsolve.studies.failure_map import failure_map as study
     from fvsolve.studies.result_cache import ResultCache

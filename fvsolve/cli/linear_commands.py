@@ -19,20 +19,14 @@ SYMBOLS = {"admittance": "Y", "impedance": "Z"}
 @cli.app.command()
 def linearise(
     case: cli.SingleCase,
-    inputs: Annotated[
-        str | None,
-        Option(metavar="A,B", help="inputs of the linear system, such as valve.opening,lake.pressure (default none)"),
-    ] = None,
-    outputs: Annotated[
-        str | None, Option(metavar="A,B", help="probes used as outputs (default probes of the case)")
-    ] = None,
-    at: cli.AtTime = None,
-    before: cli.BeforeJump = False,
-    scheme: cli.LinearScheme = None,
-    out: cli.Out = None,
+    inputs: Annotated[str | None, Option(metavar="A,B", help="inputs of the linear system, such as "
+        "valve.opening,lake.pressure (default none)")] = None,
+    outputs: Annotated[str | None, Option(metavar="A,B", help="probes used as outputs (default probes of the "
+        "case)")] = None,
+    at: cli.AtTime = None, before: cli.BeforeJump = False, scheme: cli.LinearScheme = None, out: cli.Out = None,
     set: cli.Set = [],  # noqa: B006
     as_json: cli.Json = False,
-) -> None:
+) -> None:  # fmt: skip
     """Linearise a case about a state: matrices A, B, C, D and poles."""
     from fvsolve.model.energy_norm import energy_form
     from fvsolve.studies.linearise import POLES, poles_of
@@ -115,20 +109,12 @@ def system_text(system, values, poles: list[dict], folder: Path) -> Iterator:
 @cli.app.command()
 def response(
     case: cli.SingleCase,
-    port: Annotated[
-        str,
-        Option(
-            metavar="NODE",
-            help="node at which flow and pressure are taken: a reservoir, junction, inflow, chamber or tank",
-        ),
-    ],
-    at: cli.AtTime = None,
-    before: cli.BeforeJump = False,
-    scheme: cli.LinearScheme = None,
-    out: cli.Out = None,
+    port: Annotated[str, Option(metavar="NODE", help="node at which flow and pressure are taken: a reservoir, "
+        "junction, inflow, chamber or tank")],
+    at: cli.AtTime = None, before: cli.BeforeJump = False, scheme: cli.LinearScheme = None, out: cli.Out = None,
     set: cli.Set = [],  # noqa: B006
     as_json: cli.Json = False,
-) -> None:
+) -> None:  # fmt: skip
     """Compute the transfer function of pressure and flow at a node: matrices, frequency response, positive realness."""
     from fvsolve.studies.ports.response import response as ask
 

@@ -202,54 +202,24 @@ STABILITY_FILE = columns(
 
 @cli.app.command()
 def stability(
-    case: Annotated[
-        str | None,
-        Argument(metavar="CASE", help="case file or shipped case (default none: advection on a periodic grid)"),
-    ] = None,
-    scheme: Annotated[
-        str | None,
-        Option(
-            metavar="A,B", help="schemes to study (default scheme of the case, or without a case all linear schemes)"
-        ),
-    ] = None,
-    method: Annotated[
-        str | None,
-        Option(metavar="A,B", help="methods to study (default method of the case, or without a case all methods)"),
-    ] = None,
-    steps: Annotated[
-        int | None,
-        Option(
-            help="number of steps over which growth is measured; without a case it adds measured limits of linear "
-            "schemes (default 1000)"
-        ),
-    ] = None,
-    cells: Annotated[
-        int | None,
-        Option(
-            help="number of cells of the periodic grid on which growth is measured, only without a case (default 100)"
-        ),
-    ] = None,
-    courant: Annotated[
-        float | None,
-        Option(
-            help="Courant number at which growth is computed, only without a case (default 1 % above the stability "
-            "limit, or 0.5 if the limit is 0)"
-        ),
-    ] = None,
-    at: cli.AtTime = None,
-    before: cli.BeforeJump = False,
-    jobs: cli.Jobs = 1,
-    dask: cli.Dask = None,
-    out: Annotated[
-        Path | None,
-        Option(
-            metavar="DIR",
-            help="folder of tables and pictures (default runs/NAME.stability, or no files without a case)",
-        ),
-    ] = None,
+    case: Annotated[str | None, Argument(metavar="CASE", help="case file or shipped case (default none: advection on "
+        "a periodic grid)")] = None,
+    scheme: Annotated[str | None, Option(metavar="A,B", help="schemes to study (default scheme of the case, or "
+        "without a case all linear schemes)")] = None,
+    method: Annotated[str | None, Option(metavar="A,B", help="methods to study (default method of the case, or "
+        "without a case all methods)")] = None,
+    steps: Annotated[int | None, Option(help="number of steps over which growth is measured; without a case it adds "
+        "measured limits of linear schemes (default 1000)")] = None,
+    cells: Annotated[int | None, Option(help="number of cells of the periodic grid on which growth is measured, only "
+        "without a case (default 100)")] = None,
+    courant: Annotated[float | None, Option(help="Courant number at which growth is computed, only without a case "
+        "(default 1 % above the stability limit, or 0.5 if the limit is 0)")] = None,
+    at: cli.AtTime = None, before: cli.BeforeJump = False, jobs: cli.Jobs = 1, dask: cli.Dask = None,
+    out: Annotated[Path | None, Option(metavar="DIR", help="folder of tables and pictures (default "
+        "runs/NAME.stability, or no files without a case)")] = None,
     set: cli.Set = [],  # noqa: B006
     as_json: cli.Json = False,
-) -> None:
+) -> None:  # fmt: skip
     """Compute the greatest stable step of a case, predicted and measured, and bounds on it."""
     of_a_case = {"--set": set, "--at": at, "--left-limit": before, "--jobs": None if jobs == 1 else jobs}
     of_a_case |= {"--dask": dask}

@@ -95,14 +95,9 @@ def series_range(measured: np.ndarray) -> float:
 
 @validated(free=VARY, set=TABLE, seed=COUNT_FROM_ZERO, jobs=COUNT, dask=TEXT, progress=FUNCTION)
 def calibrate(
-    case,
-    free: Mapping[str, Sequence[Any]],
-    set: Mapping[str, Any] | None = None,
-    seed: int = 0,
-    jobs: int = 1,
-    dask: str | None = None,
-    progress: Callable[[int, int, str], None] | None = None,
-) -> Calibration:
+    case, free: Mapping[str, Sequence[Any]], set: Mapping[str, Any] | None = None, seed: int = 0, jobs: int = 1,
+    dask: str | None = None, progress: Callable[[int, int, str], None] | None = None,
+) -> Calibration:  # fmt: skip
     """Fit values in a case to its measured series, by least squares (`scipy.optimize.least_squares`).
 
     case : as for `run`, with measured series under `[compare]`; free : key -> (least, greatest value)

@@ -66,17 +66,10 @@ class Sensitivity(Displayable, PlainData):
 
 @validated(vary=VARY, outcome=TEXT, samples=COUNT, seed=COUNT_FROM_ZERO, out=PATH, **STUDY_ARGUMENTS)
 def sensitivity(
-    case,
-    vary: Mapping[str, Sequence[Any]],
-    outcome: str | None = None,
-    samples: int = 64,
-    seed: int = 0,
-    set: Mapping[str, Any] | None = None,
-    jobs: int = 1,
-    dask: str | None = None,
-    out: str | Path | None = None,
+    case, vary: Mapping[str, Sequence[Any]], outcome: str | None = None, samples: int = 64, seed: int = 0,
+    set: Mapping[str, Any] | None = None, jobs: int = 1, dask: str | None = None, out: str | Path | None = None,
     progress: Callable[[int, int, str], None] | None = None,
-) -> Sensitivity:
+) -> Sensitivity:  # fmt: skip
     """Compute Sobol and Morris indices of an outcome, such as "max(gate.pressure)", over the ranges of keys.
 
     case : as for `run`, or a function of a dict key -> number; vary : key -> (low, high)

@@ -228,17 +228,11 @@ POINTS = Kind(
 
 @validated(vary=VARY, out=PATH, points=POINTS, sample=TEXT, seed=COUNT_FROM_ZERO, **STUDY_ARGUMENTS)
 def sweep(
-    case,
-    vary: Mapping[str, Sequence[Any]] | None = None,
-    set: Mapping[str, Any] | None = None,
-    jobs: int = 1,
-    out: str | Path | None = None,
-    progress: Callable[[int, int, str], None] | None = None,
-    points: str | Path | Sequence[Mapping[str, Any]] | None = None,
-    sample: str | None = None,
-    seed: int = 0,
+    case, vary: Mapping[str, Sequence[Any]] | None = None, set: Mapping[str, Any] | None = None, jobs: int = 1,
+    out: str | Path | None = None, progress: Callable[[int, int, str], None] | None = None,
+    points: str | Path | Sequence[Mapping[str, Any]] | None = None, sample: str | None = None, seed: int = 0,
     dask: str | None = None,
-) -> Sweep:
+) -> Sweep:  # fmt: skip
     """Run a case once for every combination of the values of `vary`, `jobs` runs at a time.
 
     `case` is a path, a dict shaped like the file or a `Case`; `set` are overrides of all runs. With `sample`,

@@ -145,8 +145,7 @@ def test_the_error_at_the_end_is_that_of_the_fields_too(closing):
     span = max(seen) - min(seen)
     p, q = frame["pressure"], frame["flow"]
     worst = max(
-        np.mean(np.abs(p - exact[0])) / span,
-        np.mean(np.abs(q - exact[1])) / (span * area(DIAMETER) / (RHO * SPEED)),
+        np.mean(np.abs(p - exact[0])) / span, np.mean(np.abs(q - exact[1])) / (span * area(DIAMETER) / (RHO * SPEED))
     )
     assert point.end >= 0.98 * worst - 2 * closing.floor["end"]
     rows = fvsolve.run(line(), point.setting.keys)

@@ -30,10 +30,7 @@ OIL = {"name": "user", "density": 870.0, "bulk_modulus": BETA, "viscosity": 0.03
 
 def bottle():
     """Case of a chamber filled through an orifice at a drop of 100 bar."""
-    nodes = {
-        "pump": reservoir(101e5),
-        "bottle": {"type": "chamber", "volume": VOLUME, "initial_pressure": 1e5},
-    }
+    nodes = {"pump": reservoir(101e5), "bottle": {"type": "chamber", "volume": VOLUME, "initial_pressure": 1e5}}
     hole = {"type": "orifice", "from": "pump", "to": "bottle", "area": HOLE, "discharge_coefficient": CD}
     return scene(nodes, {"hole": hole}, 1.0, {"method": "dormand-prince", "rtol": 1e-8}, fluid=OIL)
 

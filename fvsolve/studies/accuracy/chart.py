@@ -62,19 +62,11 @@ WRONG_ERROR = 1.0  # errors above the range of the component are wrong results
     schemes=NAMES, methods=NAMES, cells=NUMBERS, rtol=NUMBERS, step=NUMBERS, target=NUMBER, out=PATH, **STUDY_ARGUMENTS
 )
 def chart(
-    case,
-    set: Mapping | None = None,
-    schemes: Sequence[str] | None = None,
-    methods: Sequence[str] | None = None,
-    cells: Sequence[int] | None = None,
-    rtol: Sequence[float] | None = None,
-    step: Sequence[float] | None = None,
-    target: float | None = None,
-    out: str | Path | None = None,
-    progress: Progress | None = None,
-    jobs: int = 1,
+    case, set: Mapping | None = None, schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None,
+    cells: Sequence[int] | None = None, rtol: Sequence[float] | None = None, step: Sequence[float] | None = None,
+    target: float | None = None, out: str | Path | None = None, progress: Progress | None = None, jobs: int = 1,
     dask: str | None = None,
-) -> Chart:
+) -> Chart:  # fmt: skip
     """Run a case with all combinations of schemes, methods and cells (or tolerances); compare errors with their cost.
 
     schemes, methods : names (default a selection)

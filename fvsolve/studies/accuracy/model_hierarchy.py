@@ -337,11 +337,9 @@ class Hierarchy(PlainData):
 
 @validated(set=TABLE, target=NUMBER, progress=FUNCTION)
 def ladder(
-    case,
-    set: Mapping | None = None,
-    target: float = DEFAULT_TARGET,
+    case, set: Mapping | None = None, target: float = DEFAULT_TARGET,
     progress: Callable[[int, int, str], None] | None = None,
-) -> Hierarchy:
+) -> Hierarchy:  # fmt: skip
     """Run a case as rigid columns, lumped volumes, delay lines, few and many cells, with every possible density law.
 
     A case with water in tanks on bodies is run with frozen water, modes and cells, the same for all tanks.

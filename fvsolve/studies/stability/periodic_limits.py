@@ -137,11 +137,9 @@ def measured_growth(circle: PeriodicPipe, cells: int, steps: int, courant: float
 
 
 def first_failure(
-    growth: Callable[[float], float],
-    width: float = LIMIT_TOLERANCE,
-    smallest: float = SMALLEST_COURANT,
+    growth: Callable[[float], float], width: float = LIMIT_TOLERANCE, smallest: float = SMALLEST_COURANT,
     ratio: float = COURANT_RATIO,
-) -> float | None:
+) -> float | None:  # fmt: skip
     """Least Courant number whose growth exceeds 1000; None if there is none up to 20.
 
     growth : function of the Courant number, log10 of the growth
