@@ -122,7 +122,8 @@ class EnergyLoop(RunLoop):
             return total
         (_, b, c), separation = self.tableau(), time_tolerance(past)
         if self.stepper.method.kind == "linear":
-            b = self.power_weights()
+            big_c, _, gamma = self.rosenbrock_coefficients()  # b: weights of the powers at the stages in the energy
+            b = np.append(0.0, np.linalg.solve((np.eye(b.size - 1) - gamma * big_c[1:, 1:]).T, gamma * b[1:]))
         begin, end = t + min(0.0, float(c.min())) * h, t + max(1.0, float(c.max())) * h
         for jump_time in jump_times(past, self.model.tables.delays, begin, end):
             sides = jump_time - 2.0 * separation, jump_time + 2.0 * separation
@@ -157,11 +158,6 @@ class EnergyLoop(RunLoop):
         s = self.stepper.k.shape[0]
         coefficients = self.stepper.coefficients[s * s + 3 * s :]
         return coefficients[: s * s].reshape(s, s), coefficients[s * s : s * s + s], float(coefficients[s * s + s])
-
-    def power_weights(self) -> np.ndarray:
-        """Weights float64[s] with which the powers at the stages of a Rosenbrock step enter its energy."""
-        (_, b, _), (big_c, _, gamma) = self.tableau(), self.rosenbrock_coefficients()
-        return np.append(0.0, np.linalg.solve((np.eye(b.size - 1) - gamma * big_c[1:, 1:]).T, gamma * b[1:]))
 
     def linearly_implicit(self, t: float, y: np.ndarray, h: float, a, c, k) -> np.ndarray:
         """Stage values w of the energy accounts in a Rosenbrock step from (t, y) : float64[s, accounts] [W].

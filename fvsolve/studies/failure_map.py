@@ -303,15 +303,9 @@ KEY_VALUES = Kind(
 
 
 @validated(
-    schemes=NAMES,
-    methods=NAMES,
-    courants=NUMBERS,
-    steps=NUMBERS,
-    key=KEY_VALUES,
-    tolerance=NUMBER,
-    out=OUT,
+    schemes=NAMES, methods=NAMES, courants=NUMBERS, steps=NUMBERS, key=KEY_VALUES, tolerance=NUMBER, out=OUT,
     **STUDY_ARGUMENTS,
-)
+)  # fmt: skip
 def failure_map(
     case, schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None,
     courants: Sequence[float] | None = None, steps: Sequence[float] | None = None,

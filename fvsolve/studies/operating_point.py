@@ -3,10 +3,10 @@
 The matrices are found by finite differences that are checked.
 
 Arguments of several functions : at, operating point; outputs, number of outputs; f, function of a vector x;
-base : float64[m]  f(x); direction, change of x, for the states the small deviations `width` : float64[n]
-steps, factors on `direction`, largest first; sides : float64[steps, p]  forward minus backward quotients of the matrix
-entries, column after column; starts : int64[columns]  first entry of each column; size : float64[p]  size of the row of
-each entry
+base : float64[m]  f(x); direction, change of x, for the states the small deviations `width` : float64[n], each the scale
+of the state, or its absolute value if that is greater; steps, factors on `direction`, largest first;
+sides : float64[steps, p]  forward minus backward quotients of the matrix entries, column after column;
+starts : int64[columns]  first entry of each column; size : float64[p]  size of the row of each entry
 """
 
 import time
@@ -331,14 +331,6 @@ def responses(at: OperatingPoint, y: np.ndarray, outputs: int) -> np.ndarray:
     return np.concatenate([dydt, values])
 
 
-def small_deviations(at: OperatingPoint) -> np.ndarray:
-    """Small deviation of each state for finite differences : float64[n].
-
-    It is the scale of the state or its absolute value, whichever is greater.
-    """
-    return np.maximum(at.model.scale, np.abs(at.y))
-
-
 def state_matrix(at: OperatingPoint) -> tuple[Any, np.ndarray, float, np.ndarray]:
     """(A, size of each of its rows : float64[n], error, steps), where steps are the factors on the small deviations.
 
@@ -348,11 +340,13 @@ def state_matrix(at: OperatingPoint) -> tuple[Any, np.ndarray, float, np.ndarray
     """
     from scipy.sparse import csc_array
 
-    model, n, width = at.model, at.model.y_size, small_deviations(at)
+    model, n, width = at.model, at.model.y_size, np.maximum(at.model.scale, np.abs(at.y))
     pattern = model.structure.pattern[:n].tocsc()
     pattern.sort_indices()
     rows, starts = pattern.indices, pattern.indptr[:-1]
     columns = np.repeat(np.arange(n), np.diff(pattern.indptr))
+    basins = tuple(f"{basin.name}." for basin in model.basins)
+    in_basins = np.array([name.startswith(basins) for name in model.state_names])
     for steps in (STEPS, FINER_STEPS):
         slopes, sides = matrix_entries(at, width, rows, columns, steps)
         size = np.bincount(rows, np.abs(slopes[len(steps) // 2]), n)
@@ -360,7 +354,8 @@ def state_matrix(at: OperatingPoint) -> tuple[Any, np.ndarray, float, np.ndarray
         row_size = np.where(size > 0.0, size, 1.0)[rows]
         values, errors = best_slopes(slopes, row_size, starts)
         coarse = np.bincount(rows, np.abs(slopes[0]), n)[rows]
-        hidden = hidden_kinks(sides, coarse, row_size, starts, steps) & ~basin_states(model)
+        hidden = hidden_kinks(sides, coarse, row_size, starts, steps)
+        hidden &= ~in_basins  # fluxes of water at rest have kinks of about 1e-4 of a row
         kink = side_differences(sides, row_size, starts) + hidden
         if max(np.max(errors), np.max(kink)) <= SLOPE_TOLERANCE:
             break
@@ -387,16 +382,6 @@ def matrix_entries(at: OperatingPoint, width, rows, columns, steps) -> tuple[np.
         sides.append(side)
     picked = (slice(None), structure.colors[columns], rows)
     return np.array(slopes).transpose(1, 0, 2)[picked], np.array(sides).transpose(1, 0, 2)[picked]
-
-
-def basin_states(model) -> np.ndarray:
-    """True for each state of a basin : bool[n].
-
-    Small kinks (see `hidden_kinks`) are accepted for these states, because upwind fluxes of water at rest have kinks of
-    about 1e-4 of a row.
-    """
-    names = tuple(f"{basin.name}." for basin in model.basins)
-    return np.array([name.startswith(names) for name in model.state_names]) if names else np.zeros(model.y_size, bool)
 
 
 def refuse_state(model, j: int, cause: str) -> None:
@@ -441,7 +426,7 @@ def output_matrix(at: OperatingPoint, outputs: int, steps: np.ndarray) -> tuple[
 
     Raises FvsolveError for an output without a derivative, and if C is too large or takes too long.
     """
-    n, width = at.model.y_size, small_deviations(at)
+    n, width = at.model.y_size, np.maximum(at.model.scale, np.abs(at.y))
     if outputs == 0:
         return np.zeros((0, n)), 0.0
     if n * outputs > MAX_ENTRIES:

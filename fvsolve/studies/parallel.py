@@ -70,14 +70,10 @@ class TaskPool:
             self.has_started = True
             yield number, self.work(tasks[number])
         if local < len(tasks):
-            self.workers = self.workers or self._open()
+            if self.workers is None:
+                local_pool = self.dask is None
+                self.workers = ProcessPool(self.work, self.jobs) if local_pool else Cluster(self.work, self.dask)
             yield from distribute(self.work, tasks, self.workers, local)
-
-    def _open(self) -> Any:
-        """`ProcessPool` of local processes, or `Cluster` of a Dask scheduler."""
-        if self.dask is None:
-            return ProcessPool(self.work, self.jobs)
-        return Cluster(self.work, self.dask)
 
     def __enter__(self) -> Self:
         return self

@@ -501,7 +501,10 @@ def greatest_error(places: Sequence[Sequence[Signal]], triple: Sequence[float], 
     bounds = [remainders(values, believed) * factor for values, factor in zip(rows, factors, strict=True)]
     error = error_of_maxima(np.vstack(rows), np.concatenate(bounds))
     (cuts, _), (middle, fine), most = maxima[k], places[k][-2:], float(np.max(np.abs(np.diff(own_maxima))))
-    moved = difference_at_peaks(middle, fine) if greatest_segment(cuts, middle) == greatest_segment(cuts, fine) else 0.0
+    moved = 0.0  # greatest difference of both signals at the times of their greatest values
+    if greatest_segment(cuts, middle) == greatest_segment(cuts, fine):
+        times = [signal[0][np.argmax(signal[1])] for signal in (middle, fine)]
+        moved = float(np.max(np.abs(np.interp(times, *fine) - np.interp(times, *middle))))
     mean = MEAN_FRACTION * float(np.mean(np.max(np.abs(np.diff(rows[k + 1], axis=1)), axis=1, initial=0.0)))
     ratio = convergence_ratio(places[k])
     error *= float(np.interp(ratio, CONVERGED, TRUSTED))
@@ -604,9 +607,3 @@ def convergence_ratio(signals: Sequence[Signal]) -> float:
     coarse, middle, fine = (np.interp(t, *signal) for signal in signals)
     before = float(np.mean(np.abs(middle - coarse)))
     return float(np.mean(np.abs(fine - middle))) / before if before > 0.0 else SLOW
-
-
-def difference_at_peaks(middle: Signal, fine: Signal) -> float:
-    """Greatest difference between two signals at two times, those of the greatest values of both signals."""
-    times = [signal[0][np.argmax(signal[1])] for signal in (middle, fine)]
-    return float(np.max(np.abs(np.interp(times, *fine) - np.interp(times, *middle))))

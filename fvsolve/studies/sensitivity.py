@@ -119,9 +119,10 @@ def sample_points(bounds: Mapping[str, tuple[float, float]], samples: int, seed:
     bounds : key -> (low, high); samples : base sample size of Sobol; seed : equal seeds give equal points
     Raises FvsolveError if SALib is not installed.
     """
-    _require_salib()
-    from SALib.sample import morris, sobol
-
+    try:
+        from SALib.sample import morris, sobol
+    except ImportError:
+        raise FvsolveError('sensitivity needs the package SALib: pip install "fvsolve[study]"') from None
     problem = salib_problem(bounds)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # warnings on sample sizes that are not powers of two
@@ -151,10 +152,3 @@ def analyse_values(bounds, sobol_points, sobol_values, morris_points, morris_val
 def salib_problem(bounds: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
     """Problem definition for SALib; bounds : key -> (low, high)."""
     return {"num_vars": len(bounds), "names": [*bounds], "bounds": [list(limits) for limits in bounds.values()]}
-
-
-def _require_salib() -> None:
-    try:
-        import SALib  # noqa: F401
-    except ImportError:
-        raise FvsolveError('sensitivity needs the package SALib: pip install "fvsolve[study]"') from None

@@ -299,25 +299,19 @@ def cost_grows(setting: MethodSetting) -> bool:
 
 
 def _target_setting(target: float, point: Point, case: Case) -> TargetSetting:
-    """`TargetSetting` of a point; a method that is read from a file is given by the path of the file."""
-    keys = point.setting.keys
-    if "numerics.method" in keys:
-        keys = keys | {"numerics.method": _method_in_file(keys["numerics.method"], case)}
-    numerics = {key.removeprefix("numerics."): value for key, value in keys.items() if key.startswith("numerics.")}
-    others = {key: value for key, value in keys.items() if not key.startswith("numerics.")}
-    return TargetSetting(target, point, numerics, others)
-
-
-def _method_in_file(method: str, case: Case) -> str:
-    """Value of the key `method` for a case file: a name, or the path of the file that contains the tableau.
+    """`TargetSetting` of a point. A method that is read from a file is given by the path of the file.
 
     The path is relative to the folder of the case if the file lies below this folder.
     """
+    keys, method = dict(point.setting.keys), point.setting.keys.get("numerics.method")
     path = Path(METHODS[method].source) if method in METHODS and method not in BUILT_IN else None
-    if path is None or not path.is_file():
-        return method
-    folder = None if case.path is None else case.path.resolve().parent
-    return path.relative_to(folder).as_posix() if folder and path.is_relative_to(folder) else str(path)
+    if path is not None and path.is_file():
+        folder = None if case.path is None else case.path.resolve().parent
+        below = folder is not None and path.is_relative_to(folder)
+        keys["numerics.method"] = path.relative_to(folder).as_posix() if below else str(path)
+    numerics = {key.removeprefix("numerics."): value for key, value in keys.items() if key.startswith("numerics.")}
+    others = {key: value for key, value in keys.items() if not key.startswith("numerics.")}
+    return TargetSetting(target, point, numerics, others)
 
 
 def _useless_text(case: Case, points: list[Point], floor: dict) -> str:

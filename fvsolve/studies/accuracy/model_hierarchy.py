@@ -58,18 +58,6 @@ def sloshing_basins(case) -> dict[str, Any]:
     return {name: node for name, node in basins.items() if node.on and node.physics_type.has_modes}
 
 
-def finer_levels(case, doublings: int) -> list[str]:
-    """Names of model levels finer than the case itself, each with twice the cells of the level before.
-
-    doublings : number of levels. The list is empty if the case has neither pipes nor tanks on bodies, or if a tank on a
-    body does not state its cells.
-    """
-    refinable = any(link.kind == "pipe" for link in case.links.values())
-    if basins := sloshing_basins(case):
-        refinable = all(basin.cells for basin in basins.values())
-    return [f"{2**k} times the cells" for k in range(1, doublings + 1)] if refinable else []
-
-
 def level_keys(case, level: str) -> dict[str, Any]:
     """Overrides that turn a case into the model level with this name. Raises NotApplicable if this is impossible."""
     if level in ("full line", "as it is"):
@@ -82,7 +70,10 @@ def level_keys(case, level: str) -> dict[str, Any]:
         keys = {f"links.{name}.cells": factor * pipe.cells for name, pipe in pipes.items()}
         return keys if step is None else keys | {"numerics.step": step / factor}
     if level == "delay lines":
-        return delay_line_keys_of(case, pipes)
+        for name, pipe in pipes.items():
+            if reason := reason_for_cells(case, name, pipe):
+                raise NotApplicable(f"{name} cannot be a delay line: {reason}")
+        return {f"links.{name}.pipe_model": "delay-line" for name in pipes}
     if level.endswith(("cell", "cells")):
         count, greatest = int(level.split()[0]), max(pipe.cells for pipe in pipes.values())
         return {f"links.{name}.cells": max(1, round(pipe.cells * count / greatest)) for name, pipe in pipes.items()}
@@ -120,14 +111,6 @@ def sloshing_keys(case, level: str) -> dict[str, Any]:
     keys |= {f"nodes.{name}.cells": [factor * entry if entry > MIN_REFINED_CELLS else entry for entry in basin.cells]
               for name, basin in basins.items()}  # fmt: skip
     return keys if step is None else keys | {"numerics.step": step / factor}
-
-
-def delay_line_keys_of(case, pipes: dict[str, Any]) -> dict[str, Any]:
-    """Overrides that make all pipes delay lines. Raises NotApplicable if a pipe cannot be a delay line."""
-    for name, pipe in pipes.items():
-        if reason := reason_for_cells(case, name, pipe):
-            raise NotApplicable(f"{name} cannot be a delay line: {reason}")
-    return {f"links.{name}.pipe_model": "delay-line" for name in pipes}
 
 
 def rigid_column(case, name: str) -> dict[str, Any]:
@@ -380,7 +363,8 @@ def ladder(
         reason = "no probe changes, so models have no errors"
         raise FvsolveError(f"{reason}. Try a probe that changes, or an input that does")
     cheapest = min(accurate, key=lambda level: level.seconds)
-    travel, change = travel_time(richest.model), change_time(richest.model)
+    change = change_time(richest.model)
+    travel = max((pipe.length / pipe.wave_speed for pipe in richest.model.pipes), default=0.0)
     of_law = {pair[1]: entry for entry, pair in zip(runs, models, strict=True) if pair[0] == models[at][0]}
     difference = law_difference(of_law.get("linear", own_run), own_run)
     strain = max((float(np.max(np.abs(p - p[0]))) for p in probe_pressures(richest)), default=0.0)
@@ -400,10 +384,13 @@ def refine_richest(
     The error of a level is d / (1 - r), with its difference d to the next level and the ratio r of successive
     differences (1/2 for the first). The next level only serves to compute this error and is left out. If the next level
     cannot be run, the error is r d / (1 - r), with the difference d to the level before, or None if no finer level was
-    run at all.
+    run at all. There are no finer levels without pipes and tanks on bodies, and if such a tank states no cells.
     """
     runs, differences, ratio = [("full line", own_run)], [], 0.5
-    for name in finer_levels(case, MAX_DOUBLINGS):
+    refinable = any(link.kind == "pipe" for link in case.links.values())
+    if tanks := sloshing_basins(case):
+        refinable = all(tank.cells for tank in tanks.values())
+    for name in [f"{2**k} times the cells" for k in range(1, MAX_DOUBLINGS + 1)] if refinable else []:
         report(name)
         if REFINED_COST * runs[-1][1].processor > LEVEL_CPU_LIMIT:
             break
@@ -506,11 +493,6 @@ def shallow_water_notes(case, target: float) -> Iterator[str]:
                     f"{mode.excess:.2g} % too fast in shallow-water theory")  # fmt: skip
             more = ", more than the target: modes are more accurate for small waves"
             yield text + more if mode.excess > share else text
-
-
-def travel_time(model) -> float:
-    """Greatest travel time of a wave along a pipe [s]; 0 without pipes."""
-    return max((pipe.length / pipe.wave_speed for pipe in model.pipes), default=0.0)
 
 
 def change_time(model) -> float:

@@ -80,7 +80,9 @@ def locate_roots(p: Polynomial) -> RootLocations:
     zero = next((k for k, x in enumerate(p.coefficients) if x != 0), 0)
     pairs = tuple(_pairs(p))
     axis = zero + 2 * sum(order for _, order in pairs)
-    more_left = _left_minus_right(p)
+    signed = [x if k % 4 < 2 else -x for k, x in enumerate(p.coefficients)]
+    u, v = (Polynomial(x if k % 2 == odd else 0 for k, x in enumerate(signed)) for odd in (0, 1))
+    more_left = -cauchy_index(v, u) if p.degree % 2 == 0 else cauchy_index(u, v)  # left roots minus right roots
     right = (p.degree - axis - more_left) // 2
     return RootLocations(right, axis, right + more_left, zero, pairs)
 
@@ -102,14 +104,6 @@ def axis_factor(p: Polynomial) -> Polynomial:
     """
     even, odd = even_odd_parts(p)
     return even.gcd(odd)
-
-
-def _left_minus_right(p: Polynomial) -> int:
-    """Number of roots of p with Re s < 0 minus number of roots with Re s > 0."""
-    signed = [x if k % 4 < 2 else -x for k, x in enumerate(p.coefficients)]
-    u = Polynomial(x if k % 2 == 0 else 0 for k, x in enumerate(signed))
-    v = Polynomial(x if k % 2 else 0 for k, x in enumerate(signed))
-    return -cauchy_index(v, u) if p.degree % 2 == 0 else cauchy_index(u, v)
 
 
 def cauchy_index(top: Polynomial, below: Polynomial) -> int:
@@ -340,9 +334,13 @@ def positive_real(numerator, denominator) -> Verdict:
     faults = _unstable_text(poles) + [pole.fault for pole in axis if pole.fault] + [_band_text(band) for band in bands]
     holds = not faults
     lossless = holds and even.degree < 0 and n.degree >= 0
+    # strictly: no pole on the axis, Re H(jw) > 0 at every w, and a slow decay of Re H to infinity: w^2 Re H must not
+    # tend to zero if H does, and otherwise Re H must not tend to zero
+    slow_decay = even.degree == (d.degree - 1 if n.degree < d.degree else d.degree)
+    strictly = holds and where.axis == 0 and not zeros and even.degree >= 0 and slow_decay
     reasons = faults or _proof_text(axis, zeros, lossless, n)
     return Verdict(
-        holds, holds and _strictly(n, d, where, even, zeros), lossless, (*reasons, *_hidden_text(hidden)), poles,
+        holds, strictly, lossless, (*reasons, *_hidden_text(hidden)), poles,
         tuple(axis), tuple(bands), tuple(zeros), hidden, n.coefficients[::-1] or (Fraction(0),), d.coefficients[::-1],
     )  # fmt: skip
 
@@ -473,17 +471,6 @@ def _zeros(even: Polynomial, below: Polynomial) -> list[float]:
         return []
     top = even // even.gcd(below)
     return [*([0.0] if top.coefficients[0] == 0 else []), *(x.frequency for x in positive_roots(top))]
-
-
-def _strictly(n: Polynomial, d: Polynomial, locations: RootLocations, even: Polynomial, zeros: list[float]) -> bool:
-    """True if a positive real H is strictly so: no pole on the axis, Re H(jw) > 0 at every w, and a slow decay of Re H.
-
-    At infinity w^2 Re H must not tend to zero if H does, and otherwise Re H must not tend to zero.
-    n, d : numerator and denominator of H; locations : locations of the roots of d; even : polynomial E of `_real_part`
-    zeros : frequencies with Re H(jw) = 0 [rad/s]
-    """
-    bounded_decay = even.degree == (d.degree - 1 if n.degree < d.degree else d.degree)
-    return locations.axis == 0 and not zeros and even.degree >= 0 and bounded_decay
 
 
 # words ----------------------------------------------------------------------------------------------------------

@@ -398,6 +398,7 @@ def response(
     more than 800 states.
     """
     from fvsolve.case import load
+    from fvsolve.model.energy_norm import energy_form
 
     case = load(case, dict(set or {}))
     if not any(node.domain == "hydraulic" for node in case.places.values()):
@@ -410,9 +411,16 @@ def response(
     a, b, c, d = system
     model = flows.at.model
     error = max(flows.error.values())
-    transfer = _transfer(flows.at, a, b, c, d, error)
+    form = energy_form(model, flows.at.y).full_norm()
+    transfer = Transfer(form.seen(a), form.forward @ b, c @ form.back, d, error)
     verdict = state_positive_real(transfer, max(TOLERANCE, 10.0 * error))
-    w = _frequency_table(verdict, transfer) if frequencies is None else np.asarray(frequencies, float)
+    w = np.asarray(frequencies, float) if frequencies is not None else None
+    if w is None:  # a logarithmic grid, |Im s| of the poles off the imaginary axis, and the worst frequency of each dip
+        low, high = verdict.low, verdict.high
+        grid = np.geomspace(low, high, int(POINTS_PER_DECADE * np.log10(high / low)) + 1)
+        poles = np.abs(transfer.poles.imag[~np.isin(transfer.poles, verdict.axis)])
+        poles = poles[(low < poles) & (poles < high)]
+        w = np.unique(np.concatenate([grid, poles, [dip.worst for dip in verdict.dips]]))
     driven = case.places[port].driven
     kind = "admittance" if driven is not None and driven[1] == 0.0 else "impedance"
     return Response(
@@ -471,28 +479,3 @@ def _dense(a) -> np.ndarray:
         raise FvsolveError(f"the case has {a.shape[0]} states. Expected {MAX_STATES} or fewer. Reduce the cells of its "
                            f"pipes to {percent} %: --set links.NAME.cells=...")  # fmt: skip
     return a if isinstance(a, np.ndarray) else a.toarray()
-
-
-def _transfer(at, a, b, c, d, error: float) -> Transfer:
-    """Transfer function of the state space A, b, c, d, with A, b, c converted to coordinates of the energy norm.
-
-    at : operating point; error : relative error of A, b, c, d
-    """
-    from fvsolve.model.energy_norm import energy_form
-
-    form = energy_form(at.model, at.y).full_norm()
-    return Transfer(form.seen(a), form.forward @ b, c @ form.back, d, error)
-
-
-def _frequency_table(verdict: StateVerdict, h: Transfer) -> np.ndarray:
-    """Frequencies of the response [rad/s] : float64[k], in increasing order.
-
-    They are a logarithmic grid, and two kinds of additional frequencies. These are |Im s| of each pole s off the
-    imaginary axis, if it is within the grid, and the frequency of the least Re H / |H| in each frequency band with Re H
-    < 0.
-    """
-    low, high = verdict.low, verdict.high
-    grid = np.geomspace(low, high, int(POINTS_PER_DECADE * np.log10(high / low)) + 1)
-    poles = np.abs(h.poles.imag[~np.isin(h.poles, verdict.axis)])
-    poles = poles[(low < poles) & (poles < high)]
-    return np.unique(np.concatenate([grid, poles, [dip.worst for dip in verdict.dips]]))

@@ -41,7 +41,9 @@ class RealRuns:
         self.prepare(at.model.y_size, steps, threshold)
         rng = np.random.default_rng(7)
         starts = [*([] if worst is None else [worst]), *rng.standard_normal((RANDOM_STARTS, form.size))]
-        deviations = [self.as_deviation(start) for start in starts]
+        deviations = [form.back @ start for start in starts]
+        # the greatest entry of each equals the small deviation of that state
+        deviations = [y / np.max(np.abs(y) / at.model.scale) for y in deviations]
         self.starts = [(y, small or self.linear_width(y, a)) for y in deviations]
         self.at_rest = not np.any(at.rate)
         self.structure = at.model.structure
@@ -52,14 +54,6 @@ class RealRuns:
         self.check_steps = checked_powers(steps)
         self.strides = np.diff([0, *self.check_steps]).astype(float)
         self.latest = time.monotonic() + TIME_LIMIT
-
-    def as_deviation(self, start: np.ndarray) -> np.ndarray:
-        """Deviation of all states from a deviation `start` in coordinates of the energy norm : float64[n].
-
-        It is scaled so that its greatest entry equals the small deviation of that state.
-        """
-        y = self.form.back @ start
-        return y / np.max(np.abs(y) / self.at.model.scale)
 
     def linear_width(self, y: np.ndarray, a) -> float:
         """Factor on the start deviation y for which growth remains linear up to the threshold and is above round-off.
