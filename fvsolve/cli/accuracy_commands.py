@@ -9,6 +9,7 @@ from fvsolve.cli import app as cli
 from fvsolve.cli.terminal import TextTable, present, progress_line
 from fvsolve.errors import FvsolveError
 from fvsolve.output.summary_file import plain
+from fvsolve.studies.accuracy.fit import NO_ERROR
 from fvsolve.studies.accuracy.order_study import NORMS, SHOWN_VARIABLES, study_title, variable_unit
 from fvsolve.studies.result_table import Column, ResultTable, columns
 
@@ -232,7 +233,8 @@ def order(
         files.append(folder / ("order.png" if len(studies) == 1 else f"order-{result.scheme}-{result.method}.png"))
         result.plot(files[-1])
     facts = {"studies": [result.plain() for result in studies], "files": [str(file) for file in files]}
-    present(as_json, facts | {"reused": points.reused}, order_text(studies, facts["files"]))
+    text = [line for result in studies for line in study_text(result)]
+    present(as_json, facts | {"reused": points.reused}, [*text, f"files: {', '.join(facts['files'])}"])
 
 
 def file_rows(studies) -> Iterator[dict]:
@@ -248,13 +250,6 @@ def file_rows(studies) -> Iterator[dict]:
                         "error": row.errors.get(variable, {}).get(norm), "pairwise": pairwise, "mark": mark,
                         "updates": row.cell_updates,
                     }  # fmt: skip
-
-
-def order_text(studies, files: list[str]) -> Iterator:
-    """Tables, fitted orders and notes of some studies, and the files."""
-    for result in studies:
-        yield from study_text(result)
-    yield f"files: {', '.join(files)}"
 
 
 def study_text(result) -> Iterator:
@@ -290,8 +285,6 @@ def rows_of(result, variable: str) -> ResultTable:
 
 def fit_text(fit) -> str:
     """Text of a fitted order with its spread; "none" without an order, "no error" if all errors are 0."""
-    from fvsolve.studies.accuracy.fit import NO_ERROR
-
     if fit.reason:
         return "no error" if fit.reason == NO_ERROR else "none"
     return f"{fit.order:.2f} ± {fit.spread:.2f}"
@@ -299,8 +292,6 @@ def fit_text(fit) -> str:
 
 def reason_lines(result):
     """Lines with reasons for missing orders and notes on orders, of the variables that are printed."""
-    from fvsolve.studies.accuracy.fit import NO_ERROR
-
     for name in result.variables[:SHOWN_VARIABLES]:
         notes: dict[str, list[str]] = {}
         for norm, fit in result.fits[name].items():

@@ -23,12 +23,6 @@ SHORT_DIGITS = 14  # digits printed of a longer entry
 MAX_COEFFICIENT = 40  # greatest length of a coefficient of R that is printed exactly, in characters
 
 
-def all_methods() -> tuple[dict, Iterator]:
-    """Table of all methods, explicit methods first : (values for JSON, text)."""
-    all_facts = {name: analyse(method) for name, method in METHODS.items()}
-    return {name: facts.plain() for name, facts in all_facts.items()}, _table_text(all_facts)
-
-
 def single_method(name: str, out: Path | None) -> tuple[dict, Iterator]:
     """Tableau, stability function R(s) and properties of a method : (values for JSON, text).
 
@@ -222,7 +216,12 @@ def _run(model, place: Path, force: bool, resume: bool, threads: int, painter, q
         with run_progress(model.case) as progress:
             result = solved(model, sink, progress, threads)
         if error:
-            _judge(result, model.case)
+            from fvsolve.output.summary_file import write_summary
+            from fvsolve.studies.peak_error import peak_errors
+
+            name = model.case.name
+            peak_errors(result, model.case, lambda text: print(f"{name} again: {text}", file=sys.stderr, flush=True))
+            write_summary(result.directory / "summary.json", result.summary)
         if not quiet:
             show(printing.result_text(result))
             sys.stdout.flush()
@@ -231,15 +230,6 @@ def _run(model, place: Path, force: bool, resume: bool, threads: int, painter, q
     if not quiet:
         show(printing.files_text(result))
     return result
-
-
-def _judge(result, case) -> None:
-    """Estimate the errors of the peaks of a run by more runs, and write them into its summary.json."""
-    from fvsolve.output.summary_file import write_summary
-    from fvsolve.studies.peak_error import peak_errors
-
-    peak_errors(result, case, lambda text: print(f"{case.name} again: {text}", file=sys.stderr, flush=True))
-    write_summary(result.directory / "summary.json", result.summary)
 
 
 @app.command()
@@ -300,10 +290,12 @@ def methods(
     as_json: Json = False,
 ) -> None:  # fmt: skip
     """List Runge-Kutta methods: order, stability, cost. With NAME show its tableau, R(s) and stability region."""
-
     if name is None and out is not None:
         raise FvsolveError("--out is valid for a single method only. Add the NAME of the method")
-    present(as_json, *(all_methods() if name is None else single_method(name, out)))
+    if name is not None:
+        return present(as_json, *single_method(name, out))
+    all_facts = {name: analyse(method) for name, method in METHODS.items()}
+    present(as_json, {name: facts.plain() for name, facts in all_facts.items()}, _table_text(all_facts))
 
 
 @app.command()

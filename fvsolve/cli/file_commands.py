@@ -162,15 +162,7 @@ def precompile(
         load(path)
     with progress_bar("compiling") as progress:
         result = warmed(paths, not cases, jobs, progress)
-    present(as_json, asdict(result), cache_text(result))
-
-
-def cache_text(result) -> Iterator:
-    """State of the cache of compiled code, as from `warm`."""
-    text = (
-        f"{result.compiled} functions compiled in {result.seconds:.0f} s"
-        if result.compiled
-        else "all functions were compiled already"
-    )
-    yield f"{text}; the cache holds {result.functions} functions, {result.bytes / 1e6:.1f} MB, for {result.target}"
-    yield f"{result.directory}"
+    done = f"{result.compiled} functions compiled in {result.seconds:.0f} s" if result.compiled else (
+        "all functions were compiled already")  # fmt: skip
+    cache = f"the cache holds {result.functions} functions, {result.bytes / 1e6:.1f} MB, for {result.target}"
+    present(as_json, asdict(result), [f"{done}; {cache}", f"{result.directory}"])

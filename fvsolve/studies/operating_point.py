@@ -3,8 +3,8 @@
 The matrices are found by finite differences that are checked.
 
 Arguments of several functions : at, operating point; outputs, number of outputs; f, function of a vector x;
-base : float64[m]  f(x); direction, change of x, for the states the small deviations `width` : float64[n], each the scale
-of the state, or its absolute value if that is greater; steps, factors on `direction`, largest first;
+base : float64[m]  f(x); direction, change of x, for the states the small deviations `width` : float64[n] (scale of a
+state, or its absolute value if that is greater); steps, factors on `direction`, largest first;
 sides : float64[steps, p]  forward minus backward quotients of the matrix entries, column after column;
 starts : int64[columns]  first entry of each column; size : float64[p]  size of the row of each entry
 """
