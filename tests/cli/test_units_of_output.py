@@ -9,15 +9,8 @@ from fvsolve.case import load
 from fvsolve.cli.linear_commands import output_unit
 from fvsolve.studies import response
 
-UNITS = {
-    "pressure": "bar",
-    "flow": "l/s",
-    "head": "mm",
-    "length": "km",
-    "energy": "kJ",
-    "time": "ms",
-    "velocity": "cm/s",
-}
+UNITS = {"pressure": "bar", "flow": "l/s", "head": "mm", "length": "km", "energy": "kJ", "time": "ms",
+         "velocity": "cm/s"}  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -2,20 +2,17 @@
 
 import json
 import math
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from model.test_delay_lines import short, vessel
-from reference.delays import main as delayed_main
-from reference.delays import turned
+from reference.delays import main, turned
 from reference.scenes import AMBIENT, GRAVITY, RHO, area, chamber, junction, pipe, reservoir, scene, tank, valve
 from scipy.optimize import brentq
 
 import fvsolve
 from fvsolve import build, load, studies
-from fvsolve.cli import main
 from fvsolve.errors import FvsolveError
 from fvsolve.model.energy_norm import energy_form
 from fvsolve.steppers import METHODS, method_named, stability_function
@@ -260,26 +257,20 @@ def test_what_cannot_be_answered_is_said():
         stability(chambers(2), methods=["rk44"])
 
 
-def test_the_command_prints_one_json_object_and_draws(tmp_path, monkeypatch, capsys):
+def test_the_command_prints_one_json_object_and_draws(tmp_path, monkeypatch, fvs):
     monkeypatch.chdir(tmp_path)
-    arguments = ["stability", "chamber-chain", "--method", "rk4", "--steps", "100", "--json"]
-    monkeypatch.setattr(sys, "argv", ["fvsolve", *arguments])
-    with pytest.raises(SystemExit) as left:
-        main()
-    assert not left.value.code
-    found = json.loads(capsys.readouterr().out)
+    code, out, _ = fvs("stability", "chamber-chain", "--method", "rk4", "--steps", "100", "--json")
+    assert code == 0
+    found = json.loads(out)
     (row,) = found["rows"]
     assert abs(row["difference"]) < 0.01 and row["eigenvalues"] < row["predicted"]
     folder = tmp_path / "runs" / "chamber-chain.stability"
     assert {path.name for path in folder.iterdir()} == {"points.jsonl", "stability.csv", "spectrum-rk4.png"}
 
 
-def test_without_a_case_the_command_answers_for_a_periodic_grid(monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["fvsolve", "stability", "--scheme", "upwind", "--method", "euler", "--json"])
-    with pytest.raises(SystemExit) as left:
-        main()
-    assert not left.value.code
-    assert json.loads(capsys.readouterr().out)["limits"][0]["limit"] == 1.0
+def test_without_a_case_the_command_answers_for_a_periodic_grid(fvs):
+    code, out, _ = fvs("stability", "--scheme", "upwind", "--method", "euler", "--json")
+    assert code == 0 and json.loads(out)["limits"][0]["limit"] == 1.0
 
 
 def carried(method="rk4", ends=("lake", "end"), **scalar):
@@ -350,7 +341,7 @@ def system(case: dict, method: str, h: float) -> DelayLineSystem:
 @pytest.mark.parametrize("scene", ["vessel", "short", "rough"])
 def test_a_step_of_the_linear_system_is_one_of_the_program(method, scene):
     """40 steps from given waves: with a chamber, with lines shorter than steps and a valve, and with friction."""
-    rough = delayed_main(friction={"model": "steady", "factor": 0.1}, numerics={"delay_tolerance": 0.02})
+    rough = main(friction={"model": "steady", "factor": 0.1}, numerics={"delay_tolerance": 0.02})
     case = {"vessel": vessel(method, 0.01, volume=0.15), "short": short("delay-line"), "rough": rough}[scene]
     one = system(case, method, 0.01)
     x, before = (part[..., :1] * 1e-6 for part in one.starts())  # a start that moves all states
@@ -386,10 +377,10 @@ def test_what_check_tells_to_grow_has_a_limit_below_the_step():
 
 
 def test_where_no_store_is_no_step_fails():
-    row = studies.stability(delayed_main(2.0), methods=["rk4"], steps=50).rows[0]
+    row = studies.stability(main(2.0), methods=["rk4"], steps=50).rows[0]
     assert np.isinf(row.predicted) and np.isinf(row.measured) and "slowest line" in row.notes[0]
     with pytest.raises(FvsolveError, match="stability of delay lines is computed about the start"):
-        studies.stability(delayed_main(2.0), at=1.0)
+        studies.stability(main(2.0), at=1.0)
 
 
 # ----------------------------------------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from reference import pulses, pump_trip
 from reference.bodies import bodies
 from reference.delays import fork, main, turned
 from reference.folders import CASES
-from reference.scenes import GRAVITY, RHO, scene
+from reference.scenes import GRAVITY, RHO, scene, tank
 from reference.trees import body
 from scipy.optimize import brentq
 
@@ -415,8 +415,8 @@ def test_a_map_names_the_probe_that_its_reference_does_not_know():
 
 def test_a_basin_too_large_to_be_predicted_is_measured_and_drawn_no_spectrum(tmp_path, fvs, monkeypatch):
     monkeypatch.setattr(import_module("fvsolve.studies.stability.stability"), "TIME_LIMIT", 0.0)
-    tank = {"type": "basin", "size": [1.0, 1.0], "cells": [20, 20], "level": 0.3, "start": {"level": "0.3 + 0.001 * x"}}
-    case = scene({"b": tank}, {}, 1.0, {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.5}, ["b.depth@0.1,0.1"])
+    pool = {"type": "basin", "size": [1.0, 1.0], "cells": [20, 20], "level": 0.3, "start": {"level": "0.3 + 0.001 * x"}}
+    case = scene({"b": pool}, {}, 1.0, {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.5}, ["b.depth@0.1,0.1"])
     (tmp_path / "pool.toml").write_text(write(case))
     code, said, error = fvs("stability", tmp_path / "pool.toml", "--steps", 20, "--out", tmp_path / "out")
     assert code == 0 and "give pipes or basins fewer cells" in said + error
@@ -427,44 +427,18 @@ def test_a_basin_too_large_to_be_predicted_is_measured_and_drawn_no_spectrum(tmp
 # Common features of studies: a path as case, progress without a terminal, and `--set` with `--method`.
 
 
-CASE = """
-schema = 1
-[fluid]
-name = "user"
-density = 1000.0
-bulk_modulus = 2.2e9
-viscosity = 1e-3
-vapor_pressure = 2300.0
-law = "linear"
-[nodes.a]
-type = "tank"
-area = 1.0
-level = 3.0
-[nodes.b]
-type = "tank"
-area = 1.0
-level = 2.0
-[links.hole]
-type = "orifice"
-from = "a"
-to = "b"
-diameter = 0.1
-loss_coefficient = 2.0
-[numerics]
-end = 20.0
-method = "euler"
-step = 0.1
-[output]
-every = 0.5
-probes = ["a.level"]
-"""
+def levels() -> dict:
+    """Case of two tanks that an orifice joins."""
+    nodes = {"a": tank(1.0, 3.0), "b": tank(1.0, 2.0)}
+    hole = {"type": "orifice", "from": "a", "to": "b", "diameter": 0.1, "loss_coefficient": 2.0}
+    return scene(nodes, {"hole": hole}, 20.0, {"method": "euler", "step": 0.1}, ["a.level"], 0.5)
 
 
 @pytest.fixture
 def path(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     file = tmp_path / "levels.toml"
-    file.write_text(CASE)
+    file.write_text(write(levels()))
     return file
 
 

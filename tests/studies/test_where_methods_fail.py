@@ -7,7 +7,6 @@ studies/test_where_methods_fail_in_pipes.py.
 import math
 import re
 import shlex
-import sys
 from importlib import import_module
 from pathlib import Path
 
@@ -21,7 +20,6 @@ from studies.test_where_methods_fail_in_pipes import LENGTH, SPEED, courant_limi
 
 import fvsolve
 from fvsolve.case import load
-from fvsolve.cli import main
 from fvsolve.cli.app import load_case
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers import analyse, method_named, seen_frequency, stability_function
@@ -380,7 +378,7 @@ def test_every_command_of_the_page_names_a_case_and_settings_that_it_takes(words
 @pytest.mark.parametrize(
     "words", [words for words in commands() if words[1] == "failure-map"], ids=lambda words: words[2]
 )
-def test_every_map_of_the_page_takes_its_options(words, monkeypatch, tmp_path, capsys):
+def test_every_map_of_the_page_takes_its_options(words, monkeypatch, tmp_path, fvs):
     asked = []
 
     def noted(case, *given, **more):
@@ -388,10 +386,8 @@ def test_every_map_of_the_page_takes_its_options(words, monkeypatch, tmp_path, c
         raise FvsolveError("far enough: nothing is run")
 
     monkeypatch.setattr(import_module("fvsolve.studies.failure_map"), "failure_map", noted)
-    monkeypatch.setattr(sys, "argv", [*words, "--out", str(tmp_path)])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code == 2 and "far enough" in capsys.readouterr().err and asked == [words[2]]
+    code, _, err = fvs(*words[1:], "--out", tmp_path)
+    assert code == 2 and "far enough" in err and asked == [words[2]]
 
 
 def test_the_table_of_courant_limits_is_what_is_computed():
