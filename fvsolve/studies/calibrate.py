@@ -60,10 +60,7 @@ class Residuals(RowMaker):
     """
 
     def __call__(self, values: Mapping[str, Any]) -> list[np.ndarray] | str:
-        """Run the case with values of keys; returns the differences of each series, or the reason of a failure.
-
-        The differences are as in the class : list of float64[times within the run].
-        """
+        """Run with values of keys; differences float64[times in the run] of each series, or the reason of a failure."""
         from fvsolve.run import run
 
         try:

@@ -43,10 +43,7 @@ class EnergyLoop(RunLoop):
         self.control["allow_fused"] = 0  # fused steps store no stages
 
     def run(self, budget: float) -> int:
-        """Run `RunLoop.run` one step at a time, and add the energy of each accepted step.
-
-        budget : greatest number of steps. Returns the status code of the loop.
-        """
+        """Take up to `budget` steps, and add the energy of each accepted step; returns the status code of the loop."""
         code, left, armed = super().run(0.0), budget, self.armed
         while code == loop_records.BUDGET_SPENT and left > 0.0 and not automatic.is_change_due(self.stepper):
             t, y, rules = self.t, self.now.copy(), armed.copy()
@@ -151,10 +148,7 @@ class EnergyLoop(RunLoop):
         return np.append(power, change[self.supplied].sum() - change[self.rates].sum())
 
     def rosenbrock_coefficients(self) -> tuple[np.ndarray, np.ndarray, float]:
-        """Further coefficients (C : float64[s, s], d : float64[s], gamma) of a Rosenbrock method with s stages.
-
-        They are as in `steppers/ros.py`.
-        """
+        """(C : float64[s, s], d : float64[s], gamma) of a Rosenbrock method with s stages, see `steppers/ros.py`."""
         s = self.stepper.k.shape[0]
         coefficients = self.stepper.coefficients[s * s + 3 * s :]
         return coefficients[: s * s].reshape(s, s), coefficients[s * s : s * s + s], float(coefficients[s * s + s])

@@ -170,10 +170,7 @@ def probe_ranges(reference: np.ndarray) -> np.ndarray:
 
 
 def measure_run(outcome, windows: Sequence[np.ndarray], reference) -> Measures:
-    """Measures of a run against a reference, whose rows are interpolated to the times of the run.
-
-    outcome : result of the run; windows : float64[steps, probes] each  values of the probes after successive steps
-    """
+    """Measures of a run against a reference, interpolated to its times; windows : float64[steps, probes] each."""
     if not outcome.ok:
         return Measures(outcome.reason, False, outcome.refused, steps=outcome.counts.get("steps", 0))
     t, rows, reference_rows = outcome.rows[:, 0], outcome.rows[:, 1:], reference.rows(reference.run)
@@ -396,10 +393,7 @@ class MapRuns:
         return self._references[at]
 
     def limit(self, scheme: str, method: str, k: int) -> float | None:
-        """Predicted greatest stable step [s] in column k: the lesser limit of eigenvalues and of waves in delay lines.
-
-        The result is None if one of these limits is not known.
-        """
+        """Greatest stable step [s] in column k, by eigenvalues and by waves in delay lines; None if one is unknown."""
         at = scheme, k if self.columns.keys(k) else 0
         if at not in self._spectra:
             keys = {**self.base, **self.columns.keys(k), "numerics.scheme": scheme}
@@ -449,10 +443,7 @@ class MapRuns:
         return Square(scheme, method, k, step, courant, word, run, errors[0] if errors else None, limit)
 
     def run_ahead(self, places: Sequence[tuple[str, str, int]], report: Progress) -> None:
-        """Make all runs in other processes: first with the steps of the columns, then the runs with shorter steps.
-
-        places : scheme, method and column of each square of the map; report : progress function of `failure_map`
-        """
+        """Make all runs in other processes, shorter steps last; places : (scheme, method, column) of each square."""
         while missing := self.missing_runs(places):
             missing.sort(key=lambda run: -run.trial.get("numerics.step", 0.0))  # the most expensive last
             requests = [RunRequest(run_recorded, run.keys) for run in missing]
@@ -503,10 +494,7 @@ class MissingRun(Exception):
 
 
 def _shorter_steps(case, trial: dict, ratio: int) -> dict:
-    """Key and value that shorten the steps of a run by the factor `ratio`; a tolerance is divided by ratio^2.
-
-    trial : keys and values of the run with the original step
-    """
+    """Key and value that shorten the steps of the run `trial` by `ratio`; a tolerance is divided by ratio^2."""
     factors = {"numerics.step": ratio, "numerics.courant": ratio, "numerics.rtol": ratio**2}
     own = {key: getattr(case.numerics, key.removeprefix("numerics.")) for key in factors}
     for values in (trial, own):

@@ -404,10 +404,7 @@ def refuse_state(model, j: int, cause: str) -> None:
 
 
 def check_directions(at: OperatingPoint, a, width: np.ndarray, size: np.ndarray, steps: np.ndarray) -> None:
-    """Check A along random directions of all states; raises FvsolveError if rates are not linear along them.
-
-    a : A; size : float64[n]  sizes of the rows of A
-    """
+    """Check A (size : sizes of its rows) along random directions; raises FvsolveError if rates are not linear there."""
     model, rng = at.model, np.random.default_rng(1)
     base = responses(at, at.y, 0)
     for _ in range(TRIAL_DIRECTIONS):
@@ -464,10 +461,7 @@ def too_large(n: int, outputs: int) -> FvsolveError:
 
 
 def visible_states(at: OperatingPoint, outputs: int, base: np.ndarray, width: np.ndarray) -> Iterator[int]:
-    """Yield the numbers of the states that change an output, found by bisection of the range of states.
-
-    base : float64[outputs]  outputs at the state
-    """
+    """Yield the numbers of the states that change an output, by bisection; base : float64[outputs]  their values."""
     rng, n = np.random.default_rng(2), width.size
     direction = rng.uniform(0.5, 1.0, n) * rng.choice([-1.0, 1.0], n) * width * STEPS[0]
     ranges = [(0, n)]

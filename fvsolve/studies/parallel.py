@@ -348,9 +348,6 @@ def version_numbers(reported: dict) -> dict[str, str]:
 
 
 def differing_versions(here: dict[str, str], there: dict[str, str]) -> list[str]:
-    """Texts on packages whose version there differs from that here, such as "numpy 2.1 (here 2.2)".
-
-    here, there : package -> version
-    """
+    """Texts on versions that differ, such as "numpy 2.1 (here 2.2)"; here, there : package -> version."""
     texts = {name: f"{name} {there.get(name)} (here {version})" for name, version in here.items()}
     return [text for name, text in texts.items() if there.get(name) != here[name]]

@@ -69,10 +69,7 @@ SMALL_DIFFERENCE = 0.1  # differences below this fraction of an error are not it
 
 
 def short_pipes(case: Any) -> dict[str, tuple[str, int]]:
-    """Pipes that a wave crosses faster than a cell of a neighbouring pipe.
-
-    Returns pipe -> (neighbouring pipe, number of cells that the neighbour needs).
-    """
+    """Pipes that a wave crosses faster than a neighbour's cell : pipe -> (neighbour, number of cells that it needs)."""
     pipes, short = pipes_with_cells(case), {}
     travel = {name: pipe.length / case.wave_speed(name) for name, pipe in pipes.items()}
     by_node: dict[str, list[str]] = {}
@@ -174,10 +171,7 @@ def stopped_runs_text(case: Any, runs: dict[float, Any]) -> str:
 
 
 def difference_text(triple: Sequence[float | None], error: float, unit: str, case: Any) -> str:
-    """Reason of a wide error, from the values of a peak at three resolutions, with a remedy.
-
-    triple : values from coarse to fine; error : error of the middle value; unit : unit of the values and the error
-    """
+    """Reason of a wide error of the middle of three values from coarse to fine, with a remedy; unit : of the values."""
     remedy = "more cells" if cell_counts(case) else "shorter steps"
     peaks = [peak for peak in triple if peak is not None]
     steps = np.diff(peaks)
@@ -316,10 +310,7 @@ def accepts_probes(case: Any, texts: list[str]) -> bool:
 
 
 def peak_rows(result: Result, runs: dict[float, Result], unresolved: Unresolved) -> dict[str, Any]:
-    """Entry `peaks` of a summary, as in `peak_errors`: unit, least and greatest value of each probe, with their errors.
-
-    result : result of the case
-    """
+    """Entry `peaks` of the summary of `result`, as in `peak_errors`: unit, extremes of each probe, and their errors."""
     summary, largest, rows = result.summary, {"rad": 1.0}, {}
     parts = {probe.text: (probe.part, probe.name) for probe in unresolved.case.probes}
     for extreme in summary["extremes"].values():
@@ -360,18 +351,12 @@ def error_bound(runs: dict[float, Result], triple: Sequence[float | None], place
 
 
 def usable(signals_of_place: Sequence) -> bool:
-    """True if there are at least two signals and all values are finite.
-
-    signals_of_place : signals (times, values) of one place at several resolutions
-    """
+    """True if a place has two or more signals (times, values) and all values are finite."""
     return len(signals_of_place) > 1 and all(len(v) > 0 and bool(np.isfinite(v).all()) for _, v in signals_of_place)
 
 
 def signals(runs: dict[float, Result], probe: str, rising: Callable[[np.ndarray], np.ndarray]) -> list:
-    """Signals (times [s], rising(values)) of a probe, from all finished runs that recorded it, coarsest first.
-
-    rising : function that converts the values so that the peak is a maximum
-    """
+    """Signals (times [s], rising(values)) of a probe in finished runs, coarse first; `rising` turns peaks to maxima."""
     finished = [runs[times] for times in sorted(runs) if runs[times].reason == "finished"]
     return [(run.seconds, rising(run[probe])) for run in finished if probe in run.units]
 
@@ -379,8 +364,7 @@ def signals(runs: dict[float, Result], probe: str, rising: Callable[[np.ndarray]
 def limit_row(runs: dict[float, Result], limit: int, k: int, row: dict[str, Any], unresolved: Unresolved) -> dict:
     """Row of a limit with its error. A limit that holds becomes open if the error is unknown or above the margin.
 
-    limit, k : indices of the limit and of the row in these
-    results; row : row of `run.verdicts.places`
+    limit, k : indices of the limit and of the row in these results; row : row of `run.verdicts.places`
     """
     sign, magnitude = SIGNS[row["bound"]], row["quantity"] in MAGNITUDES
     triple = values_of_runs(runs, lambda run: run.places[limit][k]["margin"], -1.0)
@@ -414,10 +398,7 @@ def expectation_error(runs: dict[float, Result], expect: Any, k: int, peak_rows:
 
 
 def values_of_runs(runs: dict[float, Result], of: Callable, sign: float = 1.0) -> tuple[float | None, ...]:
-    """Values at half, one and twice the resolution, times `sign`; None for a missing or unfinished run.
-
-    of : function of a result that returns the value, or None
-    """
+    """Values of(run) at half, one and twice the resolution, times `sign`; None for a missing or unfinished run."""
     results = [of(runs[times]) if times in runs and runs[times].reason == "finished" else None for times in LEVELS]
     return tuple(None if value is None else sign * value for value in results)
 
@@ -521,10 +502,7 @@ def three_values(maxima: np.ndarray) -> np.ndarray:
 
 
 def greatest_segment(cuts: np.ndarray, signal: Signal) -> int:
-    """Index of the local maximum at which a signal (times, values) is greatest.
-
-    cuts : times that separate the local maxima, as from `local_maxima`
-    """
+    """Index of the local maximum at which a signal is greatest; cuts : separating times, as from `local_maxima`."""
     return int(np.searchsorted(cuts, signal[0][np.argmax(signal[1])]))
 
 
@@ -560,8 +538,7 @@ def troughs(values: np.ndarray, rise: float) -> list[int]:
 def error_of_maxima(maxima: np.ndarray, off: np.ndarray) -> float:
     """Error bound of the greatest of several local maxima at the middle resolution.
 
-    maxima : float64[maxima, 3]  values at the three resolutions; off : float64[maxima]  bounds of the changes of the
-    middle values, as from `remainders`
+    maxima : float64[maxima, 3]; off : float64[maxima]  bounds of the changes of the middle values, from `remainders`
     """
     c, m, f = maxima.T
     sways, most = (m - c) * (f - m) < 0.0, float(np.max(m))
@@ -573,8 +550,7 @@ def error_of_maxima(maxima: np.ndarray, off: np.ndarray) -> float:
 def remainders(triples: np.ndarray, believed: bool = True) -> np.ndarray:
     """Bounds of the changes of the middle values by all finer resolutions : float64[values].
 
-    triples : float64[values, 3]  values at three resolutions; believed : False if no order of convergence may be
-    assumed
+    triples : float64[values, 3]  at three resolutions; believed : False if no order of convergence may be assumed
     """
     first, second = np.diff(triples, axis=1).T
     a, b, sways = np.abs(first), np.abs(second), first * second < 0.0
@@ -587,8 +563,7 @@ def remainders(triples: np.ndarray, believed: bool = True) -> np.ndarray:
 def remainder_by_ratio(ratio: float, values: np.ndarray) -> float:
     """Bound of the change of the middle value by all finer resolutions, without a safety factor.
 
-    values : float64[3] at three resolutions; ratio : ratio of successive differences, used if it is larger than that of
-    the values
+    values : float64[3]  at three resolutions; ratio : ratio of differences, used if larger than that of the values
     """
     a, b = np.abs(np.diff(values)).tolist()
     r = min(max(b / a if a > 0.0 else 0.0, ratio, QUICK), SLOW)
@@ -598,8 +573,7 @@ def remainder_by_ratio(ratio: float, values: np.ndarray) -> float:
 def convergence_ratio(signals: Sequence[Signal]) -> float:
     """Mean difference between the two finest of three signals, divided by that between the two coarsest.
 
-    The result is `SLOW` for only two signals, and if the two coarsest are equal.
-    signals : (times, values) at increasing resolutions
+    It is `SLOW` for two signals, and if the two coarsest are equal. signals : (times, values), coarsest first
     """
     if len(signals) < 3:
         return SLOW

@@ -177,10 +177,7 @@ class Heading:
         return cls(name, unit, quantity)
 
     def read(self, cell: str, place: str, faults: list[str]) -> Any:
-        """Value of a cell of the file, in the form of an override; faults of the cell are added to `faults`.
-
-        place : name of the cell in messages
-        """
+        """Value of a cell of the file as an override; faults, with the name `place` of the cell, go to `faults`."""
         value = number(cell)
         if not cell:
             faults.append(f"{place}: is empty. Expected a value in every row")

@@ -134,10 +134,7 @@ def case_path(case: Any, folder: Path, fault: AddFault) -> Path | None:
 
 
 def read_overrides(table: Any, group: str, fault) -> dict[str, dict[str, Any]]:
-    """Overrides of the events or protections in a table of the file : name -> {dotted key: value}; adds faults.
-
-    group : "events" or "protections"; fault : fault(keys, message) records a fault
-    """
+    """Overrides of a group, "events" or "protections" : name -> {dotted key: value}; adds faults by fault()."""
     if not isinstance(table, dict):
         fault((group,), f"{show(table)} is not a table. Expected named tables, [{group}.NAME]")
         return {}

@@ -169,10 +169,7 @@ class Sweep(Displayable):
         return self.columns[len(self.keys) + len(FIRST_COLUMNS) : -len(LAST_COLUMNS)]
 
     def outcome(self, name: str) -> str:
-        """Name of the column of the outcome `name`, which is given with or without its unit.
-
-        Raises FvsolveError for an unknown outcome.
-        """
+        """Column of the outcome `name`, given with or without its unit. Raises FvsolveError for an unknown outcome."""
         by_name = {column.partition(" [")[0]: column for column in self.outcomes}
         if name not in by_name and name not in by_name.values():
             hint = did_you_mean(name, by_name) or f". Outcomes are {listing(by_name) or 'none'}"

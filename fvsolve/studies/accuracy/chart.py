@@ -217,10 +217,7 @@ class _ChartStudy:
         return Point(setting, **values)
 
     def add_coarser(self, points: list[Point], target: float) -> list[Point]:
-        """Add coarser settings of each scheme and method until the coarsest fails, or its error exceeds the target.
-
-        Returns all points, old and new. points : settings with their results; target : trajectory error [-]
-        """
+        """Add coarser settings of each curve until the coarsest fails or exceeds the error `target`; returns all."""
         all_points = []
         for curve in curves_by_name(points).values():
             extended = list(curve)
@@ -234,10 +231,7 @@ class _ChartStudy:
         return all_points
 
     def compile(self, setting: MethodSetting) -> float:
-        """Wall time of a first run with a setting minus that of a second [s], mostly of compilation.
-
-        The result is 0 if the case cannot have the setting.
-        """
+        """Time of compilation for a setting [s]: a first run minus a second; 0 if the case cannot have the setting."""
         try:
             return compile_seconds(study_model(self.case, setting.keys))
         except CaseError:
@@ -315,10 +309,7 @@ def _target_setting(target: float, point: Point, case: Case) -> TargetSetting:
 
 
 def _useless_text(case: Case, points: list[Point], floor: dict) -> str:
-    """Message for the fault that all errors are below the difference between the two references.
-
-    floor : as from `_ChartStudy.floor`
-    """
+    """Message if all errors are below the difference of the two references; floor : as from `_ChartStudy.floor`."""
     least = min(good_errors(points), default=math.nan)
     errors = f"all errors (least {least:.2g})" if math.isfinite(least) else "any useful error, and no run succeeded"
     remedy = "a larger --rtol"

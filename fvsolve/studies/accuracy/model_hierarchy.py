@@ -429,10 +429,7 @@ def possible_laws(case) -> list[str]:
 
 
 def _run_level(case, name: str, law: str) -> Outcome:
-    """Outcome of a level with a density law; a level that does not suit the case gives an outcome with the reason.
-
-    name : name of the level as from `level_names`; law : density law
-    """
+    """Outcome of the level `name` with a density law, or of the reason if the level does not suit the case."""
     try:
         keys = {**level_keys(case, name), "fluid.law": law}
         return outcome(case, keys, best_of=BEST_OF, run=capped(LEVEL_CPU_LIMIT), budget=BRIEF_RUN)
@@ -444,10 +441,7 @@ def _run_level(case, name: str, law: str) -> Outcome:
 
 
 def _level_of(name: str, law: str, run: Outcome, richest: Outcome) -> ModelLevel:
-    """`ModelLevel` from the run of a level, with errors against the run `richest` of the reference level.
-
-    name : name of the level; law : density law
-    """
+    """`ModelLevel` from the run of the level `name` with a density law; errors are against the run `richest`."""
     if not run.ok:
         return ModelLevel(name, law, run.reason)
     gaps = moving_probes(run, reference_of_run(richest))
@@ -463,10 +457,7 @@ def _rms_error(gap: Deviation) -> float:
 
 
 def law_difference(linear: Outcome, richest: Outcome) -> LawDifference | None:
-    """Difference between a run with the linear density law and a run `richest` with the most complete law.
-
-    None if both are the same run, or if the linear run failed.
-    """
+    """Difference of a run with the linear law from `richest`; None if both are the same, or the linear run failed."""
     if linear is richest or not linear.ok:
         return None
     gaps = moving_probes(linear, reference_of_run(richest))

@@ -196,10 +196,7 @@ class UserFunction:
         return first, second
 
     def fault_for(self, pipe: str, problem: str) -> FvsolveError:
-        """Return an FvsolveError on a problem of the function on a pipe.
-
-        The error is also stored, because compiled steps that call the function cannot pass it on.
-        """
+        """FvsolveError on a problem on a pipe; it is also stored, because compiled steps cannot pass it on."""
         arguments = "pipe, x" if self.name == "initial" else "pipe, x, t"
         self.fault = FvsolveError(f'{self.name}({arguments}) on "{pipe}" {problem}')
         return self.fault

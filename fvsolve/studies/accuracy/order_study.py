@@ -119,10 +119,7 @@ CELLS = "cell size [m]"  # measure that is printed in the units of the case; ste
 
 
 def order_picture(study):
-    """matplotlib Figure of errors against cell size or step: a panel for each variable, a line for each norm.
-
-    study : an `Order`; at most twice `SHOWN_VARIABLES` of its variables are drawn
-    """
+    """matplotlib Figure of an `Order`: errors over size, a panel for each first variable, a line for each norm."""
     from fvsolve.draw.accuracy_pictures import order_figure
 
     length_factor, length = study.shown.get("length", (1.0, "m")) if study.plan.measure == CELLS else (1.0, "")
@@ -254,10 +251,7 @@ class OrderStudy:
                 "levels": [level.set for level in self.plan.levels]}  # fmt: skip
 
     def reference_data(self, progress: Progress, total: int) -> dict:
-        """Kind, description and error of the reference, and greatest absolute values of all variables, as plain data.
-
-        total : total number of runs, for `progress`
-        """
+        """Plain data: kind, words and error of the reference, greatest values of variables; total : for `progress`."""
         progress(0, total, "reference")
         reference = self.reference
         return {"kind": reference.kind, "words": reference.words, "own": reference.own_error, "sizes": self.sizes()}
@@ -292,10 +286,7 @@ class OrderStudy:
         return self.queue(self.case, self.request(level))
 
     def sizes(self) -> dict[str, float]:
-        """Greatest absolute value of each variable in the coarsest row that runs [SI], the scale of rounding errors.
-
-        Raises FvsolveError if no row runs.
-        """
+        """Greatest value of each variable in the coarsest row that runs [SI]; raises FvsolveError if no row runs."""
         for level in self.plan.levels:
             run = self.run(level)
             if run.ok:
@@ -386,10 +377,7 @@ class OrderStudy:
         return {"L1": (s + 1) * p / (p + 1), "L2": (s + 0.5) * p / (p + 1), "max": s * p / (p + 1)}
 
     def order_notes(self, exact: bool) -> list[str]:
-        """Notes on the expected order if jumps or kinks travel through cells, or if there are delay lines.
-
-        exact : True if all errors of delay lines are rounding errors
-        """
+        """Notes on the expected order with jumps, kinks or delay lines; exact : True if their errors are rounding."""
         breaks = self.breaks
         if delay_lines(self.case):
             return [EXACT_NOTE if exact else EXPECTED_ORDER]
@@ -406,10 +394,7 @@ class OrderStudy:
         ]
 
     def step_error_note(self, fits) -> list[str]:
-        """Remark with a smaller step, tolerance or Courant number, if the time error may hide the order in space.
-
-        The result is a list with one text, or empty.
-        """
+        """List with a remark on a smaller step or tolerance if the time error may hide the order in space, or []."""
         with_errors = [norms["L1"] for norms in fits.values() if norms["L1"].reason != NO_ERROR]
         hidden = any(FLOOR in fitted.marks or fitted.reason for fitted in with_errors)
         if self.plan.way != "space" or not hidden or len(self.plan.levels) < LEAST_ROWS:
@@ -481,11 +466,7 @@ def mark_finest(fitted: Fit, rows) -> Fit:
 
 
 def is_certain(fitted: Fit, ratio: float) -> bool:
-    """True if the fitted order p is certain enough to extrapolate errors.
-
-    The factor 1 / (1 - ratio^-p) of an extrapolation must have a relative error of at most a quarter; ratio : size of a
-    row over that of the next.
-    """
+    """True if 1 / (1 - ratio^-p), with the fitted order p and the ratio of sizes of rows, is certain to a quarter."""
     return fitted.order > 0.0 and np.log(ratio) * fitted.spread <= EXTRAPOLATION_ERROR * (ratio**fitted.order - 1.0)
 
 
@@ -509,11 +490,7 @@ def extrapolate(rows, fits) -> tuple[OrderRow, ...]:
 
 
 def difference_notes(rows, fits) -> list[str]:
-    """List with one note, or empty: variables and norms for which the table shows differences instead of errors.
-
-    The differences are those to the next row. The order of these variables and norms is not certain (see `is_certain`).
-    At most three variables are named.
-    """
+    """List with a note on variables whose order is uncertain (see `is_certain`), at most three, or an empty list."""
     ratio = rows[0].level.size / rows[1].level.size
     names = [f"{name} ({', '.join(uncertain)})" for name, norms in fits.items()
              if (uncertain := [norm for norm, fitted in norms.items() if not is_certain(fitted, ratio)])]  # fmt: skip

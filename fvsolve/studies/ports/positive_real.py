@@ -98,10 +98,7 @@ def _pairs(p: Polynomial):
 
 
 def axis_factor(p: Polynomial) -> Polynomial:
-    """Polynomial c(x) whose positive roots x are the squares w^2 of the roots s = jw of p on the imaginary axis.
-
-    It is the greatest common divisor of the even and odd part of p(jw).
-    """
+    """Common divisor of both parts of p(jw); its roots x > 0 are the squares w^2 of the roots s = jw of p."""
     even, odd = even_odd_parts(p)
     return even.gcd(odd)
 
@@ -412,10 +409,7 @@ def _real_part(n: Polynomial, d: Polynomial) -> tuple[Polynomial, Polynomial]:
 
 
 def _bands(even: Polynomial, below: Polynomial) -> list[Band]:
-    """Bands of frequencies with Re H = E / P < 0, between the roots x = w^2 > 0 at which E changes sign.
-
-    even, below : polynomials E and P from `_real_part`
-    """
+    """Bands with Re H = E / P < 0 (see `_real_part`), between the roots x = w^2 > 0 at which E changes sign."""
     if even.degree < 0:
         return []
     edges = positive_roots(odd_part(even)) if even.degree > 0 else []

@@ -278,10 +278,7 @@ def _dips(h, shift, w, angle, tolerance) -> list[Dip]:
 
 
 def _edge(h, shift, good: float, bad: float) -> float:
-    """Frequency [rad/s] at which Re H changes sign on the line Re s = shift, by bisection.
-
-    h : transfer function H; good, bad : frequencies with Re H >= 0 and with Re H < 0
-    """
+    """Frequency [rad/s] of the sign change of Re H on Re s = shift, bisected between `good` (Re H >= 0) and `bad`."""
     for _ in range(60):
         middle = 0.5 * (good + bad)
         if middle in (good, bad):
@@ -431,10 +428,7 @@ def response(
 
 
 def _linear_system(case, port: str, at, before, scheme):
-    """((A, b, c, d), `Linear` system from which they are made), with the input and the output at a port.
-
-    port, at, before, scheme : as in `response`
-    """
+    """((A, b, c, d), `Linear` system from which they are made) for a port; arguments as for `response`."""
     from fvsolve.studies.linearise import linearise
 
     driven = case.places[port].driven

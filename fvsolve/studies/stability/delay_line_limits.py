@@ -138,10 +138,7 @@ class DelayLineSystem:
         return factor * (backward - self.now * forward), factor * (forward - self.now * backward)
 
     def node_arrivals(self, waves: tuple) -> np.ndarray:
-        """Waves that arrive at nodes, at the ends `from` and `to` of each line in turn : float64[2 lines, m].
-
-        m : number of deviations; waves : result of `arrivals`
-        """
+        """Waves (see `arrivals`) that arrive at the ends `from` and `to` of each line : float64[2 lines, m]."""
         backward, forward = waves
         return np.stack([backward[self.first], forward[self.last]], axis=1).reshape(2 * self.first.size, -1)
 
@@ -236,10 +233,7 @@ class DelayLineSystem:
 
 
 def reflected_share(pipe, tau: float) -> float:
-    """Fraction of a wave that friction in the middle of a stretch of a delay line reflects, at the initial flow.
-
-    tau : travel time of the stretch [s]
-    """
+    """Fraction of a wave that friction in a stretch of a line, of travel time tau [s], reflects at the initial flow."""
     flow, width = float(pipe["flow"]), DERIVATIVE_STEP * float(pipe["admittance"]) * BAR_PRESSURE
     slope = (drag_and_slope(pipe, flow + width)[0] - drag_and_slope(pipe, flow - width)[0]) / (2.0 * width)
     k = 0.5 * tau * float(slope)
@@ -356,10 +350,7 @@ def write_history(past: np.ndarray, delays: np.ndarray, t: float, h: float, hist
 
 
 def read_history(past: np.ndarray, system: DelayLineSystem) -> np.ndarray:
-    """Past waves of all stretches of delay lines, without the last entry : float64[history_steps, 2, stretches].
-
-    past : wave history of a run
-    """
+    """Past waves of all stretches in a wave history, without the last entry : float64[history_steps, 2, stretches]."""
     values = np.zeros((system.history_steps, 2, system.delays.size))
     numbers = int(past[at.COUNT]) - 1 - system.history_steps + np.arange(system.history_steps)
     for where, s, wave in ring_offsets(at.offsets_of(past), system.model.tables.delays, numbers):

@@ -198,10 +198,7 @@ class DenseGrowth:
         self.size = float(np.linalg.norm(e, 2))
 
     def fails(self, h: float, few: bool = False) -> bool:
-        """True if the norm of a power of the matrix of a step of h [s] exceeds the threshold within `steps` powers.
-
-        few : True to check only powers of two and the last power
-        """
+        """True if a power of the step matrix exceeds the threshold; few : only powers of two and the last power."""
         m = self.matrix(h)
         with np.errstate(over="ignore", invalid="ignore"):
             return any(norm_exceeds(power, self.threshold) for _, power in matrix_powers(m, self.steps, few))

@@ -281,20 +281,14 @@ def start_fields(cells: int) -> dict[str, np.ndarray]:
 
 
 def measured_courant(scheme: str, limiter: str | None, method: str, start: np.ndarray, steps: int) -> float | None:
-    """Least Courant number found at which the L2 norm of a real run grows 1000 times within `steps` steps.
-
-    start : initial cell values. The result is None if no Courant number up to 20 is found to fail.
-    """
+    """Least Courant number up to 20 at which the norm of a run from `start` is found to grow 1000 times, or None."""
     circle = PeriodicPipe(scheme, method, start.size, limiter or "minmod")
     smallest = monotone_limit(limiter or scheme, method) or SMALLEST
     return first_failure(lambda courant: _growth(circle, start, courant, steps), LIMITED_TOLERANCE, smallest, RATIO)
 
 
 def _growth(circle: PeriodicPipe, start: np.ndarray, courant: float, steps: int) -> float:
-    """log10 of the growth in a run, the greatest norm over the norm at the start.
-
-    The result is inf for a growth above 1000, and if values are not finite.
-    """
+    """log10 of the growth of the norm in a run; inf above a growth of 1000, and if values are not finite."""
     u, greatest, done = start, 0.0, 0
     for k in range(1, NORM_CHECKS + 1):
         count, done = steps * k // NORM_CHECKS - done, steps * k // NORM_CHECKS

@@ -243,10 +243,7 @@ def measure_limit(
 
 
 def fixed_step_loop(model, structure: Callable, method: str, h: float, t: float) -> RunLoop:
-    """Run loop of a model with a method and fixed steps of h [s], at the time t [s].
-
-    structure : function that returns the `Structure` of the model
-    """
+    """Run loop with fixed steps of h [s] from the time t [s]; structure : function that returns the `Structure`."""
     changes = {"method": method, "step": h, "courant": None, "rtol": None}
     numerics = model.case.numerics.model_copy(update=changes)
     loop = RunLoop(replace(model, case=replace(model.case, numerics=numerics)), structure)
