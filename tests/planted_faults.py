@@ -95,12 +95,12 @@ FAULTS = [
         "v[position - 1] + 2.0 * v[position] + v[position + 1]",
     ),
     Fault(
-        "studies/energy/step_energy.py",
+        "studies/energy_balance.py",
         "change[self.supplied].sum() - change[self.rates].sum()",
         "change[self.supplied].sum() + change[self.rates].sum()",
     ),
     Fault(
-        "studies/failure/run_verdict.py",
+        "studies/failure_map.py",
         "turns = change[1:] * change[:-1] < 0.0",
         "turns = change[1:] * change[:-1] > 0.0",
     ),
@@ -111,7 +111,7 @@ FAULTS = [
     ),
     Fault("studies/stability/growth.py", "scaled @ result + x * v", "scaled @ result - x * v"),
     Fault(
-        "studies/linear/linearise.py",
+        "studies/linearise.py",
         "float(value / input_.scale)",
         "float(value * input_.scale)",
     ),

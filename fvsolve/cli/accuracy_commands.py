@@ -6,11 +6,11 @@ from typing import Annotated
 from typer import Option
 
 from fvsolve.cli import app as cli
-from fvsolve.cli.progress import progress_line
-from fvsolve.cli.terminal import TextTable, present
+from fvsolve.cli.terminal import TextTable, present, progress_line
 from fvsolve.errors import FvsolveError
 from fvsolve.output.summary_file import plain
-from fvsolve.studies.accuracy.order_picture import NORMS, SHOWN_VARIABLES, study_title, variable_unit
+from fvsolve.studies.accuracy.fit import NO_ERROR
+from fvsolve.studies.accuracy.order_study import NORMS, SHOWN_VARIABLES, study_title, variable_unit
 from fvsolve.studies.result_table import Column, ResultTable, columns
 
 ORDER_FILE = columns(
@@ -23,53 +23,25 @@ ORDER_FILE = columns(
 @cli.app.command()
 def chart(
     case: cli.SingleCase,
-    scheme: Annotated[
-        str | None, Option(metavar="LIST", help="schemes to compare (default upwind,muscl,upwind5,weno5)")
-    ] = None,
-    method: Annotated[
-        str | None, Option(metavar="LIST", help="methods to compare (default a selection that suits the case)")
-    ] = None,
-    cells: Annotated[
-        str | None,
-        Option(
-            metavar="LIST",
-            help="numbers of cells to compare, for example 50,100,200, of the pipe with the longest travel time or of "
-            "the basin side with most cells (default up to five numbers that suit the case)",
-        ),
-    ] = None,
-    rtol: Annotated[
-        str | None,
-        Option(
-            metavar="LIST",
-            help="relative tolerances to compare, for example 1e-3,1e-6, for a case without pipes and basins "
-            "(default 1e-2 to 1e-10)",
-        ),
-    ] = None,
-    step: Annotated[
-        str | None,
-        Option(
-            metavar="LIST",
-            help="fixed time steps [s] to compare, for example 1e-3,1e-4, for a case without cells "
-            "(default seven or eight steps)",
-        ),
-    ] = None,
-    target: Annotated[
-        float | None,
-        Option(
-            metavar="ERROR",
-            help="greatest accepted error of a probe, as a fraction of its range, for which the cheapest settings or "
-            "model are printed (default none, or 0.01 with --models)",
-        ),
-    ] = None,
-    models: Annotated[
-        bool, Option("--models", help="compare models, from lumped volumes to cells, instead of methods")
-    ] = False,
-    jobs: cli.Jobs = 1,
-    dask: cli.Dask = None,
-    set: cli.Set = [],  # noqa: B006
-    out: cli.Out = None,
-    as_json: cli.Json = False,
-) -> None:
+    scheme: Annotated[str | None, Option(metavar="LIST", help="schemes to compare (default "
+        "upwind,muscl,upwind5,weno5)")] = None,
+    method: Annotated[str | None, Option(metavar="LIST", help="methods to compare (default a selection that suits "
+        "the case)")] = None,
+    cells: Annotated[str | None, Option(metavar="LIST", help="numbers of cells to compare, for example 50,100,200, "
+        "of the pipe with the longest travel time or of the basin side with most cells (default up to five numbers "
+        "that suit the case)")] = None,
+    rtol: Annotated[str | None, Option(metavar="LIST", help="relative tolerances to compare, for example 1e-3,1e-6, "
+        "for a case without pipes and basins (default 1e-2 to 1e-10)")] = None,
+    step: Annotated[str | None, Option(metavar="LIST", help="fixed time steps [s] to compare, for example 1e-3,1e-4, "
+        "for a case without cells (default seven or eight steps)")] = None,
+    target: Annotated[float | None, Option(metavar="ERROR", help="greatest accepted error of a probe, as a fraction "
+        "of its range, for which the cheapest settings or model are printed (default none, or 0.01 with "
+        "--models)")] = None,
+    models: Annotated[bool, Option("--models", help="compare models, from lumped volumes to cells, instead of "
+        "methods")] = False,
+    jobs: cli.Jobs = 1, dask: cli.Dask = None, set: cli.Set = [],  # noqa: B006
+    out: cli.Out = None, as_json: cli.Json = False,
+) -> None:  # fmt: skip
     """Chart error against CPU time and work for schemes, methods and resolutions; list the cheapest for each error."""
     from fvsolve.studies.accuracy.chart import chart as study
     from fvsolve.studies.accuracy.work_precision import write_chart
@@ -228,47 +200,21 @@ ORDER_COLUMNS = (
 
 @cli.app.command()
 def order(
-    case: cli.SingleCase,
-    overrides: cli.Set = [],  # noqa: B006
-    refine: Annotated[
-        str | None,
-        Option(
-            help="resolution to refine: both (cells and time steps), space or time "
-            "(default both, or time for a case without pipes and basins)"
-        ),
-    ] = None,
-    key: Annotated[
-        str | None,
-        Option(
-            metavar="KEY",
-            help="single key to refine, for example links.main.cells or numerics.step (default all keys that --refine "
-            "selects)",
-        ),
-    ] = None,
-    levels: Annotated[
-        int | None, Option(help="number of refinement levels, 2 or more (default 4, or 6 if only time is refined)")
-    ] = None,
-    cells: Annotated[
-        int | None,
-        Option(
-            help="number of cells, at the coarsest level, of the pipe or basin side with most cells, or of the part of "
-            "--key (default as in the case, or fewer to shorten the study)"
-        ),
-    ] = None,
+    case: cli.SingleCase, overrides: cli.Set = [],  # noqa: B006
+    refine: Annotated[str | None, Option(help="resolution to refine: both (cells and time steps), space or time "
+        "(default both, or time for a case without pipes and basins)")] = None,
+    key: Annotated[str | None, Option(metavar="KEY", help="single key to refine, for example links.main.cells or "
+        "numerics.step (default all keys that --refine selects)")] = None,
+    levels: Annotated[int | None, Option(help="number of refinement levels, 2 or more (default 4, or 6 if only time "
+        "is refined)")] = None,
+    cells: Annotated[int | None, Option(help="number of cells, at the coarsest level, of the pipe or basin side with "
+        "most cells, or of the part of --key (default as in the case, or fewer to shorten the study)")] = None,
     scheme: Annotated[str | None, Option(metavar="A,B", help="schemes to study (default scheme of the case)")] = None,
     method: Annotated[str | None, Option(metavar="A,B", help="methods to study (default method of the case)")] = None,
-    reference: Annotated[
-        str,
-        Option(
-            help="reference solution: exact (named in the case), finer (a run at a finer level), richardson (the next "
-            "level) or auto (the first of these that suits the case)"
-        ),
-    ] = "auto",
-    jobs: cli.Jobs = 1,
-    dask: cli.Dask = None,
-    out: cli.Out = None,
-    as_json: cli.Json = False,
-) -> None:
+    reference: Annotated[str, Option(help="reference solution: exact (named in the case), finer (a run at a finer "
+        "level), richardson (the next level) or auto (the first of these that suits the case)")] = "auto",
+    jobs: cli.Jobs = 1, dask: cli.Dask = None, out: cli.Out = None, as_json: cli.Json = False,
+) -> None:  # fmt: skip
     """Measure the order of convergence of a case under refinement: a table, order.csv and order.png."""
     from fvsolve.studies.accuracy.order import order as study
     from fvsolve.studies.result_cache import ResultCache
@@ -287,7 +233,8 @@ def order(
         files.append(folder / ("order.png" if len(studies) == 1 else f"order-{result.scheme}-{result.method}.png"))
         result.plot(files[-1])
     facts = {"studies": [result.plain() for result in studies], "files": [str(file) for file in files]}
-    present(as_json, facts | {"reused": points.reused}, order_text(studies, facts["files"]))
+    text = [line for result in studies for line in study_text(result)]
+    present(as_json, facts | {"reused": points.reused}, [*text, f"files: {', '.join(facts['files'])}"])
 
 
 def file_rows(studies) -> Iterator[dict]:
@@ -303,13 +250,6 @@ def file_rows(studies) -> Iterator[dict]:
                         "error": row.errors.get(variable, {}).get(norm), "pairwise": pairwise, "mark": mark,
                         "updates": row.cell_updates,
                     }  # fmt: skip
-
-
-def order_text(studies, files: list[str]) -> Iterator:
-    """Tables, fitted orders and notes of some studies, and the files."""
-    for result in studies:
-        yield from study_text(result)
-    yield f"files: {', '.join(files)}"
 
 
 def study_text(result) -> Iterator:
@@ -345,8 +285,6 @@ def rows_of(result, variable: str) -> ResultTable:
 
 def fit_text(fit) -> str:
     """Text of a fitted order with its spread; "none" without an order, "no error" if all errors are 0."""
-    from fvsolve.studies.accuracy.fit import NO_ERROR
-
     if fit.reason:
         return "no error" if fit.reason == NO_ERROR else "none"
     return f"{fit.order:.2f} ± {fit.spread:.2f}"
@@ -354,8 +292,6 @@ def fit_text(fit) -> str:
 
 def reason_lines(result):
     """Lines with reasons for missing orders and notes on orders, of the variables that are printed."""
-    from fvsolve.studies.accuracy.fit import NO_ERROR
-
     for name in result.variables[:SHOWN_VARIABLES]:
         notes: dict[str, list[str]] = {}
         for norm, fit in result.fits[name].items():

@@ -70,10 +70,9 @@ def _version(requested: bool) -> None:
 
 @app.callback()
 def all_commands(
-    version: Annotated[
-        bool, Option("--version", callback=_version, is_eager=True, help="print the version and exit")
-    ] = False,
-) -> None:
+    version: Annotated[bool, Option("--version", callback=_version, is_eager=True, help="print the version and "
+        "exit")] = False,
+) -> None:  # fmt: skip
     """Hydraulic transients by finite volumes: a TOML file in; pressures, flows and fields out."""
 
 

@@ -7,39 +7,28 @@ from typing import Annotated
 from typer import Argument, Option
 
 from fvsolve.cli.app import Dask, Jobs, Json, Set, SingleCase, app, load_case
-from fvsolve.cli.progress import progress_line
 from fvsolve.cli.sweep import RANGE_FORMAT, key_and_values
-from fvsolve.cli.terminal import TextTable, present
+from fvsolve.cli.terminal import TextTable, present, progress_line
 from fvsolve.errors import CaseError, FvsolveError, collect_faults
 
 
 @app.command()
 def size(
     case: SingleCase,
-    vary: Annotated[
-        str, Option("--vary", metavar="KEY=LOW,HIGH", help="key to size and its range, in SI or with units")
-    ],
-    goal: Annotated[
-        str,
-        Option(metavar="minimum|maximum", help="value to find: the minimum or the maximum that satisfies all limits"),
-    ] = "minimum",
-    dependent: Annotated[
-        list[str],
-        Option(
-            metavar='"KEY = formula"',
-            help="other key to set by a formula of x, the value of the sized key in SI, for example "
-            '"nodes.vessel.gas_volume = 0.4 * x"; repeat the option for more keys',
-        ),
-    ] = [],  # noqa: B006
-    rtol: Annotated[
-        float, Option(help="relative tolerance: greatest distance of the value found from a value that fails")
-    ] = 0.01,
-    error: Annotated[
-        bool, Option("--error", help="require that margins exceed their numerical errors, estimated from further runs")
-    ] = False,
+    vary: Annotated[str, Option("--vary", metavar="KEY=LOW,HIGH", help="key to size and its range, in SI or with "
+        "units")],
+    goal: Annotated[str, Option(metavar="minimum|maximum", help="value to find: the minimum or the maximum that "
+        "satisfies all limits")] = "minimum",
+    dependent: Annotated[list[str], Option(metavar='"KEY = formula"', help="other key to set by a "
+        'formula of x, the value of the sized key in SI, for example "nodes.vessel.gas_volume = 0.4 * '
+        'x"; repeat the option for more keys')] = [],  # noqa: B006
+    rtol: Annotated[float, Option(help="relative tolerance: greatest distance of the value found from a value that "
+        "fails")] = 0.01,
+    error: Annotated[bool, Option("--error", help="require that margins exceed their numerical errors, estimated "
+        "from further runs")] = False,
     set: Set = [],  # noqa: B006
     as_json: Json = False,
-) -> None:
+) -> None:  # fmt: skip
     """Find by bracketing the minimum or maximum value of a key at which all limits of a case hold."""
     from fvsolve.studies import sizing
 
@@ -103,22 +92,15 @@ def _no_value_text(result) -> str:
 @app.command()
 def optimise(
     case: SingleCase,
-    schedule: Annotated[
-        str,
-        Option(
-            metavar="KEY",
-            help="key of the schedule to optimise, for example links.valve.opening; its ends keep their times "
-            "and values",
-        ),
-    ],
-    minimise: Annotated[
-        str, Option(metavar="max(PROBE)", help='peak to minimise, for example "max(gate.pressure)" or "max(main.head)"')
-    ],
+    schedule: Annotated[str, Option(metavar="KEY", help="key of the schedule to optimise, for example "
+        "links.valve.opening; its ends keep their times and values")],
+    minimise: Annotated[str, Option(metavar="max(PROBE)", help='peak to minimise, for example "max(gate.pressure)" '
+        'or "max(main.head)"')],
     knots: Annotated[int, Option(metavar="N", help="number of knots between the ends of the schedule, 1 to 12")] = 3,
     runs: Annotated[int, Option(metavar="N", help="greatest number of runs")] = 60,
     set: Set = [],  # noqa: B006
     as_json: Json = False,
-) -> None:
+) -> None:  # fmt: skip
     """Optimise a valve schedule, given by a few knots, to minimise a peak; compare it with the linear schedule."""
     from fvsolve.studies import closure_optimisation
 
@@ -156,18 +138,12 @@ def schedule_text(result, case) -> Iterator:
 @app.command()
 def study(
     file: Annotated[Path, Argument(metavar="FILE", help="TOML file of a study: case, events, protections")],
-    out: Annotated[
-        Path | None,
-        Option(
-            metavar="DIR",
-            help="folder of the run directories and tables (default runs/NAME, the name of FILE without .toml)",
-        ),
-    ] = None,
-    jobs: Jobs = 1,
-    dask: Dask = None,
+    out: Annotated[Path | None, Option(metavar="DIR", help="folder of the run directories and tables (default "
+        "runs/NAME, the name of FILE without .toml)")] = None,
+    jobs: Jobs = 1, dask: Dask = None,
     force: Annotated[bool, Option("--force", help="replace earlier runs of this study")] = False,
     as_json: Json = False,
-) -> None:
+) -> None:  # fmt: skip
     """Run every event with every protection of a study file, and list the limits that hold or fail."""
     from fvsolve.studies import scenarios
 

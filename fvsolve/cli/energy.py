@@ -8,8 +8,7 @@ from typing import Annotated
 from typer import Argument, Option
 
 from fvsolve.cli import app as cli
-from fvsolve.cli.progress import interrupt_message, progress_line, run_progress
-from fvsolve.cli.terminal import TextTable, present
+from fvsolve.cli.terminal import TextTable, interrupt_message, present, progress_line, run_progress
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.result_table import Column, ResultTable, cell_text
 
@@ -42,37 +41,21 @@ METHOD = (
 
 @cli.app.command()
 def energy(
-    case: Annotated[
-        str | None,
-        Argument(
-            metavar="CASE",
-            help="case file or shipped case to run (default none: list the passivity of schemes and methods)",
-        ),
-    ] = None,
-    port: Annotated[
-        str | None,
-        Option(
-            metavar="NODE",
-            help="node at which the passivity of the network is checked: a reservoir, inflow or junction "
-            "(default none)",
-        ),
-    ] = None,
-    scheme: Annotated[
-        str | None,
-        Option(metavar="S,S,...", help="schemes to study (default scheme of the case, or without a case all schemes)"),
-    ] = None,
-    method: Annotated[
-        str | None,
-        Option(metavar="M,M,...", help="methods to study (default method of the case, or without a case all methods)"),
-    ] = None,
-    out: cli.Out = None,
-    set: cli.Set = [],  # noqa: B006
+    case: Annotated[str | None, Argument(metavar="CASE", help="case file or shipped case to run (default none: list "
+        "the passivity of schemes and methods)")] = None,
+    port: Annotated[str | None, Option(metavar="NODE", help="node at which the passivity of the network is checked: "
+        "a reservoir, inflow or junction (default none)")] = None,
+    scheme: Annotated[str | None, Option(metavar="S,S,...", help="schemes to study (default scheme of the case, or "
+        "without a case all schemes)")] = None,
+    method: Annotated[str | None, Option(metavar="M,M,...", help="methods to study (default method of the case, or "
+        "without a case all methods)")] = None,
+    out: cli.Out = None, set: cli.Set = [],  # noqa: B006
     as_json: cli.Json = False,
-) -> None:
+) -> None:  # fmt: skip
     """Print the energy ledger of a run: energy supplied, stored, dissipated, and changed by the numerical method."""
     schemes, methods = cli.comma_list(scheme, "--scheme"), cli.method_names(method)
     if case is None:
-        from fvsolve.studies.energy.passivity import passivity
+        from fvsolve.studies.passivity import passivity
 
         refuse_without_case({"--port": port, "--out": out, "--set": set})
         with progress_line() as progress, interrupt_message(f"interrupted: no results are saved; {RESTARTS}"):
@@ -103,8 +86,8 @@ def ledger(case, port, out, as_json: bool) -> None:
     """
     from fvsolve.draw.accuracy_pictures import energy_figure
     from fvsolve.output.unit_columns import column, time_column
-    from fvsolve.studies.energy.energy_balance import energy as study
-    from fvsolve.studies.energy.energy_balance import write_table
+    from fvsolve.studies.energy_balance import energy as study
+    from fvsolve.studies.energy_balance import write_table
 
     folder = cli.folder_of(case, "energy", out)
     cli.warn_replaced(folder, FILES[0])
@@ -168,7 +151,7 @@ def compare_pairs(case, schemes, methods, port, out, as_json: bool) -> None:
     It ends the program with exit code 2 if all pairs were refused.
     port : name of a node, or None; out : folder of the files, or None for runs/NAME.energy
     """
-    from fvsolve.studies.energy.energy_balance import PAIR_COLUMNS, measure_pairs
+    from fvsolve.studies.energy_balance import PAIR_COLUMNS, measure_pairs
     from fvsolve.studies.result_cache import ResultCache
 
     folder = cli.folder_of(case, "energy", out)
@@ -234,7 +217,7 @@ def _pair(row) -> str:
 
 def passivity_text(result) -> Iterator:
     """Passivity of schemes and methods that follows from their coefficients."""
-    from fvsolve.studies.energy.passivity import CELLS
+    from fvsolve.studies.passivity import CELLS
 
     known = [entry for entry in result.schemes if entry.passive is not None]
     yield f"Schemes: energy of a closed pipe of {CELLS} cells, continuous in time", "bold"

@@ -7,8 +7,7 @@ from typing import Annotated
 from typer import Option
 
 from fvsolve.cli import app as cli
-from fvsolve.cli.progress import progress_line
-from fvsolve.cli.terminal import TextTable, present
+from fvsolve.cli.terminal import TextTable, present, progress_line
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.result_table import Column, ResultTable
 
@@ -16,59 +15,26 @@ from fvsolve.studies.result_table import Column, ResultTable
 @cli.app.command("failure-map")
 def failure_map(
     case: cli.SingleCase,
-    scheme: Annotated[
-        str | None,
-        Option(
-            metavar="A,B",
-            help="schemes, one panel for each (default upwind and the scheme of the case, or the latter alone for a "
-            "stiff case or a case without cells)",
-        ),
-    ] = None,
-    method: Annotated[
-        str | None,
-        Option(metavar="A,B", help="methods, one row for each (default euler, ssp-rk3, rk4 and four implicit methods)"),
-    ] = None,
-    courant: Annotated[
-        str | None,
-        Option(
-            metavar="A,B",
-            help="Courant numbers, one column for each, or a single one with --key (default 0.25 to 3, or ten time "
-            "steps for a stiff case or a case without cells)",
-        ),
-    ] = None,
-    step: Annotated[
-        str | None,
-        Option(
-            metavar="A,B",
-            help='time steps instead of Courant numbers, for example "1 ms,2 ms", one column for each, or a single '
-            "step with --key",
-        ),
-    ] = None,
-    key: Annotated[
-        str | None,
-        Option(
-            metavar="KEY=A,B",
-            help="key of the case and its values, one column for each, instead of columns of time steps or Courant "
-            "numbers",
-        ),
-    ] = None,
-    tolerance: Annotated[
-        float,
-        Option(
-            metavar="X",
-            help="greatest accepted error of a probe: mean over the run, as a fraction of the probe's range",
-        ),
-    ] = 0.02,
-    jobs: cli.Jobs = 1,
-    dask: cli.Dask = None,
-    out: Annotated[
-        Path | None, Option(metavar="DIR", help="folder of the table and pictures (default runs/NAME.map)")
-    ] = None,
+    scheme: Annotated[str | None, Option(metavar="A,B", help="schemes, one panel for each (default upwind and the "
+        "scheme of the case, or the latter alone for a stiff case or a case without cells)")] = None,
+    method: Annotated[str | None, Option(metavar="A,B", help="methods, one row for each (default euler, ssp-rk3, rk4 "
+        "and four implicit methods)")] = None,
+    courant: Annotated[str | None, Option(metavar="A,B", help="Courant numbers, one column for each, or a single one "
+        "with --key (default 0.25 to 3, or ten time steps for a stiff case or a case without cells)")] = None,
+    step: Annotated[str | None, Option(metavar="A,B", help='time steps instead of Courant numbers, for example "1 '
+        'ms,2 ms", one column for each, or a single step with --key')] = None,
+    key: Annotated[str | None, Option(metavar="KEY=A,B", help="key of the case and its values, one column for each, "
+        "instead of columns of time steps or Courant numbers")] = None,
+    tolerance: Annotated[float, Option(metavar="X", help="greatest accepted error of a probe: mean over the run, as "
+        "a fraction of the probe's range")] = 0.02,
+    jobs: cli.Jobs = 1, dask: cli.Dask = None,
+    out: Annotated[Path | None, Option(metavar="DIR", help="folder of the table and pictures (default "
+        "runs/NAME.map)")] = None,
     set: cli.Set = [],  # noqa: B006
     as_json: cli.Json = False,
-) -> None:
+) -> None:  # fmt: skip
     """Map failures of methods over time steps or values of a key. Each run is stable, ringing, wrong, blown up, ..."""
-    from fvsolve.studies.failure.failure_map import failure_map as study
+    from fvsolve.studies.failure_map import failure_map as study
     from fvsolve.studies.result_cache import ResultCache
     from fvsolve.studies.sampling import key_with_unit
 
@@ -120,7 +86,7 @@ def _write_files(result, folder: Path, head: str) -> list[Path]:
 def map_text(result, files: list[Path], head: str) -> Iterator:
     """Verdict of each run of a failure map, meaning of the verdicts, reference and files; head : label of columns"""
     from fvsolve.draw.stability_pictures import column_labels
-    from fvsolve.studies.failure.run_verdict import VERDICT_TEXTS
+    from fvsolve.studies.failure_map import VERDICT_TEXTS
 
     for scheme in result.schemes:
         heading = "steps" if result.key == "step" else head

@@ -23,13 +23,11 @@ SHORT = (
 @app.command()
 def report(
     directory: Annotated[Path, Argument(metavar="RUN_OR_STUDY", help="directory of a run or a study")],
-    out: Annotated[
-        Path | None, Option(metavar="FILE", help="file of the report (default RUN_OR_STUDY/report.html)")
-    ] = None,
-    xlsx: Annotated[
-        bool, Option("--xlsx", help="also write the tables as an Excel workbook in the folder of the report")
-    ] = False,
-) -> None:
+    out: Annotated[Path | None, Option(metavar="FILE", help="file of the report (default "
+        "RUN_OR_STUDY/report.html)")] = None,
+    xlsx: Annotated[bool, Option("--xlsx", help="also write the tables as an Excel workbook in the folder of the "
+        "report")] = False,
+) -> None:  # fmt: skip
     """Write an offline HTML page of a run or a study: verdicts, long sections, histories, model, numerics."""
     from fvsolve.report.report_files import write_report
 
@@ -41,21 +39,12 @@ def report(
 def plot(
     directory: RunDirectory,
     probes: Annotated[str, Option(metavar="A,B", help="probes whose histories are drawn (default none)")] = "",
-    route: Annotated[
-        str,
-        Option(
-            metavar="NAME",
-            help="route whose long section is drawn (default all routes, or none with --probes or --phase)",
-        ),
-    ] = "",
-    phase: Annotated[
-        list[str],
-        Option(
-            metavar="X:Y", help="phase plane to draw, probe Y over probe X; repeat the option for more (default none)"
-        ),
-    ] = [],  # noqa: B006
+    route: Annotated[str, Option(metavar="NAME", help="route whose long section is drawn (default all routes, or "
+        "none with --probes or --phase)")] = "",
+    phase: Annotated[list[str], Option(metavar="X:Y", help="phase plane to draw, probe Y over probe X; "
+        "repeat the option for more (default none)")] = [],  # noqa: B006
     out: Annotated[Path | None, Option(metavar="DIR", help="folder of the pictures (default RUN)")] = None,
-) -> None:
+) -> None:  # fmt: skip
     """Draw long sections (heads, limits, devices), histories of probes and phase planes, without a browser."""
     from fvsolve.report.pictures import write_pictures
 
@@ -66,36 +55,18 @@ def plot(
 @app.command()
 def fatigue(
     directory: RunDirectory,
-    probes: Annotated[
-        str, Option(metavar="A,B", help="probes of pressure or head whose cycles are counted (default all such probes)")
-    ] = "",
-    range: Annotated[
-        float | None,
-        Option(
-            metavar="R",
-            help="range of pressure or head that causes failure after --allowable-range cycles, in the unit of the "
-            "probe (default none: cycles are only counted)",
-        ),
-    ] = None,
-    allowable_range: Annotated[
-        float | None,
-        Option(metavar="N", help="number of cycles of the range --range until failure, required with --range"),
-    ] = None,
-    slope: Annotated[
-        float | None,
-        Option(
-            metavar="M",
-            help="exponent of the fatigue strength, required with --range: N (R/r)^M cycles of a range r cause failure",
-        ),
-    ] = None,
-    per_day: Annotated[
-        float,
-        Option(
-            metavar="N", help="number of occurrences of the run per day, from which its fatigue life in years follows"
-        ),
-    ] = 1.0,
+    probes: Annotated[str, Option(metavar="A,B", help="probes of pressure or head whose cycles are counted (default "
+        "all such probes)")] = "",
+    range: Annotated[float | None, Option(metavar="R", help="range of pressure or head that causes failure after "
+        "--allowable-range cycles, in the unit of the probe (default none: cycles are only counted)")] = None,
+    allowable_range: Annotated[float | None, Option(metavar="N", help="number of cycles of the range --range until "
+        "failure, required with --range")] = None,
+    slope: Annotated[float | None, Option(metavar="M", help="exponent of the fatigue strength, required with "
+        "--range: N (R/r)^M cycles of a range r cause failure")] = None,
+    per_day: Annotated[float, Option(metavar="N", help="number of occurrences of the run per day, from which its "
+        "fatigue life in years follows")] = 1.0,
     as_json: Json = False,
-) -> None:
+) -> None:  # fmt: skip
     """Count pressure cycles of a run by rainflow counting, and estimate the fatigue life of its parts."""
     from fvsolve.report import cycles as counting
     from fvsolve.run import open_run
@@ -131,26 +102,14 @@ def cycle_text(results: list[dict], per_day: float) -> Iterator:
 @app.command("import")
 def import_(
     source: Annotated[Path, Argument(metavar="FILE", help="EPANET network to import, for example town.inp")],
-    case: Annotated[
-        Path | None,
-        Argument(
-            metavar="CASE",
-            help="case file to write, or its folder (default the name of FILE with .toml, in the current folder)",
-        ),
-    ] = None,
-    hour: Annotated[
-        float, Option(metavar="H", help="hours from the start of the EPANET run to the initial state of the case")
-    ] = 0.0,
+    case: Annotated[Path | None, Argument(metavar="CASE", help="case file to write, or its folder (default the name "
+        "of FILE with .toml, in the current folder)")] = None,
+    hour: Annotated[float, Option(metavar="H", help="hours from the start of the EPANET run to the initial state of "
+        "the case")] = 0.0,
     wave_speed: Annotated[str, Option(metavar="A", help="wave speed of all pipes, in m/s or with a unit")] = "1200 m/s",
-    min_pipe_length: Annotated[
-        str | None,
-        Option(
-            metavar="L",
-            help='length to which shorter pipes are lengthened, for example "10 m" (default none: pipes keep their '
-            "lengths)",
-        ),
-    ] = None,
-) -> None:
+    min_pipe_length: Annotated[str | None, Option(metavar="L", help="length to which shorter pipes are lengthened, "
+        'for example "10 m" (default none: pipes keep their lengths)')] = None,
+) -> None:  # fmt: skip
     """Import an EPANET network: write its case file and print all differences from EPANET."""
     from fvsolve.epanet import import_network
 
@@ -187,22 +146,15 @@ def _positive(option: str, text: str, dimension: str) -> float:
 
 @app.command()
 def precompile(
-    cases: Annotated[
-        list[str],
-        Option(
-            "--for",
-            metavar="CASE",
-            help="case file or shipped case to compile for; repeat the option for more (default all shipped cases)",
-        ),
-    ] = [],  # noqa: B006
-    jobs: Annotated[
-        int | None, Option(metavar="N", min=1, help="number of processes (default number of processors)")
-    ] = None,
+    cases: Annotated[list[str], Option("--for", metavar="CASE", help="case file or shipped case to "
+        "compile for; repeat the option for more (default all shipped cases)")] = [],  # noqa: B006
+    jobs: Annotated[int | None, Option(metavar="N", min=1, help="number of processes (default number of "
+        "processors)")] = None,
     as_json: Json = False,
-) -> None:
+) -> None:  # fmt: skip
     """Compile the functions that cases need on this machine, so that later runs start at once."""
     from fvsolve.case import load, shipped
-    from fvsolve.cli.progress import progress_bar
+    from fvsolve.cli.terminal import progress_bar
     from fvsolve.run.precompilation import warm as warmed
 
     paths = [shipped.find(name) for name in cases or shipped.names()]
@@ -210,15 +162,7 @@ def precompile(
         load(path)
     with progress_bar("compiling") as progress:
         result = warmed(paths, not cases, jobs, progress)
-    present(as_json, asdict(result), cache_text(result))
-
-
-def cache_text(result) -> Iterator:
-    """State of the cache of compiled code, as from `warm`."""
-    text = (
-        f"{result.compiled} functions compiled in {result.seconds:.0f} s"
-        if result.compiled
-        else "all functions were compiled already"
-    )
-    yield f"{text}; the cache holds {result.functions} functions, {result.bytes / 1e6:.1f} MB, for {result.target}"
-    yield f"{result.directory}"
+    done = f"{result.compiled} functions compiled in {result.seconds:.0f} s" if result.compiled else (
+        "all functions were compiled already")  # fmt: skip
+    cache = f"the cache holds {result.functions} functions, {result.bytes / 1e6:.1f} MB, for {result.target}"
+    present(as_json, asdict(result), [f"{done}; {cache}", f"{result.directory}"])

@@ -19,24 +19,18 @@ SYMBOLS = {"admittance": "Y", "impedance": "Z"}
 @cli.app.command()
 def linearise(
     case: cli.SingleCase,
-    inputs: Annotated[
-        str | None,
-        Option(metavar="A,B", help="inputs of the linear system, such as valve.opening,lake.pressure (default none)"),
-    ] = None,
-    outputs: Annotated[
-        str | None, Option(metavar="A,B", help="probes used as outputs (default probes of the case)")
-    ] = None,
-    at: cli.AtTime = None,
-    before: cli.BeforeJump = False,
-    scheme: cli.LinearScheme = None,
-    out: cli.Out = None,
+    inputs: Annotated[str | None, Option(metavar="A,B", help="inputs of the linear system, such as "
+        "valve.opening,lake.pressure (default none)")] = None,
+    outputs: Annotated[str | None, Option(metavar="A,B", help="probes used as outputs (default probes of the "
+        "case)")] = None,
+    at: cli.AtTime = None, before: cli.BeforeJump = False, scheme: cli.LinearScheme = None, out: cli.Out = None,
     set: cli.Set = [],  # noqa: B006
     as_json: cli.Json = False,
-) -> None:
+) -> None:  # fmt: skip
     """Linearise a case about a state: matrices A, B, C, D and poles."""
     from fvsolve.model.energy_norm import energy_form
-    from fvsolve.studies.linear.linearise import POLES, poles_of
-    from fvsolve.studies.linear.linearise import linearise as ask
+    from fvsolve.studies.linearise import POLES, poles_of
+    from fvsolve.studies.linearise import linearise as ask
 
     system = ask(
         cli.load_case(case, set), cli.comma_list(inputs, "--inputs") or (), cli.comma_list(outputs, "--outputs"),
@@ -92,7 +86,7 @@ def system_text(system, values, poles: list[dict], folder: Path) -> Iterator:
     system : result of `linearise`; values : result of `poles_of`; poles : rows of the table of poles
     folder : folder of the files, whose names are listed
     """
-    from fvsolve.studies.linear.linearise import POLES
+    from fvsolve.studies.linearise import POLES
 
     moving = np.abs(system.at.rate) / system.at.model.scale
     yield (
@@ -115,20 +109,12 @@ def system_text(system, values, poles: list[dict], folder: Path) -> Iterator:
 @cli.app.command()
 def response(
     case: cli.SingleCase,
-    port: Annotated[
-        str,
-        Option(
-            metavar="NODE",
-            help="node at which flow and pressure are taken: a reservoir, junction, inflow, chamber or tank",
-        ),
-    ],
-    at: cli.AtTime = None,
-    before: cli.BeforeJump = False,
-    scheme: cli.LinearScheme = None,
-    out: cli.Out = None,
+    port: Annotated[str, Option(metavar="NODE", help="node at which flow and pressure are taken: a reservoir, "
+        "junction, inflow, chamber or tank")],
+    at: cli.AtTime = None, before: cli.BeforeJump = False, scheme: cli.LinearScheme = None, out: cli.Out = None,
     set: cli.Set = [],  # noqa: B006
     as_json: cli.Json = False,
-) -> None:
+) -> None:  # fmt: skip
     """Compute the transfer function of pressure and flow at a node: matrices, frequency response, positive realness."""
     from fvsolve.studies.ports.response import response as ask
 

@@ -29,16 +29,11 @@ BODY = {
     "speed": ("speed", "velocity"), "spin": ("spin", "angular_velocity"),
 }  # fmt: skip
 PIPE = {
-    "length": ("length", "length"),
-    "cells": ("cells", "number"),
-    "wave_speed": ("wave speed", "velocity"),
-    "velocity": ("velocity", "velocity"),
-    "reynolds": ("Reynolds", "number"),
-    "friction_factor": ("friction factor", "number"),
-    "from_head": ("head at from", "head"),
+    "length": ("length", "length"), "cells": ("cells", "number"), "wave_speed": ("wave speed", "velocity"),
+    "velocity": ("velocity", "velocity"), "reynolds": ("Reynolds", "number"),
+    "friction_factor": ("friction factor", "number"), "from_head": ("head at from", "head"),
     "to_head": ("head at to", "head"),
-}
-
+}  # fmt: skip
 BASIN = {
     "physics": ("physics", "number"), "cells": ("cells", "number"), "path": ("kernels over", "number"),
     "area": ("area", "area"), "depth": ("depth", "level"), "wave_speed": ("wave speed", "velocity"),
@@ -89,7 +84,8 @@ def result_text(run) -> Iterator:
         more = len(summary["events"]) - EVENTS_SHOWN
         yield f"and {more} more event{'s' if more > 1 else ''}; summary.json has all"
     for name, ledger in summary["ledgers"].items():
-        yield f"{name} ledger: {_ledger_text(ledger)}"
+        relative = f", {_number(ledger['relative'])} of the largest term" if "relative" in ledger else ""
+        yield f"{name} ledger: remainder {_number(ledger['remainder'])}{relative}"
     for claim in summary["expectations"]:
         yield _expectation_text(claim, summary), "green" if claim["ok"] else "bold red"
     for verdict in summary["verdicts"]:
@@ -149,8 +145,9 @@ def check_text(case, facts: dict, every: bool = False) -> Iterator:
     yield from _parts_table(case, "basin", basins, BASIN)
     patches = {f"{name}.{patch}": faces for name, part in basins.items() for patch, faces in part["patches"].items()}
     yield from _parts_table(case, "patch", patches, PATCH)
-    notes = [f"unsteady friction of {name}: {_unsteady_friction_text(part['unsteady'])}"
-            for name, part in facts["pipes"].items() if "unsteady" in part]  # fmt: skip
+    unsteady = {name: part["unsteady"] for name, part in facts["pipes"].items() if "unsteady" in part}
+    notes = [f"unsteady friction of {name}: {part['weighting']}, {part['terms']} terms a cell, within "
+             f"{part['accuracy']:g} up to {part['frequency']:.3g} Hz" for name, part in unsteady.items()]  # fmt: skip
     notes += _wall_lines(case, facts["pipes"])
     lines = {name: part for name, part in facts["pipes"].items() if part["line"] == "delay-line"}
     notes += [f"{name} is a delay line, error at most {part['line_bound']:.2g} of the greatest jump: {part['line_why']}"
@@ -275,11 +272,6 @@ def _notices(warnings: list[dict], every: bool = False) -> Iterator:
     yield from _first([f"note: {notice['text']}" for notice in warnings if notice["ok"]], every)
 
 
-def _unsteady_friction_text(terms: dict) -> str:
-    return (f"{terms['weighting']}, {terms['terms']} terms a cell, within {terms['accuracy']:g} up to "
-            f"{terms['frequency']:.3g} Hz")  # fmt: skip
-
-
 def difference_text(results: dict, summary: dict) -> Iterator:
     """Differences of two runs for each common probe, and the probes that only one of the runs has.
 
@@ -321,11 +313,6 @@ def _step_text(case, facts: dict) -> str:
     cost = "" if expected is None else f", about {expected:.2g} s of computing time"
     step = f"step at the start {case.step_amount(facts['step'])}, set by {facts['step_set_by']}"
     return f"{step}; {facts['steps']} steps of this size in the run{cost}"
-
-
-def _ledger_text(ledger: dict) -> str:
-    text = f"remainder {_number(ledger['remainder'])}"
-    return f"{text}, {_number(ledger['relative'])} of the largest term" if "relative" in ledger else text
 
 
 def _expectation_text(claim: dict, summary: dict) -> str:

@@ -8,8 +8,7 @@ from typing import Annotated
 from typer import Option
 
 from fvsolve.cli import app as cli
-from fvsolve.cli.progress import progress_line
-from fvsolve.cli.terminal import TextTable, present
+from fvsolve.cli.terminal import TextTable, present, progress_line
 from fvsolve.errors import FvsolveError
 
 Values = Annotated[
@@ -45,30 +44,15 @@ MAX_ROWS = 100  # greatest number of rows of that table
 
 @cli.app.command()
 def sweep(
-    case: cli.SingleCase,
-    set: Values = [],  # noqa: B006
-    points: Annotated[
-        Path | None,
-        Option(
-            metavar="FILE.csv",
-            help="CSV file of the values of keys in all runs: a row for each run, a column for each key",
-        ),
-    ] = None,
-    sample: Annotated[
-        str | None,
-        Option(
-            metavar="sobol:N",
-            help="sample of N runs in the ranges of --vary: sobol:N (Sobol) or lhs:N (Latin hypercube)",
-        ),
-    ] = None,
+    case: cli.SingleCase, set: Values = [],  # noqa: B006
+    points: Annotated[Path | None, Option(metavar="FILE.csv", help="CSV file of the values of keys in all runs: a "
+        "row for each run, a column for each key")] = None,
+    sample: Annotated[str | None, Option(metavar="sobol:N", help="sample of N runs in the ranges of --vary: sobol:N "
+        "(Sobol) or lhs:N (Latin hypercube)")] = None,
     vary: Ranges = [],  # noqa: B006
-    seed: cli.Seed = 0,
-    jobs: cli.Jobs = 1,
-    dask: cli.Dask = None,
-    outcome: Outcomes = [],  # noqa: B006
-    out: cli.Out = None,
-    as_json: cli.Json = False,
-) -> None:
+    seed: cli.Seed = 0, jobs: cli.Jobs = 1, dask: cli.Dask = None, outcome: Outcomes = [],  # noqa: B006
+    out: cli.Out = None, as_json: cli.Json = False,
+) -> None:  # fmt: skip
     """Run a case for every combination of values. The table has a row for each run; a failed run has its reason."""
     from fvsolve import studies
     from fvsolve.studies.sampling import key_with_unit
@@ -175,28 +159,14 @@ def _text(value) -> str:
 @cli.app.command()
 def sensitivity(
     case: cli.SingleCase,
-    vary: Annotated[
-        list[str],
-        Option(
-            "--vary",
-            metavar="KEY=LOW,HIGH",
-            help="key to vary and its range, in SI or with units; repeat the option for more keys",
-        ),
-    ],
+    vary: Annotated[list[str], Option("--vary", metavar="KEY=LOW,HIGH", help="key to vary and its range, in SI or "
+        "with units; repeat the option for more keys")],
     outcome: Annotated[str, Option(metavar="max(PROBE)", help="outcome to analyse: min, max or final of a probe")],
-    samples: Annotated[
-        int,
-        Option(
-            metavar="N", help="base sample size, a power of two; for k keys the study makes about 1.25 N (k + 2) runs"
-        ),
-    ] = 64,
-    seed: cli.Seed = 0,
-    jobs: cli.Jobs = 1,
-    dask: cli.Dask = None,
-    set: cli.Set = [],  # noqa: B006
-    out: cli.Out = None,
-    as_json: cli.Json = False,
-) -> None:
+    samples: Annotated[int, Option(metavar="N", help="base sample size, a power of two; for k keys the study makes "
+        "about 1.25 N (k + 2) runs")] = 64,
+    seed: cli.Seed = 0, jobs: cli.Jobs = 1, dask: cli.Dask = None, set: cli.Set = [],  # noqa: B006
+    out: cli.Out = None, as_json: cli.Json = False,
+) -> None:  # fmt: skip
     """Compute the sensitivity of an outcome to keys: Sobol indices and Morris effects over ranges."""
     from fvsolve import studies
 
@@ -216,19 +186,11 @@ def sensitivity(
 @cli.app.command()
 def calibrate(
     case: cli.SingleCase,
-    parameter: Annotated[
-        list[str],
-        Option(
-            metavar="KEY=LOW,HIGH",
-            help="key to calibrate and its range, in SI or with units; repeat the option for more keys",
-        ),
-    ],
-    seed: cli.Seed = 0,
-    jobs: cli.Jobs = 1,
-    dask: cli.Dask = None,
-    set: cli.Set = [],  # noqa: B006
+    parameter: Annotated[list[str], Option(metavar="KEY=LOW,HIGH", help="key to calibrate and its range, in SI or "
+        "with units; repeat the option for more keys")],
+    seed: cli.Seed = 0, jobs: cli.Jobs = 1, dask: cli.Dask = None, set: cli.Set = [],  # noqa: B006
     as_json: cli.Json = False,
-) -> None:
+) -> None:  # fmt: skip
     """Calibrate keys of a case against the measured series in its [compare]."""
     from fvsolve import studies
 

@@ -60,10 +60,7 @@ class Residuals(RowMaker):
     """
 
     def __call__(self, values: Mapping[str, Any]) -> list[np.ndarray] | str:
-        """Run the case with values of keys; returns the differences of each series, or the reason of a failure.
-
-        The differences are as in the class : list of float64[times within the run].
-        """
+        """Run with values of keys; differences float64[times in the run] of each series, or the reason of a failure."""
         from fvsolve.run import run
 
         try:
@@ -95,14 +92,9 @@ def series_range(measured: np.ndarray) -> float:
 
 @validated(free=VARY, set=TABLE, seed=COUNT_FROM_ZERO, jobs=COUNT, dask=TEXT, progress=FUNCTION)
 def calibrate(
-    case,
-    free: Mapping[str, Sequence[Any]],
-    set: Mapping[str, Any] | None = None,
-    seed: int = 0,
-    jobs: int = 1,
-    dask: str | None = None,
-    progress: Callable[[int, int, str], None] | None = None,
-) -> Calibration:
+    case, free: Mapping[str, Sequence[Any]], set: Mapping[str, Any] | None = None, seed: int = 0, jobs: int = 1,
+    dask: str | None = None, progress: Callable[[int, int, str], None] | None = None,
+) -> Calibration:  # fmt: skip
     """Fit values in a case to its measured series, by least squares (`scipy.optimize.least_squares`).
 
     case : as for `run`, with measured series under `[compare]`; free : key -> (least, greatest value)

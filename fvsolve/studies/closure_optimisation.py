@@ -80,10 +80,7 @@ class ClosureSearch:
         return times.tolist(), (self.first + (self.last - self.first) * shares).tolist()
 
     def __call__(self, z: np.ndarray) -> float:
-        """Run the case with the schedule of z, see the class; returns its peak.
-
-        The result is infinite if the run failed or the peak is not known.
-        """
+        """Peak of a run with the schedule of z, see the class; infinite if the run failed or the peak is not known."""
         time, value = self.law(z)
         keys = {self.key: {"time": time, "value": value}, "expect": peak_expectation(self.minimise)}
         result = run(load(self.case, keys | NO_FIELDS))

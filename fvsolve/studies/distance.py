@@ -213,10 +213,7 @@ def column_ranges(values: np.ndarray) -> np.ndarray:
 
 
 def pressure_ranges(envelope: Mapping[str, Mapping]) -> dict[str, float]:
-    """Range of the pressure in each pipe over all cells and the run : pipe -> range [Pa], nan if it is constant.
-
-    envelope : pipe -> {"min_pressure", "max_pressure": float64[cells] [Pa]}, as in `Outcome`
-    """
+    """Range of the pressure in each pipe over cells and run [Pa], nan if constant; envelope : as in `Outcome`."""
     pressures = {name: np.append(entry["min_pressure"], entry["max_pressure"]) for name, entry in envelope.items()}
     return {name: float(column_ranges(entry)) for name, entry in pressures.items()}
 
@@ -238,10 +235,7 @@ def fields(model, waves: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> dict:
 
 
 def wave_sums(run: Outcome) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Waves in the cells of all pipes at the end of a run : pipe -> (r + l, r - l), float64[cells] each [kg/s].
-
-    r, l : forward and backward wave
-    """
+    """Forward waves r and backward waves l at the end of a run : pipe -> (r + l, r - l), float64[cells] each [kg/s]."""
     sums = dict(run.lines)
     for row, pipe in zip(run.model.tables.pipes, run.model.pipes, strict=True):
         if pipe.name not in sums:

@@ -266,10 +266,7 @@ def best_run_of(case, keys) -> Outcome:
 
 
 def compile_seconds(model) -> float:
-    """Wall time of a first run minus that of a second run [s].
-
-    The difference is the time of compilation, or of loading compiled code.
-    """
+    """Wall time of a first run minus that of a second [s]: the time to compile, or to load compiled code."""
     times = []
     for _ in range(2):
         began = perf_counter()

@@ -70,14 +70,10 @@ class TaskPool:
             self.has_started = True
             yield number, self.work(tasks[number])
         if local < len(tasks):
-            self.workers = self.workers or self._open()
+            if self.workers is None:
+                local_pool = self.dask is None
+                self.workers = ProcessPool(self.work, self.jobs) if local_pool else Cluster(self.work, self.dask)
             yield from distribute(self.work, tasks, self.workers, local)
-
-    def _open(self) -> Any:
-        """`ProcessPool` of local processes, or `Cluster` of a Dask scheduler."""
-        if self.dask is None:
-            return ProcessPool(self.work, self.jobs)
-        return Cluster(self.work, self.dask)
 
     def __enter__(self) -> Self:
         return self
@@ -352,9 +348,6 @@ def version_numbers(reported: dict) -> dict[str, str]:
 
 
 def differing_versions(here: dict[str, str], there: dict[str, str]) -> list[str]:
-    """Texts on packages whose version there differs from that here, such as "numpy 2.1 (here 2.2)".
-
-    here, there : package -> version
-    """
+    """Texts on versions that differ, such as "numpy 2.1 (here 2.2)"; here, there : package -> version."""
     texts = {name: f"{name} {there.get(name)} (here {version})" for name, version in here.items()}
     return [text for name, text in texts.items() if there.get(name) != here[name]]

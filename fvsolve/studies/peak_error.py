@@ -1,15 +1,31 @@
 """Error bounds of peaks and limit margins, from runs at half, one and twice the resolution.
 
-Each error is bounded from the local extrema of a signal (`extrema.py`). The error of the margin of a design limit is
-bounded from the signals at some places of each part to which the limit applies. With column separation no order of
-convergence is assumed, because peaks after cavity collapse converge slowly (docs/cavitation.md). Without cells, a peak
-between two rows of output is higher than the rows by up to an eighth of their second difference.
+The error of the margin of a design limit is bounded from the signals at some places of each part to which the limit
+applies. With column separation no order of convergence is assumed, because peaks after cavity collapse converge slowly
+(docs/cavitation.md). Without cells, a peak between two rows of output is higher than the rows by up to an eighth of
+their second difference.
+
+Each error is bounded from the local maxima of a signal. A local maximum has the values c, m and f at half, one and
+twice the resolution. Their differences are a = m - c and b = f - m, with the ratio r = |b| / |a|, limited to the range
+from 1/4 (order 2) to 0.6 (order 3/4). The remainder of a maximum bounds the change of m by all finer resolutions. It is
+2.15 times the larger of |b| / (1 - r) and |a| r / (1 - r), with 1 - r = 0.4 if a and b differ in sign. If the
+differences have the same sign and grow, it is multiplied by |b| / |a|, at most by 2.
+
+The error bound follows from all local maxima m with their remainders, because a lower maximum may come to exceed the
+greatest. Remainders at places other than that of the greatest value are multiplied by 0.6. The ratio of the mean
+differences of whole signals shows how far they have converged. If it is small, half of this bound is enough. The bound
+is at least the larger of two terms: a fifth of the mean difference of all maxima, and the difference between the
+signals at the times of their greatest values, because a moving crest may still grow. Both terms are limited to 16 times
+the difference of the greatest value. The ratio r of the greatest value may be small by chance, so the bound is also at
+least 1.6 / 2.15 of its remainder with the ratio of whole signals. The constants were chosen so that the bound holds for
+random mains (benchmarks/peak_bands.py --random) and its median is least.
 
 Arguments of several functions : runs, results at all resolutions, as from `refined_runs`; triple, values at half, one
 and twice the resolution
 """
 
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -17,13 +33,20 @@ import numpy as np
 
 from fvsolve.case import load
 from fvsolve.errors import CaseError, listing
+from fvsolve.model.start_notices import LEAST_CELLS, answering_parts
+from fvsolve.parts.schedule import Schedule
 from fvsolve.run import Result, run
 from fvsolve.run.result import HOLDS, OPEN
 from fvsolve.run.verdicts import MAGNITUDES, PLACES_KEY, PlaceMargins, verdict
-from fvsolve.studies.extrema import greatest_error
 from fvsolve.studies.outcome import NO_FIELDS
-from fvsolve.studies.resolution import basins_from_files, refined_keys
-from fvsolve.studies.unresolved import MAX_NAMES, WIDE_ERROR, Unresolved, has_separation
+from fvsolve.studies.resolution import (
+    basins_from_files,
+    cell_counts,
+    delay_lines,
+    pipes_with_cells,
+    refined_keys,
+    scaled,
+)
 
 LEVELS = (0.5, 1.0, 2.0)
 RELATIVE_FLOOR = 5e-6  # least relative error, from iterations, interpolated rows and nearly decayed oscillations
@@ -33,6 +56,163 @@ SIDES = tuple(SIGNS)
 MIN_ROWS, MAX_ROWS = 500, 4000  # limits of the number of rows of signals, at the resolution of the run itself
 PLACES_PER_PART = 12  # greatest number of places of a part with signals, under a bound
 MAX_PLACES = 400  # greatest number of places with signals, of all limits
+Part = tuple[str, str]  # group and name
+MANY_STEPS = 20.0  # accumulated error of steps between jumps of delay lines, in tolerances of a step
+SMOOTHED = 0.05  # effect of jumps below a quarter of numerics.delay_tolerance, smoothed over a step, over that key
+MIN_CELLS = 4  # cells recommended for a pipe, and for the travel time of a short pipe in its neighbour
+MAX_NAMES = 3  # greatest number of names in a text
+WIDE_ERROR = 0.05  # error relative to the span of a signal above which a reason is given
+SMALL_DIFFERENCE = 0.1  # differences below this fraction of an error are not its cause
+
+
+# reasons of unknown or wide errors -----------------------------------------------------------------------------------
+
+
+def short_pipes(case: Any) -> dict[str, tuple[str, int]]:
+    """Pipes that a wave crosses faster than a neighbour's cell : pipe -> (neighbour, number of cells that it needs)."""
+    pipes, short = pipes_with_cells(case), {}
+    travel = {name: pipe.length / case.wave_speed(name) for name, pipe in pipes.items()}
+    by_node: dict[str, list[str]] = {}
+    for name, pipe in pipes.items():
+        for node in (pipe.from_, pipe.to):
+            by_node.setdefault(node, []).append(name)
+    for name, pipe in pipes.items():
+        for neighbour in (*by_node[pipe.from_], *by_node[pipe.to]):
+            if travel[neighbour] / pipes[neighbour].cells > travel[name]:
+                short[name] = neighbour, math.ceil(MIN_CELLS * travel[neighbour] / travel[name])
+    return short
+
+
+def brief_pulses(case: Any) -> list[str]:
+    """Keys of schedules with a pulse that is shorter than the longest time in which a wave crosses a cell."""
+    pipes = pipes_with_cells(case)
+    cell = max((pipe.length / pipe.cells / case.wave_speed(name) for name, pipe in pipes.items()), default=0.0)
+    return [f"{group}.{name}.{key}" for group in ("nodes", "links") for name, part in getattr(case, group).items()
+            for key, info in type(part).model_fields.items() if pulse_width(getattr(part, key)) < cell]  # fmt: skip
+
+
+def pulse_width(value: Any) -> float:
+    """Shortest time in which a scheduled value rises and falls, or falls and rises [s]; inf if it never does.
+
+    It is also inf for a harmonic schedule, and for a value that is not a `Schedule`.
+    """
+    if not isinstance(value, Schedule) or value.wave or len(value.time) < 3:
+        return np.inf
+    changes = np.flatnonzero(np.diff(value.value))
+    turns = [(a, b) for a, b in zip(changes, changes[1:], strict=False) if np.prod(np.diff(value.value)[[a, b]]) < 0.0]
+    return min((float(value.time[b + 1] - value.time[a]) for a, b in turns), default=np.inf)
+
+
+class Unresolved:
+    """Reasons of unknown or wide errors of the peaks of a case, each with a remedy.
+
+    unknown : (group, name) of a part -> reason for which the errors of its peaks are unknown
+    shared : reasons of wide errors that concern all peaks
+    tolerance : accumulated error of the steps of delay lines under error control, relative to the range of a signal
+    """
+
+    def __init__(self, case: Any, runs: dict[float, Any]) -> None:
+        self.case, self.runs = case, runs
+        self.unknown = unknown_parts(case)
+        self.tolerance = 0.0
+        if case.numerics.rtol is not None and delay_lines(case):
+            self.tolerance = max(MANY_STEPS * case.numerics.rtol, SMOOTHED * case.numerics.delay_tolerance)
+        liquid = ["column separation, so no order is assumed; use more cells"] if has_separation(runs) else []
+        self.shared = [*liquid, *differing_events(runs), *coarse_pipes_at_devices(case)]
+
+    def reason(self, part: tuple[str, str], triple: Sequence[float | None], error: float | None, span: float,
+               unit: str) -> str | None:  # fmt: skip
+        """Reason why the error of a peak is unknown, or wide (above `WIDE_ERROR` times `span`); otherwise None.
+
+        part : (group, name) of the part; triple : peak at half, one and twice the resolution; span : range of the
+        signal; unit : unit of all values
+        """
+        if error is None:
+            return self.unknown.get(part) or stopped_runs_text(self.case, self.runs)
+        if error <= WIDE_ERROR * span:
+            return None
+        return "; ".join(self.shared) or difference_text(triple, error, unit, self.case)
+
+
+def unknown_parts(case: Any) -> dict[Part, str]:
+    """Parts with unknown errors of their peaks : (group, name) of a part -> reason.
+
+    With a short pulse in a schedule (`brief_pulses`) these are all parts. Otherwise they are the pipes of `short_pipes`
+    and those with a single cell, and their end nodes.
+    """
+    reasons: dict[Part, str] = {}
+    if pulses := brief_pulses(case):
+        text = (
+            f"{listing(pulses, MAX_NAMES)} {'change' if len(pulses) > 1 else 'changes'} in both directions within the "
+            "travel time of a cell; use more cells"
+        )
+        reasons = {(group, name): text for group in ("nodes", "links") for name in getattr(case, group)}
+    texts = {name: f"a wave crosses {name} faster than a cell of {neighbour}; set links.{neighbour}.cells = {cells}"
+             for name, (neighbour, cells) in short_pipes(case).items()}  # fmt: skip
+    half = scaled(cell_counts(case), 0.5)
+    for name, pipe in pipes_with_cells(case).items():
+        if half[f"links.{name}.cells"] == (pipe.cells,):  # no coarser cells
+            texts[name] = f"{name} has a single cell; set links.{name}.cells = {MIN_CELLS}"
+    for name, text in texts.items():
+        link = case.links[name]
+        for part in (("links", name), ("nodes", link.from_), ("nodes", link.to)):
+            reasons.setdefault(part, text)
+    return reasons
+
+
+def stopped_runs_text(case: Any, runs: dict[float, Any]) -> str:
+    """Reason why runs at other resolutions give no value of a peak; runs : factor of resolution -> result."""
+    ended = [f"{times:g} times the resolution: {run.reason}" for times, run in runs.items() if run.reason != "finished"]
+    if len(runs) == 1:
+        files = listing(basins_from_files(case), MAX_NAMES)
+        return (f"the cells of {files} come from a file, so there is no run at another resolution; run the case with a "
+                "file of finer cells, and compare both runs with fvsolve compare")  # fmt: skip
+    return "; ".join(ended) or "at another resolution the peak is not a number; use more cells or shorter steps"
+
+
+def difference_text(triple: Sequence[float | None], error: float, unit: str, case: Any) -> str:
+    """Reason of a wide error of the middle of three values from coarse to fine, with a remedy; unit : of the values."""
+    remedy = "more cells" if cell_counts(case) else "shorter steps"
+    peaks = [peak for peak in triple if peak is not None]
+    steps = np.diff(peaks)
+    if np.abs(steps).max() < SMALL_DIFFERENCE * error:
+        return f"another peak of the signal, or a moving peak, may exceed the computed peak; use {remedy}"
+    steps_text = " and ".join(f"{abs(peak):.2g}" for peak in steps)
+    if len(steps) == 1:
+        return f"a difference of {steps_text} {unit} between the only two resolutions; use {remedy}"
+    falls = steps[0] * steps[1] > 0.0 and abs(steps[1]) < 0.6 * abs(steps[0])
+    order = "decrease, but are large" if falls else "show no order of convergence"
+    return f"differences of {steps_text} {unit} between resolutions {order}; use {remedy}"
+
+
+def has_separation(runs: dict[float, Any]) -> bool:
+    """True if column separation occurred in a run."""
+    return any(run.summary["cavities"] for run in runs.values())
+
+
+def coarse_pipes_at_devices(case: Any) -> list[str]:
+    """Texts, at most `MAX_NAMES`, on pipes with too few cells next to a check valve or accumulator."""
+    pipes, devices = pipes_with_cells(case), answering_parts(case)
+    texts = [
+        f"{name} has {pipe.cells} cell{'' if pipe.cells == 1 else 's'} beside {listing(devices[name], MAX_NAMES)}; "
+        f"set links.{name}.cells = {LEAST_CELLS}"
+        for name, pipe in pipes.items()
+        if pipe.cells < LEAST_CELLS and devices[name]
+    ]
+    return texts[:MAX_NAMES]
+
+
+def differing_events(runs: dict[float, Any]) -> list[str]:
+    """List with a text on the devices whose numbers of events differ between resolutions, or an empty list."""
+    finished = [runs[times] for times in sorted(runs) if runs[times].reason == "finished"]
+    counts = [Counter(event["name"] for event in run.summary["events"]) for run in finished]
+    names = sorted(set().union(*counts)) if len(finished) > 1 else []
+    by_device = {name: [event[name] for event in counts] for name in names}
+    texts = [f"{name} ({', '.join(map(str, values))})" for name, values in by_device.items() if len(set(values)) > 1]
+    return [f"numbers of events differ between resolutions: {listing(texts, MAX_NAMES)}"] if texts else []
+
+
+# errors of peaks and margins -----------------------------------------------------------------------------------------
 
 
 def peak_errors(result: Result, case: Any, progress: Callable[[str], None] | None = None) -> dict[str, Any]:
@@ -130,10 +310,7 @@ def accepts_probes(case: Any, texts: list[str]) -> bool:
 
 
 def peak_rows(result: Result, runs: dict[float, Result], unresolved: Unresolved) -> dict[str, Any]:
-    """Entry `peaks` of a summary, as in `peak_errors`: unit, least and greatest value of each probe, with their errors.
-
-    result : result of the case
-    """
+    """Entry `peaks` of the summary of `result`, as in `peak_errors`: unit, extremes of each probe, and their errors."""
     summary, largest, rows = result.summary, {"rad": 1.0}, {}
     parts = {probe.text: (probe.part, probe.name) for probe in unresolved.case.probes}
     for extreme in summary["extremes"].values():
@@ -174,18 +351,12 @@ def error_bound(runs: dict[float, Result], triple: Sequence[float | None], place
 
 
 def usable(signals_of_place: Sequence) -> bool:
-    """True if there are at least two signals and all values are finite.
-
-    signals_of_place : signals (times, values) of one place at several resolutions
-    """
+    """True if a place has two or more signals (times, values) and all values are finite."""
     return len(signals_of_place) > 1 and all(len(v) > 0 and bool(np.isfinite(v).all()) for _, v in signals_of_place)
 
 
 def signals(runs: dict[float, Result], probe: str, rising: Callable[[np.ndarray], np.ndarray]) -> list:
-    """Signals (times [s], rising(values)) of a probe, from all finished runs that recorded it, coarsest first.
-
-    rising : function that converts the values so that the peak is a maximum
-    """
+    """Signals (times [s], rising(values)) of a probe in finished runs, coarse first; `rising` turns peaks to maxima."""
     finished = [runs[times] for times in sorted(runs) if runs[times].reason == "finished"]
     return [(run.seconds, rising(run[probe])) for run in finished if probe in run.units]
 
@@ -193,8 +364,7 @@ def signals(runs: dict[float, Result], probe: str, rising: Callable[[np.ndarray]
 def limit_row(runs: dict[float, Result], limit: int, k: int, row: dict[str, Any], unresolved: Unresolved) -> dict:
     """Row of a limit with its error. A limit that holds becomes open if the error is unknown or above the margin.
 
-    limit, k : indices of the limit and of the row in these
-    results; row : row of `run.verdicts.places`
+    limit, k : indices of the limit and of the row in these results; row : row of `run.verdicts.places`
     """
     sign, magnitude = SIGNS[row["bound"]], row["quantity"] in MAGNITUDES
     triple = values_of_runs(runs, lambda run: run.places[limit][k]["margin"], -1.0)
@@ -228,10 +398,7 @@ def expectation_error(runs: dict[float, Result], expect: Any, k: int, peak_rows:
 
 
 def values_of_runs(runs: dict[float, Result], of: Callable, sign: float = 1.0) -> tuple[float | None, ...]:
-    """Values at half, one and twice the resolution, times `sign`; None for a missing or unfinished run.
-
-    of : function of a result that returns the value, or None
-    """
+    """Values of(run) at half, one and twice the resolution, times `sign`; None for a missing or unfinished run."""
     results = [of(runs[times]) if times in runs and runs[times].reason == "finished" else None for times in LEVELS]
     return tuple(None if value is None else sign * value for value in results)
 
@@ -282,3 +449,135 @@ def description(runs: dict[float, Result], case: Any) -> str:
     if 0.5 not in runs:
         text += "; half the resolution is not possible (patches would begin within cells), so no order is assumed"
     return text
+
+
+# error bounds from local maxima --------------------------------------------------------------------------------------
+
+SAFETY = 2.15  # factor on remainders
+QUICK, SLOW = 0.25, 0.6  # ratios of differences at order 2, and at the least order that is accepted
+GROWTH = 2.0  # greatest factor for differences that grow
+OTHER_PLACES = 0.6  # factor on remainders of places other than that of the greatest value
+MEAN_FRACTION = 0.2  # fraction of the mean difference of all maxima
+MAX_MOVED = 16.0  # limit of the two further terms, in differences of the greatest value
+CONVERGED, TRUSTED = (0.35, 0.75), (0.5, 1.0)  # ratios of mean differences of signals -> factor on the bound
+MINIMUM_SAFETY = 1.6  # factor on the remainder by that ratio
+RISE = 0.002  # drop between two separate maxima, as a fraction of the range of a signal
+
+Signal = tuple[np.ndarray, np.ndarray]  # times and values
+
+
+def greatest_error(places: Sequence[Sequence[Signal]], triple: Sequence[float], believed: bool = True) -> float:
+    """Error bound of the greatest value of several signals at the middle of three resolutions, or the first of two.
+
+    places : for each place in the network, its signals (times, values) at two or three increasing resolutions
+    triple : greatest value over all places and steps at each resolution; believed : False if no order of convergence
+    may be assumed
+    """
+    own_maxima, maxima = three_values(np.array([triple], float)), [local_maxima(signals) for signals in places]
+    if not places:
+        return error_of_maxima(own_maxima, remainders(own_maxima, believed))
+    k = int(np.argmax([np.max(signals[-2][1]) for signals in places]))
+    rows = [own_maxima, *(values[np.isfinite(values).all(axis=1)] for _, values in maxima)]
+    factors = [1.0 if j in (0, k + 1) else OTHER_PLACES for j in range(len(rows))]
+    bounds = [remainders(values, believed) * factor for values, factor in zip(rows, factors, strict=True)]
+    error = error_of_maxima(np.vstack(rows), np.concatenate(bounds))
+    (cuts, _), (middle, fine), most = maxima[k], places[k][-2:], float(np.max(np.abs(np.diff(own_maxima))))
+    moved = 0.0  # greatest difference of both signals at the times of their greatest values
+    if greatest_segment(cuts, middle) == greatest_segment(cuts, fine):
+        times = [signal[0][np.argmax(signal[1])] for signal in (middle, fine)]
+        moved = float(np.max(np.abs(np.interp(times, *fine) - np.interp(times, *middle))))
+    mean = MEAN_FRACTION * float(np.mean(np.max(np.abs(np.diff(rows[k + 1], axis=1)), axis=1, initial=0.0)))
+    ratio = convergence_ratio(places[k])
+    error *= float(np.interp(ratio, CONVERGED, TRUSTED))
+    least = MINIMUM_SAFETY * remainder_by_ratio(ratio, own_maxima[0])
+    return max(error, min(max(moved, mean), MAX_MOVED * most), least)
+
+
+def three_values(maxima: np.ndarray) -> np.ndarray:
+    """Values at three resolutions : float64[maxima, 3]; from two columns, a coarser one is extrapolated linearly.
+
+    maxima : float64[maxima, 2 or 3], values of local maxima at increasing resolutions
+    """
+    return maxima if maxima.shape[1] == 3 else np.column_stack([2.0 * maxima[:, 0] - maxima[:, 1], maxima])
+
+
+def greatest_segment(cuts: np.ndarray, signal: Signal) -> int:
+    """Index of the local maximum at which a signal is greatest; cuts : separating times, as from `local_maxima`."""
+    return int(np.searchsorted(cuts, signal[0][np.argmax(signal[1])]))
+
+
+def local_maxima(signals: Sequence[Signal]) -> tuple[np.ndarray, np.ndarray]:
+    """Local maxima of a signal; signals : (times, values) of this signal at two or three increasing resolutions.
+
+    Returns (times that separate the local maxima of the finest signal, greatest values between these times :
+    float64[maxima, 3]). The columns of the values are as from `three_values`; values are not finite in rows where a
+    signal has no point between these times.
+    """
+    t, v = signals[-1]
+    cuts = t[troughs(v, RISE * float(np.ptp(v)))]
+    greatest = np.full((len(cuts) + 1, len(signals)), -np.inf)
+    for k, (times, values) in enumerate(signals):
+        np.maximum.at(greatest[:, k], np.searchsorted(cuts, times), values)
+    return cuts, three_values(greatest)
+
+
+def troughs(values: np.ndarray, rise: float) -> list[int]:
+    """Indices of the least values between successive maxima, both of which are higher by more than `rise`."""
+    turns = np.concatenate([[0], 1 + np.flatnonzero(np.diff(np.sign(np.diff(values)))), [len(values) - 1]])
+    positions, rising, high, low = [], True, 0, 0
+    for i in turns.tolist():
+        if rising and values[i] < values[high] - rise:
+            rising, low = False, i
+        elif not rising and values[i] > values[low] + rise:
+            positions.append(low)
+            rising, high = True, i
+        high, low = (i if values[i] > values[high] else high), (i if values[i] < values[low] else low)
+    return positions
+
+
+def error_of_maxima(maxima: np.ndarray, off: np.ndarray) -> float:
+    """Error bound of the greatest of several local maxima at the middle resolution.
+
+    maxima : float64[maxima, 3]; off : float64[maxima]  bounds of the changes of the middle values, from `remainders`
+    """
+    c, m, f = maxima.T
+    sways, most = (m - c) * (f - m) < 0.0, float(np.max(m))
+    above = float(np.max(np.where((f >= m) | sways, m + off, m)))
+    below = float(np.max(np.where((f <= m) | sways, m - off, m)))
+    return max(above - most, most - below)
+
+
+def remainders(triples: np.ndarray, believed: bool = True) -> np.ndarray:
+    """Bounds of the changes of the middle values by all finer resolutions : float64[values].
+
+    triples : float64[values, 3]  at three resolutions; believed : False if no order of convergence may be assumed
+    """
+    first, second = np.diff(triples, axis=1).T
+    a, b, sways = np.abs(first), np.abs(second), first * second < 0.0
+    ratio = np.divide(b, a, out=np.where(b > 0.0, np.inf, 0.0), where=a > 0.0)
+    r = np.clip(ratio, QUICK, SLOW) if believed else np.full(len(a), SLOW)
+    rest = SAFETY * np.maximum(b, a * r) / (1.0 - np.where(sways, SLOW, r))
+    return rest * np.where(sways, 1.0, np.clip(ratio, 1.0, GROWTH))
+
+
+def remainder_by_ratio(ratio: float, values: np.ndarray) -> float:
+    """Bound of the change of the middle value by all finer resolutions, without a safety factor.
+
+    values : float64[3]  at three resolutions; ratio : ratio of differences, used if larger than that of the values
+    """
+    a, b = np.abs(np.diff(values)).tolist()
+    r = min(max(b / a if a > 0.0 else 0.0, ratio, QUICK), SLOW)
+    return max(b, a * r) / (1.0 - r)
+
+
+def convergence_ratio(signals: Sequence[Signal]) -> float:
+    """Mean difference between the two finest of three signals, divided by that between the two coarsest.
+
+    It is `SLOW` for two signals, and if the two coarsest are equal. signals : (times, values), coarsest first
+    """
+    if len(signals) < 3:
+        return SLOW
+    t = signals[-1][0]
+    coarse, middle, fine = (np.interp(t, *signal) for signal in signals)
+    before = float(np.mean(np.abs(middle - coarse)))
+    return float(np.mean(np.abs(fine - middle))) / before if before > 0.0 else SLOW

@@ -202,10 +202,7 @@ def exact_reference(case) -> Reference:
 
 
 def reference_of_solution(solution: room.Solution, kind: str, words: str) -> Reference:
-    """Reference from a solution, evaluated on the cells and at the times of runs; the values are cached.
-
-    kind, words : as in `Reference`
-    """
+    """Reference from a solution, evaluated (and cached) on cells and times of runs; kind, words : as in `Reference`."""
     cells, times = {}, {}
 
     def fields_of(model) -> dict:
@@ -304,10 +301,7 @@ def alternative_method(explicit: bool, judged: str) -> str:
 
 
 def run_text(case, scheme: str, cells, method: str, control: str, size: float) -> str:
-    """Description of a run, such as "upwind5 on 800 cells with rk4 at courant 0.8".
-
-    cells : numbers of cells as from `cell_counts`; control : "courant", "step" or "rtol"; size : value of `control`
-    """
+    """Description such as "upwind5 on 800 cells with rk4 at courant 0.8"; cells : as from `cell_counts`."""
     where = f"{scheme} on {total_cells(case, cells)} cells with " if cells else ""
     return f"{where}{method} at {control} {size:.4g}"
 
@@ -328,10 +322,7 @@ def _is_characteristic(case, keys: dict) -> bool:
 
 
 def reference_of_refinements(words: str, runs: Sequence[Outcome]) -> Reference:
-    """Reference from the last and finest of three runs; its own error is extrapolated from their differences.
-
-    words : description of the reference
-    """
+    """Reference `words` from the finest of three runs; its own error is extrapolated from their differences."""
     coarse, middle, fine = runs
     fine_reference, middle_reference = reference_of_run(fine, words), reference_of_run(middle, words)
     coarse_errors, fine_errors = error_norms(coarse, middle_reference), error_norms(middle, fine_reference)

@@ -147,10 +147,7 @@ def most_cells(cells_by_key: Counts) -> int:
 
 
 def cell_size(case, key: str, numbers: tuple[int, ...]) -> float:
-    """Cell size of a pipe [m], or the greater of the mean cell sizes along the sides of a basin [m].
-
-    key, numbers : as for `part_cells`
-    """
+    """Cell size of a pipe [m], or the greater mean size along a side of a basin; arguments as for `part_cells`."""
     table, name, _ = key.split(".")
     lengths = (case.links[name].length,) if table == "links" else case.nodes[name].size
     return max(length / n for length, n in zip(lengths, numbers, strict=True))
@@ -202,10 +199,7 @@ def order_varies(case) -> bool:
 
 
 def has_initial_jump(case, coarse: Mapping, fine: Mapping) -> bool:
-    """True if a basin starts with a jump: differences between neighbouring cells hardly decrease on finer cells.
-
-    coarse, fine : overrides that set the numbers of cells
-    """
+    """True if a basin starts with a jump: differences of neighbours hardly fall from `coarse` to `fine` (overrides)."""
     if not any(basin.start or getattr(basin, "scalars", {}) for basin in basins(case).values()):
         return False
     steps = [initial_steps(study_model(case, cells)) for cells in (coarse, fine)]

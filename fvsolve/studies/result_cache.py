@@ -76,10 +76,7 @@ class ResultCache:
         return self.lookup(case_key(case, extra))
 
     def lookup(self, key: str) -> dict | None:
-        """Stored result with the hash `key` of a case and settings, or None.
-
-        A result of an earlier study is also counted as reused.
-        """
+        """Stored result with the hash `key`, or None; a result of an earlier study also counts as reused."""
         known = self.results.get(key)
         if known is not None and key not in self.new_keys:
             self.reused_keys.add(key)

@@ -49,10 +49,6 @@ class Column:
         """Header of the column in files."""
         return self.header or self.key
 
-    def formatted(self, row: Mapping) -> str:
-        """Text of the value of this column in a row, for a terminal."""
-        return self.words(row) if callable(self.words) else cell_text(row.get(self.key), self.words)
-
 
 @dataclass(frozen=True)
 class ResultTable:
@@ -77,7 +73,8 @@ class ResultTable:
     def words(self) -> tuple[list[str], list[list[str]]]:
         """Headers and rows as text for a terminal."""
         heads = [column.head or column.title for column in self.columns]
-        return heads, [[column.formatted(row) for column in self.columns] for row in self.rows]
+        return heads, [[column.words(row) if callable(column.words) else cell_text(row.get(column.key), column.words)
+                        for column in self.columns] for row in self.rows]  # fmt: skip
 
 
 def columns(**titles: str) -> tuple[Column, ...]:

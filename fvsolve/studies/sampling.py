@@ -38,23 +38,17 @@ def sample_points(case: Case, vary: Mapping[str, Sequence[Any]], sample: str, se
     seed : equal seeds give equal points
     Raises FvsolveError for an invalid `sample`, CaseError for invalid ranges.
     """
-    kind, count = parse_sample(sample)
-    low, high = (np.array(side) for side in zip(*key_ranges(case, vary).values(), strict=True))
-    from scipy.stats import qmc
-
-    make = qmc.LatinHypercube if kind == "lhs" else qmc.Sobol
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # warnings on sample sizes that are not powers of two
-        unit = make(len(vary), seed=np.random.default_rng(seed)).random(count)
-    return [dict(zip(vary, row, strict=True)) for row in (low + (high - low) * unit).tolist()]
-
-
-def parse_sample(sample: str) -> tuple[str, int]:
-    """Parse a sample such as `sobol:64` into kind and number of points. Raises FvsolveError."""
     match = re.fullmatch(r"(\w+):(\d+)", sample.strip())
     if match is None or match[1] not in SAMPLERS or not 0 < int(match[2]) <= MAX_RUNS:
         raise FvsolveError(f"sample = {show(sample)} is not valid. Expected {SAMPLE_FORMAT}")
-    return match[1], int(match[2])
+    low, high = (np.array(side) for side in zip(*key_ranges(case, vary).values(), strict=True))
+    from scipy.stats import qmc
+
+    make = qmc.LatinHypercube if match[1] == "lhs" else qmc.Sobol
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # warnings on sample sizes that are not powers of two
+        unit = make(len(vary), seed=np.random.default_rng(seed)).random(int(match[2]))
+    return [dict(zip(vary, row, strict=True)) for row in (low + (high - low) * unit).tolist()]
 
 
 def key_ranges(case: Case, vary: Mapping[str, Sequence[Any]]) -> dict[str, tuple[float, float]]:
@@ -183,10 +177,7 @@ class Heading:
         return cls(name, unit, quantity)
 
     def read(self, cell: str, place: str, faults: list[str]) -> Any:
-        """Value of a cell of the file, in the form of an override; faults of the cell are added to `faults`.
-
-        place : name of the cell in messages
-        """
+        """Value of a cell of the file as an override; faults, with the name `place` of the cell, go to `faults`."""
         value = number(cell)
         if not cell:
             faults.append(f"{place}: is empty. Expected a value in every row")

@@ -1,6 +1,7 @@
 """Scenario study: a file with named sets of overrides of a case, runs of all combinations, and limit verdicts."""
 
 import csv
+import itertools
 import json
 import os
 import tomllib
@@ -133,10 +134,7 @@ def case_path(case: Any, folder: Path, fault: AddFault) -> Path | None:
 
 
 def read_overrides(table: Any, group: str, fault) -> dict[str, dict[str, Any]]:
-    """Overrides of the events or protections in a table of the file : name -> {dotted key: value}; adds faults.
-
-    group : "events" or "protections"; fault : fault(keys, message) records a fault
-    """
+    """Overrides of a group, "events" or "protections" : name -> {dotted key: value}; adds faults by fault()."""
     if not isinstance(table, dict):
         fault((group,), f"{show(table)} is not a table. Expected named tables, [{group}.NAME]")
         return {}
@@ -175,24 +173,13 @@ def dotted_path(*keys: str) -> str:
 def all_conflicts(events: dict, protections: dict) -> Iterator[tuple[str, str, str, str]]:
     """Yield (event, protection, key of the event, key of the protection) for each pair of overrides in conflict.
 
-    They are in conflict as in `conflicting_keys`.
+    Keys are in conflict if they are equal with different values, or if one of them contains the other.
     """
-    for event, of_event in events.items():
-        for protection, of_protection in protections.items():
-            for keys in conflicting_keys(of_event, of_protection):
-                yield event, protection, *keys
-
-
-def conflicting_keys(first: dict[str, Any], second: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yield (key of `first`, key of `second`) for keys that are equal, or one of which contains the other.
-
-    Equal keys with equal values are left out.
-    """
-    for key in first:
-        for other_key in second:
+    for (event, of_event), (protection, of_protection) in itertools.product(events.items(), protections.items()):
+        for key, other_key in itertools.product(of_event, of_protection):
             a, b = split_key(key), split_key(other_key)
-            if a[: len(b)] == b[: len(a)] and not (a == b and first[key] == second[other_key]):
-                yield key, other_key
+            if a[: len(b)] == b[: len(a)] and not (a == b and of_event[key] == of_protection[other_key]):
+                yield event, protection, key, other_key
 
 
 def run_faults(design: Scenarios, fault: AddFault) -> None:

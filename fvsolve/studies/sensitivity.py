@@ -66,17 +66,10 @@ class Sensitivity(Displayable, PlainData):
 
 @validated(vary=VARY, outcome=TEXT, samples=COUNT, seed=COUNT_FROM_ZERO, out=PATH, **STUDY_ARGUMENTS)
 def sensitivity(
-    case,
-    vary: Mapping[str, Sequence[Any]],
-    outcome: str | None = None,
-    samples: int = 64,
-    seed: int = 0,
-    set: Mapping[str, Any] | None = None,
-    jobs: int = 1,
-    dask: str | None = None,
-    out: str | Path | None = None,
+    case, vary: Mapping[str, Sequence[Any]], outcome: str | None = None, samples: int = 64, seed: int = 0,
+    set: Mapping[str, Any] | None = None, jobs: int = 1, dask: str | None = None, out: str | Path | None = None,
     progress: Callable[[int, int, str], None] | None = None,
-) -> Sensitivity:
+) -> Sensitivity:  # fmt: skip
     """Compute Sobol and Morris indices of an outcome, such as "max(gate.pressure)", over the ranges of keys.
 
     case : as for `run`, or a function of a dict key -> number; vary : key -> (low, high)
@@ -126,9 +119,10 @@ def sample_points(bounds: Mapping[str, tuple[float, float]], samples: int, seed:
     bounds : key -> (low, high); samples : base sample size of Sobol; seed : equal seeds give equal points
     Raises FvsolveError if SALib is not installed.
     """
-    _require_salib()
-    from SALib.sample import morris, sobol
-
+    try:
+        from SALib.sample import morris, sobol
+    except ImportError:
+        raise FvsolveError('sensitivity needs the package SALib: pip install "fvsolve[study]"') from None
     problem = salib_problem(bounds)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # warnings on sample sizes that are not powers of two
@@ -158,10 +152,3 @@ def analyse_values(bounds, sobol_points, sobol_values, morris_points, morris_val
 def salib_problem(bounds: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
     """Problem definition for SALib; bounds : key -> (low, high)."""
     return {"num_vars": len(bounds), "names": [*bounds], "bounds": [list(limits) for limits in bounds.values()]}
-
-
-def _require_salib() -> None:
-    try:
-        import SALib  # noqa: F401
-    except ImportError:
-        raise FvsolveError('sensitivity needs the package SALib: pip install "fvsolve[study]"') from None

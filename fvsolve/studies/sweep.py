@@ -169,10 +169,7 @@ class Sweep(Displayable):
         return self.columns[len(self.keys) + len(FIRST_COLUMNS) : -len(LAST_COLUMNS)]
 
     def outcome(self, name: str) -> str:
-        """Name of the column of the outcome `name`, which is given with or without its unit.
-
-        Raises FvsolveError for an unknown outcome.
-        """
+        """Column of the outcome `name`, given with or without its unit. Raises FvsolveError for an unknown outcome."""
         by_name = {column.partition(" [")[0]: column for column in self.outcomes}
         if name not in by_name and name not in by_name.values():
             hint = did_you_mean(name, by_name) or f". Outcomes are {listing(by_name) or 'none'}"
@@ -228,17 +225,11 @@ POINTS = Kind(
 
 @validated(vary=VARY, out=PATH, points=POINTS, sample=TEXT, seed=COUNT_FROM_ZERO, **STUDY_ARGUMENTS)
 def sweep(
-    case,
-    vary: Mapping[str, Sequence[Any]] | None = None,
-    set: Mapping[str, Any] | None = None,
-    jobs: int = 1,
-    out: str | Path | None = None,
-    progress: Callable[[int, int, str], None] | None = None,
-    points: str | Path | Sequence[Mapping[str, Any]] | None = None,
-    sample: str | None = None,
-    seed: int = 0,
+    case, vary: Mapping[str, Sequence[Any]] | None = None, set: Mapping[str, Any] | None = None, jobs: int = 1,
+    out: str | Path | None = None, progress: Callable[[int, int, str], None] | None = None,
+    points: str | Path | Sequence[Mapping[str, Any]] | None = None, sample: str | None = None, seed: int = 0,
     dask: str | None = None,
-) -> Sweep:
+) -> Sweep:  # fmt: skip
     """Run a case once for every combination of the values of `vary`, `jobs` runs at a time.
 
     `case` is a path, a dict shaped like the file or a `Case`; `set` are overrides of all runs. With `sample`,

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 import fvsolve
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.studies.accuracy.model_hierarchy import ladder
-from fvsolve.studies.failure.failure_map import failure_map
+from fvsolve.studies.failure_map import failure_map
 
 PLANE = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.9}
 

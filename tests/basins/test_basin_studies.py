@@ -21,8 +21,8 @@ from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.studies.accuracy.chart import chart
 from fvsolve.studies.accuracy.order import order
 from fvsolve.studies.accuracy.refine import refinement_plan, resolutions
-from fvsolve.studies.energy.energy_balance import energy
-from fvsolve.studies.linear.linearise import linearise
+from fvsolve.studies.energy_balance import energy
+from fvsolve.studies.linearise import linearise
 from fvsolve.studies.peak_error import description
 from fvsolve.studies.resolution import cell_counts, cell_keys_of, project_to, scaled
 from fvsolve.studies.stability.stability import stability

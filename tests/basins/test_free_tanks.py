@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from fvsolve import advance, build, load, run
 from fvsolve.model.model import State
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 LENGTH, DEPTH = 2.0, 0.1
 

@@ -17,7 +17,7 @@ from fvsolve.errors import CaseError
 from fvsolve.mesh import rectangle
 from fvsolve.mesh.mesh import assemble, edges_of
 from fvsolve.model.model import State
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 SIDES = {"west": (0, 0.0), "east": (0, 1.0), "south": (1, 0.0), "north": (1, 1.0)}
 STEPPED = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2"}

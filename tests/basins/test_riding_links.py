@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 import fvsolve as fv
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 SOLID = {"type": "body", "mass": 1.0, "inertia": [1.0, 1.0, 1.0]}
 SIZE, CELLS, LEVEL = (2.0, 1.0), (8, 4), 0.4

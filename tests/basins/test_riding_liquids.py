@@ -15,7 +15,7 @@ from scipy.special import j0
 from fvsolve import advance, build, load, run
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.model.model import State
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 HEAVY = {"type": "body", "mass": 10.0, "inertia": [1.0, 1.0, 1.0]}
 TILT = {"roll": "30 deg", "pitch": "-70 deg", "yaw": "25 deg"}

@@ -16,7 +16,7 @@ from fvsolve.case import sloshing
 from fvsolve.errors import CaseError
 from fvsolve.model.model import State
 from fvsolve.studies import linearise
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 SIDE, DEPTH = 2.0, 0.8
 BOX = sloshing.Outline((SIDE, 1.0), np.zeros(2), False)

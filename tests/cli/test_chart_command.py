@@ -1,7 +1,5 @@
 """`fvsolve chart`: output, files and refused arguments."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re

@@ -1,7 +1,5 @@
 """Command line: tables for readers, JSON for programs, messages and exit codes, never a traceback."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

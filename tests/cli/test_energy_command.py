@@ -1,79 +1,50 @@
 """`fvsolve energy`: output, files, JSON and errors; ordinary runs import none of its modules."""
 
-from __future__ import annotations
-
 import csv
 import json
 import signal
 import subprocess
 import sys
 import time
+from functools import partial
 
 import numpy as np
 import pytest
 from reference import folders
+from reference.scenes import WATER, chamber, junction, lake, pipe, reservoir, scene, tank, valve
 
-from fvsolve.cli import main
+from fvsolve.case.text import write
 
-CASE = """
-schema = 1
-[fluid]
-name = "user"
-density = 1000.0
-bulk_modulus = 2.2e9
-viscosity = 1e-3
-vapor_pressure = 2300.0
-[nodes.lake]
-type = "reservoir"
-head = 50.0
-[nodes.gate]
-type = "junction"
-[nodes.air]
-type = "reservoir"
-pressure = "0 barg"
-[links.main]
-type = "pipe"
-from = "lake"
-to = "gate"
-length = "600 m"
-diameter = "300 mm"
-wave_speed = 1200.0
-friction = { model = "steady", factor = 0.02 }
-cells = 20
-[links.tap]
-type = "valve"
-from = "gate"
-to = "air"
-area = 0.002
-opening = { start = 0.1, duration = 0.5, value = [1.0, 0.2] }
-[numerics]
-end = 2.0
-scheme = "muscl"
-method = "ssp-rk3"
-courant = 0.8
-"""
+FLUID = {key: value for key, value in WATER.items() if key != "law"}
+
+
+def hammer() -> dict:
+    """Case of a main with friction whose valve closes to 20 %."""
+    nodes = {"lake": lake(50.0), "gate": junction(), "air": reservoir("0 barg")}
+    main = pipe("lake", "gate", 600.0, 0.3, 1200.0, 20, friction={"model": "steady", "factor": 0.02})
+    opening = {"start": 0.1, "duration": 0.5, "value": [1.0, 0.2]}
+    links = {"main": main, "tap": valve("gate", "air", 0.61 * 0.002, opening)}
+    return scene(nodes, links, 2.0, {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.8}, fluid=FLUID)
+
+
+def joined(one: dict, other: dict, area: float) -> dict:
+    """Case of two nodes that a valve joins, without output and numerics of its own."""
+    case = scene({"a": one, "b": other}, {"way": valve("a", "b", 0.61 * area)}, 20.0, {}, fluid=FLUID)
+    return {key: value for key, value in case.items() if key != "output"}
 
 
 @pytest.fixture
 def case(tmp_path):
     path = tmp_path / "hammer.toml"
-    path.write_text(CASE)
+    path.write_text(write(hammer()))
     return str(path)
 
 
 @pytest.fixture
-def told(monkeypatch, capsys, tmp_path):
+def told(monkeypatch, fvs, tmp_path):
     """Function that runs `fvsolve energy` in a temporary folder: (exit code, standard output, standard error)."""
     monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: str):
-        monkeypatch.setattr(sys, "argv", ["fvsolve", "energy", *arguments])
-        with pytest.raises(SystemExit) as left:
-            main()
-        said = capsys.readouterr()
-        return left.value.code or 0, said.out, said.err
-
-    return run
+    return partial(fvs, "energy")
 
 
 def test_the_ledger_is_printed_and_written_row_by_row(told, case, tmp_path):
@@ -150,30 +121,10 @@ def test_bad_input_is_named(told, case, arguments, fault):
     assert not out
 
 
-TANKS = """
-[fluid]
-name = "user"
-density = 1000.0
-bulk_modulus = 2.2e9
-viscosity = 1e-3
-vapor_pressure = 2300.0
-[nodes]
-a = { type = "tank", area = 2.0, level = 3.0 }
-b = { type = "tank", area = 0.7, level = 0.5 }
-[links.way]
-type = "valve"
-from = "a"
-to = "b"
-area = 0.01
-[numerics]
-end = 20.0
-"""
-
-
 @pytest.fixture
 def tanks(tmp_path):
     path = tmp_path / "tanks.toml"
-    path.write_text(TANKS)
+    path.write_text(write(joined(tank(2.0, 3.0), tank(0.7, 0.5), 0.01)))
     return str(path)
 
 
@@ -215,18 +166,9 @@ def test_a_case_without_ports_says_that_it_has_none(told, tanks):
     assert err.strip().endswith("Expected a reservoir, an inflow or a junction; the case has no such node")
 
 
-PLACES = {
-    '{ type = "tank", area = 2.0, level = 3.0 }': '{ type = "reservoir", pressure = "50 barg" }',
-    '{ type = "tank", area = 0.7, level = 0.5 }': '{ type = "chamber", volume = 0.02, initial_pressure = "5 barg" }',
-    "area = 0.01": "area = 1e-6",
-}
-
-
 def test_what_newton_leaves_is_told_beside_the_verdict(told, tmp_path):
-    text = TANKS
-    for old, new in PLACES.items():
-        text = text.replace(old, new)
-    (tmp_path / "pot.toml").write_text(text)
+    pot = chamber(0.02, "5 barg")
+    (tmp_path / "pot.toml").write_text(write(joined(reservoir("50 barg"), pot, 1e-6)))
     step = ["--set", "numerics.step=0.01"]
     code, out, _ = told("pot.toml", "--set", "numerics.method=radau-iia-5", "--set", "numerics.rtol=1e-3")
     assert code == 0

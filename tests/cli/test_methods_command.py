@@ -1,7 +1,5 @@
 """`fvsolve methods`: table, JSON, a single method with its picture, and errors."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """Observed orders of schemes and methods equal the theory, and `fvsolve order` prints and explains them."""
 
-from __future__ import annotations
-
 import csv
 import json
 

@@ -1,7 +1,5 @@
 """Printed numbers are in the units of `[output]`: for each command, the SI numbers converted."""
 
-from __future__ import annotations
-
 import re
 
 import pytest
@@ -11,15 +9,8 @@ from fvsolve.case import load
 from fvsolve.cli.linear_commands import output_unit
 from fvsolve.studies import response
 
-UNITS = {
-    "pressure": "bar",
-    "flow": "l/s",
-    "head": "mm",
-    "length": "km",
-    "energy": "kJ",
-    "time": "ms",
-    "velocity": "cm/s",
-}
+UNITS = {"pressure": "bar", "flow": "l/s", "head": "mm", "length": "km", "energy": "kJ", "time": "ms",
+         "velocity": "cm/s"}  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,5 @@
 """`fvsolve precompile` compiles everything that a run needs, or states the reason why it cannot."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -17,7 +17,7 @@ from fvsolve.fluid import properties
 from fvsolve.fluid.laws import MixtureLaw
 from fvsolve.kernels import density as law
 from fvsolve.kernels import dtypes as rec
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 OIL = {"name": "user", "density": 870.0, "bulk_modulus": 1.6e9, "viscosity": 0.04}
 MIXTURES = {

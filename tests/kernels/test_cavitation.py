@@ -16,7 +16,7 @@ import fvsolve
 from fvsolve.errors import CaseError
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.jacobian_pattern import jacobian_pattern
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 CASE = CASES / "adelaide.toml"
 WATER = {**scenes.WATER, "law": "mixture", "air_fraction": 1e-7, "cavitation": True}

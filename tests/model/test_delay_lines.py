@@ -422,7 +422,7 @@ def test_an_unknown_word_and_a_bad_share():
 
 
 def test_a_line_of_the_case_is_a_rung():
-    from fvsolve.studies.accuracy.model_levels import level_keys, level_names
+    from fvsolve.studies.accuracy.model_hierarchy import level_keys, level_names
 
     case = fvsolve.load(main(1.0) | {"numerics": {"end": 1.0}})
     assert "delay lines" in level_names(case) and level_keys(case, "delay lines") == {

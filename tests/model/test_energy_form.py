@@ -10,8 +10,8 @@ from reference.scenes import scene
 
 from fvsolve.model.energy_norm import energy_form, form_of
 from fvsolve.steppers import method_named, stability_function
-from fvsolve.studies.linear.linearise import linearise_at
-from fvsolve.studies.linear.operating_point import operating_point
+from fvsolve.studies.linearise import linearise_at
+from fvsolve.studies.operating_point import operating_point
 from fvsolve.studies.stability.growth import DenseGrowth, predicted_limit
 from fvsolve.studies.stability.stability import stability
 

@@ -14,7 +14,7 @@ import fvsolve
 from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.output.memory_sink import MemorySink
 from fvsolve.solve.solve import Run
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 TIGHT = {"method": "dormand-prince", "rtol": 1e-11}
 LENGTH, DIAMETER, BORE = 20.0, 0.1, area(0.1)

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 import fvsolve
 from fvsolve.model import RunData
 from fvsolve.model.jacobian_pattern import jacobian_pattern
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 LENGTH, DIAMETER = 200.0, 0.3
 INERTIA = RHO * LENGTH / area(DIAMETER)

@@ -28,7 +28,7 @@ from scipy.optimize import brentq
 
 import fvsolve
 from fvsolve.model import State
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 DIAMETER, FACTOR, HEIGHT, BORE, LOW = 0.2, 0.02, 5.0, 0.05, 1.6e5
 AREA = area(DIAMETER)

@@ -12,7 +12,7 @@ from reference.scenes import WATER, area, junction, reservoir, scene
 import fvsolve
 from fvsolve import exact
 from fvsolve.errors import CaseError
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 from fvsolve.studies.ports.response import response
 from fvsolve.studies.reference import initial_values
 

@@ -13,7 +13,7 @@ from fvsolve.errors import CaseError
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.build import build
 from fvsolve.solve import initial_state
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 MASS, LOW, TURN = 60e3, 0.8, 4e5  # hull: mass [kg], depth of its centre [m], inertia about it [kg m2]
 START = 0.15  # angle [rad]

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 import fvsolve
 from fvsolve.parts.outlet.law import FREE, LEAST_DROP, emitter_drop, emitter_flow, emitter_slope, emitter_step
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 TIGHT = {"method": "dormand-prince", "rtol": 1e-11}
 

@@ -15,7 +15,7 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 import fvsolve
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 ADAPTIVE = ("auto", "rodas-5p", "rodas-4", "radau-iia-5", "esdirk-4", "tr-bdf2", "dormand-prince", "bogacki-shampine")
 FIXED = ("rk4", "implicit-euler", "trapezoid", "implicit-midpoint")

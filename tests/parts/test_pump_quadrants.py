@@ -152,7 +152,7 @@ def test_head_and_torque_meet_at_both_ends_of_every_curve(given):
 
 
 def test_energy_is_never_made_while_it_runs_down_and_back():
-    from fvsolve.studies.energy.energy_balance import energy
+    from fvsolve.studies.energy_balance import energy
 
     found = energy(column(30.0, 8.0, ["pump.flow"], **SHAFT, trip=1.0))
     assert found.relative < 1e-7 and min(np.diff(found.dissipated["pump"])) > 0.0

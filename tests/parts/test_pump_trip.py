@@ -13,8 +13,8 @@ from scipy.optimize import brentq
 
 import fvsolve
 from fvsolve.parts.pump.suter_tables import suter_tables
-from fvsolve.studies.energy.energy_balance import energy
-from fvsolve.studies.linear.linearise import linearise
+from fvsolve.studies.energy_balance import energy
+from fvsolve.studies.linearise import linearise
 
 ONE = {"flow": [0.1], "head": [50.0]}
 OMEGA, INERTIA, EFFICIENCY = 150.0, 2.0, 0.8

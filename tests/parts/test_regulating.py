@@ -25,7 +25,7 @@ from reference.scenes import (
 
 import fvsolve
 from fvsolve.steady import union
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 BETA, TIME, BAND, SET = 2e7, 0.5, 1e5, 5e5
 FRICTION = {"model": "steady", "factor": 0.02}

@@ -11,7 +11,7 @@ from reference.scenes import RHO, SMOOTH, WATER, chamber, junction, lake, pipe, 
 from scipy.optimize import brentq
 
 import fvsolve
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 AMBIENT, BETA = 101325.0, 2e7
 SOFT = {**WATER, "bulk_modulus": BETA}

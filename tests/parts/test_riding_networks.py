@@ -9,7 +9,7 @@ from scipy.integrate import simpson, solve_ivp
 import fvsolve as fv
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.output.fields import read_series
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 HALF, DEPTH, LEVEL = 4.0, 1.5, 0.8  # half distance of arms, depth of the duct, level above the duct [m]
 TANK, BORE, LOSS = 1.2, 0.6, 3.0  # area of tanks [m2], bore of the duct [m], loss [-]

@@ -9,7 +9,7 @@ import pytest
 from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, area, junction, pipe, reservoir, scene, tank, valve
 
 import fvsolve
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 CDA, BURST, SECTION, FILL = 2e-3, 3.5e4, 0.5, 0.05
 

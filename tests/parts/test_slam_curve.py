@@ -7,7 +7,7 @@ import pytest
 from reference.scenes import RHO, WATER, area, junction, pipe, reservoir, scene
 
 import fvsolve
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 BORE, LENGTH = 0.2, 50.0
 RATES, VELOCITIES = [0.5, 2.0, 6.0], [0.02, 0.1, 0.5]

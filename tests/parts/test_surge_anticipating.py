@@ -10,7 +10,7 @@ from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, junction, pipe, reser
 from scipy.integrate import solve_ivp
 
 import fvsolve
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 OPENS, HOLD, SHUTS = 0.4, 1.5, 2.5
 TIGHT = {"method": "dormand-prince", "rtol": 1e-10}

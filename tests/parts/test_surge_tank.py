@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 import fvsolve
 from fvsolve.model.jacobian_pattern import jacobian_pattern
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 LENGTH, DIAMETER, FACTOR, SHAFT, THROAT = 2000.0, 3.0, 0.015, 80.0, 2.0
 TIGHT = {"method": "dormand-prince", "rtol": 1e-11}

@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import fvsolve
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 ALPHA, BETA, PUSH, BRAKE = 1.2, 0.008, 1800.0, 18.0
 D, INERTIA, HEAD, LENGTH, BORE = 1.5, 60e3, 80.0, 300.0, 2.25

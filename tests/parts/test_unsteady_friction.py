@@ -17,8 +17,8 @@ import fvsolve
 from fvsolve import exact
 from fvsolve.assembly import pipe_terms as unsteady_terms
 from fvsolve.errors import CaseError
-from fvsolve.studies.accuracy.model_levels import rigid_column
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.accuracy.model_hierarchy import rigid_column
+from fvsolve.studies.energy_balance import energy
 from fvsolve.studies.ports.response import response
 from fvsolve.studies.reference import initial_values
 

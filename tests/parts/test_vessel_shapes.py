@@ -12,7 +12,7 @@ from scipy.integrate import quad, solve_ivp
 import fvsolve
 from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.parts.accumulator import law_shape, law_vessel
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 TIGHT = {"method": "dormand-prince", "rtol": 1e-11}
 LENGTH, BORE = 20.0, area(0.1)

@@ -13,7 +13,7 @@ from reference.folders import CASES
 
 import fvsolve
 from fvsolve.fluid import properties
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy_balance import energy
 
 CASE = CASES / "hydraulic-drive.toml"
 BREAKS = (5e-3, 15e-3, 90e-3, 110e-3, 170e-3, 180e-3)

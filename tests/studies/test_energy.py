@@ -1,7 +1,5 @@
 """Energy balance against closed forms: supplied, stored and dissipated energy, and numerical loss."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -20,14 +18,17 @@ from reference.scenes import (
     ramp,
     reservoir,
     scene,
+    smooth_ramp,
     step,
     tank,
     valve,
 )
 from scipy.stats import binom
 
+import fvsolve
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.steppers import METHODS
+from fvsolve.studies.energy_balance import energy, measure_pairs
 
 BETA = WATER["bulk_modulus"]
 TIGHT = {"method": "dormand-prince", "rtol": 1e-11}
@@ -286,3 +287,312 @@ def test_a_port_that_is_none_is_named():
         energy(case, port="pumpp")
     with pytest.raises(FvsolveError, match="Expected a reservoir"):
         energy(case, port="pot")
+
+
+# ----------------------------------------------------------------------------------------------------------------------
+# The energy remainder falls at the order of scheme and method, for each density law and kind of method.
+
+
+def throttled(scheme: str, method: str, cells: int, law: str) -> dict:
+    """Case of a main with friction whose valve closes smoothly to 30 % in 3 s."""
+    nodes = {"lake": lake(50.0), "gate": junction(), "out": reservoir(AMBIENT)}
+    links = {"main": pipe("lake", "gate", 1000.0, 0.3, 1000.0, cells, friction=FRICTION)}
+    links["tap"] = valve("gate", "out", 0.002, smooth_ramp(0.0, 3.0, 1.0, 0.3))
+    fluid = {**WATER, "law": law}
+    return scene(nodes, links, 4.0, {"scheme": scheme, "method": method, "courant": 0.5}, fluid=fluid)
+
+
+def orders(remainders: list[float]) -> np.ndarray:
+    return np.log2(np.array(remainders[:-1]) / np.array(remainders[1:]))
+
+
+@pytest.mark.parametrize(
+    "scheme, method, order",
+    [
+        ("upwind", "euler", 1), ("upwind", "rk4", 1), ("central", "rk4", 2), ("linear-upwind", "ssp-rk3", 2),
+        ("fromm", "ssp-rk3", 3), ("muscl", "ssp-rk3", 3), ("upwind3", "ssp-rk3", 3), ("upwind3", "rk4", 3),
+        ("upwind5", "dormand-prince", 5), ("weno5", "dormand-prince", 5),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_with_cells_and_steps_the_remainder_falls_at_the_order_of_the_scheme(scheme, method, order, law):
+    """fromm and muscl gain an order: their second-order error moves waves but removes no energy.
+
+    Under the law log, energies are differences of m h, known to 1e-8 J here, which fifth order reaches at 160 cells.
+    """
+    counts = (40, 80) if law == "log" and order == 5 else (80, 160)
+    found = [energy(throttled(scheme, method, cells, law)) for cells in counts]
+    assert all(one.ok for one in found)
+    (measured,) = orders([float(np.abs(one.remainder).max()) for one in found])
+    assert measured == pytest.approx(order, abs=0.16 if counts[0] == 80 else 0.25)
+
+
+def swinging(method: str, h: float) -> dict:
+    """Case of two tanks and a rigid column with friction, without cells and without reversal of the flow."""
+    swell = {"time": [0.0, 20.0, 40.0], "value": [0.0, 0.05, 0.02], "kind": "smooth"}
+    nodes = {"a": tank(2.0, 5.0), "b": tank(3.0, 3.0), "spring": {"type": "inflow", "flow": swell}}
+    links = {"way": {"type": "rigid-column", "from": "a", "to": "b", "length": 50.0, "diameter": 0.5,
+                     "friction": FRICTION},
+             "sluice": valve("spring", "a", 1.0)}  # fmt: skip
+    return scene(nodes, links, 16.0, {"method": method, "step": h, "initial": "rest"})
+
+
+@pytest.mark.parametrize(
+    "method, order",
+    [
+        ("euler", 1), ("improved-euler", 2), ("ssp-rk3", 3), ("rk4", 4), ("dormand-prince", 5),
+        ("implicit-euler", 1), ("trapezoid", 2), ("tr-bdf2", 2), ("alexander-3", 3), ("esdirk-4", 4),
+        ("radau-iia-3", 3), ("radau-iia-5", 5), ("lobatto-iiic-4", 4), ("rodas-4", 4), ("rodas-5p", 5),
+    ],
+)  # fmt: skip
+def test_without_cells_the_remainder_falls_at_least_at_the_order_of_the_method(method, order):
+    steps = (1.0, 0.5, 0.25) if order > 1 else (0.5, 0.25, 0.125)
+    measured = orders([float(np.abs(energy(swinging(method, h)).remainder).max()) for h in steps])
+    assert measured[-1] > order - 0.25
+    assert measured[-1] < order + 1.4
+
+
+@pytest.mark.parametrize("law", ["log", "table"])
+def test_a_chamber_under_a_curved_law_stores_what_its_law_says(law):
+    """Energy of the chamber: V (beta (exp(p / beta) - 1) - p) stored under log; integral of h dm under table."""
+    fluid = {**WATER, "law": "log"} if law == "log" else {"name": "Water", "temperature": 293.15, "law": "table"}
+    volume, p0, p1 = 0.5, AMBIENT, AMBIENT + 4e7
+    nodes = {"pump": reservoir(p1), "pot": chamber(volume, p0)}
+    case = scene(nodes, {"hole": valve("pump", "pot", 2e-6)}, 36.0, {"method": "dormand-prince", "rtol": 1e-8},
+                 fluid=fluid)  # fmt: skip
+    found = energy(case)
+    if law == "log":
+        beta, p = WATER["bulk_modulus"], p1 - AMBIENT
+        grown = math.expm1(p / beta)
+        assert found.stored["pot"][-1] == pytest.approx(volume * (beta * grown - p), rel=1e-7)
+        assert found.supplied["pump"][-1] == pytest.approx(
+            volume * beta * grown * (1.0 - math.exp(-p / beta)), rel=1e-7
+        )
+    else:
+        from CoolProp.CoolProp import PropsSI
+
+        s = PropsSI("S", "T", 293.15, "P", AMBIENT, "Water")
+        grid = np.linspace(p0, p1, 2001)
+        rho = np.array([PropsSI("D", "S", s, "P", float(p), "Water") for p in grid])
+        h = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(grid) * (1 / rho[1:] + 1 / rho[:-1]))])
+        stored = volume * (rho[-1] * h[-1] - (p1 - p0))
+        assert found.stored["pot"][-1] == pytest.approx(stored, rel=1e-5)
+        assert found.supplied["pump"][-1] == pytest.approx(volume * (rho[-1] - rho[0]) * h[-1], rel=1e-5)
+    assert found.relative < 1e-7
+
+
+def test_the_linear_law_makes_energy_where_a_piston_moves_and_the_ledger_says_so():
+    """A piston under the linear law creates energy of order p / beta of the work; under log it creates none."""
+    nodes = {"ground": {"type": "frame"}, "load": {"type": "mass", "mass": 50.0, "initial_position": 0.1},
+             "pump": reservoir(AMBIENT + 2e7), "sump": reservoir(AMBIENT)}  # fmt: skip
+    links = {
+        "cyl": {"type": "cylinder", "ports": {"case": "ground", "rod": "load"}, "stroke": 0.5, "area_A": 1e-3,
+                "area_B": 1e-3, "dead_volume_A": 1e-5, "dead_volume_B": 1e-5, "leakage": 1e-12},
+        "in": valve("pump", "cyl.A", 1e-6), "away": valve("cyl.B", "sump", 1e-6),
+        "damper": {"type": "damper", "from": "ground", "to": "load", "damping": 2e5},
+    }  # fmt: skip
+    found = {}
+    for law in ("linear", "log"):
+        case = scene(nodes, links, 1.0, {"method": "radau-iia-5", "rtol": 1e-9}, fluid={**WATER, "law": law})
+        found[law] = energy(case)
+    work = found["log"].dissipated["damper"][-1]
+    assert not found["log"].law
+    assert found["log"].relative < 1e-7
+    law = abs(found["linear"].law["cyl"][-1])
+    assert 1e-4 < law / work < 2e7 / WATER["bulk_modulus"]
+    assert found["linear"].remainder[-1] == pytest.approx(found["linear"].law["cyl"][-1], rel=1e-4)
+    assert found["log"].dissipated["cyl leak"][-1] > 0.0
+
+
+def test_at_a_head_of_water_power_is_rho_g_h_q():
+    nodes = {"lake": lake(50.0), "out": reservoir(AMBIENT)}
+    case = scene(nodes, {"tap": valve("lake", "out", 0.01), "pot": valve("lake", "box", 1e-9)}, 1.0,
+                 {"method": "rk4", "step": 0.1})  # fmt: skip
+    case["nodes"]["box"] = chamber(0.1)
+    found = energy(case)
+    q = 0.01 * math.sqrt(2 * GRAVITY * 50.0)
+    assert found.supplied["lake"][-1] == pytest.approx(RHO * GRAVITY * 50.0 * q, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "method, end",
+    [(name, 150.0) for name in (*(method.name for method in METHODS.values() if method.adaptive), "auto")]
+    + [(name, 400.0) for name in ("dormand-prince", "rodas-4", "tr-bdf2", "auto")],
+)
+def test_what_a_draining_tank_loses_is_what_it_had(method, end):
+    """The level is a parabola in time, which methods of order two integrate exactly; the power in the drain is not."""
+    nodes, links = {"up": tank(2.0, 10.0), "out": reservoir(AMBIENT)}, {"drain": valve("up", "out", 0.01)}
+    found = energy(scene(nodes, links, end, {"method": method, "rtol": 1e-6}, ["up.level"]))
+    speed = 0.01 / 2.0 * math.sqrt(2.0 * GRAVITY)  # speed of the surface over the root of the level [m^0.5/s]
+    left = max(0.0, math.sqrt(10.0) - 0.5 * speed * end) ** 2
+    lost = RHO * GRAVITY * 2.0 * (10.0**2 - left**2) / 2.0
+    assert found.dissipated["drain"][-1] == pytest.approx(lost, rel=1e-2)
+
+
+# ----------------------------------------------------------------------------------------------------------------------
+# The residual of Newton's method has its own account: it is no supplied energy and no loss of schemes or steps.
+
+
+VOLUME, P0, P1 = 0.02, 5e5, 50e5  # pressures above ambient
+PER = VOLUME / WATER["bulk_modulus"]
+
+
+def filled(method: str, **numerics) -> dict:
+    """Case of a chamber that an orifice fills within 2 s and that then stays at zero drop."""
+    nodes = {"src": reservoir(AMBIENT + P1), "pot": chamber(VOLUME, AMBIENT + P0)}
+    return scene(nodes, {"hole": valve("src", "pot", 6e-7)}, 20.0, {"method": method, **numerics})
+
+
+@pytest.mark.parametrize("method", ["gauss-2", "gauss-4", "tr-bdf2", "radau-iia-5"])
+def test_a_chamber_that_has_filled_is_supplied_what_it_took_and_creates_nothing(method):
+    found = energy(filled(method, step=0.01))
+    assert found.supplied["src"][-1] == pytest.approx(PER * P1 * (P1 - P0), rel=1e-6)
+    assert found.stored["pot"][-1] == pytest.approx(0.5 * PER * (P1**2 - P0**2), rel=1e-6)
+    assert found.dissipated["hole"][-1] == pytest.approx(0.5 * PER * (P1 - P0) ** 2, rel=3e-5)
+    assert found.remainder == pytest.approx(found.step + found.newton, abs=1e-12 * found.throughput)
+    assert np.abs(found.newton).max() < 1e-12 * found.throughput
+    if method.startswith("gauss"):  # Gauss methods conserve squares, so the step loss is rounding
+        assert np.abs(found.step).max() < 1e-12 * found.throughput
+        assert found.verdict == "rounding"
+    elif method == "radau-iia-5":
+        assert found.verdict != "the numbers create energy"
+
+
+def test_what_newton_leaves_is_a_part_of_its_own_and_condemns_no_method():
+    """With rtol, Newton's method stops at a tolerance."""
+    case = fvsolve.load(filled("radau-iia-5", rtol=1e-3))
+    found = energy(case)
+    assert found.newton_counts
+    assert list(found.numerical()) == ["step", "newton", "remainder"]
+    assert found.plain()["newton_loss"] == found.newton[-1]
+    (row,) = measure_pairs(case, None, ["radau-iia-5"])
+    assert not row["creates"]
+    assert row["newton_loss"] == found.newton[-1]
+
+
+def test_beside_newton_gauss_leaves_rounding_in_a_network_of_pipes():
+    from fvsolve.case import shipped
+
+    found = energy(shipped.find("three-way-junction"), {"numerics.method": "gauss-4", "numerics.end": 1.0})
+    assert max(np.abs(found.newton).max(), np.abs(found.step).max()) < 1e-13 * found.throughput
+
+
+def test_steps_of_second_order_book_the_orifice_to_one_per_cent_where_the_state_is_exact():
+    """The mass of the chamber is a parabola in time, so error control sees only the error of the powers."""
+    found = energy(filled("tr-bdf2", rtol=1e-6))
+    lost = 0.5 * PER * (P1 - P0) ** 2
+    assert found.supplied["src"][-1] == pytest.approx(PER * P1 * (P1 - P0), rel=1e-6)
+    assert found.dissipated["hole"][-1] == pytest.approx(lost, rel=0.01)
+    assert found.step[-1] == pytest.approx(lost - found.dissipated["hole"][-1], rel=1e-6)
+
+
+@pytest.mark.parametrize("method", ["rk4", "rodas-4"])
+def test_methods_without_newton_leave_none(method):
+    found = energy(filled(method, step=0.02))
+    assert not found.newton.any()
+
+
+# ----------------------------------------------------------------------------------------------------------------------
+# Energy of delay lines: stored energy by quadrature, against closed forms, fine cells and the sum of all powers.
+
+
+LENGTH, DIAMETER, SPEED, FLOW, HEAD = 600.0, 0.3, 1000.0, 0.05, 50.0
+TAU, AREA = LENGTH / SPEED, area(DIAMETER)
+LOSSLESS = {"model": "none"}
+STEADY = {"model": "steady", "factor": 0.02}
+
+
+def main(law, gate: dict, method: str, h: float, end: float) -> dict:
+    """Case of a lake, a main as delay line, and a given node at its end."""
+    nodes = {"lake": lake(HEAD), "gate": gate}
+    links = {"main": pipe("lake", "gate", LENGTH, DIAMETER, SPEED, 20, friction=law)}
+    return scene(nodes, links, end, {"pipe_model": "delay-line", "method": method, "step": h})
+
+
+def chain(h: float, method: str = "rk4", law=STEADY) -> dict:
+    """Case of two delay lines with a third between them, shorter than a step; the demand falls to 40 % in 1 s."""
+    nodes = {"lake": lake(50.0), "a": junction(), "b": junction()}
+    nodes["gate"] = junction({"time": [0.5, 1.5], "value": [FLOW, 0.4 * FLOW], "kind": "smooth"})
+    links = {
+        "long": pipe("lake", "a", LENGTH, DIAMETER, SPEED, 20, friction=law),
+        "short": pipe("a", "b", 4.3, 0.25, SPEED, 2, friction=law),
+        "last": pipe("b", "gate", 453.7, 0.2, 1100.0, 20, friction=law),
+    }
+    return scene(nodes, links, 4.0, {"pipe_model": "delay-line", "method": method, "step": h})
+
+
+@pytest.mark.parametrize("method", ["euler", "rk4", "trapezoid", "rodas-4"])
+@pytest.mark.parametrize("share", [0.5, 1.5, 2.5, 4.0])
+def test_the_ledger_of_an_instant_closure_is_exact(method, share):
+    """Lossless: Joukowsky's wave fills the main and returns; after four travel times the stored energy is as before.
+
+    Steps of 13 ms do not divide the travel time, so jumps reach the lake and the gate within steps.
+    """
+    found = energy(main(LOSSLESS, junction(step(0.1, FLOW, 0.0)), method, 0.013, 0.1 + share * TAU))
+    filled, still = {0.5: (0.5, 0.5), 1.5: (0.5, 0.5), 2.5: (-0.5, 0.5), 4.0: (0.0, 0.0)}[share]
+    risen, p = RHO * SPEED * FLOW / AREA, RHO * GRAVITY * HEAD
+    elastic = (abs(filled) * risen**2 + 2.0 * filled * risen * p) * AREA / (2.0 * RHO * SPEED**2)
+    stored = LENGTH * (elastic - still * RHO * FLOW**2 / (2.0 * AREA))
+    assert found.stored["main"][-1] == pytest.approx(stored, abs=1e-12 * found.throughput)
+    assert np.max(np.abs(found.numerical_remainder)) < 1e-12 * found.throughput
+
+
+@pytest.mark.parametrize("h", [0.01, 0.013])
+def test_stages_outside_a_step_see_jumps_of_its_neighbours(h):
+    """crouzeix-4 has stages outside its steps; after the closure no energy is created, even by jumps at step ends."""
+    found = energy(main(LOSSLESS, junction(step(0.1, FLOW, 0.0)), "crouzeix-4", h, 2.0))
+    shut = found.numerical_remainder[found.t > 0.12]
+    assert np.max(np.abs(shut - shut[0])) < 1e-12 * found.throughput
+
+
+def test_what_is_stored_and_taken_as_by_fine_cells():
+    found, cells = chain(0.0025), chain(0.0025)
+    found = energy(found | {"numerics": found["numerics"] | {"delay_tolerance": 1e-3}})
+    cells["numerics"] = {"scheme": "upwind5", "method": "rk4", "courant": 0.9, "end": 4.0}
+    for name, n in (("long", 140), ("short", 2), ("last", 96)):
+        cells["links"][name]["cells"] = n
+    truth = energy(cells)
+    for name in ("long", "last"):
+        assert found.stored[name][-1] == pytest.approx(truth.stored[name][-1], rel=1e-4)
+        friction = f"{name} friction"
+        assert found.dissipated[friction][-1] == pytest.approx(truth.dissipated[friction][-1], rel=1e-4)
+    assert found.supplied["lake"][-1] == pytest.approx(truth.supplied["lake"][-1], rel=1e-4)
+
+
+@pytest.mark.parametrize("method", ["rk4", "trapezoid"])
+def test_what_the_steps_take_falls_with_their_square(method):
+    """Stored energy by quadrature and the sum of all powers differ only by interpolation between steps."""
+    sizes = [abs(float(energy(chain(h, method)).step[-1])) for h in (0.02, 0.01, 0.005)]
+    assert sizes[0] > 3.0 * sizes[1] > 9.0 * sizes[2]
+
+
+def test_a_short_line_takes_and_never_gives():
+    """A short line smooths waves: the energy that it removes is a square at each time."""
+    found = energy(chain(0.02, law=LOSSLESS))
+    taken = found.scheme["short"]
+    assert set(found.scheme) == {"short"}
+    assert taken[-1] > 0.0
+    assert np.min(np.diff(taken)) > -1e-12 * found.throughput
+
+
+@pytest.mark.parametrize("method", ["rk4", "trapezoid"])
+def test_from_the_other_end(method):
+    one, case = energy(chain(0.01, method)), chain(0.01, method)
+    for link in case["links"].values():
+        link["from"], link["to"] = link["to"], link["from"]
+    other = energy(case)
+    for what in ("supplied", "stored", "dissipated", "scheme"):
+        for name, values in getattr(one, what).items():
+            assert np.max(np.abs(getattr(other, what)[name] - values)) < 1e-9 * one.throughput, (what, name)
+
+
+def test_a_jump_into_a_store_is_booked_as_the_store_has_it():
+    """A jump reaches a chamber between two lossless lines within a step: the remainder is of second order."""
+    nodes = {"lake": lake(HEAD), "air": chamber(20.0), "gate": junction(step(0.1, FLOW, 0.0))}
+    links = {
+        "one": pipe("lake", "air", LENGTH, DIAMETER, SPEED, 20, friction=LOSSLESS),
+        "two": pipe("air", "gate", 0.5 * LENGTH, DIAMETER, SPEED, 20, friction=LOSSLESS),
+    }
+    for h in (0.014, 0.007, 0.0035, 0.0017):
+        found = energy(scene(nodes, links, 3.0, {"pipe_model": "delay-line", "method": "rk4", "step": h}))
+        assert np.max(np.abs(found.numerical_remainder)) < 30.0 * h**2 * found.throughput

@@ -1,7 +1,5 @@
 """Verdicts of a failure map, on synthetic runs of each kind and on real runs of known kind."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math
@@ -26,15 +24,16 @@ from reference.scenes import (
 )
 
 from fvsolve.case import load
+from fvsolve.case.text import write
 from fvsolve.compile.cache_folders import PACKAGE, source_hash
 from fvsolve.errors import FvsolveError
 from fvsolve.studies import result_cache
-from fvsolve.studies.failure.failure_map import failure_map
-from fvsolve.studies.failure.run_verdict import (
+from fvsolve.studies.failure_map import (
     BLOWN_RANGES,
     WINDOW_STEPS,
     Measures,
     excess_variation,
+    failure_map,
     probe_ranges,
     ringing_amplitude,
     run_recorded,
@@ -264,28 +263,13 @@ def test_what_cannot_be_asked_says_so(asked, said):
         failure_map(load(closing()), **asked)
 
 
-def test_the_command_writes_table_and_pictures_and_speaks_json(tmp_path, monkeypatch, capsys):
-    from fvsolve.case import text
-    from fvsolve.cli import main
-
+def test_the_command_writes_table_and_pictures_and_speaks_json(tmp_path, fvs):
     path = tmp_path / "scene.toml"
-    path.write_text(text.write(closing()))
-    command = [
-        "fvsolve",
-        "failure-map",
-        str(path),
-        "--scheme",
-        "upwind",
-        "--method",
-        "euler,rk4",
-        "--step",
-        "8 ms,0.02",
-    ]
-    monkeypatch.setattr(sys, "argv", [*command, "--out", str(tmp_path / "out"), "--json"])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code == 0
-    said = json.loads(capsys.readouterr().out)
+    path.write_text(write(closing()))
+    asked = ("--scheme", "upwind", "--method", "euler,rk4", "--step", "8 ms,0.02")
+    code, out, _ = fvs("failure-map", path, *asked, "--out", tmp_path / "out", "--json")
+    assert code == 0
+    said = json.loads(out)
     assert said["values"] == [0.008, 0.02] and [one["method"] for one in said["squares"]] == ["euler"] * 2 + ["rk4"] * 2
     assert all(one["courant"] == pytest.approx(120 * one["step"]) for one in said["squares"])
     with open(tmp_path / "out" / "map.csv") as file:
@@ -295,10 +279,8 @@ def test_the_command_writes_table_and_pictures_and_speaks_json(tmp_path, monkeyp
 
 def test_no_old_picture_stands_beside_a_new_table(tmp_path, fvs, monkeypatch):
     """Pictures of an earlier map are deleted, even if the new picture cannot be drawn."""
-    from fvsolve.case import text
-
     path, out = tmp_path / "scene.toml", tmp_path / "out"
-    path.write_text(text.write(closing()))
+    path.write_text(write(closing()))
     asked = ("failure-map", str(path), "--scheme", "upwind", "--method", "euler", "--step", "8 ms", "--out", str(out))
     assert fvs(*asked)[0] == 0 and (out / "map.png").is_file() and (out / "map.svg").is_file()
     monkeypatch.setitem(sys.modules, "matplotlib.patches", None)

@@ -1,7 +1,5 @@
 """Hierarchy of models: simpler forms of a case, their errors, and the cheapest form within a target."""
 
-from __future__ import annotations
-
 import json
 import math
 import subprocess
@@ -15,8 +13,7 @@ import fvsolve
 from fvsolve.case.text import write
 from fvsolve.errors import FvsolveError
 from fvsolve.studies import ladder
-from fvsolve.studies.accuracy.model_hierarchy import change_time
-from fvsolve.studies.accuracy.model_levels import level_keys, level_names
+from fvsolve.studies.accuracy.model_hierarchy import change_time, level_keys, level_names
 
 LENGTH, DIAMETER, SPEED, FACTOR = 300.0, 0.2, 1000.0, 0.02
 AREA = math.pi / 4 * DIAMETER**2
@@ -35,8 +32,9 @@ def shutting(duration: float, cells: int = 40, end: float = 6.0, **more) -> dict
     return scene(nodes, links, end, numerics, ["gate.pressure", "main.flow"], **more)
 
 
-def named(found, name: str, law: str = "linear"):
-    return next(one for one in found.rungs if (one.name, one.law) == (name, law))
+def named(found, name: str, law: str | None = "linear"):
+    """Level of a hierarchy with this name; law : density law, None for that of its first level with the name"""
+    return next(one for one in found.rungs if one.name == name and law in (None, one.law))
 
 
 def test_slow_changes_need_a_column_alone_and_quick_ones_the_line():
@@ -243,3 +241,68 @@ def test_where_no_refinement_reaches_the_target_the_answer_says_what_it_is_worth
     found = ladder(coarse(), target=1e-5)
     assert found.own_error > 1e-5 and f"itself has an error of about {found.own_error:.2g}" in found.rules[-1]
     assert "more than the target" in found.rules[-1] and found.plain()["own_error"] == found.own_error
+
+
+# ----------------------------------------------------------------------------------------------------------------------
+# Water in moving tanks as frozen mass, modes or cells: the hierarchy of models states which form a case needs.
+
+
+def rolling(rate: float, level: float = 0.2, **basin):
+    """Case of a rolling hull with an initial rate, and a basin across it."""
+    nodes = {
+        "hull": {"type": "body", "mass": 3000.0, "inertia": [2e4] * 3,
+                 "joint": {"kind": "revolute", "axis": [1, 0, 0], "rate": rate, "stiffness": 8e4}},
+        "tank": {"type": "basin", "on": "hull", "at": [-0.5, -1.5, 0.3], "size": [1.0, 3.0], "cells": [1, 40],
+                 "level": level, **basin},
+    }  # fmt: skip
+    numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.7}
+    return scene(nodes, {}, 8.0, numerics, ["hull.angle", "tank.depth@0.5,0.1", "tank.u@0.5,0.1"], every=0.05)
+
+
+def test_small_waves_need_modes_and_great_ones_cells():
+    small, great = ladder(rolling(1e-4), target=0.05), ladder(rolling(0.3), target=0.05)
+    assert [one.name for one in small.rungs[:3]] == ["frozen", "modes", "cells"]
+    assert small.cheapest.name == "modes" and named(small, "frozen", None).error > 0.3
+    assert great.cheapest.name.endswith("cells") and named(great, "modes", None).error > 0.05
+    assert set(named(small, "modes", None).errors) == {"hull.angle", "tank.depth@0.5,0.1"}
+    assert set(named(small, "frozen", None).errors) == {"hull.angle"}
+
+
+def test_it_says_how_far_from_shallow_a_tank_is():
+    found = ladder(rolling(1e-4, level=1.0), target=0.05)
+    (said,) = found.shallow_water
+    assert (
+        said == "tank: its slowest wave, with k h = 1 (wave number times depth), is 16 % too fast in shallow-water "
+        "theory, more than the target: modes are more accurate for small waves"
+    )
+
+
+def test_a_rung_that_cannot_say_the_scene_is_skipped_with_its_reason():
+    found = ladder(rolling(1e-4, manning=0.02))
+    assert "modes have no friction" in named(found, "modes", None).reason
+    assert named(found, "cells", None).error is not None
+
+
+def test_a_scene_said_by_modes_has_the_same_rungs():
+    case = rolling(1e-4, sloshing="modes")
+    case["output"]["probes"] = ["hull.angle"]
+    case["numerics"] = {"end": 8.0, "method": "rk4", "step": 0.02}
+    found = ladder(case, target=0.05)
+    assert [one.name for one in found.rungs[:3]] == ["frozen", "modes", "cells"] and found.cheapest.name == "modes"
+
+
+def test_basins_that_do_not_ride_are_refused_by_name():
+    case = rolling(1e-4)
+    case["nodes"]["pond"] = {"type": "basin", "size": [1, 1], "cells": [4, 4], "level": 0.1}
+    with pytest.raises(FvsolveError, match="does not support basins yet; the case has pond"):
+        ladder(case)
+
+
+def test_a_liquid_that_rides_is_no_tank_that_sloshes():
+    """A liquid has no level, so a basin of it is refused by name."""
+    liquid = {"physics": "liquid", "cells": [4, 4], "pressure": 5e5, "thickness": 0.1}
+    case = rolling(1e-4, **liquid)
+    case["output"]["probes"] = ["hull.angle"]
+    del case["nodes"]["tank"]["level"]
+    with pytest.raises(FvsolveError, match="chart --models does not support basins yet; the case has tank"):
+        ladder(case, target=0.05)

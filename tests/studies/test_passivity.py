@@ -1,7 +1,5 @@
 """Passivity of methods and schemes: claims from coefficients, and real runs that agree with them."""
 
-from __future__ import annotations
-
 import importlib
 import math
 
@@ -26,11 +24,11 @@ from reference.scenes import step as stepped
 
 import fvsolve
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.energy.energy_balance import energy, measure_pairs
-from fvsolve.studies.energy.passivity import closed_pipe, courant_limit, method_claim, passivity, scheme_claim
+from fvsolve.studies.energy_balance import energy, measure_pairs
 from fvsolve.studies.outcome import outcome, study_model
+from fvsolve.studies.passivity import closed_pipe, courant_limit, method_claim, passivity, scheme_claim
 
-study = importlib.import_module("fvsolve.studies.energy.passivity")
+study = importlib.import_module("fvsolve.studies.passivity")
 VOLUME, FLOW = 0.2, 1e-3
 BETA = WATER["bulk_modulus"]
 ALWAYS = ["implicit-euler", "implicit-midpoint", "gauss-4", "gauss-6", "radau-iia-3", "radau-iia-5", "lobatto-iiic-4"]

@@ -1,7 +1,5 @@
 """Periodic pipe: real runs fail at the limits of linear schemes, and limits of limited schemes are measured."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`positive_real` on textbook functions, boundary cases, narrow bands, hidden modes and random passive networks."""
 
-from __future__ import annotations
-
 import math
 from decimal import Decimal
 from fractions import Fraction as F
@@ -16,7 +14,7 @@ from pytest import approx
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers.numbers.polynomial import Polynomial
 from fvsolve.studies import positive_real
-from fvsolve.studies.ports.rational import locate_roots
+from fvsolve.studies.ports.positive_real import locate_roots
 
 S = [1, 0]  # the polynomial s
 
@@ -289,10 +287,7 @@ def test_half_planes_are_counted_where_rows_of_routh_degenerate(name):
 
 
 @examples(60)
-@given(
-    st.lists(st.integers(-3, 3), max_size=3),
-    st.lists(st.tuples(st.integers(-2, 2), st.integers(1, 4)), max_size=3),
-)
+@given(st.lists(st.integers(-3, 3), max_size=3), st.lists(st.tuples(st.integers(-2, 2), st.integers(1, 4)), max_size=3))
 def test_half_planes_of_products_of_known_roots(real, pairs):
     p = times([1], *([1, -r] for r in real), *([1, -2 * a, a * a + b * b] for a, b in pairs))
     where = [*real, *(a for a, _ in pairs for _ in range(2))]

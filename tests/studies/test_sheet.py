@@ -1,7 +1,5 @@
 """A sheet has equal rows in a file, on a terminal, as JSON and in a frame; unknown values are empty."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math

@@ -1,23 +1,24 @@
 """Stability of cases: prediction against exact growth and real runs, and bounds that mislead."""
 
-from __future__ import annotations
-
 import json
 import math
-import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+from model.test_delay_lines import short, vessel
+from reference.delays import main, turned
 from reference.scenes import AMBIENT, GRAVITY, RHO, area, chamber, junction, pipe, reservoir, scene, tank, valve
 from scipy.optimize import brentq
 
-from fvsolve import build, load
-from fvsolve.cli import main
+import fvsolve
+from fvsolve import build, load, studies
 from fvsolve.errors import FvsolveError
 from fvsolve.model.energy_norm import energy_form
 from fvsolve.steppers import METHODS, method_named, stability_function
-from fvsolve.studies.linear.linearise import linearise, linearise_at
-from fvsolve.studies.linear.operating_point import operating_point
+from fvsolve.studies.linearise import linearise, linearise_at
+from fvsolve.studies.operating_point import operating_point, with_held_schedules
+from fvsolve.studies.stability.delay_line_limits import DelayLineLimits, DelayLineRuns, DelayLineSystem, read_history
 from fvsolve.studies.stability.growth import (
     DenseGrowth,
     VectorGrowth,
@@ -28,7 +29,7 @@ from fvsolve.studies.stability.growth import (
     step_matrix,
 )
 from fvsolve.studies.stability.real_runs import RealRuns
-from fvsolve.studies.stability.stability import stability
+from fvsolve.studies.stability.stability import LinearSystem, stability
 from fvsolve.studies.stability.stability_row import field_of_values, region_limit
 
 NUMERICS = {"method": "rk4", "step": 1e-3}
@@ -256,26 +257,20 @@ def test_what_cannot_be_answered_is_said():
         stability(chambers(2), methods=["rk44"])
 
 
-def test_the_command_prints_one_json_object_and_draws(tmp_path, monkeypatch, capsys):
+def test_the_command_prints_one_json_object_and_draws(tmp_path, monkeypatch, fvs):
     monkeypatch.chdir(tmp_path)
-    arguments = ["stability", "chamber-chain", "--method", "rk4", "--steps", "100", "--json"]
-    monkeypatch.setattr(sys, "argv", ["fvsolve", *arguments])
-    with pytest.raises(SystemExit) as left:
-        main()
-    assert not left.value.code
-    found = json.loads(capsys.readouterr().out)
+    code, out, _ = fvs("stability", "chamber-chain", "--method", "rk4", "--steps", "100", "--json")
+    assert code == 0
+    found = json.loads(out)
     (row,) = found["rows"]
     assert abs(row["difference"]) < 0.01 and row["eigenvalues"] < row["predicted"]
     folder = tmp_path / "runs" / "chamber-chain.stability"
     assert {path.name for path in folder.iterdir()} == {"points.jsonl", "stability.csv", "spectrum-rk4.png"}
 
 
-def test_without_a_case_the_command_answers_for_a_periodic_grid(monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["fvsolve", "stability", "--scheme", "upwind", "--method", "euler", "--json"])
-    with pytest.raises(SystemExit) as left:
-        main()
-    assert not left.value.code
-    assert json.loads(capsys.readouterr().out)["limits"][0]["limit"] == 1.0
+def test_without_a_case_the_command_answers_for_a_periodic_grid(fvs):
+    code, out, _ = fvs("stability", "--scheme", "upwind", "--method", "euler", "--json")
+    assert code == 0 and json.loads(out)["limits"][0]["limit"] == 1.0
 
 
 def carried(method="rk4", ends=("lake", "end"), **scalar):
@@ -329,3 +324,147 @@ def test_a_vessel_that_starts_without_a_scalar_is_no_kink(scheme, ends):
     drop = AMBIENT + 20.0 * RHO * GRAVITY - 2.0e5  # pressure drop from the vessel to the end
     leaves = area(0.1) * math.sqrt(2 * RHO * drop * 0.1 / (0.02 * 100.0)) if "end" in ends else 0.0
     assert found.a[i, i] == pytest.approx(-0.25 - leaves / (20.0 * RHO), rel=1e-3)
+
+
+# ----------------------------------------------------------------------------------------------------------------------
+# Stability with delay lines: the linear system equals the steps of the program, and runs fail at its limits.
+
+
+def system(case: dict, method: str, h: float) -> DelayLineSystem:
+    """Linear system of the steps of a case, with step h [s]."""
+    case["numerics"] |= {"method": method, "step": h}
+    model = fvsolve.build(fvsolve.load(case))
+    return DelayLineSystem(with_held_schedules(model, 0.0), method_named(method), h)
+
+
+@pytest.mark.parametrize("method", ["euler", "rk4", "ssp-rk3", "trapezoid", "gauss-4"])
+@pytest.mark.parametrize("scene", ["vessel", "short", "rough"])
+def test_a_step_of_the_linear_system_is_one_of_the_program(method, scene):
+    """40 steps from given waves: with a chamber, with lines shorter than steps and a valve, and with friction."""
+    rough = main(friction={"model": "steady", "factor": 0.1}, numerics={"delay_tolerance": 0.02})
+    case = {"vessel": vessel(method, 0.01, volume=0.15), "short": short("delay-line"), "rough": rough}[scene]
+    one = system(case, method, 0.01)
+    x, before = (part[..., :1] * 1e-6 for part in one.starts())  # a start that moves all states
+    runs = DelayLineRuns.__new__(DelayLineRuns)
+    runs.steps = 40
+    moved, still = (runs.start_run(one, width * x[:, 0], width * before[..., 0]) for width in (1.0, 0.0))
+    for run in (moved, still):
+        run.run(40.0)
+    _, _, x, before = one.propagate(x, before, 40, np.inf)
+    found = read_history(moved.run_data.past, one) - read_history(still.run_data.past, one)
+    assert found == pytest.approx(before[..., 0], abs=1e-6 * np.abs(before).max())
+    assert moved.now[one.states] - still.now[one.states] == pytest.approx(
+        x[:, 0], abs=1e-6 * np.abs(x).max(initial=0.0)
+    )
+
+
+@pytest.mark.parametrize("method", ["euler", "implicit-midpoint"])
+def test_runs_fail_at_the_step_that_is_predicted(method):
+    """A wave fills the chamber of 0.15 m3 within 10 ms; the reversed pipe has an equal limit."""
+    row = studies.stability(vessel("rk4", 0.01, volume=0.15), methods=[method], steps=200).rows[0]
+    assert row.lines and row.rate == 0.0 and row.where == "neck" and abs(row.difference) < 0.01
+    other = studies.stability(turned(vessel("rk4", 0.01, volume=0.15)), methods=[method], steps=200).rows[0]
+    assert other.predicted == pytest.approx(row.predicted, rel=1e-6)
+
+
+def test_what_check_tells_to_grow_has_a_limit_below_the_step():
+    """Runs that tests/step_limits/test_lines.py compares with `check`, with steps of 10 ms for 30 s."""
+    for method, volume, grows in (("euler", 0.6, True), ("ssp-rk3", 0.15, True), ("rk4", 0.15, False)):
+        made = DelayLineLimits(
+            fvsolve.load(vessel(method, 0.01, 30.0, volume)), "upwind", method_named(method), 3000, 30.0
+        )
+        assert made.fails(0.01) == grows
+
+
+def test_where_no_store_is_no_step_fails():
+    row = studies.stability(main(2.0), methods=["rk4"], steps=50).rows[0]
+    assert np.isinf(row.predicted) and np.isinf(row.measured) and "slowest line" in row.notes[0]
+    with pytest.raises(FvsolveError, match="stability of delay lines is computed about the start"):
+        studies.stability(main(2.0), at=1.0)
+
+
+# ----------------------------------------------------------------------------------------------------------------------
+# Real runs of servo axes in `stability`: rounding and the end of a case are not taken as failed steps.
+
+
+ARM = Path(__file__).parents[1] / "reference" / "servo-arm.toml"
+OIL = {"name": "user", "density": 870.0, "bulk_modulus": 1.4e9, "viscosity": 46e-6, "law": "linear"}
+THETA = "0 | 0 0\n 1 | 3/5 2/5\n ---\n | 3/5 2/5"  # |R| = 1.5 at infinity, |R| > 1 beyond |h lambda| = 10
+
+
+@pytest.fixture(scope="module")
+def arm():
+    """Linear system of the moving arm; hoses near zero drop have laws that are linear over 1e-11 of the pressures."""
+    return LinearSystem(operating_point(ARM, {"numerics.method": "radau-iia-5"}, 0.7))
+
+
+def runs(side, method):
+    """Real runs of a method without an end in time."""
+    found = RealRuns(side.at, method, side.form, a=side.linear.a)
+    found.latest = np.inf
+    return found
+
+
+@pytest.mark.parametrize("method", ["rodas-5p", "radau-iia-5", "tr-bdf2"])
+def test_what_newton_and_rounding_leave_is_no_growth(arm, method):
+    """Deviations start at 1e-14 here; runs at 0.2 ms are right to five digits, as the next test shows."""
+    assert not any(runs(arm, method).fails(h) for h in (4e-5, 2e-4))
+
+
+@pytest.fixture(scope="module")
+def truth():
+    return swing("radau-iia-5")
+
+
+def swing(method, step=None):
+    """Angle [deg] and pressure [bar] of the arm every 2 ms until 1.9 s, in motion until 1.2 s : float64[2, n]."""
+    steps = {} if step is None else {"numerics.step": step}
+    case = fvsolve.load(ARM)
+    raw = {**case.raw, "numerics": {"end": "1.9 s"} | ({"rtol": 1e-8} if step is None else {})}
+    run = fvsolve.run(raw, {"numerics.method": method, **steps})
+    return np.array([run["arm.angle"], run["lift.A.gauge_pressure"]])
+
+
+def test_steps_that_are_said_to_be_safe_are_right(truth):
+    at = round(1.2 / 2e-3)
+    assert swing("rodas-5p", 2e-4)[:, at] == pytest.approx(truth[:, at], rel=1e-5)
+
+
+@pytest.mark.parametrize("method, step", [("rk4", 2e-4), ("rodas-5p", 4e-2)])
+def test_steps_that_fail_are_found(arm, truth, method, step):
+    """Explicit steps fail in motion; linearly implicit steps fail where the arm stops, with pressures 18 bar off."""
+    assert runs(arm, method).fails(step)
+    if method == "rodas-5p":
+        assert np.abs(swing(method, step) - truth)[1].max() > 10.0
+
+
+def test_an_implicit_method_that_fails_is_found_where_it_is_predicted_to():
+    """Chambers and flowing valves: |R| of this method exceeds 1 beyond h = 10 / |lambda|."""
+    fvsolve.tableau("theta-4-10", THETA)
+    nodes = {"in": reservoir(2e6), "a": chamber(1e-3), "b": chamber(2e-3), "out": reservoir(1e6)}
+    links = {f"v{k}": valve(*pair, 1e-5) for k, pair in enumerate((("in", "a"), ("a", "b"), ("b", "out")))}
+    (row,) = stability(scene(nodes, links, 1.0, {"method": "theta-4-10", "step": 1e-6})).rows
+    assert row.measured == pytest.approx(row.predicted, rel=1e-3)
+    assert row.eigenvalues < row.predicted < 1.1 * row.eigenvalues
+
+
+def pushed():
+    """Case of a cylinder that a spool valve moves to its end in 1.5 s, where its model ends."""
+    nodes = {"P": reservoir(2e7), "T": reservoir(3e5), "A": chamber(4e-4), "B": chamber(4e-4),
+             "post": {"type": "frame"}, "load": {"type": "mass", "mass": 350.0, "initial_position": 1.0}}  # fmt: skip
+    links = {
+        "spool": {"type": "spool-valve", "ports": {port: port for port in "PTAB"}, "area": 2e-5, "position": 0.4},
+        "hoseA": valve("A", "lift.A", area(9e-3)), "hoseB": valve("B", "lift.B", area(9e-3)),
+        "lift": {"type": "cylinder", "ports": {"rod": "load", "case": "post"}, "closed_length": 0.8, "stroke": 0.6,
+                 "piston_diameter": 63e-3, "rod_diameter": 36e-3, "dead_volume_A": 60e-6, "dead_volume_B": 60e-6,
+                 "initial_pressure_B": 4e6},
+    }  # fmt: skip
+    return scene(nodes, links, 1.0, {"method": "radau-iia-5", "rtol": 1e-6}, fluid=OIL)
+
+
+def test_a_scene_that_ends_is_no_step_that_fails():
+    """1000 steps of 1.4 ms or more reach the end of the cylinder with any method."""
+    (row,) = stability(pushed(), methods=["radau-iia-5"], at=0.1).rows
+    assert row.measured == np.inf and row.steps * row.measured_up_to > 2.0
+    (quick,) = stability(pushed(), methods=["rk4"], at=0.1).rows
+    assert quick.measured == pytest.approx(quick.predicted, rel=0.1)

@@ -1,13 +1,25 @@
 """Studies of cases with devices, vessels and cavities."""
 
-from __future__ import annotations
+import math
+import time
+from importlib import import_module
 
 import numpy as np
 import pytest
-from reference import pump_trip
+from invariance.moving import SCENES, flume, u_tube
+from model.test_delay_lines import vessel
+from reference import pulses, pump_trip
+from reference.bodies import bodies
+from reference.delays import fork, main, turned
 from reference.folders import CASES
+from reference.scenes import GRAVITY, RHO, scene, tank
+from reference.trees import body
+from scipy.optimize import brentq
 
 import fvsolve
+from fvsolve import studies
+from fvsolve.case.text import write
+from fvsolve.cli import terminal
 from fvsolve.cli.accuracy_commands import variable_unit
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.accuracy import model_hierarchy, refine
@@ -19,15 +31,15 @@ from fvsolve.studies.accuracy.chart_settings import (
     unsupported_schemes,
 )
 from fvsolve.studies.accuracy.fit import fit
-from fvsolve.studies.accuracy.model_hierarchy import change_time
-from fvsolve.studies.accuracy.model_levels import NotApplicable, level_keys
+from fvsolve.studies.accuracy.model_hierarchy import NotApplicable, change_time, level_keys
 from fvsolve.studies.accuracy.order_study import check_order
 from fvsolve.studies.accuracy.refine import affordable_plan
-from fvsolve.studies.failure import run_verdict as watched_runs
-from fvsolve.studies.failure.map_columns import eigenvalues_of
-from fvsolve.studies.failure.run_verdict import NOT_RUN, Measures, verdict
-from fvsolve.studies.linear.linearise import linearise
+from fvsolve.studies.energy_balance import energy
+from fvsolve.studies.failure_map import NOT_RUN, Measures, failure_map, run_recorded, verdict
+from fvsolve.studies.failure_map_columns import eigenvalues_of
+from fvsolve.studies.linearise import linearise
 from fvsolve.studies.outcome import GIVEN_UP, outcome
+from fvsolve.studies.ports.response import response
 from fvsolve.studies.reference import candidates, find_reference
 from fvsolve.studies.result_cache import ResultCache
 from fvsolve.studies.stability import stability as room
@@ -200,6 +212,270 @@ def test_a_map_of_cavities_has_a_reference_and_a_limit():
 def test_a_square_that_takes_too_long_is_given_up_and_called_neither_wrong_nor_blown_up(monkeypatch):
     late, off = Measures(f"{GIVEN_UP} 10 s", False), Measures("finished", True, error=0.5, farthest=0.0)
     assert verdict(late, lambda: off, 0.02) == verdict(off, lambda: late, 0.02) == NOT_RUN
-    monkeypatch.setattr(watched_runs, "CPU_LIMIT", 0.0)
-    found, _ = watched_runs.run_recorded(case("relief-on-closed-main", links__main__cells=4))
+    monkeypatch.setattr(import_module("fvsolve.studies.failure_map"), "CPU_LIMIT", 0.0)
+    found, _ = run_recorded(case("relief-on-closed-main", links__main__cells=4))
     assert found.reason.startswith(GIVEN_UP) and not found.ok
+
+
+# ----------------------------------------------------------------------------------------------------------------------
+# Studies of cases with delay lines: orders, against cells and rays, and exact results.
+
+
+def rough(**numerics) -> dict:
+    """Case of a pulse of demand in one delay line with large friction."""
+    case = pulses.case(exact=False, points=pulses.FEW)
+    case["links"]["main"]["friction"] = {"model": "steady", "factor": 0.5}
+    demand = case["nodes"]["gate"]["demand"]
+    demand["value"] = [one + 0.2 for one in demand["value"]]
+    given = {"pipe_model": "delay-line", "method": "euler", "step": 0.00125, "delay_tolerance": 0.01, **numerics}
+    return case | {"numerics": {"end": pulses.END, **given}}
+
+
+def test_friction_of_lines_is_of_second_order_beside_cells():
+    found = studies.order(rough())
+    assert found.kind == "finer" and found.words.startswith("upwind5 on 2560 cells")
+    for probe in ("gate.pressure", "main.pressure@0.37"):
+        assert found.fits[probe]["L1"].order == pytest.approx(2.0, abs=0.1)
+    stretched = studies.order(rough(step=0.0002), refine="space")
+    assert stretched.fits["gate.pressure"]["L1"].order == pytest.approx(2.0, abs=0.2)
+    assert [row.level.size for row in stretched.rows] == pytest.approx([0.1 / n for n in (6, 11, 21, 41)])
+
+
+def test_drawn_the_other_way_or_by_two_the_study_is_the_same():
+    one, other = studies.order(rough(), levels=2), studies.order(turned(rough()), levels=2)
+    two = studies.order(rough(), levels=2, jobs=2)
+    for row, same, as_well in zip(one.rows, two.rows, other.rows, strict=True):
+        assert same.errors == row.errors
+        for name in ("pressure", "flow", "gate.pressure"):
+            assert as_well.errors[name] == pytest.approx(row.errors[name], rel=1e-8)
+
+
+def test_smooth_waves_between_steps_are_of_sixth_order():
+    """Against rays in the middle of a pipe; at the gate, waves return after whole steps and are exact."""
+    case = pulses.case(pipe_model="delay-line", method="euler", courant=0.9)
+    found = studies.order(case, levels=3)
+    errors = [row.errors["main.pressure@0.37"]["L1"] for row in found.rows]
+    assert found.kind == "exact" and errors[0] > 30.0 * errors[1] > 30.0**2 * errors[2]
+    assert max(row.errors["gate.pressure"]["max"] for row in found.rows) < 1e-6
+
+
+def test_what_is_exact_at_any_step_is_said_to_be():
+    found = studies.order(main(4.0), levels=3)
+    assert found.words.startswith("upwind on") and any("exact here, at any step" in note for note in found.notes)
+    with pytest.raises(FvsolveError, match="no delay line of this case into more stretches: there is no friction"):
+        studies.order(main(4.0), refine="space")
+    with pytest.raises(FvsolveError, match="functions along pipes need cells, but main would be"):
+        studies.order(main(4.0), source=lambda pipe, x, t: (0.0 * x, 0.0 * x))
+
+
+def test_lines_beside_cells_are_refined_with_them():
+    case = fork(
+        {"scheme": "upwind5", "method": "rk4", "courant": 0.9},
+        every=0.0499,
+        friction={"model": "steady", "factor": 0.05},
+    )
+    case["links"]["up"]["pipe_model"] = "auto"
+    case["nodes"]["gate"]["demand"] |= {"time": [0.0, 0.5, 1.5], "value": [0.03, 0.03, 0.0], "kind": "smooth"}
+    found = studies.order(case, levels=3)
+    assert [row.level.cells for row in found.rows] == [5, 10, 20]
+    errors = [row.errors["gate.pressure"]["L1"] for row in found.rows]
+    assert errors[0] > 2.0 * errors[1] > 4.0 * errors[2]
+
+
+def test_a_chart_of_lines_is_judged_by_cells():
+    """Shorter steps help until the error of friction remains; four times the stretches divide it by fourteen."""
+    steps, methods = [0.013, 0.0031, 0.00078], ["euler"]
+    found = studies.chart(rough(delay_tolerance=0.005), methods=methods, step=steps)
+    assert found.reference.startswith("upwind5 on") and found.floor["trajectory"] < 1e-6 and found.default == "rk4"
+    errors = [point.trajectory for point in found.curves()["euler"]]
+    assert errors[0] > 20.0 * errors[1] > 20.0 * errors[2]
+    finer = studies.chart(rough(delay_tolerance=0.00125), methods=methods, step=[0.00078])
+    assert finer.curves()["euler"][0].trajectory == pytest.approx(errors[2] * (11.0 / 41.0) ** 2, rel=0.2)
+    other = turned(rough(delay_tolerance=0.005))
+    other["output"]["probes"] = ["gate.pressure", "main.pressure@0.63"]
+    two = studies.chart(other, methods=methods, step=steps, jobs=2)
+    assert [one.trajectory for one in two.points] == pytest.approx([one.trajectory for one in found.points], rel=1e-8)
+
+
+def test_a_chart_of_lines_has_steps_and_no_more():
+    for asked in ({"schemes": ["upwind"]}, {"cells": [10]}, {"rtol": [1e-3]}):
+        with pytest.raises(FvsolveError, match="Use step for their resolution"):
+            studies.chart(rough(), **asked)
+    with pytest.raises(FvsolveError, match="if delay lines are exact, any step is accurate"):
+        studies.chart(main(2.0, every=0.0499), methods=["euler"], step=[0.05])
+
+
+def test_a_chart_of_lines_beside_cells_refines_the_cells():
+    case = fork({"scheme": "upwind5", "method": "rk4", "courant": 0.9}, 2.0, every=0.0499)
+    case["links"]["up"]["pipe_model"] = "delay-line"
+    case["nodes"]["gate"]["demand"] |= {"time": [0.0, 0.5, 1.5], "value": [0.03, 0.03, 0.0], "kind": "smooth"}
+    found = studies.chart(case, schemes=["upwind5"], methods=["rk4"], cells=[6, 12, 24])
+    errors = [one.trajectory for one in found.curves()["upwind5 rk4"]]
+    assert errors[0] > 2.0 * errors[1] > 4.0 * errors[2] and math.isfinite(found.floor["trajectory"])
+    assert "links.up.cells" not in found.points[0].setting.keys and found.default == "weno5 rk4"
+
+
+def test_a_map_of_lines_says_at_which_step_a_store_makes_waves_grow():
+    """A chamber that fills within 10 ms at a line of 0.1 s: the limit, and runs on both sides of it."""
+    case = vessel("rk4", 0.01, 6.0, 0.15, 60)
+    found = studies.failure_map(case, methods=["rk4", "implicit-midpoint", "rodas-5p"], steps=[0.0034, 0.0207, 0.068])
+    assert found.wave_rate is None and found.reference.startswith("upwind5")
+    for method, safe in (("rk4", 2), ("implicit-midpoint", 1)):
+        row = found.row("weno5", method)
+        assert [one.step <= one.limit for one in row] == [True] * safe + [False] * (3 - safe)
+        assert [one.verdict == "blown up" for one in row] == [False] * safe + [True] * (3 - safe)
+    assert found.row("weno5", "rodas-5p")[0].limit is None
+    with pytest.raises(FvsolveError, match="Courant numbers need pipes with cells"):
+        studies.failure_map(case, courants=[0.5])
+
+
+def test_a_map_of_lines_without_stores_predicts_no_limit():
+    case = main(2.0, every=0.0499)
+    case["output"]["probes"] = ["gate.pressure"]
+    found = studies.failure_map(case, methods=["euler"], steps=[0.03, 0.11])
+    assert [one.verdict for one in found.squares] == ["stable", "stable"]
+    assert all(math.isinf(one.limit) for one in found.squares)
+    two = studies.failure_map(turned(case), methods=["euler"], steps=[0.03, 0.11], jobs=2)
+    assert [one.measures.error for one in two.squares] == [one.measures.error for one in found.squares]
+
+
+# ----------------------------------------------------------------------------------------------------------------------
+# Studies of moving cases: poles, impedances and energy balances against closed forms, and messages.
+
+
+def poles(case) -> np.ndarray:
+    return np.linalg.eigvals(np.asarray(linearise(case).a))
+
+
+def test_a_free_body_about_its_middle_axis_has_the_poles_of_eulers_equations():
+    """Poles +-w sqrt((I2 - I1) (I3 - I2) / (I1 I3)), one of them unstable; rows of A may be rounding alone."""
+    stone = body(5.0, [0.3, 0.5, 0.7], {"kind": "free", "rate": [0.0, 2.0, 0.0]})
+    found = poles(bodies({"stone": stone}, 1.0, ["stone.wy"], method="gauss-4", step=0.01) | {"gravity": 0.0})
+    wanted = 2.0 * math.sqrt(0.2 * 0.2 / (0.3 * 0.7))
+    assert max(found.real) == pytest.approx(wanted, rel=1e-9) and min(found.real) == pytest.approx(-wanted, rel=1e-9)
+    stone["joint"]["rate"] = [0.01, 2.0, 0.02]  # near the equilibrium; it can still be linearised
+    found = poles(bodies({"stone": stone}, 1.0, ["stone.wy"], method="gauss-4", step=0.01) | {"gravity": 0.0})
+    assert max(found.real) == pytest.approx(wanted, rel=1e-3)
+
+
+def test_a_tank_on_a_spring_has_the_pole_of_the_tangent_law():
+    mass, stiff, length, depth = 100.0, 3e3, 2.0, 0.1
+    c, water = math.sqrt(GRAVITY * depth), RHO * depth * length
+
+    def law(w):
+        s = 0.5 * w * length / c
+        return stiff - mass * w * w - water * w * w * math.tan(s) / s
+
+    w = brentq(law, 0.2, math.pi * c / length * 0.999)
+    off = []
+    for n in (20, 40):
+        nodes = {
+            "cart": body(mass, [1, 1, 1], {"kind": "prismatic", "axis": [1, 0, 0]}),
+            "world": {"type": "frame", "points": {"far": [5.0, 0, 0]}},
+            "b": {"type": "basin", "on": "cart", "size": [length, 1.0], "cells": [n, 1], "level": depth},
+        }  # fmt: skip
+        spring = {"type": "spring", "from": "cart", "to": "world.far", "stiffness": stiff, "preload": 0.0}
+        found = poles(
+            scene(nodes, {"spring": spring}, 1.0, {"scheme": "upwind5", "method": "rk4", "step": 0.01}, ["cart.rate"])
+        )
+        off.append(np.abs(found - 1j * w).min() / w)
+    assert off[1] < 5e-5 and off[0] / off[1] > 3.5
+
+
+def test_the_impedance_of_a_u_tube_on_its_hull_is_that_of_two_tanks_and_what_lies_between():
+    """Impedance rho g / (A s) (s^2 + w^2) / (s^2 + 2 w^2), w^2 = g a / (A L)."""
+    case = u_tube("dormand-prince", free=False)
+    case["nodes"]["hull"]["joint"]["angle"] = {"mean": 0.0, "amplitude": 0.0, "period": 5.0}
+    case["links"]["duct"]["minor_loss"] = 0.0
+    found = response(case, "port")
+    s = 1j * np.array([0.1, 0.3, 1.0, 2.0])
+    square = GRAVITY * math.pi / 4 * 0.6**2 / (1.2 * 8.0)
+    wanted = RHO * GRAVITY / (1.2 * s) * (s**2 + square) / (s**2 + 2.0 * square)
+    assert found(s) == pytest.approx(wanted, rel=1e-6)
+
+
+def test_the_ledger_of_energy_of_a_basin_with_a_wall_and_of_a_device_beside_it_closes():
+    """Rows of devices come after those of basins; a valve joins a basin with a moving wall to a tank."""
+    parts = []
+    for step in (8e-3, 4e-3):
+        found = energy(flume("ssp-rk3"), {"numerics.step": step})
+        parts.append(float(np.abs(found.step).max()))
+    assert {"b.paddle"} <= {*found.supplied} and {"tap"} <= {*found.dissipated} and {"t"} <= {*found.stored}
+    passed = max(np.abs(one).max() for one in [*found.supplied.values(), *found.dissipated.values()])
+    assert found.dissipated["tap"][-1] > 1e-4 * passed
+    assert parts[1] < parts[0] / 5.0 and parts[1] < 1e-3 * passed
+
+
+def test_a_map_names_the_probe_that_its_reference_does_not_know():
+    case = SCENES["loop"]("rk4")
+    case["output"]["probes"] = ["one.angle", "loop.gap"]
+    with pytest.raises(FvsolveError, match="of the range of loop.gap.*remove this probe from output.probes"):
+        failure_map(case, methods=["rk4"], steps=[4e-3])
+
+
+def test_a_basin_too_large_to_be_predicted_is_measured_and_drawn_no_spectrum(tmp_path, fvs, monkeypatch):
+    monkeypatch.setattr(import_module("fvsolve.studies.stability.stability"), "TIME_LIMIT", 0.0)
+    pool = {"type": "basin", "size": [1.0, 1.0], "cells": [20, 20], "level": 0.3, "start": {"level": "0.3 + 0.001 * x"}}
+    case = scene({"b": pool}, {}, 1.0, {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.5}, ["b.depth@0.1,0.1"])
+    (tmp_path / "pool.toml").write_text(write(case))
+    code, said, error = fvs("stability", tmp_path / "pool.toml", "--steps", 20, "--out", tmp_path / "out")
+    assert code == 0 and "give pipes or basins fewer cells" in said + error
+    assert "1e4 / ||J||" not in said + error
+
+
+# ----------------------------------------------------------------------------------------------------------------------
+# Common features of studies: a path as case, progress without a terminal, and `--set` with `--method`.
+
+
+def levels() -> dict:
+    """Case of two tanks that an orifice joins."""
+    nodes = {"a": tank(1.0, 3.0), "b": tank(1.0, 2.0)}
+    hole = {"type": "orifice", "from": "a", "to": "b", "diameter": 0.1, "loss_coefficient": 2.0}
+    return scene(nodes, {"hole": hole}, 20.0, {"method": "euler", "step": 0.1}, ["a.level"], 0.5)
+
+
+@pytest.fixture
+def path(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    file = tmp_path / "levels.toml"
+    file.write_text(write(levels()))
+    return file
+
+
+def test_a_map_takes_a_path(path):
+    found = failure_map(str(path), methods=["rk4"], steps=[0.1])
+    assert [one.verdict for one in found.squares] == ["stable"]
+
+
+def test_without_a_terminal_a_study_says_now_and_then_where_it_is(monkeypatch, capsys):
+    monkeypatch.setattr(terminal, "PROGRESS_INTERVAL", 1e-3)
+    with terminal.progress_line() as progress:
+        progress(3, 9, "upwind with rk4")
+        latest = time.monotonic() + 5.0
+        said = ""
+        while not said and time.monotonic() < latest:
+            time.sleep(2e-3)
+            said = capsys.readouterr().err
+    assert said.splitlines()[0] == "3 of 9: upwind with rk4"
+
+
+def test_a_line_of_progress_is_not_repeated_unchanged(monkeypatch, capsys):
+    monkeypatch.setattr(terminal, "PROGRESS_INTERVAL", 1e-3)
+    with terminal.progress_line() as progress:
+        for done in (3, 4):
+            progress(done, 9, "rk4")
+            time.sleep(0.1)
+    assert capsys.readouterr().err.splitlines() == ["3 of 9: rk4", "4 of 9: rk4"]
+
+
+@pytest.mark.parametrize("study", ["chart", "order", "failure-map", "stability"])
+def test_a_setting_that_belongs_to_the_method_asked_for_is_read_with_it(fvs, path, study):
+    own = ["--set", "numerics.rtol=1e-5", "--method", "dormand-prince"]
+    columns = {"failure-map": ["--step", "0.1"], "chart": ["--rtol", "1e-4,1e-6"]}.get(study, [])
+    code, _, said = fvs(study, path, *own, *columns)
+    assert "rtol" not in said and code == 0, said
+
+
+def test_a_setting_that_belongs_to_no_method_asked_for_is_refused(fvs, path):
+    code, _, said = fvs("stability", path, "--set", "numerics.rtol=1e-5", "--method", "rk4")
+    assert code == 2 and "rtol" in said

@@ -3,8 +3,6 @@
 The sections of docs/where-methods-fail.md name these tests. All of them run the compiled program.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -127,10 +125,7 @@ def test_the_courant_limit_of_each_pair_is_met_by_real_runs_within_one_per_cent(
     limit = courant_limit(method, unit, steps)
     assert limit > 0.01
     below, above = (
-        measured_growth(
-            lossless(cells, scheme, method, c * travel, steps),
-            worst_start(model, method, c * unit, steps),
-        )
+        measured_growth(lossless(cells, scheme, method, c * travel, steps), worst_start(model, method, c * unit, steps))
         for c in (0.995 * limit, 1.005 * limit)
     )
     assert below < THRESHOLD < above, (scheme, method, limit, below, above)

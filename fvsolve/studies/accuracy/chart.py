@@ -62,19 +62,11 @@ WRONG_ERROR = 1.0  # errors above the range of the component are wrong results
     schemes=NAMES, methods=NAMES, cells=NUMBERS, rtol=NUMBERS, step=NUMBERS, target=NUMBER, out=PATH, **STUDY_ARGUMENTS
 )
 def chart(
-    case,
-    set: Mapping | None = None,
-    schemes: Sequence[str] | None = None,
-    methods: Sequence[str] | None = None,
-    cells: Sequence[int] | None = None,
-    rtol: Sequence[float] | None = None,
-    step: Sequence[float] | None = None,
-    target: float | None = None,
-    out: str | Path | None = None,
-    progress: Progress | None = None,
-    jobs: int = 1,
+    case, set: Mapping | None = None, schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None,
+    cells: Sequence[int] | None = None, rtol: Sequence[float] | None = None, step: Sequence[float] | None = None,
+    target: float | None = None, out: str | Path | None = None, progress: Progress | None = None, jobs: int = 1,
     dask: str | None = None,
-) -> Chart:
+) -> Chart:  # fmt: skip
     """Run a case with all combinations of schemes, methods and cells (or tolerances); compare errors with their cost.
 
     schemes, methods : names (default a selection)
@@ -225,10 +217,7 @@ class _ChartStudy:
         return Point(setting, **values)
 
     def add_coarser(self, points: list[Point], target: float) -> list[Point]:
-        """Add coarser settings of each scheme and method until the coarsest fails, or its error exceeds the target.
-
-        Returns all points, old and new. points : settings with their results; target : trajectory error [-]
-        """
+        """Add coarser settings of each curve until the coarsest fails or exceeds the error `target`; returns all."""
         all_points = []
         for curve in curves_by_name(points).values():
             extended = list(curve)
@@ -242,10 +231,7 @@ class _ChartStudy:
         return all_points
 
     def compile(self, setting: MethodSetting) -> float:
-        """Wall time of a first run with a setting minus that of a second [s], mostly of compilation.
-
-        The result is 0 if the case cannot have the setting.
-        """
+        """Time of compilation for a setting [s]: a first run minus a second; 0 if the case cannot have the setting."""
         try:
             return compile_seconds(study_model(self.case, setting.keys))
         except CaseError:
@@ -307,32 +293,23 @@ def cost_grows(setting: MethodSetting) -> bool:
 
 
 def _target_setting(target: float, point: Point, case: Case) -> TargetSetting:
-    """`TargetSetting` of a point; a method that is read from a file is given by the path of the file."""
-    keys = point.setting.keys
-    if "numerics.method" in keys:
-        keys = keys | {"numerics.method": _method_in_file(keys["numerics.method"], case)}
+    """`TargetSetting` of a point. A method that is read from a file is given by the path of the file.
+
+    The path is relative to the folder of the case if the file lies below this folder.
+    """
+    keys, method = dict(point.setting.keys), point.setting.keys.get("numerics.method")
+    path = Path(METHODS[method].source) if method in METHODS and method not in BUILT_IN else None
+    if path is not None and path.is_file():
+        folder = None if case.path is None else case.path.resolve().parent
+        below = folder is not None and path.is_relative_to(folder)
+        keys["numerics.method"] = path.relative_to(folder).as_posix() if below else str(path)
     numerics = {key.removeprefix("numerics."): value for key, value in keys.items() if key.startswith("numerics.")}
     others = {key: value for key, value in keys.items() if not key.startswith("numerics.")}
     return TargetSetting(target, point, numerics, others)
 
 
-def _method_in_file(method: str, case: Case) -> str:
-    """Value of the key `method` for a case file: a name, or the path of the file that contains the tableau.
-
-    The path is relative to the folder of the case if the file lies below this folder.
-    """
-    path = Path(METHODS[method].source) if method in METHODS and method not in BUILT_IN else None
-    if path is None or not path.is_file():
-        return method
-    folder = None if case.path is None else case.path.resolve().parent
-    return path.relative_to(folder).as_posix() if folder and path.is_relative_to(folder) else str(path)
-
-
 def _useless_text(case: Case, points: list[Point], floor: dict) -> str:
-    """Message for the fault that all errors are below the difference between the two references.
-
-    floor : as from `_ChartStudy.floor`
-    """
+    """Message if all errors are below the difference of the two references; floor : as from `_ChartStudy.floor`."""
     least = min(good_errors(points), default=math.nan)
     errors = f"all errors (least {least:.2g})" if math.isfinite(least) else "any useful error, and no run succeeded"
     remedy = "a larger --rtol"

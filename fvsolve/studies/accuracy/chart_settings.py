@@ -112,10 +112,7 @@ def cell_keys(case: Case, cells: int) -> dict:
 
 
 def cells_setting(case: Case, scheme: str, method: str, cells: int) -> MethodSetting:
-    """Setting of a case with cells: Courant number 0.9, or 1 for upwind with Euler.
-
-    Methods with error control have a tolerance instead.
-    """
+    """Setting of a case with cells: Courant number 0.9, 1 for upwind with Euler, or a tolerance with error control."""
     by_error = uses_error_control(method)
     control = "rtol" if by_error else "courant"
     size = IMPLICIT_RTOL if by_error else 1.0 if (scheme, method) == ("upwind", "euler") else DEFAULT_COURANT
@@ -289,11 +286,7 @@ def _lumped_settings(case: Case, schemes, methods, cells, rtol, step) -> list[Me
 
 
 def _delay_line_settings(case: Case, schemes, methods, cells, rtol, step) -> list[MethodSetting]:
-    """Settings of a case in which all pipes are delay lines, so that the resolution is the step.
-
-    A tolerance is not used: the error estimate of a step does not include the interpolation
-    between steps.
-    """
+    """Settings of a case of delay lines alone, by steps: error estimates of steps do not include the interpolation."""
     if schemes or cells or rtol:
         option = "scheme" if schemes else "cells" if cells else "rtol"
         text = f"{case.name} has only delay lines, so the option {option} does not apply"

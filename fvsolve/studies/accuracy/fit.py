@@ -101,18 +101,12 @@ class FitRows:
     # fits ---------------------------------------------------------------------------------------------------
 
     def fit_all(self, strict: bool = True) -> Fit | None:
-        """Fit the order in a window of the rows without a mark (see `find_window`); None if no window shows an order.
-
-        strict : False if the last order between rows of the window may deviate from the orders before it
-        """
+        """Fit in the window of good rows (see `find_window`), or None; strict : False if the last order may deviate."""
         limits = find_window(self.h[self.good], self.e[self.good], strict)
         return None if limits is None else self.fit_window(self.good, *limits)
 
     def fit_without_outlier(self) -> Fit | None:
-        """Fit the order without one row, whose error lies far below the line of the others; None without such a row.
-
-        An error lies so low where it changes sign.
-        """
+        """Fit without a row whose error lies far below the line, as where it changes sign; None without such a row."""
         best = None
         for i in range(1, len(self.good) - 1):
             rest = np.delete(self.good, i)
@@ -183,10 +177,7 @@ class FitRows:
 
 
 def pair_orders(h: np.ndarray, e: np.ndarray) -> np.ndarray:
-    """Orders between rows, log(e[i] / e[i+1]) / log(h[i] / h[i+1]); NaN where an error is zero or not finite.
-
-    h, e : float64[n]; returns float64[n-1]
-    """
+    """Orders between rows, log(e[i] / e[i+1]) / log(h[i] / h[i+1]) : float64[n-1]; NaN if one is 0 or not finite."""
     with np.errstate(divide="ignore", invalid="ignore"):
         orders = np.log(e[:-1] / e[1:]) / np.log(h[:-1] / h[1:])
     return np.where(np.isfinite(orders), orders, math.nan)

@@ -1,7 +1,9 @@
 """Errors and computing times of models of a case, from rigid columns to many cells, with every density law.
 
-A level of the hierarchy is a model of the case with a density law. The level `richest` is the reference of all others.
-It has the most cells and the most complete density law that runs.
+A level of the hierarchy is a model of the case with a density law, set by overrides. Levels of pipes are rigid columns,
+lumped volumes, delay lines, and few or many cells. Levels of tanks on moving bodies are frozen water (a rigid mass),
+sloshing modes and cells. The level `richest` is the reference of all others. It has the most cells and the most
+complete density law that runs.
 """
 
 import math
@@ -12,17 +14,171 @@ from typing import Any
 import numpy as np
 
 from fvsolve.case.chainage import add_bends, placed
+from fvsolve.case.raw import raw_link
 from fvsolve.case.sloshing import slowest
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.fluid import LAWS
+from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.schedule_pieces import value_with_limit
+from fvsolve.kernels.steady_friction import drag
+from fvsolve.model.delay_line_selection import reason_for_cells
 from fvsolve.model.model_facts import velocities
-from fvsolve.studies.accuracy.model_levels import NotApplicable, finer_levels, level_keys, level_names, sloshing_basins
 from fvsolve.studies.distance import Deviation, moving_probes
-from fvsolve.studies.outcome import GIVEN_UP, Outcome, capped, outcome, refuse_basins
+from fvsolve.studies.outcome import GIVEN_UP, Outcome, capped, outcome, refuse_basins, study_model
 from fvsolve.studies.reference import reference_of_run
 from fvsolve.studies.result_table import PlainData
 from fvsolve.validation import FUNCTION, NUMBER, TABLE, validated
+
+SLOSHING = ("frozen", "modes", "cells")
+MIN_REFINED_CELLS = 4  # sides of a tank with at most so many cells are not refined
+CELL_NUMERICS = {"numerics.method": "ssp-rk3", "numerics.courant": 0.7}
+LUMPED_NUMERICS = {"numerics.method": "auto", "numerics.rtol": 1e-7}
+
+
+class NotApplicable(Exception):
+    """Raised, with the reason, if a case cannot be turned into a model level."""
+
+
+def level_names(case) -> list[str]:
+    """Names of the model levels of a case, such as "rigid column", simplest first."""
+    pipes = [link for link in case.links.values() if link.kind == "pipe"]
+    if sloshing_basins(case):
+        return list(SLOSHING)
+    if not pipes:
+        return ["as it is"]
+    greatest = max(pipe.cells for pipe in pipes)
+    counts = [2**k for k in range(20) if 2 ** (k + 1) <= greatest]
+    cells = [f"{count} cell{'s' * (count > 1)}" for count in counts]
+    return ["rigid column", "lumped volume", "column and volume", "delay lines", *cells, "full line"]
+
+
+def sloshing_basins(case) -> dict[str, Any]:
+    """Basins with a free surface that are mounted on bodies: name -> node."""
+    basins = {name: node for name, node in case.nodes.items() if node.kind == "basin"}
+    return {name: node for name, node in basins.items() if node.on and node.physics_type.has_modes}
+
+
+def level_keys(case, level: str) -> dict[str, Any]:
+    """Overrides that turn a case into the model level with this name. Raises NotApplicable if this is impossible."""
+    if level in ("full line", "as it is"):
+        return {}
+    if sloshing_basins(case):
+        return sloshing_keys(case, level)
+    pipes = {name: link for name, link in case.links.items() if link.kind == "pipe"}
+    if level.endswith("times the cells"):
+        factor, step = int(level.split()[0]), case.numerics.step
+        keys = {f"links.{name}.cells": factor * pipe.cells for name, pipe in pipes.items()}
+        return keys if step is None else keys | {"numerics.step": step / factor}
+    if level == "delay lines":
+        for name, pipe in pipes.items():
+            if reason := reason_for_cells(case, name, pipe):
+                raise NotApplicable(f"{name} cannot be a delay line: {reason}")
+        return {f"links.{name}.pipe_model": "delay-line" for name in pipes}
+    if level.endswith(("cell", "cells")):
+        count, greatest = int(level.split()[0]), max(pipe.cells for pipe in pipes.values())
+        return {f"links.{name}.cells": max(1, round(pipe.cells * count / greatest)) for name, pipe in pipes.items()}
+    keys = {"expect": {}, "compare": {}, "routes": {}, "limits": {}, **LUMPED_NUMERICS}
+    keys["output.probes"] = [probe.text for probe in case.output.probes if probe.part != "links"
+                             or probe.name not in pipes or probe.text == f"{probe.name}.flow"]  # fmt: skip
+    if level != "lumped volume":
+        keys |= {f"links.{name}": rigid_column(case, name) for name in pipes}
+    else:
+        model = study_model(case)
+        keys |= {f"links.{name}": orifice_of(case, model, name) for name in pipes}
+    if level != "rigid column":
+        keys |= junction_chambers(case, pipes)
+    return keys
+
+
+def sloshing_keys(case, level: str) -> dict[str, Any]:
+    """Overrides that turn a case with tanks on bodies into the model level with this name.
+
+    All tanks have frozen water, sloshing modes or cells. The cells are those of the case, or a multiple of them along
+    sides with more than `MIN_REFINED_CELLS` cells.
+    """
+    basins, keys = sloshing_basins(case), {"expect": {}, "compare": {}, "routes": {}, "limits": {}}
+    if level in ("frozen", "modes"):
+        quantities = {"frozen": (), "modes": ("depth",)}[level]
+        probes = [entry for entry in case.output.probes if entry.name not in basins or entry.quantity in quantities]
+        keys["output.probes"] = [entry.text for entry in probes]
+        return keys | {f"nodes.{name}.sloshing": level for name in basins} | LUMPED_NUMERICS
+    keys |= {f"nodes.{name}.sloshing": "cells" for name in basins}
+    if any(basin.lumped for basin in basins.values()):
+        keys |= CELL_NUMERICS
+    if level == "cells":
+        return keys
+    factor, step = int(level.split()[0]), case.numerics.step
+    keys |= {f"nodes.{name}.cells": [factor * entry if entry > MIN_REFINED_CELLS else entry for entry in basin.cells]
+              for name, basin in basins.items()}  # fmt: skip
+    return keys if step is None else keys | {"numerics.step": step / factor}
+
+
+def rigid_column(case, name: str) -> dict[str, Any]:
+    """Table of the case (key -> value) that describes a pipe as a rigid column."""
+    names = ("from", "to", "length", "diameter", "friction", "minor_loss", "initial_flow")
+    raw = {"diameter": case.links[name].diameter, **raw_link(case.raw, name)}
+    table = {"type": "rigid-column", **{key: raw[key] for key in names if key in raw}}
+    if table.get("friction", {}).get("model") == "unsteady":  # a rigid column has no unsteady friction
+        friction = {key: value for key, value in table["friction"].items() if key in ("roughness", "factor")}
+        table["friction"] = {"model": "quasi-steady", **friction}
+    return table
+
+
+def orifice_of(case, model, name: str) -> dict[str, Any]:
+    """Table of the case (key -> value) for an orifice with the friction loss of a pipe at its initial flow.
+
+    The loss is dp = zeta rho v^2 / 2, with loss coefficient zeta, density rho and velocity v. Raises NotApplicable if
+    zeta is not known or not positive.
+    """
+    row = model.tables.pipes[[pipe.name for pipe in model.pipes].index(name)]
+    law = [row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds")]
+    flow, scale = float(row["flow"]), 2.0 * model.case.properties.density * row["area"] * case.links[name].length
+    if law[0] not in (rec.FRICTION_NONE, rec.FRICTION_FACTOR) and flow == 0.0:
+        raise NotApplicable(f"{name} is at rest at the start, so its friction loss is not known")
+    zeta = float(scale * (drag(*law, flow) / (abs(flow) * flow) if flow else row["loss"]))
+    if not zeta > 0.0:
+        raise NotApplicable(f"{name} has no friction, so there is no resistance between two volumes")
+    raw = {"diameter": case.links[name].diameter, **raw_link(case.raw, name)}
+    return {"type": "orifice", "from": raw["from"], "to": raw["to"], "diameter": raw["diameter"],
+            "loss_coefficient": zeta}  # fmt: skip
+
+
+def junction_chambers(case, pipes: dict) -> dict[str, Any]:
+    """Overrides that turn junctions into chambers, each with half the volume of every adjacent pipe.
+
+    Reservoirs, tanks and accumulators are kept. The volume of a chamber of the case is increased. Volumes of pipes are
+    multiplied by beta / (rho a^2), so that the chambers, in which the bulk modulus of the fluid is beta, are as elastic
+    as fluid and pipe wall together (density rho, wave speed a). Raises NotApplicable if a node cannot be
+    a chamber, or if no node becomes one.
+    """
+    volume_of: dict[str, float] = {}
+    fluid = case.properties
+    for name, pipe in pipes.items():
+        stiffness = fluid.density * case.wave_speed(name) ** 2
+        half_volume = 0.125 * math.pi * pipe.diameter**2 * pipe.length * fluid.bulk_modulus / stiffness
+        for end in pipe.ports.values():
+            volume_of[end] = volume_of.get(end, 0.0) + half_volume
+    chambers = {}
+    for name, volume in volume_of.items():
+        node = case.nodes.get(name, case.places[name])
+        if node.kind in ("reservoir", "tank", "accumulator"):
+            continue
+        if node.kind not in ("junction", "inflow", "chamber"):
+            raise NotApplicable(f"a volume at {name} would replace the {node.kind}")
+        if name not in case.nodes:
+            raise NotApplicable(f"{name} is a chamber of a cylinder, to which no other volume can be added")
+        raw = case.raw["nodes"][name]
+        if node.kind == "inflow" or (node.kind == "junction" and np.any(node.demand.value != 0.0)):
+            raise NotApplicable(f"flow enters or leaves at {name}, which a volume cannot represent")
+        start_keys = {key: raw[key] for key in ("elevation", "position", "initial_pressure") if key in raw}
+        own_volume = node.volume if node.kind == "chamber" else 0.0
+        chambers[f"nodes.{name}"] = {"type": "chamber", "volume": own_volume + volume, **start_keys}
+    if not chambers:
+        raise NotApplicable(
+            "all ends of the pipes are reservoirs, tanks or accumulators, so no node can take the pipes' volumes"
+        )
+    return chambers
+
 
 DEFAULT_TARGET = 1e-2
 BEST_OF, BRIEF_RUN = 3, 0.3  # timed runs of a level; time of the first run above which it is not repeated [s]
@@ -164,11 +320,9 @@ class Hierarchy(PlainData):
 
 @validated(set=TABLE, target=NUMBER, progress=FUNCTION)
 def ladder(
-    case,
-    set: Mapping | None = None,
-    target: float = DEFAULT_TARGET,
+    case, set: Mapping | None = None, target: float = DEFAULT_TARGET,
     progress: Callable[[int, int, str], None] | None = None,
-) -> Hierarchy:
+) -> Hierarchy:  # fmt: skip
     """Run a case as rigid columns, lumped volumes, delay lines, few and many cells, with every possible density law.
 
     A case with water in tanks on bodies is run with frozen water, modes and cells, the same for all tanks.
@@ -209,7 +363,8 @@ def ladder(
         reason = "no probe changes, so models have no errors"
         raise FvsolveError(f"{reason}. Try a probe that changes, or an input that does")
     cheapest = min(accurate, key=lambda level: level.seconds)
-    travel, change = travel_time(richest.model), change_time(richest.model)
+    change = change_time(richest.model)
+    travel = max((pipe.length / pipe.wave_speed for pipe in richest.model.pipes), default=0.0)
     of_law = {pair[1]: entry for entry, pair in zip(runs, models, strict=True) if pair[0] == models[at][0]}
     difference = law_difference(of_law.get("linear", own_run), own_run)
     strain = max((float(np.max(np.abs(p - p[0]))) for p in probe_pressures(richest)), default=0.0)
@@ -229,10 +384,13 @@ def refine_richest(
     The error of a level is d / (1 - r), with its difference d to the next level and the ratio r of successive
     differences (1/2 for the first). The next level only serves to compute this error and is left out. If the next level
     cannot be run, the error is r d / (1 - r), with the difference d to the level before, or None if no finer level was
-    run at all.
+    run at all. There are no finer levels without pipes and tanks on bodies, and if such a tank states no cells.
     """
     runs, differences, ratio = [("full line", own_run)], [], 0.5
-    for name in finer_levels(case, MAX_DOUBLINGS):
+    refinable = any(link.kind == "pipe" for link in case.links.values())
+    if tanks := sloshing_basins(case):
+        refinable = all(tank.cells for tank in tanks.values())
+    for name in [f"{2**k} times the cells" for k in range(1, MAX_DOUBLINGS + 1)] if refinable else []:
         report(name)
         if REFINED_COST * runs[-1][1].processor > LEVEL_CPU_LIMIT:
             break
@@ -271,10 +429,7 @@ def possible_laws(case) -> list[str]:
 
 
 def _run_level(case, name: str, law: str) -> Outcome:
-    """Outcome of a level with a density law; a level that does not suit the case gives an outcome with the reason.
-
-    name : name of the level as from `level_names`; law : density law
-    """
+    """Outcome of the level `name` with a density law, or of the reason if the level does not suit the case."""
     try:
         keys = {**level_keys(case, name), "fluid.law": law}
         return outcome(case, keys, best_of=BEST_OF, run=capped(LEVEL_CPU_LIMIT), budget=BRIEF_RUN)
@@ -286,10 +441,7 @@ def _run_level(case, name: str, law: str) -> Outcome:
 
 
 def _level_of(name: str, law: str, run: Outcome, richest: Outcome) -> ModelLevel:
-    """`ModelLevel` from the run of a level, with errors against the run `richest` of the reference level.
-
-    name : name of the level; law : density law
-    """
+    """`ModelLevel` from the run of the level `name` with a density law; errors are against the run `richest`."""
     if not run.ok:
         return ModelLevel(name, law, run.reason)
     gaps = moving_probes(run, reference_of_run(richest))
@@ -305,10 +457,7 @@ def _rms_error(gap: Deviation) -> float:
 
 
 def law_difference(linear: Outcome, richest: Outcome) -> LawDifference | None:
-    """Difference between a run with the linear density law and a run `richest` with the most complete law.
-
-    None if both are the same run, or if the linear run failed.
-    """
+    """Difference of a run with the linear law from `richest`; None if both are the same, or the linear run failed."""
     if linear is richest or not linear.ok:
         return None
     gaps = moving_probes(linear, reference_of_run(richest))
@@ -335,11 +484,6 @@ def shallow_water_notes(case, target: float) -> Iterator[str]:
                     f"{mode.excess:.2g} % too fast in shallow-water theory")  # fmt: skip
             more = ", more than the target: modes are more accurate for small waves"
             yield text + more if mode.excess > share else text
-
-
-def travel_time(model) -> float:
-    """Greatest travel time of a wave along a pipe [s]; 0 without pipes."""
-    return max((pipe.length / pipe.wave_speed for pipe in model.pipes), default=0.0)
 
 
 def change_time(model) -> float:

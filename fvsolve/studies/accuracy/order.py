@@ -10,8 +10,7 @@ import numpy as np
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.exact.solution import Solution, averages
 from fvsolve.model import RunData
-from fvsolve.studies.accuracy.order_result import Order
-from fvsolve.studies.accuracy.order_study import OrderStudy
+from fvsolve.studies.accuracy.order_study import Order, OrderStudy
 from fvsolve.studies.accuracy.refine import affordable_plan
 from fvsolve.studies.distance import recording_keys
 from fvsolve.studies.outcome import STUDY_ARGUMENTS, Outcome, Progress, name_list, outcome, refuse_basins, study_model
@@ -25,19 +24,9 @@ REFERENCE_KINDS = ("auto", "exact", "finer", "richardson")
 
 
 @validated(
-    refine=TEXT,
-    key=TEXT,
-    levels=COUNT,
-    cells=COUNT,
-    schemes=NAMES,
-    methods=NAMES,
-    against=TEXT,
-    initial=FUNCTION,
-    source=FUNCTION,
-    exact=FUNCTION,
-    out=OUT,
-    **STUDY_ARGUMENTS,
-)
+    refine=TEXT, key=TEXT, levels=COUNT, cells=COUNT, schemes=NAMES, methods=NAMES, against=TEXT, initial=FUNCTION,
+    source=FUNCTION, exact=FUNCTION, out=OUT, **STUDY_ARGUMENTS,
+)  # fmt: skip
 def order(
     case, set: Mapping | None = None, *, refine: str | None = None, key: str | None = None, levels: int | None = None,
     cells: int | None = None, schemes: str | Sequence[str] | None = None, methods: str | Sequence[str] | None = None,
@@ -137,15 +126,14 @@ class ManufacturedStudy(OrderStudy):
 
     @cached_property
     def reference(self) -> Reference:
-        """Reference: the exact function, or a finer run from the same start and with the same source."""
+        """Reference: the exact function, or a finer run from the same start and with the same source.
+
+        The pressure of a node by the exact function is that at the pipe end that joins the node.
+        """
         time_only = self.plan.way == "time" and self.against == "auto"  # the space error would hide the time error
         use_exact = self.exact is not None and self.against != "finer" and not time_only
-        if use_exact:
-            return self.reference_of_function()
-        return self.find_reference(self.plan.way, False, run=self.outcome)
-
-    def reference_of_function(self) -> Reference:
-        """Reference from the exact function; the pressure of a node is that at the pipe end that joins the node."""
+        if not use_exact:
+            return self.find_reference(self.plan.way, False, run=self.outcome)
         laws = {}
         for name, pipe in pipes(self.case).items():
             for node, x in ((pipe.from_, 0.0), (pipe.to, pipe.length)):
@@ -208,10 +196,7 @@ class UserFunction:
         return first, second
 
     def fault_for(self, pipe: str, problem: str) -> FvsolveError:
-        """Return an FvsolveError on a problem of the function on a pipe.
-
-        The error is also stored, because compiled steps that call the function cannot pass it on.
-        """
+        """FvsolveError on a problem on a pipe; it is also stored, because compiled steps cannot pass it on."""
         arguments = "pipe, x" if self.name == "initial" else "pipe, x, t"
         self.fault = FvsolveError(f'{self.name}({arguments}) on "{pipe}" {problem}')
         return self.fault

@@ -1,20 +1,20 @@
-"""Order study of one scheme and method: runs of all rows, errors against a reference, and fitted orders.
+"""Order study of one scheme and method: runs of all rows, errors against a reference, fitted orders, and their picture.
 
 Arguments of several functions : rows, each an `OrderRow`; fits, variable -> norm -> `Fit`; points, result cache;
 progress, called as progress(done, total, next)
 """
 
+import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
+from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers.tableau import METHODS
 from fvsolve.studies.accuracy.fit import FAILED, FLOOR, LEAST_ROWS, NO_ERROR, Fit, fit
-from fvsolve.studies.accuracy.order_picture import error_scale
-from fvsolve.studies.accuracy.order_result import Order, OrderRow
 from fvsolve.studies.accuracy.refine import Level, Plan
 from fvsolve.studies.distance import NORMS, error_norms, recording_keys, variable_size
 from fvsolve.studies.outcome import REFERENCE_CPU_LIMIT, Outcome, Progress, capped, outcome, study_model
@@ -35,6 +35,137 @@ from fvsolve.studies.resolution import (
     unit_of,
 )
 from fvsolve.studies.result_cache import ResultCache
+from fvsolve.studies.result_table import PlainData
+
+
+@dataclass(frozen=True)
+class OrderRow(PlainData):
+    """Row of an order study: a refinement level with its errors and cost.
+
+    errors : variable -> {"L1" | "L2" | "max": error [SI]}; seconds : time of the run [s]
+    rhs : number of evaluations of the rates; reason : reason of a failed run, else empty
+    """
+
+    level: Level
+    errors: dict[str, dict[str, float]]
+    seconds: float
+    rhs: int
+    cell_updates: int
+    steps: int
+    reason: str = ""
+
+    json = """cells=level.cells size=level.size step=level.step set=level.set
+              seconds rhs cell_updates steps reason errors"""
+
+
+@dataclass(frozen=True, repr=False)
+class Order(Displayable, PlainData):
+    """Order study of one scheme and method.
+
+    rows : refinement levels with errors, from coarse to fine; fits : variable -> {"L1" | "L2" | "max": Fit}
+    kind : kind of the reference, "exact" | "finer" | "richardson" | "function"; words : description of the reference
+    own_error : variable -> {"L1" | "L2" | "max": error of the reference itself [SI]}; notes : remarks on the numbers
+    units : SI units of the variables of basins
+    shown : variable -> (factor from SI, unit) of its printed errors, and "length" -> that of printed cell sizes; errors
+    of variables without an entry are printed in SI
+    """
+
+    case: str
+    scheme: str
+    method: str
+    plan: Plan
+    kind: str
+    words: str
+    rows: tuple[OrderRow, ...]
+    fits: dict[str, dict[str, Fit]]
+    own_error: dict[str, dict[str, float]]
+    notes: tuple[str, ...] = ()
+    units: dict[str, str] = field(default_factory=dict)
+    shown: dict[str, tuple[float, str]] = field(default_factory=dict)
+
+    picture = "fvsolve.studies.accuracy.order_study:order_picture"
+    json = "case scheme method refine=plan.way measure=plan.measure how=plan.words reference rows fits notes"
+
+    def summary_line(self) -> str:
+        return f"of {self.case!r}: {self.scheme}, {self.method}, {len(self.rows)} rows against {self.kind}"
+
+    def table_columns(self) -> dict[str, list]:
+        """Columns of the table, header -> value of each row: cells, size, step [s], errors in SI, and cost."""
+        columns: dict[str, list] = {"cells": [row.level.cells for row in self.rows]}
+        columns |= {"size": [row.level.size for row in self.rows], "step": [row.level.step for row in self.rows]}
+        for name, norms in self.fits.items():
+            for norm in norms:
+                key = f"{name} {norm}"
+                columns[key] = [row.errors.get(name, {}).get(norm, math.nan) for row in self.rows]
+        return columns | {"rhs": [row.rhs for row in self.rows], "seconds": [row.seconds for row in self.rows]}
+
+    def error_unit(self, variable: str) -> tuple[float, str]:
+        """(factor from SI, unit) of the printed errors of a variable."""
+        return self.shown.get(variable) or (1.0, variable_unit(variable, self.units))
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """Names of the compared variables."""
+        return tuple(self.fits)
+
+    @property
+    def reference(self) -> dict:
+        """Kind, description and error of the reference."""
+        return {"kind": self.kind, "words": self.words, "own_error": self.own_error}
+
+
+SHOWN_VARIABLES = 3  # variables with a table on the terminal; order.csv contains all
+CELLS = "cell size [m]"  # measure that is printed in the units of the case; steps and tolerances are SI
+
+
+def order_picture(study):
+    """matplotlib Figure of an `Order`: errors over size, a panel for each first variable, a line for each norm."""
+    from fvsolve.draw.accuracy_pictures import order_figure
+
+    length_factor, length = study.shown.get("length", (1.0, "m")) if study.plan.measure == CELLS else (1.0, "")
+    measure = CELLS.replace("[m]", f"[{length}]") if length else study.plan.measure
+    curves = {}
+    for variable, fits in list(study.fits.items())[: 2 * SHOWN_VARIABLES]:
+        size, error_unit = study.error_unit(variable)
+        curves[f"{variable} [{error_unit}]"] = {
+            norm: ([size * row.errors.get(variable, {}).get(norm, math.nan) for row in study.rows],
+                   replace(fit, constant=size * fit.constant / length_factor**fit.order)) for norm, fit in fits.items()
+        }  # fmt: skip
+    sizes = [length_factor * row.level.size for row in study.rows]
+    return order_figure(sizes, curves, measure, f"{study.case}: {study_title(study)}; {study.words}")
+
+
+def study_title(study) -> str:
+    """Title of an `Order` study: scheme, method and description of the refinement."""
+    scheme = f"{study.scheme}, " if study.rows[0].level.cells else ""
+    return f"{scheme}{study.method}, {study.plan.words}"
+
+
+def variable_unit(variable: str, known: Mapping[str, str] = {}) -> str:  # noqa: B006
+    """SI unit of a variable of an order study: from `known` (variable -> unit), otherwise from its dimension."""
+    from fvsolve.units import DIMENSIONS
+
+    return known[variable] if variable in known else DIMENSIONS[variable_dimension(variable)].si
+
+
+def variable_dimension(variable: str) -> str:
+    """Dimension of a variable of pipes, nodes or links, such as "pressure"; "number" for other variables."""
+    from fvsolve.parts import KINDS
+
+    quantity = variable.split("@")[0].rsplit(".", 1)[-1].rsplit(" ", 1)[-1]
+    kinds = [kind for group in KINDS.values() for kind in group.values()]
+    return next((quantities[quantity] for kind in kinds
+                 for quantities in (kind.quantities, getattr(kind, "along", {}))
+                 if quantity in quantities), "number")  # fmt: skip
+
+
+def error_scale(case, variable: str) -> tuple[float, str]:
+    """(factor from SI, unit) of errors of a variable in the units of `[output]`, or of lengths for "length"."""
+    from fvsolve.output.unit_columns import column
+
+    result = column("", variable if variable == "length" else variable_dimension(variable), case)
+    return result.span_from_si(1.0), result.span_unit
+
 
 BEST_OF, BRIEF_RUN = 2, 1.0  # timed runs of a row; time of the first run above which it is not repeated [s]
 EXCESS_ORDER = 1.5  # greatest excess of a fitted order over that of scheme and method; it occurs at single points
@@ -120,10 +251,7 @@ class OrderStudy:
                 "levels": [level.set for level in self.plan.levels]}  # fmt: skip
 
     def reference_data(self, progress: Progress, total: int) -> dict:
-        """Kind, description and error of the reference, and greatest absolute values of all variables, as plain data.
-
-        total : total number of runs, for `progress`
-        """
+        """Plain data: kind, words and error of the reference, greatest values of variables; total : for `progress`."""
         progress(0, total, "reference")
         reference = self.reference
         return {"kind": reference.kind, "words": reference.words, "own": reference.own_error, "sizes": self.sizes()}
@@ -158,10 +286,7 @@ class OrderStudy:
         return self.queue(self.case, self.request(level))
 
     def sizes(self) -> dict[str, float]:
-        """Greatest absolute value of each variable in the coarsest row that runs [SI], the scale of rounding errors.
-
-        Raises FvsolveError if no row runs.
-        """
+        """Greatest value of each variable in the coarsest row that runs [SI]; raises FvsolveError if no row runs."""
         for level in self.plan.levels:
             run = self.run(level)
             if run.ok:
@@ -252,10 +377,7 @@ class OrderStudy:
         return {"L1": (s + 1) * p / (p + 1), "L2": (s + 0.5) * p / (p + 1), "max": s * p / (p + 1)}
 
     def order_notes(self, exact: bool) -> list[str]:
-        """Notes on the expected order if jumps or kinks travel through cells, or if there are delay lines.
-
-        exact : True if all errors of delay lines are rounding errors
-        """
+        """Notes on the expected order with jumps, kinks or delay lines; exact : True if their errors are rounding."""
         breaks = self.breaks
         if delay_lines(self.case):
             return [EXACT_NOTE if exact else EXPECTED_ORDER]
@@ -272,10 +394,7 @@ class OrderStudy:
         ]
 
     def step_error_note(self, fits) -> list[str]:
-        """Remark with a smaller step, tolerance or Courant number, if the time error may hide the order in space.
-
-        The result is a list with one text, or empty.
-        """
+        """List with a remark on a smaller step or tolerance if the time error may hide the order in space, or []."""
         with_errors = [norms["L1"] for norms in fits.values() if norms["L1"].reason != NO_ERROR]
         hidden = any(FLOOR in fitted.marks or fitted.reason for fitted in with_errors)
         if self.plan.way != "space" or not hidden or len(self.plan.levels) < LEAST_ROWS:
@@ -347,11 +466,7 @@ def mark_finest(fitted: Fit, rows) -> Fit:
 
 
 def is_certain(fitted: Fit, ratio: float) -> bool:
-    """True if the fitted order p is certain enough to extrapolate errors.
-
-    The factor 1 / (1 - ratio^-p) of an extrapolation must have a relative error of at most a quarter; ratio : size of a
-    row over that of the next.
-    """
+    """True if 1 / (1 - ratio^-p), with the fitted order p and the ratio of sizes of rows, is certain to a quarter."""
     return fitted.order > 0.0 and np.log(ratio) * fitted.spread <= EXTRAPOLATION_ERROR * (ratio**fitted.order - 1.0)
 
 
@@ -375,11 +490,7 @@ def extrapolate(rows, fits) -> tuple[OrderRow, ...]:
 
 
 def difference_notes(rows, fits) -> list[str]:
-    """List with one note, or empty: variables and norms for which the table shows differences instead of errors.
-
-    The differences are those to the next row. The order of these variables and norms is not certain (see `is_certain`).
-    At most three variables are named.
-    """
+    """List with a note on variables whose order is uncertain (see `is_certain`), at most three, or an empty list."""
     ratio = rows[0].level.size / rows[1].level.size
     names = [f"{name} ({', '.join(uncertain)})" for name, norms in fits.items()
              if (uncertain := [norm for norm, fitted in norms.items() if not is_certain(fitted, ratio)])]  # fmt: skip

@@ -177,10 +177,7 @@ def target_crossings(points: Sequence[Point], target: float, floor: float, cost:
 
 
 def cheapest_curve(points: Sequence[Point], target: float, floor: float, cost: str) -> tuple[str, Crossing] | None:
-    """Name and crossing of the curve with the least cost at a target error; None if no curve reaches the target.
-
-    Arguments as for `target_crossings`.
-    """
+    """Name and crossing of the curve with the least cost at a target, or None; arguments as for `target_crossings`."""
     return min(target_crossings(points, target, floor, cost).items(), key=lambda item: item[1].cost, default=None)
 
 
@@ -205,10 +202,7 @@ def coarser_setting(case: Case, setting: MethodSetting) -> MethodSetting | None:
 
 
 def fineness_text(points, name: str | None, where: Crossing | None) -> str:
-    """Text of the resolution at a crossing with a target error, such as "200 cells" or "rtol 1e-06".
-
-    name : name of the curve, None without a crossing; where : the crossing; points : points of all curves
-    """
+    """Resolution at the crossing `where` of the curve `name` in words, such as "200 cells"; "" without a crossing."""
     if name is None or where is None:
         return ""
     coarse, fine = (curves_by_name(points)[name][k].setting for k in (where.coarser, where.finer))

@@ -137,10 +137,7 @@ def sweep_positive_real(
 
 
 def _value_per_point(name: str, given, shape: tuple, kind: type) -> np.ndarray:
-    """Convert the result `given` of the function `name` to an array with a number of type `kind` for each point.
-
-    Raises FvsolveError if this is not possible.
-    """
+    """Result `given` of the function `name` as an array for all points. Raises FvsolveError if this is impossible."""
     try:
         return np.broadcast_to(np.asarray(given, kind), shape)
     except (TypeError, ValueError):

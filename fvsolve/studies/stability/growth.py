@@ -8,6 +8,7 @@ growth counts; threshold, growth above which a step fails; latest, time of the m
 `VectorGrowth` raises TooLarge; default: in 30 s
 """
 
+import functools
 import time
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
@@ -161,22 +162,14 @@ def matrix_powers(m: np.ndarray, steps: int, few: bool = False) -> Iterator[tupl
             power = power @ m
         else:
             rest = n - high
-            power = known[high] @ (known[rest] if rest in known else assembled_power(known, rest))
+            parts = (known[1 << k] for k in range(rest.bit_length()) if rest >> k & 1)
+            power = known[high] @ (known[rest] if rest in known else functools.reduce(np.matmul, parts))
         last = n
         if n <= CONSECUTIVE_POWERS or n & (n - 1) == 0:
             known[n] = power
         yield n, power
         if not np.all(np.isfinite(power)):
             return
-
-
-def assembled_power(known: dict[int, np.ndarray], n: int) -> np.ndarray:
-    """Power m^n of a matrix as a product of the powers m^(2^k) in `known`."""
-    product = None
-    for k in range(n.bit_length()):
-        if n >> k & 1:
-            product = known[1 << k] if product is None else product @ known[1 << k]
-    return product
 
 
 def power_growth(m: np.ndarray, steps: int = STEPS) -> Growth:
@@ -205,10 +198,7 @@ class DenseGrowth:
         self.size = float(np.linalg.norm(e, 2))
 
     def fails(self, h: float, few: bool = False) -> bool:
-        """True if the norm of a power of the matrix of a step of h [s] exceeds the threshold within `steps` powers.
-
-        few : True to check only powers of two and the last power
-        """
+        """True if a power of the step matrix exceeds the threshold; few : only powers of two and the last power."""
         m = self.matrix(h)
         with np.errstate(over="ignore", invalid="ignore"):
             return any(norm_exceeds(power, self.threshold) for _, power in matrix_powers(m, self.steps, few))
@@ -269,15 +259,11 @@ class VectorGrowth:
         self.method, self.e, self.steps, self.threshold = method, e.tocsr(), steps, threshold
         self.latest = time.monotonic() + TIME_LIMIT if latest is None else latest
         self.transpose = e.T.tocsr()
-        self.size = self.two_norm()
-        self.start_block = np.random.default_rng(1).standard_normal((e.shape[0], VECTORS))
-
-    def two_norm(self) -> float:
-        """Estimate of the 2-norm of the Jacobian [1/s], by power iteration."""
-        v = np.random.default_rng(2).standard_normal(self.e.shape[0])
-        for _ in range(50):
+        v = np.random.default_rng(2).standard_normal(e.shape[0])
+        for _ in range(50):  # power iteration for the 2-norm
             v = self.transpose @ (self.e @ (v / np.linalg.norm(v)))
-        return float(np.sqrt(np.linalg.norm(v)))
+        self.size = float(np.sqrt(np.linalg.norm(v)))
+        self.start_block = np.random.default_rng(1).standard_normal((e.shape[0], VECTORS))
 
     def limit(self) -> StepLimit:
         """Limit of the step [s], below which no step is found to fail."""

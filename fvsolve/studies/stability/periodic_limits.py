@@ -69,9 +69,18 @@ class PeriodicPipe:
     """Linear advection on a periodic grid by one scheme and one method; a run is one call of compiled code."""
 
     def __init__(self, scheme: str, method: str, cells: int, limiter: str = "minmod") -> None:
-        self.tables = _tables(scheme, limiter, cells)
+        from fvsolve.kernels.calls import compile_as
+        from fvsolve.kernels.reconstruction import rhs_periodic
+        from fvsolve.steppers.run_handle import RHS
+
+        names = (*rec.Tables._fields, *rec.RunArrays._fields)
+        tables = {name: np.zeros(1, rec.RECORDS.get(name, float)) for name in names}
+        tables["scratch"] = np.zeros(2 * cells + 7)
+        scheme_settings(tables["settings"][0], scheme, limiter)
+        tables["pipes"]["noise"] = WENO_NOISE
+        self.tables = tuple(tables.values())
         self.stepper = Integrator(method_named(method), cells, 0, lambda: Structure.full(cells), np.ones(cells))
-        self.handle, self.functions = make_handle(self.tables), (*observers(), _rhs())
+        self.handle, self.functions = make_handle(self.tables), (*observers(), compile_as(rhs_periodic, RHS))
 
     def run(self, start: np.ndarray, courant: float, steps: int) -> np.ndarray | None:
         """Cell values after `steps` steps at a Courant number, from the values `start`; None if not finite."""
@@ -114,34 +123,28 @@ def measured_limits(
 
 
 def measured_limit(scheme: str, method: str, cells: int = CELLS, steps: int = STEPS) -> MeasuredLimit:
-    """Least Courant number at which growth exceeds 1000 within `steps` steps, predicted and measured."""
-    predicted = first_failure(lambda courant: predicted_growth(scheme, method, cells, steps, courant))
-    circle = PeriodicPipe(scheme, method, cells)
-    measured = first_failure(lambda courant: measured_growth(circle, cells, steps, courant))
-    return MeasuredLimit(scheme, method, cells, steps, predicted, measured)
+    """Least Courant number at which growth exceeds 1000 within `steps` steps, predicted and measured.
 
+    The growth is that of the wave that grows most: from the stability function, and in a run from one impulse.
+    """
+    theta, circle = 2 * np.pi * np.arange(cells // 2 + 1) / cells, PeriodicPipe(scheme, method, cells)
+    r, impulse = analyse(method).stability_function, np.zeros(cells)
+    impulse[0] = 1.0
 
-def predicted_growth(scheme: str, method: str, cells: int, steps: int, courant: float) -> float:
-    """log10 of the greatest growth of a wave of the periodic grid within `steps` steps, from the stability function."""
-    theta = 2 * np.pi * np.arange(cells // 2 + 1) / cells
-    r = analyse(method).stability_function
-    return steps * math.log10(np.abs(r(courant * symbol(weights_of(scheme), theta))).max())
+    def predicted_growth(courant: float) -> float:
+        return steps * math.log10(np.abs(r(courant * symbol(weights_of(scheme), theta))).max())
 
+    def measured_growth(courant: float) -> float:
+        end = circle.run(impulse, courant, steps)
+        return math.inf if end is None else math.log10(np.abs(np.fft.rfft(end)).max())
 
-def measured_growth(circle: PeriodicPipe, cells: int, steps: int, courant: float) -> float:
-    """log10 of the greatest growth of a wave in a run from one impulse; inf if values do not remain finite."""
-    start = np.zeros(cells)
-    start[0] = 1.0
-    end = circle.run(start, courant, steps)
-    return math.inf if end is None else math.log10(np.abs(np.fft.rfft(end)).max())
+    return MeasuredLimit(scheme, method, cells, steps, first_failure(predicted_growth), first_failure(measured_growth))
 
 
 def first_failure(
-    growth: Callable[[float], float],
-    width: float = LIMIT_TOLERANCE,
-    smallest: float = SMALLEST_COURANT,
+    growth: Callable[[float], float], width: float = LIMIT_TOLERANCE, smallest: float = SMALLEST_COURANT,
     ratio: float = COURANT_RATIO,
-) -> float | None:
+) -> float | None:  # fmt: skip
     """Least Courant number whose growth exceeds 1000; None if there is none up to 20.
 
     growth : function of the Courant number, log10 of the growth
@@ -161,23 +164,6 @@ def check_size(cells: int, steps: int) -> None:
         raise FvsolveError(f"cells = {cells}: expected 6 or more, the widest scheme uses 5 cells")
     if steps < 10:
         raise FvsolveError(f"steps = {steps}: expected 10 or more, because failure is growth over many steps")
-
-
-def _tables(scheme: str, limiter: str, cells: int) -> tuple:
-    """Tables that the kernel of the periodic grid reads: settings of the scheme, small number of WENO, work space."""
-    tables = {name: np.zeros(1, rec.RECORDS.get(name, float)) for name in (*rec.Tables._fields, *rec.RunArrays._fields)}
-    tables["scratch"] = np.zeros(2 * cells + 7)
-    scheme_settings(tables["settings"][0], scheme, limiter)
-    tables["pipes"]["noise"] = WENO_NOISE
-    return tuple(tables.values())
-
-
-def _rhs():
-    from fvsolve.kernels.calls import compile_as
-    from fvsolve.kernels.reconstruction import rhs_periodic
-    from fvsolve.steppers.run_handle import RHS
-
-    return compile_as(rhs_periodic, RHS)
 
 
 # limited schemes --------------------------------------------------------------------------------------------------
@@ -295,20 +281,14 @@ def start_fields(cells: int) -> dict[str, np.ndarray]:
 
 
 def measured_courant(scheme: str, limiter: str | None, method: str, start: np.ndarray, steps: int) -> float | None:
-    """Least Courant number found at which the L2 norm of a real run grows 1000 times within `steps` steps.
-
-    start : initial cell values. The result is None if no Courant number up to 20 is found to fail.
-    """
+    """Least Courant number up to 20 at which the norm of a run from `start` is found to grow 1000 times, or None."""
     circle = PeriodicPipe(scheme, method, start.size, limiter or "minmod")
     smallest = monotone_limit(limiter or scheme, method) or SMALLEST
     return first_failure(lambda courant: _growth(circle, start, courant, steps), LIMITED_TOLERANCE, smallest, RATIO)
 
 
 def _growth(circle: PeriodicPipe, start: np.ndarray, courant: float, steps: int) -> float:
-    """log10 of the growth in a run, the greatest norm over the norm at the start.
-
-    The result is inf for a growth above 1000, and if values are not finite.
-    """
+    """log10 of the growth of the norm in a run; inf above a growth of 1000, and if values are not finite."""
     u, greatest, done = start, 0.0, 0
     for k in range(1, NORM_CHECKS + 1):
         count, done = steps * k // NORM_CHECKS - done, steps * k // NORM_CHECKS

@@ -9,7 +9,7 @@ import numpy as np
 from fvsolve.model.energy_norm import EnergyForm
 from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
 from fvsolve.steppers import loop_records
-from fvsolve.studies.linear.operating_point import OperatingPoint
+from fvsolve.studies.operating_point import OperatingPoint
 from fvsolve.studies.stability.growth import STEP_RATIO, STEPS, THRESHOLD, StepLimit, bisect, checked_powers
 
 SMALL_DEVIATIONS = 10.0 ** -np.arange(6.0, 16.0)  # greatest at the start, in units of the small deviation of states
@@ -41,7 +41,9 @@ class RealRuns:
         self.prepare(at.model.y_size, steps, threshold)
         rng = np.random.default_rng(7)
         starts = [*([] if worst is None else [worst]), *rng.standard_normal((RANDOM_STARTS, form.size))]
-        deviations = [self.as_deviation(start) for start in starts]
+        deviations = [form.back @ start for start in starts]
+        # the greatest entry of each equals the small deviation of that state
+        deviations = [y / np.max(np.abs(y) / at.model.scale) for y in deviations]
         self.starts = [(y, small or self.linear_width(y, a)) for y in deviations]
         self.at_rest = not np.any(at.rate)
         self.structure = at.model.structure
@@ -52,14 +54,6 @@ class RealRuns:
         self.check_steps = checked_powers(steps)
         self.strides = np.diff([0, *self.check_steps]).astype(float)
         self.latest = time.monotonic() + TIME_LIMIT
-
-    def as_deviation(self, start: np.ndarray) -> np.ndarray:
-        """Deviation of all states from a deviation `start` in coordinates of the energy norm : float64[n].
-
-        It is scaled so that its greatest entry equals the small deviation of that state.
-        """
-        y = self.form.back @ start
-        return y / np.max(np.abs(y) / self.at.model.scale)
 
     def linear_width(self, y: np.ndarray, a) -> float:
         """Factor on the start deviation y for which growth remains linear up to the threshold and is above round-off.
@@ -249,10 +243,7 @@ def measure_limit(
 
 
 def fixed_step_loop(model, structure: Callable, method: str, h: float, t: float) -> RunLoop:
-    """Run loop of a model with a method and fixed steps of h [s], at the time t [s].
-
-    structure : function that returns the `Structure` of the model
-    """
+    """Run loop with fixed steps of h [s] from the time t [s]; structure : function that returns the `Structure`."""
     changes = {"method": method, "step": h, "courant": None, "rtol": None}
     numerics = model.case.numerics.model_copy(update=changes)
     loop = RunLoop(replace(model, case=replace(model.case, numerics=numerics)), structure)

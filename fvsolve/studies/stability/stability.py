@@ -21,8 +21,8 @@ from fvsolve.model.energy_norm import EnergyForm, energy_form
 from fvsolve.schemes import SCHEMES, branches
 from fvsolve.steppers import automatic, method_named
 from fvsolve.steppers.tableau import AUTO
-from fvsolve.studies.linear.linearise import Linear, Spectrum, find_eigenvalues, linearise_at
-from fvsolve.studies.linear.operating_point import OperatingPoint, has_limiter, operating_point, with_weights
+from fvsolve.studies.linearise import Linear, Spectrum, find_eigenvalues, linearise_at
+from fvsolve.studies.operating_point import OperatingPoint, has_limiter, operating_point, with_weights
 from fvsolve.studies.outcome import STUDY_ARGUMENTS, Progress, name_list
 from fvsolve.studies.parallel import PickledCase, TaskPool, Work
 from fvsolve.studies.resolution import delay_lines, fixed_choices
@@ -154,8 +154,7 @@ def stability(
 def cached_rows(points: ResultCache, case, options: dict, pairs: list, pool: TaskPool, report: Progress) -> list[dict]:
     """Rows of all pairs (scheme, method); rows that are not in the cache are computed by `pool` and stored.
 
-    points : cache of rows; report : progress function
-    options : settings of the study that are part of the key of a row
+    points : cache of rows; report : progress function; options : settings that are part of the key of a row
     """
     keys = [{"study": "stability", "scheme": scheme, "method": method, **options} for scheme, method in pairs]
     rows = [points.find(case, extra) for extra in keys]
@@ -266,10 +265,7 @@ class SchemeRows:
                 "steps": self.steps, "threshold": self.threshold}  # fmt: skip
 
     def bound_columns(self, side: LinearSystem, method) -> dict:
-        """Columns of a row that do not need powers of the step matrix: names, sizes, bounds of the step.
-
-        side : linear system of the scheme
-        """
+        """Columns that need no powers of the step matrix: names, sizes, bounds; side : linear system of the scheme."""
         model, left_out = side.at.model, {}
         values = side.spectrum
         row = self.first_columns(side.at, method) | {
@@ -328,10 +324,7 @@ def von_neumann_limit(scheme: str, method) -> float:
 
 
 def dominant_part(form: EnergyForm, end: np.ndarray) -> tuple[str, float]:
-    """(name of the part with the greatest share of the energy of a deviation, this share).
-
-    end : float64[r]  deviation in coordinates of the energy norm, with norm 1
-    """
+    """(part with most of the energy of a deviation, its share); end : float64[r]  in the energy norm, with norm 1."""
     shares: dict[str, float] = {}
     for part, root in zip(form.parts, form.rows @ (form.back @ end), strict=True):
         shares[part] = shares.get(part, 0.0) + float(root**2)

@@ -11,8 +11,8 @@ import numpy as np
 from fvsolve.errors import listing
 from fvsolve.steppers import analyse
 from fvsolve.steppers.tableau import Method
-from fvsolve.studies.linear.linearise import ZERO_TOLERANCE
-from fvsolve.studies.linear.operating_point import has_limiter
+from fvsolve.studies.linearise import ZERO_TOLERANCE
+from fvsolve.studies.operating_point import has_limiter
 from fvsolve.studies.stability.growth import TooLarge, bisect_limit
 
 

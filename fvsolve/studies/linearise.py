@@ -13,11 +13,13 @@ from fvsolve.model.energy_norm import EnergyForm
 from fvsolve.model.model import inputs_of
 from fvsolve.schemes import SCHEMES
 from fvsolve.solve.advance import hold
-from fvsolve.studies.linear.operating_point import OperatingPoint, has_limiter, operating_point
-from fvsolve.studies.linear.state_matrices import (
+from fvsolve.studies.operating_point import (
     COARSE_STEPS,
     SLOPE_TOLERANCE,
+    OperatingPoint,
+    has_limiter,
     longest_step_slopes,
+    operating_point,
     output_matrix,
     responses,
     single_sided_differences,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
@@ -13,7 +13,8 @@ from fvsolve.case import load
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.schemes import LIMITED
 from fvsolve.steppers.tableau import METHODS as KNOWN_METHODS
-from fvsolve.studies.failure.map_columns import (
+from fvsolve.studies.distance import Deviation, column_ranges, time_weights
+from fvsolve.studies.failure_map_columns import (
     Columns,
     WaveGrowthLimit,
     cells_for_delay_lines,
@@ -22,14 +23,211 @@ from fvsolve.studies.failure.map_columns import (
     greatest_step,
     map_columns,
 )
-from fvsolve.studies.failure.run_verdict import NOT_RUN, Measures, measure_run, run_recorded, verdict
-from fvsolve.studies.outcome import STUDY_ARGUMENTS, Progress, name_list, refuse_basins
+from fvsolve.studies.outcome import (
+    GIVEN_UP,
+    STUDY_ARGUMENTS,
+    CappedRun,
+    Outcome,
+    Progress,
+    has_diverged,
+    name_list,
+    outcome,
+    refuse_basins,
+)
 from fvsolve.studies.parallel import RunQueue, RunRequest
 from fvsolve.studies.reference import Reference, find_reference
 from fvsolve.studies.resolution import delay_lines, fixed_choices
 from fvsolve.studies.result_cache import OUT, ResultCache, cache_in
 from fvsolve.studies.result_table import PlainData
 from fvsolve.validation import NAMES, NUMBER, NUMBERS, ROW, TEXT, Kind, is_row, validated
+
+STABLE, RINGING, COARSE, WRONG, BLOWN_UP, REFUSED, NOT_RUN = (
+    "stable", "ringing", "coarse", "wrong", "blown up", "refused", "not run",
+)  # fmt: skip
+VERDICT_TEXTS = {
+    STABLE: "error within the tolerance, and smooth",
+    RINGING: "finite, but oscillates from step to step, or oscillates more and faster than the reference",
+    COARSE: "error above the tolerance, but a shorter step helps",
+    WRONG: "finite, error above the tolerance, and neither half nor a quarter of the step helps",
+    BLOWN_UP: "not finite, or more than three ranges of a probe outside the values of the reference",
+    REFUSED: "fvsolve refused the case, or stopped with a reason",
+    NOT_RUN: "too many implicit steps, or given up after too much time",
+}
+BLOWN_RANGES = 3.0  # a run farther outside the values of the reference, in ranges of a probe, has blown up
+MIN_SWINGS = 8  # successive changes of alternating sign that count as ringing
+SWING_RANGE, REFERENCE_SWING = 0.02, 1e-3  # least swings that count [range]: of a run, of the reference, may decay
+PACE_RATIO = 0.5  # swings count if they follow in less than this fraction of the time of those of the reference
+EXCESS_VARIATION = 0.25  # greatest excess of the variation of a probe, as a fraction of that of the reference
+ERROR_RATIO = 0.75  # a shorter step helps if at most this fraction of the error remains
+
+
+@dataclass(frozen=True)
+class Measures:
+    """Measures of a run against the reference, each for the worst probe, relative to the range of the probe.
+
+    reason : reason for the end of the run; ok : True if the run finished; refused : True if the run did not begin
+    error : mean distance from the reference over time; nan if the run did not finish
+    farthest : greatest distance of a recorded value from the range of values of the reference, 0 inside this range;
+    nan if the run did not finish. Long runs record windows of steps, see `RecordedRun`.
+    ringing, variation : see `ringing_amplitude` and `excess_variation`
+    steps : number of steps; seconds : elapsed time of the steps [s]
+    """
+
+    reason: str
+    ok: bool
+    refused: bool = False
+    error: float = math.nan
+    farthest: float = math.nan
+    ringing: float = 0.0
+    variation: float = 0.0
+    steps: int = 0
+    seconds: float = math.nan
+
+
+def verdict(run: Measures, shorter: Callable[[], Measures], tolerance: float) -> str:
+    """Verdict on a run, a key of `VERDICT_TEXTS`.
+
+    shorter : function that returns the measures of the run with half the step, and at the second call with a quarter;
+    it is called only if the error is above the tolerance and no earlier verdict applies
+    """
+    if run.reason.startswith(GIVEN_UP):
+        return NOT_RUN
+    if run.refused or (not run.ok and not has_diverged(run.reason)):
+        return REFUSED
+    if not run.ok or not run.farthest <= BLOWN_RANGES:
+        return BLOWN_UP
+    if run.ringing > tolerance or run.variation > EXCESS_VARIATION:
+        return RINGING
+    if run.error <= tolerance:
+        return STABLE
+    enough = max(tolerance, ERROR_RATIO * run.error)
+    for _ in range(2):
+        shorter_run = shorter()
+        if shorter_run.reason.startswith(GIVEN_UP):
+            return NOT_RUN
+        if shorter_run.error <= enough:
+            return COARSE
+    return WRONG
+
+
+def ringing_amplitude(windows: Sequence[np.ndarray], ranges: np.ndarray) -> float:
+    """Greatest amplitude of an oscillation from step to step, relative to the range of the probe.
+
+    windows : float64[steps, probes] each  values after successive steps; ranges : float64[probes]
+    Eight successive changes must alternate in sign; the amplitude is half of the least of these changes.
+    """
+    worst = 0.0
+    for window in windows:
+        change = np.diff(window, axis=0) / ranges
+        if len(change) < MIN_SWINGS:
+            continue
+        turns = change[1:] * change[:-1] < 0.0
+        sliding = np.lib.stride_tricks.sliding_window_view
+        alternate = sliding(turns, MIN_SWINGS - 1, axis=0).all(axis=-1)
+        least = 0.5 * sliding(np.abs(change), MIN_SWINGS, axis=0).min(axis=-1)
+        worst = max(worst, float(np.max(least[alternate], initial=0.0)))
+    return worst
+
+
+def excess_variation(rows: np.ndarray, reference: np.ndarray, ranges: np.ndarray) -> float:
+    """Excess of the total variation TV of the worst probe over the reference, (TV - TV_ref) / max(TV_ref, range).
+
+    TV is the sum of |changes| from row to row. A probe counts only if its swings follow each other in less than half
+    the time of the swings of the reference. Thus a swing of the reference that the method amplifies or does not damp
+    does not count as ringing. Each row is first replaced by the median of itself and its neighbours, so that a single
+    outlier after a jump does not count as a swing.
+    rows, reference : float64[k, probes]  values of the run and the reference; ranges : float64[probes]
+    """
+    smooth, smooth_reference = (_medians(values) / ranges for values in (rows, reference))
+    variation, expected = (np.abs(np.diff(values, axis=0)).sum(axis=0) for values in (smooth, smooth_reference))
+    excesses = (variation - expected) / np.maximum(expected, 1.0)
+    quick = [turn_interval(a, SWING_RANGE) < PACE_RATIO * turn_interval(b, REFERENCE_SWING)
+             for a, b in zip(smooth.T, smooth_reference.T, strict=True)]  # fmt: skip
+    return float(np.max(excesses[quick], initial=0.0))
+
+
+def turn_interval(values: np.ndarray, height: float) -> float:
+    """Median number of rows between turning points of swings of `height` or more; inf for fewer than two points."""
+    turns, low, high, direction = [], 0, 0, 0
+    for i, value in enumerate(values):
+        low, high = (i if value < values[low] else low), (i if value > values[high] else high)
+        if direction >= 0 and value < values[high] - height:
+            turns += [high] * direction
+            direction, low = -1, i
+        elif direction <= 0 and value > values[low] + height:
+            turns += [low] * -direction
+            direction, high = 1, i
+    return float(np.median(np.diff(turns))) if len(turns) > 1 else np.inf
+
+
+def _medians(rows: np.ndarray) -> np.ndarray:
+    return np.median([rows[:-2], rows[1:-1], rows[2:]], axis=0) if len(rows) > 2 else rows
+
+
+def probe_ranges(reference: np.ndarray) -> np.ndarray:
+    """Greatest minus least value of each probe in the reference, inf for constant probes : float64[probes]."""
+    return np.nan_to_num(column_ranges(reference), nan=np.inf)
+
+
+def measure_run(outcome, windows: Sequence[np.ndarray], reference) -> Measures:
+    """Measures of a run against a reference, interpolated to its times; windows : float64[steps, probes] each."""
+    if not outcome.ok:
+        return Measures(outcome.reason, False, outcome.refused, steps=outcome.counts.get("steps", 0))
+    t, rows, reference_rows = outcome.rows[:, 0], outcome.rows[:, 1:], reference.rows(reference.run)
+    expected = np.column_stack([np.interp(t, reference.run.rows[:, 0], column) for column in reference_rows.T])
+    widths, steps = probe_ranges(reference_rows), np.concatenate([rows[-1:], *windows])
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = [Deviation(off, time_weights(t), width).ranges()["L1"]
+                 for off, width in zip((rows - expected).T, widths, strict=True)]  # fmt: skip
+        outside = np.maximum(steps - reference_rows.max(axis=0), reference_rows.min(axis=0) - steps) / widths
+        return Measures(
+            outcome.reason, True, False, float(np.max(error)), max(0.0, float(outside.max())),
+            ringing_amplitude(windows, widths), excess_variation(rows, expected, widths), outcome.counts["steps"],
+            outcome.seconds,
+        )  # fmt: skip
+
+
+WINDOW_STEPS = 9  # least number of successive steps in a window
+CPU_LIMIT = 10.0  # CPU time after which a run is given up [s]
+WINDOW_COUNT = 30  # in long runs the distance of windows is this fraction of the steps taken: 1 / 30
+
+
+class RecordedRun(CappedRun):
+    """Run that records its probes after every step; in a long run only in windows of nine or more successive steps.
+
+    The steps are those of a run without recording.
+    windows : for each window a list of float64[probes], the values of the probes after successive steps, in SI units
+    """
+
+    def __init__(self, *arguments) -> None:
+        super().__init__(*arguments)
+        self.windows: list[list[np.ndarray]] = [[]]
+        self.budget = self.left = 1.0
+        self.max_seconds = CPU_LIMIT
+
+    def pause(self) -> None:
+        """Record the probes, and in a long run skip the steps between two windows. Raises GivenUp at the CPU limit."""
+        self.check()
+        self.windows[-1].append(self.run_data.observe(self.loop.t, self.loop.now, self.loop.stepper.out))
+        apart = int(self.loop.state["steps"]) // WINDOW_COUNT
+        self.budget = 1.0
+        if apart > WINDOW_STEPS and len(self.windows[-1]) >= WINDOW_STEPS:
+            self.windows.append([])
+            self.budget = float(apart)
+
+
+def run_recorded(case, set: Mapping | None = None) -> tuple[Outcome, list[np.ndarray]]:
+    """(outcome of a run with the changed keys `set`, recorded windows : list of float64[steps, probes] in SI units)."""
+    runs: list[RecordedRun] = []
+
+    def run(*arguments) -> RecordedRun:
+        runs.append(RecordedRun(*arguments))
+        return runs[-1]
+
+    result = outcome(case, set, run=run)
+    windows = runs[-1].windows if runs else []
+    return result, [np.array(window) for window in windows if len(window) > 1]
+
 
 METHODS = ("euler", "ssp-rk3", "rk4", "implicit-euler", "trapezoid", "gauss-4", "radau-iia-5")
 TOLERANCE = 0.02  # greatest mean error, over the range of a probe
@@ -102,15 +300,9 @@ KEY_VALUES = Kind(
 
 
 @validated(
-    schemes=NAMES,
-    methods=NAMES,
-    courants=NUMBERS,
-    steps=NUMBERS,
-    key=KEY_VALUES,
-    tolerance=NUMBER,
-    out=OUT,
+    schemes=NAMES, methods=NAMES, courants=NUMBERS, steps=NUMBERS, key=KEY_VALUES, tolerance=NUMBER, out=OUT,
     **STUDY_ARGUMENTS,
-)
+)  # fmt: skip
 def failure_map(
     case, schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None,
     courants: Sequence[float] | None = None, steps: Sequence[float] | None = None,
@@ -201,10 +393,7 @@ class MapRuns:
         return self._references[at]
 
     def limit(self, scheme: str, method: str, k: int) -> float | None:
-        """Predicted greatest stable step [s] in column k: the lesser limit of eigenvalues and of waves in delay lines.
-
-        The result is None if one of these limits is not known.
-        """
+        """Greatest stable step [s] in column k, by eigenvalues and by waves in delay lines; None if one is unknown."""
         at = scheme, k if self.columns.keys(k) else 0
         if at not in self._spectra:
             keys = {**self.base, **self.columns.keys(k), "numerics.scheme": scheme}
@@ -254,10 +443,7 @@ class MapRuns:
         return Square(scheme, method, k, step, courant, word, run, errors[0] if errors else None, limit)
 
     def run_ahead(self, places: Sequence[tuple[str, str, int]], report: Progress) -> None:
-        """Make all runs in other processes: first with the steps of the columns, then the runs with shorter steps.
-
-        places : scheme, method and column of each square of the map; report : progress function of `failure_map`
-        """
+        """Make all runs in other processes, shorter steps last; places : (scheme, method, column) of each square."""
         while missing := self.missing_runs(places):
             missing.sort(key=lambda run: -run.trial.get("numerics.step", 0.0))  # the most expensive last
             requests = [RunRequest(run_recorded, run.keys) for run in missing]
@@ -308,10 +494,7 @@ class MissingRun(Exception):
 
 
 def _shorter_steps(case, trial: dict, ratio: int) -> dict:
-    """Key and value that shorten the steps of a run by the factor `ratio`; a tolerance is divided by ratio^2.
-
-    trial : keys and values of the run with the original step
-    """
+    """Key and value that shorten the steps of the run `trial` by `ratio`; a tolerance is divided by ratio^2."""
     factors = {"numerics.step": ratio, "numerics.courant": ratio, "numerics.rtol": ratio**2}
     own = {key: getattr(case.numerics, key.removeprefix("numerics.")) for key in factors}
     for values in (trial, own):

@@ -163,10 +163,7 @@ def stage_matrix(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def stages_by_time(c: np.ndarray) -> np.ndarray:
-    """Matrix float64[stages, times] that joins stages at equal times: 1 if a stage is at a time, otherwise 0.
-
-    c : times of the stages as fractions of a step
-    """
+    """Matrix float64[stages, times]: 1 if a stage is at a time, else 0; c : times of stages as fractions of a step."""
     times = sorted(set(np.round(c, 12)))
     return np.array([[float(abs(x - time) < 1e-9) for time in times] for x in c])
 

@@ -211,10 +211,7 @@ def _wave_rate(case, set: dict) -> float | None:
 
 
 def cells_for_delay_lines(case, set: dict) -> dict:
-    """Keys and values that replace delay lines by cells, with the default number of cells in the slowest line.
-
-    They are empty without delay lines.
-    """
+    """Overrides that replace delay lines by cells, the default number in the slowest line; empty without lines."""
     case = load(case, set)
     travel = _slowest_travel_time(case)
     return cells_for_lines(case, travel / DEFAULT_CELLS) if travel else {}

@@ -1,1 +1,0 @@
-"""Energy balance of runs, and passivity of schemes and methods."""

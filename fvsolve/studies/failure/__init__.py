@@ -1,1 +1,0 @@
-"""Failure maps: verdicts on runs of a case over methods and steps, with predicted limits of the step."""

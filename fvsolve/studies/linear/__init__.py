@@ -1,1 +1,0 @@
-"""Linearisation of a case about a state: matrices A, B, C, D and eigenvalues."""
