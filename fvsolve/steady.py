@@ -5,8 +5,6 @@ along an edge (link) the potential decreases by drop(M). All edges and nodes are
 (Todini and Pilati 1988). In a loop without friction the flows are those of least norm.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 

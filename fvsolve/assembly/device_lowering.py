@@ -1,7 +1,5 @@
 """Table of devices: parts with a compiled law of their own."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any, ClassVar

@@ -1,7 +1,5 @@
 """Coefficients of friction, laminar transitions and hydrostatics of a case."""
 
-from __future__ import annotations
-
 import math
 
 from fvsolve.kernels import dtypes as rec

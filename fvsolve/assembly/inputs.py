@@ -1,7 +1,5 @@
 """Inputs of a model: schedules that can be held at a value, named `PART.KEY`."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

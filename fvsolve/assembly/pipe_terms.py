@@ -5,8 +5,6 @@ diameter D. s is the Laplace variable of tau. A sum is fitted to the transform o
 the value for a wave of dimensionless angular frequency w, over all w that cells resolve and that fit into the run.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 

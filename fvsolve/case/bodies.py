@@ -3,8 +3,6 @@
 Equations (59), (62) and (67) of docs/course.md in NumPy; the kernels evaluate them at later times.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar

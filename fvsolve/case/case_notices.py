@@ -1,7 +1,5 @@
 """Notices of a case: values outside usual ranges, wave speeds that contradict the wall, schedules after the end."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Any

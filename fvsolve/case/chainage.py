@@ -9,8 +9,6 @@ Arguments: table : nested dicts of a case as in the file; report : function that
 fault.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Effect of a changed key on the model: other numbers, another initial state, or a new model."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any

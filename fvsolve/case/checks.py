@@ -3,8 +3,6 @@
 The keys of a part are checked when it is read, its connections in `connections`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -3,8 +3,6 @@
 Arguments of the functions that read them: kinds : as for `read_probe`; routes, links : by name, None if faulty.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import suppress

@@ -4,8 +4,6 @@ python -m fvsolve.case.key_tables docs/parts.md    rewrites the tables of a page
 python -m fvsolve.case.key_tables valve            prints the table of a part
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Reading of a case from a TOML file or a dict, in stages; each stage runs when what it needs is known."""
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Iterator, Mapping

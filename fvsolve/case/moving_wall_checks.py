@@ -1,7 +1,5 @@
 """Checks of moving walls of basins."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -4,8 +4,6 @@ Arguments: nodes, links : parts by name; named : tables of all nodes, also of fa
 `Pose`; patches : patches of basins on bodies, by full name.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Stages of the reading of a case: cut pipes, parts, meshes, cells, and the kinds of places that probes may name."""
 
-from __future__ import annotations
-
 import functools
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Routes: consecutive pipes with one running chainage."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator, Sequence
 from contextlib import suppress

@@ -4,8 +4,6 @@ The table `[defaults.pipe]` has values of keys for all pipes that do not state t
 functions is a case as nested dicts, as in the file.
 """
 
-from __future__ import annotations
-
 import functools
 import re
 import tomllib

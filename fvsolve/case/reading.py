@@ -1,7 +1,5 @@
 """State of the reading of one case, shared by its stages: faults found, values read, origin of added parts."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any

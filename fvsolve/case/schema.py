@@ -1,7 +1,5 @@
 """JSON schema of a case file, for editors."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from json import dumps, loads

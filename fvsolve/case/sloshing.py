@@ -13,8 +13,6 @@ surface held flat the water has the inertia of an ideal fluid under a lid (Jouko
 Higher modes are left out: their water moves with the tank.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Conversion of an EPANET file to the text of a case file."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from pathlib import Path

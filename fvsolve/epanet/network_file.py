@@ -1,7 +1,5 @@
 """EPANET files, read by WNTR, and EPANET's solution at an hour of its run."""
 
-from __future__ import annotations
-
 import logging
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """Tables of a case file for the types of parts that EPANET has."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Translation of an EPANET network into parts of a case."""
 
-from __future__ import annotations
-
 import math
 import re
 from typing import Any

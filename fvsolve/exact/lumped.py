@@ -19,8 +19,6 @@ Mass on linear springs and dampers between frames, under a constant force: m u''
 u from the start, force F at the start without damping, stiffness k of all springs, damping c of all dampers.
 """
 
-from __future__ import annotations
-
 import cmath
 import math
 from collections.abc import Callable

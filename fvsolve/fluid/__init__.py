@@ -1,7 +1,5 @@
 """Properties of a fluid at its reference state."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Free gas in a liquid, and vapour in cavities."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 CoolProp is imported on first use. The cache has one file per fluid, state, law and CoolProp version.
 """
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """Tables of density along an isentrope, computed with a state object of CoolProp."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

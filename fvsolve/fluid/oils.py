@@ -5,8 +5,6 @@ value at 15 degC. Compressibility: Tait's equation of an HLP 32 for all grades, 
 1/K_s = 1/K_T - T a^2 / (rho cp): bulk moduli K at constant entropy (s) and temperature (T), thermal expansion a.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass

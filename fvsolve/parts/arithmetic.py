@@ -1,7 +1,5 @@
 """Formulas of x and y, parsed into a list of steps that act on arrays of floats."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Attitude of a body: the keys of its representations, checked against each other."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from contextlib import suppress

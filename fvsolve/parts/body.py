@@ -1,7 +1,5 @@
 """Rigid bodies in space, and their joints."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar

@@ -1,7 +1,5 @@
 """Scalars transported by the fluid: temperature, concentration, tracer."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated, Any
 

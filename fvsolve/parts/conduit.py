@@ -1,7 +1,5 @@
 """Friction of pipes and rigid columns, and the keys that both have."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar
 

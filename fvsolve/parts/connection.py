@@ -1,7 +1,5 @@
 """Throat between a vessel and its node: keys, the link made from them, and its table rows."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Any, ClassVar
 

@@ -1,7 +1,5 @@
 """Context of a part in its case, for checks of the part."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any

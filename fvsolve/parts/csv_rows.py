@@ -4,8 +4,6 @@ The separator is a tab, a semicolon or a comma: the first that gives every row a
 shorter row is a fault, since its meaning would be ambiguous.
 """
 
-from __future__ import annotations
-
 import codecs
 import csv
 import re

@@ -1,7 +1,5 @@
 """Hydraulic cylinders."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Any, ClassVar
 

@@ -1,7 +1,5 @@
 """Values over a plane: a number, a formula of x and y, or interpolated points of a file; their means over cells."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Junctions, given inflows, reservoirs and chambers."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, ClassVar
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """Links between two points of bodies: pins, which close loops, and bushings."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar
 

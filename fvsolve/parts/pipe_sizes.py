@@ -4,8 +4,6 @@ Loss coefficients of fittings are those of Crane TP-410: K = (L / D) f_T, with t
 D, and f_T the friction factor of clean commercial steel in fully turbulent flow. The fitting `entrance` has K = 0.5.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Rigid columns of liquid."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Any, ClassVar
 

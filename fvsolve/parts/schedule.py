@@ -1,7 +1,5 @@
 """Schedules: values that may change with time, and the keys that declare them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any

@@ -1,7 +1,5 @@
 """Spool valves with four metering edges."""
 
-from __future__ import annotations
-
 from typing import Annotated, ClassVar
 
 from fvsolve.assembly.inputs import POSITION, Input

@@ -1,7 +1,5 @@
 """Tables of a case file: base class, keys, and faults of incompatible keys."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any, ClassVar
 

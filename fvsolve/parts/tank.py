@@ -1,7 +1,5 @@
 """Open tanks."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 

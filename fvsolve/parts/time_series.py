@@ -1,7 +1,5 @@
 """Time series of a case, read from CSV files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Torques on shafts and bodies."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar
 

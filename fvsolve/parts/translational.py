@@ -1,7 +1,5 @@
 """Translational mechanics on one axis: masses, frames, springs, dampers, end stops and forces."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar
 

@@ -1,7 +1,5 @@
 """Valves and orifices, and the keys for the size of all restrictions."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar

@@ -3,8 +3,6 @@
 A bare number is in SI. Text is a number and a unit, `"304.8 mm"`. Spellings outside `UNITS` are read by pint.
 """
 
-from __future__ import annotations
-
 import difflib
 import functools
 import math

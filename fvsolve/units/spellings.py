@@ -3,8 +3,6 @@
 The file data/units.toml states them; pint reads other spellings, and is imported at the first of these.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Faults of all sections are reported together: a file with several faults has those of files with one fault each."""
 
-from __future__ import annotations
-
 import copy
 import re
 import tomllib

@@ -1,7 +1,5 @@
 """Limits and claims have a common rule: a result that the run cannot confirm is open, and open does not hold."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """Limits find known exceedances in any unit, direction and order, with place and time."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

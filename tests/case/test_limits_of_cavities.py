@@ -1,7 +1,5 @@
 """A limit at vapour pressure fails where a cavity opens, though no pressure is lower; NaN satisfies no limit."""
 
-from __future__ import annotations
-
 import math
 import zipfile
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Methods with a tableau file beside the case: in a case, in a run and its directory, and in a chart."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Faults of bodies, of parts on bodies and of moving walls, found before a run."""
 
-from __future__ import annotations
-
 import pytest
 from reference.scenes import scene
 

@@ -1,7 +1,5 @@
 """Placed parts have the positions of a pipe that is cut by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from reference.scenes import area, junction, lake, pipe, reservoir, scene, step, valve

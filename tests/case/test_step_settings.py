@@ -1,7 +1,5 @@
 """Steps that are not possible are refused with the possible settings: in the file, by --set and in integrate."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Runs that cannot advance, or do not fit into memory or on disk, are refused at once; long runs are announced."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -1,7 +1,5 @@
 """EPANET networks as cases: steady heads and flows agree with EPANET, nothing drifts, and bad files are explained."""
 
-from __future__ import annotations
-
 import math
 import sys
 import tomllib

@@ -1,7 +1,5 @@
 """Named exact solutions compared with closed forms, with an independent tracer of rays, and with SciPy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from pytest import approx

@@ -1,7 +1,5 @@
 """Density law `log` compared with exact solutions, and its distance from `linear`. Soft fluid: c = 10 m/s."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from reference import scenes

@@ -1,7 +1,5 @@
 """Density law `mixture`, liquid with free gas and vapour, compared with quadrature, closed forms and SciPy."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

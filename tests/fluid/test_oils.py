@@ -1,7 +1,5 @@
 """Hydraulic oils by name, compared with the standards that define them and with tables of a measured oil."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """Accumulators and air vessels against closed forms, energy integrals and SciPy, with losses by direction."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Air valves against SciPy, a closed form and a plain junction, with staged outflow; pressure-dependent demand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Closing and opening valves against Allievi's recursion and exact ray tracing."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

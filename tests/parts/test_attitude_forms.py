@@ -1,7 +1,5 @@
 """Forms of an attitude in a case file against SciPy, and the faults of forms that are wrong or disagree."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Bodies in space against closed forms, Lagrange's equations and SciPy, with conserved quantities and orders."""
 
-from __future__ import annotations
-
 import math
 from importlib import import_module
 

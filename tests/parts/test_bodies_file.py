@@ -1,7 +1,5 @@
 """Faults and notices of bodies, joints and links between points in a case file, all at once and with their places."""
 
-from __future__ import annotations
-
 import pytest
 from parts.test_bodies import parallelogram
 from reference.bodies import Crane, bodies, pendulum

@@ -1,7 +1,5 @@
 """Chambers and orifices against closed forms and SciPy, also beyond the finite time of filling."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

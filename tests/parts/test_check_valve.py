@@ -1,7 +1,5 @@
 """Check valves: closing times in closed form, arrangements that could chatter, slow discs against SciPy."""
 
-from __future__ import annotations
-
 import functools
 import math
 

@@ -1,7 +1,5 @@
 """Walls that creep: waves against Laplace transforms by every kind of method; energy, mass and faults."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from model.test_sparsity import random_state, stray

@@ -1,7 +1,5 @@
 """Formulas of x and y: values as in mathematics, and faults that name every unsupported form."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Darcy and Hazen-Williams friction against formulas, a fine method of characteristics and a damped mode."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

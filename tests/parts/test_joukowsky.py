@@ -1,7 +1,5 @@
 """Sudden closure of a frictionless pipe: dp = rho a v, a square wave of period 4 L / a."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Junctions of pipes: series, branches, dead ends, arbitrary lengths and valves, without growing modes."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

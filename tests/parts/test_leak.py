@@ -1,7 +1,5 @@
 """Leaks against closed forms: drainage by any power of the pressure, no reverse flow, at pipes and in networks."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """CSV files: values are read as written, or the fault names the line; separators, commas, units, encodings."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from pytest import approx

@@ -1,7 +1,5 @@
 """Cylinders, masses and force elements on an axis, against closed forms and SciPy."""
 
-from __future__ import annotations
-
 import math
 from importlib import import_module
 

@@ -1,7 +1,5 @@
 """Cylinders, masses and spool valves in a case file: values as read, and a bad file for each message."""
 
-from __future__ import annotations
-
 import pytest
 
 import fvsolve

@@ -3,8 +3,6 @@
 The reference is the law, integrated by SciPy.
 """
 
-from __future__ import annotations
-
 import functools
 import itertools
 

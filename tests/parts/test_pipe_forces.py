@@ -1,7 +1,5 @@
 """Forces on legs of a pipe: the momentum that their fluid loses, against Joukowsky and the forces on ends and wall."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from fluids.friction import friction_factor

@@ -1,7 +1,5 @@
 """Pipes along an elevation profile: a straight pipe plus the weight of the fluid, and a chain of pipes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from reference.scenes import AMBIENT, GRAVITY, RHO, area, junction, lake, pipe, reservoir, scene, step, valve

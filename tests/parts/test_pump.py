@@ -1,7 +1,5 @@
 """Pumps against closed forms: operating points, affinity laws, series, parallel, constant states, density laws."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

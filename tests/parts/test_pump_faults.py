@@ -1,7 +1,5 @@
 """Faults and notices of pumps in a case."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from reference.scenes import junction, lake, pipe, pump, scene, step

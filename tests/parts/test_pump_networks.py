@@ -1,7 +1,5 @@
 """Pumps in networks that change: flows and heads lie on their curves, and check valves do not chatter."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from pytest import approx

@@ -1,7 +1,5 @@
 """Curves with a joined Suter table, estimated inertia and starting pumps, against SciPy at 1e-12."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pump trips: run-down of the shaft, rigid columns, pipes, four quadrants and energy, against SciPy at 1e-12."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Regulating valves: motion through both stops against SciPy, steady states of random networks, rigid columns."""
 
-from __future__ import annotations
-
 import functools
 import math
 

@@ -1,7 +1,5 @@
 """Relief valves: a plateau in closed form, both kinds of disc against SciPy at 1e-12, reverse flow, starts, faults."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rupture discs: time of bursting and outflow in closed form, balances and resumed runs."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Scalars in networks: transport, division, mixing, diffusion, decay and storage in closed form, with balances."""
 
-from __future__ import annotations
-
 import copy
 import math
 from importlib import import_module

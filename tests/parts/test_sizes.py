@@ -1,7 +1,5 @@
 """Nominal pipe sizes and fittings against printed tables and the package `fluids`, and faults of names."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 

@@ -1,7 +1,5 @@
 """Check valves with a deceleration curve: slams of evenly decelerated columns, and Joukowsky's jump in a main."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from reference.scenes import RHO, WATER, area, junction, pipe, reservoir, scene

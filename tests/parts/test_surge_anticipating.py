@@ -1,7 +1,5 @@
 """Surge-anticipating valves against valves that follow the same opening by schedule, and tanks in closed form."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tanks with a connection: extremes of a mass oscillation with friction and throttle against the closed form."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

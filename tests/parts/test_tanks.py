@@ -1,7 +1,5 @@
 """Tanks that drain, equalise and reverse their flow against closed forms, also beyond finite times of emptying."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -3,8 +3,6 @@
 LINE has Q11 = x (1.2 - 0.008 n11) and T11 = x (1800 - 18 n11), which linear interpolation reproduces exactly.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Faults of turbines and hill charts, and the extension of a chart beyond its points."""
 
-from __future__ import annotations
-
 import copy
 import math
 import random

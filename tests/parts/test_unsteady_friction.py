@@ -1,7 +1,5 @@
 """Unsteady friction against the exact laminar line and printed weighting functions; its energy, and a first plateau."""
 
-from __future__ import annotations
-
 import functools
 import math
 

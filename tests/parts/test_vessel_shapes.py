@@ -1,7 +1,5 @@
 """Vessels with a shape: volumes by quadrature, oscillations in closed form and by SciPy, compressors by the gas law."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Harmonic schedules: values and both derivatives against the formula, integrals of a flow, and faults."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

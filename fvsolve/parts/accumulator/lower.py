@@ -1,7 +1,5 @@
 """Accumulators and air vessels in the tables of a model, and their states at the start."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Accumulators and air vessels: keys, shapes, ranges and faults."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Any, ClassVar
 

@@ -1,7 +1,5 @@
 """Air valves in the tables of a model, and their states at the start."""
 
-from __future__ import annotations
-
 import math
 
 from fvsolve.assembly.device_lowering import Device

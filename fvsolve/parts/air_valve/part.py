@@ -1,7 +1,5 @@
 """Air valves: keys, ranges and faults."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Any, ClassVar
 

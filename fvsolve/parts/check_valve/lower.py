@@ -1,7 +1,5 @@
 """Check valves in the tables of a model, and their states at the start."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from fvsolve.assembly.device_lowering import Device

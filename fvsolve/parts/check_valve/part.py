@@ -1,7 +1,5 @@
 """Check valves: keys, faults and the curve of slam velocities."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar

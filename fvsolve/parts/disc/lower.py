@@ -1,7 +1,5 @@
 """Valves with a disc that pressure lifts, in the tables of a model, and their states at the steady start."""
 
-from __future__ import annotations
-
 import math
 
 from fvsolve.assembly.device_lowering import Device, opening_of

@@ -1,7 +1,5 @@
 """Dynamics of the disc of a self-acting valve: keys and faults."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 from fvsolve.parts.table_model import Table, exclusive_key_faults

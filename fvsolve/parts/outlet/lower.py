@@ -1,7 +1,5 @@
 """Outlets to ambient, and valves that open to ambient, in the tables of a model."""
 
-from __future__ import annotations
-
 from fvsolve.assembly.device_lowering import Device
 from fvsolve.assembly.inputs import opening_input
 from fvsolve.assembly.lowering import Lowering, Restriction

@@ -1,7 +1,5 @@
 """Outlets to ambient, leaks, and valves that may open to ambient: keys and faults."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, ClassVar
 
 from pydantic import Field

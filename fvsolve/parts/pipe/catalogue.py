@@ -11,8 +11,6 @@ outer diameter, allowable pressure 20 MRS / (C (SDR - 1)) bar, MRS the minimum r
 coefficient; by PN: the wall with that allowable pressure.
 """
 
-from __future__ import annotations
-
 import functools
 import re
 from typing import Any, NamedTuple

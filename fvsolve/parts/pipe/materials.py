@@ -4,8 +4,6 @@ Numbers without a source are left out; the user gives them. Of several sources, 
 wave, greatest pressure jump), and the mean of least and greatest value of roughness and all other properties.
 """
 
-from __future__ import annotations
-
 import functools
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Pipes: keys, faults, and names of catalogue entries turned into numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """Walls of pipes: elasticity, restraint, lining, and creep of plastics."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any

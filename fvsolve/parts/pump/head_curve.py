@@ -1,7 +1,5 @@
 """Values of a case file for the head curve, efficiency, power and Suter table of a pump."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Pumps in the tables of a model: their steady start, and notices about it."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

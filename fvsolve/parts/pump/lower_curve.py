@@ -1,7 +1,5 @@
 """Head curves of pumps, and Suter tables joined to them, as numbers for the kernels."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Shafts of pumps and turbines in the tables of a model: power, efficiency, inertia, drive and torques."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

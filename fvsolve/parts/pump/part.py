@@ -1,7 +1,5 @@
 """Pumps with shaft: keys and faults."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, ClassVar
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """Published Suter tables of pumps; the file data/suter_tables.toml has their numbers and sources."""
 
-from __future__ import annotations
-
 import functools
 import math
 from dataclasses import dataclass

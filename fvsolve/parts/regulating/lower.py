@@ -1,7 +1,5 @@
 """Control valves in the tables of a model, and their states at the steady start."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

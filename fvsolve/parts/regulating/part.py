@@ -1,7 +1,5 @@
 """Control valves (pressure-reducing, pressure-sustaining, flow-control): keys."""
 
-from __future__ import annotations
-
 from typing import Annotated, ClassVar
 
 from fvsolve.parts.link import TwoPort

@@ -1,7 +1,5 @@
 """Relief valves in the tables of a model, without or with disc dynamics."""
 
-from __future__ import annotations
-
 from fvsolve.assembly.device_lowering import Device
 from fvsolve.errors import Notice
 from fvsolve.parts.disc.law import RELIEF

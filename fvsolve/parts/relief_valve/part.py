@@ -1,7 +1,5 @@
 """Relief valves: keys."""
 
-from __future__ import annotations
-
 from typing import Annotated, ClassVar
 
 from fvsolve.parts.disc.part import DROPS, Disc

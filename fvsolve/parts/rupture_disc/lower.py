@@ -1,7 +1,5 @@
 """Rupture discs in the tables of a model; discs are intact at the start."""
 
-from __future__ import annotations
-
 from fvsolve.assembly.device_lowering import Device
 from fvsolve.parts.outlet.law import EVENT_COUNT
 from fvsolve.parts.outlet.lower import RelievingRows

@@ -1,7 +1,5 @@
 """Rupture discs: keys."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from fvsolve.parts.disc.part import DROPS

@@ -1,7 +1,5 @@
 """Surge-anticipating valves in the tables of a model; the valves are shut at the start."""
 
-from __future__ import annotations
-
 from fvsolve.assembly.device_lowering import Device
 from fvsolve.errors import Notice
 from fvsolve.parts.outlet.law import EVENT_COUNT

@@ -1,7 +1,5 @@
 """Surge-anticipating valves: keys and faults."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 from fvsolve.errors import did_you_mean, listing

@@ -1,7 +1,5 @@
 """Hill charts of turbines in a case file or a CSV file, and faults of their points."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from typing import Any, NamedTuple

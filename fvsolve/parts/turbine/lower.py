@@ -5,8 +5,6 @@ and unit flow u = flow / (flow scale capacity), at a head of 1 m. The flow scale
 `capacity` the greatest flow of a curve over this scale.
 """
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Turbines and pump-turbines with shaft: keys and faults."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from math import pi
 from typing import Annotated, ClassVar
