@@ -16,7 +16,7 @@ from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.fluid.laws import LAWS, law_names
 from fvsolve.parts import KINDS, Basin
 from fvsolve.parts.basin import VELOCITY_FIELDS, Physics
-from fvsolve.parts.context import CaseContext
+from fvsolve.parts.table_model import CaseContext
 from fvsolve.parts.value import ROOT
 from fvsolve.steppers.loop_records import LEAST_STEP, LEAST_TOLERANCE
 from fvsolve.steppers.tableau import AUTO, METHODS

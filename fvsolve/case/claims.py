@@ -16,8 +16,8 @@ from fvsolve.case.probe import ALL, OF_PRESSURE, Extent, Kinds, Probe, only_dime
 from fvsolve.case.reading import Reading
 from fvsolve.errors import did_you_mean
 from fvsolve.parts import value as val
+from fvsolve.parts.csv_rows import copy_name, find_file, read_columns
 from fvsolve.parts.table_model import read_keys
-from fvsolve.parts.time_series import copy_name, find_file, read_columns
 from fvsolve.parts.value import NEEDED, VALUE, Quantity, ReadContext, ValueFault, faults_of, nonnegative
 from fvsolve.units import show
 

@@ -20,11 +20,9 @@ from fvsolve.parts.attitude_keys import Attitude
 from fvsolve.parts.basin import BasinStart, Patch
 from fvsolve.parts.body import Joint
 from fvsolve.parts.connection import Connection
-from fvsolve.parts.disc.part import Disc
-from fvsolve.parts.link import TwoPort
-from fvsolve.parts.node import PlaceOnBody
-from fvsolve.parts.pipe.materials import SI, materials
-from fvsolve.parts.pipe.pipe_wall import Lining, Wall
+from fvsolve.parts.nodes_and_links import PlaceOnBody, TwoPort
+from fvsolve.parts.pipe.pipe_wall import SI, Lining, Wall, materials
+from fvsolve.parts.self_acting.part import Disc
 from fvsolve.parts.table_model import Table, plain_value
 from fvsolve.parts.value import NEEDED, Quantity, Text, Value
 from fvsolve.parts.valve import Sized

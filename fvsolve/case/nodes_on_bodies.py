@@ -14,7 +14,7 @@ from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.parts.basin import Basin, Physics
 from fvsolve.parts.body import Body
 from fvsolve.parts.formula import means, samples
-from fvsolve.parts.node import Node, PlaceOnBody
+from fvsolve.parts.nodes_and_links import Node, PlaceOnBody
 from fvsolve.units import show
 
 Faults = Iterator[tuple[tuple, str]]

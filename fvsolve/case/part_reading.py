@@ -12,7 +12,7 @@ from fvsolve.data import read_table
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import KINDS, Basin, Chamber, Pipe
 from fvsolve.parts.body import Body, BodyPoint
-from fvsolve.parts.node import Node
+from fvsolve.parts.nodes_and_links import Node
 from fvsolve.parts.pipe.part import MOST_CELLS
 from fvsolve.units import show
 

@@ -14,9 +14,9 @@ from fvsolve.exact import NAMES
 from fvsolve.fluid import LAWS
 from fvsolve.fluid.coolprop import OIL_WORDS
 from fvsolve.parts import value as val
+from fvsolve.parts.csv_rows import copy_name, find_file
 from fvsolve.parts.pipe.part import LINES
 from fvsolve.parts.table_model import NamedTables, Table
-from fvsolve.parts.time_series import copy_name, find_file
 from fvsolve.parts.value import BY_CELLS, SHAPE, VALUE, Choice, Number, Quantity, ReadContext, positive
 from fvsolve.schemes import LIMITERS, SCHEMES
 from fvsolve.steppers.structure import KINDS

@@ -14,11 +14,11 @@ from fvsolve.errors import FvsolveError, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.attitude_keys import Attitude
 from fvsolve.parts.carried_scalar import ScalarValues
+from fvsolve.parts.csv_rows import copy_name, find_file
 from fvsolve.parts.formula import SpatialField, SpatialFieldKey, uniform
-from fvsolve.parts.node import Node, PlaceOnBody
+from fvsolve.parts.nodes_and_links import Node, PlaceOnBody
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.table_model import NamedTables, Nested, Table
-from fvsolve.parts.time_series import copy_name, find_file
 from fvsolve.parts.value import (
     SHAPE,
     VALUE,

@@ -9,7 +9,7 @@ import numpy as np
 from fvsolve.assembly.lowering import Lowering
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.attitude_keys import Attitude, is_zero_vector, length_notices
-from fvsolve.parts.node import Node
+from fvsolve.parts.nodes_and_links import Node
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.table_model import Nested, Table
 from fvsolve.parts.value import (

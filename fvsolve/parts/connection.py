@@ -3,9 +3,8 @@
 import math
 from typing import Annotated, Any, ClassVar
 
-from fvsolve.assembly.inputs import opening_input
-from fvsolve.assembly.lowering import Restriction
-from fvsolve.parts.link import TwoPort
+from fvsolve.assembly.lowering import Restriction, opening_input
+from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.table_model import Table
 from fvsolve.parts.value import SHAPE, Number, Quantity, ReadContext, UsualRange, Value, positive
 from fvsolve.units import show

@@ -5,9 +5,9 @@ from typing import Annotated, Any, ClassVar
 
 from fvsolve.assembly.mechanics import PushLowering, join_ports
 from fvsolve.kernels import dtypes as rec
-from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.hydraulic_nodes import Chamber
-from fvsolve.parts.link import Link, Ports
+from fvsolve.parts.nodes_and_links import Link, Ports
+from fvsolve.parts.table_model import CaseContext, Faults
 from fvsolve.parts.value import PROFILE, VALUE, Quantity, UsualRange, nonnegative, positive
 
 SIZES = UsualRange(5e-4, 30.0, "micro-hydraulics to ship lifts")

@@ -5,13 +5,12 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field
 
 from fvsolve import units
-from fvsolve.assembly.inputs import FLOW, HEAD, PRESSURE, Input, scalar_inputs
-from fvsolve.assembly.lowering import Lowering
+from fvsolve.assembly.lowering import FLOW, HEAD, PRESSURE, Input, Lowering, scalar_inputs
 from fvsolve.kernels import dtypes as rec
-from fvsolve.parts.context import CaseContext, Faults
-from fvsolve.parts.node import PlaceOnBody
+from fvsolve.parts.nodes_and_links import PlaceOnBody
 from fvsolve.parts.outlet.part import outlet_to_ambient
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
+from fvsolve.parts.table_model import CaseContext, Faults
 from fvsolve.parts.value import VALUE, Number, Quantity, UsualRange, between, positive
 
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import value as val
+from fvsolve.parts.csv_rows import copy_name, find_file, read_columns
 from fvsolve.parts.table_model import keys_json, read_keys
-from fvsolve.parts.time_series import copy_name, find_file, read_columns
 from fvsolve.parts.value import NEEDED, Choice, Number, Quantity, Range, ReadContext, Rows, Text, Value, ValueFault
 from fvsolve.units import show
 

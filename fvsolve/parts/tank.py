@@ -8,11 +8,10 @@ import numpy as np
 from fvsolve.assembly.lowering import Lowering
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.connection import Connection, ConnectionTable, with_connection
-from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.hydraulic_nodes import Junction
-from fvsolve.parts.node import PlaceOnBody
+from fvsolve.parts.nodes_and_links import PlaceOnBody
 from fvsolve.parts.schedule import constant
-from fvsolve.parts.table_model import keys_json, read_keys
+from fvsolve.parts.table_model import CaseContext, Faults, keys_json, read_keys
 from fvsolve.parts.value import (
     NEEDED,
     PROFILE,

@@ -6,16 +6,14 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from fvsolve.assembly.inputs import FORCE, Input
-from fvsolve.assembly.lowering import rows_in
+from fvsolve.assembly.lowering import FORCE, Input, rows_in
 from fvsolve.assembly.mechanics import AxisLowering, PushLowering, join_ports
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.attitude_keys import is_zero_vector, length_notices
 from fvsolve.parts.body import NamedPoints
-from fvsolve.parts.context import CaseContext, Faults
-from fvsolve.parts.link import Coupling
-from fvsolve.parts.node import Node
+from fvsolve.parts.nodes_and_links import Coupling, Node
 from fvsolve.parts.schedule import Schedule, Scheduled
+from fvsolve.parts.table_model import CaseContext, Faults
 from fvsolve.parts.value import VALUE, Quantity, Rows, Text, UsualRange, nonnegative, positive
 
 

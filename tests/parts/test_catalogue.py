@@ -10,8 +10,7 @@ import fvsolve
 from fvsolve import load
 from fvsolve.errors import CaseError
 from fvsolve.parts.pipe.catalogue import class_size, ductile
-from fvsolve.parts.pipe.materials import materials, sources
-from fvsolve.parts.pipe.pipe_wall import Wall, restraint_factor
+from fvsolve.parts.pipe.pipe_wall import Wall, materials, restraint_factor, sources
 
 # SLR Pipeline, technical details: DN, DE, nominal wall of K9 and of the preferred C class [mm]
 SLR = [

@@ -8,7 +8,7 @@ from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, junction, lake, pipe,
 from scipy.optimize import brentq
 
 import fvsolve
-from fvsolve.parts.outlet.law import FREE, LEAST_DROP, emitter_drop, emitter_flow, emitter_slope, emitter_step
+from fvsolve.parts.outlet.law_outlet import FREE, LEAST_DROP, emitter_drop, emitter_flow, emitter_slope, emitter_step
 from fvsolve.studies.energy.energy_balance import energy
 
 TIGHT = {"method": "dormand-prince", "rtol": 1e-11}

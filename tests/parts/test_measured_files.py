@@ -9,8 +9,8 @@ import fvsolve
 from fvsolve.basins.transport.lower import face_flows
 from fvsolve.errors import CaseError, MeshError
 from fvsolve.mesh import rectangle
+from fvsolve.parts.csv_rows import read_columns
 from fvsolve.parts.formula import SpatialFieldKey
-from fvsolve.parts.time_series import read_columns
 from fvsolve.parts.value import ReadContext
 
 T, H = [0.0, 0.5, 1.25], [45.7, -46.1, 1234.5]

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import fvsolve
-from fvsolve.parts.pump.suter_tables import suter_tables
+from fvsolve.parts.pump.head_curve import suter_tables
 from fvsolve.studies.energy.energy_balance import energy
 from fvsolve.studies.linear.linearise import linearise
 

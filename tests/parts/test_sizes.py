@@ -11,7 +11,7 @@ from reference.scenes import AMBIENT, WATER, reservoir, scene
 
 import fvsolve
 from fvsolve.errors import CaseError
-from fvsolve.parts.pipe_sizes import FITTINGS, fittings_loss, pipe_bore
+from fvsolve.parts.conduit import FITTINGS, fittings_loss, pipe_bore
 
 # ASME B36.10M: outer diameter and wall [mm]
 PRINTED = {

@@ -11,7 +11,7 @@ from reference.scenes import GRAVITY, RHO, lake, scene
 
 import fvsolve
 from fvsolve.errors import CaseError
-from fvsolve.parts.turbine import law_chart
+from fvsolve.parts.turbine import law as turbine_law
 from fvsolve.parts.turbine.hill_chart import HillChartValue
 from fvsolve.parts.turbine.lower import chart_numbers
 from fvsolve.parts.value import ReadContext
@@ -161,12 +161,12 @@ def test_at_any_speed_flow_and_opening_it_loses_power_and_nothing_jumps():
         numbers = np.array(chart_numbers(SimpleNamespace(hill_chart=chart, diameter=1.3), WEIGHT))
         for _ in range(100):
             x, omega = draw.uniform(1e-3, 1.0), draw.uniform(-60.0, 60.0)
-            q = draw.uniform(-2.0, 2.0) * law_chart.capacity(numbers, 0, x) * numbers[law_chart.FLOW]
-            root, _, _, torque, _ = law_chart.chart_at(numbers, 0, x, omega, q)
+            q = draw.uniform(-2.0, 2.0) * turbine_law.capacity(numbers, 0, x) * numbers[turbine_law.FLOW]
+            root, _, _, torque, _ = turbine_law.chart_at(numbers, 0, x, omega, q)
             given, taken = WEIGHT * q * root * abs(root), torque * omega
             assert given - taken >= -1e-9 * (abs(given) + abs(taken))
             for more in ((x * (1 - 1e-9), omega, q), (x, omega + 1e-9, q), (x, omega, q * (1 + 1e-9))):
-                near = law_chart.chart_at(numbers, 0, *more)
+                near = turbine_law.chart_at(numbers, 0, *more)
                 assert abs(near[0] - root) < 1e-5 * (1.0 + abs(root)) and abs(near[3] - torque) < 1e-5 * (
                     1e3 + abs(torque)
                 )

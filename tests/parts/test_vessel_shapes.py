@@ -9,7 +9,7 @@ from scipy.integrate import quad, solve_ivp
 
 import fvsolve
 from fvsolve.model.jacobian_pattern import jacobian_pattern
-from fvsolve.parts.accumulator import law_shape, law_vessel
+from fvsolve.parts.accumulator import law_vessel
 from fvsolve.studies.energy.energy_balance import energy
 
 TIGHT = {"method": "dormand-prince", "rtol": 1e-11}
@@ -75,7 +75,7 @@ def at_start(model) -> tuple[float, float]:
 def test_what_a_cylinder_holds_below_a_level_is_the_quadrature_of_its_sections(degrees):
     radius, length, slope = 1.1, 5.3, math.radians(degrees)
     top, whole = length * math.sin(slope) + 2.0 * radius * math.cos(slope), math.pi * radius**2 * length
-    kind = law_shape.HORIZONTAL_CYLINDER if degrees == 0.0 else law_shape.INCLINED_CYLINDER
+    kind = law_vessel.HORIZONTAL_CYLINDER if degrees == 0.0 else law_vessel.INCLINED_CYLINDER
     shape = np.array([kind, top, radius, length, slope])
     bends = sorted((length * math.sin(slope), 2.0 * radius * math.cos(slope)))
     for z in np.linspace(0.01, 0.99, 7) * top:
@@ -85,11 +85,11 @@ def test_what_a_cylinder_holds_below_a_level_is_the_quadrature_of_its_sections(d
                 for a, b in zip(edges, edges[1:], strict=False) if b > a)
             for k in (0, 1)
         )  # fmt: skip
-        assert law_shape.volume_below(shape, 0, z) == pytest.approx(below, abs=1e-12 * whole)
-        assert law_shape.moment_below(shape, 0, z) == pytest.approx(moment, abs=1e-12 * whole * top)
-        assert law_shape.surface_at(shape, 0, z) == pytest.approx(section(slope, z, radius, length), abs=1e-11 * whole)
-        assert law_shape.level_at(shape, 0, below) == pytest.approx(z, abs=1e-12 * top)
-    assert law_shape.volume_below(shape, 0, top) == pytest.approx(whole, rel=1e-12)
+        assert law_vessel.volume_below(shape, 0, z) == pytest.approx(below, abs=1e-12 * whole)
+        assert law_vessel.moment_below(shape, 0, z) == pytest.approx(moment, abs=1e-12 * whole * top)
+        assert law_vessel.surface_at(shape, 0, z) == pytest.approx(section(slope, z, radius, length), abs=1e-11 * whole)
+        assert law_vessel.level_at(shape, 0, below) == pytest.approx(z, abs=1e-12 * top)
+    assert law_vessel.volume_below(shape, 0, top) == pytest.approx(whole, rel=1e-12)
 
 
 def test_a_cylinder_that_barely_slopes_or_leans_is_that_which_lies_or_stands():

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from fvsolve.assembly.device_lowering import Device
+from fvsolve.assembly.lowering import Device
 from fvsolve.errors import Notice
-from fvsolve.parts.accumulator import law, law_shape
+from fvsolve.parts.accumulator import law, law_vessel
 from fvsolve.parts.accumulator.part import UPRIGHT, height_of, length_of
 
 SLOPE_TOLERANCE = 1e-6  # axis rise over radius below which a cylinder counts as horizontal; likewise for upright
@@ -25,10 +25,10 @@ class VesselStart:
         shape = np.array(shape_numbers(part))
         self.gas = part.gas_volume
         if self.gas is None:
-            self.gas = part.volume - float(law_shape.volume_below(shape, 0, part.level))
+            self.gas = part.volume - float(law_vessel.volume_below(shape, 0, part.level))
         self.fluid_volume = part.volume - self.gas
-        self.level = float(law_shape.level_at(shape, 0, self.fluid_volume))
-        below = float(law_shape.moment_below(shape, 0, self.level))
+        self.level = float(law_vessel.level_at(shape, 0, self.fluid_volume))
+        below = float(law_vessel.moment_below(shape, 0, self.level))
         self.centroid = below / self.fluid_volume if self.fluid_volume > 0.0 else 0.0
 
     def gas_pressure(self, p: float) -> tuple[float, float]:
@@ -61,22 +61,22 @@ def shape_numbers(part) -> list[float]:
     if part.diameter is None:
         if not hasattr(part.area, "level") or len(part.area.level) == 1:
             area = part.area if not hasattr(part.area, "level") else part.area.area[0]
-            return [law_shape.PRISM, top, float(area), 0.0, 0.0]
+            return [law_vessel.PRISM, top, float(area), 0.0, 0.0]
         level, area = part.area.level, part.area.area
         steps = [
             0.5 * (a + b) * (high - low) for low, high, a, b in zip(level, level[1:], area, area[1:], strict=False)
         ]
         volume = [math.fsum(steps[:k]) for k in range(len(level))]
-        return [law_shape.AREA_TABLE, top, len(level), 0.0, 0.0, *map(float, (*level, *area, *volume))]
+        return [law_vessel.AREA_TABLE, top, len(level), 0.0, 0.0, *map(float, (*level, *area, *volume))]
     radius, length, slope = 0.5 * part.diameter, length_of(part), UPRIGHT if part.slope is None else part.slope
     if radius * math.cos(slope) <= SLOPE_TOLERANCE * length * math.sin(slope):
-        return [law_shape.PRISM, top, math.pi * radius**2, 0.0, 0.0]
+        return [law_vessel.PRISM, top, math.pi * radius**2, 0.0, 0.0]
     kind = (
-        law_shape.HORIZONTAL_CYLINDER
+        law_vessel.HORIZONTAL_CYLINDER
         if length * math.sin(slope) <= SLOPE_TOLERANCE * radius * math.cos(slope)
-        else law_shape.INCLINED_CYLINDER
+        else law_vessel.INCLINED_CYLINDER
     )
-    return [kind, top, radius, length, 0.0 if kind == law_shape.HORIZONTAL_CYLINDER else slope]
+    return [kind, top, radius, length, 0.0 if kind == law_vessel.HORIZONTAL_CYLINDER else slope]
 
 
 NECK_ERROR_SHARE = (
@@ -186,23 +186,16 @@ class AccumulatorRows(Device, kind="accumulator"):
 class ShapedRows(AccumulatorRows, kind=""):
     """Conversion to table rows of air vessels with a shape; the weight of their fluid acts on the node."""
 
+    law = law_vessel
     quantities = (*AccumulatorRows.quantities, "level")
 
-    @property
-    def law(self):
-        from fvsolve.parts.accumulator import law_vessel
-
-        return law_vessel
-
     def numbers(self, draft, name, part) -> list[float]:
-
         compressor = [0.0, 0.0, 0.0]
         if part.compressor is not None:
             compressor = [0.0, part.compressor.start, part.compressor.stop]
         return [0.0] * law.NUMBER_COUNT + [0.0, 0.0, part.bottom or 0.0, *compressor] + shape_numbers(part)
 
     def begin(self, start, part, row) -> list[str]:
-
         draft, n = start.draft, part.exponent
         node, at = draft.node_table[row["node"]], row["data"]
         at_start = VesselStart(start, part)

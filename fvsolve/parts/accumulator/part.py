@@ -4,10 +4,9 @@ import math
 from typing import Annotated, Any, ClassVar
 
 from fvsolve.parts.connection import Connection, ConnectionTable, with_connection
-from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.hydraulic_nodes import Junction
-from fvsolve.parts.node import Node
-from fvsolve.parts.table_model import Nested, Table, missing_key_faults
+from fvsolve.parts.nodes_and_links import Node
+from fvsolve.parts.table_model import CaseContext, Faults, Nested, Table, missing_key_faults
 from fvsolve.parts.tank import Surface
 from fvsolve.parts.value import Number, Quantity, Range, UsualRange, nonnegative, positive
 

@@ -2,7 +2,7 @@
 
 import math
 
-from fvsolve.assembly.device_lowering import Device
+from fvsolve.assembly.lowering import Device
 from fvsolve.errors import Notice
 from fvsolve.parts.air_valve import law
 

@@ -4,10 +4,10 @@ import math
 from typing import Annotated, Any, ClassVar
 
 from fvsolve.parts.connection import Connection, behind_throat
-from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.hydraulic_nodes import Junction
-from fvsolve.parts.node import Node
+from fvsolve.parts.nodes_and_links import Node
 from fvsolve.parts.schedule import constant
+from fvsolve.parts.table_model import CaseContext, Faults
 from fvsolve.parts.value import Number, Quantity, UsualRange, between, positive
 
 BORE_RANGE = between(0, 1, open=True)  # m; a plain 50 would be in mm

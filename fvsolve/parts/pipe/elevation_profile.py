@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.parts.csv_rows import read_rows
-from fvsolve.parts.time_series import copy_name, find_file
+from fvsolve.parts.csv_rows import copy_name, find_file, read_rows
 from fvsolve.parts.value import ReadContext, Rows, Value, ValueFault, check_increasing
 from fvsolve.units import show
 

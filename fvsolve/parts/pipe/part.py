@@ -7,7 +7,6 @@ from pydantic import Field
 
 from fvsolve.parts.carried_scalar import ScalarValues
 from fvsolve.parts.conduit import LENGTH, Conduit
-from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.pipe.elevation_profile import Profile, ProfileValue
 from fvsolve.parts.pipe.pipe_wall import (
     MODULI,
@@ -19,7 +18,7 @@ from fvsolve.parts.pipe.pipe_wall import (
     creep_elements,
     wall_faults,
 )
-from fvsolve.parts.table_model import Nested
+from fvsolve.parts.table_model import CaseContext, Faults, Nested
 from fvsolve.parts.value import (
     BY_CELLS,
     SHAPE,

@@ -5,14 +5,22 @@ import math
 import numpy as np
 
 from fvsolve import units
-from fvsolve.assembly.device_lowering import Device
-from fvsolve.assembly.inputs import SPEED, Input
+from fvsolve.assembly.lowering import SPEED, Device, Input
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.pump import law
-from fvsolve.parts.pump import law_curve as curves
-from fvsolve.parts.pump.lower_curve import curve_numbers, joined_table, rated_point, specific_speed
-from fvsolve.parts.pump.lower_shaft import ShaftLowering, inertia, numbers_of, rated_power, shaft_points, usual_inertia
+from fvsolve.parts.pump.lower_shaft import (
+    ShaftLowering,
+    curve_numbers,
+    inertia,
+    joined_table,
+    numbers_of,
+    rated_point,
+    rated_power,
+    shaft_points,
+    specific_speed,
+    usual_inertia,
+)
 from fvsolve.steady import Edge
 
 SPEED_TOLERANCE = 1e-6  # difference of heads regarded as rounding [m]
@@ -194,10 +202,10 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
         ratio = rho / start.draft.fluid.density
 
         def newton(flow, present):
-            a, s = curves.curve_step(floats, at, speed, rho, rho * gravity, g, float(flow), float(present * ratio))
+            a, s = law.curve_step(floats, at, speed, rho, rho * gravity, g, float(flow), float(present * ratio))
             return 1.0 / s, ratio, a / s
 
-        first = rho * floats[at + curves.SCALE] * speed
+        first = rho * floats[at + law.SCALE] * speed
         return Edge(i, j, newton, float(first), drives=True)
 
     def follow(self, start, k) -> None:
@@ -207,7 +215,7 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
         """Pressure rise [Pa] of a pump at a mass flow [kg/s] in the steady start; row : its row in the valve table"""
         floats, rho = start.draft.tables.floats, start.density_at(int(row["from_node"]))
         at, speed = int(row["data"]), float(row["drive"])
-        return float(rho * start.case.gravity * curves.curve_head(floats, at, speed, float(flow) / rho)[0])
+        return float(rho * start.case.gravity * law.curve_head(floats, at, speed, float(flow) / rho)[0])
 
     def revise_state(self, start, part, row) -> bool:
         k = int(row["valve"])

@@ -4,7 +4,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from fvsolve.parts.link import TwoPort
+from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.pump.head_curve import CurvePoints, Efficiency, HeadCurve, ShaftPower, Suter, SuterTable
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.value import PROFILE, VALUE, Choice, Flag, Quantity, UsualRange, nonnegative, positive

@@ -4,9 +4,8 @@ import math
 from itertools import pairwise
 from typing import Any, NamedTuple
 
-from fvsolve.parts.csv_rows import CsvError, read_rows, split_header
+from fvsolve.parts.csv_rows import CsvError, copy_name, find_file, read_rows, split_header
 from fvsolve.parts.table_model import keys_json, read_keys
-from fvsolve.parts.time_series import copy_name, find_file
 from fvsolve.parts.value import NEEDED, Number, ReadContext, Rows, Value, ValueFault, between
 from fvsolve.units import show
 

@@ -6,9 +6,9 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from fvsolve.parts.context import CaseContext, Faults
-from fvsolve.parts.link import TwoPort
+from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
+from fvsolve.parts.table_model import CaseContext, Faults
 from fvsolve.parts.turbine.hill_chart import HillChart, HillChartValue, OpeningCurve
 from fvsolve.parts.value import VALUE, Quantity, UsualRange, anything, between, positive
 

@@ -7,7 +7,7 @@ velocity at which the valve shuts [m/s] and the deceleration of the flow at the 
 
 from fvsolve.jit import njit
 from fvsolve.kernels.restrictions import head_drop
-from fvsolve.parts.check_valve.law import PRESSURE_MARGIN, joins_junction
+from fvsolve.parts.self_acting.law_check_valve import PRESSURE_MARGIN, joins_junction
 
 REVERSED, SHUT, OPEN, BEYOND_CURVE = 0, 1, 2, 3  # flags; the last: the deceleration exceeds the curve
 CRACKING_PRESSURE, UNIT_FLOW, LAST_RATE = (
