@@ -86,7 +86,7 @@ FAULTS = [
         "return per * taken, per * rate",
         "return per * taken, 1.01 * per * rate",
     ),
-    Fault("units/__init__.py", "value_si - ambient", "value_si + ambient"),
+    Fault("units.py", "value_si - ambient", "value_si + ambient"),
     Fault("case/sloshing.py", "return 0.25 * np.pi * a * a if", "return 0.2525 * np.pi * a * a if"),
     Fault("fluid/oils.py", "(hot - cold)) - 0.7)", "(hot - cold)) - 0.707)"),
     Fault(

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve import units
-from fvsolve.case.raw import split_key
+from fvsolve.case.reading import split_key
 from fvsolve.errors import article, did_you_mean, listing
 from fvsolve.parts import KINDS, Pipe
 from fvsolve.units import show

@@ -9,7 +9,7 @@ from fvsolve.case.chainage import original_keys, pieces_of, placed
 from fvsolve.case.claims import COMPARE_KEYS, expect_keys, limit_keys
 from fvsolve.case.load import TOP
 from fvsolve.case.pipe_routes import Route
-from fvsolve.case.raw import WITH_DEFAULTS, default_values, raw_link, split_key
+from fvsolve.case.reading import WITH_DEFAULTS, default_values, raw_link, split_key
 from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.errors import FvsolveError
 from fvsolve.parts import KINDS, Scalar

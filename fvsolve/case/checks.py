@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from fvsolve import units
-from fvsolve.case import basins, bodies, connections, nodes_on_bodies, sloshing
+from fvsolve.case import basins, bodies, connections, sloshing
 from fvsolve.case.claims import Expect
-from fvsolve.case.raw import Raw
+from fvsolve.case.reading import Raw
 from fvsolve.case.resource_checks import name_faults
 from fvsolve.case.sections import CAVITY_SCHEMES, FluidSpec, Numerics
 from fvsolve.errors import article, did_you_mean, listing
@@ -46,9 +46,9 @@ def part_faults(
     """
     poses = bodies.poses(nodes, start)
     named, raw_links = (nodes, {}) if raw is None else (raw.table.get(group, {}) for group in ("nodes", "links"))
-    high = {name: node for name, node in nodes.items() if nodes_on_bodies.has_elevation(node, poses)}
+    high = {name: node for name, node in nodes.items() if bodies.has_elevation(node, poses)}
     lends = any(_may_lend(link, named) for name, link in raw_links.items() if name not in links or "profile" in link)
-    high = {name: nodes_on_bodies.with_elevation(node, poses) for name, node in high.items()}
+    high = {name: bodies.with_elevation(node, poses) for name, node in high.items()}
     yield from _elevations(high, links, lends)
 
     def vacuum(group: str, name: str, key: str, pressures: list[float]) -> Faults:
@@ -58,12 +58,12 @@ def part_faults(
 
     if meshes or lumped or gravity == 0.0 or any(map(in_space, (*nodes.values(), *links.values()))):
         yield from bodies.find_faults(nodes, named)
-        yield from nodes_on_bodies.find_faults(nodes, links, basins.places_on_bodies(nodes, meshes), named)
+        yield from bodies.faults_on_bodies(nodes, links, basins.places_on_bodies(nodes, meshes), named)
         yield from bodies.coincident_ends(nodes, links, poses)
         yield from bodies.open_pins(nodes, links, poses)
         yield from sloshing.find_faults(nodes, lumped, poses)
         yield from sloshing.weightless(nodes, gravity)
-        yield from nodes_on_bodies.overturned(nodes, poses)
+        yield from bodies.overturned(nodes, poses)
 
     def separation(*ends: str) -> float | None:
         return bodies.separation(nodes, poses, *ends)

@@ -13,8 +13,7 @@ from fvsolve.case.case import Case, wave_speed
 from fvsolve.case.part_reading import Parts
 from fvsolve.case.pipe_routes import legs, read_routes
 from fvsolve.case.probe import default_probes, read_probe
-from fvsolve.case.raw import Raw, copy_paths, default_faults, override, read_raw, split_key
-from fvsolve.case.reading import Reading
+from fvsolve.case.reading import Raw, Reading, copy_paths, default_faults, override, read_raw, split_key
 from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.errors import FluidError, did_you_mean
 from fvsolve.fluid import properties

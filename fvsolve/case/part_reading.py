@@ -5,8 +5,7 @@ from typing import Any, NamedTuple
 
 from fvsolve.case import basins, bodies, chainage, connections, resource_checks
 from fvsolve.case.case import default_cells
-from fvsolve.case.raw import fill_pipes, with_defaults
-from fvsolve.case.reading import GROUPS, Reading
+from fvsolve.case.reading import GROUPS, Reading, fill_pipes, with_defaults
 from fvsolve.case.sections import Numerics
 from fvsolve.data import read_table
 from fvsolve.errors import did_you_mean, listing

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.case.raw import raw_link
+from fvsolve.case.reading import raw_link
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.steady_friction import drag
 from fvsolve.model.delay_line_selection import reason_for_cells
