@@ -42,15 +42,10 @@ class Route(Table):
     """Table `[routes.NAME]`: consecutive pipes with one running chainage."""
 
     pipes: Annotated[tuple[str, ...], PipeNames()]
-    start: Annotated[
-        float | None,
-        Quantity(
-            "length",
-            about="chainage of the start of the route [m]; "
-            "that of its first pipe (0 if reversed or without `profile`) if left out",
-            changes=VALUE,
-        ),
-    ] = None
+    start: Annotated[float | None, Quantity(
+        "length", about="chainage of the start of the route [m]; "
+        "that of its first pipe (0 if reversed or without `profile`) if left out", changes=VALUE,
+    )] = None  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -58,12 +58,9 @@ class FluidSpec(Table):
     pressure: Annotated[
         float, Quantity("pressure", positive, "pressure at which properties are evaluated [Pa]", changes=BY_CELLS)
     ] = 101325.0
-    law: Annotated[
-        str,
-        Choice(
-            "density law", tuple(LAWS), "density law of the whole case; linear (mixture with cavitation) if left out"
-        ),
-    ] = "linear"
+    law: Annotated[str, Choice(
+        "density law", tuple(LAWS), "density law of the whole case; linear (mixture with cavitation) if left out",
+    )] = "linear"  # fmt: skip
     density: Annotated[float | None, Quantity("density", positive, "density [kg/m3]", DENSITIES, BY_CELLS)] = None
     bulk_modulus: Annotated[
         float | None, Quantity("modulus", positive, "isentropic bulk modulus [Pa]", MODULI, BY_CELLS)
@@ -72,13 +69,9 @@ class FluidSpec(Table):
         float | None, Quantity("viscosity", val.nonnegative, "dynamic viscosity [Pa s]", VISCOSITIES)
     ] = None
     vapor_pressure: Annotated[float | None, Quantity("pressure", val.nonnegative, "vapour pressure [Pa]")] = None
-    air_fraction: Annotated[
-        float | None,
-        Number(
-            val.between(0, 1),
-            f"volume fraction of air at 1 atm, law mixture; {CAVITY_AIR:g} with cavitation if left out",
-        ),
-    ] = None
+    air_fraction: Annotated[float | None, Number(
+        val.between(0, 1), f"volume fraction of air at 1 atm, law mixture; {CAVITY_AIR:g} with cavitation if left out",
+    )] = None  # fmt: skip
     gas_exponent: Annotated[
         float | None,
         Number(val.between(1, 2), "polytropic exponent of the gas, law mixture: 1 isothermal, 1.4 adiabatic"),
@@ -155,92 +148,52 @@ class Numerics(Table):
 
     end: Annotated[float, Quantity("time", about="end time of the run [s]")]
     start: Annotated[float, Quantity("time", about="start time of the run [s]")] = 0.0
-    initial: Annotated[
-        str,
-        Choice(
-            "start",
-            STARTS,
-            "steady: stated levels, pressures and flows are kept, the rest is in equilibrium; equilibrium: nothing "
-            "moves and bodies and masses are placed where their forces balance; rest: no flow",
-            changes=val.PROFILE,
-        ),
-    ] = "steady"
-    scheme: Annotated[
-        str | None,
-        Choice(
-            "scheme",
-            tuple(SCHEMES),
-            f"reconstruction scheme of the cells; {DEFAULT_SCHEME} (with cavitation {CAVITY_SCHEME}) if left out",
-        ),
-    ] = None
+    initial: Annotated[str, Choice(
+        "start", STARTS,
+        "steady: stated levels, pressures and flows are kept, the rest is in equilibrium; equilibrium: nothing "
+        "moves and bodies and masses are placed where their forces balance; rest: no flow", changes=val.PROFILE,
+    )] = "steady"  # fmt: skip
+    scheme: Annotated[str | None, Choice(
+        "scheme", tuple(SCHEMES),
+        f"reconstruction scheme of the cells; {DEFAULT_SCHEME} (with cavitation {CAVITY_SCHEME}) if left out",
+    )] = None  # fmt: skip
     limiter: Annotated[str, Choice("limiter", tuple(LIMITERS), "slope limiter of the scheme muscl")] = DEFAULT_LIMITER
-    method: Annotated[
-        str | None,
-        MethodChoice(
-            "method",
-            MethodNames(),
-            f"Runge-Kutta method; {DEFAULT_METHOD} (with rtol {DEFAULT_METHOD_RTOL}, with cavitation {CAVITY_METHOD}, "
-            f"with scalars or friction in basins {DEFAULT_METHOD_SSP}) if left out",
-            changes=val.PROFILE,
-        ),
-    ] = None
-    courant: Annotated[
-        float | None,
-        Number(
-            positive,
-            f"Courant number: step over the shortest wave travel time of a cell; {DEFAULT_COURANT} with cells "
-            f"(with cavitation {CAVITY_COURANT}) if left out",
-            changes=VALUE,
-        ),
-    ] = None
+    method: Annotated[str | None, MethodChoice(
+        "method", MethodNames(),
+        f"Runge-Kutta method; {DEFAULT_METHOD} (with rtol {DEFAULT_METHOD_RTOL}, with cavitation {CAVITY_METHOD}, "
+        f"with scalars or friction in basins {DEFAULT_METHOD_SSP}) if left out", changes=val.PROFILE,
+    )] = None  # fmt: skip
+    courant: Annotated[float | None, Number(
+        positive, f"Courant number: step over the shortest wave travel time of a cell; {DEFAULT_COURANT} with cells "
+        f"(with cavitation {CAVITY_COURANT}) if left out", changes=VALUE,
+    )] = None  # fmt: skip
     step: Annotated[float | None, Quantity("time", positive, "fixed step [s]", changes=VALUE)] = None
-    rtol: Annotated[
-        float | None,
-        Number(
-            val.between(0, 1, open=True),
-            f"relative tolerance of the error per step; {DEFAULT_RTOL:g} (without cells, with auto, or with adaptive "
-            "implicit methods) if left out",
-        ),
-    ] = None
-    linear_algebra: Annotated[
-        str | None,
-        Choice(
-            "linear algebra",
-            KINDS,
-            "linear solver of implicit steps; chosen by the structure of the case if left out",
-            changes=VALUE,
-        ),
-    ] = None
-    cell_time: Annotated[
-        float | None,
-        Quantity(
-            "time",
-            positive,
-            f"wave travel time of a cell, for pipes that state no cells [s]; longest travel time of a pipe / "
-            f"{DEFAULT_CELLS} if left out",
-            changes=SHAPE,
-        ),
-    ] = None
+    rtol: Annotated[float | None, Number(
+        val.between(0, 1, open=True),
+        f"relative tolerance of the error per step; {DEFAULT_RTOL:g} (without cells, with auto, or with adaptive "
+        "implicit methods) if left out",
+    )] = None  # fmt: skip
+    linear_algebra: Annotated[str | None, Choice(
+        "linear algebra", KINDS, "linear solver of implicit steps; chosen by the structure of the case if left out",
+        changes=VALUE,
+    )] = None  # fmt: skip
+    cell_time: Annotated[float | None, Quantity(
+        "time", positive,
+        f"wave travel time of a cell, for pipes that state no cells [s]; longest travel time of a pipe / "
+        f"{DEFAULT_CELLS} if left out", changes=SHAPE,
+    )] = None  # fmt: skip
     pipe_model: Annotated[
         str, Choice("pipe model", LINES, "model of pipes that state no pipe_model", changes=SHAPE)
     ] = "finite-volume"
-    delay_tolerance: Annotated[
-        float,
-        Number(
-            val.between(0, 1, open=True),
-            "allowed error of pipe models chosen by auto, and size below which jumps in a delay line are smoothed; "
-            "both as a fraction of the largest jump",
-            changes=SHAPE,
-        ),
-    ] = DEFAULT_ACCURACY
-    below_vapor: Annotated[
-        str,
-        Choice(
-            "choice",
-            ("continue", "stop"),
-            "action at pressures below vapour pressure: mark the results and continue, or stop",
-        ),
-    ] = "continue"
+    delay_tolerance: Annotated[float, Number(
+        val.between(0, 1, open=True),
+        "allowed error of pipe models chosen by auto, and size below which jumps in a delay line are smoothed; "
+        "both as a fraction of the largest jump", changes=SHAPE,
+    )] = DEFAULT_ACCURACY  # fmt: skip
+    below_vapor: Annotated[str, Choice(
+        "choice", ("continue", "stop"),
+        "action at pressures below vapour pressure: mark the results and continue, or stop",
+    )] = "continue"  # fmt: skip
 
     def filled(self, has_cells: bool, carries: bool, rubs: bool, parts: bool) -> Numerics:
         """Copy with the default scheme, step control and method filled in.
@@ -329,11 +282,9 @@ class OutputLine(Table):
     """Table of one line across a basin, along which its fields are written with every frame."""
 
     basin: Annotated[str, val.Text("name of the basin", VALUE)]
-    from_: Annotated[
-        tuple[float, float],
-        val.Rows("length", length=2, about="x, y of the start of the line [m]", changes=VALUE),
-        Field(alias="from"),
-    ]
+    from_: Annotated[tuple[float, float], val.Rows(
+        "length", length=2, about="x, y of the start of the line [m]", changes=VALUE,
+    ), Field(alias="from")]  # fmt: skip
     to: Annotated[
         tuple[float, float], val.Rows("length", length=2, about="x, y of the end of the line [m]", changes=VALUE)
     ]
@@ -345,15 +296,10 @@ class OutputLine(Table):
 class Output(Table):
     """Table `[output]`: recorded quantities, output times and units."""
 
-    every: Annotated[
-        float | None,
-        Quantity(
-            "time",
-            positive,
-            f"interval between rows of the history [s]; (end - start) / {DEFAULT_ROWS} if left out",
-            changes=VALUE,
-        ),
-    ] = None
+    every: Annotated[float | None, Quantity(
+        "time", positive, f"interval between rows of the history [s]; (end - start) / {DEFAULT_ROWS} if left out",
+        changes=VALUE,
+    )] = None  # fmt: skip
     fields: Annotated[int, val.Whole(val.between(0, 10**6), "number of frames of the fields, 0 for none", VALUE)] = (
         DEFAULT_FRAMES
     )

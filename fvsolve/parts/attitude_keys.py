@@ -33,15 +33,9 @@ class Attitude(Table):
     roll: Annotated[float | None, Angle("angle about x, the last rotation [rad]; 0 if left out")] = None
     pitch: Annotated[float | None, Angle("angle about y, the second rotation [rad]; 0 if left out")] = None
     yaw: Annotated[float | None, Angle("angle about z, the first rotation [rad]; 0 if left out")] = None
-    zyz: Annotated[
-        tuple[float, ...] | None,
-        Rows(
-            "angle",
-            length=3,
-            about="classical Euler angles [psi, theta, phi] about z, y and z [rad]",
-            usual=USUAL_ANGLES,
-        ),
-    ] = None
+    zyz: Annotated[tuple[float, ...] | None, Rows(
+        "angle", length=3, about="classical Euler angles [psi, theta, phi] about z, y and z [rad]", usual=USUAL_ANGLES,
+    )] = None  # fmt: skip
     axis: Annotated[
         tuple[float, ...] | None, Rows("number", length=3, about="axis of a single rotation by `angle`")
     ] = None

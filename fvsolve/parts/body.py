@@ -183,22 +183,14 @@ class Joint(Table):
         Schedule | None,
         Scheduled("position", about="travel at the start, or a schedule that drives the joint [m]; 0 if left out"),
     ] = None
-    rate: Annotated[
-        Any,
-        JointQuantity(
-            "angular_velocity",
-            "rate of angle or travel at the start; of a ball or free joint the angular velocity [x, y, z] in body axes"
-            "; 0 if left out",
-        ),
-    ] = None
-    velocity: Annotated[
-        tuple[float, ...] | None,
-        Rows(
-            "velocity",
-            length=3,
-            about="velocity of the centre of mass of a free body at the start [m/s]; 0 if left out",
-        ),
-    ] = None
+    rate: Annotated[Any, JointQuantity(
+        "angular_velocity",
+        "rate of angle or travel at the start; of a ball or free joint the angular velocity [x, y, z] in body axes"
+        "; 0 if left out",
+    )] = None  # fmt: skip
+    velocity: Annotated[tuple[float, ...] | None, Rows(
+        "velocity", length=3, about="velocity of the centre of mass of a free body at the start [m/s]; 0 if left out",
+    )] = None  # fmt: skip
     damping: Annotated[
         Any, JointQuantity("damping", "damping torque or force per rate of the joint; 0 if left out")
     ] = None

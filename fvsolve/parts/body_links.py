@@ -30,14 +30,10 @@ class Pin(TwoPort, kind="pin"):
     joins: ClassVar[dict[str, str]] = {"from": "spatial", "to": "spatial"}
     quantities: ClassVar[dict[str, str]] = {"gap": "length", "force": "force"}
 
-    axis: Annotated[
-        tuple[float, ...] | None,
-        Rows(
-            "number",
-            length=3,
-            about="free direction, in the axes of `from`; none (all three directions constrained) if left out",
-        ),
-    ] = None
+    axis: Annotated[tuple[float, ...] | None, Rows(
+        "number", length=3,
+        about="free direction, in the axes of `from`; none (all three directions constrained) if left out",
+    )] = None  # fmt: skip
     stabilisation: Annotated[
         float, Quantity("rate", positive, "rate at which a gap closes (Baumgarte stabilisation) [1/s]", changes=VALUE)
     ] = 10.0
@@ -144,12 +140,9 @@ class Torque(Link, kind="torque"):
         None
     )
     to: Annotated[str, Text("shaft (PUMP.shaft or TURBINE.shaft) or body on which the torque acts")]
-    torque: Annotated[
-        Schedule,
-        Scheduled(
-            "torque", about="torque on `to`, positive as the torque of a motor on its pump, or about `axis` [N m]"
-        ),
-    ]
+    torque: Annotated[Schedule, Scheduled(
+        "torque", about="torque on `to`, positive as the torque of a motor on its pump, or about `axis` [N m]",
+    )]  # fmt: skip
     axis: Annotated[
         tuple[float, ...] | None,
         Rows("number", length=3, about="axis of the torque on a body, in the axes of the body"),

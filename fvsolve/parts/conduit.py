@@ -154,23 +154,14 @@ class Friction(Table):
         float | None, Number(positive, "coefficient C of hazen-williams [-], or n of chezy-manning [s/m^(1/3)]")
     ] = None
 
-    weighting: Annotated[
-        str | None,
-        Choice(
-            "weighting function",
-            WEIGHTINGS,
-            "weighting function of past flow changes, model unsteady; "
-            "chosen by the initial Reynolds number if left out",
-        ),
-    ] = None
-    accuracy: Annotated[
-        float | None,
-        Number(
-            between(1e-6, 0.1),
-            "relative accuracy of the sum of exponentials, model unsteady; 1e-4 if left out",
-            changes=SHAPE,
-        ),
-    ] = None
+    weighting: Annotated[str | None, Choice(
+        "weighting function", WEIGHTINGS, "weighting function of past flow changes, model unsteady; "
+        "chosen by the initial Reynolds number if left out",
+    )] = None  # fmt: skip
+    accuracy: Annotated[float | None, Number(
+        between(1e-6, 0.1), "relative accuracy of the sum of exponentials, model unsteady; 1e-4 if left out",
+        changes=SHAPE,
+    )] = None  # fmt: skip
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:

@@ -28,12 +28,9 @@ class Connection(Table):
         Quantity("length", positive, "diameter of the throat [m]", UsualRange(5e-5, 14.0, "capillaries to shafts")),
     ] = None
     # shape: with equal losses a pipe end has other roots
-    loss_in: Annotated[
-        float,
-        Number(
-            positive, "loss coefficient K in K rho v^2 / 2, v in the throat, for flow into the vessel", changes=SHAPE
-        ),
-    ]
+    loss_in: Annotated[float, Number(
+        positive, "loss coefficient K in K rho v^2 / 2, v in the throat, for flow into the vessel", changes=SHAPE,
+    )]  # fmt: skip
     loss_out: Annotated[float, Number(positive, "loss coefficient K for flow out of the vessel", changes=SHAPE)]
 
 

@@ -58,22 +58,16 @@ class Cylinder(Link, kind="cylinder"):
     dead_volume_B: Annotated[
         float, Quantity("volume", positive, "volume of chamber B with the rod out, lines included [m3]", changes=VALUE)
     ]
-    initial_pressure_A: Annotated[
-        float | None,
-        Quantity(
-            "pressure",
-            about="pressure of chamber A at the start [Pa]; that of its links, or the supporting pressure of a shut "
-            "chamber if left out",
-        ),
-    ] = None
-    initial_pressure_B: Annotated[
-        float | None,
-        Quantity(
-            "pressure",
-            about="pressure of chamber B at the start [Pa]; that of its links, or the supporting pressure of a shut "
-            "chamber if left out",
-        ),
-    ] = None
+    initial_pressure_A: Annotated[float | None, Quantity(
+        "pressure",
+        about="pressure of chamber A at the start [Pa]; that of its links, or the supporting pressure of a shut "
+        "chamber if left out",
+    )] = None  # fmt: skip
+    initial_pressure_B: Annotated[float | None, Quantity(
+        "pressure",
+        about="pressure of chamber B at the start [Pa]; that of its links, or the supporting pressure of a shut "
+        "chamber if left out",
+    )] = None  # fmt: skip
     leakage: Annotated[
         float, Quantity("leakage", nonnegative, "leakage flow from A to B per pressure difference [m3/s/Pa]")
     ] = 0.0

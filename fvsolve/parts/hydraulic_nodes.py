@@ -37,13 +37,10 @@ class Junction(PlaceOnBody, kind="junction"):
     minimum_pressure: Annotated[
         float | None, Quantity("pressure", about="pressure up to which no demand is supplied [Pa]; ambient if left out")
     ] = None
-    demand_exponent: Annotated[
-        float,
-        Number(
-            between(0, 3, open=True),
-            "exponent of the supplied demand over pressure, between minimum_pressure and required_pressure",
-        ),
-    ] = 0.5
+    demand_exponent: Annotated[float, Number(
+        between(0, 3, open=True),
+        "exponent of the supplied demand over pressure, between minimum_pressure and required_pressure",
+    )] = 0.5  # fmt: skip
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
         if self.required_pressure is None:

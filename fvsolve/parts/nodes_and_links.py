@@ -35,15 +35,10 @@ class Node(Table):
     )
     domain: ClassVar[str] = "hydraulic"  # | "translational" | "spatial"
 
-    elevation: Annotated[
-        float | None,
-        Quantity(
-            "length",
-            about="elevation above datum, at all nodes or none [m]; "
-            "0 (reservoir with `head`: that of the other end of its first link) if left out",
-            usual=USUAL_ELEVATIONS,
-        ),
-    ] = None
+    elevation: Annotated[float | None, Quantity(
+        "length", about="elevation above datum, at all nodes or none [m]; "
+        "0 (reservoir with `head`: that of the other end of its first link) if left out", usual=USUAL_ELEVATIONS,
+    )] = None  # fmt: skip
     position: Annotated[
         tuple[float, float] | None, Rows("length", length=2, about="position [x, y] in drawings [m]", changes=VALUE)
     ] = None
@@ -86,14 +81,10 @@ class PlaceOnBody(Node):
     """Node that a body may carry."""
 
     on: Annotated[str | None, Text("body that carries the node; fixed in the world if left out")] = None
-    at: Annotated[
-        tuple[float, ...] | None,
-        Rows(
-            "position",
-            length=3,
-            about="position (of a basin: of its origin) in axes of the body, instead of `elevation` [m]; 0 if left out",
-        ),
-    ] = None
+    at: Annotated[tuple[float, ...] | None, Rows(
+        "position", length=3,
+        about="position (of a basin: of its origin) in axes of the body, instead of `elevation` [m]; 0 if left out",
+    )] = None  # fmt: skip
 
     @classmethod
     def bodies(cls, given: dict[str, Any]) -> tuple[str, ...]:

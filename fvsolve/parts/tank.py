@@ -101,12 +101,9 @@ class Tank(PlaceOnBody, kind="tank"):
 
     area: Annotated[Any, Surface()]
     level: Annotated[float, Quantity("level", nonnegative, "water level above the bottom at the start [m]", LEVELS)]
-    height: Annotated[
-        float | None,
-        Quantity(
-            "level", positive, "level above the bottom at which the tank spills [m]; never if left out", LEVELS, VALUE
-        ),
-    ] = None
+    height: Annotated[float | None, Quantity(
+        "level", positive, "level above the bottom at which the tank spills [m]; never if left out", LEVELS, VALUE,
+    )] = None  # fmt: skip
     connection: Annotated[Connection | None, ConnectionTable()] = None
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -69,15 +69,9 @@ class Spring(Coupling, kind="spring"):
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("free_length", "preload"),)
 
     stiffness: Annotated[float, Quantity("stiffness", positive, "spring rate, force per length [N/m]", changes=VALUE)]
-    free_length: Annotated[
-        float | None,
-        Quantity(
-            "length",
-            nonnegative,
-            "length x_to - x_from without load [m]; 0 without `preload` if left out",
-            changes=VALUE,
-        ),
-    ] = None
+    free_length: Annotated[float | None, Quantity(
+        "length", nonnegative, "length x_to - x_from without load [m]; 0 without `preload` if left out", changes=VALUE,
+    )] = None  # fmt: skip
     preload: Annotated[
         float | None, Quantity("force", about="force at the start, positive in compression [N]", changes=VALUE)
     ] = None
@@ -195,14 +189,10 @@ class Force(Coupling, kind="force"):
         Schedule,
         Scheduled("force", about="force on `to`, positive along `direction` (of masses: along their axis) [N]"),
     ]
-    direction: Annotated[
-        tuple[float, ...] | None,
-        Rows(
-            "number",
-            length=3,
-            about="direction of a force on a point, in world axes; the line from `from` to `to` if left out",
-        ),
-    ] = None
+    direction: Annotated[tuple[float, ...] | None, Rows(
+        "number", length=3,
+        about="direction of a force on a point, in world axes; the line from `from` to `to` if left out",
+    )] = None  # fmt: skip
 
     @property
     def ports(self) -> dict[str, str]:

@@ -105,13 +105,10 @@ class Sized(Table):
         ("area", "diameter"),
     )
 
-    discharge_coefficient: Annotated[
-        float | None,
-        Number(
-            between(0, 1, open=True),
-            f"discharge coefficient Cd, with `area` or `diameter`; {DISCHARGE_COEFFICIENT} if left out",
-        ),
-    ] = None
+    discharge_coefficient: Annotated[float | None, Number(
+        between(0, 1, open=True),
+        f"discharge coefficient Cd, with `area` or `diameter`; {DISCHARGE_COEFFICIENT} if left out",
+    )] = None  # fmt: skip
     loss_coefficient: Annotated[
         float | None, Number(positive, "loss coefficient K, referred to the velocity in `area` or `diameter`")
     ] = None
@@ -122,15 +119,10 @@ class Sized(Table):
         float | None,
         Number(positive, "flow coefficient Cv, US gpm of water of 999.016 kg/m3 (60 degF) at 1 psi", COEFFICIENTS),
     ] = None
-    area: Annotated[
-        float | None,
-        Quantity(
-            "area",
-            positive,
-            "area of the opening [m2]; needed unless `diameter`, `Kv` or `Cv` is given",
-            UsualRange(1e-12, 200.0, "leaks to sluices"),
-        ),
-    ] = None
+    area: Annotated[float | None, Quantity(
+        "area", positive, "area of the opening [m2]; needed unless `diameter`, `Kv` or `Cv` is given",
+        UsualRange(1e-12, 200.0, "leaks to sluices"),
+    )] = None  # fmt: skip
     diameter: Annotated[
         float | None,
         Quantity("length", positive, "diameter of the opening [m]", UsualRange(1e-6, 14.0, "leaks to sluices")),

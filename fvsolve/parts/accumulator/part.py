@@ -21,13 +21,10 @@ class Compressor(Table):
     stop: Annotated[
         float, Quantity("level", nonnegative, "fluid level, below `start`, at which the compressor stops [m]", LEVELS)
     ]
-    flow: Annotated[
-        float,
-        Quantity(
-            "flow", positive, "flow of free air, at ambient pressure and the initial temperature of the gas [m3/s]",
-            UsualRange(1e-5, 10.0, "workshops to stations"),
-        ),
-    ]  # fmt: skip
+    flow: Annotated[float, Quantity(
+        "flow", positive, "flow of free air, at ambient pressure and the initial temperature of the gas [m3/s]",
+        UsualRange(1e-5, 10.0, "workshops to stations"),
+    )]  # fmt: skip
 
 
 def length_of(vessel: Any) -> float:
@@ -83,32 +80,19 @@ class Accumulator(Node, kind="accumulator"):
     }  # fmt: skip
 
     volume: Annotated[float, Quantity("volume", positive, "total volume of gas and fluid [m3]", VOLUMES)]
-    precharge: Annotated[
-        float | None,
-        Quantity(
-            "pressure",
-            about="gas pressure at which the bladder fills `volume` [Pa]; required without `gas_volume` and `level`",
-            usual=GAS_PRESSURES,
-        ),
-    ] = None
-    gas_volume: Annotated[
-        float | None,
-        Quantity(
-            "volume",
-            positive,
-            "gas volume of an air vessel at the start [m3]; required without `precharge` and `level`",
-            VOLUMES,
-        ),
-    ] = None
-    level: Annotated[
-        float | None,
-        Quantity(
-            "level",
-            nonnegative,
-            "fluid level above the bottom at the start [m]; required without `precharge` and `gas_volume`",
-            LEVELS,
-        ),
-    ] = None
+    precharge: Annotated[float | None, Quantity(
+        "pressure",
+        about="gas pressure at which the bladder fills `volume` [Pa]; required without `gas_volume` and `level`",
+        usual=GAS_PRESSURES,
+    )] = None  # fmt: skip
+    gas_volume: Annotated[float | None, Quantity(
+        "volume", positive, "gas volume of an air vessel at the start [m3]; required without `precharge` and `level`",
+        VOLUMES,
+    )] = None  # fmt: skip
+    level: Annotated[float | None, Quantity(
+        "level", nonnegative,
+        "fluid level above the bottom at the start [m]; required without `precharge` and `gas_volume`", LEVELS,
+    )] = None  # fmt: skip
     diameter: Annotated[
         float | None,
         Quantity("length", positive, "diameter of a cylinder with flat ends, whose length follows from `volume` [m]",

@@ -36,24 +36,16 @@ class AirValve(Node, kind="air-valve"):
 
     inlet: Annotated[float, Quantity("length", BORE_RANGE, "diameter of the bore for air inflow [m]")]
     outlet: Annotated[float, Quantity("length", BORE_RANGE, "diameter of the bore for air outflow [m]")]
-    switch: Annotated[
-        float | None,
-        Quantity(
-            "pressure_drop",
-            positive,
-            "gauge pressure above which air leaves through `throttled_outlet` instead of `outlet` [Pa]",
-            UsualRange(100.0, 1e5, "anti-slam discs"),
-        ),
-    ] = None
-    switch_velocity: Annotated[
-        float | None,
-        Quantity(
-            "velocity",
-            positive,
-            "fluid velocity to the valve above which air leaves through `throttled_outlet`, instead of `switch` [m/s]",
-            UsualRange(0.01, 20.0, "anti-slam discs"),
-        ),
-    ] = None
+    switch: Annotated[float | None, Quantity(
+        "pressure_drop", positive,
+        "gauge pressure above which air leaves through `throttled_outlet` instead of `outlet` [Pa]",
+        UsualRange(100.0, 1e5, "anti-slam discs"),
+    )] = None  # fmt: skip
+    switch_velocity: Annotated[float | None, Quantity(
+        "velocity", positive,
+        "fluid velocity to the valve above which air leaves through `throttled_outlet`, instead of `switch` [m/s]",
+        UsualRange(0.01, 20.0, "anti-slam discs"),
+    )] = None  # fmt: skip
     throttled_outlet: Annotated[
         float | None, Quantity("length", BORE_RANGE, "diameter of the bore for throttled air outflow [m]")
     ] = None
@@ -63,23 +55,14 @@ class AirValve(Node, kind="air-valve"):
     discharge_coefficient: Annotated[
         float, Number(between(0, 1, open=True), "discharge coefficient Cd of all bores")
     ] = 0.6
-    volume: Annotated[
-        float | None,
-        Quantity(
-            "volume",
-            positive,
-            "volume of the float chamber [m3]; a cylinder three inlet diameters long and wide if left out",
-        ),
-    ] = None
-    temperature: Annotated[
-        float,
-        Quantity(
-            "temperature",
-            positive,
-            "constant temperature of the air [K]",
-            UsualRange(220.0, 370.0, "outdoors to hot rooms"),
-        ),
-    ] = 293.15
+    volume: Annotated[float | None, Quantity(
+        "volume", positive,
+        "volume of the float chamber [m3]; a cylinder three inlet diameters long and wide if left out",
+    )] = None  # fmt: skip
+    temperature: Annotated[float, Quantity(
+        "temperature", positive, "constant temperature of the air [K]",
+        UsualRange(220.0, 370.0, "outdoors to hot rooms"),
+    )] = 293.15  # fmt: skip
 
     initial_pressure: ClassVar[None] = None
 

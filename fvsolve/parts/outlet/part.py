@@ -94,12 +94,9 @@ class Leak(Link, kind="leak"):
     joins: ClassVar[dict[str, str]] = {"from": "hydraulic"}
 
     from_: Annotated[str, Text("place of the leak"), Field(alias="from")]
-    coefficient: Annotated[
-        float,
-        Number(
-            positive, "flow in m3/s at a pressure drop of 1 Pa", UsualRange(1e-15, 0.1, "seeping to a main torn off")
-        ),
-    ]
+    coefficient: Annotated[float, Number(
+        positive, "flow in m3/s at a pressure drop of 1 Pa", UsualRange(1e-15, 0.1, "seeping to a main torn off"),
+    )]  # fmt: skip
     exponent: Annotated[
         float, Number(between(0, 3, open=True), "exponent of the pressure drop, 0.5 for a hole of fixed size")
     ] = 0.5
@@ -143,18 +140,12 @@ class SurgeAnticipating(Relieving, kind="surge-anticipating"):
     power: dp q [W].
     """
 
-    low_set: Annotated[
-        float | None,
-        Quantity(
-            "pressure", about="pressure at `senses` below which the valve opens, gauge or absolute by its unit [Pa]"
-        ),
-    ] = None
-    high_set: Annotated[
-        float | None,
-        Quantity(
-            "pressure", about="pressure at `senses` above which the valve opens, gauge or absolute by its unit [Pa]"
-        ),
-    ] = None
+    low_set: Annotated[float | None, Quantity(
+        "pressure", about="pressure at `senses` below which the valve opens, gauge or absolute by its unit [Pa]",
+    )] = None  # fmt: skip
+    high_set: Annotated[float | None, Quantity(
+        "pressure", about="pressure at `senses` above which the valve opens, gauge or absolute by its unit [Pa]",
+    )] = None  # fmt: skip
     trip: Annotated[
         float | None, Quantity("time", about="time at which the valve opens regardless of pressure [s]")
     ] = None

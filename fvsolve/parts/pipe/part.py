@@ -86,26 +86,16 @@ class Pipe(Conduit, kind="pipe"):
     ] = None
     wall: Annotated[Wall | Literal["rigid"] | None, WallOrRigid()] = None
     material: Annotated[str | None, MaterialName()] = None
-    class_: Annotated[
-        str | None,
-        Text(
-            'pressure class or schedule: "K9", "C40", "SDR11", "PN16", "schedule 40"; with `nominal` it sets bore, '
-            "wall and allowable pressure",
-            BY_CELLS,
-        ),
-        Field(alias="class"),
-    ] = None
+    class_: Annotated[str | None, Text(
+        'pressure class or schedule: "K9", "C40", "SDR11", "PN16", "schedule 40"; with `nominal` it sets bore, '
+        "wall and allowable pressure", BY_CELLS,
+    ), Field(alias="class")] = None  # fmt: skip
     restraint: Annotated[str | float | None, Restraint()] = None
     lining: Annotated[Lining | None, Nested(Lining, "inner layer of the wall; `diameter` is the bore inside it")] = None
-    allowable_pressure: Annotated[
-        float | None,
-        Quantity(
-            "gauge_pressure",
-            positive,
-            "allowable pressure above ambient [Pa]; that of the key `class` if left out",
-            changes=VALUE,
-        ),
-    ] = None
+    allowable_pressure: Annotated[float | None, Quantity(
+        "gauge_pressure", positive, "allowable pressure above ambient [Pa]; that of the key `class` if left out",
+        changes=VALUE,
+    )] = None  # fmt: skip
     source: Annotated[
         str | None, Text("source of the data of the pipe; the sources of the catalogue if left out", VALUE)
     ] = None
@@ -113,15 +103,11 @@ class Pipe(Conduit, kind="pipe"):
         int | None,
         Whole(between(1, MOST_CELLS), "number of finite volumes; travel time over numerics.cell_time if left out"),
     ] = None
-    pipe_model: Annotated[
-        str | None,
-        Choice(
-            "pipe model",
-            LINES,
-            "method for waves: finite volumes, a delay line, whose cells are only output positions, or auto "
-            "(a delay line where its error bound is below numerics.delay_tolerance); numerics.pipe_model if left out",
-        ),
-    ] = None
+    pipe_model: Annotated[str | None, Choice(
+        "pipe model", LINES,
+        "method for waves: finite volumes, a delay line, whose cells are only output positions, or auto "
+        "(a delay line where its error bound is below numerics.delay_tolerance); numerics.pipe_model if left out",
+    )] = None  # fmt: skip
     scalars: Annotated[dict[str, Any], ScalarValues("scalar values in the pipe at the start", Number())] = {}
 
     @property

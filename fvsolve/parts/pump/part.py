@@ -37,36 +37,23 @@ class Pump(TwoPort, kind="pump"):
         None
     )
     suter: Annotated[SuterTable | None, Suter()] = None
-    curve_extrapolation: Annotated[
-        str | None,
-        Choice(
-            "law",
-            ("suter", "parabola"),
-            "head outside the flows of `curve`: suter (a table by specific speed, joined to the curve; default with "
-            "`rated_speed`) or parabola",
-        ),
-    ] = None
-    speed: Annotated[
-        Schedule,
-        Scheduled(
-            "number",
-            nonnegative,
-            "relative speed, 1 at the speed of the curve",
-            UsualRange(0.0, 2.5, "of the rated speed"),
-        ),
-    ] = Field(default_factory=lambda: constant(1.0))
+    curve_extrapolation: Annotated[str | None, Choice(
+        "law", ("suter", "parabola"),
+        "head outside the flows of `curve`: suter (a table by specific speed, joined to the curve; default with "
+        "`rated_speed`) or parabola",
+    )] = None  # fmt: skip
+    speed: Annotated[Schedule, Scheduled(
+        "number", nonnegative, "relative speed, 1 at the speed of the curve",
+        UsualRange(0.0, 2.5, "of the rated speed"),
+    )] = Field(default_factory=lambda: constant(1.0))  # fmt: skip
     rated_speed: Annotated[
         float | None, Quantity("angular_velocity", positive, "speed at relative speed 1 [rad/s]", SPEEDS, PROFILE)
     ] = None
-    inertia: Annotated[
-        float | None,
-        Quantity(
-            "inertia",
-            positive,
-            "inertia of all rotating masses and water in the pump, with `rated_speed` [kg m2]; estimated if left out",
-            changes=VALUE,
-        ),
-    ] = None
+    inertia: Annotated[float | None, Quantity(
+        "inertia", positive,
+        "inertia of all rotating masses and water in the pump, with `rated_speed` [kg m2]; estimated if left out",
+        changes=VALUE,
+    )] = None  # fmt: skip
     trip: Annotated[
         float | None, Quantity("time", about="time at which the motor is switched off, requires `rated_speed` [s]")
     ] = None

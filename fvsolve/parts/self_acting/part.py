@@ -32,26 +32,14 @@ class Disc(Table):
     time_constant dx/dt = target - x, or x'' = w^2 (target - x) - 2 damping_ratio w x' with w = 2 pi natural_frequency.
     """
 
-    time_constant: Annotated[
-        float | None,
-        Quantity(
-            "time",
-            positive,
-            "time constant of the disc, damping over stiffness [s]; no delay if left out",
-            UsualRange(1e-6, 300.0, "poppets to damped flaps"),
-            VALUE,
-        ),
-    ] = None
-    natural_frequency: Annotated[
-        float | None,
-        Quantity(
-            "frequency",
-            positive,
-            "undamped natural frequency of the disc, instead of `time_constant` [Hz]",
-            UsualRange(1e-2, 2e4, "flaps to poppets"),
-            VALUE,
-        ),
-    ] = None
+    time_constant: Annotated[float | None, Quantity(
+        "time", positive, "time constant of the disc, damping over stiffness [s]; no delay if left out",
+        UsualRange(1e-6, 300.0, "poppets to damped flaps"), VALUE,
+    )] = None  # fmt: skip
+    natural_frequency: Annotated[float | None, Quantity(
+        "frequency", positive, "undamped natural frequency of the disc, instead of `time_constant` [Hz]",
+        UsualRange(1e-2, 2e4, "flaps to poppets"), VALUE,
+    )] = None  # fmt: skip
     damping_ratio: Annotated[
         float | None,
         Number(nonnegative, "damping ratio of the disc, with `natural_frequency`; 1 is critical", changes=VALUE),
@@ -138,15 +126,11 @@ class CheckValve(Disc, Sized, TwoPort, kind="check-valve"):
     cracking_pressure: Annotated[
         float, Quantity("pressure_drop", nonnegative, "pressure drop above which the valve opens [Pa]", DROPS)
     ] = 0.0
-    overpressure: Annotated[
-        float | None,
-        Quantity(
-            "pressure_drop",
-            positive,
-            "drop above `cracking_pressure` that opens the valve fully, with time_constant or natural_frequency [Pa]",
-            DROPS,
-        ),
-    ] = None
+    overpressure: Annotated[float | None, Quantity(
+        "pressure_drop", positive,
+        "drop above `cracking_pressure` that opens the valve fully, with time_constant or natural_frequency [Pa]",
+        DROPS,
+    )] = None  # fmt: skip
     deceleration: Annotated[Any, SlamCurveTable()] = None
 
     @property
@@ -189,18 +173,12 @@ class ReliefValve(Disc, Sized, TwoPort, kind="relief-valve"):
 
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "opening": "number"}
 
-    set_pressure: Annotated[
-        float,
-        Quantity(
-            "pressure", about="pressure at `from` above which the valve opens, gauge or absolute by its unit [Pa]"
-        ),
-    ]
-    overpressure: Annotated[
-        float,
-        Quantity(
-            "pressure_drop", positive, "pressure above `set_pressure` at which the valve is fully open [Pa]", DROPS
-        ),
-    ]
+    set_pressure: Annotated[float, Quantity(
+        "pressure", about="pressure at `from` above which the valve opens, gauge or absolute by its unit [Pa]",
+    )]  # fmt: skip
+    overpressure: Annotated[float, Quantity(
+        "pressure_drop", positive, "pressure above `set_pressure` at which the valve is fully open [Pa]", DROPS,
+    )]  # fmt: skip
 
 
 STROKES = UsualRange(1e-4, 1e5, "servo valves to motor drives")
@@ -212,16 +190,10 @@ class Regulating(Sized, TwoPort):
 
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "opening": "number"}
 
-    time_constant: Annotated[
-        float,
-        Quantity(
-            "time",
-            positive,
-            "time in which an error of one `band` (or of `set_flow`) opens the shut valve [s]",
-            STROKES,
-            VALUE,
-        ),
-    ]
+    time_constant: Annotated[float, Quantity(
+        "time", positive, "time in which an error of one `band` (or of `set_flow`) opens the shut valve [s]", STROKES,
+        VALUE,
+    )]  # fmt: skip
 
 
 class PressureReducing(Regulating, kind="pressure-reducing"):
@@ -232,15 +204,10 @@ class PressureReducing(Regulating, kind="pressure-reducing"):
     """
 
     set_pressure: Annotated[Schedule, Scheduled("pressure", about="set pressure at `to` [Pa]")]
-    band: Annotated[
-        float,
-        Quantity(
-            "pressure_drop",
-            positive,
-            "pressure error that moves the valve over its stroke in one time constant [Pa]",
-            BANDS,
-        ),
-    ] = 1e5
+    band: Annotated[float, Quantity(
+        "pressure_drop", positive, "pressure error that moves the valve over its stroke in one time constant [Pa]",
+        BANDS,
+    )] = 1e5  # fmt: skip
 
 
 class PressureSustaining(Regulating, kind="pressure-sustaining"):
@@ -251,15 +218,10 @@ class PressureSustaining(Regulating, kind="pressure-sustaining"):
     """
 
     set_pressure: Annotated[Schedule, Scheduled("pressure", about="set pressure at `from` [Pa]")]
-    band: Annotated[
-        float,
-        Quantity(
-            "pressure_drop",
-            positive,
-            "pressure error that moves the valve over its stroke in one time constant [Pa]",
-            BANDS,
-        ),
-    ] = 1e5
+    band: Annotated[float, Quantity(
+        "pressure_drop", positive, "pressure error that moves the valve over its stroke in one time constant [Pa]",
+        BANDS,
+    )] = 1e5  # fmt: skip
 
 
 class FlowControl(Regulating, kind="flow-control"):

@@ -40,15 +40,10 @@ class Turbine(TwoPort, kind="turbine"):
     opening: Annotated[Schedule, Scheduled("number", between(0, 1), "opening of the guide vanes, 0 shut to 1 open")] = (
         Field(default_factory=lambda: constant(1.0))
     )
-    inertia: Annotated[
-        float | None,
-        Quantity(
-            "inertia",
-            positive,
-            "inertia of runner, water in it and generator, required with `trip` [kg m2]",
-            changes=VALUE,
-        ),
-    ] = None
+    inertia: Annotated[float | None, Quantity(
+        "inertia", positive, "inertia of runner, water in it and generator, required with `trip` [kg m2]",
+        changes=VALUE,
+    )] = None  # fmt: skip
     trip: Annotated[
         float | None, Quantity("time", about="time of load rejection, when the generator is disconnected [s]")
     ] = None
