@@ -217,12 +217,8 @@ class Joint(Table):
             if all(isinstance(x, (int, float)) for x in given["axis"]) and is_zero_vector(given["axis"]):
                 faults.append((("axis",), "is all zeros; expected a direction, for example [0, 1, 0]"))
         if "at" in given and isinstance(given.get("on"), str) and "." in given["on"]:
-            faults.append(
-                (
-                    ("at",),
-                    f"{given['on']} gives the position already; remove `at`, or give a body without point in `on`",
-                )
-            )
+            text = f"{given['on']} gives the position already; remove `at`, or give a body without point in `on`"
+            faults.append((("at",), text))
         return faults
 
     @classmethod

@@ -144,10 +144,8 @@ class EndStop(Coupling, kind="end-stop"):
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         if None not in (self.minimum, self.maximum) and self.minimum >= self.maximum:
-            yield (
-                ("maximum",),
-                f"{self.maximum:g} m is not above `minimum`, {self.minimum:g} m; expected a greater value",
-            )
+            text = f"{self.maximum:g} m is not above `minimum`, {self.minimum:g} m; expected a greater value"
+            yield (("maximum",), text)
 
 
 NO_STOP = 1e300  # distance to a stop that does not exist
@@ -203,15 +201,11 @@ class Force(Coupling, kind="force"):
         if is_zero_vector(self.direction):
             yield ("direction",), "is all zeros; expected for example [0, 0, -1]"
         if around.spatial(self.to) and self.from_ is None and self.direction is None:
-            yield (
-                (),
-                "direction is missing: a force on a point needs this key or `from`; for example [0, 0, -1], downward",
-            )
+            text = "direction is missing: a force on a point needs this key or `from`; for example [0, 0, -1], downward"
+            yield ((), text)
         if not around.spatial(self.to) and self.direction is not None:
-            yield (
-                ("direction",),
-                f"{self.to} moves along a single axis, which gives the direction of the force; remove this key",
-            )
+            text = f"{self.to} moves along a single axis, which gives the direction of the force; remove this key"
+            yield (("direction",), text)
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         yield from length_notices("direction", self.direction)

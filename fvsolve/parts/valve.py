@@ -75,12 +75,8 @@ class CharacteristicValue(Value):
         opening, flow_area = values["opening"], values["flow_area"]
         faults = []
         if len(opening) != len(flow_area):
-            faults.append(
-                (
-                    ("flow_area",),
-                    f"has length {len(flow_area)}, but `opening` has length {len(opening)}; expected equal lengths",
-                )
-            )
+            text = f"has length {len(flow_area)}, but `opening` has length {len(opening)}; expected equal lengths"
+            faults.append((("flow_area",), text))
         if opening[0] != 0 or opening[-1] != 1:
             faults.append((("opening",), "openings must begin at 0 and end at 1"))
         if flow_area[0] != 0:

@@ -168,15 +168,11 @@ class Accumulator(Node, kind="accumulator"):
         if self.compressor is not None:
             start, stop = self.compressor.start, self.compressor.stop
             if stop >= start:
-                yield (
-                    ("compressor", "stop"),
-                    f"{stop:g} m is not below the level `start`, {start:g} m; expected a lower level",
-                )
+                message = f"{stop:g} m is not below the level `start`, {start:g} m; expected a lower level"
+                yield (("compressor", "stop"), message)
             if start >= top:
-                yield (
-                    ("compressor", "start"),
-                    f"{start:g} m is never reached; expected less than {top:.6g} m, at which the vessel is full",
-                )
+                message = f"{start:g} m is never reached; expected less than {top:.6g} m, at which the vessel is full"
+                yield (("compressor", "start"), message)
 
 
 class Vessel(Accumulator):

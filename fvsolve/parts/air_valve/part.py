@@ -89,10 +89,8 @@ class AirValve(Node, kind="air-valve"):
             if link.kind in ("pipe", "rigid-column") and name in link.ports.values()
         ]
         if self.switch_velocity is not None and not lines:
-            yield (
-                ("switch_velocity",),
-                "no pipe or rigid column joins this node to give a fluid velocity; give the key `switch` instead",
-            )
+            message = "no pipe or rigid column joins this node to give a fluid velocity; give the key `switch` instead"
+            yield (("switch_velocity",), message)
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
         size = Connection.model_construct(area=None, diameter=THROAT_SIZE * self.inlet, loss_in=1.0, loss_out=1.0)

@@ -176,7 +176,5 @@ class SurgeAnticipating(Relieving, kind="surge-anticipating"):
         places = [place for place, node in around.nodes.items() if getattr(node, "domain", "") == "hydraulic"]
         if self.senses is not None and self.senses not in places:
             near = did_you_mean(self.senses, places)
-            yield (
-                ("senses",),
-                f"unknown place of the fluid {show(self.senses)}; expected one of {listing(places)}{near}",
-            )
+            message = f"unknown place of the fluid {show(self.senses)}; expected one of {listing(places)}{near}"
+            yield (("senses",), message)

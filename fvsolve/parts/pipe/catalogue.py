@@ -107,15 +107,11 @@ def _add_schedule(table: dict[str, Any], material: Material | None) -> None:
     Raises ValueFault if a material is given and is not a steel. Nothing is done for an unknown size.
     """
     if material is not None and material.name not in STEELS:
-        raise ValueFault(
-            [
-                (
-                    ("nominal",),
-                    f"is a steel size without the key `class`; expected a class for {material.name}, or `diameter` and "
-                    "a wall thickness instead of `nominal`",
-                )
-            ]
+        text = (
+            f"is a steel size without the key `class`; expected a class for {material.name}, or `diameter` and "
+            "a wall thickness instead of `nominal`"
         )
+        raise ValueFault([(("nominal",), text)])
     try:
         bore, thickness = pipe_size(table["nominal"], table.get("schedule", "40"))
     except ValueFault:

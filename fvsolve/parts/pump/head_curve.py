@@ -160,14 +160,8 @@ class HeadCurve(Value):
         flows = np.linspace(0.0, end, 1001)
         rises = np.flatnonzero(np.polynomial.polynomial.polyval(flows, slope) > 0.0)
         if rises.size:
-            raise ValueFault(
-                [
-                    (
-                        ("coefficients",),
-                        f"the head rises at a flow of {flows[rises[0]]:.4g} m3/s; the head must fall as the flow rises",
-                    )
-                ]
-            )
+            text = f"the head rises at a flow of {flows[rises[0]]:.4g} m3/s; the head must fall as the flow rises"
+            raise ValueFault([(("coefficients",), text)])
 
     def json(self) -> dict[str, Any]:
         return {"anyOf": [keys_json(keys_of("head", "head")), keys_json(self.polynomial)]}
@@ -280,13 +274,11 @@ class Suter(Value):
             if len(series) < 9:
                 faults.append(((key,), f"{len(series)} values; expected at least 9, from x = 0 to x = 2 pi"))
             elif abs(series[0] - series[-1]) > ROUNDING * max(map(abs, series)):
-                faults.append(
-                    (
-                        (key,),
-                        f"ends at {series[-1]:g} and begins at {series[0]:g}; expected equal values, because "
-                        "x = 2 pi is x = 0 again",
-                    )
+                text = (
+                    f"ends at {series[-1]:g} and begins at {series[0]:g}; expected equal values, because "
+                    "x = 2 pi is x = 0 again"
                 )
+                faults.append(((key,), text))
         if faults:
             raise ValueFault(faults)
         values["head"], values["torque"] = ((*series[:-1], series[0]) for series in (head, torque))

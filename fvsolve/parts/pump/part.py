@@ -71,23 +71,15 @@ class Pump(TwoPort, kind="pump"):
         if "inertia" in given and "rated_speed" not in given:
             faults.append((("inertia",), 'needs rated_speed, for example "1480 rpm"'))
         if "curve_extrapolation" in given and "curve" not in given:
-            faults.append(
-                (
-                    ("curve_extrapolation",),
-                    "applies outside the flows of a curve; give the key `curve`, or remove this key",
-                )
-            )
+            text = "applies outside the flows of a curve; give the key `curve`, or remove this key"
+            faults.append((("curve_extrapolation",), text))
         if given.get("curve_extrapolation") == "suter" and "curve" in given and "rated_speed" not in given:
             faults.append(
                 (("curve_extrapolation",), 'needs rated_speed, for example "1480 rpm", for the specific speed')
             )
         if "suter" in given and isinstance(given.get("efficiency"), dict):
-            faults.append(
-                (
-                    ("efficiency",),
-                    "`suter` already gives the torque; expected a number, the efficiency at the rated point",
-                )
-            )
+            text = "`suter` already gives the torque; expected a number, the efficiency at the rated point"
+            faults.append((("efficiency",), text))
         if "suter" in given and "shaft_power" in given:
             faults.append((("shaft_power",), "`suter` already gives the torque; leave `shaft_power` out"))
         return faults

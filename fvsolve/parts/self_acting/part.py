@@ -93,12 +93,8 @@ class SlamCurveTable(Value):
         values, faults = read_keys(given, self.keys, setting), []
         rate, velocity = values["rate"], values["reverse_velocity"]
         if len(rate) != len(velocity):
-            faults.append(
-                (
-                    ("reverse_velocity",),
-                    f"has length {len(velocity)}, but `rate` has length {len(rate)}; expected equal lengths",
-                )
-            )
+            text = f"has length {len(velocity)}, but `rate` has length {len(rate)}; expected equal lengths"
+            faults.append((("reverse_velocity",), text))
         try:
             check_increasing(rate, given["rate"], "rates")
         except ValueError as error:

@@ -38,25 +38,20 @@ def faults_of_curve(curve) -> list[tuple[str, str]]:
         faults.append(("opening", f"{curve.opening:g} is almost shut; expected at least {LEAST:g}, or 0"))
     if curve.quantity == EFFICIENCY and not all(n > 0.0 and q > 0.0 for n, q in points):
         k = next(k for k, (n, q) in enumerate(points) if not (n > 0.0 and q > 0.0))
-        faults.append(
-            (
-                EFFICIENCY,
-                f"gives no torque at point {k + 1}, {point_text(points[k])}; expected {TORQUE} instead for the whole "
-                "curve",
-            )
+        text = (
+            f"gives no torque at point {k + 1}, {point_text(points[k])}; expected {TORQUE} instead for the whole curve"
         )
+        faults.append((EFFICIENCY, text))
     if not any(q >= LEAST for _, q in points):
         faults.append(
             (FLOW, f"has no value of {LEAST:g} or more; expected at least one, a flow that drives the turbine")
         )
     if (dead := next((p for p in points if p[0] == 0.0 and p[1] <= 0.0), None)) is not None:
-        faults.append(
-            (
-                "",
-                f"{point_text(dead)} is not a valid point: through a runner at rest a positive head drives a positive "
-                "flow; expected a flow above 0 at unit speed 0",
-            )
+        text = (
+            f"{point_text(dead)} is not a valid point: through a runner at rest a positive head drives a positive "
+            "flow; expected a flow above 0 at unit speed 0"
         )
+        faults.append(("", text))
     return faults or angle_faults(points)
 
 
@@ -70,13 +65,11 @@ def angle_faults(points: list[tuple[float, float]]) -> list[tuple[str, str]]:
     for k, ((n, q), (m, r)) in enumerate(pairwise(points)):
         across = n * r - q * m
         if abs(across) <= ANGLE_TOLERANCE * math.hypot(n, q) * math.hypot(m, r):
-            return [
-                (
-                    "",
-                    f"points {k + 1} and {k + 2}, {point_text((n, q))} and {point_text((m, r))}, are in line with the "
-                    f"origin; expected different angles, atan2({FLOW}, {SPEED})",
-                )
-            ]
+            text = (
+                f"points {k + 1} and {k + 2}, {point_text((n, q))} and {point_text((m, r))}, are in line with the "
+                f"origin; expected different angles, atan2({FLOW}, {SPEED})"
+            )
+            return [("", text)]
         if across * way < 0.0:
             rule = (
                 f"its angle, atan2({FLOW}, {SPEED}), must rise or fall throughout: list the points in their order "
@@ -85,13 +78,11 @@ def angle_faults(points: list[tuple[float, float]]) -> list[tuple[str, str]]:
             return [("", f"turns back at point {k + 1}, {point_text((n, q))}; a curve may fold in {SPEED}, but {rule}")]
         way = across
         if (n > 0.0) != (m > 0.0) and (q * abs(m) + r * abs(n)) <= 0.0:
-            return [
-                (
-                    "",
-                    f"passes from {point_text((n, q))} to {point_text((m, r))} across reverse flow through a runner at "
-                    f"rest, through which a positive head drives a positive flow; expected {FLOW} above 0 at {SPEED} 0",
-                )
-            ]
+            text = (
+                f"passes from {point_text((n, q))} to {point_text((m, r))} across reverse flow through a runner at "
+                f"rest, through which a positive head drives a positive flow; expected {FLOW} above 0 at {SPEED} 0"
+            )
+            return [("", text)]
     if not (points[0] if way > 0.0 else points[-1])[0] >= LEAST:
         end = f"the end of the curve with the least angle, atan2({FLOW}, {SPEED})"
         return [(SPEED, f"is below {LEAST:g} at {end}; expected a forward speed, at which a turbine drives")]
@@ -267,13 +258,10 @@ def chart_of(curves: dict, places: dict, faults: list, source: Any, file: str = 
     for k, curve in curves.items():
         if curve.opening in seen:
             first = seen[curve.opening]
-            faults.append(
-                (
-                    (*places[k], "opening"),
-                    f"{curve.opening:g} is already the opening of hill_chart[{first}]; give a single curve for each "
-                    "opening",
-                )
+            message = (
+                f"{curve.opening:g} is already the opening of hill_chart[{first}]; give a single curve for each opening"
             )
+            faults.append(((*places[k], "opening"), message))
         seen.setdefault(curve.opening, k)
         keys, name = places[k], f"{file}opening {curve.opening:g}: "
         texts = faults_of_shut(curve) if curve.opening == 0.0 else faults_of_curve(curve)
