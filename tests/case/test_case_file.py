@@ -114,12 +114,7 @@ def test_what_the_design_says_is_what_the_case_holds(scene):
     half = case.output.probes[3]
     assert (half.part, half.name, half.quantity, half.fraction) == ("links", "main", "pressure", 0.5)
     claim = case.expect["max(gate.pressure)"]
-    assert (claim.function, claim.probe.text, claim.time, claim.value) == (
-        "max",
-        "gate.pressure",
-        None,
-        1.0751e6,
-    )
+    assert (claim.function, claim.probe.text, claim.time, claim.value) == ("max", "gate.pressure", None, 1.0751e6)
     assert (claim.rtol, claim.atol) == (1e-2, 0.0)
     assert case.properties.density == 1000 and case.fluid.viscosity == approx(1e-3)
     assert not case.elevations_stated and case.elevation("gate") == 0.0
@@ -284,16 +279,8 @@ def test_a_case_goes_through_pickle_and_back(scene):
         ("links.main.cells", 400, lambda case: case.links["main"].cells == 400),
         ("links.main.length", "1 km", lambda case: case.links["main"].length == 1000),
         ("links.main.initial_flow", "20 l/s", lambda case: case.links["main"].initial_flow == 0.02),
-        (
-            "links.main.friction",
-            '{ model = "none" }',
-            lambda case: case.links["main"].friction.model == "none",
-        ),
-        (
-            "links.main.friction.model",
-            "quasi-steady",
-            lambda case: case.links["main"].friction.roughness == 0.00026,
-        ),
+        ("links.main.friction", '{ model = "none" }', lambda case: case.links["main"].friction.model == "none"),
+        ("links.main.friction.model", "quasi-steady", lambda case: case.links["main"].friction.roughness == 0.00026),
         ("links.valve.opening", "0.5", lambda case: case.links["valve"].opening.first == 0.5),
         ("links.valve.opening.duration", "2", lambda case: case.links["valve"].opening.time[1] == 3.0),
         ("numerics.scheme", "upwind", lambda case: case.numerics.scheme == "upwind"),
@@ -301,11 +288,7 @@ def test_a_case_goes_through_pickle_and_back(scene):
         ("gravity", "0", lambda case: case.gravity == 0),
         ("output.probes", '["gate.pressure"]', lambda case: len(case.output.probes) == 1),
         ("output.units.flow", "l/s", lambda case: case.output.units["flow"] == "l/s"),
-        (
-            'expect."max(gate.pressure)".rtol',
-            "0.5",
-            lambda case: case.expect["max(gate.pressure)"].rtol == 0.5,
-        ),
+        ('expect."max(gate.pressure)".rtol', "0.5", lambda case: case.expect["max(gate.pressure)"].rtol == 0.5),
         # a key replaces its alternative
         ("numerics.step", "1 ms", lambda case: case.numerics.step == 1e-3 and case.numerics.courant is None),
         ("links.main.wall", "rigid", lambda case: case.links["main"].wave_speed is None),
@@ -367,10 +350,7 @@ def test_one_point_is_a_constant():
         ({"area": "10 cm2"}, 0.61 * 1e-3 * np.sqrt(2e5 / 1000)),
         ({"diameter": 0.1, "loss_coefficient": 4}, np.pi / 400 / 2 * np.sqrt(2e5 / 1000)),
         ({"Kv": 36}, 0.01),  # m3/h at 1 bar
-        (
-            {"Cv": 100},
-            100 * 3.785411784e-3 / 60 * np.sqrt(1e5 / 6894.757293168361 * 0.999016),
-        ),  # gpm at 1 psi
+        ({"Cv": 100}, 100 * 3.785411784e-3 / 60 * np.sqrt(1e5 / 6894.757293168361 * 0.999016)),  # gpm at 1 psi
     ],
 )
 def test_every_size_of_a_valve_passes_the_flow_it_names(size, flow):

@@ -37,12 +37,9 @@ def test_a_claim_of_values_after_a_mark_is_open(text: str) -> None:
 
 def test_a_claim_of_values_before_it_holds_or_fails() -> None:
     claims = {
-        "at(gate.head, 0 s)": {"value": 20.0, "atol": 5.0},
-        "at(gate.head, 0.05 s)": {"value": 90.0, "atol": 5.0},
-        "max(gate.head)": WIDE,
-        "max(main.head)": WIDE,
-        "min(gate.head)": {"value": 0.0, "atol": 1.0},
-    }
+        "at(gate.head, 0 s)": {"value": 20.0, "atol": 5.0}, "at(gate.head, 0.05 s)": {"value": 90.0, "atol": 5.0},
+        "max(gate.head)": WIDE, "max(main.head)": WIDE, "min(gate.head)": {"value": 0.0, "atol": 1.0},
+    }  # fmt: skip
     result = fvsolve.run(marked(expect=claims))
     assert min(mark.time for mark in result.marks) > 0.1
     assert result.extremes["gate.head"].t_max < min(mark.time for mark in result.marks)

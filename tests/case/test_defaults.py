@@ -59,12 +59,8 @@ def file(tmp_path):
 def spelled_out():
     common = {"type": "pipe", "diameter": 0.3, "friction": {"model": "steady", "factor": 0.02}}
     one = {
-        "from": "lake",
-        "to": "mid",
-        "length": 1000,
-        "cells": 30,
-        "wall": {"youngs_modulus": 170e9, "thickness": 7e-3},
-    }
+        "from": "lake", "to": "mid", "length": 1000, "cells": 30, "wall": {"youngs_modulus": 170e9, "thickness": 7e-3},
+    }  # fmt: skip
     two = {"from": "mid", "to": "end", "length": 500, "cells": 10, "wave_speed": 900}
     return {"one": common | one, "two": common | two}
 

@@ -161,10 +161,7 @@ def test_what_lies_between_long_steps_is_judged_by_rows(method: str) -> None:
 
 
 def test_delay_lines_are_limited_at_the_same_places() -> None:
-    limits = {
-        "top": {"on": "pipes", "maximum": 14e5},
-        "fast": {"on": "pipes", "quantity": "velocity", "maximum": 0.49},
-    }
+    limits = {"top": {"on": "pipes", "maximum": 14e5}, "fast": {"on": "pipes", "quantity": "velocity", "maximum": 0.49}}
     exact = {"scheme": "upwind", "method": "euler", "step": 0.05}
     cells, lines = (
         judged(shut(limits=limits, numerics={"pipe_model": one, **exact})) for one in ("finite-volume", "delay-line")

@@ -49,10 +49,8 @@ def by_hand() -> dict:
     z = dict(zip("abcd", np.interp([1500.0, 1500.0, 2950.0, 3500.0], HILL["chainage"], HILL["elevation"]), strict=True))
     nodes = {name: junction(elevation=float(one)) for name, one in z.items()} | {"top": VENT | {"elevation": 65.0}}
     links = pipes | {
-        "half": GATE | {"from": "a", "to": "b"},
-        "hole": HOLE | {"from": "c"},
-        "safe": SAFE | {"from": "d"},
-    }
+        "half": GATE | {"from": "a", "to": "b"}, "hole": HOLE | {"from": "c"}, "safe": SAFE | {"from": "d"},
+    }  # fmt: skip
     return line(nodes, links)
 
 
@@ -112,12 +110,9 @@ def test_keys_of_the_whole_and_of_its_pieces_can_be_set() -> None:
 
 STANDS = {"half": 1003.0, "top": 1020.0, "hole": 2951.0, "safe": 3997.5}  # not at faces of the whole pipe
 RESTATED = {
-    "as it is": {},
-    "by cell_time": {"cells": None},
-    "no profile": {"profile": None},
-    "a delay line": {"pipe_model": "delay-line"},
-    "a few cells": {"cells": 3},
-}
+    "as it is": {}, "by cell_time": {"cells": None}, "no profile": {"profile": None},
+    "a delay line": {"pipe_model": "delay-line"}, "a few cells": {"cells": 3},
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("unit", ["m", "km", "ft"])

@@ -28,10 +28,7 @@ FAULTS = {
     "no such method": (piped(method="radau5"), 'numerics.method: no method named "radau5"; did you mean "'),
     "misspelt": (piped(method="esdirk4"), 'no method named "esdirk4"; did you mean "esdirk-4"?'),
     "auto misspelt": (piped(method="atuo"), 'no method named "atuo"; did you mean "auto"?'),
-    "no error estimate": (
-        piped(method="gauss-4", rtol=1e-6),
-        'method "gauss-4" estimates no error; use ',
-    ),
+    "no error estimate": (piped(method="gauss-4", rtol=1e-6), 'method "gauss-4" estimates no error; use '),
     "no estimate by default": (cellless(method="gauss-4"), 'numerics.method: method "gauss-4" estimates no error; use'),
     "rtol below rounding": (
         piped(method="radau-iia-5", rtol=1e-14),

@@ -133,10 +133,7 @@ def still(made):
     return case
 
 
-LINES = [
-    ("auto", 0.0),
-    ("finite-volume", 3.0),
-]  # numerics.pipe_model, and shortest pipe for steps of cells [m]
+LINES = [("auto", 0.0), ("finite-volume", 3.0)]  # numerics.pipe_model, and shortest pipe for steps of cells [m]
 
 
 @pytest.mark.parametrize("line, shortest", LINES)

@@ -226,8 +226,7 @@ def test_equal_questions_give_equal_fluids_and_unequal_ones_unequal(empty_cache)
 
 
 @pytest.mark.parametrize(
-    "damage",
-    [lambda text: "", lambda text: text[: len(text) // 2], lambda text: text.replace("998.2", "989.2", 1)],
+    "damage", [lambda text: "", lambda text: text[: len(text) // 2], lambda text: text.replace("998.2", "989.2", 1)]
 )
 def test_a_damaged_cache_file_is_asked_again(empty_cache, damage):
     density = properties("Water", ROOM, ATM).density

@@ -230,10 +230,7 @@ def test_what_does_not_mix_is_refused_by_key(keys, key, text):
 
 def test_gas_that_expands_too_far_for_the_scheme_is_told_what_follows_it():
     nodes = {"up": reservoir(4e5), "g": junction(), "out": reservoir(2e5)}
-    links = {
-        "main": pipe("up", "g", 200.0, 0.3, 1000.0, 6),
-        "gate": valve("g", "out", 0.01, ramp(0.1, 0.2, 1.0, 0.0)),
-    }
+    links = {"main": pipe("up", "g", 200.0, 0.3, 1000.0, 6), "gate": valve("g", "out", 0.01, ramp(0.1, 0.2, 1.0, 0.0))}
     fluid = {"name": "Water", "law": "mixture", "air_fraction": 1e-3}
     result = fvsolve.run(scene(nodes, links, 5.0, {"rtol": 1e-6}, ["g.pressure"], 0.1, fluid=fluid))
     assert not result.ok and "cavitation = true" in result.reason

@@ -21,11 +21,7 @@ SCHEDULES = {
     "curved closure": ramp(0.0, 2.05 * PERIOD, 1.0, 0.0, 1.5),
     "opening": ramp(0.0, 1.5 * PERIOD, 0.2, 1.0),
     "late closure": ramp(7 * STEP, PERIOD, 1.0, 0.1),
-    "there and back": {
-        "time": [0.0, PERIOD, 2 * PERIOD, 4 * PERIOD],
-        "value": [1.0, 0.4, 0.4, 0.9],
-        "kind": "linear",
-    },
+    "there and back": {"time": [0.0, PERIOD, 2 * PERIOD, 4 * PERIOD], "value": [1.0, 0.4, 0.4, 0.9], "kind": "linear"},
 }
 
 

@@ -38,10 +38,7 @@ def notes(one: Attitude) -> list[tuple[str, str]]:
 
 SAID = {
     "roll alone": ({"roll": "30 deg"}, Rotation.from_euler("x", 30, degrees=True)),
-    "roll, pitch, yaw": (
-        {"roll": 0.1, "pitch": "-20 deg", "yaw": 2},
-        Rotation.from_euler("ZYX", [2, -np.pi / 9, 0.1]),
-    ),
+    "roll, pitch, yaw": ({"roll": 0.1, "pitch": "-20 deg", "yaw": 2}, Rotation.from_euler("ZYX", [2, -np.pi / 9, 0.1])),
     "zyz": ({"zyz": [0.1, "20 deg", -1]}, Rotation.from_euler("ZYZ", [0.1, np.pi / 9, -1.0])),
     "axis": ({"axis": [0, 0.6, 0.8], "angle": "40 deg"}, Rotation.from_rotvec(np.radians([0, 24, 32]))),
     "Euler parameters": ({"euler_parameters": [0.6, 0, 0.8, 0]}, Rotation.from_quat([0, 0.8, 0, 0.6])),

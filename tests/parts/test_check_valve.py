@@ -238,14 +238,11 @@ def test_a_disc_that_slams_on_a_rigid_column_stops_it_dead_and_opens_again(rtol)
 
 LAG, SWING = {"time_constant": 0.4}, {"natural_frequency": 0.6, "damping_ratio": 0.5}
 METHODS = {
-    "auto": {"rtol": 1e-6},
-    "rodas-5p": {"method": "rodas-5p", "rtol": 1e-6},
-    "rodas-4": {"method": "rodas-4", "rtol": 1e-6},
-    "radau": {"method": "radau-iia-5", "rtol": 1e-6},
-    "explicit": {"method": "dormand-prince", "rtol": 1e-6},
-    "sharp": {"method": "rodas-5p", "rtol": 1e-9},
+    "auto": {"rtol": 1e-6}, "rodas-5p": {"method": "rodas-5p", "rtol": 1e-6},
+    "rodas-4": {"method": "rodas-4", "rtol": 1e-6}, "radau": {"method": "radau-iia-5", "rtol": 1e-6},
+    "explicit": {"method": "dormand-prince", "rtol": 1e-6}, "sharp": {"method": "rodas-5p", "rtol": 1e-9},
     "given": {"method": "rk4", "step": 1e-3},
-}
+}  # fmt: skip
 
 
 def held_column(kind, after, disc, numerics):
@@ -346,10 +343,8 @@ def slamming_of(disc, rho):
         drive, braked = lift(x, m), k * (3.3e5 - far(t) - drop(x, m) - friction * m * abs(m))
         held = x >= 1.0 and (drive if lag else max(v, drive)) >= 0.0
         return [
-            0.0 if held else drive / lag if lag else v,
-            braked,
-            0.0 if lag or held else w * (w * drive - 2 * zeta * v),
-        ]
+            0.0 if held else drive / lag if lag else v, braked, 0.0 if lag or held else w * (w * drive - 2 * zeta * v),
+        ]  # fmt: skip
 
     seat = lambda t, y: y[0] - 1e-5  # noqa: E731
     seat.terminal = True

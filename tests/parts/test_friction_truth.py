@@ -237,13 +237,7 @@ def test_the_nine_pipes_of_streeter_and_wylie_follow_the_characteristics():
     nodes = {n: junction() for n in pressures} | {"R1": lake(191.0), "air": reservoir(AMBIENT)}
     links = {
         f"{a}-{b}": pipe(
-            a,
-            b,
-            float(x),
-            d / 1000,
-            1200.0,
-            round(x / 6),
-            friction={"model": "hazen-williams", "coefficient": c},
+            a, b, float(x), d / 1000, 1200.0, round(x / 6), friction={"model": "hazen-williams", "coefficient": c}
         )
         for a, b, x, d, c in NINE
     }

@@ -43,10 +43,8 @@ def test_joukowskys_force_on_a_bend_is_exact(turned: bool) -> None:
 
 def throttled(law: str, friction: dict, **numerics) -> dict:
     nodes = {
-        "lake": lake(60.0, elevation=0.0),
-        "gate": junction(elevation=15.0),
-        "air": reservoir(AMBIENT, elevation=15.0),
-    }
+        "lake": lake(60.0, elevation=0.0), "gate": junction(elevation=15.0), "air": reservoir(AMBIENT, elevation=15.0),
+    }  # fmt: skip
     one = pipe("lake", "gate", 500.0, DIAMETER, SPEED, 25, friction=friction, bends=[300.0],
                profile={"chainage": [0, 300, 400, 500], "elevation": [0.0, 5.0, 30.0, 15.0]})  # fmt: skip
     tap = valve("gate", "air", 0.03 * area(DIAMETER), ramp(0.1, 0.4, 1.0, 0.2))

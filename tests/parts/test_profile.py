@@ -9,11 +9,7 @@ import fvsolve
 LENGTH, DIAMETER, SPEED, CELLS = 3000.0, 0.4, 1000.0, 60
 STEEL = {"model": "quasi-steady", "roughness": 2e-4}
 HILL = {"chainage": [1200.0, 1950.0, 2400.0, 2500.0, 4200.0], "elevation": [30.0, 42.0, 65.0, 31.0, 20.0]}
-LAWS = {
-    "linear": {},
-    "log": {"law": "log"},
-    "mixture": {"law": "mixture", "air_fraction": 1e-3},
-}
+LAWS = {"linear": {}, "log": {"law": "log"}, "mixture": {"law": "mixture", "air_fraction": 1e-3}}
 
 
 def line(links: dict, nodes: dict | None = None, law: str = "linear", **numerics) -> dict:

@@ -134,10 +134,8 @@ def test_elevations_are_lifted_too(law):
     flows = []
     for height in (-5.0, 4.0):
         nodes = {
-            "sump": lake(-3.0, elevation=height),
-            "out": junction(elevation=height),
-            "top": lake(25.0, elevation=20.0),
-        }
+            "sump": lake(-3.0, elevation=height), "out": junction(elevation=height), "top": lake(25.0, elevation=20.0),
+        }  # fmt: skip
         links = {"pump": pump("sump", "out", curve=ONE), "main": main("out", "top")}
         case = scene(nodes, links, 2.0, {}, ["pump.flow", "out.head", "pump.head"])
         case["fluid"] = {**case["fluid"], "law": law}

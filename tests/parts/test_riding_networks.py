@@ -183,15 +183,10 @@ def tilted(law, rides):
         "main": {**PIPE, "from": "top", "to": "tee", "length": 30.0, "friction": rough},
         "branch": {**PIPE, "from": "far", "to": "tee", "length": 12.0, "friction": rough},
         "rod": {
-            "type": "rigid-column",
-            "from": "tee",
-            "to": "low",
-            "length": 20.0,
-            "diameter": 0.05,
-            "friction": rough,
+            "type": "rigid-column", "from": "tee", "to": "low", "length": 20.0, "diameter": 0.05, "friction": rough,
         },
         "tap": {"type": "valve", "from": "low", "to": "end", "area": 1e-4, "discharge_coefficient": 0.6},
-    }
+    }  # fmt: skip
     case = scene({**body, **more}, links, 1.0, {"scheme": "upwind5", "method": "rk4", "courant": 0.8},
                  ["tee.pressure", "low.pressure", "far.head", "main.pressure@0.5", "rod.flow", "tap.flow"])  # fmt: skip
     case["fluid"] = {**WATER, "law": law} | ({"air_fraction": 1e-4} if law == "mixture" else {})

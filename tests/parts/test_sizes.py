@@ -15,15 +15,10 @@ from fvsolve.parts.conduit import FITTINGS, fittings_loss, pipe_bore
 
 # ASME B36.10M: outer diameter and wall [mm]
 PRINTED = {
-    ("DN15", "40"): (21.3, 2.77),
-    ("DN25", "80"): (33.4, 4.55),
-    ("DN50", "40"): (60.3, 3.91),
-    ("DN65", "40"): (73.0, 5.16),
-    ("DN100", "40"): (114.3, 6.02),
-    ("DN150", "80"): (168.3, 10.97),
-    ("DN200", "40"): (219.1, 8.18),
-    ("DN300", "STD"): (323.8, 9.53),
-}
+    ("DN15", "40"): (21.3, 2.77), ("DN25", "80"): (33.4, 4.55), ("DN50", "40"): (60.3, 3.91),
+    ("DN65", "40"): (73.0, 5.16), ("DN100", "40"): (114.3, 6.02), ("DN150", "80"): (168.3, 10.97),
+    ("DN200", "40"): (219.1, 8.18), ("DN300", "STD"): (323.8, 9.53),
+}  # fmt: skip
 CRANE = {  # TP-410, pages: L / D
     "elbow-90": 30, "elbow-45": 16, "bend-90": 14, "mitre-90": 60, "tee-run": 20, "tee-branch": 60, "gate-valve": 8,
     "globe-valve": 340, "angle-valve": 55, "ball-valve": 3, "plug-valve": 18, "butterfly-valve": 45,

@@ -24,12 +24,8 @@ def main(links: dict, numerics: dict, law: str = "linear", turned: bool = False,
     """Return a case of a main from a reservoir that falls and rises to a valve, with `links` at its middle."""
     ends = ("mid", "up") if turned else ("up", "mid")
     nodes = {
-        "up": reservoir(FALL),
-        "mid": junction(),
-        "town": reservoir(2e5),
-        "end": junction(),
-        "sump": reservoir(1.2e5),
-    }
+        "up": reservoir(FALL), "mid": junction(), "town": reservoir(2e5), "end": junction(), "sump": reservoir(1.2e5),
+    }  # fmt: skip
     ways = {"one": pipe(*ends, 200.0, 0.2, 1000.0, 8), "two": pipe("mid", "end", 100.0, 0.2, 1000.0, 4),
             "tap": valve("end", "town", 1e-3)}  # fmt: skip
     probes = [f"{name}.flow" for name in links] + ["mid.pressure", "end.pressure"]

@@ -178,11 +178,8 @@ def folded(points: int) -> dict:
 
 def folds(points: int, numerics, conduit=None) -> fvsolve.Result:
     way = {
-        "type": "rigid-column",
-        "length": 500.0,
-        "diameter": math.sqrt(48.0 / math.pi),
-        "friction": dict(NO_FRICTION),
-    }
+        "type": "rigid-column", "length": 500.0, "diameter": math.sqrt(48.0 / math.pi), "friction": dict(NO_FRICTION),
+    }  # fmt: skip
     case = plant(numerics, 40.0, conduit or way, hill_chart=[folded(points)], **FOLD)
     case["nodes"]["up"] = lake(200.0)
     return fvsolve.run(case)

@@ -19,12 +19,10 @@ INERTIA = RHO * LENGTH / BORE  # inertance of the column, dp = INERTIA dq/dt
 RADIUS, LONG = 0.5 * ACROSS, VOLUME / area(ACROSS)
 TABLE = {"level": [0.0, 0.5, 1.0], "area": [0.05, 0.1, 0.08]}
 SHAPES = {
-    "upright": {"diameter": ACROSS, "level": 0.7},
-    "sloped": {"diameter": ACROSS, "slope": 0.4, "level": 0.4},
-    "lying": {"diameter": ACROSS, "slope": 0.0, "level": 0.18},
-    "table": {"area": TABLE, "level": 0.6},
+    "upright": {"diameter": ACROSS, "level": 0.7}, "sloped": {"diameter": ACROSS, "slope": 0.4, "level": 0.4},
+    "lying": {"diameter": ACROSS, "slope": 0.0, "level": 0.18}, "table": {"area": TABLE, "level": 0.6},
     "prism": {"area": 0.08, "level": 0.6},
-}
+}  # fmt: skip
 
 
 def surface(shape: str, z: float) -> float:
