@@ -16,7 +16,7 @@ from fvsolve.fluid.coolprop import OIL_WORDS
 from fvsolve.parts import value as val
 from fvsolve.parts.csv_rows import copy_name, find_file
 from fvsolve.parts.pipe.part import LINES
-from fvsolve.parts.table_model import NamedTables, Table
+from fvsolve.parts.table_model import NamedTables, Table, check_table
 from fvsolve.parts.value import BY_CELLS, SHAPE, VALUE, Choice, Number, Quantity, ReadContext, positive
 from fvsolve.schemes import LIMITERS, SCHEMES
 from fvsolve.steppers.structure import KINDS
@@ -236,8 +236,7 @@ class OutputUnits(val.Value):
     )  # fmt: skip
 
     def read(self, given: Any, setting: ReadContext) -> dict[str, str]:
-        if not isinstance(given, dict):
-            raise ValueError(f'{show(given)} is not a table; expected for example {{ pressure = "barg" }}')
+        check_table(given, 'for example { pressure = "barg" }')
         faults = []
         for quantity, unit in given.items():
             if quantity not in self.quantities:

@@ -11,7 +11,7 @@ from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.attitude_keys import Attitude, is_zero_vector, length_notices
 from fvsolve.parts.nodes_and_links import Node
 from fvsolve.parts.schedule import Schedule, Scheduled
-from fvsolve.parts.table_model import Nested, Table
+from fvsolve.parts.table_model import Nested, Table, check_table
 from fvsolve.parts.value import (
     PROFILE,
     Choice,
@@ -23,6 +23,7 @@ from fvsolve.parts.value import (
     UsualRange,
     Value,
     ValueFault,
+    faults_of,
     nonnegative,
     positive,
 )
@@ -40,18 +41,15 @@ class NamedPoints(Value):
         self.about = about
 
     def read(self, given: Any, setting: ReadContext) -> dict[str, tuple[float, ...]]:
-        if not isinstance(given, dict):
-            raise ValueError(f"{show(given)} is not a table; expected {{ NAME = [x, y, z] }}")
+        check_table(given, "{ NAME = [x, y, z] }")
         points, faults = {}, []
         for name, place in given.items():
             if not re.fullmatch(r"[\w-]+", name):
                 faults.append(((name,), f"{show(name)} is not a valid name; a name has letters, digits, _ and -"))
             try:
                 points[name] = Rows("position", length=3).read(place, setting)
-            except ValueFault as error:
-                faults += [((name, *below), text) for below, text in error.faults]
             except ValueError as error:
-                faults.append(((name,), str(error)))
+                faults += faults_of(error, name)
         if faults:
             raise ValueFault(faults)
         return points
@@ -236,10 +234,8 @@ class Joint(Table):
             try:
                 if key in given:
                     result[key] = value.read(given[key], setting)
-            except ValueFault as error:
-                faults += [((key, *below), text) for below, text in error.faults]
             except ValueError as error:
-                faults.append(((key,), str(error)))
+                faults += faults_of(error, key)
         driven = [key for key in ("angle", "travel") if isinstance(given.get(key), dict)]
         for key in ("rate", "damping", "stiffness") if driven else ():
             if key in given:

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from fvsolve.errors import FvsolveError
 from fvsolve.parts.carried_scalar import ScalarValues
-from fvsolve.parts.table_model import Table, keys_json, read_keys
+from fvsolve.parts.table_model import Table, check_table, keys_json, read_keys
 from fvsolve.parts.value import NEEDED, VALUE, Quantity, ReadContext, Rows, Text, UsualRange, Value
 from fvsolve.units import show
 
@@ -168,9 +168,8 @@ class Ports(Value):
     about: str = "place of each port"
 
     def read(self, given: Any, setting: ReadContext) -> dict[str, str]:
-        if not isinstance(given, dict):
-            example = ", ".join(f'{name} = "..."' for name in self.names)
-            raise ValueError(f"{show(given)} is not a table; expected {{ {example} }}")
+        example = ", ".join(f'{name} = "..."' for name in self.names)
+        check_table(given, f"{{ {example} }}")
         return read_keys(given, self.keys(), setting)
 
     def keys(self) -> dict[str, tuple[Value, Any]]:

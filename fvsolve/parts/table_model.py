@@ -1,7 +1,7 @@
 """Tables of a case file: base class, keys, faults of incompatible keys, and context of a part in its case."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
@@ -12,6 +12,7 @@ from fvsolve.parts.value import (
     ReadContext,
     Value,
     ValueFault,
+    check_increasing,
     context_of,
     faults_of,
     key_hint,
@@ -72,6 +73,50 @@ def read_keys(given: dict[str, Any], keys: dict[str, tuple[Value, Any]], setting
     if faults:
         raise ValueFault(faults)
     return result
+
+
+def check_table(given: Any, expected: str) -> None:
+    """Raise ValueError if a value is not a table; expected : text about the expected table"""
+    if not isinstance(given, dict):
+        raise ValueError(f"{show(given)} is not a table; expected {expected}")
+
+
+def read_lists(
+    given: dict[str, Any], keys: dict[str, tuple[Value, Any]], setting: ReadContext, noun: str, further=lambda *_: []
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Read a table of two lists of equal lengths, of which the first rises : (first list, second list).
+
+    keys : the two keys -> (declaration, default); noun : plural name of the values of the first list, for messages
+    further : function of both lists that returns further faults. Raises ValueFault with all faults.
+    """
+    (key, first), (other, second) = read_keys(given, keys, setting).items()
+    faults = []
+    if len(first) != len(second):
+        text = f"has length {len(second)}, but `{key}` has length {len(first)}; expected equal lengths"
+        faults.append(((other,), text))
+    faults += further(first, second)
+    try:
+        check_increasing(first, given[key], noun)
+    except ValueError as error:
+        faults.append(((key,), str(error)))
+    if faults:
+        raise ValueFault(faults)
+    return first, second
+
+
+@dataclass(frozen=True)
+class ListTable:
+    """Base of values of parts that are tables of lists of numbers, compared by their contents."""
+
+    def table(self) -> dict[str, list[float]]:
+        """Table of a case file: key -> list."""
+        return {field.name: [float(x) for x in getattr(self, field.name)] for field in fields(self)}
+
+    def __eq__(self, other: object) -> bool:
+        return type(other) is type(self) and self.table() == other.table()
+
+    def __hash__(self) -> int:
+        return hash(tuple(map(tuple, self.table().values())))
 
 
 def keys_json(keys: dict[str, tuple[Value, Any]]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from fvsolve.parts.connection import Connection, ConnectionTable, with_connectio
 from fvsolve.parts.hydraulic_nodes import Junction
 from fvsolve.parts.nodes_and_links import PlaceOnBody
 from fvsolve.parts.schedule import constant
-from fvsolve.parts.table_model import CaseContext, Faults, keys_json, read_keys
+from fvsolve.parts.table_model import CaseContext, Faults, ListTable, keys_json, read_lists
 from fvsolve.parts.value import (
     NEEDED,
     PROFILE,
@@ -21,8 +21,6 @@ from fvsolve.parts.value import (
     Rows,
     UsualRange,
     Value,
-    ValueFault,
-    check_increasing,
     nonnegative,
     positive,
 )
@@ -31,7 +29,7 @@ LEVELS = UsualRange(0.0, 2000.0, "tanks to lakes and shafts")
 
 
 @dataclass(frozen=True, eq=False)
-class AreaTable:
+class AreaTable(ListTable):
     """Area of the free surface over the level, linear between entries and constant outside them.
 
     level : float64[n]  level above the bottom, ascending from 0 [m]; area : float64[n]  surface at that level [m2]
@@ -39,16 +37,6 @@ class AreaTable:
 
     level: np.ndarray
     area: np.ndarray
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, AreaTable) and self.table() == other.table()
-
-    def __hash__(self) -> int:
-        return hash((self.level.tobytes(), self.area.tobytes()))
-
-    def table(self) -> dict[str, list[float]]:
-        """Area table as a table of a case file: key -> list."""
-        return {"level": self.level.tolist(), "area": self.area.tolist()}
 
 
 class Surface(Value):
@@ -66,22 +54,9 @@ class Surface(Value):
             return given
         if not isinstance(given, dict):
             return Quantity("area", positive).read(given, setting)
-        values = read_keys(given, self.keys, setting)
-        level, area = values["level"], values["area"]
-        faults = []
-        if len(level) != len(area):
-            faults.append(
-                (("area",), f"has length {len(area)}, but `level` has length {len(level)}; expected equal lengths")
-            )
-        if level[0] != 0:
-            faults.append((("level",), "levels are measured from the bottom; the first must be 0"))
-        try:
-            check_increasing(level, given["level"], "levels")
-        except ValueError as error:
-            faults.append((("level",), str(error)))
-        if faults:
-            raise ValueFault(faults)
-        return AreaTable(np.array(level), np.array(area))
+        bottom = [(("level",), "levels are measured from the bottom; the first must be 0")]
+        lists = read_lists(given, self.keys, setting, "levels", lambda level, _: bottom * (level[0] != 0))
+        return AreaTable(*map(np.array, lists))
 
     def json(self) -> dict[str, Any]:
         return {"anyOf": [Quantity("area").json(), keys_json(self.keys)]}

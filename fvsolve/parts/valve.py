@@ -11,7 +11,7 @@ from fvsolve.assembly.lowering import LAMINAR_REYNOLDS, POSITION, Input, Restric
 from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.nodes_and_links import Link, Ports, TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
-from fvsolve.parts.table_model import Table, keys_json, read_keys
+from fvsolve.parts.table_model import ListTable, Table, keys_json, read_lists
 from fvsolve.parts.value import (
     NEEDED,
     SHAPE,
@@ -22,9 +22,7 @@ from fvsolve.parts.value import (
     Rows,
     UsualRange,
     Value,
-    ValueFault,
     between,
-    check_increasing,
     positive,
 )
 
@@ -35,7 +33,7 @@ WATER_15, WATER_60F = 1000.0, 999.016  # densities for which Kv and Cv are defin
 
 
 @dataclass(frozen=True, eq=False)
-class Characteristic:
+class Characteristic(ListTable):
     """Relative flow area over the opening of the stem, linear between entries.
 
     opening : float64[n]  ascending from 0 to 1; flow_area : float64[n]  over the flow area at full opening, from 0
@@ -43,16 +41,6 @@ class Characteristic:
 
     opening: np.ndarray
     flow_area: np.ndarray
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Characteristic) and self.table() == other.table()
-
-    def __hash__(self) -> int:
-        return hash((self.opening.tobytes(), self.flow_area.tobytes()))
-
-    def table(self) -> dict[str, list[float]]:
-        """Characteristic as a table of a case file: key -> list."""
-        return {"opening": self.opening.tolist(), "flow_area": self.flow_area.tolist()}
 
 
 class CharacteristicValue(Value):
@@ -71,23 +59,17 @@ class CharacteristicValue(Value):
             return given
         if not isinstance(given, dict):
             return self.names.read(given, setting)
-        values = read_keys(given, self.keys, setting)
-        opening, flow_area = values["opening"], values["flow_area"]
+        lists = read_lists(given, self.keys, setting, "openings", self.end_faults)
+        return Characteristic(*map(np.array, lists))
+
+    def end_faults(self, opening: tuple[float, ...], flow_area: tuple[float, ...]) -> list:
+        """Faults of the first and last entries of both lists."""
         faults = []
-        if len(opening) != len(flow_area):
-            text = f"has length {len(flow_area)}, but `opening` has length {len(opening)}; expected equal lengths"
-            faults.append((("flow_area",), text))
         if opening[0] != 0 or opening[-1] != 1:
             faults.append((("opening",), "openings must begin at 0 and end at 1"))
         if flow_area[0] != 0:
             faults.append((("flow_area",), "opening 0 is shut: the first flow area must be 0"))
-        try:
-            check_increasing(opening, given["opening"], "openings")
-        except ValueError as error:
-            faults.append((("opening",), str(error)))
-        if faults:
-            raise ValueFault(faults)
-        return Characteristic(np.array(opening), np.array(flow_area))
+        return faults
 
     def json(self) -> dict[str, Any]:
         return {"anyOf": [self.names.json(), keys_json(self.keys)]}

@@ -33,6 +33,7 @@ from fvsolve.parts.value import (
     ValueFault,
     Whole,
     between,
+    faults_of,
     positive,
 )
 
@@ -191,8 +192,6 @@ def add_profile_length(given: dict[str, Any], setting: ReadContext) -> dict[str,
         return given
     try:
         profile = ProfileValue().read(given["profile"], setting)
-    except ValueFault as error:
-        raise ValueFault([(("profile", *below), text) for below, text in error.faults]) from None
     except ValueError as error:
-        raise ValueFault([(("profile",), str(error))]) from None
+        raise ValueFault(faults_of(error, "profile")) from None
     return {"length": profile.length, **given, "profile": profile}

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 from fvsolve.data import read_table
 from fvsolve.errors import did_you_mean
-from fvsolve.parts.table_model import Table, keys_json, read_keys
+from fvsolve.parts.table_model import ListTable, Table, check_table, keys_json, read_keys
 from fvsolve.parts.value import (
     BY_CELLS,
     NEEDED,
@@ -99,7 +99,7 @@ def sources() -> dict[str, str]:
 
 
 @dataclass(frozen=True)
-class Creep:
+class Creep(ListTable):
     """Kelvin-Voigt elements: each adds a strain J (1 - exp(-t / tau)) per unit of hoop stress to the elastic strain.
 
     compliance : J of each element [1/Pa]; time : retardation time tau of each element [s]; t is the time since loading
@@ -107,10 +107,6 @@ class Creep:
 
     compliance: tuple[float, ...]
     time: tuple[float, ...]
-
-    def table(self) -> dict[str, list[float]]:
-        """Elements as a table of a case file: key -> list."""
-        return {"compliance": list(self.compliance), "time": list(self.time)}
 
 
 @dataclass(frozen=True)
@@ -145,8 +141,7 @@ class Elements(Value):
     def read(self, given: Any, setting: ReadContext) -> Creep:
         if isinstance(given, Creep):
             return given
-        if not isinstance(given, dict):
-            raise ValueError(f"{show(given)} is not a table; expected {{ compliance = [1e-10], time = [0.05] }}")
+        check_table(given, "{ compliance = [1e-10], time = [0.05] }")
         creep = Creep(**read_keys(given, CREEP_KEYS, setting))
         if len(creep.compliance) != len(creep.time):
             sizes = f"`compliance` has length {len(creep.compliance)}, and `time` has length {len(creep.time)}"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.data import read_table
-from fvsolve.parts.table_model import keys_json, read_keys
+from fvsolve.parts.table_model import check_table, keys_json, read_keys, read_lists
 from fvsolve.parts.value import (
     NEEDED,
     PROFILE,
@@ -20,7 +20,6 @@ from fvsolve.parts.value import (
     Value,
     ValueFault,
     between,
-    check_increasing,
     nonnegative,
     positive,
 )
@@ -99,18 +98,8 @@ def points(
     faults_of : function of (table, flows, values) that returns further faults
     Raises ValueFault if flows do not rise, lengths differ, or `faults_of` finds faults.
     """
-    lists = read_keys(given, keys_of(word, dimension, range), setting)
-    flow, value = lists["flow"], lists[word]
-    faults = faults_of(given, flow, value)
-    if len(flow) != len(value):
-        faults.append(((word,), f"has length {len(value)}, but `flow` has length {len(flow)}; expected equal lengths"))
-    try:
-        check_increasing(flow, given["flow"], "flows")
-    except ValueError as error:
-        faults.append((("flow",), str(error)))
-    if faults:
-        raise ValueFault(faults)
-    return CurvePoints(flow, value, word)
+    further = functools.partial(faults_of, given)
+    return CurvePoints(*read_lists(given, keys_of(word, dimension, range), setting, "flows", further), word)
 
 
 def keys_of(word: str, dimension: str, range=nonnegative) -> dict[str, tuple[Value, Any]]:
@@ -127,10 +116,7 @@ class HeadCurve(Value):
     def read(self, given: Any, setting: ReadContext) -> CurvePoints:
         if isinstance(given, CurvePoints):
             return given
-        if not isinstance(given, dict):
-            raise ValueError(
-                f'{show(given)} is not a table; expected for example {{ flow = ["50 l/s"], head = ["40 m"] }}'
-            )
+        check_table(given, 'for example { flow = ["50 l/s"], head = ["40 m"] }')
         if "coefficients" in given:
             coefficients = read_keys(given, self.polynomial, setting)["coefficients"]
             self.check_polynomial(coefficients)
@@ -206,10 +192,7 @@ class ShaftPower(Value):
     def read(self, given: Any, setting: ReadContext) -> CurvePoints:
         if isinstance(given, CurvePoints):
             return given
-        if not isinstance(given, dict):
-            raise ValueError(
-                f'{show(given)} is not a table; expected for example {{ flow = [0, "50 l/s"], power = [...] }}'
-            )
+        check_table(given, 'for example { flow = [0, "50 l/s"], power = [...] }')
         return points(given, "power", "power", setting)
 
     def json(self) -> dict[str, Any]:
@@ -253,8 +236,7 @@ class Suter(Value):
     def read(self, given: Any, setting: ReadContext) -> SuterTable:
         if isinstance(given, SuterTable):
             return given
-        if not isinstance(given, dict):
-            raise ValueError(f"{show(given)} is not a table; expected keys {', '.join(self.keys)}")
+        check_table(given, f"keys {', '.join(self.keys)}")
         values = read_keys(given, self.keys, setting)
         table = values.pop("table")
         if table is not None and ("head" in given or "torque" in given):

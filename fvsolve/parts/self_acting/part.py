@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar
 
 from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled
-from fvsolve.parts.table_model import Table, exclusive_key_faults, keys_json, read_keys
+from fvsolve.parts.table_model import ListTable, Table, exclusive_key_faults, keys_json, read_lists
 from fvsolve.parts.value import (
     NEEDED,
     VALUE,
@@ -16,8 +16,6 @@ from fvsolve.parts.value import (
     Rows,
     UsualRange,
     Value,
-    ValueFault,
-    check_increasing,
     nonnegative,
     positive,
 )
@@ -61,7 +59,7 @@ class Disc(Table):
 
 
 @dataclass(frozen=True)
-class SlamCurve:
+class SlamCurve(ListTable):
     """Reverse velocity at which a check valve shuts, over the deceleration of the flow; linear between entries.
 
     rate : deceleration, ascending [m/s2]; reverse_velocity : velocity in the bore [m/s]
@@ -69,10 +67,6 @@ class SlamCurve:
 
     rate: tuple[float, ...]
     reverse_velocity: tuple[float, ...]
-
-    def table(self) -> dict[str, list[float]]:
-        """Curve as a table of a case file: key -> list."""
-        return {"rate": [*self.rate], "reverse_velocity": [*self.reverse_velocity]}
 
 
 class SlamCurveTable(Value):
@@ -90,18 +84,7 @@ class SlamCurveTable(Value):
             return given
         if not isinstance(given, dict):
             raise ValueError(f"is not a table; expected {self.takes}")
-        values, faults = read_keys(given, self.keys, setting), []
-        rate, velocity = values["rate"], values["reverse_velocity"]
-        if len(rate) != len(velocity):
-            text = f"has length {len(velocity)}, but `rate` has length {len(rate)}; expected equal lengths"
-            faults.append((("reverse_velocity",), text))
-        try:
-            check_increasing(rate, given["rate"], "rates")
-        except ValueError as error:
-            faults.append((("rate",), str(error)))
-        if faults:
-            raise ValueFault(faults)
-        return SlamCurve(rate, velocity)
+        return SlamCurve(*read_lists(given, self.keys, setting, "rates"))
 
     def json(self) -> dict[str, Any]:
         return keys_json(self.keys)

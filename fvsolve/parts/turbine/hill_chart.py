@@ -5,8 +5,8 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 from fvsolve.parts.csv_rows import CsvError, copy_name, find_file, read_rows, split_header
-from fvsolve.parts.table_model import keys_json, read_keys
-from fvsolve.parts.value import NEEDED, Number, ReadContext, Rows, Value, ValueFault, between
+from fvsolve.parts.table_model import check_table, keys_json, read_keys
+from fvsolve.parts.value import NEEDED, Number, ReadContext, Rows, Value, ValueFault, between, faults_of
 from fvsolve.units import show
 
 LEAST = 1e-3  # least valid unit speed, unit flow and opening
@@ -176,17 +176,14 @@ class HillChartValue(Value):
         for k, entry in enumerate(given):
             try:
                 curves[k] = self.curve(entry, setting)
-            except ValueFault as error:
-                faults += [((k, *below), text) for below, text in error.faults]
             except ValueError as error:
-                faults.append(((k,), str(error)))
+                faults += faults_of(error, k)
         places = {k: (k,) for k in curves}
         return chart_of(curves, places, faults, [entry.table() for entry in curves.values()])
 
     def curve(self, given: Any, setting: ReadContext) -> OpeningCurve:
         """Read the curve of an opening from its table; raises ValueError, or ValueFault for faults of its keys."""
-        if not isinstance(given, dict):
-            raise ValueError(f"{show(given)} is not a table; expected for example {EXAMPLE}")
+        check_table(given, f"for example {EXAMPLE}")
         keys = read_keys(given, self.keys, setting)
         words = [word for word in (EFFICIENCY, TORQUE) if keys[word] is not None]
         if len(words) != 1:
