@@ -386,10 +386,8 @@ def lower_devices(draft) -> None:
         states = device.states_of(draft, name, part)
         row["hooks"], row["mode"], row["states"] = draft.hooks(device), device.mode, len(states)
         row["data"], row["opens_by_event"], row["event"] = (
-            len(draft.floats),
-            device.events_only,
-            draft.flags(name, device.events),
-        )
+            len(draft.floats), device.events_only, draft.flags(name, device.events),
+        )  # fmt: skip
         row["controls_column"] = row["event"] + device.controlling_event if device.controlling_event >= 0 else -1
         if name in draft.valve_names:
             row["valve"] = draft.valve_names.index(name)

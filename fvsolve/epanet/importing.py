@@ -90,11 +90,8 @@ def _text(path: Path, network: Any, translation: Translation, hour: float, time:
         'pipe_model = "auto"' + (f"  # {_short_pipes_comment(translation, short)}" if short else ""),
     ]
     lines += [
-        "",
-        "[output]",
-        f"probes = {text.inline(_probes(translation))}",
-        'units = { flow = "l/s", pressure = "barg" }',
-    ]
+        "", "[output]", f"probes = {text.inline(_probes(translation))}", 'units = { flow = "l/s", pressure = "barg" }',
+    ]  # fmt: skip
     return "\n".join(lines) + "\n"
 
 

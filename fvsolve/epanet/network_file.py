@@ -139,16 +139,9 @@ def _listed_faults(package: Any, path: Path) -> list[str]:
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "net.rpt"
         call = [
-            sys.executable,
-            "-I",
-            "-S",
-            "-c",
-            _OPEN_SCRIPT,
-            library,
-            str(path),
-            str(report),
+            sys.executable, "-I", "-S", "-c", _OPEN_SCRIPT, library, str(path), str(report),
             str(Path(folder) / "net.bin"),
-        ]
+        ]  # fmt: skip
         try:
             subprocess.run(call, capture_output=True, timeout=LISTING_TIME, check=False)
         except (OSError, subprocess.SubprocessError):

@@ -107,10 +107,8 @@ class Scheduled(Value):
         return {
             "table": {"time": (Rows("time"), NEEDED), "value": (Rows(*item), NEEDED), "kind": kind},
             "ramp": {
-                "start": (Quantity("time"), NEEDED),
-                "duration": (Quantity("time", val.nonnegative), NEEDED),
-                "value": (Rows(*item, length=2), NEEDED),
-                "exponent": (Number(val.positive), 1.0),
+                "start": (Quantity("time"), NEEDED), "duration": (Quantity("time", val.nonnegative), NEEDED),
+                "value": (Rows(*item, length=2), NEEDED), "exponent": (Number(val.positive), 1.0),
             },
             "wave": {
                 "mean": (Quantity(self.dimension), NEEDED),
@@ -120,7 +118,7 @@ class Scheduled(Value):
             },
             "file": {"file": (Text(), NEEDED), "time": (Text(), None), "value": (Text(), None), "kind": kind},
             "signal": {"signal": (Text(), NEEDED)},
-        }
+        }  # fmt: skip
 
     @property
     def takes(self) -> str:

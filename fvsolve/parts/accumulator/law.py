@@ -69,11 +69,8 @@ def full_bladder_gas(floats, node, at):
 def gas_state_dense(st, floats, node, at, y):
     """Results of `gas_state` under density laws other than `linear`, with its arguments."""
     n, gas, total, neck = (
-        floats[at + EXPONENT],
-        floats[at + GAS_VOLUME],
-        floats[at + TOTAL_VOLUME],
-        floats[at + NECK_STIFFNESS],
-    )
+        floats[at + EXPONENT], floats[at + GAS_VOLUME], floats[at + TOTAL_VOLUME], floats[at + NECK_STIFFNESS],
+    )  # fmt: skip
     p0, mass, empty = node["pressure"], node["mass"] + y, floats[at + EMPTY_MASS]
     if neck > 0.0 and y < empty:
         expansion = full_bladder_gas(floats, node, at)

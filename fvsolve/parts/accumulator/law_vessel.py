@@ -194,11 +194,8 @@ def vessel_state(st, floats, node, at, y, a):
     st : settings of the model; node : row of the node; floats[at:] : parameters of the vessel
     """
     gas, total, n, first = (
-        floats[at + GAS_VOLUME],
-        floats[at + TOTAL_VOLUME],
-        floats[at + EXPONENT],
-        floats[at + GAS_PRESSURE],
-    )
+        floats[at + GAS_VOLUME], floats[at + TOTAL_VOLUME], floats[at + EXPONENT], floats[at + GAS_PRESSURE],
+    )  # fmt: skip
     if st["law"] == LAW_LINEAR:
         ratio = max(1e-9, 1.0 - y / (st["rho"] * gas))
         u = log1p(-y / (st["rho"] * gas)) if ratio > 1e-9 else log(ratio)
@@ -216,11 +213,8 @@ def vessel_state_dense(st, floats, node, at, y, a):
     with the density rho at the pressure q at the centroid of the fluid.
     """
     gas, total, n, first = (
-        floats[at + GAS_VOLUME],
-        floats[at + TOTAL_VOLUME],
-        floats[at + EXPONENT],
-        floats[at + GAS_PRESSURE],
-    )
+        floats[at + GAS_VOLUME], floats[at + TOTAL_VOLUME], floats[at + EXPONENT], floats[at + GAS_PRESSURE],
+    )  # fmt: skip
     mass = node["mass"] + y
     if y == 0.0 and a == 0.0:
         return 0.0, total - gas
@@ -391,11 +385,8 @@ def compression_energy_rate(p, gas, n, ambient, a):
 def stored_energy_change(st, floats, node, at, y, a):
     """Stored energy of a vessel minus that at the start [J]; arguments as for `vessel_state`."""
     n, gas, total, first = (
-        floats[at + EXPONENT],
-        floats[at + GAS_VOLUME],
-        floats[at + TOTAL_VOLUME],
-        floats[at + GAS_PRESSURE],
-    )
+        floats[at + EXPONENT], floats[at + GAS_VOLUME], floats[at + TOTAL_VOLUME], floats[at + GAS_PRESSURE],
+    )  # fmt: skip
     u, change, volume, level = vessel_state(st, floats, node, at, y, a)
     start, start_volume = floats[at + LEVEL], total - gas
     energy = gas_energy(first, gas, n, st["ambient"], u)

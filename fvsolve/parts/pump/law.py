@@ -188,19 +188,9 @@ def curve_step(floats, at, speed, rho, weight, g, m, drop):
 # is known. Then pairs (schedule, value at the start) of given torques, then the points of P (flows, then powers) or WB.
 # With a joined table, these follow P: rated torque, correction of WB at the last flow, and WB.
 (
-    MODE,
-    CHECK,
-    TRIP,
-    START_SPEED,
-    INERTIA,
-    OFFSET,
-    TORQUE,
-    RATED,
-    COUNT_OR_TORQUE,
-    TORQUE_COUNT,
-    HAS_SHAFT_POWER,
+    MODE, CHECK, TRIP, START_SPEED, INERTIA, OFFSET, TORQUE, RATED, COUNT_OR_TORQUE, TORQUE_COUNT, HAS_SHAFT_POWER,
     OWN_NUMBERS,
-) = range(12)
+) = range(12)  # fmt: skip
 HELD_SPEED, TRIPPING, TORQUE_DRIVEN = 0, 1, 2  # modes
 MAX_TORQUE_SLOPE = 8.0  # bound of d(torque) / d(speed) of a Suter table, over the rated torque and n + v
 BAR, FLOW_ROUNDING = 1e5, 1e-9  # flow regarded as zero, over the flow at 1 bar
@@ -396,10 +386,8 @@ def outside(out, tables, device):
         return 0
     n, q, _ = pump_point(out, tables, device)
     slack, last, begun = (
-        OUTSIDE * floats[curve + SCALE],
-        floats[curve + LAST],
-        tables.valves[device["valve"]]["drive"],
-    )
+        OUTSIDE * floats[curve + SCALE], floats[curve + LAST], tables.valves[device["valve"]]["drive"],
+    )  # fmt: skip
     if -slack <= q <= max(n, 0.0) * last + slack:
         return 0
     if floats[curve + JOIN] > 0.0:

@@ -247,11 +247,9 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
                 f"{valve['drive']:.4g}"
             )
         draft.warnings += [
-            *reversed_pump(start, name, part, valve),
-            *unusual_flow(draft, name, part),
-            *estimated_inertia(draft, name, part),
-            *rated_point_notes(draft, name, part),
-        ]
+            *reversed_pump(start, name, part, valve), *unusual_flow(draft, name, part),
+            *estimated_inertia(draft, name, part), *rated_point_notes(draft, name, part),
+        ]  # fmt: skip
         return moving + self.set_free_shaft(start, part, row, valve)
 
     def fluid_torque(self, start, row, valve) -> float:

@@ -58,12 +58,8 @@ def events(t, y, out, tables, device, g):
     The last function is the last deceleration of the curve minus that at the reversal [m/s2].
     """
     k, at, data, o, present = (
-        device["valve"],
-        device["event"],
-        device["data"],
-        device["y"],
-        valve_mode(y, tables, device),
-    )
+        device["valve"], device["event"], device["data"], device["y"], valve_mode(y, tables, device),
+    )  # fmt: skip
     flow = out[tables.layout[0]["valve"] + k]
     v = flow / tables.floats[data + UNIT_FLOW]
     for mode in range(BEYOND_CURVE):

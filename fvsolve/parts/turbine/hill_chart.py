@@ -116,11 +116,8 @@ class OpeningCurve(NamedTuple):
     def table(self) -> dict[str, Any]:
         """Curve as a table of a case file."""
         return {
-            "opening": self.opening,
-            SPEED: list(self.speed),
-            FLOW: list(self.flow),
-            self.quantity: list(self.value),
-        }
+            "opening": self.opening, SPEED: list(self.speed), FLOW: list(self.flow), self.quantity: list(self.value),
+        }  # fmt: skip
 
     def torques(self, weight: float) -> list[float]:
         """Unit torque T11 [N/m3] at the points; weight : rho g [N/m3]"""
