@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reference.refusals import refused
 
 import fvsolve
-from fvsolve.errors import CaseError
 from fvsolve.steppers import METHODS
 
 TWO_TANKS = Path(fvsolve.__file__).parents[1] / "cases" / "two-tanks.toml"
@@ -78,15 +78,13 @@ def test_a_file_is_named_on_the_command_line_too(tmp_path, fvs):
     ],
 )
 def test_what_a_file_lacks_is_a_fault_of_the_key(tmp_path, file, tableau, method, said):
-    with pytest.raises(CaseError, match=said):
-        fvsolve.load(placed(tmp_path, tableau, file, method))
+    refused(placed(tmp_path, tableau, file, method), said)
 
 
 def test_two_files_of_one_name_are_not_one_method(tmp_path):
     fvsolve.load(placed(tmp_path / "one"))
     fvsolve.load(placed(tmp_path / "copy"))  # with an equal tableau
-    with pytest.raises(CaseError, match="another method already.*rename"):
-        fvsolve.load(placed(tmp_path / "two", HEUN_EULER))
+    refused(placed(tmp_path / "two", HEUN_EULER), "another method already.*rename")
 
 
 @pytest.mark.parametrize("inside", [True, False])

@@ -4,12 +4,13 @@ import json
 
 import numpy as np
 import pytest
+from reference.refusals import refused
 from reference.scenes import chamber, lake, pipe, scene, tank, valve
 
 import fvsolve
 from fvsolve import build, load
 from fvsolve.case.text import write
-from fvsolve.errors import CaseError, FvsolveError
+from fvsolve.errors import FvsolveError
 from fvsolve.steppers import METHODS, integrate
 
 ABLE = list(dict.fromkeys(method.name for method in METHODS.values() if method.adaptive))
@@ -59,15 +60,12 @@ FAULTS = {
 
 @pytest.mark.parametrize("case, wanted", FAULTS.values(), ids=FAULTS)
 def test_the_file_is_refused(case, wanted):
-    with pytest.raises(CaseError) as caught:
-        fvsolve.load(case)
-    assert wanted in str(caught.value)
+    assert wanted in str(refused(case))
 
 
 def test_who_asks_for_error_control_is_told_who_can():
-    with pytest.raises(CaseError) as caught:
-        fvsolve.load(piped(method="trapezoid", rtol=1e-6))
-    assert all(f'"{name}"' in str(caught.value) for name in ABLE)
+    error = refused(piped(method="trapezoid", rtol=1e-6))
+    assert all(f'"{name}"' in str(error) for name in ABLE)
     with pytest.raises(FvsolveError) as said:
         integrate(lambda t, y: -y, [1.0], [0.0, 1.0], "trapezoid")
     assert all(name in str(said.value) for name in ABLE)

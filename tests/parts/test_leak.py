@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from reference.refusals import refused
 from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, junction, lake, pipe, reservoir, scene, tank, valve
 from scipy.optimize import brentq
 
@@ -146,9 +147,7 @@ def test_what_leaks_is_dissipated_and_the_ledger_closes(law):
 def test_what_is_wrong_with_a_leak_is_said(wrong, said):
     nodes = {"t": tank(0.5, 4.0), "lake": reservoir(2e5)}
     links = {"gap": valve("lake", "t", 1e-3), "hole": leak("t", 1e-6) | wrong}
-    with pytest.raises(fvsolve.CaseError) as error:
-        fvsolve.load(scene(nodes, links, 1.0, {}))
-    assert said in str(error.value)
+    assert said in str(refused(scene(nodes, links, 1.0, {})))
 
 
 @pytest.mark.parametrize("stated", [{}, {"position": [0.0, 0.0]}])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from reference.refusals import refused
 from reference.scenes import RHO, WATER, area, junction, pipe, reservoir, scene
 
 import fvsolve
@@ -102,9 +103,7 @@ def test_what_is_wrong_with_its_curve_is_said(wrong, said):
     case = column(3.0, TIGHT)
     given = case["links"]["check"] | wrong
     case["links"]["check"] = {key: value for key, value in given.items() if value is not None}
-    with pytest.raises(fvsolve.CaseError) as error:
-        fvsolve.load(case)
-    assert said in str(error.value)
+    assert said in str(refused(case))
 
 
 def test_its_energy_closes_through_a_slam_and_it_only_dissipates():

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from reference.refusals import refused
 from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, area, reservoir, scene, valve
 from scipy.integrate import quad, solve_ivp
 
@@ -312,13 +313,11 @@ def test_what_is_wrong_with_a_shape_is_said(wrong, said):
 
 def test_all_that_is_wrong_is_said_at_once_and_a_vessel_without_a_shape_has_no_level():
     case = swing(0.0, 1.0, slope=2.0, gas_volume=0.2, compressor={"start": 0.1, "stop": 0.2, "flow": -1.0})
-    with pytest.raises(fvsolve.CaseError) as error:
-        fvsolve.load(case)
-    assert all(key in str(error.value) for key in ("gas_volume", "compressor.flow"))
+    error = refused(case)
+    assert all(key in str(error) for key in ("gas_volume", "compressor.flow"))
     bare = swing(0.0, 1.0)
     bare["nodes"]["a"] = {"type": "accumulator", "volume": VOLUME, "gas_volume": 0.05}
-    with pytest.raises(fvsolve.CaseError, match="level"):
-        fvsolve.load(bare)
+    refused(bare, "level")
 
 
 def test_a_valve_beside_it_carries_what_both_heads_leave():
