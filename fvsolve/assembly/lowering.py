@@ -385,13 +385,14 @@ def lower_devices(draft) -> None:
     for k, ((name, part, device), row) in enumerate(zip(draft.devices, table, strict=True)):
         states = device.states_of(draft, name, part)
         row["hooks"], row["mode"], row["states"] = draft.hooks(device), device.mode, len(states)
-        row["data"], row["opens_by_event"], row["event"] = (
-            len(draft.floats), device.events_only, draft.flags(name, device.events),
-        )  # fmt: skip
+        row["data"], row["opens_by_event"] = len(draft.floats), device.events_only
+        row["event"] = draft.flags(name, device.events)
         row["controls_column"] = row["event"] + device.controlling_event if device.controlling_event >= 0 else -1
         if name in draft.valve_names:
             row["valve"] = draft.valve_names.index(name)
-            link_device(draft.valve_table[row["valve"]], device, k, row)
+            valve = draft.valve_table[row["valve"]]
+            valve["device"] = k if calls.hook_of(device.law, "set") is not None else -1  # it sets the opening
+            valve["event"], valve["data"] = row["event"], row["data"] if valve["data"] < 0 else valve["data"]
         elif name in draft.node_index:
             row["node"] = draft.node_index[name]
             row["row"] = draft.node_table[row["node"]]["row"]
@@ -402,15 +403,6 @@ def lower_devices(draft) -> None:
         for state, scale in zip(states, device.scales(draft, name, part), strict=True):
             at = draft.states([f"{name}.{state}"], scale)
             row["y"] = at if row["y"] < 0 else row["y"]
-
-
-def link_device(valve, device: Device, k: int, row) -> None:
-    """Write the offsets of flags and numbers of a device to its VALVE row, and its number if it sets the opening.
-
-    A device sets the opening of the valve if its law has a function `set`.
-    """
-    valve["device"] = k if calls.hook_of(device.law, "set") is not None else -1
-    valve["event"], valve["data"] = row["event"], row["data"] if valve["data"] < 0 else valve["data"]
 
 
 def opening_of(start, k: int) -> float:

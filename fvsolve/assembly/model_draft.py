@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.assembly.lowering import Device, Lowering, links_by_table
+from fvsolve.assembly.lowering import Lowering, links_by_table
 from fvsolve.assembly.schedule_tables import Schedules
 from fvsolve.assembly.state_names import StateNames
 from fvsolve.errors import CaseError, Fault, Notice
@@ -160,11 +160,6 @@ def no_rows(record: np.dtype) -> Any:
     return field(default_factory=lambda: np.zeros(0, record))
 
 
-def byte_copy(table: np.ndarray) -> np.ndarray:
-    """Copy of a table, made byte by byte, because numpy would copy records field by field."""
-    return np.ndarray(table.shape, table.dtype, bytearray(table.tobytes()))
-
-
 @dataclass(slots=True, eq=False)
 class ModelDraft:
     """Tables, names and states of a model while it is built. It has slots: no other attributes can be added."""
@@ -268,7 +263,9 @@ class ModelDraft:
         Writable tables and lists are copied, so that later changes do not reach the original.
         """
         copy = object.__new__(ModelDraft)
-        tables = {id(source): byte_copy(source) for source in self.tables if source.flags.writeable}
+        # numpy would copy records field by field, so tables are copied as bytes
+        tables = {id(source): np.ndarray(source.shape, source.dtype, bytearray(source.tobytes()))
+                  for source in self.tables if source.flags.writeable}  # fmt: skip
         for name in self.__slots__:
             value = getattr(self, name)
             if isinstance(value, np.ndarray):
@@ -341,10 +338,6 @@ class ModelDraft:
     def device_names(self) -> list[str]:
         """Names of devices, in the order of their table."""
         return [name for name, _, _ in self.devices]
-
-    def device_of(self, name: str) -> Device:
-        """Conversion object of the device `name`."""
-        return self.devices[self.device_names.index(name)][2]
 
     def fill(self, table: str, record: np.dtype) -> tuple[list[str], np.ndarray]:
         """Fill the rows of a table from the links of the case : (name of the link of each row, rows)."""

@@ -350,7 +350,8 @@ def missing_reactions(nodes: dict[str, Any], links: dict[str, Any], free: bool =
             yield key, "the reaction of the leak on the body is not modelled yet; expected a valve to a reservoir"
         elif link.kind == "rigid-column":
             for end in ends:
-                if end in nodes and set_by_columns(end, nodes, links):
+                kinds = {other.kind for other in links.values() if end in other.ports.values()}
+                if end in nodes and nodes[end].kind in ("junction", "inflow") and "pipe" not in kinds:
                     text = f"at {end} this column joins only valves and columns, whose reaction is not modelled yet"
                     yield key, f"{text}; {USE_PIPE}"
         elif link.kind != "pipe" or free:
@@ -358,12 +359,6 @@ def missing_reactions(nodes: dict[str, Any], links: dict[str, Any], free: bool =
                 reason = "the flow of a pipe" if link.kind == "pipe" else "the flow of a valve"
                 text = f"at {end} neither {reason} nor the tank has inertia; expected a rigid-column at the tank"
                 yield key, text
-
-
-def set_by_columns(end: str, nodes: dict[str, Any], links: dict[str, Any]) -> bool:
-    """True if only rigid columns and restrictions set the pressure of the node `end`."""
-    kinds = {link.kind for link in links.values() if end in link.ports.values()}
-    return nodes[end].kind in ("junction", "inflow") and "pipe" not in kinds
 
 
 def node_of(place: str, nodes: dict[str, Any]) -> Any:

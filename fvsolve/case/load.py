@@ -75,13 +75,9 @@ def shortest_cell_time(links: Mapping[str, Any], meshes: Mapping[str, Any], flui
     return min([*times, *(float(mesh.area.min()) ** 0.5 for mesh in meshes.values())], default=math.inf)
 
 
-def _alternatives() -> list[tuple[str, ...]]:
-    """Groups of alternative keys of numerics, friction and all parts; a table may have at most one key of a group."""
-    return _alternatives_of((Numerics, Friction, *KINDS["nodes"].values(), *KINDS["links"].values()))
-
-
 @functools.lru_cache(maxsize=4)
-def _alternatives_of(models: tuple) -> list[tuple[str, ...]]:
+def alternatives_of(models: tuple) -> list[tuple[str, ...]]:
+    """Groups of alternative keys of classes of tables; a table may have at most one key of a group."""
     return list(dict.fromkeys(keys for model in models for keys in model.alternatives))
 
 
@@ -90,7 +86,8 @@ def read_case(raw: Raw, settings: Mapping[str, Any], previous: Case | None = Non
 
     settings : overrides, see `load`. Raises CaseError with all faults.
     """
-    refused = override(raw, chainage.settings(raw.table, settings), _alternatives())
+    models = (Numerics, Friction, *KINDS["nodes"].values(), *KINDS["links"].values())
+    refused = override(raw, chainage.settings(raw.table, settings), alternatives_of(models))
     if previous is not None and not refused:
         case = update_values(Reading(raw), previous)
         if case is not None:

@@ -323,8 +323,12 @@ def parts_of(name: str, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) 
     if may_be_piece(name, kinds) or (name in ALL and None in kinds[ALL[name]].values()):
         return None
     if name in ALL:
-        included = (lambda kind: kind is Pipe) if name == "pipes" else (lambda kind: counts_as_node(kind, quantity))
-        matches = [(ALL[name], part) for part, kind in kinds[ALL[name]].items() if kind is not None and included(kind)]
+        known = {part: kind for part, kind in kinds[ALL[name]].items() if kind is not None}
+        if name == "pipes":
+            matches = [(ALL[name], part) for part, kind in known.items() if kind is Pipe]
+        else:  # without reservoirs, whose pressure is given
+            matches = [(ALL[name], part) for part, kind in known.items() if quantity in quantities_of(kind)
+                       and not (kind is Reservoir and quantity in OF_PRESSURE)]  # fmt: skip
         if not matches:
             if name == "pipes":
                 raise ValueError(f"{show(name)} means all pipes, but the case has none")
@@ -333,14 +337,6 @@ def parts_of(name: str, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) 
     known = [*kinds["nodes"], *kinds["links"], *routes, *ALL]
     text = f"unknown part or route {show(name)}{did_you_mean(name, known) or f'; there are {listing(known)}'}"
     raise ValueError(text)
-
-
-def counts_as_node(kind: Any, quantity: str) -> bool:
-    """True if the word "nodes" in a limit or expectation includes this class of node for a quantity.
-
-    A reservoir is not included for pressures and heads, since its pressure is given.
-    """
-    return quantity in quantities_of(kind) and not (kind is Reservoir and quantity in OF_PRESSURE)
 
 
 def quantities_of(kind: Any) -> dict[str, str]:

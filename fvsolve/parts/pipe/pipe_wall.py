@@ -286,11 +286,6 @@ def restraint_factor(restraint: str | float | None, bore: float, wall: Wall) -> 
     return thin / (1.0 + ratio) + 2.0 * ratio * (1.0 + nu)
 
 
-def needs_poisson(restraint: str | float | None, bore: float, wall: Wall) -> bool:
-    """True if the restraint factor depends on Poisson's ratio of the wall."""
-    return restraint in ("upstream", "anchored") or (restraint == "joints" and wall.thickness * THIN_WALL > bore)
-
-
 def creep_elements(pipe: Any) -> tuple[tuple[float, float], ...]:
     """(final relative growth of the bore area per pressure [1/Pa], time constant [s]) of each creep element of a wall.
 
@@ -323,7 +318,8 @@ def wall_faults(pipe: Any) -> Iterator[tuple[tuple[Any, ...], str]]:
     wall = pipe.wall
     if not isinstance(wall, Wall):
         return
-    if wall.poisson_ratio is None and needs_poisson(pipe.restraint, pipe.diameter, wall):
+    thick_joints = pipe.restraint == "joints" and wall.thickness * THIN_WALL > pipe.diameter
+    if wall.poisson_ratio is None and (pipe.restraint in ("upstream", "anchored") or thick_joints):
         reason = f"the catalogue has no value for {pipe.material}" if pipe.material else "none is given"
         text = f"{show(pipe.restraint)} needs Poisson's ratio of the wall, and {reason}; give wall.poisson_ratio"
         yield ("restraint",), text

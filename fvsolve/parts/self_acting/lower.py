@@ -358,7 +358,8 @@ class Regulator(Device, kind=""):
     def check_set_pressure(self, draft, name, part) -> None:
         """Report a fault if no source of the case can supply the set pressure of a valve."""
         nodes, case = draft.case.nodes.values(), draft.case
-        if any(node.kind not in ("reservoir", "tank", "junction") for node in nodes) or "pump" in kinds_of(case):
+        pumped = any(link.kind == "pump" for link in case.links.values())
+        if pumped or any(node.kind not in ("reservoir", "tank", "junction") for node in nodes):
             return  # pressure comes from elsewhere too
         weight, place = draft.fluid.density * case.gravity, getattr(part, "to" if self.end == "to" else "from_")
         best, source = max(head_of(case, weight, other) for other in case.nodes)
@@ -521,11 +522,6 @@ class FlowControlRows(Regulator, kind="flow-control"):
         if now == "shut":  # it holds nothing back but what is beyond its set flow
             return OPEN
         return ACTIVE if here.flow > here.target + SMALL_FLOW * here.start.flow_scale else now
-
-
-def kinds_of(case) -> set[str]:
-    """Types of the links in a case."""
-    return {link.kind for link in case.links.values()}
 
 
 def head_of(case, weight: float, name: str) -> tuple[float, str]:
