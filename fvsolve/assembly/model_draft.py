@@ -72,10 +72,8 @@ class Hydraulics:
             row["friction"] = rec.FRICTION_FACTOR
             row["loss"] += per_factor * law.factor
         elif not self.fluid.viscosity:
-            fault(
-                f"links.{name}.friction",
-                "the key `roughness` needs the fluid's viscosity; give `fluid.viscosity`, or the key `factor`",
-            )
+            text = "the key `roughness` needs the fluid's viscosity; give `fluid.viscosity`, or the key `factor`"
+            fault(f"links.{name}.friction", text)
         else:
             row["friction"], row["rough"] = rec.FRICTION_ROUGH, per_factor
             row["roughness"] = law.roughness / link.diameter

@@ -87,10 +87,8 @@ def moving_wall_faults(
             yield (*key, patch, "zone"), "applies only to a moving wall; give `body` or `travel` too"
     walls = {patch: options for patch, options in moving_walls(basin).items() if patch in mesh.patches[:-1]}
     for patch, options in walls.items():
-        yield from (
-            ((*key, patch, *below), text)
-            for below, text in wall_faults(basin, mesh, patch, options, nodes, times, named)
-        )
+        for below, text in wall_faults(basin, mesh, patch, options, nodes, times, named):
+            yield (*key, patch, *below), text
         if f"{name}.{patch}" in joined:
             yield (*key, patch), "a link joins here, and this is a moving wall; join the link to a fixed patch"
     yield from (((*key, *below), text) for below, text in faults_between(basin, mesh, walls, times))
@@ -130,10 +128,8 @@ def wall_faults(
         return
     size, zone = float(np.ptp(at)), options.zone or float(np.ptp(at))
     if zone > size * (1.0 + 1e-9):
-        yield (
-            ("zone",),
-            f"{zone:g} m is more than the length of the basin along {'xy'[axis]}, {size:g} m; expected a narrower zone",
-        )
+        text = f"{zone:g} m is more than the length of the basin along {'xy'[axis]}, {size:g} m"
+        yield ("zone",), f"{text}; expected a narrower zone"
     if options.travel is not None:
         per = area_growth(mesh, axis, weights(basin, mesh, patch, at))
         yield from ((("travel",), text) for text in travel_faults(options.travel, side, zone, times, mesh, per))

@@ -418,11 +418,7 @@ def patch_faults(end: str, node: Any) -> Iterator[str]:
 
 def position_text(ends: list[str], patches: dict[str, Any]) -> str:
     """Text with the computed positions of the ends of a link that are patches; "" if no end is a patch."""
-    texts = [
-        f"{end} at [{', '.join(f'{coordinate:.7g}' for coordinate in patches[end].at)}]"
-        for end in ends
-        if end in patches
-    ]
+    texts = [f"{end} at [{', '.join(f'{x:.7g}' for x in patches[end].at)}]" for end in ends if end in patches]
     return f" ({' and '.join(texts)})" if texts else ""
 
 
@@ -445,13 +441,8 @@ def basin_faults(name: str, basin: Any, nodes: dict[str, Any], named: Any) -> Fa
         yield (*key, "on"), text
     free = next(free_joints(basin.on, nodes), None)
     for patch, patch_options in basin.patches.items():
-        opened = (
-            "impedance"
-            if patch_options.impedance is not None
-            else "boundary"
-            if patch_options.boundary == "open"
-            else None
-        )
+        opened = "boundary" if patch_options.boundary == "open" else None
+        opened = opened if patch_options.impedance is None else "impedance"
         if opened is not None and free is not None and not basin.lumped:
             text = (
                 f"{free} moves freely, and the reaction to outflow is not modelled; expected a wall or a driven joint"

@@ -42,10 +42,8 @@ def changes(case: Case, key: str) -> str:
 
 def class_of_key(case: Case, keys: tuple[Any, ...]) -> str:
     """Effect of changing the value at a key path of a case: "value", "profile" or "shape", see `changes`."""
-    result, links = (
-        declaration_of(case.raw, keys).changes,
-        [raw_link(case.raw, name) for name in case.raw.get("links", {})],
-    )
+    result = declaration_of(case.raw, keys).changes
+    links = [raw_link(case.raw, name) for name in case.raw.get("links", {})]
     if keys[0] == "links" and keys[2:3] == ("length",) and keys[1] in pieces_of(case.raw):
         return SHAPE  # its pieces between chainages get other cells
     if result == BY_CELLS:

@@ -212,11 +212,8 @@ def scalar_faults(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[st
                     if scalar not in scalars:
                         yield place, _unknown_scalar(scalar, scalars)
                     elif part.physics_type.joined and patch_options.boundary != "open":
-                        yield (
-                            place,
-                            "is not valid here, because the joined links give the value. Remove this key, or set "
-                            'boundary = "open"',
-                        )
+                        text = "is not valid here, because the joined links give the value. Remove this key, or set "
+                        yield place, text + 'boundary = "open"'
             if scalars and part.no_scalars:
                 yield (group, name), f"is {article(part.kind)}; {part.no_scalars}"
     if not scalars:

@@ -137,11 +137,8 @@ def default_cell(key: str, default: Any, needs: tuple[tuple[str, ...], ...]) -> 
         content = {key: value for key, value in content.items() if value is not None}
     if content in (None, {}, (), ""):
         return "*none*"
-    return (
-        f"{content:g}"
-        if isinstance(content, (int, float)) and not isinstance(content, bool)
-        else f"`{inline(content)}`"
-    )
+    is_number = isinstance(content, (int, float)) and not isinstance(content, bool)
+    return f"{content:g}" if is_number else f"`{inline(content)}`"
 
 
 def main(given: list[str]) -> None:

@@ -371,10 +371,8 @@ def update_values(reading: Reading, previous: Case) -> Case | None:
                 return None
             if known[0] is not given:
                 try:
-                    known = (
-                        given,
-                        part_reading.read_part(reading, raw.table, type(known[1]), read_before(given, *known)),
-                    )
+                    part = part_reading.read_part(reading, raw.table, type(known[1]), read_before(given, *known))
+                    known = given, part
                 except ValueError:
                     return None
                 reading.read[group, name] = known
@@ -408,14 +406,8 @@ def is_self_contained(case: Case) -> bool:
 
     An exact solution, if the case has one, must also be stated in its file.
     """
-    no_outer_input = not (
-        chainage.placed(chainage.add_bends(case.raw))
-        or case.signals
-        or case.scalars
-        or case.compare
-        or case.copies
-        or case.equilibrium_nodes
-    )
+    outer = case.signals or case.scalars or case.compare or case.copies or case.equilibrium_nodes
+    no_outer_input = not (chainage.placed(chainage.add_bends(case.raw)) or outer)
     exact_in_file = case.exact is None or "exact" in case.raw
     return no_outer_input and exact_in_file and not any(isinstance(node, Basin) for node in case.nodes.values())
 

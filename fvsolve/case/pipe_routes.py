@@ -105,11 +105,8 @@ def route_faults(
 
     named : links as in the file, also faulty links; pieces : cut pipe -> names of its pieces
     """
-    pipes = [
-        item
-        for item, given in named.items()
-        if item not in links and (is_pipe(given) or kind_of("links", given) is None)
-    ]
+    pipes = [item for item, given in named.items()
+             if item not in links and (is_pipe(given) or kind_of("links", given) is None)]  # fmt: skip
     pipes += [item for item, link in links.items() if link.kind == "pipe"]
     for name, route in routes.items():
         if route is None:

@@ -153,12 +153,8 @@ def default_probes(kinds: Kinds) -> list[Probe]:
     for part, quantities in (("nodes", DEFAULT_OF_NODES), ("links", DEFAULT_OF_LINKS)):
         other = kinds["links" if part == "nodes" else "nodes"]
         for name, kind in kinds[part].items():
-            own = (
-                [quantity_name for quantity_name in quantities if quantity_name in kind.quantities]
-                if kind is not None
-                else []
-            )
-            own = [quantity_name for quantity_name in own if quantity_name not in getattr(kind, "on_request", ())]
+            known = {} if kind is None else kind.quantities
+            own = [key for key in quantities if key in known and key not in getattr(kind, "on_request", ())]
             for quantity in [*own, *_scalars_of(kind, kinds, "quantities")] if own else []:
                 text = f"{part}.{name}.{quantity}" if name in other else f"{name}.{quantity}"
                 probes.append(_probe(text, part, name, quantity, None, kinds))
@@ -199,11 +195,8 @@ def _quantity(
 ) -> tuple[float | None, str]:
     known = {**along, **own, **getattr(kind, "fields", {})}
     if quantity not in known:
-        has = (
-            f"it has {', '.join(known)}{did_you_mean(quantity, known)}"
-            if known
-            else 'with sloshing = "frozen" its water moves with its body; expected a probe of the body'
-        )
+        has = 'with sloshing = "frozen" its water moves with its body; expected a probe of the body'
+        has = f"it has {', '.join(known)}{did_you_mean(quantity, known)}" if known else has
         raise ValueError(f"{name} is {article(kind.kind)}, which has no {show(quantity)}; {has}")
     if place is None:
         if quantity not in own:

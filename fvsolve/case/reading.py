@@ -295,12 +295,8 @@ def with_defaults(table: Mapping[str, Any], given: dict[str, Any]) -> dict[str, 
     if not general:
         return given
     known = WITH_DEFAULTS[given["type"]].keys()  # unknown keys are reported once, as faults of the defaults
-    stated = {
-        key
-        for group in WITH_DEFAULTS[given["type"]].alternatives
-        if any(word in given for word in group)
-        for key in group
-    }
+    groups = WITH_DEFAULTS[given["type"]].alternatives
+    stated = {key for group in groups if any(word in given for word in group) for key in group}
     return {**{key: value for key, value in general.items() if key in known and key not in stated}, **given}
 
 

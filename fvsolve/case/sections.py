@@ -40,9 +40,8 @@ DEFAULT_ACCURACY = 1e-2  # fraction of the largest jump
 
 
 # Ranges of liquids, after CoolProp and the CRC Handbook: liquid hydrogen to mercury, light liquids to cold heavy oil.
-TEMPERATURES = val.UsualRange(
-    60.0, 1000.0, "liquefied gases to molten salt"
-)  # for fluid "user"; other fluids have their own range
+# For fluid "user"; other fluids have their own range
+TEMPERATURES = val.UsualRange(60.0, 1000.0, "liquefied gases to molten salt")
 DENSITIES = val.UsualRange(60.0, 14e3, "liquid hydrogen to mercury")
 MODULI = val.UsualRange(1e7, 4e10, "liquefied gases to mercury")
 VISCOSITIES = val.UsualRange(1e-5, 5.0, "liquefied gases to heavy fuel oil")

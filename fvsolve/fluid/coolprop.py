@@ -102,10 +102,8 @@ def isentrope(state: Any, name: str, vapor_pressure: float) -> FluidTable:
     """
     temperature, pressure, entropy = state.T(), state.p(), state.smass()
     if not 0.0 < vapor_pressure < pressure:
-        raise FluidError(
-            "law",
-            f'"table" needs a liquid, and {name} is not liquid at this temperature and pressure; use "linear" or "log"',
-        )
+        text = f'"table" needs a liquid, and {name} is not liquid at this temperature and pressure'
+        raise FluidError("law", f'{text}; use "linear" or "log"')
     span = (vapor_pressure, _reach(state, temperature, pressure))
     intervals, max_intervals = INTERVALS
     try:
@@ -276,11 +274,8 @@ def _pure_properties(name: str, temperature: float, pressure: float, law: str) -
     try:
         state.update(CoolProp.PT_INPUTS, pressure, temperature)
     except ValueError as error:
-        raise FluidError(
-            "pressure",
-            f"{name} is two-phase at {celsius(temperature)} and {pressure:g} Pa, or CoolProp has no data ({error}); "
-            "try another temperature or pressure",
-        ) from None
+        text = f"{name} is two-phase at {celsius(temperature)} and {pressure:g} Pa, or CoolProp has no data ({error})"
+        raise FluidError("pressure", f"{text}; try another temperature or pressure") from None
     values |= dict(density=state.rhomass(), bulk_modulus=state.rhomass() * state.speed_sound() ** 2)
     values["viscosity"] = value_or_none(state.viscosity)
     if LAWS[law].tabulated:

@@ -65,11 +65,8 @@ def air_of(given: dict[str, float]) -> Air:
     if cavitation and exponent != 1.0:
         raise FluidError("gas_exponent", f"{exponent:g} is not 1; with cavitation the gas is isothermal, expected 1")
     if saturation <= ATMOSPHERE:
-        raise FluidError(
-            "saturation_pressure",
-            f"{saturation:g} Pa is not above 1 atm, the pressure to which `air_fraction` refers; "
-            f"expected more than {ATMOSPHERE:g} Pa",
-        )
+        text = f"{saturation:g} Pa is not above 1 atm, the pressure to which `air_fraction` refers"
+        raise FluidError("saturation_pressure", f"{text}; expected more than {ATMOSPHERE:g} Pa")
     return Air(fraction, exponent, saturation, cavitation)
 
 
@@ -80,10 +77,8 @@ def check_cavities(fluid) -> None:
     if fluid.vapor_pressure == 0.0:
         raise FluidError("cavitation", f'needs the vapour pressure of "{fluid.name}"; give the key `vapor_pressure`')
     if fluid.vapor_pressure >= ATMOSPHERE:
-        raise FluidError(
-            "cavitation",
-            f"{fluid.name} boils at 1 atm, the pressure to which `air_fraction` refers; leave out the key `cavitation`",
-        )
+        text = f"{fluid.name} boils at 1 atm, the pressure to which `air_fraction` refers"
+        raise FluidError("cavitation", f"{text}; leave out the key `cavitation`")
 
 
 LAWS: dict[str, type[Law]] = {}  # name -> law, from the simplest to the most general

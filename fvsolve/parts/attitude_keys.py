@@ -100,7 +100,7 @@ class Attitude(Table):
             message = (
                 f"is not exactly a rotation: R'R differs from the identity by {off:.2g}; the nearest rotation is used"
             )
-            yield (("matrix",), off, ROUNDING, message)
+            yield ("matrix",), off, ROUNDING, message
         for key, text, apart in self._deviations():
             if apart > ROUNDING:
                 yield (key,), apart, ROUNDING, f"{text}; the latter is used"

@@ -297,11 +297,8 @@ class Basin(PlaceOnBody, kind="basin"):
         known = isinstance(physics, str) and physics in Physics.kinds
         faults = Physics.kinds[physics].own_faults(given) if known else []
         if "mesh" in given:
-            faults += [
-                ((key,), "is a key of rectangles, but this basin has a `mesh`; remove this key or `mesh`")
-                for key in RECTANGLE_KEYS
-                if key in given
-            ]
+            text = "is a key of rectangles, but this basin has a `mesh`; remove this key or `mesh`"
+            faults += [((key,), text) for key in RECTANGLE_KEYS if key in given]
         else:
             faults += [((), f"{key} is missing") for key in RECTANGLE_KEYS[:2] if key not in given]
         for name, patch in given["patches"].items() if isinstance(given.get("patches"), dict) else ():

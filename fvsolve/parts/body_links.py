@@ -87,11 +87,8 @@ class Bushing(TwoPort, kind="bushing"):
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         if not any((self.stiffness, self.damping, self.rotational_stiffness, self.rotational_damping)):
-            yield (
-                ("stiffness",),
-                "is 0, like `damping`, `rotational_stiffness` and `rotational_damping`; "
-                "expected at least one of these four keys above 0",
-            )
+            text = "is 0, like `damping`, `rotational_stiffness` and `rotational_damping`"
+            yield ("stiffness",), f"{text}; expected at least one of these four keys above 0"
 
     stiffness: Annotated[
         float, Quantity("stiffness", nonnegative, "force per displacement between the points [N/m]", changes=VALUE)
@@ -165,10 +162,8 @@ class Torque(Link, kind="torque"):
             if given is not None:
                 yield (key,), f"is a key for bodies, but {self.to} is a shaft; remove this key"
         if turned.inertia is None:
-            yield (
-                ("to",),
-                f"{self.to} has no inertia, so its speed cannot follow from a torque; give the {turned.kind} `inertia`",
-            )
+            text = f"{self.to} has no inertia, so its speed cannot follow from a torque"
+            yield ("to",), f"{text}; give the {turned.kind} `inertia`"
         if turned.trip is not None:
             text = (
                 "is held at its speed until the trip; remove the key `trip`, and let the torque fall to 0 at that time"

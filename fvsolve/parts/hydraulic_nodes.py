@@ -69,7 +69,7 @@ class Junction(PlaceOnBody, kind="junction"):
                 f"{least:g} Pa is below ambient pressure, at which nothing can flow out. "
                 f"Expected at least {around.ambient:g} Pa"
             )
-            yield (("minimum_pressure",), message)
+            yield ("minimum_pressure",), message
         if not (self.demand.value.min() >= 0.0 and self.demand.value.max() > 0.0):
             text = "is negative at some time, or always 0; `required_pressure` needs values of at least 0, not all 0"
             yield ("demand",), text

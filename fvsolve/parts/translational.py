@@ -145,7 +145,7 @@ class EndStop(Coupling, kind="end-stop"):
     def faults(self, name: str, around: CaseContext) -> Faults:
         if None not in (self.minimum, self.maximum) and self.minimum >= self.maximum:
             text = f"{self.maximum:g} m is not above `minimum`, {self.minimum:g} m; expected a greater value"
-            yield (("maximum",), text)
+            yield ("maximum",), text
 
 
 NO_STOP = 1e300  # distance to a stop that does not exist
@@ -202,10 +202,10 @@ class Force(Coupling, kind="force"):
             yield ("direction",), "is all zeros; expected for example [0, 0, -1]"
         if around.spatial(self.to) and self.from_ is None and self.direction is None:
             text = "direction is missing: a force on a point needs this key or `from`; for example [0, 0, -1], downward"
-            yield ((), text)
+            yield (), text
         if not around.spatial(self.to) and self.direction is not None:
             text = f"{self.to} moves along a single axis, which gives the direction of the force; remove this key"
-            yield (("direction",), text)
+            yield ("direction",), text
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         yield from length_notices("direction", self.direction)

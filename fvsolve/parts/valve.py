@@ -201,12 +201,8 @@ class OrificeRows(ValveRows, kind="orifice"):
     """Conversion to table rows of orifices: the same rows as those of valves."""
 
 
-EDGES = (
-    ("P", "A", 1),
-    ("P", "B", -1),
-    ("A", "T", -1),
-    ("B", "T", 1),
-)  # from, to, sign of the position at which it opens
+# From, to, sign of the position at which it opens
+EDGES = ("P", "A", 1), ("P", "B", -1), ("A", "T", -1), ("B", "T", 1)
 
 
 class SpoolValve(Sized, Link, kind="spool-valve"):

@@ -15,14 +15,8 @@ from fvsolve.kernels.density import density, log_density, pressure_of_log
 from fvsolve.kernels.dtypes import LAW_LINEAR
 from fvsolve.kernels.network_energy import height_pressure, vessel_energy, vessel_power
 
-EXPONENT, GAS_VOLUME, TOTAL_VOLUME, NECK_STIFFNESS, EMPTY_MASS, EMPTY_PRESSURE = (
-    0,
-    1,
-    2,
-    3,
-    4,
-    5,
-)  # indices into the numbers of an accumulator
+# Indices into the numbers of an accumulator
+EXPONENT, GAS_VOLUME, TOTAL_VOLUME, NECK_STIFFNESS, EMPTY_MASS, EMPTY_PRESSURE = 0, 1, 2, 3, 4, 5
 NUMBER_COUNT = 6
 """Exponent n; gas volume at the start [m3]; volume of gas, fluid and neck [m3]; stiffness dp/dm of the neck [Pa/kg], 0
 without a neck; inflow since the start at which the gas just fills the vessel [kg], negative if fluid must flow out;

@@ -255,10 +255,8 @@ def surface_area(floats, at, level):
 
     floats, at : as for `vessel_state`
     """
-    return max(
-        surface_at(floats, at + SHAPE, level),
-        LEAST_SURFACE * floats[at + TOTAL_VOLUME] / floats[at + SHAPE + FULL_LEVEL],
-    )
+    least = LEAST_SURFACE * floats[at + TOTAL_VOLUME] / floats[at + SHAPE + FULL_LEVEL]
+    return max(surface_at(floats, at + SHAPE, level), least)
 
 
 @njit
@@ -347,13 +345,9 @@ def value(t, y, out, tables, device, quantity):
     """Gas volume [m3] for quantity 0, gas pressure [Pa] for quantity 1, level [m] for quantity 2."""
     node, st, floats, at = tables.nodes[device["node"]], tables.settings[0], tables.floats, device["data"]
     u, change, _, level = vessel_state(st, floats, node, at, y[node["y"]], compressor_gas(y, device))
-    return (
-        level
-        if quantity == 2
-        else floats[at + GAS_PRESSURE] + change
-        if quantity == 1
-        else floats[at + GAS_VOLUME] * exp(u)
-    )
+    if quantity == 2:
+        return level
+    return floats[at + GAS_PRESSURE] + change if quantity == 1 else floats[at + GAS_VOLUME] * exp(u)
 
 
 @njit

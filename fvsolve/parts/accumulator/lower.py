@@ -71,17 +71,13 @@ def shape_numbers(part) -> list[float]:
     radius, length, slope = 0.5 * part.diameter, length_of(part), UPRIGHT if part.slope is None else part.slope
     if radius * math.cos(slope) <= SLOPE_TOLERANCE * length * math.sin(slope):
         return [law_vessel.PRISM, top, math.pi * radius**2, 0.0, 0.0]
-    kind = (
-        law_vessel.HORIZONTAL_CYLINDER
-        if length * math.sin(slope) <= SLOPE_TOLERANCE * radius * math.cos(slope)
-        else law_vessel.INCLINED_CYLINDER
-    )
-    return [kind, top, radius, length, 0.0 if kind == law_vessel.HORIZONTAL_CYLINDER else slope]
+    if length * math.sin(slope) <= SLOPE_TOLERANCE * radius * math.cos(slope):
+        return [law_vessel.HORIZONTAL_CYLINDER, top, radius, length, 0.0]
+    return [law_vessel.INCLINED_CYLINDER, top, radius, length, slope]
 
 
-NECK_ERROR_SHARE = (
-    1e-5  # share of the released mass added to the scale of errors in the neck, so that it exceeds rounding
-)
+# Share of the released mass added to the scale of errors in the neck, so that it exceeds rounding
+NECK_ERROR_SHARE = 1e-5
 NECK_SHARE = 0.01  # volume of the neck of a bladder accumulator over its volume
 
 
@@ -104,7 +100,6 @@ class AccumulatorRows(Device, kind="accumulator"):
     def pressure_at_start(self, start, i, node, row) -> float | None:
         if node.initial_pressure is None or not node.has_shape:
             return node.initial_pressure
-
         return VesselStart(start, node).node_pressure(node.initial_pressure)
 
     def numbers(self, draft, name, part) -> list[float]:
@@ -203,10 +198,8 @@ class ShapedRows(AccumulatorRows, kind=""):
         if not p > 0.0:
             name = list(draft.case.places)[row["node"]].removesuffix(".inside")
             height = at_start.level + at_start.bottom
-            pressure, head = (
-                draft.case.amount(node["pressure"], "pressure", 6),
-                draft.case.amount(height, "head", span=True),
-            )
+            pressure = draft.case.amount(node["pressure"], "pressure", 6)
+            head = draft.case.amount(height, "head", span=True)
             text = (f"no steady state: the pressure at the node, {pressure}, is below that of the fluid column, {head} "
                     "high, so the gas would have no pressure; set the key `bottom` or `level` "
                     "lower, or `gas_volume` greater")  # fmt: skip

@@ -169,10 +169,10 @@ class Accumulator(Node, kind="accumulator"):
             start, stop = self.compressor.start, self.compressor.stop
             if stop >= start:
                 message = f"{stop:g} m is not below the level `start`, {start:g} m; expected a lower level"
-                yield (("compressor", "stop"), message)
+                yield ("compressor", "stop"), message
             if start >= top:
                 message = f"{start:g} m is never reached; expected less than {top:.6g} m, at which the vessel is full"
-                yield (("compressor", "start"), message)
+                yield ("compressor", "start"), message
 
 
 class Vessel(Accumulator):

@@ -83,14 +83,10 @@ class AirValve(Node, kind="air-valve"):
         if self.throttled_outlet is not None and not self.throttled_outlet < self.outlet:
             text = f"{self.throttled_outlet:g} m does not throttle; expected less than `outlet`, {self.outlet:g} m"
             yield ("throttled_outlet",), text
-        lines = [
-            link
-            for link in around.links.values()
-            if link.kind in ("pipe", "rigid-column") and name in link.ports.values()
-        ]
-        if self.switch_velocity is not None and not lines:
+        lines = [link for link in around.links.values() if link.kind in LINE_KINDS]
+        if self.switch_velocity is not None and not any(name in link.ports.values() for link in lines):
             message = "no pipe or rigid column joins this node to give a fluid velocity; give the key `switch` instead"
-            yield (("switch_velocity",), message)
+            yield ("switch_velocity",), message
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
         size = Connection.model_construct(area=None, diameter=THROAT_SIZE * self.inlet, loss_in=1.0, loss_out=1.0)

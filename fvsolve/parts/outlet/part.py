@@ -177,4 +177,4 @@ class SurgeAnticipating(Relieving, kind="surge-anticipating"):
         if self.senses is not None and self.senses not in places:
             near = did_you_mean(self.senses, places)
             message = f"unknown place of the fluid {show(self.senses)}; expected one of {listing(places)}{near}"
-            yield (("senses",), message)
+            yield ("senses",), message

@@ -45,9 +45,8 @@ END_VERBS = {"from": "begins", "to": "ends"}
 LINES = ("finite-volume", "delay-line", "auto")  # numerical methods for waves in a pipe
 
 
-WAVES = UsualRange(
-    30.0, 2000.0, "soft hoses to stiff pipes"
-)  # most are between 50 and 1500 m/s, Wylie and Streeter 1993
+# Most are between 50 and 1500 m/s, Wylie and Streeter 1993
+WAVES = UsualRange(30.0, 2000.0, "soft hoses to stiff pipes")
 SOFT_WALLS = (  # (modulus [Pa], least wall over bore of such a pipe, text); the thinnest plastics are SDR 26
     (2e8, 0.1, "softer than any plastic, like rubber"),
     (4e8, 0.04, "as soft as low-density polyethylene"),

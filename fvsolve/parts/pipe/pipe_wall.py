@@ -198,11 +198,9 @@ class MaterialName(Value):
 
     @property
     def names(self) -> list[str]:
-
         return list(materials())
 
     def read(self, given: Any, setting: ReadContext) -> str:
-
         if isinstance(given, str) and given in self.names:
             return given
         if not isinstance(given, str):

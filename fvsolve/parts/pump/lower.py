@@ -42,11 +42,8 @@ def reversed_pump(start, name: str, part, valve) -> list[Notice]:
     )
     if valve["drive"] <= 0.0 or start.rest or not (heads[i] > heads[j] + SPEED_TOLERANCE or lowest):
         return []
-    target = (
-        "which has the lowest water level"
-        if lowest
-        else f"where the head is {start.case.amount(heads[i] - heads[j], 'head', span=True)} lower"
-    )
+    target = f"where the head is {start.case.amount(heads[i] - heads[j], 'head', span=True)} lower"
+    target = "which has the lowest water level" if lowest else target
     text = (
         f"{name}: it pumps from {part.from_} to {part.to}, {target}; check its direction (`from` is the suction side)"
     )
@@ -242,10 +239,8 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
             elif draft.case.law.linear:
                 valve["drop"] = drop
         if valve["open"] == 0.0 and k not in start.shut:
-            moving.append(
-                f"pump {name}: its flow at the start is not on its characteristic at the relative speed "
-                f"{valve['drive']:.4g}"
-            )
+            text = f"pump {name}: its flow at the start is not on its characteristic at the relative speed "
+            moving.append(f"{text}{valve['drive']:.4g}")
         draft.warnings += [
             *reversed_pump(start, name, part, valve), *unusual_flow(draft, name, part),
             *estimated_inertia(draft, name, part), *rated_point_notes(draft, name, part),

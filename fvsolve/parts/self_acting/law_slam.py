@@ -10,11 +10,8 @@ from fvsolve.kernels.restrictions import head_drop
 from fvsolve.parts.self_acting.law_check_valve import PRESSURE_MARGIN, joins_junction
 
 REVERSED, SHUT, OPEN, BEYOND_CURVE = 0, 1, 2, 3  # flags; the last: the deceleration exceeds the curve
-CRACKING_PRESSURE, UNIT_FLOW, LAST_RATE = (
-    0,
-    1,
-    2,
-)  # numbers: cracking pressure [Pa], mass flow at 1 m/s [kg/s], last rate of the curve [m/s2]
+# Numbers: cracking pressure [Pa], mass flow at 1 m/s [kg/s], last rate of the curve [m/s2]
+CRACKING_PRESSURE, UNIT_FLOW, LAST_RATE = 0, 1, 2
 UNKNOWN = -1
 FORWARD_VELOCITY = 1e-6  # velocity from which a reversed flow counts as forward again [m/s]
 SMALLEST = 1e-300

@@ -111,11 +111,8 @@ class LiftedValve(Device, kind=""):
         start.draft.tables.floats[row["data"] + 2] = start.valve_law(k)[1]
         self.add_start_notices(start, name, x)
         target = self.lifting_pressure(start, k) / part.overpressure
-        return (
-            [f"{name}: the valve is shut at the start, although the pressure there would open the valve"]
-            if start.rest and target > SMALL_LIFT
-            else []
-        )
+        text = f"{name}: the valve is shut at the start, although the pressure there would open the valve"
+        return [text] if start.rest and target > SMALL_LIFT else []
 
     def store_lift(self, start, row, x: float, target: float) -> None:
         """Store the lift x and the target lift at the start in the parameters of the disc.
@@ -192,13 +189,9 @@ class CheckValveRows(Device, kind="check-valve"):
     def of(self, part) -> Device:
         if part.deceleration is not None:
             return SlamCurveRows()
-        return (
-            self
-            if not part.has_dynamics
-            else LaggedCheckDisc()
-            if part.natural_frequency is None
-            else InertialCheckDisc()
-        )
+        if not part.has_dynamics:
+            return self
+        return LaggedCheckDisc() if part.natural_frequency is None else InertialCheckDisc()
 
     def numbers(self, draft, name, part) -> list[float]:
         return [part.cracking_pressure]

@@ -136,14 +136,10 @@ def chart_at(floats, at, opening, omega, flow):
     share_1, share_2 = (n * d - u * c) / turn, (a * u - b * n) / turn
     roots = first + 3 * rays + i
     torques = roots + curves * rays
-    root_1, root_2 = (
-        interpolate_curves(floats, roots, rays, k, share),
-        interpolate_curves(floats, roots + 1, rays, k, share),
-    )
-    t_1, t_2 = (
-        interpolate_curves(floats, torques, rays, k, share),
-        interpolate_curves(floats, torques + 1, rays, k, share),
-    )
+    root_1 = interpolate_curves(floats, roots, rays, k, share)
+    root_2 = interpolate_curves(floats, roots + 1, rays, k, share)
+    t_1 = interpolate_curves(floats, torques, rays, k, share)
+    t_2 = interpolate_curves(floats, torques + 1, rays, k, share)
     root = share_1 * root_1 + share_2 * root_2
     by_n, by_u = (root_1 * d - root_2 * b) / turn, (root_2 * a - root_1 * c) / turn
     torque, torque_slope = 0.0, 0.0
@@ -188,11 +184,9 @@ def is_outside(floats, at, opening, omega, flow):
     k, share, _ = opening_share(floats, at, opening)
     flow_scale = floats[at + FLOW] * capacity(floats, at, opening)
     angle, own = operating_angle(omega / floats[at + SPEED], flow / flow_scale), at + OWN + 2 * curves
-    return (
-        not interpolate_curves(floats, own, 1, k, share)
-        <= angle
-        <= interpolate_curves(floats, own + curves, 1, k, share)
-    )
+    first = interpolate_curves(floats, own, 1, k, share)
+    last = interpolate_curves(floats, own + curves, 1, k, share)
+    return not first <= angle <= last
 
 
 @njit

@@ -124,13 +124,8 @@ def pump_nodes(angle: float, root: float, torque: float, torque_scale: float, di
     nodes = []
     for tilt in np.linspace(first_tilt, STANDING, count + 1)[1:]:
         ratio = min(math.tan(tilt), STEEPEST)
-        nodes.append(
-            (
-                tilt,
-                root_on_line(first_tilt, root, tilt),
-                direction * (PUMP_RATIO * torque_scale * ratio + max(excess, 0.0)),
-            )
-        )
+        shaft_torque = direction * (PUMP_RATIO * torque_scale * ratio + max(excess, 0.0))
+        nodes.append((tilt, root_on_line(first_tilt, root, tilt), shaft_torque))
     return [(-tilt if direction < 0.0 else BACKWARD + tilt, value, shaft_torque) for tilt, value, shaft_torque in nodes]
 
 
