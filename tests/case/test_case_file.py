@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from case.test_faults import SCENE as PLAIN
 from pytest import approx
 from reference import folders
 from reference.refusals import refused
@@ -22,61 +23,22 @@ from fvsolve.errors import CaseError
 from fvsolve.parts import KINDS, Friction, Wall
 
 # Example of the design, with a user fluid.
-SCENE = """
-schema = 1
-title = "A valve shuts at the end of a 914 m main"
-
-[fluid]
-name = "user"
-density = 1000
-bulk_modulus = "2.2 GPa"
-viscosity = "1 cSt"
-vapor_pressure = "2339 Pa"
-
-[nodes.lake]
-type = "reservoir"
-head = "45.72 m"
-
-[nodes.gate]
-type = "junction"
-
-[nodes.outfall]
-type = "reservoir"
-pressure = "0 barg"
-
-[links.main]
-type = "pipe"
-from = "lake"
-to = "gate"
-length = "914.4 m"
-diameter = "304.8 mm"
-wave_speed = "1219.2 m/s"
-friction = { model = "steady", roughness = "0.26 mm" }
-cells = 200
-
-[links.valve]
-type = "valve"
-from = "gate"
-to = "outfall"
-area = "0.001768 m2"
-discharge_coefficient = 0.6
-opening = { start = "1 s", duration = "0.05 s", value = [1.0, 0.0] }
-
-[numerics]
-end = "10 s"
-scheme = "muscl"
-limiter = "van-leer"
-method = "ssp-rk3"
-courant = 0.9
-
-[output]
+SCENE = "\n" + PLAIN
+for plain, full in {
+    'title = "A valve shuts"': 'title = "A valve shuts at the end of a 914 m main"',
+    "density = 998": "density = 1000",
+    "viscosity = 1e-3": 'viscosity = "1 cSt"',
+    "vapor_pressure = 2339": 'vapor_pressure = "2339 Pa"',
+    "courant = 0.9": 'scheme = "muscl"\nlimiter = "van-leer"\nmethod = "ssp-rk3"\ncourant = 0.9',
+    'probes = ["gate.pressure"]': """\
 every = "10 ms"
 fields = 50
 probes = ["gate.pressure", "gate.head", "valve.flow", "main.pressure@0.5"]
 
 [expect]
-"max(gate.pressure)" = { value = "1.0751 MPa", rtol = 1e-2 }
-"""
+"max(gate.pressure)" = { value = "1.0751 MPa", rtol = 1e-2 }""",
+}.items():
+    SCENE = SCENE.replace(plain, full)
 
 
 @pytest.fixture
