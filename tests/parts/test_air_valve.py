@@ -249,12 +249,10 @@ def by_stages(case, speed: float | None = None):
     result = fvsolve.run(case)
     t, times = np.asarray(result.t), {e["what"]: e["time"] for e in reversed(result.summary["events"])}
     rows = (t >= 0.6) & (t < times.get("shuts", np.inf) - 0.02)
-    y, at, off, parted = (
-        [result[name][rows][0] for name in ("c.flow", "v.air_volume", "v.air_mass")],
-        t[rows][0],
-        [],
-        0.0,
-    )
+    y = [result[name][rows][0] for name in ("c.flow", "v.air_volume", "v.air_mass")]
+    at = t[rows][0]
+    off = []
+    parted = 0.0
     for wide, end in ((0.02, t[rows][-1]), (0.008, t[rows][-1])):
         out = math.hypot(wide, 0.003)
 

@@ -31,10 +31,8 @@ def line(cells: int = 50, kind: str = "smooth", end: float = 4.0, creep=ELEMENTS
             "wall": wall, "friction": {"model": "none"}}  # fmt: skip
     numerics = {"scheme": "upwind5", "method": "rk4", "courant": 0.8} | numerics
     numerics = {key: value for key, value in numerics.items() if value is not None}
-    nodes, probes = (
-        {"lake": reservoir(1e6, elevation=0.0), "gate": junction(demand, elevation=0.0)},
-        ["gate.pressure", "main.flow@0.3"],
-    )
+    nodes = {"lake": reservoir(1e6, elevation=0.0), "gate": junction(demand, elevation=0.0)}
+    probes = ["gate.pressure", "main.flow@0.3"]
     return scene(nodes, {"main": pipe}, end, numerics, probes, 0.02)
 
 

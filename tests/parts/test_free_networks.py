@@ -318,10 +318,8 @@ def momenta(model, t, y):
     line(body["mass"], body["centre"], body["centre"])
     found[3:] += turn @ body["inertia"].reshape(3, 3) @ turn.T @ spin
     for i, node in enumerate(tables.nodes):
-        r, mass = (
-            tables.moving_segments[node["moving_segment"]]["start"],
-            node["mass"] + (y[node["y"]] if node["y"] >= 0 else 0.0),
-        )
+        r = tables.moving_segments[node["moving_segment"]]["start"]
+        mass = node["mass"] + (y[node["y"]] if node["y"] >= 0 else 0.0)
         levels[i] = np.array([0, 0, mass / (node["density"] * node["area"]) if node["kind"] == rec.TANK else 0.0])
         line(mass, r, r + levels[i])
     for pipe in tables.pipes:
