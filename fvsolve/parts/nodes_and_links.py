@@ -16,23 +16,42 @@ from fvsolve.units import show
 USUAL_ELEVATIONS = UsualRange(-12e3, 9e3, "boreholes to mountains")
 
 
-class Node(Table):
+class Part(Table):
+    """Base of nodes and links: type in the case file, and scalars.
+
+    kinds : type in the case file -> class; noun : word for messages; own_scalars : scalars that the part states, none
+    if empty: "start" or "inflow" of a node, "along" the length of a link
+    """
+
+    noun: ClassVar[str] = ""
+    kind: ClassVar[str] = ""
+    kinds: ClassVar[dict[str, type[Part]]] = {}
+    no_scalars: ClassVar[str] = ""  # reason why a case with scalars cannot have this part yet
+    own_scalars: ClassVar[str] = ""
+
+    def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
+        super().__init_subclass__(**rest)
+        if kind:
+            if kind in cls.kinds:
+                raise FvsolveError(f"a {cls.noun} of type {show(kind)} exists already; expected another name")
+            cls.kind = kind
+            cls.kinds[kind] = cls
+
+
+class Node(Part):
     """Place with a single potential: pressure at its elevation (hydraulic), or velocity (translational or spatial).
 
     Ports: those of the links that name it. Stored and dissipated energy: none, unless its type states otherwise.
     """
 
-    kind: ClassVar[str] = ""
+    noun: ClassVar[str] = "node"
     kinds: ClassVar[dict[str, type[Node]]] = {}
     quantities: ClassVar[dict[str, str]] = {
         "pressure": "pressure", "gauge_pressure": "gauge_pressure", "head": "head"
     }  # fmt: skip
     fixes_pressure: ClassVar[bool] = False
-    no_scalars: ClassVar[str] = ""  # reason why a case with scalars cannot have this part yet
-    own_scalars: ClassVar[str] = ""  # scalars that it states: "start" | "inflow"; none if empty
-    driven: ClassVar[tuple[str, float] | None] = (
-        None  # key of a prescribed flow, and its sign as flow into links; 0 for a prescribed pressure
-    )
+    # key of a prescribed flow, and its sign as flow into links; 0 for a prescribed pressure
+    driven: ClassVar[tuple[str, float] | None] = None
     domain: ClassVar[str] = "hydraulic"  # | "translational" | "spatial"
 
     elevation: Annotated[float | None, Quantity(
@@ -68,14 +87,6 @@ class Node(Table):
         """
         return {name: self}, {}
 
-    def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
-        super().__init_subclass__(**rest)
-        if kind:
-            if kind in Node.kinds:
-                raise FvsolveError(f"a node of type {show(kind)} exists already; expected another name")
-            cls.kind = kind
-            Node.kinds[kind] = cls
-
 
 class PlaceOnBody(Node):
     """Node that a body may carry."""
@@ -101,22 +112,20 @@ class PlaceOnBody(Node):
         return self.at or (0.0, 0.0, 0.0)
 
 
-class Link(Table):
+class Link(Part):
     """Part with ports that join places; flow is positive into the part at each port.
 
     The sum of potential times flow over the ports is the power [W] into the part. Potential and flow are pressure and
     volume flow (hydraulic domain), velocity and force (translational), or angular velocity and torque (rotational).
     """
 
-    kind: ClassVar[str] = ""
+    noun: ClassVar[str] = "link"
     kinds: ClassVar[dict[str, type[Link]]] = {}
     quantities: ClassVar[dict[str, str]] = {"flow": "flow"}
     on_request: ClassVar[tuple[str, ...]] = ()  # quantities that are recorded only by explicit probes
     along: ClassVar[dict[str, str]] = {}  # quantities that also exist at a fraction of the length
     joins: ClassVar[dict[str, str]] = {}  # port -> required domain of its place
     may_lack: ClassVar[tuple[str, ...]] = ()  # ports that may join nothing
-    no_scalars: ClassVar[str] = ""  # reason why a case with scalars cannot have this part yet
-    own_scalars: ClassVar[str] = ""  # scalars that it states: "along" its length; none if empty
     owns: ClassVar[dict[str, str]] = {}  # own place, `LINK.PLACE` for other parts -> domain
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Link]]:
@@ -125,14 +134,6 @@ class Link(Table):
         They contain the link itself, and its own places `NAME.PLACE`.
         """
         return {}, {name: self}
-
-    def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
-        super().__init_subclass__(**rest)
-        if kind:
-            if kind in Link.kinds:
-                raise FvsolveError(f"a link of type {show(kind)} exists already; expected another name")
-            cls.kind = kind
-            Link.kinds[kind] = cls
 
 
 class TwoPort(Link):
